@@ -1,0 +1,88 @@
+"""What an engine can do, and what a world needs. Negotiation fails closed: a mismatch is an error before the build."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import NamedTuple
+
+from anysim.errors import CapabilityError
+
+
+class Capability(StrEnum):
+    """One thing an engine may be able to do. The value is what messages and tables print."""
+
+    RIGID_BODIES = "rigid bodies"
+    ARTICULATIONS = "articulations"
+    CONTACTS = "contacts"
+    TERRAIN_PLANE = "terrain: plane"
+    TERRAIN_HEIGHTFIELD = "terrain: heightfield"
+    SHAPE_MESH = "shape: mesh (convex)"
+    MIMIC_JOINTS = "mimic joints"
+    JOINT_FRICTION = "joint friction"
+    ARMATURE = "armature"
+    JOINT_LIMITS = "joint limits"
+    EFFORT_LIMITS = "effort limits"
+    GRAVITY_COMPENSATION = "gravity compensation"
+    RESTITUTION = "restitution"
+    TORSIONAL_FRICTION = "torsional friction"
+    CONTROL_POSITION = "control: position"
+    CONTROL_VELOCITY = "control: velocity"
+    CONTROL_EFFORT = "control: effort"
+    WRENCHES = "external wrenches"
+    CONTACT_SENSORS = "contact sensors"
+    CONTACT_POINTS = "contact points"
+    RAYCAST = "raycast"
+    RENDER_RGB = "render: rgb"
+    RENDER_DEPTH = "render: depth"
+    RENDER_SEGMENTATION = "render: segmentation"
+    SNAPSHOT_STATE = "snapshot: state"
+    SNAPSHOT_TRAJECTORY = "snapshot: trajectory"
+    PARAMETERS_PER_ENV = "parameters per env"
+    LIVE_EDIT_NATIVE = "live add and remove without a rebuild"
+    DYNAMICS = "dynamics"  # bodies fall; the null engine moves nothing by itself
+
+
+class Support(NamedTuple):
+    """How well: exact, or approximate with the error that was measured."""
+
+    exact: bool = True
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Capabilities:
+    """What an engine declares. A capability that is not in `supported` is absent."""
+
+    supported: Mapping[Capability, Support] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, *exact: Capability, approximate: Mapping[Capability, str] | None = None) -> "Capabilities":
+        """`Capabilities.of(A, B, approximate={C: "2 mm sink at 40 N"})`."""
+        table = {c: Support() for c in exact} | {c: Support(False, note) for c, note in (approximate or {}).items()}
+        return cls(dict(sorted(table.items(), key=lambda item: list(Capability).index(item[0]))))
+
+    def __contains__(self, capability: object) -> bool:
+        return capability in self.supported
+
+    def __iter__(self) -> Iterator[Capability]:
+        return iter(self.supported)
+
+
+@dataclass(frozen=True, slots=True)
+class Need:
+    """A world needs `capability` because of `why`: `joint 'wrist' is a mimic (robot 'arm')`."""
+
+    capability: Capability
+    why: str
+
+
+def check(engine: str, capabilities: Capabilities, needs: Sequence[Need], source: str = "this world") -> list[Need]:
+    """Raise one CapabilityError that lists every absent need; return the needs met only approximately."""
+    absent = [need for need in needs if need.capability not in capabilities]
+    if absent:
+        reasons = "; ".join(f"{need.why} ({need.capability})" for need in absent)
+        raise CapabilityError(
+            f"{engine} cannot run {source}: {reasons}. "
+            f"Choose another engine (`anysim list engines` shows what each can do) or change the lines named."
+        )
+    return [need for need in needs if not capabilities.supported[need.capability].exact]

@@ -1,0 +1,178 @@
+"""Rotations and poses over arrays of any leading shape. Quaternions are xyzw; poses are `[position, quaternion]`.
+
+Everything is written component by component: numpy rounds elementwise operations one by one, so a row's result is the
+same bits whatever the batch around it (a matrix product through BLAS or einsum would not promise that).
+"""
+
+import numpy as np
+
+from anysim.conventions import Array
+
+
+def multiply(a: Array, b: Array) -> Array:
+    """Quaternion product a*b: the rotation b first, then a. Shapes (..., 4)."""
+    ax, ay, az, aw = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
+    bx, by, bz, bw = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
+    return np.stack(
+        [
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+            aw * bw - ax * bx - ay * by - az * bz,
+        ],
+        axis=-1,
+    )
+
+
+def conjugate(q: Array) -> Array:
+    """The inverse of a unit quaternion. Shape (..., 4)."""
+    return np.stack([-q[..., 0], -q[..., 1], -q[..., 2], q[..., 3]], axis=-1)
+
+
+def normalize(q: Array) -> Array:
+    """Unit length. Shape (..., 4)."""
+    return q / norm(q)[..., None]
+
+
+def norm(v: Array) -> Array:
+    """Euclidean length along the last axis, summed in index order."""
+    total = v[..., 0] * v[..., 0]
+    for i in range(1, v.shape[-1]):
+        total = total + v[..., i] * v[..., i]
+    return np.sqrt(total)
+
+
+def dot(a: Array, b: Array) -> Array:
+    """Inner product along the last axis, summed in index order."""
+    total = a[..., 0] * b[..., 0]
+    for i in range(1, a.shape[-1]):
+        total = total + a[..., i] * b[..., i]
+    return total
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Cross product along the last axis. Shape (..., 3)."""
+    return np.stack(
+        [
+            a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1],
+            a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2],
+            a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0],
+        ],
+        axis=-1,
+    )
+
+
+def rotate(q: Array, v: Array) -> Array:
+    """Rotate vectors v (..., 3) by unit quaternions q (..., 4)."""
+    u, w = q[..., :3], q[..., 3:4]
+    t = 2.0 * cross(u, v)
+    return v + w * t + cross(u, t)
+
+
+def rotate_inverse(q: Array, v: Array) -> Array:
+    """Rotate vectors v (..., 3) by the inverses of unit quaternions q (..., 4)."""
+    return rotate(conjugate(q), v)
+
+
+def compose(a: Array, b: Array) -> Array:
+    """The pose b expressed in the frame a, seen from a's parent: a∘b. Shapes (..., 7)."""
+    position = a[..., :3] + rotate(a[..., 3:], b[..., :3])
+    return np.concatenate([position, multiply(a[..., 3:], b[..., 3:])], axis=-1)
+
+
+def inverse(pose: Array) -> Array:
+    """The inverse pose. Shape (..., 7)."""
+    q = conjugate(pose[..., 3:])
+    return np.concatenate([-rotate(q, pose[..., :3]), q], axis=-1)
+
+
+def pose(position: Array | tuple[float, ...], quaternion: Array | tuple[float, ...]) -> Array:
+    """One pose (7,) from its parts."""
+    return np.concatenate([np.asarray(position, dtype=float), np.asarray(quaternion, dtype=float)], axis=-1)
+
+
+def from_axis_angle(axis: Array, angle: Array) -> Array:
+    """Quaternion (..., 4) of a rotation by `angle` (...) about the unit vector `axis` (..., 3)."""
+    half = 0.5 * np.asarray(angle, dtype=float)
+    return np.concatenate([axis * np.sin(half)[..., None], np.cos(half)[..., None]], axis=-1)
+
+
+def from_roll_pitch_yaw(rpy: Array) -> Array:
+    """Quaternion (..., 4) of fixed-axis roll, then pitch, then yaw (..., 3), as in URDF."""
+    rpy = np.asarray(rpy, dtype=float)
+    h = 0.5 * rpy
+    sr, sp, sy = np.sin(h[..., 0]), np.sin(h[..., 1]), np.sin(h[..., 2])
+    cr, cp, cy = np.cos(h[..., 0]), np.cos(h[..., 1]), np.cos(h[..., 2])
+    return np.stack(
+        [
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+            cr * cp * cy + sr * sp * sy,
+        ],
+        axis=-1,
+    )
+
+
+def to_matrix(q: Array) -> Array:
+    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
+    x, y, z, w = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
+    return np.stack(
+        [
+            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], axis=-1),
+            np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], axis=-1),
+            np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], axis=-1),
+        ],
+        axis=-2,
+    )
+
+
+def from_matrix(matrix: Array) -> Array:
+    """Unit quaternion (4,) of one rotation matrix (3, 3), with w >= 0 (Shepperd's method)."""
+    m = np.asarray(matrix, dtype=float)
+    trace = m[0, 0] + m[1, 1] + m[2, 2]
+    choices = [m[0, 0], m[1, 1], m[2, 2], trace]
+    i = int(np.argmax(choices))
+    q = np.empty(4)
+    if i == 3:
+        q[:] = [m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], 1 + trace]
+    else:
+        j, k = (i + 1) % 3, (i + 2) % 3
+        q[i] = 1 - trace + 2 * m[i, i]
+        q[j] = m[j, i] + m[i, j]
+        q[k] = m[k, i] + m[i, k]
+        q[3] = m[k, j] - m[j, k]
+    q /= np.sqrt(q @ q)
+    return -q if q[3] < 0 else q
+
+
+def rotation_vector(q: Array) -> Array:
+    """Axis times angle (..., 3) of unit quaternions (..., 4), angle in [0, pi]."""
+    q = np.where(q[..., 3:] < 0, -q, q)
+    sine = norm(q[..., :3])
+    angle = 2.0 * np.arctan2(sine, q[..., 3])
+    scale = np.where(sine < 1e-12, 2.0, angle / np.where(sine < 1e-12, 1.0, sine))
+    return q[..., :3] * scale[..., None]
+
+
+def angle_between(a: Array, b: Array) -> Array:
+    """The angle [rad] (...) of the rotation from a to b (..., 4)."""
+    return norm(rotation_vector(multiply(conjugate(a), b)))
+
+
+def look_at(eye: Array, target: Array) -> Array:
+    """Optical-frame quaternions (..., 4) (x right, y down, z forward) of cameras at `eye` that look at `target` (..., 3).
+
+    The image's up is the world's z; a camera that looks straight up or down has the world's y as its up.
+    """
+    forward = target - eye
+    forward = forward / norm(forward)[..., None]
+    up = np.broadcast_to(np.array([0.0, 0.0, 1.0]), forward.shape)
+    right = cross(forward, up)
+    size = norm(right)[..., None]
+    steep = size < 1e-6
+    right = np.where(steep, np.array([1.0, 0.0, 0.0]), right / np.where(steep, 1.0, size))
+    down = cross(forward, right)
+    matrix = np.stack([right, down, forward], axis=-1)
+    flat = matrix.reshape(-1, 3, 3)
+    return np.array([from_matrix(m) for m in flat]).reshape(*forward.shape[:-1], 4)

@@ -1,0 +1,376 @@
+"""The neutral model: what every engine builds from. Frozen, in SI units, names turned into indices.
+
+A `World` lists bodies depth first (children in source order). A body is free (it floats), static (a root welded to
+the world) or a link (moved by one joint against its parent). Links that a source joins rigidly are lumped into one
+body; their frames survive as sites. All joints here have one degree of freedom; a free body's six are its pose.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from functools import cached_property
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+
+from anysim.conventions import IDENTITY_QUATERNION, WORLD, Array
+
+Vec3 = tuple[float, float, float]
+Quat = tuple[float, float, float, float]
+ORIGIN: Vec3 = (0.0, 0.0, 0.0)
+
+
+class BodyKind(StrEnum):
+    FREE = "free"
+    STATIC = "static"
+    LINK = "link"
+
+
+class JointType(StrEnum):
+    REVOLUTE = "revolute"  # also continuous ones: limits are infinite
+    PRISMATIC = "prismatic"
+
+
+class ControlMode(StrEnum):
+    POSITION = "position"  # u = kp (q* - q) + kd (qd* - qd) + ff
+    VELOCITY = "velocity"  # u = kd (qd* - qd) + ff
+    EFFORT = "effort"  # u = ff
+
+
+class Inertial(NamedTuple):
+    """Mass [kg], centre of mass [m] in the body frame, and the inertia about it in body axes.
+
+    `inertia` is (ixx, iyy, izz, ixy, ixz, iyz) [kg m^2].
+    """
+
+    mass: float
+    com: Vec3 = ORIGIN
+    inertia: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A rigid body. `position`, `quaternion`: its frame in the parent's (or the world's) at zero joint position."""
+
+    name: str
+    kind: BodyKind
+    parent: int = WORLD
+    position: Vec3 = ORIGIN
+    quaternion: Quat = IDENTITY_QUATERNION
+    inertial: Inertial = Inertial(0.0)
+    gravity_compensation: bool = False
+
+
+class Mimic(NamedTuple):
+    """This joint follows another: position = multiplier * leader + offset."""
+
+    joint: int
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """One degree of freedom that moves `body` against its parent, about or along `axis` through `anchor`.
+
+    Units are [rad] or [m]; `axis` (unit) and `anchor` are in the body's frame; `friction` is dry friction [N m] or [N],
+    `armature` the rotor's inertia at the joint. `initial` is the position after a reset.
+    """
+
+    name: str
+    body: int
+    type: JointType
+    axis: Vec3
+    anchor: Vec3 = ORIGIN
+    lower: float = -inf
+    upper: float = inf
+    velocity_limit: float = inf
+    effort_limit: float = inf
+    damping: float = 0.0
+    friction: float = 0.0
+    armature: float = 0.0
+    initial: float = 0.0
+    mimic: Mimic | None = None
+    limit_softness: float = 0.0  # time constant [s] of the limit and mimic constraints; 0 leaves it to the engine
+
+
+@dataclass(frozen=True, slots=True)
+class Plane:
+    """An infinite ground plane, normal +z; `visual_size` is the half extent that is drawn."""
+
+    visual_size: float = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    half_size: Vec3
+
+
+@dataclass(frozen=True, slots=True)
+class Sphere:
+    radius: float
+
+
+@dataclass(frozen=True, slots=True)
+class Capsule:
+    """Along z; `half_length` is half the straight part."""
+
+    radius: float
+    half_length: float
+
+
+@dataclass(frozen=True, slots=True)
+class Cylinder:
+    """Along z."""
+
+    radius: float
+    half_length: float
+
+
+@dataclass(frozen=True, slots=True)
+class MeshShape:
+    """A mesh of the world by name; as a collision shape it is its convex hull."""
+
+    mesh: str
+
+
+@dataclass(frozen=True, slots=True)
+class HeightFieldShape:
+    """A height field of the world by name, centred on its frame."""
+
+    heightfield: str
+
+
+Shape = Plane | Box | Sphere | Capsule | Cylinder | MeshShape | HeightFieldShape
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """How a geom touches. The pair rule is in `anysim.conventions`.
+
+    `softness` is the time constant [s] with which penetration is pushed out (0: the engine's default); `impedance` the
+    range (near 0 soft, near 1 rigid) of the constraint as penetration grows, as in MuJoCo's solimp.
+    """
+
+    friction: float = 0.8
+    torsional_friction: float = 0.005
+    rolling_friction: float = 0.0001
+    restitution: float = 0.0
+    softness: float = 0.0
+    impedance: tuple[float, float] = (0.9, 0.95)
+    priority: int = 0
+    torsional: bool = False  # torsional friction takes part in contacts of this geom
+
+
+@dataclass(frozen=True, slots=True)
+class Geom:
+    """A shape fixed to a body (or to the world: body -1)."""
+
+    name: str
+    body: int
+    shape: Shape
+    position: Vec3 = ORIGIN
+    quaternion: Quat = IDENTITY_QUATERNION
+    color: tuple[float, float, float, float] = (0.7, 0.7, 0.7, 1.0)
+    surface: Surface = Surface()
+    collides: bool = True
+    visible: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """A named frame fixed to a body (or to the world: body -1): a tool, a lumped link, a hole."""
+
+    name: str
+    body: int
+    position: Vec3 = ORIGIN
+    quaternion: Quat = IDENTITY_QUATERNION
+
+
+@dataclass(frozen=True, slots=True)
+class Actuator:
+    """The drive of one joint; the law is u = kp (q* - q) + kd (qd* - qd) + ff, clipped to +-effort_limit."""
+
+    name: str
+    joint: int
+    mode: ControlMode
+    kp: float
+    kd: float
+    effort_limit: float = inf
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """A pinhole camera, optical frame (x right, y down, z forward), fixed to a body or (-1) to the world."""
+
+    name: str
+    body: int
+    position: Vec3
+    quaternion: Quat
+    fov: float  # vertical [degrees]
+    width: int
+    height: int
+    channels: tuple[str, ...] = ("rgb",)
+    look_at: str | None = None  # entity looked at from reset on
+    near: float = 0.01
+    far: float = 20.0
+
+
+@dataclass(frozen=True, slots=True)
+class Light:
+    name: str
+    direction: Vec3
+    position: Vec3 | None = None
+    color: Vec3 = (1.0, 1.0, 1.0)
+    intensity: float = 0.8
+
+
+@dataclass(frozen=True, slots=True)
+class ContactSensor:
+    """Net contact force [N] on the bodies, world axes; `against` restricts it to contacts with those bodies.
+
+    A body index of -1 in `against` stands for geoms fixed to the world.
+    """
+
+    name: str
+    bodies: tuple[int, ...]
+    against: tuple[int, ...] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Mesh:
+    """Triangles in the owner's frame: vertices (V, 3) [m] float64, faces (F, 3) int32; `hash` of source and processing."""
+
+    name: str
+    vertices: Array = field(repr=False, compare=False)
+    faces: Array = field(repr=False, compare=False)
+    hash: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class HeightField:
+    """Heights (rows, cols) [m], row 0 at the lowest y, over `size` = full extent (x, y) [m]."""
+
+    name: str
+    heights: Array = field(repr=False, compare=False)
+    size: tuple[float, float] = (10.0, 10.0)
+
+
+class EntityKind(StrEnum):
+    ROBOT = "robot"
+    OBJECT = "object"
+
+
+@dataclass(frozen=True, slots=True)
+class Entity:
+    """A logical object: a contiguous slice of bodies and joints. Bodies [body_start, body_stop), joints alike.
+
+    Its segmentation id is its position in `World.entities` plus one (0 is background and ground).
+    """
+
+    name: str
+    kind: EntityKind
+    body_start: int
+    body_stop: int
+    joint_start: int
+    joint_stop: int
+    label: str = ""
+    source: str = ""
+    license: str = ""
+
+    @property
+    def root(self) -> int:
+        """The index of the root body."""
+        return self.body_start
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """Joints of a robot that are commanded together. `joints`, `actuators` index the world; `opened`, `closed` are eef targets."""
+
+    name: str
+    joints: tuple[int, ...]
+    actuators: tuple[int, ...]
+    opened: tuple[float, ...] | None = None
+    closed: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """What a robot exposes beyond its entity: channels, and tools (name: site index)."""
+
+    name: str
+    model: str
+    channels: Mapping[str, Channel]
+    tools: Mapping[str, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Physics:
+    dt: float = 0.002
+    control_dt: float = 0.02
+    gravity: Vec3 = (0.0, 0.0, -9.81)
+    friction_cone: str = "elliptic"
+    impratio: float = 1.0
+
+    @property
+    def substeps(self) -> int:
+        """Physics steps per control step."""
+        return round(self.control_dt / self.dt)
+
+
+@dataclass(frozen=True)
+class World:
+    """Everything an engine needs to build, and nothing about any engine."""
+
+    name: str = "world"
+    physics: Physics = Physics()
+    bodies: tuple[Body, ...] = ()
+    joints: tuple[Joint, ...] = ()
+    geoms: tuple[Geom, ...] = ()
+    sites: tuple[Site, ...] = ()
+    actuators: tuple[Actuator, ...] = ()
+    cameras: tuple[Camera, ...] = ()
+    lights: tuple[Light, ...] = ()
+    contact_sensors: tuple[ContactSensor, ...] = ()
+    entities: tuple[Entity, ...] = ()
+    robots: tuple[Robot, ...] = ()
+    meshes: tuple[Mesh, ...] = ()
+    heightfields: tuple[HeightField, ...] = ()
+    excluded_pairs: frozenset[tuple[int, int]] = frozenset()
+    """Pairs of bodies (low, high) that never collide. Bodies in a parent-child relation never do, and are not listed."""
+
+    @cached_property
+    def hash(self) -> str:
+        """A digest that is equal wherever this world is, on any machine. See `anysim.world.digest`."""
+        from anysim.world.digest import world_hash
+
+        return world_hash(self)
+
+    @cached_property
+    def body_joint(self) -> tuple[int, ...]:
+        """For each body the joint that moves it, or -1."""
+        table = [-1] * len(self.bodies)
+        for index, joint in enumerate(self.joints):
+            table[joint.body] = index
+        return tuple(table)
+
+    @cached_property
+    def body_entity(self) -> tuple[int, ...]:
+        """For each body the entity it belongs to."""
+        table = [-1] * len(self.bodies)
+        for index, entity in enumerate(self.entities):
+            table[entity.body_start : entity.body_stop] = [index] * (entity.body_stop - entity.body_start)
+        return tuple(table)
+
+    @cached_property
+    def initial_body_pose(self) -> Array:
+        """Poses (B, 7) of all bodies right after a reset, in the world frame."""
+        from anysim.world.kinematics import forward_kinematics
+
+        roots = np.array([[*b.position, *b.quaternion] for b in self.bodies]).reshape(-1, 7)
+        joints = np.array([j.initial for j in self.joints])
+        poses = forward_kinematics(self, roots[None], joints[None])[0]
+        poses.setflags(write=False)
+        return poses

@@ -1,0 +1,45 @@
+"""Which engine runs the world, how, and with which time steps."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from anysim_schemas.base import Positive, Spec, Vec3
+from anysim_schemas.plugin import PluginSlot
+
+
+class EngineSpec(Spec):
+    """An installed engine by name, with the options that only it understands."""
+
+    name: Annotated[str, Field(description="an installed engine, as in `anysim list engines`")] = "mujoco"
+    options: Annotated[dict[str, Any], PluginSlot("engine", "name")] = Field(
+        default_factory=dict, description="options owned by the engine"
+    )
+
+
+class PhysicsSpec(Spec):
+    """Time steps and gravity. `control_dt` must be a whole multiple of `dt`."""
+
+    dt: Positive = Field(default=0.002, description="physics time step [s]")
+    control_dt: Positive = Field(default=0.02, description="time between two actions [s]")
+    gravity: Vec3 = Field(default=(0.0, 0.0, -9.81), description="gravity [m/s^2], world axes, z up")
+    friction_cone: Literal["elliptic", "pyramidal"] = Field(
+        default="elliptic", description="shape of the friction cone where the engine offers a choice"
+    )
+    impratio: Positive = Field(
+        default=1.0, description="ratio of frictional to normal contact impedance; above 1 reduces creep of grasped objects"
+    )
+
+    @model_validator(mode="after")
+    def _whole_substeps(self) -> "PhysicsSpec":
+        ratio = self.control_dt / self.dt
+        if ratio < 1 or abs(ratio - round(ratio)) > 1e-6:
+            raise ValueError(
+                f"control_dt ({self.control_dt} s) must be a whole multiple of dt ({self.dt} s), their ratio is {ratio:g}"
+            )
+        return self
+
+    @property
+    def substeps(self) -> int:
+        """Physics steps per control step."""
+        return round(self.control_dt / self.dt)

@@ -1,0 +1,26 @@
+"""Slots in a spec whose content belongs to a plugin: engine options, term parameters, controller parameters.
+
+The spec only marks the slot. Who loads a file passes a resolver that turns `(kind, name)` into the pydantic model the
+plugin declares; the loader then validates the slot with it and reports its errors with the rest, by file and line.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from pydantic import BaseModel
+
+
+@dataclass(frozen=True)
+class PluginSlot:
+    """Marks a `dict[str, Any]` field as owned by the plugin `kind:<value of the sibling field name_field>`."""
+
+    kind: str
+    name_field: str
+
+
+class UnknownPlugin(LookupError):
+    """Raised by a resolver: the message says what was asked for, what exists and how to get it."""
+
+
+OptionsResolver = Callable[[str, str], type[BaseModel] | None]
+"""`resolver(kind, name)` returns the model of the options, None if it takes none, or raises UnknownPlugin."""
