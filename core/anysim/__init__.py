@@ -1,0 +1,39 @@
+"""anysim: one YAML world and one MDP on any physics engine.
+
+Importing this package imports nothing heavy: the names below are loaded when they are first used.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+_LAZY = {
+    "make": "anysim.make",
+    "load": "anysim.make",
+    "compile_world": "anysim.make",
+    "create_simulation": "anysim.engine.factory",
+    "SimEngine": "anysim.engine.base",
+    "World": "anysim.world.model",
+    "TaskEnv": "anysim.task.env",
+}
+__all__ = [*_LAZY, "__version__"]
+
+if TYPE_CHECKING:
+    from anysim.engine.base import SimEngine as SimEngine
+    from anysim.engine.factory import create_simulation as create_simulation
+    from anysim.make import compile_world as compile_world
+    from anysim.make import load as load
+    from anysim.make import make as make
+    from anysim.task.env import TaskEnv as TaskEnv
+    from anysim.world.model import World as World
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LAZY:
+        raise AttributeError(f"module 'anysim' has no attribute '{name}'")
+    return getattr(import_module(_LAZY[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

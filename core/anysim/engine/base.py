@@ -1,0 +1,555 @@
+"""SimEngine: the one interface of all physics engines.
+
+The public methods here check, lock, cache and account; a backend writes the primitives at the end of the class (names
+with a leading underscore). `num_envs` copies of one World are stepped together, each with its own state.
+"""
+
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.engine import checks
+from anysim.engine.cameras import CameraRig, CameraView
+from anysim.engine.capability import Capabilities, Capability, Need, check
+from anysim.engine.commands import CommandBuffer, Control
+from anysim.engine.index import Index
+from anysim.engine.parameters import PARAMETERS, count
+from anysim.engine.state import (
+    Availability, ContactPoints, RayHits, Snapshot, SnapshotLevel, State,
+)  # fmt: skip
+from anysim.errors import CapabilityError, EngineError, listing
+from anysim.world.model import BodyKind, ControlMode, World
+from anysim.engine.needs import needs_of
+
+EnvIds = Sequence[int] | Array | None
+"""Which envs: None for all, else unique indices."""
+
+
+class SimEngine(ABC):
+    """A physics engine that holds `num_envs` sub-environments of one World."""
+
+    name: ClassVar[str]
+    capabilities: ClassVar[Capabilities]
+    parameters: ClassVar[frozenset[str]] = frozenset()
+    """The names of `anysim.engine.parameters` that the engine can change per env."""
+
+    def __init__(self, **options: Any) -> None:
+        """Options are those of `options_model`; a wrong one raises EngineError with what exists."""
+        self.options = checks.validated_options(self.name, self.options_model(), options)
+        self._lock = threading.RLock()
+        self._world: World | None = None
+        self._destroyed = False
+
+    # ------------------------------------------------------------------ what it is
+
+    @classmethod
+    @abstractmethod
+    def availability(cls) -> Availability:
+        """Whether it can run here. Imports nothing heavy and never raises."""
+
+    @classmethod
+    def options_model(cls) -> Any:
+        """The pydantic model of the engine's options, or None if it has none."""
+        return None
+
+    @property
+    def version(self) -> str:
+        """The version of the physics engine, as it stamps snapshots."""
+        return self.availability().version
+
+    @property
+    def world(self) -> World:
+        """The World it runs."""
+        self._require_world()
+        assert self._world is not None
+        return self._world
+
+    # ------------------------------------------------------------------ lifecycle
+
+    def create_world(self, world: World, num_envs: int = 1) -> Self:
+        """Build `num_envs` copies of a World and reset them all.
+
+        Raises:
+            CapabilityError: the world needs what the engine does not have; nothing was built.
+            EngineError: there is a world already, or the engine was destroyed.
+        """
+        with self._lock:
+            if self._destroyed:
+                raise EngineError(f"this {self.name} engine was destroyed; make a new one")
+            if self._world is not None:
+                raise EngineError(f"this {self.name} engine has a world already; destroy() it or make another engine")
+            if num_envs < 1:
+                raise EngineError(f"num_envs must be at least 1, got {num_envs}")
+            self.approximations: list[Need] = check(self.name, self.capabilities, needs_of(world), f"'{world.name}'")
+            self.num_envs = num_envs
+            self._install(world)
+            try:
+                self._build(world, num_envs)
+            except BaseException:
+                self._world = None
+                raise
+            self._reset_rows(self._all)
+            return self
+
+    def _install(self, world: World) -> None:
+        """Everything the base class keeps about a world."""
+        self._world = world
+        self.index = Index(world)
+        self._all = np.arange(self.num_envs)
+        self._ticks = np.zeros(self.num_envs, dtype=np.int64)
+        self._state: State | None = None
+        self._commands = CommandBuffer(world, self.num_envs)
+        self._rig = CameraRig(world, self.num_envs)
+        self._changed: dict[str, None] = {}
+
+    def destroy(self) -> None:
+        """Free the world. May be called any number of times."""
+        with self._lock:
+            if self._world is not None:
+                self._retire_state()
+                self._free()
+                self._world = None
+            self._destroyed = True
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.destroy()
+
+    # ------------------------------------------------------------------ stepping
+
+    def reset(self, env_ids: EnvIds = None) -> None:
+        """Put envs into the World's initial state; commands return to holding it. Parameters stay as they are."""
+        with self._lock:
+            self._require_world()
+            self._reset_rows(self._ids(env_ids))
+
+    def _reset_rows(self, ids: Array) -> None:
+        self._retire_state()
+        self._commands.reset(ids)
+        self._reset(ids)
+        self._ticks[ids] = 0
+
+    def step(self, n_steps: int = 1, env_ids: EnvIds = None) -> None:
+        """Advance by `n_steps` physics steps of `world.physics.dt`; with `env_ids`, only those envs.
+
+        Commands persist; wrenches last for this call. A non-finite env is marked in `State.fault`, the others go on.
+        """
+        with self._lock:
+            self._require_world()
+            if n_steps < 1:
+                raise EngineError(f"n_steps must be at least 1, got {n_steps}")
+            ids = None if env_ids is None else self._ids(env_ids)
+            self._retire_state()
+            commands = self._commands
+            if commands.control_changed:
+                self._apply_control(commands.control)
+                commands.control_changed = False
+            if commands.wrench is not None:
+                self._apply_wrench(commands.wrench)
+            self._step(n_steps, ids)
+            if commands.wrench is not None:
+                commands.wrench = None
+                self._apply_wrench(None)
+            if ids is None:
+                self._ticks += n_steps
+            else:
+                self._ticks[ids] += n_steps
+
+    def get_state(self) -> State:
+        """The state of all envs now: read lazily, cached until the engine moves on."""
+        with self._lock:
+            self._require_world()
+            if self._state is None:
+                self._state = State(self._read_locked, self._ticks * self.world.physics.dt)
+            return self._state
+
+    def _read_locked(self, name: str) -> Array:
+        with self._lock:
+            return self._read(name)
+
+    def _retire_state(self) -> None:
+        if self._state is not None:
+            self._state.retire()
+            self._state = None
+
+    # ------------------------------------------------------------------ writing
+
+    def set_joint_state(
+        self, position: Any = None, velocity: Any = None, env_ids: EnvIds = None, joints: Sequence[int] | None = None
+    ) -> None:
+        """Write joint positions and velocities (E, K); mimic joints follow their leaders. Commands stay."""
+        with self._lock:
+            self._require_world()
+            ids, which = self._ids(env_ids), self._which(joints, len(self.world.joints), "joint")
+            pos = None if position is None else checks.rows("position", position, (len(ids), len(which)))
+            vel = None if velocity is None else checks.rows("velocity", velocity, (len(ids), len(which)))
+            self._retire_state()
+            self._write_joints(ids, *checks.with_followers(self.world, which, pos, vel))
+
+    def set_body_state(
+        self, pose: Any = None, twist: Any = None, env_ids: EnvIds = None, bodies: Sequence[int] | None = None
+    ) -> None:
+        """Write poses (E, K, 7) and twists (E, K, 6) of root bodies: free ones, and poses of static ones.
+
+        `bodies` defaults to all free bodies. Links move by their joints: naming one is an error.
+        """
+        with self._lock:
+            self._require_world()
+            ids = self._ids(env_ids)
+            free = [i for i, b in enumerate(self.world.bodies) if b.kind is BodyKind.FREE]
+            which = np.array(free, dtype=int) if bodies is None else self._which(bodies, len(self.world.bodies), "body")
+            poses = None if pose is None else checks.poses("pose", pose, (len(ids), len(which), 7))
+            twists = None if twist is None else checks.rows("twist", twist, (len(ids), len(which), 6))
+            checks.roots_only(self.world, which, with_twist=twists is not None)
+            self._retire_state()
+            self._write_bodies(ids, which, poses, twists)
+
+    def set_control(
+        self, position: Any = None, velocity: Any = None, effort: Any = None, env_ids: EnvIds = None,
+        actuators: Sequence[int] | None = None,
+    ) -> None:  # fmt: skip
+        """Write drive targets (E, K): position [rad, m], velocity [rad/s, m/s], feed-forward effort [N m, N]."""
+        with self._lock:
+            self._require_world()
+            ids = None if env_ids is None else self._ids(env_ids)
+            which = None if actuators is None else self._which(actuators, len(self.world.actuators), "actuator")
+            self._commands.write(position, velocity, effort, ids, which)
+
+    def set_control_mode(
+        self, mode: ControlMode | str, env_ids: EnvIds = None, actuators: Sequence[int] | None = None
+    ) -> None:
+        """Switch drives between position, velocity and effort control."""
+        with self._lock:
+            self._require_world()
+            needed = {m: Capability(f"control: {m}") for m in ControlMode}[ControlMode(mode)]
+            self._require(needed)
+            which = self._which(actuators, len(self.world.actuators), "actuator")
+            self._commands.set_mode(ControlMode(mode), self._ids(env_ids), which)
+
+    def apply_wrench(self, wrench: Any, bodies: Sequence[int], env_ids: EnvIds = None) -> None:
+        """Forces and torques (E, K, 6) [N, N m], world axes, at the bodies' centres of mass, for the next step() call."""
+        with self._lock:
+            self._require_world()
+            self._require(Capability.WRENCHES)
+            ids, which = self._ids(env_ids), self._which(bodies, len(self.world.bodies), "body")
+            self._commands.add_wrench(checks.rows("wrench", wrench, (len(ids), len(which), 6)), ids, which)
+
+    # ------------------------------------------------------------------ parameters
+
+    def get_parameters(self, name: str, env_ids: EnvIds = None, indices: Sequence[int] | None = None) -> Array:
+        """Values (E, K, ...) of a neutral parameter such as `body.mass`, as the engine has them."""
+        with self._lock:
+            parameter, ids, which = self._parameter(name, env_ids, indices)
+            del parameter
+            return self._get_parameter(name)[np.ix_(ids, which)].copy()
+
+    def set_parameters(
+        self, name: str, values: Any, env_ids: EnvIds = None, indices: Sequence[int] | None = None
+    ) -> None:
+        """Change a neutral parameter per env, values (E, K, ...); what the engine took is read back and compared.
+
+        Raises:
+            CapabilityError: the engine cannot change it.
+            EngineError: a wrong shape, a value out of bounds, or the engine kept another value.
+        """
+        with self._lock:
+            parameter, ids, which = self._parameter(name, env_ids, indices)
+            rows = checks.rows(name, values, (len(ids), len(which), *parameter.shape))
+            if parameter.minimum is not None and rows.size and rows.min() < parameter.minimum:
+                raise EngineError(f"{name} [{parameter.unit}] must be at least {parameter.minimum:g}, got {rows.min():g}")
+            self._retire_state()
+            self._set_parameter(name, rows, ids, which)
+            self._changed[name] = None
+            kept = self._get_parameter(name)[np.ix_(ids, which)]
+            checks.kept(self.name, name, rows, kept)
+            if name in ("actuator.kp", "actuator.kd"):
+                self._commands.control_changed = True
+
+    def _parameter(self, name: str, env_ids: EnvIds, indices: Sequence[int] | None) -> tuple[Any, Array, Array]:
+        self._require_world()
+        parameter = PARAMETERS.get(name)
+        if parameter is None:
+            raise EngineError(f"there is no parameter '{name}' (parameters: {listing(PARAMETERS, 20)})")
+        if name not in self.parameters:
+            raise CapabilityError(f"{self.name} cannot change '{name}' (it can: {listing(sorted(self.parameters), 20)})")
+        return parameter, self._ids(env_ids), self._which(indices, count(parameter, self.world), parameter.target)
+
+    # ------------------------------------------------------------------ snapshots
+
+    def snapshot(self, env_ids: EnvIds = None, level: SnapshotLevel | str = SnapshotLevel.TRAJECTORY) -> Snapshot:
+        """Copy the state of envs, with their commands, camera poses, clocks and changed parameters."""
+        with self._lock:
+            self._require_world()
+            level = SnapshotLevel(level)
+            self._require(Capability(f"snapshot: {level}"))
+            ids = self._ids(env_ids)
+            data: dict[str, Array] = {"ticks": self._ticks[ids]}
+            data |= {f"commands.{k}": v for k, v in self._commands.rows(ids).items()}
+            data |= {"cameras": self._rig.poses[ids]}
+            data |= {f"parameter.{name}": self._get_parameter(name)[ids] for name in self._changed}
+            data |= {f"engine.{k}": v for k, v in self._snapshot(ids, level).items()}
+            return Snapshot(self.name, self.version, self.world.hash, level, {k: np.array(v) for k, v in data.items()})
+
+    def restore(self, snapshot: Snapshot, env_ids: EnvIds = None) -> None:
+        """Put snapshot rows into envs (as many as it holds, in order).
+
+        Raises:
+            SnapshotError: of another engine, engine version or world, or another number of rows; nothing was changed.
+        """
+        with self._lock:
+            self._require_world()
+            ids = self._ids(env_ids)
+            checks.same_stamp(snapshot, self.name, self.version, self.world.hash, len(ids))
+            data = snapshot.data
+            self._retire_state()
+            for name in PARAMETERS:
+                key = f"parameter.{name}"
+                if key in data:
+                    self._set_parameter(name, data[key], ids, np.arange(data[key].shape[1]))
+                    self._changed[name] = None
+                elif name in self._changed:
+                    default = self._default_parameter(name)
+                    self._set_parameter(name, np.repeat(default[None], len(ids), 0), ids, np.arange(len(default)))
+            prefixed = lambda prefix: {k[len(prefix) :]: v for k, v in data.items() if k.startswith(prefix)}  # noqa: E731
+            self._commands.restore(ids, prefixed("commands."))
+            self._rig.poses[ids] = data["cameras"]
+            self._restore(ids, prefixed("engine."), snapshot.level)
+            self._ticks[ids] = data["ticks"]
+
+    # ------------------------------------------------------------------ sensing
+
+    def render(
+        self, camera_name: str = "default", width: int | None = None, height: int | None = None,
+        env_ids: EnvIds = None, channels: Sequence[str] = ("rgb",),
+    ) -> dict[str, Array]:  # fmt: skip
+        """Images of one camera: `rgb` (E, H, W, 3) uint8, `depth` (E, H, W) float32 [m] along the optical axis (inf
+        beyond the far plane), `segmentation` (E, H, W) int32 entity ids (`Index.segmentation_id`; 0 elsewhere).
+
+        `default` is an overview of the world where no camera has that name.
+        """
+        with self._lock:
+            self._require_world()
+            for channel in channels:
+                if channel not in ("rgb", "depth", "segmentation"):
+                    raise EngineError(f"there is no channel '{channel}' (channels: rgb, depth, segmentation)")
+                self._require(Capability(f"render: {channel}"))
+            ids = self._ids(env_ids)
+            view = self._rig.view(camera_name, self.index, self.get_state(), ids, width, height)
+            return self._render(view, ids, tuple(channels))
+
+    def camera_poses(self, camera_name: str, env_ids: EnvIds = None) -> Array:
+        """World poses (E, 7) of a camera's optical frame now."""
+        with self._lock:
+            self._require_world()
+            return self._rig.view(camera_name, self.index, self.get_state(), self._ids(env_ids), None, None).pose
+
+    def set_camera_pose(self, camera_name: str, pose: Any, env_ids: EnvIds = None) -> None:
+        """Place a camera per env: poses (E, 7) in the frame of its body, or of the world where it has none."""
+        with self._lock:
+            self._require_world()
+            ids = self._ids(env_ids)
+            self._rig.poses[ids, self.index.camera(camera_name)] = checks.poses("pose", pose, (len(ids), 7))
+
+    def raycast(self, origins: Any, directions: Any, env_ids: EnvIds = None) -> RayHits:
+        """First hits of rays (E, R, 3) [m], world frame, with collision geometry. Directions need not be unit."""
+        with self._lock:
+            self._require_world()
+            self._require(Capability.RAYCAST)
+            ids = self._ids(env_ids)
+            start = checks.rows("origins", origins, (len(ids), None, 3))
+            along = checks.rows("directions", directions, start.shape)
+            length = np.linalg.norm(along, axis=-1, keepdims=True)
+            if start.size and length.min() < 1e-12:
+                raise EngineError("a ray needs a direction that is not zero")
+            return self._raycast(start, along / length, ids)
+
+    def contacts(self, env_ids: EnvIds = None) -> ContactPoints:
+        """All contact points of envs in their current state."""
+        with self._lock:
+            self._require_world()
+            self._require(Capability.CONTACT_POINTS)
+            return self._contacts(self._ids(env_ids))
+
+    # ------------------------------------------------------------------ live editing
+
+    def add_robot(self, name: str, robot: str, **placement: Any) -> None:
+        """Add a robot of the catalogue to every env: `add_robot("left", "franka_panda", position=(0, 0.4, 0))`."""
+        from anysim.world.edit import with_robot
+
+        with self._lock:
+            self._rebuild(with_robot(self.world, name, robot, placement))
+
+    def add_object(self, name: str, source: Any, **spec: Any) -> None:
+        """Add an object to every env: `add_object("ball", {"sphere": 0.03}, mass=0.1, position=(0.5, 0, 0.5))`."""
+        from anysim.world.edit import with_object
+
+        with self._lock:
+            self._rebuild(with_object(self.world, name, {"source": source, **spec}))
+
+    def remove_robot(self, name: str) -> None:
+        """Remove a robot; the rest goes on as it was."""
+        from anysim.world.edit import without_entity
+
+        with self._lock:
+            self.index.robot(name)
+            self._rebuild(without_entity(self.world, name))
+
+    def remove_object(self, name: str) -> None:
+        """Remove an object; the rest goes on as it was."""
+        from anysim.world.edit import without_entity
+
+        with self._lock:
+            if name not in [e.name for e in self.index.objects]:
+                raise EngineError(f"there is no object '{name}' (objects: {listing(e.name for e in self.index.objects)})")
+            self._rebuild(without_entity(self.world, name))
+
+    def add_camera(self, name: str, **spec: Any) -> None:
+        """Add a camera, with the fields of a world's `cameras` entry."""
+        from anysim.world.edit import with_camera
+
+        with self._lock:
+            world = with_camera(self.world, name, spec)
+            self._rig = self._rig.extended(world)
+            self._world = world
+            self.index = Index(world)
+
+    def _rebuild(self, world: World) -> None:
+        """Replace the world, carrying by name all that both worlds have. On failure the old world is untouched."""
+        from anysim.engine.carry import carry_over
+
+        needs = check(self.name, self.capabilities, needs_of(world), f"'{world.name}'")
+        carry_over(self, world)
+        self.approximations = needs
+
+    # ------------------------------------------------------------------ the simple named surface
+
+    def list_robots(self) -> list[str]:
+        """The names of the robots."""
+        return [robot.name for robot in self.world.robots]
+
+    def robot_joint_names(self, robot_name: str | None = None) -> list[str]:
+        """The names of a robot's joints, without its own name in front."""
+        prefix = len(self.index.robot(robot_name).name) + 1
+        return [self.world.joints[j].name[prefix:] for j in self.index.robot_joints(robot_name)]
+
+    def get_observation(self, robot_name: str | None = None, *, skip_images: bool = False) -> dict[str, Array]:
+        """What a script or agent wants to know about a robot: `joint_pos`, `joint_vel` (N, J), `<tool>_pose` (N, 7),
+        and `images/<camera>` of all cameras unless skipped."""
+        from anysim.engine.surface import observation
+
+        with self._lock:
+            return observation(self, robot_name, skip_images)
+
+    def send_action(
+        self, action: Mapping[str, float] | Any, robot_name: str | None = None, n_substeps: int = 1
+    ) -> None:
+        """Set position targets (by joint name, or (N, A) for all of the robot's drives) and step."""
+        from anysim.engine.surface import send
+
+        with self._lock:
+            send(self, action, robot_name)
+            self.step(n_substeps)
+
+    # ------------------------------------------------------------------ helpers
+
+    def _require_world(self) -> None:
+        if self._world is None:
+            state = "was destroyed" if self._destroyed else "has no world; call create_world() first"
+            raise EngineError(f"this {self.name} engine {state}")
+
+    def _require(self, capability: Capability) -> None:
+        if capability not in self.capabilities:
+            raise CapabilityError(f"{self.name} does not have '{capability}' (`anysim list engines` shows what each can do)")
+
+    def _ids(self, env_ids: EnvIds) -> Array:
+        return self._all if env_ids is None else checks.indices(env_ids, self.num_envs, "env")
+
+    def _which(self, indices: Sequence[int] | None, size: int, kind: str) -> Array:
+        return np.arange(size) if indices is None else checks.indices(indices, size, kind)
+
+    # ------------------------------------------------------------------ primitives of a backend
+    # Arguments are checked: ids and indices are unique int arrays in range, values are float64 of the right shape.
+
+    @abstractmethod
+    def _build(self, world: World, num_envs: int) -> None:
+        """Make `num_envs` copies. A failure must leave nothing behind."""
+
+    @abstractmethod
+    def _free(self) -> None:
+        """Free what `_build` made."""
+
+    @abstractmethod
+    def _reset(self, ids: Array) -> None:
+        """Write the World's initial state, with nothing left over (warm starts, accumulated forces)."""
+
+    @abstractmethod
+    def _step(self, n_steps: int, ids: Array | None) -> None:
+        """Advance all envs, or those in `ids`, by n physics steps. Must not disturb the others."""
+
+    @abstractmethod
+    def _read(self, name: str) -> Array:
+        """A fresh array of one of `anysim.engine.state.FIELDS`, consistent with all writes so far."""
+
+    @abstractmethod
+    def _write_joints(self, ids: Array, joints: Array, position: Array | None, velocity: Array | None) -> None:
+        """Write (E, K) values."""
+
+    @abstractmethod
+    def _write_bodies(self, ids: Array, bodies: Array, pose: Array | None, twist: Array | None) -> None:
+        """Write poses (E, K, 7) of root bodies and twists (E, K, 6) of free ones."""
+
+    @abstractmethod
+    def _apply_control(self, control: Control) -> None:
+        """Take over the commands of all envs; called before a step after any of them changed."""
+
+    def _apply_wrench(self, wrench: Array | None) -> None:
+        """Set external wrenches (N, B, 6) at the centres of mass, or clear them."""
+        raise self._absent(Capability.WRENCHES)
+
+    def _get_parameter(self, name: str) -> Array:
+        """All values (N, K, ...) of one of `self.parameters`."""
+        raise self._absent(Capability.PARAMETERS_PER_ENV)
+
+    def _set_parameter(self, name: str, values: Array, ids: Array, indices: Array) -> None:
+        """Write values (E, K, ...) of one of `self.parameters`."""
+        raise self._absent(Capability.PARAMETERS_PER_ENV)
+
+    def _default_parameter(self, name: str) -> Array:
+        """Values (K, ...) as built from the World."""
+        raise self._absent(Capability.PARAMETERS_PER_ENV)
+
+    @abstractmethod
+    def _snapshot(self, ids: Array, level: SnapshotLevel) -> dict[str, Array]:
+        """Everything beyond commands, parameters and cameras that continuing needs; arrays with leading env axis."""
+
+    @abstractmethod
+    def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:
+        """Write rows that `_snapshot` made."""
+
+    def _carry_rows(self) -> Any:
+        """Solver state to carry across a rebuild, in a form that `_take_rows` of the new build understands."""
+        return None
+
+    def _take_rows(self, carried: Any, old: World) -> None:
+        """Take over by name what `_carry_rows` of the old build returned (warm starts and the like)."""
+
+    def _render(self, view: CameraView, ids: Array, channels: tuple[str, ...]) -> dict[str, Array]:
+        """Images of one camera for the envs in `ids`, as `render` documents."""
+        raise self._absent(Capability.RENDER_RGB)
+
+    def _raycast(self, origins: Array, directions: Array, ids: Array) -> RayHits:
+        """Rays (E, R, 3), unit directions."""
+        raise self._absent(Capability.RAYCAST)
+
+    def _contacts(self, ids: Array) -> ContactPoints:
+        """Contact points of envs."""
+        raise self._absent(Capability.CONTACT_POINTS)
+
+    def _absent(self, capability: Capability) -> CapabilityError:
+        return CapabilityError(f"{self.name} does not have '{capability}'")

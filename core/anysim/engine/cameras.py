@@ -1,0 +1,67 @@
+"""Cameras are engine-neutral: the contract turns mounts and per-env poses into world poses; an engine only draws."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.engine.index import Index
+from anysim.engine.state import State
+from anysim.errors import EngineError
+from anysim.math import pose as P
+from anysim.world.model import Camera, World
+
+
+@dataclass(frozen=True)
+class CameraView:
+    """What an engine needs to draw: world poses (E, 7) of the optical frame, lens and size."""
+
+    name: str
+    pose: Array
+    fov: float
+    width: int
+    height: int
+    near: float
+    far: float
+
+
+class CameraRig:
+    """The cameras of a world in all envs: `poses` (N, C, 7) relative to their bodies, may be changed per env."""
+
+    def __init__(self, world: World, num_envs: int) -> None:
+        self._world = world
+        mounts = [[*c.position, *c.quaternion] for c in world.cameras]
+        self.poses = np.tile(np.array(mounts, dtype=float).reshape(1, -1, 7), (num_envs, 1, 1))
+
+    def extended(self, world: World) -> "CameraRig":
+        """The rig of a world with more cameras (after the present ones), keeping the poses of these."""
+        rig = CameraRig(world, len(self.poses))
+        rig.poses[:, : self.poses.shape[1]] = self.poses
+        return rig
+
+    def view(
+        self, name: str, index: Index, state: State, ids: Array, width: int | None, height: int | None
+    ) -> CameraView:
+        """The camera by name, at its pose now; `default` is an overview unless a camera has that name."""
+        names = [c.name for c in self._world.cameras]
+        if name == "default" and name not in names:
+            camera = self._overview()
+            local = np.tile([*camera.position, *camera.quaternion], (len(ids), 1))
+        else:
+            number = index.camera(name)
+            camera = self._world.cameras[number]
+            local = self.poses[ids, number]
+        pose = local if camera.body < 0 else P.compose(state.body_pose[ids, camera.body], local)
+        size = (width or camera.width, height or camera.height)
+        if min(size) < 1 or max(size) > 8192:
+            raise EngineError(f"an image of {size[0]} x {size[1]} pixels cannot be drawn; 1 to 8192 expected")
+        return CameraView(name, pose, camera.fov, *size, camera.near, camera.far)
+
+    def _overview(self) -> Camera:
+        """Looks at the middle of all bodies' initial places, from far enough to see them."""
+        places = self._world.initial_body_pose[:, :3] if self._world.bodies else np.zeros((1, 3))
+        middle = (places.min(axis=0) + places.max(axis=0)) / 2
+        reach = max(1.0, float(np.linalg.norm(places - middle, axis=1).max()) * 2.5)
+        eye = middle + reach * np.array([0.75, -0.75, 0.55])
+        quaternion = P.look_at(eye, middle)
+        return Camera("default", -1, tuple(eye), tuple(quaternion), 50.0, 640, 480, far=max(20.0, 4 * reach))

@@ -1,0 +1,62 @@
+"""What a world needs of an engine, each need with the name that causes it."""
+
+from math import isfinite
+
+from anysim.engine.capability import Capability, Need
+from anysim.world.model import BodyKind, ControlMode, HeightFieldShape, MeshShape, Plane, World
+
+
+def needs_of(world: World) -> list[Need]:
+    """Every capability the world needs, once, with the first thing that needs it."""
+    found: dict[Capability, str] = {}
+
+    def need(capability: Capability, why: str) -> None:
+        found.setdefault(capability, why)
+
+    for body in world.bodies:
+        if body.kind is BodyKind.FREE:
+            need(Capability.RIGID_BODIES, f"body '{body.name}' is free")
+        elif body.kind is BodyKind.LINK:
+            need(Capability.ARTICULATIONS, f"body '{body.name}' is a link")
+        if body.gravity_compensation:
+            need(Capability.GRAVITY_COMPENSATION, f"body '{body.name}' is gravity compensated")
+    for joint in world.joints:
+        what = f"joint '{joint.name}'"
+        if joint.mimic is not None:
+            need(Capability.MIMIC_JOINTS, f"{what} follows '{world.joints[joint.mimic.joint].name}'")
+        if joint.friction > 0:
+            need(Capability.JOINT_FRICTION, f"{what} has dry friction")
+        if joint.armature > 0:
+            need(Capability.ARMATURE, f"{what} has armature")
+        if isfinite(joint.lower) or isfinite(joint.upper):
+            need(Capability.JOINT_LIMITS, f"{what} is limited")
+    for actuator in world.actuators:
+        capability = {
+            ControlMode.POSITION: Capability.CONTROL_POSITION,
+            ControlMode.VELOCITY: Capability.CONTROL_VELOCITY,
+            ControlMode.EFFORT: Capability.CONTROL_EFFORT,
+        }[actuator.mode]
+        need(capability, f"drive '{actuator.name}' is {actuator.mode} controlled")
+        if isfinite(actuator.effort_limit):
+            need(Capability.EFFORT_LIMITS, f"drive '{actuator.name}' is limited")
+    for geom in world.geoms:
+        what = f"geom '{geom.name}'"
+        if not geom.collides:
+            continue
+        need(Capability.CONTACTS, f"{what} collides")
+        if isinstance(geom.shape, Plane):
+            need(Capability.TERRAIN_PLANE, f"{what} is a plane")
+        elif isinstance(geom.shape, HeightFieldShape):
+            need(Capability.TERRAIN_HEIGHTFIELD, f"{what} is a height field")
+        elif isinstance(geom.shape, MeshShape):
+            need(Capability.SHAPE_MESH, f"{what} is a mesh")
+        if geom.surface.restitution > 0:
+            need(Capability.RESTITUTION, f"{what} bounces")
+        if geom.surface.torsional:
+            need(Capability.TORSIONAL_FRICTION, f"{what} has torsional friction")
+    for sensor in world.contact_sensors:
+        need(Capability.CONTACT_SENSORS, f"contact sensor '{sensor.name}'")
+    for camera in world.cameras:
+        for channel in camera.channels:
+            need(Capability(f"render: {channel}"), f"camera '{camera.name}' gives {channel}")
+    return [Need(capability, why) for capability, why in found.items()]

@@ -1,0 +1,102 @@
+"""Kinds: named plugins found through entry points, imported when they are used and not before.
+
+A kind is a group `anysim.<kind>` (engines, tasks, robots, controllers, skills, planners, writers, terms…). Two
+distributions that offer one name are an error that lists both; `dist:name` chooses.
+"""
+
+from collections.abc import Mapping
+from functools import cache
+from importlib import metadata
+from typing import Any
+
+from anysim.errors import PluginError, listing, suggest
+
+KINDS: Mapping[str, str] = {
+    "engines": "physics engines",
+    "tasks": "tasks (a package with a task.yaml)",
+    "robots": "robots (a package with NAME.yaml)",
+    "controllers": "action controllers",
+    "terms": "libraries of observation, reward, predicate, command and event terms",
+    "skills": "skills",
+    "planners": "planners",
+    "writers": "record writers",
+    "importers": "asset importers, by file format",
+}
+"""The kinds that anysim looks up, and what each is."""
+
+INSTALL_HINTS: Mapping[tuple[str, str], str] = {
+    ("engines", "mujoco"): "anysim-mujoco",
+    ("writers", "mcap"): "anysim-mcap",
+    ("planners", "numba_ik"): "anysim-ik",
+    ("importers", "mjcf"): "anysim-mujoco",
+}
+"""Where well-known plugins come from, for the remedy in an error."""
+
+
+@cache
+def _entries(kind: str) -> Mapping[str, tuple[metadata.EntryPoint, ...]]:
+    table: dict[str, list[metadata.EntryPoint]] = {}
+    for entry in metadata.entry_points(group=f"anysim.{kind}"):
+        known = table.setdefault(entry.name, [])
+        if not any(_dist(entry) == _dist(other) and entry.value == other.value for other in known):
+            known.append(entry)
+    return {name: tuple(table[name]) for name in sorted(table)}
+
+
+def _dist(entry: metadata.EntryPoint) -> str:
+    return entry.dist.name if entry.dist is not None else "unknown distribution"
+
+
+def refresh() -> None:
+    """Forget what was found; the next look-up reads the installed distributions again."""
+    _entries.cache_clear()
+
+
+def names(kind: str) -> list[str]:
+    """The names installed for a kind, sorted. Imports nothing."""
+    return list(_entries(kind))
+
+
+def entry(kind: str, name: str) -> metadata.EntryPoint:
+    """The entry point of `name` or `dist:name`.
+
+    Raises:
+        PluginError: unknown (lists what is installed) or ambiguous (lists the distributions).
+    """
+    dist, _, bare = name.rpartition(":")
+    found = _entries(kind).get(bare, ())
+    if dist:
+        found = tuple(e for e in found if _dist(e) == dist)
+    if not found:
+        installed = names(kind)
+        package = INSTALL_HINTS.get((kind, bare))
+        remedy = f"; it comes with the package {package}: pip install {package}" if package else ""
+        raise PluginError(
+            f"no {kind.removesuffix('s')} named '{name}' is installed{suggest(bare, installed)}{remedy} "
+            f"(installed: {listing(installed)})"
+        )
+    if len(found) > 1:
+        offers = ", ".join(f"{_dist(e)}:{bare}" for e in found)
+        raise PluginError(f"the {kind.removesuffix('s')} '{bare}' is offered twice; choose one of {offers}")
+    return found[0]
+
+
+def distribution(kind: str, name: str) -> str:
+    """The distribution that offers the plugin."""
+    return _dist(entry(kind, name))
+
+
+def load(kind: str, name: str) -> Any:
+    """Import and return the plugin's object.
+
+    Raises:
+        PluginError: unknown, ambiguous, or its import failed (names the distribution and the cause).
+    """
+    found = entry(kind, name)
+    try:
+        return found.load()
+    except Exception as error:
+        raise PluginError(
+            f"the {kind.removesuffix('s')} '{name}' of {_dist(found)} does not load: "
+            f"{type(error).__name__}: {error} (entry point {found.value})"
+        ) from error

@@ -1,0 +1,1 @@
+"""Batched inverse kinematics for anysim, compiled with numba."""

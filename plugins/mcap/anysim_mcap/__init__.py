@@ -1,0 +1,1 @@
+"""Trajectories as MCAP files and videos for anysim."""

@@ -1,0 +1,1 @@
+"""The robot catalogue of anysim: one YAML file a robot."""
