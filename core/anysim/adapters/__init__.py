@@ -1,1 +1,1 @@
-""" """
+"""Views of a TaskEnv in the dialects of other libraries."""

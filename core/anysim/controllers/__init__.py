@@ -1,1 +1,1 @@
-""" """
+"""Controllers: how an action of a channel becomes targets of its drives."""

@@ -1,1 +1,1 @@
-""" """
+"""Tasks: the Markov decision process over a world."""

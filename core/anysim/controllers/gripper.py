@@ -1,0 +1,25 @@
+"""Grippers."""
+
+import numpy as np
+
+from anysim.controllers.base import ChannelView, Controller
+from anysim.conventions import Array
+from anysim.errors import TaskError
+
+
+class GripperBinary(Controller):
+    """One number opens (>= 0) or closes (< 0) the gripper: its drives go to the channel's `opened` or `closed` targets.
+
+    The closed target lies beyond contact, so that the drives press with their effort limit.
+    """
+
+    def __init__(self, channel: ChannelView, num_envs: int) -> None:
+        super().__init__(channel, num_envs)
+        if channel.opened is None or channel.closed is None:
+            raise TaskError(f"channel '{channel.name}' has no `opened` and `closed` targets in the catalogue; gripper_binary needs them")
+        self._opened, self._closed = channel.opened, channel.closed
+        self.dim = 1
+        self.low, self.high = -np.ones(1), np.ones(1)
+
+    def apply(self, action: Array, env_ids: Array | None) -> Array:
+        return np.where(action >= 0, self._opened, self._closed)

@@ -1,0 +1,54 @@
+"""Joint position and joint delta position control."""
+
+from collections.abc import Mapping
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from anysim.controllers.base import ChannelView, Controller
+from anysim.conventions import Array
+
+
+class JointPosition(Controller):
+    """The action is the joint position target itself [rad, m], bounded by the joint limits."""
+
+    def __init__(self, channel: ChannelView, num_envs: int) -> None:
+        super().__init__(channel, num_envs)
+        self.dim = len(channel.actuators)
+        self.low, self.high = channel.lower, channel.upper
+
+    def apply(self, action: Array, env_ids: Array | None) -> Array:
+        return action
+
+
+class JointDeltaPosition(Controller):
+    """The action moves the joint position targets: target += scale * action, action in [-1, 1], inside the limits.
+
+    It moves the target, not the measured position, so that a load does not make the arm sag away.
+    """
+
+    def __init__(
+        self, channel: ChannelView, num_envs: int, *,
+        scale: Annotated[float, Field(gt=0, description="largest change in one control step [rad, m]")] = 0.05,
+    ) -> None:  # fmt: skip
+        super().__init__(channel, num_envs)
+        self.dim = len(channel.actuators)
+        self.low, self.high = -np.ones(self.dim), np.ones(self.dim)
+        self.scale = scale
+        self._target = np.zeros((num_envs, self.dim))
+
+    def reset(self, env_ids: Array, targets: Array) -> None:
+        self._target[env_ids] = targets
+
+    def apply(self, action: Array, env_ids: Array | None) -> Array:
+        rows = slice(None) if env_ids is None else env_ids
+        moved = self._target[rows] + self.scale * action
+        self._target[rows] = np.minimum(np.maximum(moved, self.channel.lower), self.channel.upper)
+        return self._target[rows]
+
+    def snapshot(self, env_ids: Array) -> dict[str, Array]:
+        return {"target": self._target[env_ids]}
+
+    def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
+        self._target[env_ids] = data["target"]

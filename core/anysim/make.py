@@ -1,0 +1,124 @@
+"""From a name or a file to a running env: load, compile, create, bind."""
+
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from anysim import registry
+from anysim.engine.factory import create_simulation
+from anysim.errors import SpecError, SpecIssue, TaskError
+from anysim.plugin_options import resolve_options
+from anysim_schemas.load import LoadedRun, load_run
+
+if TYPE_CHECKING:
+    from anysim.task.env import TaskEnv
+    from anysim.world.model import World
+    from anysim_schemas.run import RunSpec
+
+TASK_FILE = "task.yaml"
+
+
+def task_path(name: str) -> Path:
+    """The file of an installed task.
+
+    Raises:
+        PluginError: no such task; lists those installed.
+    """
+    package = registry.entry("tasks", name).value
+    return Path(str(files(package).joinpath(TASK_FILE)))
+
+
+def source_path(source: str | Path) -> Path:
+    """A file as it is, or the file of an installed task by name."""
+    text = str(source)
+    looks_like_file = isinstance(source, Path) or text.endswith((".yaml", ".yml")) or "/" in text
+    return Path(text) if looks_like_file else task_path(text)
+
+
+def _extends(uri: str) -> Path:
+    """`extends: task:pick_cube` names an installed task."""
+    scheme, _, name = uri.partition(":")
+    if scheme != "task":
+        raise TaskError(f"'{uri}' cannot be extended; a path or task:NAME expected")
+    return task_path(name)
+
+
+def load(*sources: str | Path | dict[str, Any], overrides: Sequence[str] = ()) -> LoadedRun:
+    """Load files (or installed tasks by name), merged in order, with dotted overrides such as `physics.dt=0.004`.
+
+    Raises:
+        SpecError: every fault with file, line and column.
+    """
+    resolved = [s if isinstance(s, dict) else source_path(s) for s in sources]
+    return load_run(resolved, overrides=overrides, resolver=resolve_options, extends=_extends)
+
+
+def compile_world(source: "str | Path | LoadedRun | RunSpec | dict[str, Any]", overrides: Sequence[str] = ()) -> "World":
+    """The neutral World of a file, an installed task, or a spec.
+
+    Raises:
+        SpecError, AssetError: with the file, line and column of the key at fault where they are known.
+    """
+    from anysim.world.compile import compile_world as compile_spec
+    from anysim_schemas.run import RunSpec
+
+    if isinstance(source, RunSpec):
+        return compile_spec(source)
+    loaded = source if isinstance(source, LoadedRun) else load(source, overrides=overrides)
+    base = loaded.files[-1].parent if loaded.files else None
+    try:
+        return compile_spec(loaded.spec, base=base)
+    except SpecError as error:
+        raise located(error, loaded) from None
+
+
+def located(error: SpecError, loaded: LoadedRun) -> SpecError:
+    """The same issues with the file, line and column of the key at fault."""
+    return SpecError([SpecIssue(i.where or loaded.where(i.path), i.path, i.message) for i in error.issues])
+
+
+def make(
+    source: str | Path | LoadedRun | dict[str, Any], *, engine: str | None = None, num_envs: int | None = None,
+    seed: int | None = None, overrides: Sequence[str] = (),
+) -> "TaskEnv":  # fmt: skip
+    """An env of a task: `env = anysim.make("pick_cube", engine="mujoco", num_envs=16)`.
+
+    Args:
+        source: an installed task by name, a YAML file, or what `load` returned.
+        engine: an installed engine by name; wins over the file.
+        num_envs: parallel environments; wins over the file.
+        seed: seeds the envs now; otherwise the first `reset(seed=...)` does.
+        overrides: dotted overrides, as `-o` on the command line.
+
+    Raises:
+        SpecError: the file, with line and column.
+        CapabilityError: the engine cannot run this world; nothing was built.
+    """
+    from anysim.managers.standard import standard_managers
+    from anysim.task.env import TaskEnv
+
+    more = [*overrides, *([f"engine={engine}"] if engine else []), *([f"num_envs={num_envs}"] if num_envs else [])]
+    if isinstance(source, LoadedRun):
+        loaded = load(source.data, overrides=more) if more else source
+    else:
+        loaded = load(source, overrides=more)
+    spec = loaded.spec
+    world = compile_world(loaded)
+    simulation = create_simulation(spec.engine.name, **spec.engine.options)
+    try:
+        managers = standard_managers(spec, world, spec.num_envs)
+        simulation.create_world(world, spec.num_envs)
+        name = str(source) if isinstance(source, str) and "/" not in str(source) else world.name
+        env = TaskEnv(spec, simulation, managers, name)
+    except SpecError as error:
+        simulation.destroy()
+        raise located(error, loaded) from None
+    except BaseException:
+        simulation.destroy()
+        raise
+    if seed is not None:
+        env.streams.seed(seed, np.arange(spec.num_envs))
+    return env

@@ -1,0 +1,59 @@
+"""The lifecycle that every manager has.
+
+    configure(spec, streams)  ->  build(world)  ->  bind(engine)  ->  reset(env_ids)
+                              ->  before_step(...) / after_step()  ->  snapshot(env_ids) / restore(env_ids, data)
+
+A manager owns its slice of the state and nothing else; managers never call each other. `RESET_ORDER` is the one place
+that says who comes before whom.
+"""
+
+from abc import ABC
+from collections.abc import Mapping
+from typing import ClassVar, Self
+
+from anysim.conventions import Array
+from anysim.engine.base import SimEngine
+from anysim.managers.streams import Streams
+from anysim.world.model import World
+from anysim_schemas.run import RunSpec
+
+RESET_ORDER = ("layout", "scene", "terrain", "robot", "camera", "capture", "task")
+"""Poses first, then what things are, then who moves and who looks, and the task last, on the settled scene."""
+
+
+class Manager(ABC):
+    """Does nothing by itself; a subclass overrides the steps of the lifecycle that it needs."""
+
+    name: ClassVar[str]
+    spec: RunSpec
+    streams: Streams
+    engine: SimEngine
+
+    def configure(self, spec: RunSpec, streams: Streams) -> Self:
+        """Take the spec; check what can be checked without a world."""
+        self.spec = spec
+        self.streams = streams
+        return self
+
+    def build(self, world: World) -> None:
+        """Prepare for a compiled World; names become indices here."""
+
+    def bind(self, engine: SimEngine) -> None:
+        """The engine is live: allocate buffers."""
+        self.engine = engine
+
+    def reset(self, env_ids: Array) -> None:
+        """Write the initial state of these envs, from their streams."""
+
+    def before_step(self, env_ids: Array | None) -> None:
+        """Before the physics steps of a control step; `env_ids` None means all envs."""
+
+    def after_step(self, env_ids: Array | None) -> None:
+        """After the physics steps of a control step."""
+
+    def snapshot(self, env_ids: Array) -> dict[str, Array]:
+        """Copies of the manager's own state, arrays with a leading env axis."""
+        return {}
+
+    def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
+        """Write what `snapshot` returned."""

@@ -1,0 +1,102 @@
+"""LayoutManager: a pose for every placed object, from the declarative layout of the spec."""
+
+import numpy as np
+
+from anysim.conventions import GROUND, Array
+from anysim.errors import TaskError
+from anysim.managers.base import Manager
+from anysim.managers.values import draw
+from anysim.math import pose as P
+from anysim.world.geometry import footprint_radius, lowest_point, top_height
+from anysim.world.model import BodyKind, World
+from anysim_schemas.layout import PlacementSpec
+
+ATTEMPTS = 100
+"""Draws of one object's place before the layout is given up."""
+
+
+class LayoutManager(Manager):
+    """Draws poses in the order of support (a table before what stands on it) and writes them to the engine."""
+
+    name = "layout"
+
+    def build(self, world: World) -> None:
+        self._world = world
+        entities = {e.name: e for e in world.entities}
+        self._order = [name for name in _support_order(self.spec.world.layout) if name in entities]
+        self._roots = np.array([entities[name].root for name in self._order], dtype=int)
+        self._free = np.array([world.bodies[r].kind is BodyKind.FREE for r in self._roots], dtype=bool)
+        self._radius = {name: footprint_radius(world, name) for name in self._order}
+
+    def reset(self, env_ids: Array) -> None:
+        if not self._order:
+            return
+        poses = np.stack([self._place(int(env)) for env in env_ids])
+        free = self._roots[self._free]
+        if len(free):
+            self.engine.set_body_state(poses[:, self._free], np.zeros((len(env_ids), len(free), 6)), env_ids, free)
+        fixed = self._roots[~self._free]
+        if len(fixed):
+            self.engine.set_body_state(poses[:, ~self._free], None, env_ids, fixed)
+
+    def _place(self, env: int) -> Array:
+        """Poses (K, 7) of the placed objects of one env, in `_order`."""
+        placed: dict[str, Array] = {}
+        for name in self._order:
+            entry = self.spec.world.layout[name]
+            for attempt in range(ATTEMPTS):
+                pose = self._draw_pose(env, name, entry, placed, attempt)
+                crowding = self._crowding(name, entry, pose, placed)
+                if crowding is None:
+                    placed[name] = pose
+                    break
+            else:
+                raise TaskError(
+                    f"env {env}: no place for '{name}' in {ATTEMPTS} draws that keeps its clearance of {entry.clearance:g} m "
+                    f"from '{crowding}'; widen world.layout.{name} or lower its clearance"
+                )
+        return np.stack([placed[name] for name in self._order])
+
+    def _draw_pose(self, env: int, name: str, entry: PlacementSpec, placed: dict[str, Array], attempt: int) -> Array:
+        def value(field: str) -> float:
+            return draw(getattr(entry, field), f"layout/{name}/{field}", self.streams, env, attempt)
+
+        turn = P.from_roll_pitch_yaw(np.array([value("roll"), value("pitch"), value("yaw")]))
+        if entry.on is None:
+            position = draw(entry.position, f"layout/{name}/position", self.streams, env, attempt)
+            return np.concatenate([np.asarray(position, dtype=float), turn])
+        if entry.on == GROUND:
+            top = top_height(self._world, GROUND, np.array([[0, 0, 0, 0, 0, 0, 1.0]]))[0]
+        else:
+            top = top_height(self._world, entry.on, placed[entry.on][None])[0]
+        flat = np.concatenate([np.zeros(3), turn])[None]
+        return np.concatenate([[value("x"), value("y"), top - lowest_point(self._world, name, flat)[0]], turn])
+
+    def _crowding(self, name: str, entry: PlacementSpec, pose: Array, placed: dict[str, Array]) -> str | None:
+        """The first placed object that is nearer than the clearance, measured between circles around both footprints."""
+        if entry.clearance <= 0:
+            return None
+        for other, theirs in placed.items():
+            if other == entry.on:
+                continue
+            gap = float(np.hypot(*(pose[:2] - theirs[:2]))) - self._radius[name] - self._radius[other]
+            if gap < entry.clearance:
+                return other
+        return None
+
+
+def _support_order(layout: "dict[str, PlacementSpec]") -> list[str]:
+    """Names with every support before what stands on it, otherwise in the order of the file."""
+    order: list[str] = []
+
+    def visit(name: str) -> None:
+        if name in order or name not in layout:
+            return
+        support = layout[name].on
+        if support is not None:
+            visit(support)
+        order.append(name)
+
+    for name in layout:
+        visit(name)
+    return order

@@ -1,0 +1,72 @@
+"""SceneManager: what each object is in this episode: mass, friction, colour."""
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.engine.base import SimEngine
+from anysim.managers.base import Manager
+from anysim.managers.values import draw_rows, is_random
+from anysim.world.colors import rgb
+from anysim.world.model import BodyKind, World
+from anysim_schemas.objects import ObjectSpec
+
+
+class SceneManager(Manager):
+    """Draws the random fields of objects and writes them as parameters; constant fields are in the World already."""
+
+    name = "scene"
+
+    def build(self, world: World) -> None:
+        self._world = world
+        random = {
+            name: obj
+            for name, obj in self.spec.world.objects.items()
+            if any(is_random(v) for v in (obj.mass, obj.density, obj.friction, obj.color))
+        }
+        self._random: dict[str, ObjectSpec] = random
+
+    def bind(self, engine: SimEngine) -> None:
+        super().bind(engine)
+        self._bodies: dict[str, Array] = {}
+        self._geoms: dict[str, Array] = {}
+        for name in self._random:
+            entity = engine.index.entity(name)
+            self._bodies[name] = np.arange(entity.body_start, entity.body_stop)
+            self._geoms[name] = np.array(engine.index.geoms_of(entity), dtype=int)
+
+    def reset(self, env_ids: Array) -> None:
+        for name, obj in self._random.items():
+            if is_random(obj.mass) or is_random(obj.density):
+                self._write_mass(name, obj, env_ids)
+            if is_random(obj.friction):
+                rows = draw_rows(obj.friction, f"scene/{name}/friction", self.streams, env_ids)
+                self._write_geoms("geom.friction", name, rows[:, None], env_ids)
+            if is_random(obj.color):
+                self._write_color(name, obj, env_ids)
+
+    def _write_mass(self, name: str, obj: ObjectSpec, env_ids: Array) -> None:
+        """Scale masses and inertias of all the object's bodies alike, so that its shape stays what it was."""
+        bodies = self._bodies[name]
+        inertials = [self._world.bodies[b].inertial for b in bodies]
+        nominal = np.array([i.mass for i in inertials])
+        if self._world.bodies[bodies[0]].kind is BodyKind.STATIC and not nominal.sum():
+            return
+        if is_random(obj.mass):
+            ratio = draw_rows(obj.mass, f"scene/{name}/mass", self.streams, env_ids) / nominal.sum()
+        else:
+            from anysim.world.compile import nominal_value
+
+            ratio = draw_rows(obj.density, f"scene/{name}/density", self.streams, env_ids) / nominal_value(obj.density)
+        self.engine.set_parameters("body.mass", ratio[:, None] * nominal, env_ids, bodies)
+        inertia = np.array([i.inertia for i in inertials])
+        self.engine.set_parameters("body.inertia", ratio[:, None, None] * inertia, env_ids, bodies)
+
+    def _write_color(self, name: str, obj: ObjectSpec, env_ids: Array) -> None:
+        from anysim.managers.values import draw
+
+        rows = [rgb(draw(obj.color, f"scene/{name}/color", self.streams, int(e))) for e in env_ids]
+        self._write_geoms("geom.color", name, np.array([[[*c, 1.0]] for c in rows]), env_ids)
+
+    def _write_geoms(self, parameter: str, name: str, rows: Array, env_ids: Array) -> None:
+        geoms = self._geoms[name]
+        self.engine.set_parameters(parameter, np.repeat(rows, len(geoms), axis=1), env_ids, geoms)

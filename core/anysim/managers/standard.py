@@ -1,0 +1,20 @@
+"""The managers that every env has."""
+
+from anysim.managers.base import Manager
+from anysim.managers.camera import CameraManager
+from anysim.managers.layout import LayoutManager
+from anysim.managers.robot import RobotManager
+from anysim.managers.scene import SceneManager
+from anysim.managers.streams import Streams
+from anysim.world.model import World
+from anysim_schemas.run import RunSpec
+
+
+def standard_managers(spec: RunSpec, world: World, num_envs: int) -> list[Manager]:
+    """Configured and built, sharing one set of streams."""
+    streams = Streams(num_envs)
+    managers: list[Manager] = [LayoutManager(), SceneManager(), RobotManager(), CameraManager()]
+    for manager in managers:
+        manager.configure(spec, streams)
+        manager.build(world)
+    return managers

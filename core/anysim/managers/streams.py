@@ -1,0 +1,93 @@
+"""Random streams: who draws what, and why nothing else moves when one more thing is drawn.
+
+A seed gives each env a master generator; each episode draws one 64-bit `episode_seed` from it. Everything random in
+the episode is a draw from a stream named by its purpose (`layout/cube/x`) and keyed by (episode_seed, name, tick)
+alone: a counter-based generator, so no stream has state, none depends on another, and an episode can be drawn again
+from its `episode_seed`.
+"""
+
+import hashlib
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.errors import TaskError
+
+
+@cache
+def stream_key(name: str) -> int:
+    """A 64-bit key of a stream's name, the same on every machine."""
+    return int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "little")
+
+
+class Streams:
+    """The streams of all envs, and the draws of their current episodes.
+
+    Attributes:
+        episode_seed: (N,) uint64, what the current episode of each env was drawn from.
+        draws: for each env, what was drawn in its current episode by name.
+    """
+
+    def __init__(self, num_envs: int) -> None:
+        self.num_envs = num_envs
+        self.episode_seed = np.zeros(num_envs, dtype=np.uint64)
+        self.draws: list[dict[str, object]] = [{} for _ in range(num_envs)]
+        self._masters: list[np.random.Generator | None] = [None] * num_envs
+
+    @property
+    def seeded(self) -> bool:
+        """Whether every env has been seeded."""
+        return all(master is not None for master in self._masters)
+
+    def seed(self, seed: int | Sequence[int], env_ids: Array) -> None:
+        """Seed envs: an int seeds env i with (seed, i); a sequence gives one seed to each of `env_ids`."""
+        if isinstance(seed, int | np.integer):
+            entropies = [[int(seed), int(i)] for i in env_ids]
+        else:
+            if len(seed) != len(env_ids):
+                raise TaskError(f"{len(env_ids)} envs need as many seeds, got {len(seed)}")
+            entropies = [[int(s)] for s in seed]
+        for env, entropy in zip(env_ids, entropies, strict=True):
+            if min(entropy) < 0:
+                raise TaskError(f"a seed must not be negative, got {min(entropy)}")
+            self._masters[env] = np.random.Generator(np.random.PCG64(np.random.SeedSequence(entropy)))
+
+    def begin(self, env_ids: Array, episode_seeds: Sequence[int] | Array | None = None) -> None:
+        """Start new episodes: draw their seeds, or take those given. Envs never seeded get entropy from the system."""
+        for row, env in enumerate(env_ids):
+            master = self._masters[env]
+            if master is None:
+                master = self._masters[env] = np.random.default_rng()
+            drawn = int(master.integers(0, 2**63)) if episode_seeds is None else int(episode_seeds[row])
+            self.episode_seed[env] = drawn
+            self.draws[env] = {}
+
+    def generator(self, env: int, name: str, tick: int = 0) -> np.random.Generator:
+        """The stream `name` of an env's current episode at a control step; fresh at each call."""
+        key = np.array([self.episode_seed[env], stream_key(name)], dtype=np.uint64)
+        counter = np.array([0, 0, 0, tick], dtype=np.uint64)
+        return np.random.Generator(np.random.Philox(key=key, counter=counter))
+
+    def snapshot(self, env_ids: Array) -> dict[str, object]:
+        """Both levels of randomness of envs, as plain data."""
+        masters = [self._masters[i] for i in env_ids]
+        return {
+            "episode_seed": [int(self.episode_seed[i]) for i in env_ids],
+            "draws": [dict(self.draws[i]) for i in env_ids],
+            "masters": [None if m is None else m.bit_generator.state for m in masters],
+        }
+
+    def restore(self, env_ids: Array, data: dict[str, object]) -> None:
+        """Write what `snapshot` returned."""
+        masters, seeds, draws = data["masters"], data["episode_seed"], data["draws"]
+        assert isinstance(masters, list) and isinstance(seeds, list) and isinstance(draws, list)
+        for row, env in enumerate(env_ids):
+            self.episode_seed[env] = seeds[row]
+            self.draws[env] = dict(draws[row])
+            master = None
+            if masters[row] is not None:
+                master = np.random.Generator(np.random.PCG64())
+                master.bit_generator.state = masters[row]
+            self._masters[env] = master

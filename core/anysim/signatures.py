@@ -1,0 +1,48 @@
+"""Parameters of plugins from their signatures: keyword-only arguments become a pydantic model.
+
+A function or class takes its positional arguments from anysim and its keyword-only ones from the YAML file. Their
+annotations are checked when the file is loaded; an annotation with an attribute `reference_kind` (a handle such as
+`Frame`) is written as a name in the file and resolved when the env is built.
+"""
+
+import inspect
+from collections.abc import Callable
+from functools import cache
+from typing import Any, get_type_hints
+
+from pydantic import BaseModel, ConfigDict, create_model
+
+from anysim_schemas.base import Reference
+
+
+@cache
+def parameters(function: Callable[..., Any]) -> dict[str, inspect.Parameter]:
+    """The keyword-only parameters, with resolved annotations."""
+    hinted = function.__init__ if inspect.isclass(function) else function
+    hints = get_type_hints(hinted, include_extras=True)
+    signature = inspect.signature(hinted)
+    return {
+        name: p.replace(annotation=hints.get(name, Any))
+        for name, p in signature.parameters.items()
+        if p.kind is inspect.Parameter.KEYWORD_ONLY
+    }
+
+
+def reference_kind(annotation: Any) -> str | None:
+    """The kind of handle an annotation stands for, or None for plain data."""
+    return getattr(annotation, "reference_kind", None)
+
+
+@cache
+def options_model(function: Callable[..., Any]) -> type[BaseModel]:
+    """A frozen, closed pydantic model of the keyword-only parameters."""
+    fields: dict[str, Any] = {}
+    for name, p in parameters(function).items():
+        kind = reference_kind(p.annotation)
+        if kind == "robot":  # the only robot of a world need not be named
+            fields[name] = (Reference | None, None)
+        else:
+            annotation = Reference if kind else p.annotation
+            fields[name] = (annotation, ... if p.default is inspect.Parameter.empty else p.default)
+    config = ConfigDict(extra="forbid", frozen=True)
+    return create_model(getattr(function, "__name__", "options"), __config__=config, **fields)

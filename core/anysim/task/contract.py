@@ -1,0 +1,73 @@
+"""The MDP contract: what a step returns, and what its words mean."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.engine.state import Snapshot
+
+
+class Status(StrEnum):
+    """One word for each env. Where several are true at once: success before failed before truncated."""
+
+    RUNNING = "running"
+    SUCCESS = "success"
+    FAILED = "failed"
+    TRUNCATED = "truncated"
+
+
+STATUS_NAMES = np.array([str(s) for s in Status])
+"""The words by code; codes are what the env keeps, words are what it returns."""
+RUNNING, SUCCESS, FAILED, TRUNCATED = range(4)
+
+Obs = dict[str, Array]
+"""Observation groups: `policy` always; `privileged` and others as the task declares; (N, D) float32."""
+
+
+class StepResult(NamedTuple):
+    """What a control step gives, for all envs. Fresh arrays: nothing here is written to later.
+
+    Attributes:
+        obs: the state that the action led to, also in an episode's last step.
+        reward: (N,) float32; NaN where the engine faulted.
+        status: (N,) one of the words of `Status`.
+        info: arrays (N, ...): `is_success`, `fault` bool; `elapsed_steps` int64; `episode_seed` uint64.
+    """
+
+    obs: Obs
+    reward: Array
+    status: Array
+    info: dict[str, Array]
+
+    @property
+    def terminated(self) -> Array:
+        """(N,) bool: success or failed."""
+        return (self.status == Status.SUCCESS) | (self.status == Status.FAILED)
+
+    @property
+    def truncated(self) -> Array:
+        """(N,) bool: out of time."""
+        return self.status == Status.TRUNCATED
+
+    @property
+    def done(self) -> Array:
+        """(N,) bool: not running any more."""
+        return self.status != Status.RUNNING
+
+
+@dataclass(frozen=True)
+class EnvSnapshot:
+    """Envs at one moment: the engine's rows, every manager's rows, the streams and the clocks."""
+
+    engine: Snapshot
+    managers: Mapping[str, Mapping[str, Array]] = field(repr=False)
+    streams: Mapping[str, Any] = field(repr=False)
+
+    @property
+    def num_envs(self) -> int:
+        """How many envs it holds."""
+        return self.engine.num_envs

@@ -1,0 +1,285 @@
+"""TaskEnv: the loop. No autoreset here; gymnasium's modes and other dialects are views on it."""
+
+from collections.abc import Sequence
+from typing import Any, Self
+
+import numpy as np
+
+from anysim import hooks
+from anysim.conventions import Array
+from anysim.engine.base import SimEngine
+from anysim.errors import SnapshotError, TaskError
+from anysim.managers.base import RESET_ORDER, Manager
+from anysim.managers.robot import RobotManager
+from anysim.managers.streams import Streams
+from anysim.task.contract import (
+    FAILED, RUNNING, STATUS_NAMES, SUCCESS, TRUNCATED, EnvSnapshot, Obs, StepResult,
+)  # fmt: skip
+from anysim.task.mdp import Mdp
+from anysim.task.view import SceneView
+from anysim_schemas.run import RunSpec
+
+
+class TaskEnv:
+    """`num_envs` environments of one task on one engine.
+
+    An env must be reset before it is stepped, and again when it has ended. Env i's episodes depend on its own seed
+    alone: not on the number of envs, nor on when the others are reset.
+    """
+
+    def __init__(self, spec: RunSpec, engine: SimEngine, managers: Sequence[Manager], name: str = "task") -> None:
+        """`engine` has its world, `managers` are configured and built; `anysim.make` does all of this."""
+        if spec.task is None:
+            raise TaskError("this file has no `task`; a world alone can be run through `create_simulation`")
+        self.spec, self.engine, self.name = spec, engine, name
+        self.num_envs = engine.num_envs
+        self.streams = managers[0].streams if managers else Streams(self.num_envs)
+        self.scene = SceneView(engine)
+        order = {manager: place for place, manager in enumerate(RESET_ORDER)}
+        self.managers = sorted(managers, key=lambda m: order[m.name])
+        for manager in self.managers:
+            manager.bind(engine)
+        self.robots = next((m for m in self.managers if isinstance(m, RobotManager)), None)
+        self.action_dim = 0 if self.robots is None else self.robots.action_dim
+        self.mdp = Mdp(spec.task, self.scene, self.streams)
+        self.scene.last_action = np.zeros((self.num_envs, self.action_dim))
+        self._task = spec.task
+        self._substeps = engine.world.physics.substeps
+        self._code = np.full(self.num_envs, -1, dtype=np.int8)  # -1: never reset
+        self._fault = np.zeros(self.num_envs, dtype=bool)
+        self._success = np.zeros(self.num_envs, dtype=bool)
+        self._closed = False
+        self._obs: Obs = {}
+        self._hooks = hooks.manager().hook
+        self.scene.look(None)
+        self.observation_sizes = {group: rows.shape[1] for group, rows in self.mdp.observe().items()}
+        """Components of each observation group."""
+        self._hooks.after_build(env=self)
+
+    # ------------------------------------------------------------------ facts
+
+    @property
+    def action_bounds(self) -> tuple[Array, Array]:
+        """Lower and upper bounds (A,) of the action."""
+        if self.robots is None:
+            return np.zeros(0), np.zeros(0)
+        return self.robots.action_low.copy(), self.robots.action_high.copy()
+
+    @property
+    def obs(self) -> Obs:
+        """The latest observation of all envs, as after the last reset or step. Reading it changes nothing."""
+        return {group: rows.copy() for group, rows in self._obs.items()}
+
+    @property
+    def status(self) -> Array:
+        """(N,) the word of `Status` for each env."""
+        return STATUS_NAMES[np.maximum(self._code, 0)]
+
+    @property
+    def info(self) -> dict[str, Array]:
+        """Info of all envs now, as in `StepResult.info`."""
+        return self._info()
+
+    @property
+    def running(self) -> Array:
+        """(N,) bool: reset, and not ended."""
+        return self._code == RUNNING
+
+    # ------------------------------------------------------------------ reset
+
+    def reset(
+        self, *, seed: int | Sequence[int] | None = None, mask: Array | None = None,
+        episode_seeds: Sequence[int] | Array | None = None,
+    ) -> tuple[Obs, dict[str, Array]]:  # fmt: skip
+        """Start new episodes in all envs, or where `mask` (N,) is true.
+
+        Args:
+            seed: an int seeds env i with (seed, i), whatever N; a sequence gives each chosen env its own seed; None goes
+                on with the generators as they are.
+            episode_seeds: draw exactly these episodes instead (for replay).
+
+        Returns:
+            Observations and info of the chosen envs only, in order.
+        """
+        ids = self._chosen(mask)
+        if seed is not None:
+            self.streams.seed(seed, ids)
+        self.streams.begin(ids, episode_seeds)
+        self.engine.reset(ids)
+        for manager in self.managers:
+            manager.reset(ids)
+        self.scene.elapsed[ids] = 0
+        self.scene.last_action[ids] = 0.0
+        self._code[ids], self._fault[ids], self._success[ids] = RUNNING, False, False
+        self.scene.look(ids)
+        self.mdp.reset(ids)
+        rows = self.mdp.observe()
+        self._store(rows, ids)
+        self._hooks.before_episode(env=self, env_ids=ids)
+        return {g: r.copy() for g, r in rows.items()}, {k: v[ids] for k, v in self._info().items()}
+
+    def _chosen(self, mask: Array | None) -> Array:
+        if mask is None:
+            return np.arange(self.num_envs)
+        mask = np.asarray(mask)
+        if mask.dtype != bool or mask.shape != (self.num_envs,):
+            raise TaskError(f"mask must be a bool array of shape ({self.num_envs},), got {mask.dtype} {mask.shape}")
+        return np.flatnonzero(mask)
+
+    def _store(self, rows: Obs, ids: Array | None) -> None:
+        """Keep the latest observation: a fresh array for a full batch, rows written into the present one otherwise."""
+        if ids is None or len(ids) == self.num_envs:
+            self._obs = rows
+            return
+        for group, values in rows.items():
+            kept = self._obs.get(group)
+            # copied before it is written to: earlier results may still hold the array
+            fresh = np.zeros((self.num_envs, values.shape[1]), np.float32) if kept is None else kept.copy()
+            fresh[ids] = values
+            self._obs[group] = fresh
+
+    # ------------------------------------------------------------------ step
+
+    def step(self, action: Any, mask: Array | None = None) -> StepResult:
+        """One control step of all envs, or only where `mask` (N,) is true.
+
+        The order is fixed: actions, physics, status, reward, interval events, observation, hooks. Observations thus
+        show the state that the reward and the status were judged by. Envs that are not stepped keep their status and
+        observation and have reward 0.
+
+        Args:
+            action: (N, A); clipped to `action_bounds`. Rows of envs that are not stepped are ignored.
+
+        Raises:
+            TaskError: an env has not been reset since it ended (with `ended: hold` and no mask it is left out instead).
+        """
+        running = self._code == RUNNING
+        ids = self._stepped(running, mask)
+        if self.robots is not None:
+            clipped = self.robots.validated(action)
+            self.robots.act(clipped, ids)
+            if ids is None:
+                self.scene.last_action = clipped
+            else:
+                self.scene.last_action[ids] = clipped[ids]
+        for manager in self.managers:
+            manager.before_step(ids)
+        self.engine.step(self._substeps, ids)
+        for manager in self.managers:
+            manager.after_step(ids)
+        rows = slice(None) if ids is None else ids
+        self.scene.elapsed[rows] += 1
+        self.scene.look(ids)
+        self._evaluate(rows)
+        reward = self._reward(ids)
+        self.mdp.interval_events()
+        observed = self.mdp.observe()
+        self._store(observed, ids)
+        result = StepResult(self._full(observed, ids), reward, STATUS_NAMES[self._code], self._info())
+        self._announce(result, ids)
+        return result
+
+    def _stepped(self, running: Array, mask: Array | None) -> Array | None:
+        """The envs to step: None for all of them."""
+        wanted = self._chosen(mask)
+        ended = wanted[~running[wanted]]
+        if len(ended) == 0 and len(wanted) == self.num_envs:
+            return None
+        hold = mask is None and self._task.ended == "hold" and running.any() and (self._code >= 0).all()
+        if len(ended) and not hold:
+            words = {int(i): "not reset yet" if self._code[i] < 0 else str(STATUS_NAMES[self._code[i]]) for i in ended[:8]}
+            raise TaskError(f"envs {words} cannot be stepped; call reset(mask=...) before step()")
+        return np.flatnonzero(running) if hold else wanted
+
+    def _evaluate(self, rows: Any) -> None:
+        success, failure = self.mdp.judge()
+        fault = self.engine.get_state().fault[rows]
+        self._fault[rows] = fault
+        late = self.scene.elapsed[rows] >= self._task.horizon
+        code = np.where(late, TRUNCATED, RUNNING)
+        code = np.where(failure, FAILED, code)
+        if self._task.on_success == "end":
+            code = np.where(success, SUCCESS, code)
+        self._success[rows] = success & ~fault
+        self._code[rows] = np.where(fault, FAILED, code)
+
+    def _reward(self, ids: Array | None) -> Array:
+        if ids is None:
+            return self.mdp.reward(self._fault)
+        reward = np.zeros(self.num_envs, dtype=np.float32)
+        reward[ids] = self.mdp.reward(self._fault[ids])
+        return reward
+
+    def _full(self, observed: Obs, ids: Array | None) -> Obs:
+        return {g: rows.copy() for g, rows in observed.items()} if ids is None else self.obs
+
+    def _info(self) -> dict[str, Array]:
+        return {
+            "is_success": self._success.copy(),
+            "fault": self._fault.copy(),
+            "elapsed_steps": self.scene.elapsed.copy(),
+            "episode_seed": self.streams.episode_seed.copy(),
+        }
+
+    def _announce(self, result: StepResult, ids: Array | None) -> None:
+        stepped = np.arange(self.num_envs) if ids is None else ids
+        self._hooks.after_step(env=self, result=result)
+        if self._fault[stepped].any():
+            self._hooks.on_fault(env=self, env_ids=stepped[self._fault[stepped]])
+        ended = stepped[self._code[stepped] != RUNNING]
+        if len(ended):
+            self._hooks.after_episode(env=self, env_ids=ended)
+
+    # ------------------------------------------------------------------ snapshots, images, end
+
+    def snapshot(self, mask: Array | None = None) -> EnvSnapshot:
+        """Envs at this moment. Continuing from it equals the uninterrupted run, bit for bit."""
+        ids = self._chosen(mask)
+        managers = {m.name: m.snapshot(ids) for m in self.managers}
+        managers["task"] = self.mdp.snapshot(ids) | {
+            "elapsed": self.scene.elapsed[ids], "last_action": self.scene.last_action[ids],
+            "code": self._code[ids], "fault": self._fault[ids], "success": self._success[ids],
+        }  # fmt: skip
+        return EnvSnapshot(self.engine.snapshot(ids), managers, self.streams.snapshot(ids))
+
+    def reset_to(self, snapshot: EnvSnapshot, env_ids: Sequence[int] | Array | None = None) -> Obs:
+        """Put a snapshot's envs into `env_ids` (default: all, in order); returns their observations.
+
+        Raises:
+            SnapshotError: it was taken in another world, engine or version, or of another number of envs.
+        """
+        ids = np.arange(self.num_envs) if env_ids is None else np.asarray(env_ids, dtype=int)
+        if snapshot.num_envs != len(ids):
+            raise SnapshotError(f"the snapshot holds {snapshot.num_envs} envs, {len(ids)} were asked for; pass env_ids")
+        self.engine.restore(snapshot.engine, ids)
+        for manager in self.managers:
+            manager.restore(ids, snapshot.managers[manager.name])
+        task = snapshot.managers["task"]
+        self.mdp.restore(ids, task)
+        self.scene.elapsed[ids], self.scene.last_action[ids] = task["elapsed"], task["last_action"]
+        self._code[ids], self._fault[ids] = task["code"], task["fault"]
+        self._success[ids] = task["success"]
+        self.streams.restore(ids, dict(snapshot.streams))
+        self.scene.look(ids)
+        rows = self.mdp.observe()
+        self._store(rows, ids)
+        return {g: r.copy() for g, r in rows.items()}
+
+    def render(self, camera: str | None = None, env_ids: Sequence[int] | Array | None = None) -> Array:
+        """Images (E, H, W, 3) uint8 of a camera (default: the world's first, else an overview)."""
+        cameras = self.engine.world.cameras
+        name = camera or (cameras[0].name if cameras else "default")
+        return self.engine.render(name, env_ids=env_ids)["rgb"]
+
+    def close(self) -> None:
+        """Free the engine. May be called twice."""
+        if not self._closed:
+            self._closed = True
+            self._hooks.on_close(env=self)
+            self.engine.destroy()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

@@ -1,0 +1,43 @@
+"""Commands: `(scene, draw, *, parameters) -> (n, 7)` goal poses, drawn when an episode starts.
+
+`draw(name, value)` gives one draw of a spec's value for each env at hand, from a stream of its own.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.task.view import Frame, SceneView
+from anysim_schemas.values import FloatValue, Vec3Value
+
+__all__ = ["goal_above", "goal_at"]
+
+Draw = Callable[[str, Any], Array]
+
+
+def _upright(position: Array) -> Array:
+    return np.concatenate([position, np.tile([0.0, 0.0, 0.0, 1.0], (len(position), 1))], axis=1)
+
+
+def goal_at(scene: SceneView, draw: Draw, *, position: Vec3Value) -> Array:
+    """A point in the world [m]."""
+    return _upright(draw("position", position))
+
+
+def goal_above(
+    scene: SceneView, draw: Draw, *, surface: Frame, height: FloatValue, x: FloatValue = 0.0, y: FloatValue = 0.0
+) -> Array:
+    """A point `height` [m] above the top of an object, at x, y [m] from its centre in the object's axes."""
+    from anysim.world.geometry import top_height  # the shapes' extents are needed here only
+
+    base = surface.position
+    top = top_height(scene.engine.world, surface.name, surface.pose)
+    dx, dy = draw("x", x), draw("y", y)
+    yaw = 2.0 * np.arctan2(surface.quaternion[:, 2], surface.quaternion[:, 3])
+    cosine, sine = np.cos(yaw), np.sin(yaw)
+    position = np.stack(
+        [base[:, 0] + cosine * dx - sine * dy, base[:, 1] + sine * dx + cosine * dy, top + draw("height", height)], axis=1
+    )
+    return _upright(position)

@@ -1,0 +1,34 @@
+"""Events: `(scene, draw, *, parameters)`, run on reset or in each step; they act through the engine's public contract."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.task.view import ObjectView, SceneView
+from anysim_schemas.base import NonNegative
+from anysim_schemas.values import NonNegativeValue, Vec3Value
+
+__all__ = ["push", "set_friction"]
+
+Draw = Callable[[str, Any], Array]
+
+
+def push(scene: SceneView, draw: Draw, *, object: ObjectView, force: Vec3Value, every: NonNegative = 50) -> None:
+    """A force [N], world axes, on an object during one control step out of `every`."""
+    due = scene.env_ids[(scene.elapsed[scene.rows] % max(1, int(every))) == 0]
+    if len(due) == 0:
+        return
+    force_rows = draw("force", force)[np.isin(scene.env_ids, due)]
+    wrench = np.concatenate([force_rows, np.zeros((len(due), 3))], axis=1)
+    scene.engine.apply_wrench(wrench[:, None], [object.entity.root], due)
+
+
+def set_friction(
+    scene: SceneView, draw: Draw, *, object: ObjectView, friction: NonNegativeValue
+) -> None:
+    """Give all surfaces of an object one friction coefficient."""
+    geoms = scene.index.geoms_of(object.entity)
+    rows = draw("friction", friction)
+    scene.engine.set_parameters("geom.friction", np.repeat(rows[:, None], len(geoms), axis=1), scene.env_ids, geoms)
