@@ -65,6 +65,10 @@ class Controller(ABC):
     def apply(self, action: Array, env_ids: Array | None) -> Array:
         """Position targets (E, K) for actions (E, dim) of all envs, or of `env_ids`."""
 
+    @abstractmethod
+    def action_for(self, targets: Array, env_ids: Array) -> Array:
+        """The action (E, dim), within its bounds, that brings the drives nearest to position targets (E, K) in one step."""
+
     def snapshot(self, env_ids: Array) -> dict[str, Array]:
         """Copies of the controller's own state."""
         return {}

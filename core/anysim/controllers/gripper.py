@@ -23,3 +23,7 @@ class GripperBinary(Controller):
 
     def apply(self, action: Array, env_ids: Array | None) -> Array:
         return np.where(action >= 0, self._opened, self._closed)
+
+    def action_for(self, targets: Array, env_ids: Array) -> Array:
+        nearer_open = np.abs(targets - self._opened).sum(axis=1) <= np.abs(targets - self._closed).sum(axis=1)
+        return np.where(nearer_open, 1.0, -1.0)[:, None]

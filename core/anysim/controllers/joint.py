@@ -21,6 +21,9 @@ class JointPosition(Controller):
     def apply(self, action: Array, env_ids: Array | None) -> Array:
         return action
 
+    def action_for(self, targets: Array, env_ids: Array) -> Array:
+        return np.minimum(np.maximum(targets, self.low), self.high)
+
 
 class JointDeltaPosition(Controller):
     """The action moves the joint position targets: target += scale * action, action in [-1, 1], inside the limits.
@@ -46,6 +49,10 @@ class JointDeltaPosition(Controller):
         moved = self._target[rows] + self.scale * action
         self._target[rows] = np.minimum(np.maximum(moved, self.channel.lower), self.channel.upper)
         return self._target[rows]
+
+    def action_for(self, targets: Array, env_ids: Array) -> Array:
+        wanted = (targets - self._target[env_ids]) / self.scale
+        return np.minimum(np.maximum(wanted, self.low), self.high)
 
     def snapshot(self, env_ids: Array) -> dict[str, Array]:
         return {"target": self._target[env_ids]}

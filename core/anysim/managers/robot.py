@@ -117,6 +117,21 @@ class RobotManager(Manager):
         if self.slices:
             self.engine.set_control(position=self._targets)
 
+    def slice_of(self, robot: str, channel: str) -> ActionSlice:
+        """The part of the action that belongs to a robot's channel.
+
+        Raises:
+            TaskError: the world gives that channel no controller.
+        """
+        for s in self.slices:
+            if (s.robot, s.channel) == (robot, channel):
+                return s
+        known = [f"{s.robot}.{s.channel}" for s in self.slices]
+        raise TaskError(
+            f"'{robot}.{channel}' has no controller; add world.robots.{robot}.actions.{channel} "
+            f"(channels with one: {listing(known)})"
+        )
+
     def validated(self, action: Array) -> Array:
         """The action as float64 (N, A), clipped to the channels' bounds.
 

@@ -176,3 +176,18 @@ def look_at(eye: Array, target: Array) -> Array:
     matrix = np.stack([right, down, forward], axis=-1)
     flat = matrix.reshape(-1, 3, 3)
     return np.array([from_matrix(m) for m in flat]).reshape(*forward.shape[:-1], 4)
+
+
+def step_toward(pose: Array, target: Array, max_distance: float, max_angle: float) -> Array:
+    """Move poses (n, 7) straight towards targets (n, 7): at most `max_distance` [m] and `max_angle` [rad].
+
+    Position and rotation keep pace: both cover the same fraction of what is left, so they arrive together.
+    """
+    distance = norm(target[:, :3] - pose[:, :3])
+    turn = rotation_vector(multiply(conjugate(pose[:, 3:]), target[:, 3:]))
+    angle = norm(turn)
+    share = np.minimum(1.0, np.minimum(max_distance / np.maximum(distance, 1e-12), max_angle / np.maximum(angle, 1e-12)))
+    position = pose[:, :3] + share[:, None] * (target[:, :3] - pose[:, :3])
+    axis = turn / np.maximum(angle, 1e-12)[:, None]
+    rotation = normalize(multiply(pose[:, 3:], from_axis_angle(axis, share * angle)))
+    return np.concatenate([position, rotation], axis=1)

@@ -1,0 +1,66 @@
+"""SkillPolicy: the task's expert as a policy over all envs, each on its own timeline."""
+
+from typing import Any
+
+import numpy as np
+
+from anysim import registry
+from anysim.conventions import Array
+from anysim.errors import AnysimError, SpecError, SpecIssue, TaskError
+from anysim.signatures import options_model, parameters, reference_kind
+from anysim.skills.base import OUTCOMES, Outcome, Skill
+from anysim.task.env import TaskEnv
+from anysim.task.library import resolve
+from anysim_schemas.task import ExpertSpec
+
+
+def bind_skill(spec: ExpertSpec, env: TaskEnv) -> Skill:
+    """The skill with its parameters checked and names resolved.
+
+    Raises:
+        SpecError: at `task.expert.<parameter>`, a name that does not exist in this world.
+    """
+    skill_class: type[Skill] = registry.load("skills", spec.skill)
+    values = options_model(skill_class).model_validate(spec.params)
+    keywords: dict[str, Any] = {}
+    for name, parameter in parameters(skill_class).items():
+        value, handle = getattr(values, name), reference_kind(parameter.annotation)
+        if handle is not None:
+            try:
+                value = resolve(handle, value, env.scene)
+            except AnysimError as error:
+                raise SpecError([SpecIssue("", f"task.expert.{name}", str(error))]) from None
+        keywords[name] = value
+    return skill_class(env, **keywords)
+
+
+class SkillPolicy:
+    """Acts in the envs it is asked for; an env whose skill has given up stays still."""
+
+    def __init__(self, env: TaskEnv) -> None:
+        task = env.spec.task
+        if task is None or task.expert is None:
+            raise TaskError(f"task '{env.name}' has no expert; add task.expert, or drive the env with a policy of your own")
+        self.env = env
+        self.name = task.expert.skill
+        self.skill = bind_skill(task.expert, env)
+        self._still = np.clip(np.zeros(env.action_dim), *env.action_bounds)
+
+    def begin(self, env_ids: Array) -> None:
+        """These envs have just been reset."""
+        self.skill.begin(env_ids)
+
+    def act(self, env_ids: Array) -> Array:
+        """The action (N, A); only the rows `env_ids` mean anything."""
+        action = np.tile(self._still, (self.env.num_envs, 1))
+        self.skill.act(env_ids, action)
+        return action
+
+    def gave_up(self, env_ids: Array) -> Array:
+        """(n,) bool: the skill ended in these envs with a failure."""
+        outcome = self.skill.outcome[env_ids]
+        return (outcome != OUTCOMES.index(Outcome.RUNNING)) & (outcome != OUTCOMES.index(Outcome.OK))
+
+    def describe(self, env: int) -> dict[str, object]:
+        """What an env is doing, for records and tables."""
+        return {"skill": self.name, **self.skill.describe(env)}
