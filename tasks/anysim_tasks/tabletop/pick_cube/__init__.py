@@ -1,0 +1,1 @@
+"""Lift a randomly placed cube to a random goal above the table."""
