@@ -221,6 +221,13 @@ class SimEngine(ABC):
             which = None if actuators is None else self._which(actuators, len(self.world.actuators), "actuator")
             self._commands.write(position, velocity, effort, ids, which)
 
+    @property
+    def control(self) -> Control:
+        """Copies of the commands in force: targets (N, A) and modes, indices into `anysim.engine.commands.MODES`."""
+        with self._lock:
+            self._require_world()
+            return Control(*(array.copy() for array in self._commands.control))
+
     def set_control_mode(
         self, mode: ControlMode | str, env_ids: EnvIds = None, actuators: Sequence[int] | None = None
     ) -> None:

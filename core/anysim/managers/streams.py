@@ -64,6 +64,11 @@ class Streams:
             self.episode_seed[env] = drawn
             self.draws[env] = {}
 
+    def skip(self, env: int, episodes: int) -> None:
+        """Pass over the next episodes of an env, as if they had been begun."""
+        for _ in range(episodes):
+            self.begin(np.array([env]))
+
     def generator(self, env: int, name: str, tick: int = 0) -> np.random.Generator:
         """The stream `name` of an env's current episode at a control step; fresh at each call."""
         key = np.array([self.episode_seed[env], stream_key(name)], dtype=np.uint64)

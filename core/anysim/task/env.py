@@ -118,6 +118,11 @@ class TaskEnv:
         self._hooks.before_episode(env=self, env_ids=ids)
         return {g: r.copy() for g, r in rows.items()}, {k: v[ids] for k, v in self._info().items()}
 
+    def retire(self, env_ids: Array) -> None:
+        """End episodes that nobody wants to go on with: these envs are truncated now if they were running."""
+        running = env_ids[self._code[env_ids] == RUNNING]
+        self._code[running] = TRUNCATED
+
     def _chosen(self, mask: Array | None) -> Array:
         if mask is None:
             return np.arange(self.num_envs)
