@@ -14,6 +14,7 @@ from anysim.plugin_options import resolve_options
 from anysim_schemas.load import LoadedRun, load_run
 
 if TYPE_CHECKING:
+    from anysim.engine.base import SimEngine
     from anysim.task.env import TaskEnv
     from anysim.world.model import World
     from anysim_schemas.run import RunSpec
@@ -80,6 +81,38 @@ def located(error: SpecError, loaded: LoadedRun) -> SpecError:
     return SpecError([SpecIssue(i.where or loaded.where(i.path), i.path, i.message) for i in error.issues])
 
 
+def dry_run(loaded: LoadedRun, world: "World") -> None:
+    """Resolve every name the task refers to, without the engine it is for.
+
+    Raises:
+        SpecError: with file, line and column.
+    """
+    from anysim.engine.null import NullEngine
+    from anysim.skills.runner import bind_skill
+
+    spec = loaded.spec
+    try:
+        with _env(spec, world, NullEngine(), 1, "check") as env:
+            if spec.task is not None and spec.task.expert is not None:
+                bind_skill(spec.task.expert, env)
+    except SpecError as error:
+        raise located(error, loaded) from None
+
+
+def _env(spec: "RunSpec", world: "World", simulation: "SimEngine", num_envs: int, name: str) -> "TaskEnv":
+    """An env on a fresh engine; the engine is destroyed if anything fails."""
+    from anysim.managers.standard import standard_managers
+    from anysim.task.env import TaskEnv
+
+    try:
+        managers = standard_managers(spec, world, num_envs)
+        simulation.create_world(world, num_envs)
+        return TaskEnv(spec, simulation, managers, name)
+    except BaseException:
+        simulation.destroy()
+        raise
+
+
 def make(
     source: str | Path | LoadedRun | dict[str, Any], *, engine: str | None = None, num_envs: int | None = None,
     seed: int | None = None, overrides: Sequence[str] = (),
@@ -97,9 +130,6 @@ def make(
         SpecError: the file, with line and column.
         CapabilityError: the engine cannot run this world; nothing was built.
     """
-    from anysim.managers.standard import standard_managers
-    from anysim.task.env import TaskEnv
-
     more = [*overrides, *([f"engine={engine}"] if engine else []), *([f"num_envs={num_envs}"] if num_envs else [])]
     if isinstance(source, LoadedRun):
         loaded = load(source.data, overrides=more) if more else source
@@ -107,18 +137,11 @@ def make(
         loaded = load(source, overrides=more)
     spec = loaded.spec
     world = compile_world(loaded)
-    simulation = create_simulation(spec.engine.name, **spec.engine.options)
+    name = str(source) if isinstance(source, str) and "/" not in str(source) else world.name
     try:
-        managers = standard_managers(spec, world, spec.num_envs)
-        simulation.create_world(world, spec.num_envs)
-        name = str(source) if isinstance(source, str) and "/" not in str(source) else world.name
-        env = TaskEnv(spec, simulation, managers, name)
+        env = _env(spec, world, create_simulation(spec.engine.name, **spec.engine.options), spec.num_envs, name)
     except SpecError as error:
-        simulation.destroy()
         raise located(error, loaded) from None
-    except BaseException:
-        simulation.destroy()
-        raise
     if seed is not None:
         env.streams.seed(seed, np.arange(spec.num_envs))
     return env

@@ -37,6 +37,12 @@ def find(kind: str, name: str) -> Callable[..., Any]:
     return functions[bare]
 
 
+def term_names(library: str) -> list[str]:
+    """The terms of a library, as `kind name`, in order."""
+    tables = registry.load("terms", library).TERMS
+    return [f"{kind} {name}" for kind in tables for name in sorted(_functions(library, kind))]
+
+
 def bind(kind: str, spec: TermSpec, scene: SceneView, path: str) -> Callable[..., Any]:
     """The term as a function of its positional arguments after `scene`, with parameters checked and names resolved.
 

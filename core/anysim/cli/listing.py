@@ -1,0 +1,64 @@
+"""`anysim list`: what is installed."""
+
+from typing import Annotated
+
+import typer
+
+from anysim.cli.options import AsJson
+
+
+def list_(
+    kind: Annotated[str, typer.Argument(metavar="KIND", help="engines, tasks, robots, controllers, terms, skills, planners, writers…")],
+    json: AsJson = False,
+) -> None:
+    """List what is installed of a kind, and where it comes from."""
+    from anysim import registry
+    from anysim.cli.output import print_json, print_table
+    from anysim.errors import PluginError, listing, suggest
+
+    if kind not in registry.KINDS:
+        raise PluginError(f"there is no kind '{kind}'{suggest(kind, list(registry.KINDS))} (kinds: {listing(registry.KINDS, 20)})")
+    rows = [{"name": name, "from": _origin(kind, name), "what": _what(kind, name)} for name in registry.names(kind)]
+    if json:
+        print_json(rows)
+    else:
+        print_table(f"{kind}: {registry.KINDS[kind]}", ("name", "from", "what"), [tuple(r.values()) for r in rows])
+
+
+def _origin(kind: str, name: str) -> str:
+    from anysim import registry
+    from anysim.errors import PluginError
+
+    try:
+        return registry.distribution(kind, name)
+    except PluginError as error:
+        return f"ambiguous: {error}"
+
+
+def _what(kind: str, name: str) -> str:
+    """One line about a plugin; a plugin that does not load says so here and hurts nothing else."""
+    from anysim import registry
+    from anysim.errors import AnysimError
+
+    try:
+        if kind == "engines":
+            here = registry.load(kind, name).availability()
+            return here.version if here.available else f"not available: {'; '.join(here.missing)}. {here.remedy}"
+        if kind == "tasks":
+            from anysim.make import load, task_path
+
+            task = load(task_path(name)).spec.task
+            return task.description if task else ""
+        if kind == "robots":
+            from anysim.world.catalogue import load_robot
+
+            robot = load_robot(name)
+            return f"{robot.category}: {robot.description} ({robot.license})"
+        if kind == "terms":
+            from anysim.task.library import term_names
+
+            return ", ".join(term_names(name))
+        doc = registry.load(kind, name).__doc__ or ""
+    except AnysimError as error:
+        return f"does not load: {error}"
+    return doc.strip().splitlines()[0] if doc.strip() else ""

@@ -1,0 +1,39 @@
+"""Tables on a terminal, plain tab-separated lines in a pipe."""
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import typer
+
+
+def interactive() -> bool:
+    """Whether a person is looking at stdout."""
+    import sys
+
+    return sys.stdout.isatty()
+
+
+def print_json(data: Any) -> None:
+    """One JSON document, keys in the order given."""
+    typer.echo(json.dumps(data, indent=2, default=str))
+
+
+def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
+    """A table for people; in a pipe a header line and a line for each row, separated by tabs."""
+    cells = [["" if cell is None else str(cell) for cell in row] for row in rows]
+    if not interactive():
+        typer.echo("\t".join(columns))
+        for row in cells:
+            typer.echo("\t".join(row))
+        return
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(title=title, title_justify="left", header_style="bold")
+    for column in columns:
+        table.add_column(column)
+    for row in cells:
+        table.add_row(*(Text(cell) for cell in row))
+    Console().print(table)

@@ -1,0 +1,133 @@
+"""`anysim run`: collect episodes of a task with its expert."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from anysim.cli.options import AsJson, Engine, NumEnvs, Overrides, Seed, Task
+
+if TYPE_CHECKING:
+    from anysim.record.collector import EpisodeResult
+    from anysim.task.env import TaskEnv
+
+
+def run(
+    task: Task,
+    engine: Engine = None,
+    num_envs: NumEnvs = None,
+    episodes: Annotated[int, typer.Option("--episodes", "-k", min=1, help="Episodes to attempt, over all envs.")] = 1,
+    seed: Seed = 0,
+    override: Overrides = None,
+    out: Annotated[Path | None, typer.Option(help="Directory of the trajectories; default runs/<task>-<engine>-<id>.")] = None,
+    min_success: Annotated[float, typer.Option(min=0.0, max=1.0, help="Exit with 1 if a smaller share succeeds.")] = 0.0,
+    json: AsJson = False,
+) -> None:
+    """Run a task's expert, and keep the trajectories that succeed.
+
+    Every trajectory is a directory with a manifest, an MCAP file and a video for each recorded camera. Running the same
+    command again goes on where an interrupted one stopped.
+
+    Examples:
+      anysim run pick_cube --num-envs 16 --episodes 64 --seed 1
+      anysim run pick_cube -o world.objects.cube.mass=0.3 --out runs/heavy
+    """
+    from anysim.make import make
+    from anysim.record.collector import Collector
+    from anysim.skills.runner import SkillPolicy
+
+    with make(task, engine=engine, num_envs=num_envs, overrides=override or ()) as env:
+        directory = out or Path("runs") / f"{env.name}-{env.engine.name}-{_run_id(env, seed)}"
+        collector = Collector(env, SkillPolicy(env), directory, episodes, seed)
+        if not json:
+            _announce(env, directory, episodes, seed, len(collector.recorder.committed()))
+        results: list[EpisodeResult] = []
+        with _progress(episodes, json) as show:
+            for result in collector.run():
+                results.append(result)
+                show(result)
+    results.sort(key=lambda r: (r.env, r.episode))
+    _report(results, directory, json)
+    if sum(r.success for r in results) < min_success * len(results):
+        raise typer.Exit(1)
+
+
+def _run_id(env: "TaskEnv", seed: int) -> str:
+    """A short name for what is run: the same command gives the same directory, another spec another one."""
+    import hashlib
+    from json import dumps
+
+    text = dumps([env.spec.to_dict(), seed], sort_keys=True)
+    return f"seed{seed}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"
+
+
+def _announce(env: "TaskEnv", directory: Path, episodes: int, seed: int, present: int) -> None:
+    typer.echo(
+        f"{env.name} on {env.engine.name} {env.engine.version}: {episodes} episodes in {env.num_envs} envs, seed {seed}"
+    )
+    for need in env.engine.approximations:
+        typer.echo(f"approximate: {need.capability} ({need.why}): {env.engine.capabilities.supported[need.capability].note}")
+    typer.echo(f"trajectories: {directory}" + (f" (resuming: {present} are there already)" if present else ""))
+
+
+@contextmanager
+def _progress(total: int, quiet: bool) -> Iterator[Any]:
+    """A progress bar for a person, a line for each episode in a pipe, nothing with --json."""
+    from anysim.cli.output import interactive
+
+    if quiet:
+        yield lambda result: None
+        return
+    if not interactive():
+        yield lambda result: typer.echo(_line(result))
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    with Progress(
+        TextColumn("episodes"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[good]} succeeded"),
+        TimeElapsedColumn(), TimeRemainingColumn(),
+    ) as progress:  # fmt: skip
+        bar = progress.add_task("episodes", total=total, good=0)
+        good = 0
+
+        def show(result: "EpisodeResult") -> None:
+            nonlocal good
+            good += result.success
+            progress.update(bar, advance=1, good=good)
+
+        yield show
+
+
+def _line(result: "EpisodeResult") -> str:
+    kept = f" -> {result.path}" if result.path else ""
+    return f"env {result.env} episode {result.episode}: {result.status} in {result.steps} steps{kept}"
+
+
+def _report(results: "list[EpisodeResult]", directory: Path, as_json: bool) -> None:
+    from anysim.cli.output import print_json, print_table
+
+    good, total = sum(r.success for r in results), len(results)
+    if as_json:
+        episodes = [
+            {
+                "env": r.env, "episode": r.episode, "episode_seed": r.episode_seed, "status": r.status, "steps": r.steps,
+                "total_reward": r.total_reward, "outcome": r.outcome, "path": str(r.path) if r.path else None,
+                "resumed": r.resumed,
+            }
+            for r in results
+        ]  # fmt: skip
+        print_json({"out": str(directory), "attempts": total, "successes": good, "episodes": episodes})
+        return
+    print_table(
+        "Episodes",
+        ("env", "episode", "status", "steps", "return", "attempts", "last phase"),
+        [
+            (r.env, r.episode, r.status, r.steps, f"{r.total_reward:.2f}", r.outcome.get("attempt"), r.outcome.get("phase"))
+            for r in results
+        ],
+    )
+    kept = sum(r.path is not None for r in results)
+    rate = f"{good / total:.1%}" if total else "none"
+    typer.echo(f"{good} of {total} attempts succeeded ({rate}); {kept} trajectories in {directory / 'episodes'}")

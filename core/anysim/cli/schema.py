@@ -1,0 +1,21 @@
+"""`anysim schema`: JSON Schemas for editors."""
+
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
+
+class Root(StrEnum):
+    """The kinds of files that have a schema."""
+
+    RUN = "run"
+    ROBOT = "robot"
+
+
+def schema(root: Annotated[Root, typer.Argument(help="run: worlds and tasks; robot: catalogue entries.")] = Root.RUN) -> None:
+    """Print the JSON Schema of a kind of file, for completion and checks in an editor."""
+    from anysim.cli.output import print_json
+    from anysim_schemas.jsonschema import schemas
+
+    print_json(schemas()[root.value])
