@@ -6,7 +6,7 @@ with a leading underscore). `num_envs` copies of one World are stepped together,
 
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -557,6 +557,18 @@ class SimEngine(ABC):
     def _contacts(self, ids: Array) -> ContactPoints:
         """Contact points of envs."""
         raise self._absent(Capability.CONTACT_POINTS)
+
+    def renderer_name(self) -> str:
+        """What draws the images (driver, software or GPU), for `anysim doctor`; empty if nothing does."""
+        return ""
+
+    def raw_loop(self) -> Callable[[int], None] | None:
+        """The engine's own loop without anysim, for benchmarks: a function of the number of physics steps.
+
+        Each call writes the drives' present commands, steps a private copy of the present state, and copies out the
+        arrays from which joint positions and velocities, body poses and twists are made. None where an engine has none.
+        """
+        return None
 
     def _absent(self, capability: Capability) -> CapabilityError:
         return CapabilityError(f"{self.name} does not have '{capability}'")

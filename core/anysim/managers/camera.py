@@ -1,11 +1,11 @@
 """CameraManager: view points are state of the world; those that look at an object are aimed when it has been placed."""
 
+import numpy as np
+
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.managers.base import Manager
 from anysim.math import pose as P
-
-import numpy as np
 
 
 class CameraManager(Manager):

@@ -7,7 +7,7 @@ from anysim.errors import TaskError
 from anysim.managers.base import Manager
 from anysim.managers.values import draw
 from anysim.math import pose as P
-from anysim.world.geometry import footprint_radius, lowest_point, top_height
+from anysim.world.geometry import EntityShape, ground_top
 from anysim.world.model import BodyKind, World
 from anysim_schemas.layout import PlacementSpec
 
@@ -26,7 +26,8 @@ class LayoutManager(Manager):
         self._order = [name for name in _support_order(self.spec.world.layout) if name in entities]
         self._roots = np.array([entities[name].root for name in self._order], dtype=int)
         self._free = np.array([world.bodies[r].kind is BodyKind.FREE for r in self._roots], dtype=bool)
-        self._radius = {name: footprint_radius(world, name) for name in self._order}
+        supports = {self.spec.world.layout[name].on for name in self._order} - {None, GROUND}
+        self._shapes = {name: EntityShape(world, name) for name in {*self._order, *supports} if name}
 
     def reset(self, env_ids: Array) -> None:
         if not self._order:
@@ -65,21 +66,22 @@ class LayoutManager(Manager):
         if entry.on is None:
             position = draw(entry.position, f"layout/{name}/position", self.streams, env, attempt)
             return np.concatenate([np.asarray(position, dtype=float), turn])
+        shape, x, y = self._shapes[name], value("x"), value("y")
         if entry.on == GROUND:
-            top = top_height(self._world, GROUND, np.array([[0, 0, 0, 0, 0, 0, 1.0]]))[0]
+            low, high = shape.bounds(np.concatenate([[x, y, 0.0], turn]))
+            top = ground_top(self._world, low[:2], high[:2])
         else:
-            top = top_height(self._world, entry.on, placed[entry.on][None])[0]
-        flat = np.concatenate([np.zeros(3), turn])[None]
-        return np.concatenate([[value("x"), value("y"), top - lowest_point(self._world, name, flat)[0]], turn])
+            top = self._shapes[entry.on].top_height(placed[entry.on])
+        return shape.resting_on(top, np.asarray(x), np.asarray(y), turn)
 
     def _crowding(self, name: str, entry: PlacementSpec, pose: Array, placed: dict[str, Array]) -> str | None:
-        """The first placed object that is nearer than the clearance, measured between circles around both footprints."""
+        """The first placed object that is nearer than the clearance, measured between balls around both."""
         if entry.clearance <= 0:
             return None
         for other, theirs in placed.items():
             if other == entry.on:
                 continue
-            gap = float(np.hypot(*(pose[:2] - theirs[:2]))) - self._radius[name] - self._radius[other]
+            gap = float(P.norm(pose[:3] - theirs[:3])) - self._shapes[name].radius - self._shapes[other].radius
             if gap < entry.clearance:
                 return other
         return None

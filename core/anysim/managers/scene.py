@@ -5,9 +5,10 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.managers.base import Manager
-from anysim.managers.values import draw_rows, is_random
+from anysim.managers.values import draw, draw_rows, is_random
 from anysim.world.colors import rgb
 from anysim.world.model import BodyKind, World
+from anysim.world.nominal import nominal
 from anysim_schemas.objects import ObjectSpec
 
 
@@ -54,16 +55,12 @@ class SceneManager(Manager):
         if is_random(obj.mass):
             ratio = draw_rows(obj.mass, f"scene/{name}/mass", self.streams, env_ids) / nominal.sum()
         else:
-            from anysim.world.compile import nominal_value
-
-            ratio = draw_rows(obj.density, f"scene/{name}/density", self.streams, env_ids) / nominal_value(obj.density)
+            ratio = draw_rows(obj.density, f"scene/{name}/density", self.streams, env_ids) / nominal(obj.density)
         self.engine.set_parameters("body.mass", ratio[:, None] * nominal, env_ids, bodies)
         inertia = np.array([i.inertia for i in inertials])
         self.engine.set_parameters("body.inertia", ratio[:, None, None] * inertia, env_ids, bodies)
 
     def _write_color(self, name: str, obj: ObjectSpec, env_ids: Array) -> None:
-        from anysim.managers.values import draw
-
         rows = [rgb(draw(obj.color, f"scene/{name}/color", self.streams, int(e))) for e in env_ids]
         self._write_geoms("geom.color", name, np.array([[[*c, 1.0]] for c in rows]), env_ids)
 

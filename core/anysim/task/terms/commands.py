@@ -10,6 +10,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.task.view import Frame, SceneView
+from anysim.world.geometry import EntityShape
 from anysim_schemas.values import FloatValue, Vec3Value
 
 __all__ = ["goal_above", "goal_at"]
@@ -30,10 +31,8 @@ def goal_above(
     scene: SceneView, draw: Draw, *, surface: Frame, height: FloatValue, x: FloatValue = 0.0, y: FloatValue = 0.0
 ) -> Array:
     """A point `height` [m] above the top of an object, at x, y [m] from its centre in the object's axes."""
-    from anysim.world.geometry import top_height  # the shapes' extents are needed here only
-
     base = surface.position
-    top = top_height(scene.engine.world, surface.name, surface.pose)
+    top = EntityShape(scene.engine.world, surface.name).top_height(surface.pose)
     dx, dy = draw("x", x), draw("y", y)
     yaw = 2.0 * np.arctan2(surface.quaternion[:, 2], surface.quaternion[:, 3])
     cosine, sine = np.cos(yaw), np.sin(yaw)

@@ -1,0 +1,55 @@
+"""`anysim bench`: what anysim costs."""
+
+from typing import Annotated
+
+import typer
+
+from anysim.cli.options import AsJson
+
+app = typer.Typer(help="Measure what anysim costs, as ratios in one run.", no_args_is_help=True)
+
+
+@app.callback()
+def _group() -> None:
+    pass
+
+
+@app.command("step")
+def step(
+    engine: Annotated[str | None, typer.Option("--engine", "-e", help="An installed engine with a raw loop.")] = None,
+    num_envs: Annotated[str, typer.Option("--num-envs", "-n", help="Numbers of envs, separated by commas.")] = "1,16,64,256",
+    task: Annotated[str, typer.Option(help="The task of the second half.")] = "pick_cube",
+    rounds: Annotated[int, typer.Option(min=1, help="Interleaved rounds; the best of each side counts.")] = 7,
+    json: AsJson = False,
+) -> None:
+    """Step through SimEngine and through a whole task, each against the engine's own loop doing the same.
+
+    First a Panda with five boxes: commands written and joint positions, velocities, body poses and twists read every
+    control step. Then the task, with observations, rewards and status.
+    """
+    from anysim.benchmark import engine_cost, env_cost
+    from anysim.cli.output import print_json, print_table
+    from anysim.engine.factory import default_engine
+    from anysim.errors import EngineError
+
+    try:
+        sizes = [int(n) for n in num_envs.split(",")]
+    except ValueError:
+        raise EngineError(f"--num-envs takes whole numbers separated by commas, got '{num_envs}'") from None
+    name = engine or default_engine()
+    costs = []
+    for n in sizes:
+        typer.echo(f"measuring {n} envs…", err=True)
+        costs += [engine_cost(name, n, rounds), env_cost(name, n, task, rounds)]
+    costs.sort(key=lambda c: c.what != "engine")
+    if json:
+        print_json([c._asdict() for c in costs])
+        return
+    print_table(
+        f"Physics steps per second on {name}, all envs together",
+        ("loop", "envs", "anysim", "raw", "ratio (wall)", "ratio (cpu)"),
+        [
+            (c.what if c.what == "engine" else task, c.num_envs, f"{c.ours:,.0f}", f"{c.raw:,.0f}", f"{c.ratio:.3f}", f"{c.cpu_ratio:.3f}")
+            for c in costs
+        ],
+    )
