@@ -11,7 +11,7 @@ from anysim import registry
 from anysim.engine.factory import create_simulation
 from anysim.errors import SpecError, SpecIssue, TaskError
 from anysim.plugin_options import resolve_options
-from anysim_schemas.load import LoadedRun, load_run
+from anysim_schemas.load import Loaded, LoadedRun, load_run
 
 if TYPE_CHECKING:
     from anysim.engine.base import SimEngine
@@ -68,7 +68,7 @@ def compile_world(source: "str | Path | LoadedRun | RunSpec | dict[str, Any]", o
 
     if isinstance(source, RunSpec):
         return compile_spec(source)
-    loaded = source if isinstance(source, LoadedRun) else load(source, overrides=overrides)
+    loaded = source if isinstance(source, Loaded) else load(source, overrides=overrides)
     base = loaded.files[-1].parent if loaded.files else None
     try:
         return compile_spec(loaded.spec, base=base)
@@ -131,7 +131,7 @@ def make(
         CapabilityError: the engine cannot run this world; nothing was built.
     """
     more = [*overrides, *([f"engine={engine}"] if engine else []), *([f"num_envs={num_envs}"] if num_envs else [])]
-    if isinstance(source, LoadedRun):
+    if isinstance(source, Loaded):
         loaded = load(source.data, overrides=more) if more else source
     else:
         loaded = load(source, overrides=more)
