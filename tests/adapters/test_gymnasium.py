@@ -1,0 +1,83 @@
+"""Gymnasium's own checker, and the vector view against SyncVectorEnv of single views."""
+
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from anysim.adapters.gymnasium import GymEnv, GymVectorEnv
+from anysim.errors import TaskError
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from tests.task.helpers import arm, blocks
+
+N = 4
+
+
+def test_check_env_passes() -> None:
+    with arm(1, "task.horizon=20") as env, warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=".*Box.*(infinity|unbounded).*")
+        warnings.filterwarnings("ignore", message=".*not having any render modes.*|.*render_mode.*")
+        warnings.filterwarnings("ignore", message=".*No render.*|.*spec.*")
+        check_env(GymEnv(env), skip_render_check=True)
+
+
+def test_a_single_view_needs_a_single_env() -> None:
+    with blocks(2) as env, pytest.raises(TaskError, match="num_envs=1"):
+        GymEnv(env)
+
+
+def same(a: Any, b: Any) -> bool:
+    if isinstance(a, dict):
+        return a.keys() == b.keys() and all(same(a[k], b[k]) for k in a)
+    if isinstance(a, np.ndarray) and a.dtype == object:
+        return len(a) == len(b) and all(same(x, y) for x, y in zip(a, b, strict=True))
+    return bool(np.array_equal(a, b))
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_the_vector_view_equals_sync_vector_env(mode: AutoresetMode) -> None:
+    def single() -> gym.Env:
+        return GymEnv(arm(1, "task.horizon=9"))
+
+    makers: list[Callable[[], gym.Env]] = [single] * N
+    sync = SyncVectorEnv(makers, autoreset_mode=mode)
+    native = GymVectorEnv(arm(N, "task.horizon=9"), mode)
+    rng = np.random.default_rng(0)
+    try:
+        a, b = sync.reset(seed=5), native.reset(seed=5)
+        assert same(a[0], b[0])
+        assert same(a[1], b[1])
+        ends = 0
+        for t in range(60):
+            if mode is AutoresetMode.DISABLED and t > 0:
+                done = a[2] | a[3]
+                # staggered ends: an extra reset of one env now and then
+                if t % 4 == 0:
+                    done = done | (np.arange(N) == (t // 4) % N)
+                if done.any():
+                    ends += int(done.sum())
+                    a = sync.reset(options={"reset_mask": done.copy()})
+                    b = native.reset(options={"reset_mask": done.copy()})
+                    assert same(a[0], b[0])
+                    assert same(a[1], b[1])
+            action = rng.uniform(-1, 1, (N, 8)).astype(np.float32)
+            a, b = sync.step(action), native.step(action)
+            for left, right in zip(a, b, strict=True):
+                assert same(left, right)
+            ends += int((a[2] | a[3]).sum())
+        assert ends > 10
+    finally:
+        sync.close()
+        native.close()
+
+
+def test_disabled_refuses_to_step_ended_envs() -> None:
+    vector = GymVectorEnv(blocks(2, "task.horizon=1"), AutoresetMode.DISABLED)
+    vector.reset(seed=0)
+    vector.step(np.zeros((2, 0)))
+    with pytest.raises(TaskError, match="reset_mask"):
+        vector.step(np.zeros((2, 0)))
+    vector.close()
