@@ -1,6 +1,7 @@
 """From a name or a file to a running env: load, compile, create, bind."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -91,8 +92,9 @@ def dry_run(loaded: LoadedRun, world: "World") -> None:
     from anysim.skills.runner import bind_skill
 
     spec = loaded.spec
+    blind = replace(world, cameras=tuple(replace(camera, channels=()) for camera in world.cameras))
     try:
-        with _env(spec, world, NullEngine(), 1, "check") as env:
+        with _env(spec, blind, NullEngine(), 1, "check") as env:
             if spec.task is not None and spec.task.expert is not None:
                 bind_skill(spec.task.expert, env)
     except SpecError as error:

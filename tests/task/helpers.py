@@ -24,7 +24,7 @@ BLOCKS: dict[str, Any] = {
             "red": {"on": "table", "x": {"range": [-0.4, 0.4]}, "y": {"range": [-0.4, 0.4]}, "yaw": {"range": [-3.0, 3.0]}},
             "ball": {"on": "table", "x": {"range": [-0.4, 0.4]}, "y": {"range": [-0.4, 0.4]}, "clearance": 0.05},
         },
-        "cameras": {"eye": {"from": [1.0, 1.0, 1.5], "look_at": "red"}},
+        "cameras": {"eye": {"from": [1.0, 1.0, 1.5], "look_at": "red", "channels": []}},
     },
     "task": {
         "horizon": 8,
@@ -40,6 +40,10 @@ BLOCKS: dict[str, Any] = {
 }
 
 
+BLIND = ("record.cameras=[]", "world.cameras.front.channels=[]", "world.cameras.wrist.channels=[]")
+"""The kinematic engine does not draw."""
+
+
 def blocks(num_envs: int = 1, *overrides: str) -> TaskEnv:
     """The blocks task on the kinematic engine. Without robots its action has no components."""
     return anysim.make(BLOCKS, num_envs=num_envs, overrides=overrides)
@@ -47,4 +51,4 @@ def blocks(num_envs: int = 1, *overrides: str) -> TaskEnv:
 
 def arm(num_envs: int = 1, *overrides: str, engine: str = "null") -> TaskEnv:
     """pick_cube without cameras, by default on the kinematic engine."""
-    return anysim.make("pick_cube", engine=engine, num_envs=num_envs, overrides=["record.cameras=[]", *overrides])
+    return anysim.make("pick_cube", engine=engine, num_envs=num_envs, overrides=[*BLIND, *overrides])
