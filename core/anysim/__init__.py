@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 _LAZY = {
-    "make": "anysim.make",
-    "load": "anysim.make",
-    "compile_world": "anysim.make",
+    "make": "anysim.api",
+    "load": "anysim.api",
+    "compile_world": "anysim.api",
     "create_simulation": "anysim.engine.factory",
     "SimEngine": "anysim.engine.base",
     "World": "anysim.world.model",
@@ -22,9 +22,9 @@ __all__ = [*_LAZY, "__version__"]
 if TYPE_CHECKING:
     from anysim.engine.base import SimEngine as SimEngine
     from anysim.engine.factory import create_simulation as create_simulation
-    from anysim.make import compile_world as compile_world
-    from anysim.make import load as load
-    from anysim.make import make as make
+    from anysim.api import compile_world as compile_world
+    from anysim.api import load as load
+    from anysim.api import make as make
     from anysim.task.env import TaskEnv as TaskEnv
     from anysim.world.model import World as World
 

@@ -47,7 +47,7 @@ def engine_cost(engine_name: str, num_envs: int, rounds: int = 7) -> StepCost:
         EngineError: the engine offers no raw loop.
     """
     from anysim.engine.factory import create_simulation
-    from anysim.make import compile_world
+    from anysim.api import compile_world
 
     world = compile_world(panda_and_boxes())
     with create_simulation(engine_name) as engine:
@@ -67,7 +67,7 @@ def engine_cost(engine_name: str, num_envs: int, rounds: int = 7) -> StepCost:
 
 def env_cost(engine_name: str, num_envs: int, task: str = "pick_cube", rounds: int = 7) -> StepCost:
     """A whole task step (action, physics, status, reward, observation) against the raw loop of its world."""
-    from anysim.make import make
+    from anysim.api import make
 
     with make(task, engine=engine_name, num_envs=num_envs, overrides=["task.horizon=1000000000"]) as env:
         env.reset(seed=0)

@@ -178,7 +178,7 @@ class GymVectorEnv(VectorEnv[dict[str, Array], Array, Any]):
 
 def make_gym(source: Any, *, autoreset_mode: AutoresetMode | str | None = None, render_mode: str | None = None, **options: Any) -> Any:
     """`make_gym("pick_cube")` is a single env; with `num_envs` in `options` and an autoreset mode, a vector env."""
-    from anysim.make import make
+    from anysim.api import make
 
     if autoreset_mode is None:
         return GymEnv(make(source, **(options | {"num_envs": 1})), render_mode)

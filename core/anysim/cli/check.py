@@ -40,7 +40,7 @@ def check_one(name: str, engine: str | None, all_engines: bool, overrides: list[
     from anysim.engine.capability import check as check_capabilities
     from anysim.engine.needs import needs_of
     from anysim.errors import AnysimError, SpecError
-    from anysim.make import compile_world, dry_run, load
+    from anysim.api import compile_world, dry_run, load
 
     try:
         loaded = load(Path(name) if Path(name).exists() else name, overrides=overrides)

@@ -45,7 +45,7 @@ def _what(kind: str, name: str) -> str:
             here = registry.load(kind, name).availability()
             return here.version if here.available else f"not available: {'; '.join(here.missing)}. {here.remedy}"
         if kind == "tasks":
-            from anysim.make import load, task_path
+            from anysim.api import load, task_path
 
             task = load(task_path(name)).spec.task
             return task.description if task else ""

@@ -34,7 +34,7 @@ def run(
       anysim run pick_cube --num-envs 16 --episodes 64 --seed 1
       anysim run pick_cube -o world.objects.cube.mass=0.3 --out runs/heavy
     """
-    from anysim.make import make
+    from anysim.api import make
     from anysim.record.collector import Collector
     from anysim.skills.runner import SkillPolicy
 

@@ -45,7 +45,7 @@ class ReplayResult:
 
 def rebuild(manifest: Manifest, engine: str | None = None) -> TaskEnv:
     """The env of a recording, alone: one env, whatever their number was."""
-    from anysim.make import make
+    from anysim.api import make
 
     spec: dict[str, Any] = dict(manifest.spec) | {"num_envs": 1}
     if engine is not None and engine != manifest.engine:
