@@ -1,5 +1,6 @@
 """From a name or a file to a running env: load, compile, create, bind."""
 
+import json
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib.resources import files
@@ -132,7 +133,7 @@ def make(
         SpecError: the file, with line and column.
         CapabilityError: the engine cannot run this world; nothing was built.
     """
-    more = [*overrides, *([f"engine={engine}"] if engine else []), *([f"num_envs={num_envs}"] if num_envs else [])]
+    more = [*overrides, *([f"engine={json.dumps(engine)}"] if engine else []), *([f"num_envs={num_envs}"] if num_envs else [])]
     if isinstance(source, Loaded):
         loaded = load(source.data, overrides=more) if more else source
     else:
