@@ -1,0 +1,134 @@
+"""The command line as a user types it, each call in a process of its own."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+FAST = ["-o", "record.cameras=[]"]
+
+
+def anysim(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "anysim.cli", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, cwd=cwd, check=False)
+
+
+def manifests(out: Path) -> dict[str, dict[str, object]]:
+    found = {}
+    for path in sorted((out / "episodes").glob("*/manifest.json")):
+        data = json.loads(path.read_text())
+        data.pop("clock")
+        found[path.parent.name] = data
+    return found
+
+
+def test_help_teaches() -> None:
+    text = anysim("--help").stdout
+    for word in ("run", "replay", "check", "list", "doctor", "audit", "schema", "bench", "Exit codes"):
+        assert word in text
+    assert "anysim run pick_cube --num-envs 16" in anysim("run", "--help").stdout
+
+
+def test_help_loads_nothing_heavy() -> None:
+    code = (
+        "import sys\nsys.argv = ['anysim', '--help']\nfrom anysim.cli.main import main\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+        "heavy = [m for m in ('numpy', 'mujoco', 'gymnasium', 'pydantic', 'trimesh', 'scipy') if m in sys.modules]\n"
+        "assert not heavy, heavy\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, timeout=60)
+
+
+def test_list_names_what_is_installed() -> None:
+    rows = json.loads(anysim("list", "engines", "--json").stdout)
+    assert {"mujoco", "null"} <= {row["name"] for row in rows}
+    assert "pick_cube" in anysim("list", "tasks").stdout
+    assert "franka_panda" in anysim("list", "robots").stdout
+    wrong = anysim("list", "robotz")
+    assert wrong.returncode == 2
+    assert "did you mean 'robots'" in wrong.stderr
+
+
+def test_a_wrong_task_name_says_what_exists() -> None:
+    result = anysim("run", "pick_cub")
+    assert result.returncode == 2
+    assert "did you mean 'pick_cube'" in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_doctor_reports_every_engine() -> None:
+    rows = {row["what"]: row for row in json.loads(anysim("doctor", "--json").stdout)}
+    assert rows["mujoco: physics"]["state"] == "ok"
+    assert rows["engine: null"]["state"] == "ok"
+
+
+def test_schema_is_json() -> None:
+    assert "properties" in json.loads(anysim("schema", "run").stdout)
+
+
+def test_the_same_command_twice_gives_the_same_manifests_and_fewer_envs_the_same_episodes(tmp_path: Path) -> None:
+    def run(name: str, envs: int, episodes: int) -> dict[str, dict[str, object]]:
+        out = tmp_path / name
+        result = anysim("run", "pick_cube", "-n", str(envs), "-k", str(episodes), "-s", "1", "--out", str(out), *FAST)
+        assert result.returncode == 0, result.stderr
+        return manifests(out)
+
+    first, second = run("a", 4, 4), run("b", 4, 4)
+    assert first == second
+    assert len(first) == 4
+    fewer = run("c", 2, 2)
+    for name, manifest in fewer.items():
+        theirs = dict(first[name])
+        manifest.pop("spec"), theirs.pop("spec")  # the number of envs is in it
+        assert manifest == theirs
+
+
+def test_a_replay_in_another_process_is_identical(tmp_path: Path) -> None:
+    assert anysim("run", "pick_cube", "-n", "2", "-k", "2", "--out", str(tmp_path), *FAST).returncode == 0
+    result = anysim("replay", str(tmp_path), "--json")
+    assert result.returncode == 0, result.stderr
+    report = json.loads(result.stdout)
+    assert report["replayed"] == report["identical"] == 2
+
+
+def test_a_killed_run_leaves_whole_trajectories_and_goes_on(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "anysim.cli", "run", "pick_cube", "-n", "2", "-k", "8", "--out", str(tmp_path), *FAST]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    episodes = tmp_path / "episodes"
+    deadline = time.monotonic() + 240
+    try:
+        while not (episodes.exists() and any(episodes.iterdir())) and time.monotonic() < deadline:
+            time.sleep(0.02)
+            assert process.poll() is None, process.communicate()[1]
+        os.kill(process.pid, signal.SIGKILL)
+    finally:
+        process.kill()
+        process.communicate()
+    from anysim.record.verify import verify
+
+    survived = sorted(p.name for p in episodes.iterdir())
+    assert 1 <= len(survived) < 8
+    assert all(verify(episodes / name) == [] for name in survived)
+    result = anysim("run", "pick_cube", "-n", "2", "-k", "8", "--out", str(tmp_path), *FAST)
+    assert result.returncode == 0, result.stderr
+    assert f"resuming: {len(survived)} are there already" in result.stdout
+    assert len(manifests(tmp_path)) == 8
+    untouched = tmp_path.with_name("reference")
+    assert anysim("run", "pick_cube", "-n", "2", "-k", "8", "--out", str(untouched), *FAST).returncode == 0
+    assert manifests(tmp_path) == manifests(untouched), "an interrupted run ends where an uninterrupted one does"
+
+
+@pytest.mark.slow
+def test_sixteen_envs_succeed_and_replay_to_the_bit(tmp_path: Path) -> None:
+    arguments = ("run", "pick_cube", "-n", "16", "-k", "64", "-s", "1", "--min-success", "0.95", "--out", str(tmp_path))
+    result = anysim(*arguments)
+    assert result.returncode == 0, result.stdout + result.stderr
+    replayed = anysim("replay", str(tmp_path), "--json")
+    assert replayed.returncode == 0, replayed.stderr
+    report = json.loads(replayed.stdout)
+    assert report["identical"] == report["replayed"] >= 61
