@@ -52,7 +52,7 @@ def _what(kind: str, name: str) -> str:
         if kind == "robots":
             from anysim.world.catalogue import load_robot
 
-            robot = load_robot(name)
+            robot = load_robot(name).spec
             return f"{robot.category}: {robot.description} ({robot.license})"
         if kind == "terms":
             from anysim.task.library import term_names

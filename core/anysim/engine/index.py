@@ -105,7 +105,7 @@ class Index:
         if name in self._bodies or name in self._entities:
             return FrameIndex(name, self.body(name), (0.0, 0.0, 0.0), IDENTITY_QUATERNION)
         tools = [f"{r.name}.{t}" for r in self._robots.values() for t in r.tools]
-        known = [*self._entities, *tools, *self._bodies, *self._sites]
+        known = list(dict.fromkeys([*self._entities, *tools, *self._bodies, *self._sites]))
         raise NameLookupError(
             f"the world '{self.world.name}' has no frame named '{name}'{suggest(name, known)} "
             f"(frames: {listing(known, 20)})"
