@@ -27,7 +27,7 @@ from anysim.world.model import (
 
 
 class Link(NamedTuple):
-    """A link and the joint that moves it: rest frame in the previous link (xyz [m], rpy [rad]), axis, anchor, limits."""
+    """A link and the joint that moves it: rest frame in the previous link (xyz [m], rpy [rad]), axis and limits."""
 
     xyz: Vec3
     rpy: Vec3 = ORIGIN

@@ -232,6 +232,43 @@ def damped_solve(jac: Array, free: Array, damping: float, error: Array, matrix: 
 
 
 @compiled
+def bounded_move(
+    jac: Array, error: Array, damping: float, q: Array, lower: Array, upper: Array, pull: Array, free: Array,
+    move: Array, wanted: Array, matrix: Array, solution: Array,
+) -> None:  # fmt: skip
+    """move (K,): the least |J^T move - error|^2 + damping |move - pull|^2 with lower <= q + move <= upper.
+
+    Joints that are not `free` stay where they are. A joint that would leave its limits is set on them, and the others
+    are solved again to make up for it.
+    """
+    joints = q.shape[0]
+    for k in range(joints):
+        move[k] = 0.0
+    for _ in range(joints + 1):
+        for i in range(6):
+            wanted[i] = error[i]
+        for k in range(joints):
+            known = pull[k] if free[k] else move[k]
+            if known != 0.0:
+                for i in range(6):
+                    wanted[i] -= jac[k, i] * known
+        damped_solve(jac, free, damping, wanted, matrix, solution)
+        settled = True
+        for k in range(joints):
+            if not free[k]:
+                continue
+            move[k] = pull[k]
+            for i in range(6):
+                move[k] += jac[k, i] * solution[i]
+            if q[k] + move[k] < lower[k]:
+                move[k], free[k], settled = lower[k] - q[k], False, False
+            elif q[k] + move[k] > upper[k]:
+                move[k], free[k], settled = upper[k] - q[k], False, False
+        if settled:
+            return
+
+
+@compiled
 def errors(error: Array, vector: Array, weight: Array) -> tuple[float, float]:
     """Distance [m] and angle [rad] of a residual; rotations of zero weight do not count."""
     angle = 0.0
@@ -265,17 +302,17 @@ def solve_rows(
 ) -> None:  # fmt: skip
     """Levenberg-Marquardt from the seed, then from random starts, until a row converges.
 
-    A step solves (J J^T + (m |r|^2 + e) 1) y = r, dq = J^T y over the joints that are not pressed against a limit, is
-    shortened to MAX_MOVE and clipped to the limits. It is kept if |r| falls; m shrinks with success and grows with
-    failure. Damping in proportion to |r|^2 dies out near a solution, where convergence becomes quadratic. An attempt
-    ends when STALLS steps in a row gain little: another start is cheaper than a slow valley.
+    A step is a `bounded_move` damped by m |r|^2, shortened to MAX_MOVE. It is kept if |r| falls; m shrinks with success
+    and grows with failure. Damping in proportion to |r|^2 dies out near a solution, where convergence becomes
+    quadratic. An attempt ends when STALLS steps in a row gain little: another start is cheaper than a slow valley.
     """
     joints = seeds.shape[1]
     rot, pos, tmp_a, tmp_b = np.empty((3, 3)), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     pose, axes, points = np.empty((3, 4)), np.empty((joints, 3)), np.empty((joints, 3))
     vector, error, solution, matrix = np.empty(3), np.empty(6), np.empty(6), np.empty((6, 6))
     jac, free = np.empty((joints, 6)), np.empty(joints, np.bool_)
-    q, trial, trial_error = np.empty(joints), np.empty(joints), np.empty(6)
+    q, trial, move, still = np.empty(joints), np.empty(joints), np.empty(joints), np.zeros(joints)
+    trial_error, wanted = np.empty(6), np.empty(6)
     for row in range(targets.shape[0]):
         target_in_root(targets[row], base[row], rot, pos, tmp_a, tmp_b)
         best = np.inf
@@ -300,27 +337,23 @@ def solve_rows(
                 if done or used >= max_iterations or stalled >= STALLS:
                     break
                 jacobian(prismatic, pose, axes, points, vector, weight, jac)
-                for k in range(joints):
-                    pull = 0.0
-                    for i in range(6):
-                        pull += jac[k, i] * error[i]
-                    free[k] = not ((q[k] <= lower[k] and pull < 0.0) or (q[k] >= upper[k] and pull > 0.0))
                 before = cost
                 # The frame of the kept position is needed only for its Jacobian, so trials may overwrite it.
                 while used < max_iterations and factor < 1e4:
                     used += 1
-                    damped_solve(jac, free, factor * 2.0 * before + 1e-8, error, matrix, solution)
+                    for k in range(joints):
+                        downhill = 0.0
+                        for i in range(6):
+                            downhill += jac[k, i] * error[i]
+                        free[k] = not ((q[k] <= lower[k] and downhill < 0.0) or (q[k] >= upper[k] and downhill > 0.0))
+                    damping = factor * 2.0 * before + 1e-8
+                    bounded_move(jac, error, damping, q, lower, upper, still, free, move, wanted, matrix, solution)
                     longest = 0.0
                     for k in range(joints):
-                        move = 0.0
-                        if free[k]:
-                            for i in range(6):
-                                move += jac[k, i] * solution[i]
-                        trial[k] = move
-                        longest = max(longest, abs(move))
+                        longest = max(longest, abs(move[k]))
                     scale = min(1.0, MAX_MOVE / longest) if longest > 0.0 else 1.0
                     for k in range(joints):
-                        trial[k] = min(max(q[k] + scale * trial[k], lower[k]), upper[k])
+                        trial[k] = min(max(q[k] + scale * move[k], lower[k]), upper[k])
                     forward(frames, prismatic, trial, pose, axes, points)
                     cost = residual(pose, rot, pos, weight, vector, trial_error)
                     if cost < before:
@@ -347,10 +380,9 @@ def step_rows(
     gain: float, damping: float, targets: Array, base: Array, now: Array, posture: Array,
     joint_pos: Array, position_error: Array, angle_error: Array,
 ) -> None:  # fmt: skip
-    """One step d of each row: the least |W (J d - r)|^2 + damping^2 |d - gain (posture - q)|^2 within the limits.
+    """One `bounded_move` of each row, pulled by gain (posture - q), then scaled so that no joint exceeds max_step.
 
-    Joints that would leave their limits are set on them and the others solved again. Where the tool leaves freedom the
-    posture has it all; where it does not, the posture pulls with the square of the damping only.
+    Where the tool leaves freedom the posture has it all; elsewhere it pulls with the square of the damping only.
     """
     joints = now.shape[1]
     rot, pos, tmp_a, tmp_b = np.empty((3, 3)), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
@@ -363,31 +395,12 @@ def step_rows(
         for k in range(joints):
             q[k] = min(max(now[row, k], lower[k]), upper[k])
             pull[k] = gain * (posture[row, k] - q[k])
-            move[k] = 0.0
             free[k] = True
         forward(frames, prismatic, q, pose, axes, points)
         residual(pose, rot, pos, weight, vector, error)
         position_error[row], angle_error[row] = errors(error, vector, weight)
         jacobian(prismatic, pose, axes, points, vector, weight, jac)
-        for _ in range(joints + 1):
-            for i in range(6):
-                wanted[i] = error[i]
-                for k in range(joints):
-                    wanted[i] -= jac[k, i] * (pull[k] if free[k] else move[k])
-            damped_solve(jac, free, damping * damping, wanted, matrix, solution)
-            settled = True
-            for k in range(joints):
-                if not free[k]:
-                    continue
-                move[k] = pull[k]
-                for i in range(6):
-                    move[k] += jac[k, i] * solution[i]
-                if q[k] + move[k] < lower[k]:
-                    move[k], free[k], settled = lower[k] - q[k], False, False
-                elif q[k] + move[k] > upper[k]:
-                    move[k], free[k], settled = upper[k] - q[k], False, False
-            if settled:
-                break
+        bounded_move(jac, error, damping * damping, q, lower, upper, pull, free, move, wanted, matrix, solution)
         scale = 1.0
         for k in range(joints):
             if abs(move[k]) > max_step[k]:
