@@ -168,7 +168,7 @@ def residual(pose: Array, rot: Array, pos: Array, weight: Array, vector: Array, 
 def jacobian(
     prismatic: Array, pose: Array, axes: Array, points: Array, vector: Array, weight: Array, out: Array
 ) -> None:
-    """out (K, 6): what a unit of each joint takes off the residual, row k for joint k."""
+    """What a unit of each joint takes off the residual, into out (K, 6): row k for joint k."""
     vx, vy, vz = vector[0], vector[1], vector[2]
     square = vx * vx + vy * vy + vz * vz
     # log(exp(-d) exp(v)) = v - L d with L = 1 - [v]/2 + c [v]^2
@@ -198,7 +198,7 @@ def jacobian(
 
 @compiled
 def damped_solve(jac: Array, free: Array, damping: float, error: Array, matrix: Array, solution: Array) -> None:
-    """solution (6,) of (J_free^T J_free + damping 1) x = error by Cholesky; J is (K, 6), damping > 0."""
+    """Solve (J_free^T J_free + damping 1) x = error by Cholesky, into solution (6,); J is (K, 6), damping > 0."""
     for i in range(6):
         for j in range(i + 1):
             matrix[i, j] = 0.0
@@ -236,7 +236,7 @@ def bounded_move(
     jac: Array, error: Array, damping: float, q: Array, lower: Array, upper: Array, pull: Array, free: Array,
     move: Array, wanted: Array, matrix: Array, solution: Array,
 ) -> None:  # fmt: skip
-    """move (K,): the least |J^T move - error|^2 + damping |move - pull|^2 with lower <= q + move <= upper.
+    """The least |J^T move - error|^2 + damping |move - pull|^2 with lower <= q + move <= upper, into move (K,).
 
     Joints that are not `free` stay where they are. A joint that would leave its limits is set on them, and the others
     are solved again to make up for it.

@@ -12,7 +12,10 @@ from anysim.planning.api import IkRequest, IkResult, IkStep, InverseKinematics
 from anysim.planning.chain import Chain
 
 BLOCK = 64
-"""Rows a thread takes at a time; batches up to this size stay on the calling thread."""
+"""Rows a thread takes at a time. A row with restarts costs ten times another: blocks keep threads equally busy."""
+
+SHARED_FROM = 4 * BLOCK
+"""Rows from which on a batch is shared between threads; below, starting them costs more than they bring."""
 
 LENGTH_PER_REACH = 0.3
 """The length that makes an angle comparable to a distance, as a part of the arm's reach. Needs the fewest iterations
@@ -66,7 +69,6 @@ class NumbaIk(InverseKinematics):
         self._length = LENGTH_PER_REACH * (np.sqrt((self._frames[:, :, 3] ** 2).sum(axis=1)).sum() or 1.0)
         self._spread = np.where(chain.prismatic, 1.0, np.pi)  # random starts of joints without limits
         self._threads = threads or _cores()
-        self._pool = ThreadPoolExecutor(self._threads, "numba_ik") if self._threads > 1 else None
         self._warm_up()
 
     def _solve(self, request: IkRequest, random_restarts: int, rng_seeds: Array) -> IkResult:
@@ -85,11 +87,12 @@ class NumbaIk(InverseKinematics):
                 *(array[part] for array in result),
             )  # fmt: skip
 
-        if self._pool is None or rows <= BLOCK:
+        if self._threads == 1 or rows < SHARED_FROM:
             block(slice(0, rows))
         else:
-            # Rows that need restarts cost ten times the others; small blocks keep the threads equally busy.
-            list(self._pool.map(block, [slice(i, i + BLOCK) for i in range(0, rows, BLOCK)]))
+            # A pool a call, so that there is nothing to close and nothing that a fork could lose.
+            with ThreadPoolExecutor(self._threads, "numba_ik") as pool:
+                list(pool.map(block, [slice(i, i + BLOCK) for i in range(0, rows, BLOCK)]))
         return result
 
     def _step(self, request: IkRequest, max_step: Array, posture: Array, posture_gain: float, damping: float) -> IkStep:
@@ -111,8 +114,10 @@ class NumbaIk(InverseKinematics):
 
 
 def canonical_frames(chain: Chain) -> Array:
-    """Constant transforms [R | p] (K+1, 3, 4), one before each joint and one for the tool, of the same chain with every
-    joint about or along the z axis of its frame and through its origin."""
+    """Constant transforms [R | p] (K+1, 3, 4), one before each joint and one for the tool.
+
+    They make the same chain, but every joint is about or along the z axis of its frame, through its origin.
+    """
     frames = np.empty((len(chain) + 1, 3, 4))
     undo = P.pose((0.0, 0.0, 0.0), IDENTITY_QUATERNION)  # from a joint's canonical frame back to its body's, at zero
     for k in range(len(chain)):

@@ -1,5 +1,7 @@
 """The solver as skills see it: it finds what can be reached, says what cannot, and a row's answer is its own."""
 
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -13,7 +15,7 @@ from anysim.planning.chain import Chain
 from anysim.planning.linear import straight_line
 from anysim.testing.arms import Link, panda_arm, serial_arm
 from anysim.world.model import JointType
-from anysim_ik.planner import BLOCK, NumbaIk
+from anysim_ik.planner import SHARED_FROM, NumbaIk
 
 ROOT = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 
@@ -94,12 +96,13 @@ def rows(asked: dict[str, Any], which: Any) -> dict[str, Any]:
 
 
 def test_a_row_is_the_same_bits_in_any_batch_order_and_number_of_threads(panda: NumbaIk) -> None:
-    n = 3 * BLOCK + 17
+    n = SHARED_FROM + 17
     asked = reachable(panda.chain, n, 2)
     asked["targets"][::7, 2] += 3.0  # some that use up all restarts
     together = NumbaIk(panda.chain, threads=1).solve(**asked, random_restarts=5)
     for threads in (2, 3):
         assert same_bits(NumbaIk(panda.chain, threads=threads).solve(**asked, random_restarts=5), together)
+    assert not [t.name for t in threading.enumerate() if t.name.startswith("numba_ik")]
     order = np.random.default_rng(3).permutation(n)
     shuffled = panda.solve(**rows(asked, order), random_restarts=5)
     assert same_bits(shuffled, IkResult(*(array[order] for array in together)))
@@ -107,6 +110,14 @@ def test_a_row_is_the_same_bits_in_any_batch_order_and_number_of_threads(panda: 
         part = slice(i, i + 1)
         alone = panda.solve(**rows(asked, part), random_restarts=5)
         assert same_bits(alone, IkResult(*(array[part] for array in together)))
+
+
+def test_one_solver_serves_several_threads(panda: NumbaIk) -> None:
+    asked = reachable(panda.chain, 60, 17)
+    expected = panda.solve(**asked, random_restarts=5)
+    with ThreadPoolExecutor(4) as pool:
+        answers = list(pool.map(lambda _: panda.solve(**asked, random_restarts=5), range(16)))
+    assert all(same_bits(answer, expected) for answer in answers)
 
 
 def test_the_random_starts_of_a_row_come_from_its_own_seed(panda: NumbaIk) -> None:
