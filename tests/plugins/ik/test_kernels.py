@@ -124,6 +124,24 @@ def test_damped_solve_is_finite_for_a_singular_system() -> None:
     assert np.isfinite(solution).all()
 
 
+def test_a_bounded_move_is_within_bounds_and_the_best_for_the_joints_that_are_inside() -> None:
+    rng = np.random.default_rng(5)
+    pressed = 0
+    for _ in range(100):
+        jac, error, pull = rng.normal(size=(7, 6)), rng.normal(size=6), 0.3 * rng.normal(size=7)
+        q, lower, upper = np.zeros(7), rng.uniform(-0.5, 0.0, 7), rng.uniform(0.0, 0.5, 7)
+        move, damping = np.empty(7), 0.01
+        spare = (np.empty(6), np.empty((6, 6)), np.empty(6))
+        kernels.bounded_move(jac, error, damping, q, lower, upper, pull, np.ones(7, bool), move, *spare)
+        assert (move >= lower).all()
+        assert (move <= upper).all()
+        slope = jac @ (jac.T @ move - error) + damping * (move - pull)
+        inside = (move > lower) & (move < upper)
+        np.testing.assert_allclose(slope[inside], 0.0, atol=1e-9)
+        pressed += int((~inside).sum())
+    assert pressed > 100
+
+
 def test_the_generator_matches_the_published_algorithm_and_is_uniform() -> None:
     # The first outputs of SplitMix64 from state 1234567, a common reference.
     published = [6457827717110365317, 3203168211198807973, 9817491932198370423, 4593380528125082431]

@@ -165,6 +165,13 @@ def test_a_seed_beyond_the_limits_is_brought_back(panda: NumbaIk) -> None:
     check(panda, asked, result)
 
 
+def test_a_solution_beyond_the_limits_is_none(panda: NumbaIk) -> None:
+    q = panda.chain.initial[None] + np.array([[0.0, 0.0, 0.0, 2.2, 0.0, 0.0, 0.0]])
+    asked = {"targets": panda.chain.tool_pose(ROOT[None], q), "base": ROOT[None], "seeds": q}
+    result = panda.solve(**asked, random_restarts=0, rng_seeds=np.zeros(1, np.uint64))
+    check(panda, asked, result)
+
+
 def test_a_free_axis_leaves_the_turn_about_it_open(panda: NumbaIk) -> None:
     asked = reachable(panda.chain, 100, 9)
     free = panda.solve(**asked, random_restarts=50, rotation_weight=(1.0, 1.0, 0.0))
