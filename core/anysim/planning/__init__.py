@@ -1,1 +1,1 @@
-""" """
+"""Engine-neutral motion: kinematic chains, inverse kinematics and straight tool paths."""
