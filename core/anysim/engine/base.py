@@ -558,6 +558,14 @@ class SimEngine(ABC):
         """Contact points of envs."""
         raise self._absent(Capability.CONTACT_POINTS)
 
+    def read_back(self) -> Mapping[str, Array]:
+        """What the engine itself says of env 0, for an audit, beyond its parameters.
+
+        Any of `joint.limits` (J, 2) [rad, m], infinite where there is none, and `geom.volume` (G,) [m^3] of the shapes
+        that collide, 0 for planes and height fields.
+        """
+        return {}
+
     def renderer_name(self) -> str:
         """What draws the images (driver, software or GPU), for `anysim doctor`; empty if nothing does."""
         return ""
