@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+
 from anysim.record.frame import Frame
 from anysim.record.header import ArrayLayout, EpisodeHeader, Header, RunHeader, StateLayout
 from anysim.record.recorder import Recorder

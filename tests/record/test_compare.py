@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from anysim.errors import RecordError
 from anysim.record.compare import compare_states
 

@@ -1,10 +1,12 @@
 """A disk that fails at every stage of the protocol: nothing partial is visible, nothing is left, the next one works."""
 
 import errno
+import itertools
 import os
 from pathlib import Path
 
 import pytest
+
 from anysim.errors import RecordError
 from anysim.record import commit as protocol
 from anysim.record.header import EpisodeHeader
@@ -14,18 +16,16 @@ from anysim.record.recorder import Recorder
 FULL = OSError(errno.ENOSPC, "No space left on device")
 
 
-class Failing:
-    """Calls through, except that the n-th call with an argument that `when` accepts fails."""
+def failing(real, when=lambda *args: True, nth=1):
+    """Calls through, except that the n-th call with arguments that `when` accepts fails."""
+    calls = itertools.count(1)
 
-    def __init__(self, real, when=lambda *args: True, nth=1):
-        self.real, self.when, self.left = real, when, nth
+    def call(*args, **kwargs):
+        if when(*args) and next(calls) == nth:
+            raise FULL
+        return real(*args, **kwargs)
 
-    def __call__(self, *args, **kwargs):
-        if self.when(*args):
-            self.left -= 1
-            if self.left == 0:
-                raise FULL
-        return self.real(*args, **kwargs)
+    return call
 
 
 def is_rename_into_place(source, target):
@@ -36,14 +36,14 @@ FAULTS = {
     "begin": lambda patch, writer: patch.setattr(writer, "fail_at", "begin"),
     "append": lambda patch, writer: patch.setattr(writer, "fail_at", "append"),
     "finish": lambda patch, writer: patch.setattr(writer, "fail_at", "finish"),
-    "fsync of the first file": lambda patch, writer: patch.setattr(os, "fsync", Failing(os.fsync, nth=1)),
-    "fsync of the second file": lambda patch, writer: patch.setattr(os, "fsync", Failing(os.fsync, nth=2)),
-    "hash": lambda patch, writer: patch.setattr(protocol, "describe", Failing(protocol.describe)),
-    "fsync of the manifest": lambda patch, writer: patch.setattr(os, "fsync", Failing(os.fsync, nth=3)),
-    "manifest": lambda patch, writer: patch.setattr(protocol, "write_durably", Failing(protocol.write_durably)),
-    "fsync of the directory": lambda patch, writer: patch.setattr(os, "fsync", Failing(os.fsync, nth=4)),
-    "rename": lambda patch, writer: patch.setattr(os, "rename", Failing(os.rename, is_rename_into_place)),
-    "fsync of the parent": lambda patch, writer: patch.setattr(os, "fsync", Failing(os.fsync, nth=5)),
+    "fsync of the first file": lambda patch, writer: patch.setattr(os, "fsync", failing(os.fsync, nth=1)),
+    "fsync of the second file": lambda patch, writer: patch.setattr(os, "fsync", failing(os.fsync, nth=2)),
+    "hash": lambda patch, writer: patch.setattr(protocol, "describe", failing(protocol.describe)),
+    "fsync of the manifest": lambda patch, writer: patch.setattr(os, "fsync", failing(os.fsync, nth=3)),
+    "manifest": lambda patch, writer: patch.setattr(protocol, "write_durably", failing(protocol.write_durably)),
+    "fsync of the directory": lambda patch, writer: patch.setattr(os, "fsync", failing(os.fsync, nth=4)),
+    "rename": lambda patch, writer: patch.setattr(Path, "rename", failing(Path.rename, is_rename_into_place)),
+    "fsync of the parent": lambda patch, writer: patch.setattr(os, "fsync", failing(os.fsync, nth=5)),
 }
 
 
@@ -96,7 +96,7 @@ def test_an_error_of_another_kind_discards_too(tmp_path, writer, run_header, mak
 
 def test_a_disk_that_is_full_from_the_start(tmp_path, writer, run_header, monkeypatch):
     with monkeypatch.context() as patch:
-        patch.setattr(os, "fsync", Failing(os.fsync))
+        patch.setattr(os, "fsync", failing(os.fsync))
         with pytest.raises(RecordError, match="cannot record into"):
             Recorder(tmp_path / "run", writer, run_header)
     assert list((tmp_path / "run").iterdir()) == []
@@ -112,3 +112,20 @@ def test_a_writer_cannot_place_files_elsewhere(tmp_path, writer, run_header, rec
         with pytest.raises(RecordError, match=r"'\.\./run\.json' cannot be a file of a trajectory"):
             record(recorder)
         assert recorder.committed() == set()
+
+
+@pytest.mark.parametrize(
+    ("number", "remedy"),
+    [
+        (errno.EMFILE, r"Too many open files .*Allow more open files \(ulimit -n\)"),
+        (errno.EROFS, "Read-only file system .*Make the directory writable"),
+        (errno.EFBIG, "File too large .*Make room"),
+    ],
+)
+def test_the_remedy_fits_the_trouble(number, remedy, tmp_path, writer, run_header, record, monkeypatch):
+    def begin(self, directory, header):
+        raise OSError(number, os.strerror(number), str(directory))
+
+    monkeypatch.setattr(writer, "begin", begin)
+    with Recorder(tmp_path, writer, run_header) as recorder, pytest.raises(RecordError, match=remedy):
+        record(recorder)

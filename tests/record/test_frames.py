@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from anysim.conventions import xyzw_from_wxyz
 from anysim.engine.commands import Control
 from anysim.engine.state import State

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from anysim.errors import RecordError
 from anysim.record.frame import state_digest
 from anysim.record.header import EpisodeHeader
@@ -149,7 +150,9 @@ def test_resuming_lists_only_names_of_trajectories(tmp_path, writer, run_header,
 
 def test_misuse_is_explained(tmp_path, writer, run_header, make_frame):
     with Recorder(tmp_path, writer, run_header) as recorder:
-        with pytest.raises(RecordError, match=r"no trajectory of env 4 is being written \(open: none\); call start\(\)"):
+        with pytest.raises(
+            RecordError, match=r"no trajectory of env 4 is being written \(open: none\); call start\(\)"
+        ):
             recorder.append(4, make_frame(0))
         recorder.start(episode(4))
         with pytest.raises(RecordError, match=r"env 4 has a trajectory open \(env 4, episode 0\); commit or discard"):

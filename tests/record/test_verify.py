@@ -1,6 +1,7 @@
 import json
 
 import pytest
+
 from anysim import registry
 from anysim.errors import RecordError
 from anysim.record.manifest import read_manifest

@@ -49,9 +49,9 @@ def publish(incoming: Path, final: Path) -> None:
         OSError: it is not visible, unless even taking it back failed.
     """
     fsync(incoming)
-    os.rename(incoming, final)
+    incoming.rename(final)
     try:
         fsync(final.parent)
     except OSError:
-        os.rename(final, incoming)
+        final.rename(incoming)
         raise

@@ -49,7 +49,8 @@ class Drift(NamedTuple):
     def __str__(self) -> str:
         if self.identical:
             return f"identical, bit for bit, over {self.recorded_steps} steps"
-        lines = [f"differs from step {self.first_step} on (of {self.recorded_steps} recorded, {self.replayed_steps} replayed)"]
+        steps = f"of {self.recorded_steps} recorded, {self.replayed_steps} replayed"
+        lines = [f"differs from step {self.first_step} on ({steps})"]
         for name, field in self.fields.items():
             if not field.identical:
                 lines.append(
@@ -66,7 +67,8 @@ def compare_states(recorded: Mapping[str, Array], replayed: Mapping[str, Array])
     """
     if recorded.keys() != replayed.keys():
         raise RecordError(
-            f"recorded and replayed states hold different arrays: {listing(sorted(recorded))} and {listing(sorted(replayed))}"
+            "recorded and replayed states hold different arrays: "
+            f"{listing(sorted(recorded))} and {listing(sorted(replayed))}"
         )
     lengths = [_steps(recorded, "recorded"), _steps(replayed, "replayed")]
     common = min(lengths)
@@ -74,7 +76,9 @@ def compare_states(recorded: Mapping[str, Array], replayed: Mapping[str, Array])
     for name in sorted(recorded):
         a, b = recorded[name][:common], replayed[name][:common]
         if a.shape != b.shape:
-            raise RecordError(f"'{name}' was recorded as {a.shape[1:]} and replayed as {b.shape[1:]}; the worlds differ")
+            raise RecordError(
+                f"'{name}' was recorded as {a.shape[1:]} and replayed as {b.shape[1:]}; the worlds differ"
+            )
         fields[name] = _field(name, np.asarray(a, np.float64), np.asarray(b, np.float64))
     return Drift(fields, *lengths)
 

@@ -12,6 +12,7 @@ from anysim.record.frame import Frame, state_digest
 from anysim.record.header import Header
 from anysim.record.writer import TrajectoryWriter
 
+FLOAT64 = np.dtype(np.float64)
 MAX_TIME = 2.0**63 / 1e9
 """Log times are 64-bit nanoseconds."""
 
@@ -105,13 +106,12 @@ class Episode:
             images=self._checked_images(step, frame.images),
         )
 
-    def _array(
-        self, what: str, step: int, values: Any, shape: tuple[int, ...], dtype: Any = np.dtype(np.float64)
-    ) -> Array:
+    def _array(self, what: str, step: int, values: Any, shape: tuple[int, ...], dtype: Any = FLOAT64) -> Array:
         array = np.asarray(values)
         if array.shape != shape or not np.can_cast(array.dtype, dtype):
             raise RecordError(
-                f"{self.where}, step {step}: {what} has shape {array.shape} of {array.dtype}; the layout says {shape} of {dtype}"
+                f"{self.where}, step {step}: {what} has shape {array.shape} of {array.dtype}; "
+                f"the layout says {shape} of {dtype}"
             )
         return np.asarray(array, dtype=dtype, order="C")
 
@@ -123,14 +123,15 @@ class Episode:
             if len(bad):
                 at = tuple(int(i) for i in bad[0])
                 raise RecordError(
-                    f"{self.where}, step {step}: {name}{list(at)} is {array[at]}; a trajectory holds finite numbers only: "
-                    "discard the trajectory of an env whose state is at fault"
+                    f"{self.where}, step {step}: {name}{list(at)} is {array[at]}; a trajectory holds finite numbers "
+                    "only: discard the trajectory of an env whose state is at fault"
                 )
 
     def _same_names(self, what: str, step: int, given: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
         if given.keys() != wanted.keys():
             raise RecordError(
-                f"{self.where}, step {step}: {what} has {listing(sorted(given))}; the layout says {listing(sorted(wanted))}"
+                f"{self.where}, step {step}: {what} has {listing(sorted(given))}; "
+                f"the layout says {listing(sorted(wanted))}"
             )
 
     def _checked_obs(self, step: int, obs: Mapping[str, Array]) -> dict[str, Array]:
@@ -146,7 +147,7 @@ class Episode:
             camera, image = self.header.episode.cameras[name], images[name]
             if image.shape != (camera.height, camera.width, 3) or image.dtype != np.uint8:
                 raise RecordError(
-                    f"{self.where}, step {step}: the image of camera '{name}' has shape {image.shape} of {image.dtype}; "
-                    f"({camera.height}, {camera.width}, 3) of uint8 expected"
+                    f"{self.where}, step {step}: the image of camera '{name}' has shape {image.shape} of "
+                    f"{image.dtype}; ({camera.height}, {camera.width}, 3) of uint8 expected"
                 )
         return {name: images[name] for name in due}

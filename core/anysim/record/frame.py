@@ -60,7 +60,7 @@ def state_rows(state: State, env: int, fields: Iterable[str], control: Control |
 
 
 def state_digest(state: Mapping[str, Array]) -> str:
-    """SHA-256 over names, shapes and the bits of the float64 values; equal states of equal layout have equal digests."""
+    """SHA-256 over names, shapes and the bits of the float64 values, whatever the order of the names."""
     digest = hashlib.sha256(b"anysim-state-1")
     for name in sorted(state):
         values = np.ascontiguousarray(state[name], dtype="<f8")

@@ -3,11 +3,11 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
-from anysim_schemas.base import Name, Positive, Spec
 from pydantic import Field, field_validator
 
 from anysim.conventions import Array
 from anysim.world.model import Camera, World
+from anysim_schemas.base import Name, Positive, Spec
 
 MAX_VALUES = 1 << 20
 """No array of one frame has more numbers than this."""
@@ -124,8 +124,10 @@ def state_layout(
 
 
 def camera_info(world: World, camera: Camera, every: int, pose: Array | None = None) -> CameraInfo:
-    """A camera of a World as a recorder wants it; `pose` (7,) overrides the one in the World (a camera that looks at
-    something is aimed anew at each reset)."""
+    """A camera of a World as a recorder wants it.
+
+    `pose` (7,) overrides the one in the World: a camera that looks at something is aimed anew at each reset.
+    """
     values = [*camera.position, *camera.quaternion] if pose is None else [float(x) for x in pose]
     return CameraInfo.model_validate(
         {

@@ -47,7 +47,7 @@ class Incoming:
         return path
 
     def close(self) -> None:
-        """Leave, and remove the directory if nobody else is in it. What this leaves behind, the next recorder sweeps."""
+        """Leave, and remove the directory if nobody else is in it. What stays behind, the next recorder sweeps."""
         try:
             self._lock.release()
             self.path.rmdir()

@@ -50,8 +50,8 @@ def checked_file_name(name: str) -> str:
     """
     if _FILE.fullmatch(name) is None or name == MANIFEST_FILE:
         raise RecordError(
-            f"{name!r} cannot be a file of a trajectory; letters, digits, '_', '.' and '-' are allowed, the first one a "
-            f"letter or digit, and {MANIFEST_FILE} is taken"
+            f"{name!r} cannot be a file of a trajectory; letters, digits, '_', '.' and '-' are allowed, the first one "
+            f"a letter or digit, and {MANIFEST_FILE} is taken"
         )
     return name
 

@@ -4,13 +4,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from anysim_schemas.base import Name, Spec
 from pydantic import Field, ValidationError, model_validator
 
 from anysim.errors import RecordError
 from anysim.record.header import CameraInfo, Count, EpisodeHeader, Header, Label, RunHeader
 from anysim.record.layout import MANIFEST_FILE, RUN_FILE, checked_file_name
 from anysim.record.plain import load_json
+from anysim_schemas.base import Name, Spec
 
 TRAJECTORY_FORMAT = "anysim-trajectory-1"
 RUN_FORMAT = "anysim-run-1"
@@ -54,7 +54,7 @@ class Manifest(RunHeader):
     initial_digest: Digest | None = None
     final_digest: Digest
     outcome: dict[str, Any] = Field(default_factory=dict, description="what the collector says about it")
-    cameras: dict[Name, CameraEntry] = Field(default_factory=dict)
+    cameras: dict[Name, CameraEntry] = Field(default_factory=dict, description="those that took an image")
     files: dict[str, FileEntry]
     clock: dict[str, Any] = Field(default_factory=dict, description="all that differs between equal runs")
 

@@ -37,7 +37,9 @@ def plain(value: Any, where: str = "value") -> Any:
         return {str(key): plain(item, f"{where}.{key}") for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [plain(item, f"{where}[{i}]") for i, item in enumerate(value)]
-    raise RecordError(f"{where} is a {type(value).__name__}, which JSON cannot hold; numbers, strings and lists of them can")
+    raise RecordError(
+        f"{where} is a {type(value).__name__}, which JSON cannot hold; numbers, strings and lists of them can"
+    )
 
 
 def dump_json(value: Any, where: str = "value") -> bytes:

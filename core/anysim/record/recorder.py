@@ -17,7 +17,13 @@ from anysim.record.frame import Frame
 from anysim.record.header import EpisodeHeader, Header, RunHeader
 from anysim.record.incoming import Incoming, remove
 from anysim.record.layout import (
-    EPISODES, MANIFEST_FILE, RUN_FILE, checked_file_name, parse_trajectory, trajectories, trajectory_name,
+    EPISODES,
+    MANIFEST_FILE,
+    RUN_FILE,
+    checked_file_name,
+    parse_trajectory,
+    trajectories,
+    trajectory_name,
 )  # fmt: skip
 from anysim.record.manifest import CameraEntry, Manifest, RunRecord, read_run
 from anysim.record.plain import dump_json, plain
@@ -103,7 +109,9 @@ class Recorder:
         env = episode.env
         self._require_open()
         if env in self._attempts:
-            raise RecordError(f"env {env} has a trajectory open ({self._attempts[env].episode.where}); commit or discard it")
+            raise RecordError(
+                f"env {env} has a trajectory open ({self._attempts[env].episode.where}); commit or discard it"
+            )
         final = self._final(episode)
         if final.exists():
             raise RecordError(_taken(final))
@@ -217,7 +225,8 @@ class Recorder:
         attempt = self._attempts.get(env)
         if attempt is None:
             raise RecordError(
-                f"no trajectory of env {env} is being written (open: {listing(map(str, self.open_envs))}); call start() first"
+                f"no trajectory of env {env} is being written (open: {listing(map(str, self.open_envs))}); "
+                "call start() first"
             )
         return attempt
 
@@ -282,6 +291,12 @@ def _taken(final: Path) -> str:
 
 def _trouble(what: str, error: OSError, out: Path) -> str:
     """The sentence for a failed write: which path, how much space there is, what remains, what to do."""
+    if error.errno in (errno.EMFILE, errno.ENFILE):
+        remedy = "Allow more open files (ulimit -n), or record fewer envs at once: each has one, and one per camera"
+    elif error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
+        remedy = "Make the directory writable, or record into another one"
+    else:
+        remedy = "Make room, or record into another directory, and start it again"
     path = error.filename or out
     existing = next((p for p in (out, *out.parents) if p.exists()), Path())
     try:
@@ -290,5 +305,5 @@ def _trouble(what: str, error: OSError, out: Path) -> str:
         free = "its free space is unknown"
     return (
         f"{what}: {error.strerror or error} ({path}; {free}). What was unfinished of it is discarded, committed "
-        "trajectories are whole. Make room, or record into another directory, and start it again"
+        f"trajectories are whole. {remedy}"
     )

@@ -11,7 +11,7 @@ from anysim.errors import RecordError
 MAX_FILE = 8 << 30
 MAX_RECORD = 64 << 20
 MAX_CHUNK = 64 << 20
-"""Bytes of a file, of one record, and of one chunk when decompressed. A writer's chunks are at most 16 MiB and a frame."""
+"""Bytes of a file, of one record, and of one decompressed chunk; a writer's chunks are at most 16 MiB and a frame."""
 
 
 def records(path: Path) -> Iterator[Any]:
@@ -55,4 +55,6 @@ def _check_chunk(path: Path, chunk: Any, zstandard: Any) -> None:
         raise RecordError(f"{path} is compressed by {chunk.compression!r}; a trajectory's writer uses zstd or nothing")
     real = zstandard.frame_content_size(chunk.data) if chunk.compression else len(chunk.data)
     if chunk.uncompressed_size > MAX_CHUNK or real != chunk.uncompressed_size:
-        raise RecordError(f"{path} is damaged: a chunk of {real} bytes claims {chunk.uncompressed_size}, at most {MAX_CHUNK}")
+        raise RecordError(
+            f"{path} is damaged: a chunk of {real} bytes claims {chunk.uncompressed_size}, at most {MAX_CHUNK}"
+        )

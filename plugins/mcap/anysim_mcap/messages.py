@@ -92,7 +92,12 @@ class FrameEncoder:
             for i, name in enumerate(sorted(layout.state))
         ]
         self._obs = [
-            (name, block_head(FIRST_ARRAY + i, np.dtype(layout.obs[name].dtype).itemsize * math.prod(layout.obs[name].shape)))
+            (
+                name,
+                block_head(
+                    FIRST_ARRAY + i, np.dtype(layout.obs[name].dtype).itemsize * math.prod(layout.obs[name].shape)
+                ),
+            )
             for i, name in enumerate(sorted(layout.obs))
         ]
 

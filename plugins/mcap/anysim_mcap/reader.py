@@ -119,7 +119,9 @@ class McapReader(TrajectoryReader):
         entry = self.manifest.cameras.get(name)
         if entry is None:
             names = sorted(self.manifest.cameras)
-            raise RecordError(f"{self.directory} has no camera '{name}'{suggest(name, names)} (cameras: {listing(names)})")
+            raise RecordError(
+                f"{self.directory} has no camera '{name}'{suggest(name, names)} (cameras: {listing(names)})"
+            )
         return entry
 
     def _held(self, topic: str, value: Any) -> tuple[Any, ...]:
@@ -170,7 +172,9 @@ class McapReader(TrajectoryReader):
 
     def _array(self, name: str, values: Any, shape: tuple[int, ...], dtype: Any) -> Array:
         if len(values) != math.prod(shape):
-            raise RecordError(f"{self._path} is inconsistent: {name} has {len(values)} numbers; the manifest says {shape}")
+            raise RecordError(
+                f"{self._path} is inconsistent: {name} has {len(values)} numbers; the manifest says {shape}"
+            )
         return np.array(values, dtype=dtype).reshape(shape)
 
     def _event(self, topic: str, message: Any) -> tuple[int, Any]:

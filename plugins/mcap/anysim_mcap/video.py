@@ -11,6 +11,10 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.errors import RecordError
 
+REPRODUCIBLE = "mbtree=0:rc-lookahead=0"
+"""Parameters of x264: its macroblock tree, fed by the look-ahead, depends on memory that nobody has written, and equal
+images gave different files."""
+
 BT709 = 1
 """The colour space that the file declares, and that images are converted to (value of ITU-T H.273)."""
 
@@ -32,7 +36,8 @@ class VideoWriter:
         self._clock = 1 / rate
         self._container: Any = av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"})
         try:
-            stream: Any = self._container.add_stream("libx264", rate=rate, options={"crf": str(crf), "preset": preset})
+            quality = {"crf": str(crf), "preset": preset, "x264-params": REPRODUCIBLE}
+            stream: Any = self._container.add_stream("libx264", rate=rate, options=quality)
         except ValueError as error:
             self.abort()
             raise RecordError("this PyAV has no H.264 encoder (libx264); install the `av` wheel from PyPI") from error
@@ -62,9 +67,9 @@ class VideoWriter:
 
     def abort(self) -> None:
         """Close the file in whatever state."""
-        import av
+        from av.error import FFmpegError
 
-        with suppress(OSError, av.FFmpegError):
+        with suppress(OSError, FFmpegError):
             self._container.close()
 
 
@@ -75,13 +80,14 @@ def images(path: Path, width: int, height: int) -> Iterator[Array]:
         RecordError: it is not a video of this size, or is damaged.
     """
     import av
+    from av.error import FFmpegError
 
     try:
         with av.open(str(path), "r", format="mp4") as container:
             stream = _stream(path, container, width, height)
             for frame in container.decode(stream):
                 yield frame.to_ndarray(format="rgb24")[:height, :width]
-    except av.FFmpegError as error:
+    except FFmpegError as error:
         raise RecordError(f"{path} does not decode: {error.strerror}") from error
 
 
@@ -92,12 +98,13 @@ def count_frames(path: Path, width: int, height: int) -> int:
         RecordError: it is not a video of this size, or is damaged.
     """
     import av
+    from av.error import FFmpegError
 
     try:
         with av.open(str(path), "r", format="mp4") as container:
             stream = _stream(path, container, width, height)
             return sum(packet.size > 0 for packet in container.demux(stream))
-    except av.FFmpegError as error:
+    except FFmpegError as error:
         raise RecordError(f"{path} cannot be read as a video: {error.strerror}") from error
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from anysim.conventions import Array
 
-VARINT, FIXED64, LENGTH, FIXED32 = 0, 1, 2, 5
+VARINT, FIXED64, LENGTH = 0, 1, 2
 """Wire types."""
 
 _DOUBLE = struct.Struct("<d")

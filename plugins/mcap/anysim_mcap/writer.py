@@ -4,7 +4,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, Annotated, Any, ClassVar, Literal
 
-from anysim_schemas.base import Spec
 from pydantic import Field, ValidationError
 
 import anysim_mcap
@@ -16,6 +15,7 @@ from anysim.record.writer import TrajectoryWriter, WrittenFile
 from anysim_mcap import messages as m
 from anysim_mcap.video import VideoWriter, frame_rate
 from anysim_mcap.wire import TransformsEncoder
+from anysim_schemas.base import Spec
 
 TRAJECTORY_FILE = "trajectory.mcap"
 SPEC_ATTACHMENT = "spec.json"
@@ -111,7 +111,8 @@ class McapWriter(TrajectoryWriter):
             name, video = next(iter(self._videos.items()))
             video.close()
             del self._videos[name]
-            files.append(WrittenFile(_video_file(name), name, video.frames))
+            if video.frames:  # a camera that took no image makes no file
+                files.append(WrittenFile(_video_file(name), name, video.frames))
         return tuple(files)
 
     def abort(self) -> None:
@@ -158,7 +159,9 @@ class McapWriter(TrajectoryWriter):
             for topic, name in (("/action", m.ACTION), ("/state", m.STATE), ("/collect", m.COLLECT))
         )
         self._annotation, self._words = (
-            self._channel(topic, self._mcap.register_schema(schema["title"], "jsonschema", m.json_bytes(schema)), "json")
+            self._channel(
+                topic, self._mcap.register_schema(schema["title"], "jsonschema", m.json_bytes(schema)), "json"
+            )
             for topic, schema in (("/annotation", m.ANNOTATION_SCHEMA), ("/language", m.LANGUAGE_SCHEMA))
         )
         transforms = register_schema(self._mcap, FrameTransforms)
