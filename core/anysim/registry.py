@@ -20,6 +20,7 @@ KINDS: Mapping[str, str] = {
     "skills": "skills",
     "planners": "planners",
     "writers": "record writers",
+    "readers": "record readers, by the writer's name",
     "importers": "asset importers, by file format",
 }
 """The kinds that anysim looks up, and what each is."""
@@ -27,6 +28,7 @@ KINDS: Mapping[str, str] = {
 INSTALL_HINTS: Mapping[tuple[str, str], str] = {
     ("engines", "mujoco"): "anysim-mujoco",
     ("writers", "mcap"): "anysim-mcap",
+    ("readers", "mcap"): "anysim-mcap",
     ("planners", "numba_ik"): "anysim-ik",
     ("importers", "mjcf"): "anysim-mujoco",
 }

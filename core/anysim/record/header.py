@@ -1,0 +1,146 @@
+"""What is known before the first frame: of a run, and of one of its trajectories. All of it goes to disk as it is."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Annotated, Any, Literal, NamedTuple
+
+from pydantic import Field, field_validator
+
+from anysim.conventions import Array
+from anysim.world.model import Camera, World
+from anysim_schemas.base import Name, Positive, Spec
+
+MAX_VALUES = 1 << 20
+"""No array of one frame has more numbers than this."""
+
+Count = Annotated[int, Field(ge=0, lt=1 << 53)]
+Size = Annotated[int, Field(ge=0, le=MAX_VALUES)]
+Label = Annotated[str, Field(max_length=1024)]
+Pose7 = tuple[float, float, float, float, float, float, float]
+
+
+class ArrayLayout(Spec):
+    """Shape and number type of an array of one env."""
+
+    shape: tuple[Size, ...]
+    dtype: Literal["float32", "float64"] = "float64"
+
+
+class StateLayout(Spec):
+    """The meaning of a frame's arrays, by name, so that a reader needs no engine and no world.
+
+    `action` names the components of an action; `state` gives the shape of each state array (always float64); `obs` the
+    observation groups.
+    """
+
+    bodies: tuple[Label, ...] = ()
+    joints: tuple[Label, ...] = ()
+    actuators: tuple[Label, ...] = ()
+    action: tuple[Label, ...] = ()
+    state: dict[Name, tuple[Size, ...]] = Field(default_factory=dict)
+    obs: dict[Name, ArrayLayout] = Field(default_factory=dict)
+
+    @field_validator("state")
+    @classmethod
+    def _not_a_clock(cls, state: dict[str, Any]) -> dict[str, Any]:
+        taken = sorted({"step", "time"} & state.keys())
+        if taken:
+            raise ValueError(f"{taken[0]} is recorded by itself and cannot be a state array; choose another name")
+        return state
+
+
+class CameraInfo(Spec):
+    """A camera whose images are recorded.
+
+    `pose` [x, y, z, qx, qy, qz, qw] is that of its optical frame in `parent` (a body, or `world`); `fov` is vertical
+    [degrees]. An image belongs to each control step that `every` divides.
+    """
+
+    width: Annotated[int, Field(gt=0, le=8192)]
+    height: Annotated[int, Field(gt=0, le=8192)]
+    every: Annotated[int, Field(gt=0)] = 1
+    fov: Annotated[float, Field(gt=0, lt=180)] = 60.0
+    parent: Label = "world"
+    pose: Pose7 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+class RunHeader(Spec):
+    """What all trajectories of a run have in common."""
+
+    task: Label
+    seed: Count
+    engine: Label
+    engine_version: Label
+    world_hash: Label
+    control_dt: Positive = Field(description="[s]")
+    layout: StateLayout
+    spec: dict[str, Any] = Field(default_factory=dict, description="the resolved RunSpec, as plain data")
+    packages: dict[str, str] = Field(default_factory=dict, description="versions of the distributions involved")
+
+
+class EpisodeHeader(Spec):
+    """One trajectory of a run: which env, which episode, and what was drawn for it."""
+
+    env: Annotated[int, Field(ge=0, lt=10**9)]
+    episode: Annotated[int, Field(ge=0, lt=10**9)]
+    episode_seed: Annotated[int, Field(ge=0)]
+    drawn: dict[str, Any] = Field(default_factory=dict, description="randomised values, by name")
+    instruction: str = Field(default="", max_length=1 << 16, description="the task in words, for this episode")
+    cameras: dict[Name, CameraInfo] = Field(default_factory=dict)
+
+
+class Header(NamedTuple):
+    """Everything a writer knows when it begins."""
+
+    run: RunHeader
+    episode: EpisodeHeader
+
+
+def state_layout(
+    world: World, fields: Iterable[str], action: Sequence[str], obs: Mapping[str, Array] | None = None
+) -> StateLayout:
+    """The layout of frames of a World.
+
+    Args:
+        fields: names of `State` arrays and of `control_position`, `control_velocity`, `control_effort`.
+        action: names of the action's components.
+        obs: an example of one env's observation groups; `images/…` are left out.
+    """
+    bodies, joints, drives = len(world.bodies), len(world.joints), len(world.actuators)
+    shapes = {
+        "body_pose": (bodies, 7), "body_twist": (bodies, 6),
+        "joint_pos": (joints,), "joint_vel": (joints,), "joint_effort": (joints,),
+        "contact_force": (len(world.contact_sensors), 3),
+        "control_position": (drives,), "control_velocity": (drives,), "control_effort": (drives,),
+    }  # fmt: skip
+    groups = {} if obs is None else {k: v for k, v in obs.items() if not k.startswith("images/")}
+    return StateLayout(
+        bodies=tuple(b.name for b in world.bodies),
+        joints=tuple(j.name for j in world.joints),
+        actuators=tuple(a.name for a in world.actuators),
+        action=tuple(action),
+        state={name: shapes[name] for name in fields},
+        obs={k: ArrayLayout.model_validate({"shape": v.shape, "dtype": str(v.dtype)}) for k, v in groups.items()},
+    )
+
+
+def camera_info(world: World, camera: Camera, every: int, pose: Array | None = None) -> CameraInfo:
+    """A camera of a World as a recorder wants it.
+
+    `pose` (7,) overrides the one in the World: a camera that looks at something is aimed anew at each reset.
+    """
+    values = [*camera.position, *camera.quaternion] if pose is None else [float(x) for x in pose]
+    return CameraInfo.model_validate(
+        {
+            "width": camera.width,
+            "height": camera.height,
+            "every": every,
+            "fov": camera.fov,
+            "parent": "world" if camera.body < 0 else world.bodies[camera.body].name,
+            "pose": tuple(values),
+        }
+    )
+
+
+def image_interval(control_dt: float, fps: float) -> int:
+    """Every how many control steps an image is taken so that the video has about `fps` frames per second [Hz]."""
+    return max(1, round(1.0 / (control_dt * fps)))

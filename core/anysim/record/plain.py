@@ -1,0 +1,67 @@
+"""Plain data and the one way to write it as JSON: sorted keys, two spaces, shortest exact floats."""
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from anysim.errors import RecordError
+
+MAX_JSON_BYTES = 16 << 20
+"""Larger JSON files are refused, unread."""
+
+
+def plain(value: Any, where: str = "value") -> Any:
+    """The same data as str, int, float, bool, None, list and dict; numpy arrays become lists.
+
+    JSON has no infinity: such floats become the strings `inf`, `-inf` and `nan`, which a spec reads back as floats.
+
+    Raises:
+        RecordError: something that JSON cannot say, by its place.
+    """
+    if value is None or isinstance(value, bool | str):
+        return value
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist(), where)
+    if isinstance(value, int):
+        return int(value)
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else str(float(value))
+    if isinstance(value, Mapping):
+        for key in value:
+            if not isinstance(key, str):
+                raise RecordError(f"{where} has the key {key!r}; keys must be strings")
+        return {str(key): plain(item, f"{where}.{key}") for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item, f"{where}[{i}]") for i, item in enumerate(value)]
+    raise RecordError(
+        f"{where} is a {type(value).__name__}, which JSON cannot hold; numbers, strings and lists of them can"
+    )
+
+
+def dump_json(value: Any, where: str = "value") -> bytes:
+    """The bytes of a JSON file: equal data gives equal bytes."""
+    text = json.dumps(plain(value, where), sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False)
+    return (text + "\n").encode()
+
+
+def load_json(path: Path) -> Any:
+    """The data of a JSON file of at most MAX_JSON_BYTES.
+
+    Raises:
+        RecordError: the file is missing, too large, or not JSON.
+    """
+    try:
+        with path.open("rb") as file:
+            data = file.read(MAX_JSON_BYTES + 1)
+    except OSError as error:
+        raise RecordError(f"{path} cannot be read: {error.strerror or error}") from error
+    if len(data) > MAX_JSON_BYTES:
+        raise RecordError(f"{path} is larger than {MAX_JSON_BYTES >> 20} MiB; it is not what a recorder wrote")
+    try:
+        return json.loads(data.decode())
+    except (ValueError, RecursionError) as error:
+        raise RecordError(f"{path} is not JSON: {error}") from error

@@ -1,0 +1,73 @@
+"""Is a committed trajectory what its recorder committed?"""
+
+from pathlib import Path
+
+from anysim.errors import PluginError, RecordError, listing
+from anysim.record.commit import describe
+from anysim.record.layout import EPISODES, MANIFEST_FILE, parse_trajectory, trajectories
+from anysim.record.manifest import Manifest, read_manifest
+from anysim.record.reader import open_trajectory
+
+
+def verify(directory: str | Path) -> list[str]:
+    """The faults of a trajectory, as sentences; empty if it is whole. Reads every byte.
+
+    Finds a manifest that is damaged, missing and additional files, changed bytes, and content that contradicts the
+    manifest. The manifest itself carries no signature: who can change everything can change everything.
+    """
+    path = Path(directory)
+    try:
+        manifest = read_manifest(path)
+    except RecordError as error:
+        return [str(error)]
+    faults = _names(path, manifest) + _bytes(path, manifest)
+    if faults:
+        return faults
+    try:
+        return open_trajectory(path).faults()
+    except (RecordError, PluginError) as error:
+        return [str(error)]
+
+
+def verify_run(out: str | Path) -> dict[str, list[str]]:
+    """The faults of all trajectories of a run, by name.
+
+    Raises:
+        RecordError: there is no such run.
+    """
+    run = Path(out)
+    if not (run / EPISODES).is_dir():
+        raise RecordError(f"{run} holds no trajectories; the directory of a run has {EPISODES}/ in it")
+    return {path.name: verify(path) for path in trajectories(run)}
+
+
+def _names(path: Path, manifest: Manifest) -> list[str]:
+    faults: list[str] = []
+    if parse_trajectory(path.name) not in (None, (manifest.env, manifest.episode)):
+        faults.append(f"{path} holds env {manifest.env}, episode {manifest.episode}")
+    there = {entry.name for entry in path.iterdir()} - {MANIFEST_FILE}
+    missing, extra = sorted(manifest.files.keys() - there), sorted(there - manifest.files.keys())
+    if missing:
+        faults.append(f"{path} lacks {listing(missing)}")
+    if extra:
+        faults.append(f"{path} has files that its manifest doesn't know: {listing(extra)}")
+    return faults
+
+
+def _bytes(path: Path, manifest: Manifest) -> list[str]:
+    faults: list[str] = []
+    for name, entry in sorted(manifest.files.items()):
+        file = path / name
+        if file.is_symlink() or (file.exists() and not file.is_file()):
+            faults.append(f"{file} is not a plain file")
+        elif file.exists():
+            try:
+                found = describe(file)
+            except OSError as error:
+                faults.append(f"{file} cannot be read: {error.strerror}")
+                continue
+            if found.bytes != entry.bytes:
+                faults.append(f"{file} has {found.bytes} bytes; {entry.bytes} were committed")
+            elif found.sha256 != entry.sha256:
+                faults.append(f"{file} was changed after its commit (its SHA-256 differs)")
+    return faults

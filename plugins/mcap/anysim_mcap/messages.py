@@ -1,0 +1,171 @@
+"""The messages of a trajectory: their schemas, built at run time from the layout, and how frames become their bytes.
+
+| topic | schema | content |
+|---|---|---|
+| /action | anysim.Action | values: float64 |
+| /state | anysim.State | one `repeated double` per state array, flattened in row-major order |
+| /collect | anysim.Collect | reward, status, and `obs_<group>` |
+| /tf | foxglove.FrameTransforms | the bodies in the world |
+| /tf_static | foxglove.FrameTransforms | the cameras' optical frames, once |
+| /camera/<name>/calibration | foxglove.CameraCalibration | once |
+| /annotation, /language | JSON with a JSON Schema | when they change |
+
+Every message but foxglove's has `step`; the first three have `time` [s].
+"""
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.record.header import CameraInfo, StateLayout
+from anysim_mcap.wire import FIXED64, VARINT, block, block_head, double, tag, varint
+
+FIRST_ARRAY = 10
+"""Arrays have field numbers from here on, in the order of their sorted names."""
+
+ACTION, STATE, COLLECT = "anysim.Action", "anysim.State", "anysim.Collect"
+OBS_PREFIX = "obs_"
+_STEP, _TIME = tag(1, VARINT), tag(2, FIXED64)
+_REWARD = tag(3, FIXED64)
+
+ANNOTATION_SCHEMA = {
+    "title": "anysim.Annotation",
+    "description": "What holds from this control step on.",
+    "type": "object",
+    "properties": {"step": {"type": "integer"}, "annotations": {"type": "object"}},
+    "required": ["step", "annotations"],
+}
+LANGUAGE_SCHEMA = {
+    "title": "anysim.Language",
+    "description": "The instruction in force from this control step on.",
+    "type": "object",
+    "properties": {"step": {"type": "integer"}, "text": {"type": "string"}},
+    "required": ["step", "text"],
+}
+
+
+def json_bytes(value: Any) -> bytes:
+    """Compact, deterministic JSON."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+
+
+# ---------------------------------------------------------------------- schemas
+
+
+def file_descriptor_set(name: str, layout: StateLayout) -> bytes:
+    """The serialised FileDescriptorSet of one of the anysim messages."""
+    from google.protobuf.descriptor_pb2 import FieldDescriptorProto as F
+    from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSet
+
+    one, many = F.LABEL_OPTIONAL, F.LABEL_REPEATED
+    fields = [("step", 1, F.TYPE_UINT64, one), ("time", 2, F.TYPE_DOUBLE, one)]
+    if name == ACTION:
+        fields.append(("values", FIRST_ARRAY, F.TYPE_DOUBLE, many))
+    elif name == STATE:
+        fields += [(key, FIRST_ARRAY + i, F.TYPE_DOUBLE, many) for i, key in enumerate(sorted(layout.state))]
+    else:
+        fields += [("reward", 3, F.TYPE_DOUBLE, one), ("status", 4, F.TYPE_STRING, one)]
+        for i, key in enumerate(sorted(layout.obs)):
+            kind = F.TYPE_DOUBLE if layout.obs[key].dtype == "float64" else F.TYPE_FLOAT
+            fields.append((OBS_PREFIX + key, FIRST_ARRAY + i, kind, many))
+    package, _, bare = name.rpartition(".")
+    file = FileDescriptorProto(name=f"{package}/{bare}.proto", package=package, syntax="proto3")
+    message = file.message_type.add(name=bare)
+    for field, number, kind, label in fields:
+        message.field.add(name=field, number=number, type=kind, label=label)
+    return FileDescriptorSet(file=[file]).SerializeToString(deterministic=True)
+
+
+# ---------------------------------------------------------------------- content
+
+
+class FrameEncoder:
+    """Frames to the bytes of anysim's messages."""
+
+    def __init__(self, layout: StateLayout) -> None:
+        self._action = block_head(FIRST_ARRAY, 8 * len(layout.action))
+        self._state = [
+            (name, block_head(FIRST_ARRAY + i, 8 * math.prod(layout.state[name])))
+            for i, name in enumerate(sorted(layout.state))
+        ]
+        self._obs = [
+            (
+                name,
+                block_head(
+                    FIRST_ARRAY + i, np.dtype(layout.obs[name].dtype).itemsize * math.prod(layout.obs[name].shape)
+                ),
+            )
+            for i, name in enumerate(sorted(layout.obs))
+        ]
+
+    def start(self, step: int, time: float) -> bytes:
+        """The fields that the messages of one frame share."""
+        return _STEP + varint(step) + _TIME + double(time)
+
+    def action(self, start: bytes, action: Array) -> bytes:
+        """anysim.Action."""
+        return start + self._action + action.tobytes()
+
+    def state(self, start: bytes, state: Any) -> bytes:
+        """anysim.State."""
+        parts = [start]
+        for name, head in self._state:
+            parts.append(head)
+            parts.append(state[name].tobytes())
+        return b"".join(parts)
+
+    def collect(self, start: bytes, reward: float, status: str, obs: Any) -> bytes:
+        """anysim.Collect."""
+        parts = [start, _REWARD, double(reward), block(4, status.encode())]
+        for name, head in self._obs:
+            parts.append(head)
+            parts.append(obs[name].tobytes())
+        return b"".join(parts)
+
+
+def camera_frame(name: str) -> str:
+    """The id of a camera's optical frame."""
+    return f"camera/{name}"
+
+
+def calibration(name: str, camera: CameraInfo) -> Any:
+    """foxglove.CameraCalibration of a pinhole camera without distortion, at time 0."""
+    from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
+    from google.protobuf.timestamp_pb2 import Timestamp
+
+    focal = 0.5 * camera.height / math.tan(math.radians(camera.fov) / 2)
+    cx, cy = 0.5 * camera.width, 0.5 * camera.height
+    return CameraCalibration(
+        timestamp=Timestamp(),
+        frame_id=camera_frame(name),
+        width=camera.width,
+        height=camera.height,
+        K=[focal, 0, cx, 0, focal, cy, 0, 0, 1],
+        R=[1, 0, 0, 0, 1, 0, 0, 0, 1],
+        P=[focal, 0, cx, 0, 0, focal, cy, 0, 0, 0, 1, 0],
+    )
+
+
+def static_transforms(cameras: dict[str, CameraInfo]) -> Any:
+    """foxglove.FrameTransforms of the cameras' optical frames in the bodies they ride on, at time 0."""
+    from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+    from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+    from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
+    from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
+    from google.protobuf.timestamp_pb2 import Timestamp
+
+    return FrameTransforms(
+        transforms=[
+            FrameTransform(
+                timestamp=Timestamp(),
+                parent_frame_id=camera.parent,
+                child_frame_id=camera_frame(name),
+                translation=Vector3(**dict(zip("xyz", camera.pose[:3], strict=True))),
+                rotation=Quaternion(**dict(zip("xyzw", camera.pose[3:], strict=True))),
+            )
+            for name, camera in sorted(cameras.items())
+        ]
+    )

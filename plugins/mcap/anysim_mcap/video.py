@@ -1,0 +1,118 @@
+"""One MP4 per camera: H.264 by PyAV, encoded as the images come. Equal images give equal files."""
+
+from collections.abc import Iterator
+from contextlib import suppress
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.errors import RecordError
+
+REPRODUCIBLE = "mbtree=0:rc-lookahead=0"
+"""Parameters of x264: its macroblock tree, fed by the look-ahead, depends on memory that nobody has written, and equal
+images gave different files."""
+
+BT709 = 1
+"""The colour space that the file declares, and that images are converted to (value of ITU-T H.273)."""
+
+
+def frame_rate(control_dt: float, every: int) -> Fraction:
+    """Images per second of simulated time, as the ratio that the file's clock needs."""
+    rate = 1 / (Fraction(control_dt).limit_denominator(1_000_000) * every)
+    return rate.limit_denominator(100_000)
+
+
+class VideoWriter:
+    """Encodes (H, W, 3) uint8 images into a file. Odd sizes are padded by repeating the last column or row."""
+
+    def __init__(self, path: Path, width: int, height: int, rate: Fraction, crf: int, preset: str) -> None:
+        import av
+
+        self.frames = 0
+        self._pad = ((0, height % 2), (0, width % 2), (0, 0))
+        self._clock = 1 / rate
+        self._container: Any = av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"})
+        try:
+            quality = {"crf": str(crf), "preset": preset, "x264-params": REPRODUCIBLE}
+            stream: Any = self._container.add_stream("libx264", rate=rate, options=quality)
+        except ValueError as error:
+            self.abort()
+            raise RecordError("this PyAV has no H.264 encoder (libx264); install the `av` wheel from PyPI") from error
+        stream.width, stream.height = width + width % 2, height + height % 2
+        stream.pix_fmt = "yuv420p"
+        context = stream.codec_context
+        context.thread_count = 1
+        context.color_primaries = context.color_trc = context.colorspace = BT709
+        self._stream = stream
+
+    def write(self, image: Array) -> None:
+        """Encode the next image."""
+        import av
+
+        if self._pad[0][1] or self._pad[1][1]:
+            image = np.pad(image, self._pad, mode="edge")
+        rgb = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
+        frame = rgb.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
+        frame.pts, frame.time_base = self.frames, self._clock
+        self._container.mux(self._stream.encode(frame))
+        self.frames += 1
+
+    def close(self) -> None:
+        """Write what the encoder still holds, and the file's index."""
+        self._container.mux(self._stream.encode(None))
+        self._container.close()
+
+    def abort(self) -> None:
+        """Close the file in whatever state."""
+        from av.error import FFmpegError
+
+        with suppress(OSError, FFmpegError):
+            self._container.close()
+
+
+def images(path: Path, width: int, height: int) -> Iterator[Array]:
+    """The images (H, W, 3) uint8 of a file, one at a time.
+
+    Raises:
+        RecordError: it is not a video of this size, or is damaged.
+    """
+    import av
+    from av.error import FFmpegError
+
+    try:
+        with av.open(str(path), "r", format="mp4") as container:
+            stream = _stream(path, container, width, height)
+            for frame in container.decode(stream):
+                yield frame.to_ndarray(format="rgb24")[:height, :width]
+    except FFmpegError as error:
+        raise RecordError(f"{path} does not decode: {error.strerror}") from error
+
+
+def count_frames(path: Path, width: int, height: int) -> int:
+    """How many frames a file has, without decoding them.
+
+    Raises:
+        RecordError: it is not a video of this size, or is damaged.
+    """
+    import av
+    from av.error import FFmpegError
+
+    try:
+        with av.open(str(path), "r", format="mp4") as container:
+            stream = _stream(path, container, width, height)
+            return sum(packet.size > 0 for packet in container.demux(stream))
+    except FFmpegError as error:
+        raise RecordError(f"{path} cannot be read as a video: {error.strerror}") from error
+
+
+def _stream(path: Path, container: Any, width: int, height: int) -> Any:
+    """The one video stream, of the expected size: a decoder's memory follows from it."""
+    streams = container.streams.video
+    size = (width + width % 2, height + height % 2)
+    if len(streams) != 1 or (streams[0].width, streams[0].height) != size:
+        found = ", ".join(f"{s.width} x {s.height}" for s in streams) or "none"
+        raise RecordError(f"{path} should hold one video of {size[0]} x {size[1]} pixels; it holds {found}")
+    return streams[0]

@@ -1,0 +1,119 @@
+"""The file opens with nothing of anysim's: the plain MCAP reader and the schemas inside it."""
+
+import json
+
+import jsonschema
+import numpy as np
+import pytest
+from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+
+
+@pytest.fixture
+def reader(tmp_path, record):
+    with (record(tmp_path, steps=8) / "trajectory.mcap").open("rb") as file:
+        yield make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
+
+
+def decoded(reader, topic):
+    return [(m.message, m.decoded_message) for m in reader.iter_decoded_messages(topics=[topic])]
+
+
+def test_topics_schemas_and_counts(reader):
+    summary = reader.get_summary()
+    counts = {summary.channels[i].topic: n for i, n in summary.statistics.channel_message_counts.items()}
+    assert counts == {
+        "/action": 8, "/state": 9, "/collect": 9, "/tf": 9, "/annotation": 2, "/language": 2, "/tf_static": 1,
+        "/camera/front/calibration": 1, "/camera/wrist/calibration": 1,
+    }  # fmt: skip
+    schemas = {c.topic: (summary.schemas[c.schema_id].name, c.message_encoding) for c in summary.channels.values()}
+    assert schemas["/state"] == ("anysim.State", "protobuf")
+    assert schemas["/tf"] == schemas["/tf_static"] == ("foxglove.FrameTransforms", "protobuf")
+    assert schemas["/camera/front/calibration"] == ("foxglove.CameraCalibration", "protobuf")
+    assert schemas["/annotation"] == ("anysim.Annotation", "json")
+
+
+def test_log_time_is_simulated_time(reader):
+    times = [(m.sequence, m.log_time, m.publish_time) for m, _ in decoded(reader, "/state")]
+    assert times == [(step, step * 20_000_000, step * 20_000_000) for step in range(9)]
+
+
+def test_states_by_the_schema_in_the_file(reader, sample):
+    for step, (_, message) in enumerate(decoded(reader, "/state")):
+        assert message.step == step
+        assert message.time == step * 0.02
+        for name, values in sample.frame(step).state.items():
+            assert list(getattr(message, name)) == values.ravel().tolist()
+    for step, (_, message) in enumerate(decoded(reader, "/collect")):
+        frame = sample.frame(step)
+        assert (message.reward, message.status) == (frame.reward, "running")
+        assert list(message.obs_policy) == frame.obs["policy"].tolist()
+
+
+def test_transforms_are_those_of_the_state(reader, sample):
+    for step, (_, message) in enumerate(decoded(reader, "/tf")):
+        poses = sample.frame(step).state["body_pose"]
+        assert [t.child_frame_id for t in message.transforms] == list(sample.LAYOUT.bodies)
+        for transform, pose in zip(message.transforms, poses, strict=True):
+            assert transform.parent_frame_id == "world"
+            assert transform.timestamp.ToNanoseconds() == step * 20_000_000
+            p, q = transform.translation, transform.rotation
+            assert [p.x, p.y, p.z, q.x, q.y, q.z, q.w] == pose.tolist()
+
+
+def test_transforms_are_encoded_as_the_library_would():
+    from anysim_mcap.wire import TransformsEncoder
+
+    generator = np.random.default_rng(3)
+    names = ("a", "a much longer name of a body " * 6, "ünïcode")
+    encoder = TransformsEncoder("world", names)
+    for nanos in (0, 1, 999_999_999, 1_000_000_000, 1_020_000_000, 128_000_000_000, 1 << 61):
+        poses = generator.normal(size=(3, 7))
+        message = FrameTransforms.FromString(encoder.encode(nanos, poses))
+        assert FrameTransforms.FromString(message.SerializeToString()) == message
+        assert [t.child_frame_id for t in message.transforms] == list(names)
+        assert {t.timestamp.ToNanoseconds() for t in message.transforms} == {nanos}
+        found = [
+            [getattr(part, axis) for part, axes in ((t.translation, "xyz"), (t.rotation, "xyzw")) for axis in axes]
+            for t in message.transforms
+        ]
+        assert found == poses.tolist()
+        assert encoder.encode(nanos, poses) == message.SerializeToString()
+
+
+def test_cameras(reader):
+    ((_, placed),) = decoded(reader, "/tf_static")
+    places = {t.child_frame_id: t for t in placed.transforms}
+    assert places["camera/wrist"].parent_frame_id == "panda.hand"
+    assert places["camera/wrist"].translation.z == 0.1
+    ((_, wrist),) = decoded(reader, "/camera/wrist/calibration")
+    assert CameraCalibration.FromString(wrist.SerializeToString()).frame_id == "camera/wrist"
+    assert (wrist.width, wrist.height) == (31, 17)
+    # 90 degrees from top to bottom: the focal length is half the height
+    np.testing.assert_allclose(list(wrist.K), [8.5, 0, 15.5, 0, 8.5, 8.5, 0, 0, 1])
+
+
+def test_words_follow_their_json_schemas(reader):
+    summary = reader.get_summary()
+    seen = {}
+    for schema, channel, message in reader.iter_messages(topics=["/annotation", "/language"]):
+        assert schema.encoding == "jsonschema"
+        data = json.loads(message.data)
+        jsonschema.validate(data, json.loads(schema.data))
+        seen.setdefault(channel.topic, []).append((data["step"], data.get("text", data.get("annotations"))))
+    assert seen["/language"] == [(0, "push the cube"), (4, "now pull")]
+    assert seen["/annotation"] == [(3, {"phase": "reach", "skill": "push"}), (6, {"phase": "push", "skill": "push"})]
+    assert summary.statistics.attachment_count == 1
+
+
+def test_facts_without_the_manifest(reader):
+    facts = {record.name: record.metadata for record in reader.iter_metadata()}
+    assert facts["anysim/outcome"] == {"status": "success", "steps": "8"}
+    assert facts["anysim/trajectory"]["episode_seed"] == str(1 << 70)
+    assert json.loads(facts["anysim/names"]["joints"]) == ["panda.j1", "panda.j2"]
+    (spec,) = reader.iter_attachments()
+    assert (spec.name, spec.media_type) == ("spec.json", "application/json")
+    assert json.loads(spec.data) == {"seed": 7, "engine": {"name": "null"}}
+    assert reader.get_header().library == "anysim-mcap 0.1.0"

@@ -1,0 +1,127 @@
+import json
+
+import pytest
+
+from anysim import registry
+from anysim.errors import RecordError
+from anysim.record.manifest import read_manifest
+from anysim.record.recorder import Recorder
+from anysim.record.verify import verify, verify_run
+
+
+class ContentReader:
+    """Finds what the test tells it to."""
+
+    found: list[str] = []  # noqa: RUF012  replaced by tests
+
+    def __init__(self, directory, manifest):
+        self.directory = directory
+
+    def faults(self):
+        return self.found
+
+
+@pytest.fixture
+def committed(tmp_path, writer, run_header, record, monkeypatch):
+    monkeypatch.setattr(registry, "load", lambda kind, name: {("readers", "lines"): ContentReader}[kind, name])
+    with Recorder(tmp_path, writer, run_header) as recorder:
+        record(recorder, env=1)
+        return record(recorder, env=0, episode=3)
+
+
+def test_a_whole_one_has_no_faults(committed):
+    assert verify(committed) == []
+    assert verify_run(committed.parent.parent) == {"env_0000_episode_0003": [], "env_0001_episode_0000": []}
+
+
+def test_a_flipped_bit(committed):
+    data = bytearray((committed / "states.txt").read_bytes())
+    data[5] ^= 1
+    (committed / "states.txt").write_bytes(data)
+    (fault,) = verify(committed)
+    assert fault == f"{committed / 'states.txt'} was changed after its commit (its SHA-256 differs)"
+
+
+def test_a_shortened_file(committed):
+    data = (committed / "states.txt").read_bytes()
+    (committed / "states.txt").write_bytes(data[:-1])
+    (fault,) = verify(committed)
+    assert fault.endswith(f"has {len(data) - 1} bytes; {len(data)} were committed")
+
+
+def test_missing_and_extra_files(committed):
+    (committed / "states.txt").rename(committed / "other.txt")
+    (committed / ".hidden").write_text("")
+    assert verify(committed) == [
+        f"{committed} lacks states.txt",
+        f"{committed} has files that its manifest doesn't know: .hidden, other.txt",
+    ]
+
+
+def test_a_link_is_not_a_file(committed, tmp_path):
+    target = tmp_path / "aside"
+    (committed / "states.txt").rename(target)
+    (committed / "states.txt").symlink_to(target)
+    assert verify(committed) == [f"{committed / 'states.txt'} is not a plain file"]
+
+
+def test_another_name(committed):
+    moved = committed.rename(committed.parent / "env_0009_episode_0003")
+    assert verify(moved) == [f"{moved} holds env 0, episode 3"]
+
+
+def test_faults_of_the_content_are_reported(committed, monkeypatch):
+    monkeypatch.setattr(ContentReader, "found", ["front.mp4 has 3 frames"])
+    assert verify(committed) == ["front.mp4 has 3 frames"]
+
+
+def change(path, **values):
+    file = path / "manifest.json"
+    data = json.loads(file.read_text())
+    data.update(values)
+    file.write_text(json.dumps(data))
+
+
+def test_an_unknown_format_is_refused_with_a_sentence(committed):
+    change(committed, format="anysim-trajectory-9")
+    (fault,) = verify(committed)
+    assert "has the format 'anysim-trajectory-9'; this version of anysim reads 'anysim-trajectory-1'" in fault
+    with pytest.raises(RecordError, match="use the version of anysim that wrote it"):
+        read_manifest(committed)
+
+
+@pytest.mark.parametrize(
+    "name", ["../../run.json", "/etc/passwd", "a/b", "..", ".", "", "manifest.json", ".x", "x" * 200, "a\x00b"]
+)
+def test_a_manifest_names_no_file_outside(committed, name):
+    change(committed, files={name: {"bytes": 1, "sha256": "0" * 64}})
+    with pytest.raises(RecordError, match="is damaged or was edited"):
+        read_manifest(committed)
+
+
+def test_a_manifest_names_no_video_outside(committed):
+    camera = {"file": "../x.mp4", "frames": 1, "fps": 25.0, "width": 4, "height": 4}
+    change(committed, cameras={"front": camera})
+    with pytest.raises(RecordError, match=r"the video of camera front, '\.\./x\.mp4', is not among the files"):
+        read_manifest(committed)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{", "[" * 100_000, '{"format": 3}', "\xff"])
+def test_a_manifest_that_is_none(committed, text):
+    (committed / "manifest.json").write_text(text, encoding="latin-1")
+    with pytest.raises(RecordError, match=r"manifest\.json (is not JSON|has the format)"):
+        read_manifest(committed)
+
+
+def test_a_manifest_of_unreasonable_size_is_not_read(committed):
+    with (committed / "manifest.json").open("wb") as file:
+        file.truncate(1 << 40)
+    with pytest.raises(RecordError, match="larger than 16 MiB"):
+        read_manifest(committed)
+
+
+def test_a_directory_without_trajectories(tmp_path):
+    with pytest.raises(RecordError, match="holds no trajectories"):
+        verify_run(tmp_path)
+    (fault,) = verify(tmp_path)
+    assert "manifest.json cannot be read: No such file" in fault
