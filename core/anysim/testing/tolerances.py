@@ -14,9 +14,9 @@ the acceleration (here up to 10 m/s^2 x 1 ms), and by single-precision rounding 
 FALL_SPEED = 1e-4
 """Relative: gravity is constant, so any integrator has the speed of a free fall right; rounding adds over 1000 steps."""
 
-MOTION = 1e-3
+MOTION = 2.5e-3
 """Relative, on a motion under a constant force: first-order integrators are off by one step in time (half a step times
-the speed), that is 1/n after n steps; the tests take n >= 500 and add nothing else."""
+the speed), that is 1/n after n steps; the tests take n >= 400 and add nothing else."""
 
 COASTING = 1e-3
 """Relative loss of speed allowed over 1 s without any force: rounding only. Engines that damp by default are caught."""
