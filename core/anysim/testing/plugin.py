@@ -66,8 +66,8 @@ def engine_class(config: pytest.Config) -> Any:
     """The SimEngine class that `--engine` names."""
     name: str = config.getoption("engine")
     module, colon, attribute = name.partition(":")
-    # `dist:name` chooses between distributions and has no dot before the colon; `pkg.module:Class` does
-    if colon and "." in module:
+    # `dist:name` chooses between distributions; engines' names are in lower case, classes are not
+    if colon and attribute[:1].isupper():
         return getattr(importlib.import_module(module), attribute)
     from anysim import registry
 

@@ -144,21 +144,24 @@ def test_reset_puts_fixed_bodies_back(build):
 
 
 def test_two_engines_do_not_meet(build):
-    """Two engines in one process do not disturb each other."""
+    """Two engines in one process do not disturb each other, neither by their worlds nor by their commands."""
     world = worlds.scene()
     targets = tape(world, [0], 30)
     alone = build(world)
     play(alone, targets)
     wanted = read(alone)
     alone.destroy()
-    one, other = build(world), build(worlds.tree(gravity=(0.0, 0.0, -3.0)))
+    one, twin, other = build(world), build(world), build(worlds.tree(gravity=(0.0, 0.0, -3.0)))
     for target in targets:
         one.set_control(position=target)
-        one.step(2)
-        other.step(1)
-    assert_same(read(one), wanted, "beside another engine")
+        one.step()
+        twin.set_control(position=-target)
+        twin.step()
+        other.step()
+        one.step()
+    assert_same(read(one), wanted, "beside two other engines")
     other.destroy()
-    one.step(1)
+    one.step()
 
 
 def test_destroy_is_idempotent(build):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from anysim.testing import worlds
-from anysim.testing.compare import FIELDS, assert_same, read, tape
+from anysim.testing.compare import FIELDS, assert_same, read, spread, tape
 
 THREADS = 4
 
@@ -35,6 +35,8 @@ def test_steps_from_threads_add_up(build):
     """Steps of several threads come one after the other: as many as asked for, with the state of a serial run."""
     world = worlds.scene()
     engine, serial = build(world, 2), build(world, 2)
+    spread(engine)
+    spread(serial)
     assert _at_once(lambda _: [engine.step(2) for _ in range(25)]) == []
     serial.step(THREADS * 50)
     assert_same(read(engine), read(serial), "200 steps from 4 threads")

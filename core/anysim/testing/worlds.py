@@ -53,9 +53,10 @@ def _arm(s: Sketch, position: Vec3 = ORIGIN) -> None:
     """Two links of 0.3 m; the shoulder turns about z, the elbow about y, each with a drive."""
     rod = Box((0.15, 0.02, 0.02))
     bar = inertial(rod, 1.0, (0.15, 0.0, 0.0))
+    motor = {"damping": 0.1, "armature": 0.01, "velocity_limit": 3.0}
     base = s.robot("arm", position)
-    upper = s.link("shoulder", base, REVOLUTE, Z, bar, lower=-2.0, upper=2.0, initial=0.2, damping=0.1, armature=0.01)
-    lower = s.link("elbow", upper, REVOLUTE, Y, bar, position=(0.3, 0.0, 0.0), lower=-1.5, upper=1.5, damping=0.1, armature=0.01)
+    upper = s.link("shoulder", base, REVOLUTE, Z, bar, lower=-2.0, upper=2.0, initial=0.2, **motor)
+    lower = s.link("elbow", upper, REVOLUTE, Y, bar, position=(0.3, 0.0, 0.0), lower=-1.5, upper=1.5, **motor)
     for link in (upper, lower):
         s.shape(link, rod, (0.15, 0.0, 0.0))
         s.drive(link, ControlMode.POSITION, 60.0, 6.0, 40.0)
@@ -246,7 +247,7 @@ def blocked(kp: float = 100.0, kd: float = 10.0, limit: float = inf) -> World:
 # ---------------------------------------------------------------------- cameras
 
 
-def wall() -> World:
+def wall(cameras: bool = True) -> World:
     """A camera on a driven link looks along +x at a wall 2 m away; a small red and a small green cube stand before it.
 
     The image's left is +y. The cubes' near faces are at x = 1, their middles at y = 0.3 and -0.3.
@@ -260,6 +261,7 @@ def wall() -> World:
     s.fixed("green", Box((0.1, 0.1, 0.1)), (1.1, -0.3, 0.0))
     ahead = _looking(ORIGIN, X)
     channels = ("rgb", "depth", "segmentation")
-    s.cameras.append(Camera("eye", pole, ORIGIN, ahead, 60.0, 64, 48, channels))
-    s.cameras.append(Camera("fixed", WORLD, ORIGIN, ahead, 60.0, 64, 48, channels))
+    if cameras:
+        s.cameras.append(Camera("eye", pole, ORIGIN, ahead, 60.0, 64, 48, channels))
+        s.cameras.append(Camera("fixed", WORLD, ORIGIN, ahead, 60.0, 64, 48, channels))
     return s.world()
