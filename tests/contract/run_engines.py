@@ -42,4 +42,6 @@ def run(engine: str, tests: list[str]) -> dict[str, str]:
 
 if __name__ == "__main__":
     jobs, results = Path(sys.argv[1]), Path(sys.argv[2])
-    results.write_text(json.dumps({engine: run(engine, tests) for engine, tests in json.loads(jobs.read_text()).items()}))
+    results.write_text(
+        json.dumps({engine: run(engine, tests) for engine, tests in json.loads(jobs.read_text()).items()})
+    )

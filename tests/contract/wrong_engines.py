@@ -1,5 +1,6 @@
 """Engines that are wrong in one way each, to prove that the contract suite finds it. `caught_by` names the tests."""
 
+import os
 import time
 from contextlib import nullcontext
 from dataclasses import replace
@@ -7,70 +8,10 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+from right_engine import Right
 
-from anysim.conventions import wxyz_from_xyzw, xyzw_from_wxyz
-from anysim.engine.capability import Capabilities, Capability, Support
 from anysim.engine.commands import Control
-from anysim.engine.null import NullEngine
-from anysim.engine.state import RayHits
 from anysim.errors import AnysimError
-from anysim.math import pose as P
-
-
-def _also(*capabilities: Capability) -> Capabilities:
-    """What the null engine declares, and more."""
-    return Capabilities({**NullEngine.capabilities.supported, **{c: Support() for c in capabilities}})
-
-
-class Right(NullEngine):
-    """Nothing is wrong with it: the null engine, and wrenches that push free bodies of even inertia."""
-
-    capabilities = _also(Capability.WRENCHES)
-    caught_by: ClassVar[tuple[str, ...]] = ()
-
-    def _build(self, world, num_envs):
-        super()._build(world, num_envs)
-        self._wrench = None
-        self._mass = np.array([b.inertial.mass for b in world.bodies])[:, None]
-        self._moment = np.array([b.inertial.inertia[0] for b in world.bodies])[:, None]
-
-    def _apply_wrench(self, wrench):
-        self._wrench = None if wrench is None else wrench.copy()
-
-    def _step(self, n_steps, ids):
-        rows = self._all if ids is None else ids
-        for _ in range(n_steps):
-            if self._wrench is not None:
-                push = self._wrench[rows] * self.world.physics.dt
-                self._twists[rows, :, :3] += push[..., :3] / self._mass
-                self._twists[rows, :, 3:] += push[..., 3:] / self._moment
-            super()._step(1, ids)
-
-
-class Aliasing(Right):
-    """Hands its own buffers out as state."""
-
-    caught_by = ("test_aliasing.py::test_state_arrays_never_change_later", "test_aliasing.py::test_states_do_not_share_memory")
-
-    def _read(self, name):
-        return self._position[:] if name == "joint_pos" else super()._read(name)
-
-
-class ScalarFirst(Right):
-    """Reads and writes quaternions as wxyz: what is written is read back, and means another rotation."""
-
-    caught_by = ("test_conventions.py::test_quaternions_are_xyzw",)
-
-    def _read(self, name):
-        values = super()._read(name)
-        if name == "body_pose":
-            values[..., 3:] = wxyz_from_xyzw(values[..., 3:])
-        return values
-
-    def _write_bodies(self, ids, bodies, pose, twist):
-        if pose is not None:
-            pose = np.concatenate([pose[..., :3], xyzw_from_wxyz(pose[..., 3:])], axis=-1)
-        super()._write_bodies(ids, bodies, pose, twist)
 
 
 class ResetsAll(Right):
@@ -96,7 +37,10 @@ class ResetLeavesVelocities(Right):
 class StandsStill(Right):
     """Reports success at every step and moves nothing."""
 
-    caught_by = ("test_stepping.py::test_a_step_moves_what_moves", "test_commands.py::test_position_drive_reaches_its_target")
+    caught_by = (
+        "test_stepping.py::test_a_step_moves_what_moves",
+        "test_commands.py::test_position_drive_reaches_its_target",
+    )
 
     def _step(self, n_steps, ids):
         return
@@ -144,10 +88,15 @@ class WrenchesStay(Right):
 class SnapshotForgetsVelocities(Right):
     """Snapshots hold positions only."""
 
-    caught_by = ("test_snapshots.py::test_continuing_is_exact", "test_snapshots.py::test_a_snapshot_brings_the_state_back")
+    caught_by = (
+        "test_snapshots.py::test_continuing_is_exact",
+        "test_snapshots.py::test_a_snapshot_brings_the_state_back",
+    )
 
     def _restore(self, ids, data, level):
-        super()._restore(ids, {k: np.zeros_like(v) if k in ("twists", "velocity") else v for k, v in data.items()}, level)
+        super()._restore(
+            ids, {k: np.zeros_like(v) if k in ("twists", "velocity") else v for k, v in data.items()}, level
+        )
 
 
 class SnapshotForgetsCommands(Right):
@@ -175,79 +124,13 @@ class SnapshotForgetsParameters(Right):
 class TakesAnySnapshot(Right):
     """Accepts snapshots of other worlds when their shapes fit."""
 
-    caught_by = ("test_snapshots.py::test_a_snapshot_of_another_world_is_refused", "test_snapshots.py::test_foreign_snapshots_are_refused")
+    caught_by = (
+        "test_snapshots.py::test_a_snapshot_of_another_world_is_refused",
+        "test_snapshots.py::test_foreign_snapshots_are_refused",
+    )
 
     def restore(self, snapshot, env_ids=None):
         super().restore(replace(snapshot, world_hash=self.world.hash), env_ids)
-
-
-class CentreOfMassVelocity(Right):
-    """Reads and writes the velocity of the centre of mass: read back it looks right, but the origin moves otherwise."""
-
-    caught_by = ("test_conventions.py::test_linear_velocity_is_that_of_the_frame_origin",)
-
-    def _offset(self):
-        com = np.array([b.inertial.com for b in self.world.bodies])
-        return P.rotate(super()._read("body_pose")[..., 3:], np.broadcast_to(com, (self.num_envs, len(com), 3)))
-
-    def _read(self, name):
-        values = super()._read(name)
-        if name == "body_twist":
-            values[..., :3] += P.cross(values[..., 3:], self._offset())
-        return values
-
-    def _write_bodies(self, ids, bodies, pose, twist):
-        super()._write_bodies(ids, bodies, pose, None)
-        if twist is not None:
-            twist = twist.copy()
-            twist[..., :3] -= P.cross(twist[..., 3:], self._offset()[np.ix_(ids, bodies)])
-            super()._write_bodies(ids, bodies, None, twist)
-
-
-class CentreOfMassPose(Right):
-    """Reads the pose of the centre of mass, as some engines do."""
-
-    caught_by = ("test_conventions.py::test_poses_are_those_of_frames",)
-
-    def _read(self, name):
-        values = super()._read(name)
-        if name == "body_pose":
-            com = np.array([b.inertial.com for b in self.world.bodies])
-            values[..., :3] += P.rotate(values[..., 3:], np.broadcast_to(com, values[..., :3].shape))
-        return values
-
-
-class BodyAxes(Right):
-    """Reads and writes twists in body axes."""
-
-    caught_by = ("test_conventions.py::test_angular_velocity_is_in_world_axes",)
-
-    def _write_bodies(self, ids, bodies, pose, twist):
-        super()._write_bodies(ids, bodies, pose, None)
-        if twist is not None:
-            turn = self._roots[np.ix_(ids, bodies)][..., 3:]
-            world = np.concatenate([P.rotate(turn, twist[..., :3]), P.rotate(turn, twist[..., 3:])], axis=-1)
-            super()._write_bodies(ids, bodies, None, world)
-
-    def _read(self, name):
-        values = super()._read(name)
-        if name == "body_twist":
-            turn = super()._read("body_pose")[..., 3:]
-            values = np.concatenate([P.rotate_inverse(turn, values[..., :3]), P.rotate_inverse(turn, values[..., 3:])], -1)
-        return values
-
-
-class OwnJointOrder(Right):
-    """Has the joints in another order, reading and writing alike."""
-
-    caught_by = ("test_conventions.py::test_links_are_where_kinematics_puts_them", "test_lifecycle.py::test_create_world_begins_in_the_initial_state")
-
-    def _read(self, name):
-        values = super()._read(name)
-        return np.ascontiguousarray(values[:, ::-1]) if name in ("joint_pos", "joint_vel") else values
-
-    def _write_joints(self, ids, joints, position, velocity):
-        super()._write_joints(ids, len(self.world.joints) - 1 - joints, position, velocity)
 
 
 class ParametersOfAll(Right):
@@ -268,30 +151,6 @@ class ParametersForgottenAtReset(Right):
         super()._reset(ids)
         for name, values in self._values.items():
             values[ids] = self._defaults[name]
-
-
-class ClaimsRays(Right):
-    """Declares ray casts and has none."""
-
-    capabilities = _also(Capability.RAYCAST)
-    caught_by = ("test_errors.py::test_declared_is_done_and_undeclared_is_refused",)
-
-
-class BlindRays(Right):
-    """Declares ray casts that never hit."""
-
-    capabilities = _also(Capability.RAYCAST)
-    caught_by = ("test_sensing.py::test_rays_hit_at_their_distance",)
-
-    def _raycast(self, origins, directions, ids):
-        return RayHits(np.full(origins.shape[:2], np.inf), np.full(origins.shape[:2], -1))
-
-
-class ClaimsDynamics(Right):
-    """Declares dynamics; bodies hang in the air."""
-
-    capabilities = _also(Capability.DYNAMICS)
-    caught_by = ("test_stepping.py::test_a_dropped_ball_falls", "test_physics.py::test_free_fall")
 
 
 class SwallowsMisuse(Right):
@@ -326,34 +185,6 @@ class DependsOnNumber(Right):
         self._position *= 1.0 + 1e-15 * self.num_envs
 
 
-class KeepsInputs(Right):
-    """Keeps the caller's array and reads it at the next step."""
-
-    caught_by = ("test_aliasing.py::test_inputs_are_not_kept",)
-    _pending = None
-
-    def _write_joints(self, ids, joints, position, velocity):
-        super()._write_joints(ids, joints, position, velocity)
-        self._pending = (ids, joints, position)
-
-    def _step(self, n_steps, ids):
-        if self._pending is not None:
-            super()._write_joints(*self._pending, None)
-        self._pending = None
-        super()._step(n_steps, ids)
-
-
-class SnapshotsAlias(Right):
-    """Restores from a snapshot by keeping its arrays."""
-
-    caught_by = ("test_aliasing.py::test_snapshots_are_copies",)
-
-    def _restore(self, ids, data, level):
-        super()._restore(ids, data, level)
-        if len(ids) == self.num_envs:
-            self._roots = data["roots"]
-
-
 class DestroysOnce(Right):
     """A second destroy() fails."""
 
@@ -365,16 +196,6 @@ class DestroysOnce(Right):
         super().destroy()
 
 
-class SinglePrecision(Right):
-    """Returns float32."""
-
-    caught_by = ("test_conventions.py::test_shapes_and_types",)
-
-    def _read(self, name):
-        values = super()._read(name)
-        return values if values.dtype == bool else values.astype(np.float32)
-
-
 class SharedCommands(Right):
     """Keeps the commands of all engines in one place."""
 
@@ -382,11 +203,10 @@ class SharedCommands(Right):
     _shared: ClassVar[dict[tuple[int, ...], Control]] = {}
 
     def _apply_control(self, control):
-        super()._apply_control(control)
-        self._shared[control.position.shape] = self._control
+        self._shared[control.position.shape] = Control(*(part.copy() for part in control))
 
     def _step(self, n_steps, ids):
-        self._control = self._shared[self._control.position.shape]
+        self._control = self._shared[self._commands.control.position.shape]
         super()._step(n_steps, ids)
 
 
@@ -438,11 +258,21 @@ class ForgetsOnEdit(Right):
         self.reset()
 
 
-class MimicsStayBehind(Right):
-    """Mimic joints do not follow."""
+class DependsOnProcess(Right):
+    """Rounds by something that differs between processes."""
 
-    caught_by = ("test_commands.py::test_mimic_joints_follow",)
+    caught_by = ("test_stepping.py::test_the_same_run_in_another_process",)
 
-    def _build(self, world, num_envs):
-        super()._build(world, num_envs)
-        self._followers = []
+    def _step(self, n_steps, ids):
+        super()._step(n_steps, ids)
+        self._twists *= 1.0 + 1e-12 * os.getpid()
+
+
+class MovesOnRefusal(Right):
+    """Takes the world apart before it knows whether the new one can be built."""
+
+    caught_by = ("test_editing.py::test_a_wrong_edit_changes_nothing",)
+
+    def add_object(self, name, source, **spec):
+        self.reset()
+        super().add_object(name, source, **spec)

@@ -7,10 +7,10 @@ from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
-from anysim_mujoco.engine import MujocoEngine
 
 from anysim.conventions import IDENTITY_QUATERNION
 from anysim.world.model import Capsule, Cylinder, World
+from anysim_mujoco.engine import MujocoEngine
 
 
 class Right(MujocoEngine):
@@ -64,7 +64,10 @@ class NoEffortLimit(Right):
 class WeakDrives(Right):
     """Gains are scaled by something."""
 
-    caught_by = ("test_commands.py::test_blocked_drive_exerts_its_torque", "test_commands.py::test_position_drive_follows_its_law")
+    caught_by = (
+        "test_commands.py::test_blocked_drive_exerts_its_torque",
+        "test_commands.py::test_position_drive_follows_its_law",
+    )
 
     def _spoil(self, world):
         return replace(world, actuators=tuple(replace(a, kp=0.9 * a.kp) for a in world.actuators))
@@ -100,10 +103,16 @@ class NoPriority(Right):
 class LowFriction(Right):
     """Friction combines to something lower than the larger coefficient."""
 
-    caught_by = ("test_physics.py::test_the_larger_friction_counts", "test_physics.py::test_a_block_slides_down_a_steep_slope")
+    caught_by = (
+        "test_physics.py::test_the_larger_friction_counts",
+        "test_physics.py::test_a_block_slides_down_a_steep_slope",
+    )
 
     def _spoil(self, world):
-        return replace(world, geoms=tuple(replace(g, surface=replace(g.surface, friction=0.5 * g.surface.friction)) for g in world.geoms))
+        return replace(
+            world,
+            geoms=tuple(replace(g, surface=replace(g.surface, friction=0.5 * g.surface.friction)) for g in world.geoms),
+        )
 
 
 class NoBounce(Right):
@@ -123,7 +132,8 @@ class LyingShapes(Right):
     def _spoil(self, world):
         along_x = (0.0, 0.5**0.5, 0.0, 0.5**0.5)
         turned = [
-            replace(g, quaternion=along_x if isinstance(g.shape, Capsule | Cylinder) else g.quaternion) for g in world.geoms
+            replace(g, quaternion=along_x if isinstance(g.shape, Capsule | Cylinder) else g.quaternion)
+            for g in world.geoms
         ]
         return replace(world, geoms=tuple(turned))
 
@@ -143,7 +153,10 @@ class OtherInertia(Right):
     caught_by = ("test_physics.py::test_double_pendulum_keeps_its_energy", "test_commands.py::test_a_torque_turns")
 
     def _spoil(self, world):
-        bodies = [replace(b, inertial=b.inertial._replace(inertia=tuple(1.5 * v for v in b.inertial.inertia))) for b in world.bodies]
+        bodies = [
+            replace(b, inertial=b.inertial._replace(inertia=tuple(1.5 * v for v in b.inertial.inertia)))
+            for b in world.bodies
+        ]
         return replace(world, bodies=tuple(bodies))
 
 
@@ -153,7 +166,9 @@ class CentredMass(Right):
     caught_by = ("test_physics.py::test_a_throw_is_a_parabola",)
 
     def _spoil(self, world):
-        return replace(world, bodies=tuple(replace(b, inertial=b.inertial._replace(com=(0.0, 0.0, 0.0))) for b in world.bodies))
+        return replace(
+            world, bodies=tuple(replace(b, inertial=b.inertial._replace(com=(0.0, 0.0, 0.0))) for b in world.bodies)
+        )
 
 
 class ForceAtTheOrigin(Right):
@@ -183,14 +198,18 @@ class CentredMesh(Right):
 
     def _spoil(self, world):
         return replace(
-            world, meshes=tuple(replace(m, vertices=m.vertices - m.vertices.mean(0), hash="moved") for m in world.meshes)
+            world,
+            meshes=tuple(replace(m, vertices=m.vertices - m.vertices.mean(0), hash="moved") for m in world.meshes),
         )
 
 
 class LostAnchors(Right):
     """Joints turn about the link's origin, not about their anchor."""
 
-    caught_by = ("test_conventions.py::test_links_are_where_kinematics_puts_them", "test_physics.py::test_pendulum_period")
+    caught_by = (
+        "test_conventions.py::test_links_are_where_kinematics_puts_them",
+        "test_physics.py::test_pendulum_period",
+    )
 
     def _spoil(self, world):
         return replace(world, joints=tuple(replace(j, anchor=(0.0, 0.0, 0.0)) for j in world.joints))
@@ -202,4 +221,7 @@ class LostTurns(Right):
     caught_by = ("test_conventions.py::test_links_are_where_kinematics_puts_them",)
 
     def _spoil(self, world):
-        return replace(world, bodies=tuple(replace(b, quaternion=IDENTITY_QUATERNION) if b.parent >= 0 else b for b in world.bodies))
+        return replace(
+            world,
+            bodies=tuple(replace(b, quaternion=IDENTITY_QUATERNION) if b.parent >= 0 else b for b in world.bodies),
+        )

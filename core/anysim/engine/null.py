@@ -106,7 +106,11 @@ class NullEngine(SimEngine):
         goal = position + velocity * dt
         if len(self._driven):
             assert self._control is not None
-            mode, target, reach = self._control.mode[rows], self._control.position[rows], self._speed_limit[self._driven]
+            mode, target, reach = (
+                self._control.mode[rows],
+                self._control.position[rows],
+                self._speed_limit[self._driven],
+            )
             here = position[:, self._driven]
             way = (target - here) / dt
             rate = np.where(mode == _VELOCITY, self._control.velocity[rows], velocity[:, self._driven])

@@ -8,12 +8,14 @@ import importlib
 import json
 import re
 from collections import Counter
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-SUITE = "anysim/testing/"
+HERE = Path(__file__).parent
 NEEDS = "anysim_needs"
+_SUITE = pytest.StashKey[frozenset[str]]()
 _ABSENT = re.compile(r"does not declare '([^']+)'")
 
 
@@ -28,29 +30,39 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Register the marker, and the fixtures where there is an engine to test."""
+    """Register the marker; with an engine to test, look whether it can run here, and register the fixtures."""
     config.addinivalue_line("markers", f"{NEEDS}(*capabilities): skip where the engine does not declare them all")
-    if config.getoption("engine"):
-        pytest.register_assert_rewrite("anysim.testing.compare")
-        config.pluginmanager.register(importlib.import_module("anysim.testing.fixtures"), "anysim-contract-fixtures")
+    name = config.getoption("engine")
+    if not name:
+        return
+    from anysim.errors import AnysimError
+
+    try:
+        here = load_engine(name).availability()
+    except (AnysimError, ImportError, AttributeError) as error:
+        raise pytest.UsageError(f"--engine {name}: {error}") from error
+    if not here.available:
+        raise pytest.UsageError(f"--engine {name} cannot run here: {'; '.join(here.missing)}. {here.remedy}")
+    pytest.register_assert_rewrite("anysim.testing.compare")
+    config.pluginmanager.register(importlib.import_module("anysim.testing.fixtures"), "anysim-contract-fixtures")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Refuse to run the suite without an engine: each of its tests would end in a missing fixture."""
-    if not config.getoption("engine") and any(_in_suite(item.path.as_posix()) for item in items):
+    """Note which tests are the suite's, and refuse to run them without an engine: each would lack its fixtures."""
+    config.stash[_SUITE] = frozenset(item.nodeid for item in items if item.path.is_relative_to(HERE))
+    if config.stash[_SUITE] and not config.getoption("engine"):
         raise pytest.UsageError("the contract suite tests one engine: pytest --pyargs anysim.testing --engine NAME")
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
     """One line: engine, version, counts, and what was skipped for want of which capability."""
-    if not config.getoption("engine"):
+    suite = config.stash.get(_SUITE, frozenset())
+    if not suite:
         return
     outcomes = {
-        kind: [r for r in terminalreporter.stats.get(kind, []) if _in_suite(getattr(r, "nodeid", ""))]
+        kind: [r for r in terminalreporter.stats.get(kind, []) if getattr(r, "nodeid", "") in suite]
         for kind in ("passed", "failed", "error", "skipped")
     }
-    if not any(outcomes.values()):
-        return
     missing = Counter(_reason(report) for report in outcomes["skipped"])
     detail = ", ".join(f"{name}: {count}" for name, count in sorted(missing.items()))
     counts = [f"{len(outcomes['passed'])} passed"]
@@ -64,7 +76,11 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
 
 def engine_class(config: pytest.Config) -> Any:
     """The SimEngine class that `--engine` names."""
-    name: str = config.getoption("engine")
+    return load_engine(str(config.getoption("engine")))
+
+
+def load_engine(name: str) -> Any:
+    """The SimEngine class of an installed name, or of `module:Class`."""
     module, colon, attribute = name.partition(":")
     # `dist:name` chooses between distributions; engines' names are in lower case, classes are not
     if colon and attribute[:1].isupper():
@@ -77,7 +93,7 @@ def engine_class(config: pytest.Config) -> Any:
 def engine_options(config: pytest.Config) -> dict[str, Any]:
     """The options that `--engine-option` gives."""
     options: dict[str, Any] = {}
-    for text in config.getoption("engine_option"):
+    for text in config.getoption("engine_option") or ():
         key, equals, value = text.partition("=")
         if not equals:
             raise pytest.UsageError(f"--engine-option takes KEY=VALUE, got '{text}'")
@@ -86,10 +102,6 @@ def engine_options(config: pytest.Config) -> dict[str, Any]:
         except json.JSONDecodeError:
             options[key] = value
     return options
-
-
-def _in_suite(path: str) -> bool:
-    return SUITE in path
 
 
 def _reason(report: Any) -> str:

@@ -1,12 +1,37 @@
 """Small Worlds by hand: a sketch collects parts, one call each, and gives the frozen World."""
 
+from itertools import pairwise
 from math import inf
 from typing import Any
 
 from anysim.conventions import IDENTITY_QUATERNION, WORLD
 from anysim.world.model import (
-    Actuator, Body, BodyKind, Box, Camera, Capsule, Channel, ContactSensor, ControlMode, Cylinder, Entity, EntityKind,
-    Geom, Inertial, Joint, JointType, Physics, Plane, Quat, Robot, Shape, Site, Sphere, Surface, Vec3, World,
+    Actuator,
+    Body,
+    BodyKind,
+    Box,
+    Camera,
+    Capsule,
+    Channel,
+    ContactSensor,
+    ControlMode,
+    Cylinder,
+    Entity,
+    EntityKind,
+    Geom,
+    Inertial,
+    Joint,
+    JointType,
+    Physics,
+    Plane,
+    Quat,
+    Robot,
+    Shape,
+    Site,
+    Sphere,
+    Surface,
+    Vec3,
+    World,
 )  # fmt: skip
 
 ORIGIN: Vec3 = (0.0, 0.0, 0.0)
@@ -52,7 +77,9 @@ class Sketch:
         com: Vec3 = ORIGIN, surface: Surface = Surface(), collides: bool = True, inertia: Inertial | None = None,
     ) -> int:  # fmt: skip
         """A free object of one shape."""
-        return self._object(BodyKind.FREE, name, shape, position, quaternion, inertia or inertial(shape, mass, com), surface, collides)
+        return self._object(
+            BodyKind.FREE, name, shape, position, quaternion, inertia or inertial(shape, mass, com), surface, collides
+        )
 
     def fixed(
         self, name: str, shape: Shape, position: Vec3, *, quaternion: Quat = IDENTITY_QUATERNION,
@@ -98,7 +125,9 @@ class Sketch:
         self.actuators.append(Actuator(self.joints[joint].name, joint, mode, kp, kd, limit))
         return len(self.actuators) - 1
 
-    def shape(self, body: int, shape: Shape, position: Vec3 = ORIGIN, surface: Surface = Surface(), collides: bool = True) -> None:
+    def shape(
+        self, body: int, shape: Shape, position: Vec3 = ORIGIN, surface: Surface = Surface(), collides: bool = True
+    ) -> None:
         """A further geom of a body."""
         name = f"{self.bodies[body].name}.geom{len(self.geoms)}"
         self.geoms.append(Geom(name, body, shape, position, surface=surface, collides=collides))
@@ -110,7 +139,7 @@ class Sketch:
         starts = [*self._entities, ("", EntityKind.OBJECT, len(self.bodies), len(self.joints))]
         entities = tuple(
             Entity(name, kind, body, after[2], joint, after[3], label=name)
-            for (name, kind, body, joint), after in zip(starts, starts[1:], strict=False)
+            for (name, kind, body, joint), after in pairwise(starts)
         )
         return World(
             self.name, self.physics, tuple(self.bodies), tuple(self.joints), tuple(self.geoms), tuple(self.sites),

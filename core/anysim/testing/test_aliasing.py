@@ -133,7 +133,7 @@ def test_parameters_come_as_copies(build, engine_class):
 
 @pytest.mark.parametrize("level", ["state", "trajectory"])
 def test_snapshots_are_copies(build, engine_class, level):
-    """A snapshot does not change when the engine goes on, nor by being restored; the engine does not keep its arrays."""
+    """A snapshot does not change when the engine goes on, nor by being restored; the engine keeps none of it."""
     skip_without(engine_class, C(f"snapshot: {level}"))
     engine = build(worlds.scene(), 2)
     spread(engine)

@@ -203,7 +203,9 @@ def test_a_torque_turns(build):
     engine.set_body_state(pose=[0.0, 0.0, 0.0, 0.5**0.5, 0.0, 0.0, 0.5**0.5])
     engine.apply_wrench([0.0, 0.0, 0.0, 0.0, 0.064, 0.0], [0])
     engine.step(250)
-    assert_close(engine.get_state().body_twist[0, 0, 3:], np.array([0.0, 1.0, 0.0]), tolerances.MOTION, "rate after 0.5 s")
+    assert_close(
+        engine.get_state().body_twist[0, 0, 3:], np.array([0.0, 1.0, 0.0]), tolerances.MOTION, "rate after 0.5 s"
+    )
 
 
 @needs(C.WRENCHES)
@@ -212,7 +214,9 @@ def test_a_force_acts_at_the_centre_of_mass(build):
     engine = build(worlds.drifting((0.1, -0.05, 0.2)))
     engine.apply_wrench([4.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0])
     engine.step(250)
-    assert_close(engine.get_state().body_twist[0, 0], np.array([1.0, 0, 0, 0, 0, 0]), tolerances.MOTION, "twist after 0.5 s")
+    assert_close(
+        engine.get_state().body_twist[0, 0], np.array([1.0, 0, 0, 0, 0, 0]), tolerances.MOTION, "twist after 0.5 s"
+    )
 
 
 @needs(C.WRENCHES)

@@ -45,7 +45,9 @@ def test_contact_sensor_shape(build):
 def test_quaternions_are_xyzw(build):
     """Quaternions put the scalar last, written and read, and turn the right way."""
     engine = build(worlds.drifting())
-    assert_close(engine.get_state().body_pose[0, 0, 3:], np.array(IDENTITY_QUATERNION), tolerances.READ_BACK, "identity")
+    assert_close(
+        engine.get_state().body_pose[0, 0, 3:], np.array(IDENTITY_QUATERNION), tolerances.READ_BACK, "identity"
+    )
     wanted = np.array([0.5, 0.1, -0.2, 0.0])
     wanted[3] = np.sqrt(1 - (wanted**2).sum())
     engine.set_body_state(pose=[1.0, 2.0, 3.0, *wanted])
@@ -74,7 +76,9 @@ def test_quaternions_stay_unit(build):
 def test_poses_are_those_of_frames(build):
     """A pose is that of the body's frame, wherever its centre of mass lies."""
     engine = build(worlds.drifting(COM))
-    assert_close(engine.get_state().body_pose[0, 0, :3], np.array([0.0, 0.0, 1.0]), tolerances.READ_BACK, "initial position")
+    assert_close(
+        engine.get_state().body_pose[0, 0, :3], np.array([0.0, 0.0, 1.0]), tolerances.READ_BACK, "initial position"
+    )
     pose = np.array([1.0, 2.0, 3.0, 0.0, QUARTER, 0.0, QUARTER])
     engine.set_body_state(pose=pose)
     assert_close(engine.get_state().body_pose[0, 0], pose, tolerances.READ_BACK, "pose read back")
@@ -177,7 +181,9 @@ def test_poses_and_twists_are_written_apart(build):
     assert np.array_equal(after["body_twist"][0], before["body_twist"][0])
     engine.set_body_state(pose=[9.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], env_ids=[0], bodies=[1])
     end = engine.get_state()
-    assert_close(end.body_twist[0, 1], before["body_twist"][0, 1], tolerances.READ_BACK, "twist after a pose was written")
+    assert_close(
+        end.body_twist[0, 1], before["body_twist"][0, 1], tolerances.READ_BACK, "twist after a pose was written"
+    )
     assert np.array_equal(end.body_pose[0, 0], before["body_pose"][0, 0])
 
 

@@ -1,8 +1,11 @@
 """Live editing: things come and go, and everything else goes on as it was."""
 
+from importlib.metadata import EntryPoint
+
 import numpy as np
 import pytest
 
+from anysim import registry
 from anysim.engine.capability import Capability as C
 from anysim.errors import AnysimError, SnapshotError
 from anysim.testing import tolerances, worlds
@@ -10,6 +13,45 @@ from anysim.testing.compare import assert_close, assert_same, play, read, spread
 from anysim.testing.fixtures import skip_without_parameter
 
 CRATE = {"source": {"box": [0.2, 0.2, 0.2]}, "mass": 1.5, "position": (3.0, 3.0, 0.5)}
+
+TWO_LINK = """
+<robot name="two_link">
+  <link name="base"/>
+  <link name="link">
+    <inertial><origin xyz="0 0 0.1"/><mass value="0.4"/>
+      <inertia ixx="0.002" iyy="0.002" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><origin xyz="0 0 0.1"/><geometry><box size="0.04 0.04 0.2"/></geometry></collision>
+  </link>
+  <joint name="hinge" type="revolute">
+    <parent link="base"/><child link="link"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="20" velocity="5"/>
+  </joint>
+</robot>
+"""
+CATALOGUE = """
+name: contract_two_link
+description: one hinge
+source: file:two_link.urdf
+license: Apache-2.0
+license_source: this test
+category: arm
+channels: {arm: {joints: [hinge], gains: {kp: 50, kd: 5}}}
+home: {hinge: 0.25}
+tools: {tool: {link: link, position: [0, 0, 0.2]}}
+"""
+
+
+@pytest.fixture
+def two_link(tmp_path, monkeypatch):
+    """The name of a small robot that is in the catalogue for the time of the test."""
+    package = tmp_path / "contract_two_link_package"
+    package.mkdir()
+    (package / "two_link.urdf").write_text(TWO_LINK)
+    (package / "contract_two_link.yaml").write_text(CATALOGUE)
+    monkeypatch.syspath_prepend(tmp_path)
+    known = registry.entry
+    ours = EntryPoint("contract_two_link", "contract_two_link_package", "anysim.robots")
+    monkeypatch.setattr(registry, "entry", lambda kind, name: ours if name == ours.name else known(kind, name))
+    return ours.name
 
 
 def _by_name(engine, without=()):
@@ -86,6 +128,22 @@ def test_removing_a_robot_leaves_the_others(build):
     assert engine.get_state().joint_pos.shape == (2, 0)
     assert_same(_by_name(engine), before, "right after removing the arm")
     engine.step(10)
+
+
+def test_an_added_robot_works(build, two_link):
+    """A robot of the catalogue joins with its own home and drives; the others stay, and it leaves again."""
+    engine = _running(build)
+    before = _by_name(engine)
+    engine.add_robot("left", two_link, position=(0.0, 5.0, 0.5))
+    assert engine.list_robots() == ["arm", "left"]
+    assert engine.robot_joint_names("left") == ["hinge"]
+    assert_same(_by_name(engine, ("left",)), before, "right after adding a robot")
+    joint = engine.index.joint("left.hinge")
+    assert_close(engine.get_state().joint_pos[:, joint], 0.25, tolerances.READ_BACK, "its home")
+    engine.send_action({"hinge": -0.3}, "left", n_substeps=1500)
+    assert_close(engine.get_state().joint_pos[:, joint], -0.3, tolerances.LIMIT, "its target")
+    engine.remove_robot("left")
+    assert engine.list_robots() == ["arm"]
 
 
 def test_adding_and_removing_is_as_before(build):

@@ -9,6 +9,7 @@ import pytest
 
 from anysim.engine.capability import Capability as C
 from anysim.testing import tolerances, worlds
+from anysim.testing.fixtures import skip_without
 
 ROUNDS = 40
 _PROC = Path("/proc/self")
@@ -48,8 +49,7 @@ def test_no_memory_threads_or_handles_are_left(new_engine, engine_class):
 
 def test_renderers_are_freed(new_engine, engine_class):
     """Rendering worlds leave no thread and no file handle either."""
-    if C.RENDER_RGB not in engine_class.capabilities:
-        pytest.skip(f"{engine_class.name} does not declare '{C.RENDER_RGB}'")
+    skip_without(engine_class, C.RENDER_RGB)
     if not (_PROC / "fd").exists():
         pytest.skip("no /proc here: handles cannot be counted")
     _cycle(new_engine, 2, render=True)

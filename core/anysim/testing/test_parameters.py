@@ -48,7 +48,9 @@ def test_parameters_begin_as_the_world_says(build, engine_class, name):
     which = _movable(world, name)
     wanted = _nominal(world, name)[which]
     for row in engine.get_parameters(name, indices=which):
-        assert np.allclose(row, wanted, rtol=tolerances.READ_BACK, atol=1e-9), f"{name}: {row} where the World has {wanted}"
+        assert np.allclose(row, wanted, rtol=tolerances.READ_BACK, atol=1e-9), (
+            f"{name}: {row} where the World has {wanted}"
+        )
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -145,7 +147,9 @@ def test_mass_matters(build, engine_class):
     engine.set_parameters("body.mass", [[8.0]], env_ids=[1])
     engine.apply_wrench([4.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0])
     engine.step(500)
-    assert_close(engine.get_state().body_twist[:, 0, 0], np.array([2.0, 0.5]), 2 * tolerances.MOTION, "speeds after 1 s")
+    assert_close(
+        engine.get_state().body_twist[:, 0, 0], np.array([2.0, 0.5]), 2 * tolerances.MOTION, "speeds after 1 s"
+    )
 
 
 @needs(C.DYNAMICS)

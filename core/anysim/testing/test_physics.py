@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from math import asin, cos, radians, sin, sqrt
+from typing import Any
 
 import numpy as np
 import pytest
@@ -108,7 +109,9 @@ def test_pendulum_period(build, amplitude):
     bob = engine.world.bodies[1].inertial
     pivot = bob.inertia[0] + bob.mass * length**2
     a = amplitude
-    wanted = 2 * np.pi * sqrt(pivot / (bob.mass * G * length)) * (1 + a**2 / 16 + 11 * a**4 / 3072 + 173 * a**6 / 737280)
+    wanted = (
+        2 * np.pi * sqrt(pivot / (bob.mass * G * length)) * (1 + a**2 / 16 + 11 * a**4 / 3072 + 173 * a**6 / 737280)
+    )
     engine.set_joint_state(amplitude)
     angles = [amplitude]
     for _ in range(4000):
@@ -159,7 +162,7 @@ def test_nothing_slows_a_free_joint(build, drive):
 
 def test_a_drive_carries_its_load(build):
     """At rest against gravity a drive reports the weight, and sags by weight / kp."""
-    up = {"gravity": (0.0, 0.0, -G), "axis": (0.0, 0.0, 1.0)}
+    up: dict[str, Any] = {"gravity": (0.0, 0.0, -G), "axis": (0.0, 0.0, 1.0)}
     engine = build(worlds.slider(ControlMode.POSITION, 2000.0, 200.0, **up))
     engine.step(1500)
     state = engine.get_state()

@@ -4,6 +4,7 @@ import numpy as np
 
 from anysim.conventions import WORLD
 from anysim.engine.capability import Capability as C
+from anysim.math import pose as P
 from anysim.testing import tolerances, worlds
 from anysim.testing.compare import assert_close, assert_ratio, assert_same, play, read, tape
 from anysim.testing.fixtures import needs
@@ -14,7 +15,7 @@ G = 9.81
 
 
 def _stack():
-    """A box of 2 kg on the ground, a ball of 0.5 kg on the box; sensors: all on the box, from the ball, from the ground."""
+    """A box of 2 kg on the ground, a ball of 0.5 kg on the box; sensors for all, the ball, the ground, and both."""
     s = Sketch("stack")
     s.ground()
     box = s.free("box", Box((0.2, 0.2, 0.1)), (0.0, 0.0, 0.1), 2.0)
@@ -28,7 +29,7 @@ def _stack():
 
 @needs(C.DYNAMICS)
 def test_contact_sensors_weigh(build):
-    """At rest a sensor gives the net contact force [N], world axes, on its bodies; `against` leaves only some contacts."""
+    """At rest a sensor gives the net contact force [N] on its bodies, world axes; `against` picks some contacts."""
     engine = build(_stack(), 2)
     engine.step(1000)
     force = engine.get_state().contact_force
@@ -155,7 +156,8 @@ def test_segmentation_of_boxes(build):
 def test_nothing_to_see_is_far_and_zero(build):
     """Where nothing is, depth is inf and segmentation 0."""
     engine = build(worlds.wall())
-    engine.set_camera_pose("fixed", [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])  # looks up
+    away = P.look_at(np.zeros(3), np.array([-1.0, 0.0, 0.0]))
+    engine.set_camera_pose("fixed", np.concatenate([np.zeros(3), away]))
     images = engine.render("fixed", channels=("depth", "segmentation"))
     assert np.isinf(images["depth"]).all()
     assert not images["segmentation"].any()

@@ -1,5 +1,6 @@
 """Snapshots: as exact as declared, or refused."""
 
+import io
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from anysim.engine.state import SnapshotLevel
 from anysim.errors import CapabilityError, EngineError, SnapshotError
 from anysim.testing import tolerances, worlds
 from anysim.testing.compare import MOTION, assert_close, assert_same, play, read, spread, tape
-from anysim.testing.fixtures import needs, skip_without_parameter
+from anysim.testing.fixtures import needs, skip_without, skip_without_parameter
 
 LEVELS = [level.value for level in SnapshotLevel]
 exact = needs(C.SNAPSHOT_TRAJECTORY)
@@ -45,8 +46,7 @@ def test_levels_are_as_declared(build, engine_class, level):
 @pytest.mark.parametrize("level", LEVELS)
 def test_a_snapshot_brings_the_state_back(build, engine_class, level):
     """Restoring brings poses, velocities, joints, commands and time back at once, at every level."""
-    if C(f"snapshot: {level}") not in engine_class.capabilities:
-        pytest.skip(f"{engine_class.name} does not declare 'snapshot: {level}'")
+    skip_without(engine_class, C(f"snapshot: {level}"))
     engine = _running(build)
     before, snapshot = read(engine, fields=MOTION), engine.snapshot(level=level)
     play(engine, tape(engine.world, [0, 1], 20, seed=3))
@@ -130,6 +130,21 @@ def test_a_second_engine_takes_over(build):
 
 
 @exact
+def test_snapshots_can_be_stored(build):
+    """A snapshot survives a file, bit for bit: it is plain arrays and a stamp."""
+    engine = _running(build)
+    snapshot, file = engine.snapshot(), io.BytesIO()
+    np.savez(file, allow_pickle=False, **snapshot.data)
+    engine.step(30)
+    wanted = read(engine)
+    file.seek(0)
+    with np.load(file) as stored:
+        engine.restore(replace(snapshot, data=dict(stored)))
+    engine.step(30)
+    assert_same(read(engine), wanted, "from a stored snapshot")
+
+
+@exact
 @pytest.mark.parametrize("name", ["body.mass", "world.gravity", "joint.damping", "actuator.kp", "geom.friction"])
 def test_changed_parameters_travel(build, engine_class, name):
     """Parameters changed per env are in the snapshot; restoring undoes later changes, too."""
@@ -166,8 +181,7 @@ def test_placed_bodies_travel(build):
 @exact
 def test_control_modes_travel(build, engine_class):
     """The modes of drives are in the snapshot."""
-    if C.CONTROL_VELOCITY not in engine_class.capabilities:
-        pytest.skip(f"{engine_class.name} does not declare '{C.CONTROL_VELOCITY}'")
+    skip_without(engine_class, C.CONTROL_VELOCITY)
     engine = _running(build)
     engine.set_control_mode("velocity", env_ids=[0], actuators=[0])
     engine.set_control(velocity=0.4)
@@ -192,8 +206,7 @@ def test_control_modes_travel(build, engine_class):
 def test_foreign_snapshots_are_refused(build, engine_class, change, message):
     """A snapshot of another engine, version or world is a SnapshotError that says which, and nothing changes."""
     level = next((x for x in LEVELS if C(f"snapshot: {x}") in engine_class.capabilities), None)
-    if level is None:
-        pytest.skip(f"{engine_class.name} does not declare '{C.SNAPSHOT_STATE}'")
+    skip_without(engine_class, C.SNAPSHOT_STATE if level is None else C(f"snapshot: {level}"))
     engine = _running(build)
     snapshot = engine.snapshot(level=level)
     engine.step(5)

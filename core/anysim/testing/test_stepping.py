@@ -1,11 +1,25 @@
 """Time, partial steps and resets, and determinism."""
 
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
 import numpy as np
 import pytest
 
 from anysim.engine.capability import Capability as C
-from anysim.testing import tolerances, worlds
-from anysim.testing.compare import MOTION, assert_close, assert_ratio, assert_same, play, read, spread, tape
+from anysim.testing import plugin, tolerances, worlds
+from anysim.testing.compare import (
+    MOTION,
+    assert_close,
+    assert_ratio,
+    assert_same,
+    play,
+    read,
+    run_and_read,
+    run_elsewhere,
+    spread,
+    tape,
+)  # fmt: skip
 from anysim.testing.fixtures import needs
 
 
@@ -74,6 +88,15 @@ def test_the_same_run_twice(build):
     assert_same(states[1], states[0], "the second run")
 
 
+def test_the_same_run_in_another_process(new_engine, pytestconfig):
+    """A run is the same, bit for bit, in another process."""
+    arguments = (pytestconfig.getoption("engine"), plugin.engine_options(pytestconfig))
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        there = pool.submit(run_elsewhere, *arguments)
+        here = run_and_read(new_engine(), worlds.scene())
+        assert_same(there.result(timeout=300), here, "the other process")
+
+
 def test_envs_do_not_depend_on_their_number(build):
     """Env i has the same trajectory, bit for bit, whatever `num_envs` is."""
     world = worlds.scene()
@@ -93,7 +116,9 @@ def test_equal_envs_stay_equal(build):
         engine.step(2)
     state = read(engine)
     for env in range(1, 4):
-        assert_same({k: v[env] for k, v in state.items()}, {k: v[0] for k, v in state.items()}, f"env {env} against env 0")
+        assert_same(
+            {k: v[env] for k, v in state.items()}, {k: v[0] for k, v in state.items()}, f"env {env} against env 0"
+        )
 
 
 def test_partial_step_leaves_the_others(build):

@@ -5,8 +5,10 @@ import threading
 import numpy as np
 import pytest
 
+from anysim.engine.capability import Capability as C
 from anysim.testing import worlds
 from anysim.testing.compare import FIELDS, assert_same, read, spread, tape
+from anysim.testing.fixtures import needs
 
 THREADS = 4
 
@@ -93,6 +95,20 @@ def test_a_state_is_read_from_another_thread(build, field):
     thread.start()
     thread.join(timeout=30)
     assert np.array_equal(seen[0], getattr(engine.get_state(), field))
+
+
+@needs(C.RENDER_RGB)
+def test_images_from_another_thread(build):
+    """A thread that did not build the engine may render, before and after the one that did; the images are equal."""
+    engine, images = build(worlds.scene(cameras=True)), []
+    images.append(engine.render("front")["rgb"])
+    thread = threading.Thread(target=lambda: images.append(engine.render("front")["rgb"]))
+    thread.start()
+    thread.join(timeout=60)
+    images.append(engine.render("front")["rgb"])
+    assert len(images) == 3, "the other thread's render failed"
+    assert np.array_equal(images[0], images[1])
+    assert np.array_equal(images[0], images[2])
 
 
 def test_an_engine_made_in_a_thread_serves_another(new_engine):

@@ -12,7 +12,8 @@ DIFFERENCE = 2e-2
 the acceleration (here up to 10 m/s^2 x 1 ms), and by single-precision rounding over the step (1e-7 m / 1 ms)."""
 
 FALL_SPEED = 1e-4
-"""Relative: gravity is constant, so any integrator has the speed of a free fall right; rounding adds over 1000 steps."""
+"""Relative: gravity is constant, so any integrator has the speed of a free fall right; rounding adds up over 1000
+steps."""
 
 MOTION = 2.5e-3
 """Relative, on a motion under a constant force: first-order integrators are off by one step in time (half a step times

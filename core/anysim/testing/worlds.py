@@ -1,6 +1,7 @@
 """The worlds of the contract suite: small enough to know the answers by hand."""
 
 from math import cos, inf, pi, sin
+from typing import Any
 
 import numpy as np
 
@@ -8,8 +9,25 @@ from anysim.conventions import WORLD
 from anysim.math import pose as P
 from anysim.testing.sketch import ORIGIN, Sketch, inertial
 from anysim.world.model import (
-    Box, Camera, ContactSensor, ControlMode, Geom, HeightField, HeightFieldShape, Inertial, JointType, Mesh, MeshShape,
-    Mimic, Quat, Shape, Site, Sphere, Surface, Vec3, World,
+    Box,
+    Camera,
+    ContactSensor,
+    ControlMode,
+    Geom,
+    HeightField,
+    HeightFieldShape,
+    Inertial,
+    JointType,
+    Mesh,
+    MeshShape,
+    Mimic,
+    Quat,
+    Shape,
+    Site,
+    Sphere,
+    Surface,
+    Vec3,
+    World,
 )  # fmt: skip
 
 REVOLUTE, PRISMATIC = JointType.REVOLUTE, JointType.PRISMATIC
@@ -53,7 +71,7 @@ def _arm(s: Sketch, position: Vec3 = ORIGIN) -> None:
     """Two links of 0.3 m; the shoulder turns about z, the elbow about y, each with a drive."""
     rod = Box((0.15, 0.02, 0.02))
     bar = inertial(rod, 1.0, (0.15, 0.0, 0.0))
-    motor = {"damping": 0.1, "armature": 0.01, "velocity_limit": 3.0}
+    motor: dict[str, Any] = {"damping": 0.1, "armature": 0.01, "velocity_limit": 3.0}
     base = s.robot("arm", position)
     upper = s.link("shoulder", base, REVOLUTE, Z, bar, lower=-2.0, upper=2.0, initial=0.2, **motor)
     lower = s.link("elbow", upper, REVOLUTE, Y, bar, position=(0.3, 0.0, 0.0), lower=-1.5, upper=1.5, **motor)
@@ -120,7 +138,20 @@ def resting_mesh(half: float = 0.1) -> World:
     s = Sketch("resting_mesh")
     s.ground()
     corners = np.array([[x, y, z] for x in (0.0, 2 * half) for y in (0.0, 2 * half) for z in (0.0, 2 * half)])
-    faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
+    faces = [
+        [0, 1, 3],
+        [0, 3, 2],
+        [4, 6, 7],
+        [4, 7, 5],
+        [0, 4, 5],
+        [0, 5, 1],
+        [2, 3, 7],
+        [2, 7, 6],
+        [0, 2, 6],
+        [0, 6, 4],
+        [1, 5, 7],
+        [1, 7, 3],
+    ]
     s.more["meshes"] = (Mesh("cube", corners, np.array(faces, dtype=np.int32), "contract-cube"),)
     cube = inertial(Box((half, half, half)), 1.0, (half, half, half))
     s.free("thing", MeshShape("cube"), (0.0, 0.0, 0.002), inertia=cube)
@@ -148,7 +179,13 @@ def slope(angle: float, friction: float, other: float = 0.0) -> World:
     tilt = turn(Y, angle)
     s.fixed("slab", Box((3.0, 1.0, 0.1)), (0.0, 0.0, 0.0), quaternion=tilt, surface=Surface(friction=other))
     up = 0.1 + 0.05
-    s.free("box", Box((0.1, 0.1, 0.05)), (up * sin(angle), 0.0, up * cos(angle)), quaternion=tilt, surface=Surface(friction=friction))
+    s.free(
+        "box",
+        Box((0.1, 0.1, 0.05)),
+        (up * sin(angle), 0.0, up * cos(angle)),
+        quaternion=tilt,
+        surface=Surface(friction=friction),
+    )
     return s.world()
 
 
@@ -172,7 +209,17 @@ def pendulum(length: float = 0.5, dt: float = 0.001, damping: float = 0.0) -> Wo
     base = s.robot("pendulum", (0.0, 0.0, 2.0))
     bob = inertial(Sphere(0.05), 0.7)
     # the frame is turned by 90 degrees about x: its y axis is the world's z, its -z axis the world's y
-    s.link("bob", base, REVOLUTE, (0.0, 0.0, -1.0), bob, position=(0.0, 0.0, -length), quaternion=turn(X, pi / 2), anchor=(0.0, length, 0.0), damping=damping)
+    s.link(
+        "bob",
+        base,
+        REVOLUTE,
+        (0.0, 0.0, -1.0),
+        bob,
+        position=(0.0, 0.0, -length),
+        quaternion=turn(X, pi / 2),
+        anchor=(0.0, length, 0.0),
+        damping=damping,
+    )
     return s.world()
 
 
@@ -208,7 +255,7 @@ def tree(gravity: Vec3 = WEIGHTLESS) -> World:
 def slider(
     mode: ControlMode = ControlMode.EFFORT, kp: float = 0.0, kd: float = 0.0, limit: float = inf, *, mass: float = 2.0,
     dt: float = 0.002, gravity: Vec3 = WEIGHTLESS, axis: Vec3 = X, compensated: bool = False, drive: bool = True,
-    **joint: float,
+    **joint: Any,
 ) -> World:  # fmt: skip
     """One driven carriage on a rail: m a = u - d v, the simplest place to see a drive's law."""
     s = Sketch("slider", dt, gravity)
