@@ -1,1 +1,5 @@
-""" """
+"""The contract suite of physics engines, shipped for their authors: `pytest --pyargs anysim.testing --engine NAME`.
+
+A test's docstring is the rule that it checks. Tests that need a capability the engine does not declare are skipped and
+counted; what an engine declares is tested.
+"""

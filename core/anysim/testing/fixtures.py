@@ -1,0 +1,77 @@
+"""The fixtures of the contract suite: the engine under test, with worlds built on demand and freed afterwards."""
+
+from collections.abc import Callable, Iterator
+from typing import Any, Protocol
+
+import pytest
+
+from anysim.engine.base import SimEngine
+from anysim.engine.capability import Capability
+from anysim.engine.needs import needs_of
+from anysim.testing import plugin
+from anysim.world.model import World
+
+
+class Build(Protocol):
+    """Builds a world on a new engine of the kind under test; skips the test where the engine cannot run the world."""
+
+    def __call__(self, world: World, num_envs: int = 1) -> SimEngine: ...
+
+
+@pytest.fixture(scope="session")
+def engine_class(pytestconfig: pytest.Config) -> type[SimEngine]:
+    """The class under test."""
+    return plugin.engine_class(pytestconfig)
+
+
+@pytest.fixture
+def new_engine(engine_class: type[SimEngine], pytestconfig: pytest.Config) -> Iterator[Callable[[], SimEngine]]:
+    """Makes engines without a world, with the options of the command line; all are destroyed after the test."""
+    options: dict[str, Any] = plugin.engine_options(pytestconfig)
+    made: list[SimEngine] = []
+
+    def make() -> SimEngine:
+        made.append(engine_class(**options))
+        return made[-1]
+
+    yield make
+    for engine in made:
+        engine.destroy()
+
+
+@pytest.fixture
+def build(new_engine: Callable[[], SimEngine], engine_class: type[SimEngine]) -> Build:
+    """See Build."""
+
+    def make(world: World, num_envs: int = 1) -> SimEngine:
+        for need in needs_of(world):
+            skip_without(engine_class, need.capability)
+        return new_engine().create_world(world, num_envs)
+
+    return make
+
+
+@pytest.fixture(autouse=True)
+def _declared(request: pytest.FixtureRequest) -> None:
+    """Skip a test whose `needs` marker names a capability that the engine does not declare."""
+    for marker in request.node.iter_markers(plugin.NEEDS):
+        for capability in marker.args:
+            skip_without(request.getfixturevalue("engine_class"), capability)
+
+
+def skip_without(engine_class: type[SimEngine], capability: Capability) -> None:
+    """Skip the running test, naming the capability."""
+    if capability not in engine_class.capabilities:
+        pytest.skip(f"{engine_class.name} does not declare '{capability}'")
+
+
+def needs(*capabilities: Capability) -> pytest.MarkDecorator:
+    """Mark a test with the capabilities it needs beyond those of the worlds it builds."""
+    return getattr(pytest.mark, plugin.NEEDS)(*capabilities)
+
+
+def skip_without_parameter(engine_class: type[SimEngine], name: str) -> None:
+    """Skip the running test where the engine cannot change the parameter."""
+    skip_without(engine_class, Capability.PARAMETERS_PER_ENV)
+    if name not in engine_class.parameters:
+        pytest.skip(f"{engine_class.name} does not declare 'parameter {name}'")

@@ -1,0 +1,111 @@
+"""The pytest plugin of the contract suite: `--engine`, `--engine-option`, and the line that sums a run up.
+
+It is loaded by every pytest run on a machine that has anysim, so it imports nothing but the standard library and
+pytest until `--engine` is given.
+"""
+
+import importlib
+import json
+import re
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+HERE = Path(__file__).parent
+NEEDS = "anysim_needs"
+_SUITE = pytest.StashKey[frozenset[str]]()
+_ABSENT = re.compile(r"does not declare '([^']+)'")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the suite's options."""
+    group = parser.getgroup("anysim", "the contract suite of anysim's physics engines (--pyargs anysim.testing)")
+    group.addoption("--engine", metavar="NAME", help="the engine under test: an installed name, or module:Class")
+    group.addoption(
+        "--engine-option", metavar="KEY=VALUE", action="append", default=[],
+        help="an option of the engine, may be repeated; the value is read as JSON, else as text",
+    )  # fmt: skip
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Register the marker; with an engine to test, look whether it can run here, and register the fixtures."""
+    config.addinivalue_line("markers", f"{NEEDS}(*capabilities): skip where the engine does not declare them all")
+    name = config.getoption("engine")
+    if not name:
+        return
+    from anysim.errors import AnysimError
+
+    try:
+        here = load_engine(name).availability()
+    except (AnysimError, ImportError, AttributeError) as error:
+        raise pytest.UsageError(f"--engine {name}: {error}") from error
+    if not here.available:
+        raise pytest.UsageError(f"--engine {name} cannot run here: {'; '.join(here.missing)}. {here.remedy}")
+    pytest.register_assert_rewrite("anysim.testing.compare")
+    config.pluginmanager.register(importlib.import_module("anysim.testing.fixtures"), "anysim-contract-fixtures")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Note which tests are the suite's, and refuse to run them without an engine: each would lack its fixtures."""
+    config.stash[_SUITE] = frozenset(item.nodeid for item in items if item.path.is_relative_to(HERE))
+    if config.stash[_SUITE] and not config.getoption("engine"):
+        raise pytest.UsageError("the contract suite tests one engine: pytest --pyargs anysim.testing --engine NAME")
+
+
+def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
+    """One line: engine, version, counts, and what was skipped for want of which capability."""
+    suite = config.stash.get(_SUITE, frozenset())
+    if not suite:
+        return
+    outcomes = {
+        kind: [r for r in terminalreporter.stats.get(kind, []) if getattr(r, "nodeid", "") in suite]
+        for kind in ("passed", "failed", "error", "skipped")
+    }
+    missing = Counter(_reason(report) for report in outcomes["skipped"])
+    detail = ", ".join(f"{name}: {count}" for name, count in sorted(missing.items()))
+    counts = [f"{len(outcomes['passed'])} passed"]
+    failures = len(outcomes["failed"]) + len(outcomes["error"])
+    counts += [f"{failures} failed"] if failures else []
+    counts += [f"{len(outcomes['skipped'])} skipped" + (f" ({detail})" if detail else "")]
+    engine = engine_class(config)
+    version = engine.availability().version
+    terminalreporter.write_line(f"anysim contract: engine {engine.name} {version}: {', '.join(counts)}")
+
+
+def engine_class(config: pytest.Config) -> Any:
+    """The SimEngine class that `--engine` names."""
+    return load_engine(str(config.getoption("engine")))
+
+
+def load_engine(name: str) -> Any:
+    """The SimEngine class of an installed name, or of `module:Class`."""
+    module, colon, attribute = name.partition(":")
+    # `dist:name` chooses between distributions; engines' names are in lower case, classes are not
+    if colon and attribute[:1].isupper():
+        return getattr(importlib.import_module(module), attribute)
+    from anysim import registry
+
+    return registry.load("engines", name)
+
+
+def engine_options(config: pytest.Config) -> dict[str, Any]:
+    """The options that `--engine-option` gives."""
+    options: dict[str, Any] = {}
+    for text in config.getoption("engine_option") or ():
+        key, equals, value = text.partition("=")
+        if not equals:
+            raise pytest.UsageError(f"--engine-option takes KEY=VALUE, got '{text}'")
+        try:
+            options[key] = json.loads(value)
+        except json.JSONDecodeError:
+            options[key] = value
+    return options
+
+
+def _reason(report: Any) -> str:
+    """The capability that a skip names, else its whole reason."""
+    text = report.longrepr[2] if isinstance(report.longrepr, tuple) else str(report.longrepr)
+    found = _ABSENT.search(text)
+    return found.group(1) if found else text.removeprefix("Skipped: ")

@@ -1,0 +1,47 @@
+"""Run tests of the contract suite on many engines in one process: `run_engines.py JOBS.json RESULTS.json`.
+
+Jobs map engines (`module:Class`) to tests (`test_x.py::test_y`); results map engines to tests to outcomes, where a
+parametrised test has failed if one of its cases has.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+import anysim.testing
+
+SUITE = Path(anysim.testing.__file__).parent
+_ORDER = ("skipped", "passed", "failed")
+
+
+class Outcomes:
+    """A pytest plugin that keeps the worst outcome per test."""
+
+    def __init__(self) -> None:
+        self.tests: dict[str, str] = {}
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Called by pytest for setup, call and teardown of each test."""
+        if report.when != "call" and report.passed:
+            return
+        name = report.nodeid.rpartition("/")[2].partition("[")[0]
+        before = self.tests.get(name, _ORDER[0])
+        self.tests[name] = max(before, report.outcome, key=_ORDER.index)
+
+
+def run(engine: str, tests: list[str]) -> dict[str, str]:
+    """Outcomes of the tests on one engine."""
+    outcomes = Outcomes()
+    where = [f"{SUITE}/{test}" for test in tests]
+    options = ["-q", "--no-header", "--tb=no", "-p", "no:cacheprovider", "--import-mode=importlib"]
+    pytest.main([*options, "--engine", engine, *where], plugins=[outcomes])
+    return outcomes.tests
+
+
+if __name__ == "__main__":
+    jobs, results = Path(sys.argv[1]), Path(sys.argv[2])
+    results.write_text(
+        json.dumps({engine: run(engine, tests) for engine, tests in json.loads(jobs.read_text()).items()})
+    )

@@ -1,0 +1,87 @@
+"""The shipped contract suite, run as its users run it: in its own process, by package name."""
+
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+
+from anysim import registry
+from anysim.errors import PluginError
+
+SUMMARY = re.compile(
+    r"anysim contract: engine (\S+) (\S+): (\d+) passed(?:, (\d+) failed)?, (\d+) skipped(?: \((.*)\))?"
+)
+
+
+def _run(folder, *options):
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "--tb=short",
+        "--pyargs",
+        "anysim.testing",
+        *options,
+    ]
+    return subprocess.run(command, cwd=folder, env=dict(os.environ), capture_output=True, text=True, check=False)
+
+
+def _summary(done):
+    found = SUMMARY.search(done.stdout)
+    assert found, done.stdout[-4000:] + done.stderr[-4000:]
+    assert found[4] is None, done.stdout[-8000:]
+    assert done.returncode == 0, done.stdout[-4000:]
+    return int(found[3]), int(found[5]), found[6] or ""
+
+
+def test_the_null_engine_passes(tmp_path):
+    passed, skipped, why = _summary(_run(tmp_path, "--engine", "null"))
+    assert passed > 215
+    counts = dict(part.rsplit(": ", 1) for part in why.split(", "))
+    assert set(counts) == {"dynamics", "external wrenches", "raycast", "render: rgb"}
+    assert sum(map(int, counts.values())) == skipped
+
+
+def test_mujoco_passes(tmp_path):
+    try:
+        engine = registry.load("engines", "mujoco")
+    except PluginError as error:
+        pytest.skip(str(error))
+    here = engine.availability()
+    if not here.available:
+        pytest.skip(f"mujoco cannot run here: {'; '.join(here.missing)}")
+    passed, skipped, why = _summary(_run(tmp_path, "--engine", "mujoco"))
+    assert passed > 300
+    assert skipped == 0, why
+
+
+def test_without_an_engine_it_says_how(tmp_path):
+    done = _run(tmp_path)
+    assert done.returncode == pytest.ExitCode.USAGE_ERROR
+    assert "--engine NAME" in done.stdout + done.stderr
+
+
+def test_an_unknown_engine_lists_what_exists(tmp_path):
+    done = _run(tmp_path, "--engine", "nul")
+    assert done.returncode == pytest.ExitCode.USAGE_ERROR
+    assert "did you mean 'null'" in done.stdout + done.stderr
+
+
+def test_options_reach_the_engine(tmp_path):
+    done = _run(tmp_path, "--engine", "null", "--engine-option", "colour=red", "-k", "test_context_manager_destroys")
+    assert "null takes no options, got colour" in done.stdout
+
+
+def test_the_plugin_costs_nothing_without_an_engine(tmp_path):
+    """It is loaded in every pytest run on the machine: it must not import numpy or the engines."""
+    code = (
+        "import sys; before = set(sys.modules); import anysim.testing.plugin; "
+        "new = {m.split('.')[0] for m in set(sys.modules) - before}; "
+        "assert not new & {'numpy', 'pydantic', 'mujoco'}, new; assert 'anysim.engine' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], cwd=tmp_path, check=True)
