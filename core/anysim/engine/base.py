@@ -17,13 +17,18 @@ from anysim.engine.cameras import CameraRig, CameraView
 from anysim.engine.capability import Capabilities, Capability, Need, check
 from anysim.engine.commands import CommandBuffer, Control
 from anysim.engine.index import Index
+from anysim.engine.needs import needs_of
 from anysim.engine.parameters import PARAMETERS, count
 from anysim.engine.state import (
-    Availability, ContactPoints, RayHits, Snapshot, SnapshotLevel, State,
+    Availability,
+    ContactPoints,
+    RayHits,
+    Snapshot,
+    SnapshotLevel,
+    State,
 )  # fmt: skip
 from anysim.errors import CapabilityError, EngineError, listing
 from anysim.world.model import BodyKind, ControlMode, World
-from anysim.engine.needs import needs_of
 
 EnvIds = Sequence[int] | Array | None
 """Which envs: None for all, else unique indices."""
@@ -233,7 +238,7 @@ class SimEngine(ABC):
             self._commands.set_mode(ControlMode(mode), self._ids(env_ids), which)
 
     def apply_wrench(self, wrench: Any, bodies: Sequence[int], env_ids: EnvIds = None) -> None:
-        """Forces and torques (E, K, 6) [N, N m], world axes, at the bodies' centres of mass, for the next step() call."""
+        """Forces and torques (E, K, 6) [N, N m], world axes, at the bodies' centres of mass, for the next step()."""
         with self._lock:
             self._require_world()
             self._require(Capability.WRENCHES)
@@ -262,7 +267,9 @@ class SimEngine(ABC):
             parameter, ids, which = self._parameter(name, env_ids, indices)
             rows = checks.rows(name, values, (len(ids), len(which), *parameter.shape))
             if parameter.minimum is not None and rows.size and rows.min() < parameter.minimum:
-                raise EngineError(f"{name} [{parameter.unit}] must be at least {parameter.minimum:g}, got {rows.min():g}")
+                raise EngineError(
+                    f"{name} [{parameter.unit}] must be at least {parameter.minimum:g}, got {rows.min():g}"
+                )
             self._retire_state()
             self._set_parameter(name, rows, ids, which)
             self._changed[name] = None
@@ -277,7 +284,9 @@ class SimEngine(ABC):
         if parameter is None:
             raise EngineError(f"there is no parameter '{name}' (parameters: {listing(PARAMETERS, 20)})")
         if name not in self.parameters:
-            raise CapabilityError(f"{self.name} cannot change '{name}' (it can: {listing(sorted(self.parameters), 20)})")
+            raise CapabilityError(
+                f"{self.name} cannot change '{name}' (it can: {listing(sorted(self.parameters), 20)})"
+            )
         return parameter, self._ids(env_ids), self._which(indices, count(parameter, self.world), parameter.target)
 
     # ------------------------------------------------------------------ snapshots
@@ -316,10 +325,9 @@ class SimEngine(ABC):
                 elif name in self._changed:
                     default = self._default_parameter(name)
                     self._set_parameter(name, np.repeat(default[None], len(ids), 0), ids, np.arange(len(default)))
-            prefixed = lambda prefix: {k[len(prefix) :]: v for k, v in data.items() if k.startswith(prefix)}  # noqa: E731
-            self._commands.restore(ids, prefixed("commands."))
+            self._commands.restore(ids, _under("commands.", data))
             self._rig.poses[ids] = data["cameras"]
-            self._restore(ids, prefixed("engine."), snapshot.level)
+            self._restore(ids, _under("engine.", data), snapshot.level)
             self._ticks[ids] = data["ticks"]
 
     # ------------------------------------------------------------------ sensing
@@ -328,8 +336,10 @@ class SimEngine(ABC):
         self, camera_name: str = "default", width: int | None = None, height: int | None = None,
         env_ids: EnvIds = None, channels: Sequence[str] = ("rgb",),
     ) -> dict[str, Array]:  # fmt: skip
-        """Images of one camera: `rgb` (E, H, W, 3) uint8, `depth` (E, H, W) float32 [m] along the optical axis (inf
-        beyond the far plane), `segmentation` (E, H, W) int32 entity ids (`Index.segmentation_id`; 0 elsewhere).
+        """Images of one camera, by channel.
+
+        `rgb` (E, H, W, 3) uint8; `depth` (E, H, W) float32 [m] along the optical axis, inf beyond the far plane;
+        `segmentation` (E, H, W) int32 entity ids (`Index.segmentation_id`; 0 elsewhere).
 
         `default` is an overview of the world where no camera has that name.
         """
@@ -406,7 +416,9 @@ class SimEngine(ABC):
 
         with self._lock:
             if name not in [e.name for e in self.index.objects]:
-                raise EngineError(f"there is no object '{name}' (objects: {listing(e.name for e in self.index.objects)})")
+                raise EngineError(
+                    f"there is no object '{name}' (objects: {listing(e.name for e in self.index.objects)})"
+                )
             self._rebuild(without_entity(self.world, name))
 
     def add_camera(self, name: str, **spec: Any) -> None:
@@ -439,8 +451,10 @@ class SimEngine(ABC):
         return [self.world.joints[j].name[prefix:] for j in self.index.robot_joints(robot_name)]
 
     def get_observation(self, robot_name: str | None = None, *, skip_images: bool = False) -> dict[str, Array]:
-        """What a script or agent wants to know about a robot: `joint_pos`, `joint_vel` (N, J), `<tool>_pose` (N, 7),
-        and `images/<camera>` of all cameras unless skipped."""
+        """What a script or agent wants to know about a robot.
+
+        `joint_pos`, `joint_vel` (N, J), `<tool>_pose` (N, 7), and `images/<camera>` of all cameras unless skipped.
+        """
         from anysim.engine.surface import observation
 
         with self._lock:
@@ -465,7 +479,9 @@ class SimEngine(ABC):
 
     def _require(self, capability: Capability) -> None:
         if capability not in self.capabilities:
-            raise CapabilityError(f"{self.name} does not have '{capability}' (`anysim list engines` shows what each can do)")
+            raise CapabilityError(
+                f"{self.name} does not have '{capability}' (`anysim list engines` shows what each can do)"
+            )
 
     def _ids(self, env_ids: EnvIds) -> Array:
         return self._all if env_ids is None else checks.indices(env_ids, self.num_envs, "env")
@@ -536,7 +552,7 @@ class SimEngine(ABC):
         """Solver state to carry across a rebuild, in a form that `_take_rows` of the new build understands."""
         return None
 
-    def _take_rows(self, carried: Any, old: World) -> None:
+    def _take_rows(self, carried: Any, old: World) -> None:  # noqa: B027  optional: most engines carry nothing
         """Take over by name what `_carry_rows` of the old build returned (warm starts and the like)."""
 
     def _render(self, view: CameraView, ids: Array, channels: tuple[str, ...]) -> dict[str, Array]:
@@ -553,3 +569,8 @@ class SimEngine(ABC):
 
     def _absent(self, capability: Capability) -> CapabilityError:
         return CapabilityError(f"{self.name} does not have '{capability}'")
+
+
+def _under(prefix: str, data: Mapping[str, Array]) -> dict[str, Array]:
+    """The entries of a snapshot whose names begin with `prefix`, without it."""
+    return {name[len(prefix) :]: rows for name, rows in data.items() if name.startswith(prefix)}
