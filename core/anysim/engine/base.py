@@ -320,7 +320,7 @@ class SimEngine(ABC):
             for name in PARAMETERS:
                 key = f"parameter.{name}"
                 if key in data:
-                    self._set_parameter(name, data[key], ids, np.arange(data[key].shape[1]))
+                    self._set_parameter(name, data[key], ids, np.arange(int(data[key].shape[1])))
                     self._changed[name] = None
                 elif name in self._changed:
                     default = self._default_parameter(name)
