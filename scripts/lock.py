@@ -8,6 +8,7 @@ no longer meets the pyproject.toml files.
 """
 
 import argparse
+import os
 import shutil
 import subprocess
 import sys
@@ -21,9 +22,8 @@ HEADER = "# Exact versions of the environment, written by scripts/lock.py from t
 
 
 def find_uv(root: Path) -> str:
-    """The uv that `make venv` uses."""
-    private = root / ".venv-tools" / "bin" / "uv"
-    found = shutil.which("uv") or (str(private) if private.is_file() else None)
+    """The uv that `make venv` uses: that of the PATH, else its own."""
+    found = shutil.which("uv", path=os.pathsep.join([os.environ.get("PATH", ""), str(root / ".venv-tools" / "bin")]))
     if found is None:
         sys.exit("uv is not here; run `make venv`, which fetches it")
     return found

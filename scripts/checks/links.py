@@ -7,7 +7,7 @@ from pathlib import Path
 from checks.tree import Fault, Tree
 
 LINK = re.compile(r"\]\(<?([^)\s#>]+)[^)]*\)")
-MAKE = re.compile(r"(?:^|[`$]\s*)make ([a-z][a-z-]*)")
+MAKE = re.compile(r"(?:[`$]\s*make ([a-z][a-z-]*)|^make ([a-z][a-z-]*)(?=\s*$|\s+#|\s+[A-Z_]+=))")
 TARGET = re.compile(r"^([a-z][a-z-]*):(?!=)", re.MULTILINE)
 
 
@@ -20,7 +20,7 @@ def check(tree: Tree) -> Iterator[Fault]:
             for link in LINK.findall(line):
                 if not re.match(r"[a-z][a-z+.-]*:", link) and not _resolve(tree.root, path, link).exists():
                     yield Fault(path, number, f"the link {link} leads nowhere; links are relative to the file")
-            for target in MAKE.findall(line):
+            for target in (quoted or alone for quoted, alone in MAKE.findall(line)):
                 if target not in targets:
                     yield Fault(path, number, f"there is no `make {target}` (targets: {', '.join(targets)})")
 

@@ -28,7 +28,9 @@ def _metadata(tree: Tree) -> Iterator[Fault]:
         for key in SHARED:
             ours, theirs = member.project.get(key), first.project.get(key)
             if ours != theirs:
-                yield Fault(file, 0, f"{key} is {ours!r}, that of {first.folder} is {theirs!r}; all members agree on it")
+                yield Fault(
+                    file, 0, f"{key} is {ours!r}, that of {first.folder} is {theirs!r}; all members agree on it"
+                )
         package = member.folder / member.package
         for needed in (package / "__init__.py", package / "py.typed"):
             if not (tree.root / needed).is_file():
@@ -69,7 +71,9 @@ def _light(tree: Tree, path: Path) -> Iterator[Fault]:
             yield Fault(path, node.lineno, "runs code on import; move it to a module that is imported when it is used")
         for name in _imported(node):
             if name not in sys.stdlib_module_names and name not in path.parts:
-                yield Fault(path, node.lineno, f"imports {name}; an __init__ imports the standard library or its own package")
+                yield Fault(
+                    path, node.lineno, f"imports {name}; an __init__ imports the standard library or its own package"
+                )
 
 
 def _is_docstring(node: ast.stmt) -> bool:

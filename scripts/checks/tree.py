@@ -65,7 +65,7 @@ class Tree:
     @cached_property
     def settings(self) -> dict[str, Any]:
         """The workspace's pyproject.toml."""
-        return tomllib.loads((self.root / "pyproject.toml").read_text("utf-8"))
+        return _toml(self.root / "pyproject.toml")
 
     @cached_property
     def members(self) -> tuple[Member, ...]:
@@ -75,7 +75,8 @@ class Tree:
             for pattern in self.settings["tool"]["uv"]["workspace"]["members"]
             for found in sorted(self.root.glob(f"{pattern}/pyproject.toml"))
         ]
-        return tuple(
-            Member(folder.relative_to(self.root), tomllib.loads((folder / "pyproject.toml").read_text("utf-8"))["project"])
-            for folder in folders
-        )
+        return tuple(Member(f.relative_to(self.root), _toml(f / "pyproject.toml")["project"]) for f in folders)
+
+
+def _toml(path: Path) -> dict[str, Any]:
+    return tomllib.loads(path.read_text("utf-8"))

@@ -14,6 +14,6 @@ def check(tree: Tree) -> Iterator[Fault]:
         first = (tree.text(path) or "").partition("\n")[0]
         found = HEADER.match(first)
         if not found:
-            yield Fault(path, 1, "its first line must name its schema: # yaml-language-server: $schema=<path to schemas/json/…>")
+            yield Fault(path, 1, "its first line must name its schema: # yaml-language-server: $schema=PATH")
         elif "://" not in found[1] and not (tree.root / path.parent / found[1]).is_file():
             yield Fault(path, 1, f"the schema {found[1]} does not exist; the path is relative to the YAML file")
