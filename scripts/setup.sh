@@ -31,7 +31,7 @@ find_uv() {
         if "$python" -m venv .venv-tools >/dev/null 2>&1; then
             .venv-tools/bin/python -m pip install --quiet --disable-pip-version-check uv >&2
         elif rm -rf .venv-tools && "$python" -m pip --version >/dev/null 2>&1; then
-            "$python" -m pip install --quiet --disable-pip-version-check --target .venv-tools uv >&2
+            "$python" -m pip install --quiet --disable-pip-version-check --root-user-action=ignore --target .venv-tools uv >&2
         else
             version=$("$python" -c 'import sys; print("%d.%d" % sys.version_info[:2])')
             fail "$python has neither pip nor a working venv module, so uv cannot be fetched." \
