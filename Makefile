@@ -68,11 +68,12 @@ lock: $(STAMP)  ## write constraints.txt after a change of dependencies
 schema: $(STAMP)  ## write the JSON Schemas that editors complete YAML from
 	$(BIN)/python -m anysim_schemas.jsonschema schemas/json
 
-docs: schema  ## write the generated pages and run the examples of docs/
+docs: schema  ## write what is generated and run the examples of docs/
 	$(BIN)/python -m pytest tests/docs $(ARGS)
 
 bench: $(STAMP)  ## measure speed against the budgets, as ratios
-	$(BIN)/python -m pytest benchmarks -s $(ARGS)
+	$(BIN)/anysim bench step $(ARGS)
+	@set -e; for program in $(wildcard benchmarks/*.py); do echo "$$program"; $(BIN)/python $$program; done
 
 wheels: $(STAMP)  ## build the wheels of all packages into dist/
 	@PATH="$$PATH:.venv-tools/bin" uv build --quiet --all-packages --wheel --out-dir dist

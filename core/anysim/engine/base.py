@@ -552,7 +552,7 @@ class SimEngine(ABC):
         """Solver state to carry across a rebuild, in a form that `_take_rows` of the new build understands."""
         return None
 
-    def _take_rows(self, carried: Any, old: World) -> None:  # noqa: B027  optional: most engines carry nothing
+    def _take_rows(self, carried: Any, old: World) -> None:
         """Take over by name what `_carry_rows` of the old build returned (warm starts and the like)."""
 
     def _render(self, view: CameraView, ids: Array, channels: tuple[str, ...]) -> dict[str, Array]:
