@@ -1,6 +1,6 @@
 """Draw what a run recorded: `python scripts/demo_picture.py RUN_DIRECTORY` writes `RUN_DIRECTORY/demo.png`.
 
-One row a video, from its first image on the left to its last on the right.
+One row a trajectory, from the first image of its first camera on the left to the last on the right.
 """
 
 import argparse
@@ -46,11 +46,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Draw what a run recorded.")
     parser.add_argument("run", type=Path, help="the directory of the run")
     run: Path = parser.parse_args().run
-    videos = sorted(run.rglob("*.mp4"))
+    first = {video.parent: video for video in sorted(run.rglob("*.mp4"), reverse=True)}
+    videos = sorted(first.values())
     if not videos:
         sys.exit(f"{run} holds no video; record with a camera: record: {{writer: mcap, cameras: [front]}}")
     draw(run, videos[:ROWS], run / PICTURE)
-    print(f"{run / PICTURE}: {min(len(videos), ROWS)} of {len(videos)} videos")
+    print(f"{run / PICTURE}: {min(len(videos), ROWS)} of {len(videos)} trajectories")
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ def run(tmp_path: Path) -> Path:
     for name in ("env_0000_episode_0000", "env_0001_episode_0000"):
         folder = tmp_path / "episodes" / name
         folder.mkdir(parents=True)
+        (folder / "wrist.mp4").touch()  # of each trajectory only the first camera is read
         with av.open(str(folder / "front.mp4"), "w") as container:
             stream = container.add_stream("mpeg4", rate=10)
             stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
@@ -28,7 +29,7 @@ def run(tmp_path: Path) -> Path:
 
 
 def test_images_are_spread_from_the_first_to_the_last(run: Path) -> None:
-    images = demo_picture.spread(next(run.rglob("*.mp4")), 4)
+    images = demo_picture.spread(next(run.rglob("front.mp4")), 4)
     brightness = [float(image.mean()) for image in images]
     assert [image.shape for image in images] == [(48, 64, 3)] * 4
     assert brightness == sorted(brightness)
@@ -37,7 +38,7 @@ def test_images_are_spread_from_the_first_to_the_last(run: Path) -> None:
 
 
 def test_a_short_video_gives_what_it_has(run: Path) -> None:
-    assert len(demo_picture.spread(next(run.rglob("*.mp4")), 50)) == 10
+    assert len(demo_picture.spread(next(run.rglob("front.mp4")), 50)) == 10
 
 
 def test_the_program_writes_a_picture(run: Path) -> None:
@@ -45,7 +46,7 @@ def test_the_program_writes_a_picture(run: Path) -> None:
         [sys.executable, demo_picture.__file__, str(run)], capture_output=True, text=True, timeout=120
     )
     assert done.returncode == 0, done.stderr
-    assert "2 of 2 videos" in done.stdout
+    assert "2 of 2 trajectories" in done.stdout
     assert (run / "demo.png").read_bytes().startswith(b"\x89PNG")
 
 
