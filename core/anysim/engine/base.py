@@ -33,6 +33,9 @@ from anysim.world.model import BodyKind, ControlMode, World
 EnvIds = Sequence[int] | Array | None
 """Which envs: None for all, else unique indices."""
 
+Indices = Sequence[int] | Array | None
+"""Which joints, bodies, actuators…: None for all, else unique indices."""
+
 
 class SimEngine(ABC):
     """A physics engine that holds `num_envs` sub-environments of one World."""
@@ -186,7 +189,7 @@ class SimEngine(ABC):
     # ------------------------------------------------------------------ writing
 
     def set_joint_state(
-        self, position: Any = None, velocity: Any = None, env_ids: EnvIds = None, joints: Sequence[int] | None = None
+        self, position: Any = None, velocity: Any = None, env_ids: EnvIds = None, joints: Indices = None
     ) -> None:
         """Write joint positions and velocities (E, K); mimic joints follow their leaders. Commands stay."""
         with self._lock:
@@ -198,7 +201,7 @@ class SimEngine(ABC):
             self._write_joints(ids, *checks.with_followers(self.world, which, pos, vel))
 
     def set_body_state(
-        self, pose: Any = None, twist: Any = None, env_ids: EnvIds = None, bodies: Sequence[int] | None = None
+        self, pose: Any = None, twist: Any = None, env_ids: EnvIds = None, bodies: Indices = None
     ) -> None:
         """Write poses (E, K, 7) and twists (E, K, 6) of root bodies: free ones, and poses of static ones.
 
@@ -217,7 +220,7 @@ class SimEngine(ABC):
 
     def set_control(
         self, position: Any = None, velocity: Any = None, effort: Any = None, env_ids: EnvIds = None,
-        actuators: Sequence[int] | None = None,
+        actuators: Indices = None,
     ) -> None:  # fmt: skip
         """Write drive targets (E, K): position [rad, m], velocity [rad/s, m/s], feed-forward effort [N m, N]."""
         with self._lock:
@@ -247,16 +250,14 @@ class SimEngine(ABC):
 
     # ------------------------------------------------------------------ parameters
 
-    def get_parameters(self, name: str, env_ids: EnvIds = None, indices: Sequence[int] | None = None) -> Array:
+    def get_parameters(self, name: str, env_ids: EnvIds = None, indices: Indices = None) -> Array:
         """Values (E, K, ...) of a neutral parameter such as `body.mass`, as the engine has them."""
         with self._lock:
             parameter, ids, which = self._parameter(name, env_ids, indices)
             del parameter
             return self._get_parameter(name)[np.ix_(ids, which)].copy()
 
-    def set_parameters(
-        self, name: str, values: Any, env_ids: EnvIds = None, indices: Sequence[int] | None = None
-    ) -> None:
+    def set_parameters(self, name: str, values: Any, env_ids: EnvIds = None, indices: Indices = None) -> None:
         """Change a neutral parameter per env, values (E, K, ...); what the engine took is read back and compared.
 
         Raises:
@@ -278,7 +279,7 @@ class SimEngine(ABC):
             if name in ("actuator.kp", "actuator.kd"):
                 self._commands.control_changed = True
 
-    def _parameter(self, name: str, env_ids: EnvIds, indices: Sequence[int] | None) -> tuple[Any, Array, Array]:
+    def _parameter(self, name: str, env_ids: EnvIds, indices: Indices) -> tuple[Any, Array, Array]:
         self._require_world()
         parameter = PARAMETERS.get(name)
         if parameter is None:
@@ -486,7 +487,7 @@ class SimEngine(ABC):
     def _ids(self, env_ids: EnvIds) -> Array:
         return self._all if env_ids is None else checks.indices(env_ids, self.num_envs, "env")
 
-    def _which(self, indices: Sequence[int] | None, size: int, kind: str) -> Array:
+    def _which(self, indices: Indices, size: int, kind: str) -> Array:
         return np.arange(size) if indices is None else checks.indices(indices, size, kind)
 
     # ------------------------------------------------------------------ primitives of a backend
