@@ -66,9 +66,9 @@ def entry(kind: str, name: str) -> metadata.EntryPoint:
         PluginError: unknown (lists what is installed) or ambiguous (lists the distributions).
     """
     dist, _, bare = name.rpartition(":")
-    found = _entries(kind).get(bare, ())
+    found = list(_entries(kind).get(bare, ()))
     if dist:
-        found = tuple(e for e in found if _dist(e) == dist)
+        found = [e for e in found if _dist(e) == dist]
     if not found:
         installed = names(kind)
         package = INSTALL_HINTS.get((kind, bare))

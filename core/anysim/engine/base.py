@@ -17,16 +17,24 @@ from anysim.engine.cameras import CameraRig, CameraView
 from anysim.engine.capability import Capabilities, Capability, Need, check
 from anysim.engine.commands import CommandBuffer, Control
 from anysim.engine.index import Index
+from anysim.engine.needs import needs_of
 from anysim.engine.parameters import PARAMETERS, count
 from anysim.engine.state import (
-    Availability, ContactPoints, RayHits, Snapshot, SnapshotLevel, State,
+    Availability,
+    ContactPoints,
+    RayHits,
+    Snapshot,
+    SnapshotLevel,
+    State,
 )  # fmt: skip
 from anysim.errors import CapabilityError, EngineError, listing
 from anysim.world.model import BodyKind, ControlMode, World
-from anysim.engine.needs import needs_of
 
 EnvIds = Sequence[int] | Array | None
 """Which envs: None for all, else unique indices."""
+
+Indices = Sequence[int] | Array | None
+"""Which joints, bodies, actuators…: None for all, else unique indices."""
 
 
 class SimEngine(ABC):
@@ -181,7 +189,7 @@ class SimEngine(ABC):
     # ------------------------------------------------------------------ writing
 
     def set_joint_state(
-        self, position: Any = None, velocity: Any = None, env_ids: EnvIds = None, joints: Sequence[int] | None = None
+        self, position: Any = None, velocity: Any = None, env_ids: EnvIds = None, joints: Indices = None
     ) -> None:
         """Write joint positions and velocities (E, K); mimic joints follow their leaders. Commands stay."""
         with self._lock:
@@ -193,7 +201,7 @@ class SimEngine(ABC):
             self._write_joints(ids, *checks.with_followers(self.world, which, pos, vel))
 
     def set_body_state(
-        self, pose: Any = None, twist: Any = None, env_ids: EnvIds = None, bodies: Sequence[int] | None = None
+        self, pose: Any = None, twist: Any = None, env_ids: EnvIds = None, bodies: Indices = None
     ) -> None:
         """Write poses (E, K, 7) and twists (E, K, 6) of root bodies: free ones, and poses of static ones.
 
@@ -212,7 +220,7 @@ class SimEngine(ABC):
 
     def set_control(
         self, position: Any = None, velocity: Any = None, effort: Any = None, env_ids: EnvIds = None,
-        actuators: Sequence[int] | None = None,
+        actuators: Indices = None,
     ) -> None:  # fmt: skip
         """Write drive targets (E, K): position [rad, m], velocity [rad/s, m/s], feed-forward effort [N m, N]."""
         with self._lock:
@@ -240,7 +248,7 @@ class SimEngine(ABC):
             self._commands.set_mode(ControlMode(mode), self._ids(env_ids), which)
 
     def apply_wrench(self, wrench: Any, bodies: Sequence[int], env_ids: EnvIds = None) -> None:
-        """Forces and torques (E, K, 6) [N, N m], world axes, at the bodies' centres of mass, for the next step() call."""
+        """Forces and torques (E, K, 6) [N, N m], world axes, at the bodies' centres of mass, for the next step()."""
         with self._lock:
             self._require_world()
             self._require(Capability.WRENCHES)
@@ -249,16 +257,14 @@ class SimEngine(ABC):
 
     # ------------------------------------------------------------------ parameters
 
-    def get_parameters(self, name: str, env_ids: EnvIds = None, indices: Sequence[int] | None = None) -> Array:
+    def get_parameters(self, name: str, env_ids: EnvIds = None, indices: Indices = None) -> Array:
         """Values (E, K, ...) of a neutral parameter such as `body.mass`, as the engine has them."""
         with self._lock:
             parameter, ids, which = self._parameter(name, env_ids, indices)
             del parameter
             return self._get_parameter(name)[np.ix_(ids, which)].copy()
 
-    def set_parameters(
-        self, name: str, values: Any, env_ids: EnvIds = None, indices: Sequence[int] | None = None
-    ) -> None:
+    def set_parameters(self, name: str, values: Any, env_ids: EnvIds = None, indices: Indices = None) -> None:
         """Change a neutral parameter per env, values (E, K, ...); what the engine took is read back and compared.
 
         Raises:
@@ -269,7 +275,9 @@ class SimEngine(ABC):
             parameter, ids, which = self._parameter(name, env_ids, indices)
             rows = checks.rows(name, values, (len(ids), len(which), *parameter.shape))
             if parameter.minimum is not None and rows.size and rows.min() < parameter.minimum:
-                raise EngineError(f"{name} [{parameter.unit}] must be at least {parameter.minimum:g}, got {rows.min():g}")
+                raise EngineError(
+                    f"{name} [{parameter.unit}] must be at least {parameter.minimum:g}, got {rows.min():g}"
+                )
             self._retire_state()
             self._set_parameter(name, rows, ids, which)
             self._changed[name] = None
@@ -278,13 +286,15 @@ class SimEngine(ABC):
             if name in ("actuator.kp", "actuator.kd"):
                 self._commands.control_changed = True
 
-    def _parameter(self, name: str, env_ids: EnvIds, indices: Sequence[int] | None) -> tuple[Any, Array, Array]:
+    def _parameter(self, name: str, env_ids: EnvIds, indices: Indices) -> tuple[Any, Array, Array]:
         self._require_world()
         parameter = PARAMETERS.get(name)
         if parameter is None:
             raise EngineError(f"there is no parameter '{name}' (parameters: {listing(PARAMETERS, 20)})")
         if name not in self.parameters:
-            raise CapabilityError(f"{self.name} cannot change '{name}' (it can: {listing(sorted(self.parameters), 20)})")
+            raise CapabilityError(
+                f"{self.name} cannot change '{name}' (it can: {listing(sorted(self.parameters), 20)})"
+            )
         return parameter, self._ids(env_ids), self._which(indices, count(parameter, self.world), parameter.target)
 
     # ------------------------------------------------------------------ snapshots
@@ -318,15 +328,14 @@ class SimEngine(ABC):
             for name in PARAMETERS:
                 key = f"parameter.{name}"
                 if key in data:
-                    self._set_parameter(name, data[key], ids, np.arange(data[key].shape[1]))
+                    self._set_parameter(name, data[key], ids, np.arange(int(data[key].shape[1])))
                     self._changed[name] = None
                 elif name in self._changed:
                     default = self._default_parameter(name)
                     self._set_parameter(name, np.repeat(default[None], len(ids), 0), ids, np.arange(len(default)))
-            prefixed = lambda prefix: {k[len(prefix) :]: v for k, v in data.items() if k.startswith(prefix)}  # noqa: E731
-            self._commands.restore(ids, prefixed("commands."))
+            self._commands.restore(ids, _under("commands.", data))
             self._rig.poses[ids] = data["cameras"]
-            self._restore(ids, prefixed("engine."), snapshot.level)
+            self._restore(ids, _under("engine.", data), snapshot.level)
             self._ticks[ids] = data["ticks"]
 
     # ------------------------------------------------------------------ sensing
@@ -335,8 +344,10 @@ class SimEngine(ABC):
         self, camera_name: str = "default", width: int | None = None, height: int | None = None,
         env_ids: EnvIds = None, channels: Sequence[str] = ("rgb",),
     ) -> dict[str, Array]:  # fmt: skip
-        """Images of one camera: `rgb` (E, H, W, 3) uint8, `depth` (E, H, W) float32 [m] along the optical axis (inf
-        beyond the far plane), `segmentation` (E, H, W) int32 entity ids (`Index.segmentation_id`; 0 elsewhere).
+        """Images of one camera, by channel.
+
+        `rgb` (E, H, W, 3) uint8; `depth` (E, H, W) float32 [m] along the optical axis, inf beyond the far plane;
+        `segmentation` (E, H, W) int32 entity ids (`Index.segmentation_id`; 0 elsewhere).
 
         `default` is an overview of the world where no camera has that name.
         """
@@ -413,7 +424,9 @@ class SimEngine(ABC):
 
         with self._lock:
             if name not in [e.name for e in self.index.objects]:
-                raise EngineError(f"there is no object '{name}' (objects: {listing(e.name for e in self.index.objects)})")
+                raise EngineError(
+                    f"there is no object '{name}' (objects: {listing(e.name for e in self.index.objects)})"
+                )
             self._rebuild(without_entity(self.world, name))
 
     def add_camera(self, name: str, **spec: Any) -> None:
@@ -446,8 +459,10 @@ class SimEngine(ABC):
         return [self.world.joints[j].name[prefix:] for j in self.index.robot_joints(robot_name)]
 
     def get_observation(self, robot_name: str | None = None, *, skip_images: bool = False) -> dict[str, Array]:
-        """What a script or agent wants to know about a robot: `joint_pos`, `joint_vel` (N, J), `<tool>_pose` (N, 7),
-        and `images/<camera>` of all cameras unless skipped."""
+        """What a script or agent wants to know about a robot.
+
+        `joint_pos`, `joint_vel` (N, J), `<tool>_pose` (N, 7), and `images/<camera>` of all cameras unless skipped.
+        """
         from anysim.engine.surface import observation
 
         with self._lock:
@@ -472,12 +487,14 @@ class SimEngine(ABC):
 
     def _require(self, capability: Capability) -> None:
         if capability not in self.capabilities:
-            raise CapabilityError(f"{self.name} does not have '{capability}' (`anysim list engines` shows what each can do)")
+            raise CapabilityError(
+                f"{self.name} does not have '{capability}' (`anysim list engines` shows what each can do)"
+            )
 
     def _ids(self, env_ids: EnvIds) -> Array:
         return self._all if env_ids is None else checks.indices(env_ids, self.num_envs, "env")
 
-    def _which(self, indices: Sequence[int] | None, size: int, kind: str) -> Array:
+    def _which(self, indices: Indices, size: int, kind: str) -> Array:
         return np.arange(size) if indices is None else checks.indices(indices, size, kind)
 
     # ------------------------------------------------------------------ primitives of a backend
@@ -580,3 +597,8 @@ class SimEngine(ABC):
 
     def _absent(self, capability: Capability) -> CapabilityError:
         return CapabilityError(f"{self.name} does not have '{capability}'")
+
+
+def _under(prefix: str, data: Mapping[str, Array]) -> dict[str, Array]:
+    """The entries of a snapshot whose names begin with `prefix`, without it."""
+    return {name[len(prefix) :]: rows for name, rows in data.items() if name.startswith(prefix)}

@@ -53,7 +53,7 @@ class Support(NamedTuple):
 class Capabilities:
     """What an engine declares. A capability that is not in `supported` is absent."""
 
-    supported: Mapping[Capability, Support] = field(default_factory=dict)
+    supported: Mapping[Capability, Support] = field(default_factory=dict[Capability, Support])
 
     @classmethod
     def of(cls, *exact: Capability, approximate: Mapping[Capability, str] | None = None) -> "Capabilities":

@@ -51,7 +51,8 @@ def poses(name: str, values: Any, shape: tuple[int, ...]) -> Array:
     array = rows(name, values, shape).copy()
     length = np.linalg.norm(array[..., 3:], axis=-1, keepdims=True)
     if array.size and np.abs(length - 1).max() > 1e-3:
-        raise EngineError(f"{name} holds a quaternion of length {float(length.flat[np.abs(length - 1).argmax()]):.3g}; xyzw of unit length expected")
+        worst = float(length.flat[np.abs(length - 1).argmax()])
+        raise EngineError(f"{name} holds a quaternion of length {worst:.3g}; xyzw of unit length expected")
     # already-unit quaternions keep their bits, so that writing back what was read changes nothing
     array[..., 3:] = np.where(np.abs(length - 1) < 1e-12, array[..., 3:], array[..., 3:] / length)
     return array
@@ -109,7 +110,8 @@ def same_stamp(snapshot: Snapshot, engine: str, version: str, world_hash: str, r
     ):
         if theirs != ours:
             raise SnapshotError(
-                f"the snapshot was taken with {what} {theirs}, this is {ours}; take a new one, or carry a WorldState over"
+                f"the snapshot was taken with {what} {theirs}, this is {ours}; "
+                f"take a new one, or carry a WorldState over"
             )
     if snapshot.num_envs != rows_wanted:
         raise SnapshotError(f"the snapshot holds {snapshot.num_envs} envs, {rows_wanted} were asked for; pass env_ids")
@@ -124,7 +126,9 @@ def validated_options(engine: str, model: Any, options: dict[str, Any]) -> Any:
     fields = list(model.model_fields)
     unknown = [key for key in options if key not in fields]
     if unknown:
-        raise EngineError(f"{engine} has no option '{unknown[0]}'{suggest(unknown[0], fields)} (options: {listing(fields)})")
+        raise EngineError(
+            f"{engine} has no option '{unknown[0]}'{suggest(unknown[0], fields)} (options: {listing(fields)})"
+        )
     try:
         return model.model_validate(options)
     except ValueError as error:

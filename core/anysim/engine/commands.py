@@ -14,7 +14,7 @@ MODES = tuple(ControlMode)
 
 
 class Control(NamedTuple):
-    """Drive targets of all envs (N, A): position, velocity, feed-forward effort, and the mode as an index into MODES."""
+    """Drive targets of all envs (N, A): position, velocity, feed-forward effort, and the mode, an index into MODES."""
 
     position: Array
     velocity: Array
@@ -79,7 +79,9 @@ class CommandBuffer:
     def rows(self, ids: Array) -> dict[str, Array]:
         """Copies of the commands of envs, for a snapshot."""
         if self.wrench is not None:
-            raise EngineError("a wrench is waiting for its step; take the snapshot before apply_wrench() or after step()")
+            raise EngineError(
+                "a wrench is waiting for its step; take the snapshot before apply_wrench() or after step()"
+            )
         return {name: getattr(self.control, name)[ids] for name in Control._fields}
 
     def restore(self, ids: Array, data: Mapping[str, Array]) -> None:

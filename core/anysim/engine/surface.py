@@ -45,7 +45,8 @@ def send(engine: "SimEngine", action: Mapping[str, float] | Any, robot_name: str
     unknown = [name for name in action if name not in names]
     if unknown:
         raise EngineError(
-            f"robot '{robot.name}' has no driven joint '{unknown[0]}'{suggest(unknown[0], names)} (joints: {listing(names)})"
+            f"robot '{robot.name}' has no driven joint '{unknown[0]}'{suggest(unknown[0], names)} "
+            f"(joints: {listing(names)})"
         )
     chosen = [drives[names.index(name)] for name in action]
     values = np.array([np.broadcast_to(np.asarray(v, dtype=float), engine.num_envs) for v in action.values()]).T

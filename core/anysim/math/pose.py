@@ -161,7 +161,7 @@ def angle_between(a: Array, b: Array) -> Array:
 
 
 def look_at(eye: Array, target: Array) -> Array:
-    """Optical-frame quaternions (..., 4) (x right, y down, z forward) of cameras at `eye` that look at `target` (..., 3).
+    """Optical-frame quaternions (..., 4) (x right, y down, z forward) of cameras at `eye` (..., 3), towards `target`.
 
     The image's up is the world's z; a camera that looks straight up or down has the world's y as its up.
     """

@@ -1,0 +1,84 @@
+# Everything a developer calls. Each target sets up what it needs; `make` alone lists them.
+
+BIN     := .venv/bin
+MEMBERS := $(patsubst %/,%,$(dir $(wildcard schemas/pyproject.toml core/pyproject.toml backends/*/pyproject.toml \
+             plugins/*/pyproject.toml tasks/pyproject.toml)))
+STAMP   := .venv/installed
+
+# The demo: a scripted robot picks cubes in four worlds at once, records it, and a picture shows what happened.
+DEMO_OUT     ?= runs/demo
+DEMO_RUN      = $(BIN)/anysim run pick_cube --num-envs 4 --episodes 8 --seed 1 --out $(DEMO_OUT)
+DEMO_PICTURE  = $(BIN)/python scripts/demo_picture.py $(DEMO_OUT)
+
+# More words for pytest: make test ARGS="-k pose -x"
+ARGS ?=
+
+.DEFAULT_GOAL := help
+.PHONY: help venv demo test test-slow test-all check format lock schema docs bench wheels clean
+
+help:  ## list the targets
+	@echo "make TARGET, where TARGET is one of"
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  \1|\2/p' Makefile | awk -F'|' '{printf "%-12s %s\n", $$1, $$2}'
+
+venv: $(STAMP)  ## make .venv with all packages (editable) and the developers' tools
+
+# Runs again only when one of these files changed.
+$(STAMP): pyproject.toml constraints.txt scripts/setup.sh $(addsuffix /pyproject.toml,$(MEMBERS))
+	@scripts/setup.sh $(MEMBERS)
+	@touch $@
+
+demo: $(STAMP)  ## run a pick-and-place task in four worlds, record it and draw a picture
+	@$(if $(filter runs/demo,$(DEMO_OUT)),rm -rf runs/demo)
+	$(DEMO_RUN)
+	@$(DEMO_PICTURE)
+
+test: $(STAMP)  ## run all tests that are not marked slow (minutes)
+	$(BIN)/python -m pytest -m "not slow" $(ARGS)
+
+test-slow: $(STAMP)  ## run the tests that are marked slow
+	$(BIN)/python -m pytest -m slow $(ARGS)
+
+test-all: $(STAMP)  ## run every test
+	$(BIN)/python -m pytest $(ARGS)
+
+CHECKS := check-lint check-format check-style check-layers check-schema check-types
+check: $(CHECKS)  ## lint, format, types, layers, style and generated files (make -k check: do not stop at the first)
+.PHONY: $(CHECKS)
+$(CHECKS): $(STAMP)
+check-lint:
+	$(BIN)/ruff check
+check-format:
+	$(BIN)/ruff format --check
+check-style:
+	$(BIN)/python scripts/check_style.py
+check-layers:
+	$(BIN)/lint-imports --no-cache --no-logo
+check-schema:
+	$(BIN)/python -m anysim_schemas.jsonschema --check schemas/json
+check-types:
+	$(BIN)/pyright
+
+format: $(STAMP)  ## format the code and fix what ruff can fix
+	$(BIN)/ruff check --fix --exit-zero
+	$(BIN)/ruff format
+
+lock: $(STAMP)  ## write constraints.txt after a change of dependencies
+	$(BIN)/python scripts/lock.py
+
+schema: $(STAMP)  ## write the JSON Schemas that editors complete YAML from
+	$(BIN)/python -m anysim_schemas.jsonschema schemas/json
+
+docs: schema  ## write what is generated and run the examples of docs/
+	$(BIN)/python -m pytest tests/docs $(ARGS)
+
+bench: $(STAMP)  ## measure speed against the budgets, as ratios
+	$(BIN)/anysim bench step $(ARGS)
+	@set -e; for program in $(wildcard benchmarks/*.py); do echo "$$program"; $(BIN)/python $$program; done
+
+wheels: $(STAMP)  ## build the wheels of all packages into dist/
+	@PATH="$$PATH:.venv-tools/bin" uv build --quiet --all-packages --wheel --out-dir dist
+	@ls dist
+
+clean:  ## remove .venv, caches, wheels and the demo's output; other recordings stay
+	rm -rf .venv .venv-tools .cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache build dist runs/demo
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,56 @@
+"""What holds for every test: markers, a cache of its own, and nothing left behind."""
+
+import multiprocessing
+import os
+import threading
+from collections.abc import Generator, Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+OWN_LEFTOVERS = frozenset({".pytest_cache", ".hypothesis", ".cache", "__pycache__"})
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Register the markers, and keep assets that tests prepare away from the user's cache.
+
+    The cache is shared by all tests and kept between runs: its entries are named by the hash of their content. It is an
+    environment variable so that processes that a test starts use it too.
+    """
+    config.addinivalue_line("markers", "slow: takes many seconds; `make test` leaves it out, `make test-slow` runs it")
+    config.addinivalue_line("markers", "gpu: needs a GPU; skipped where there is none")
+    os.environ["ANYSIM_CACHE_DIR"] = str(ROOT / ".cache" / "tests")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    """Note the files of the working directory before a test."""
+    item.stash[_BEFORE] = _listing()
+    return (yield)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown(item: pytest.Item) -> Generator[None, None, None]:
+    """A test that leaves a file in the working directory fails: libraries drop logs there when something is wrong."""
+    yield
+    left = sorted(_listing() - item.stash[_BEFORE] - OWN_LEFTOVERS)
+    if left:
+        pytest.fail(f"the test left {', '.join(left)} in {Path.cwd()}; write to tmp_path", pytrace=False)
+
+
+_BEFORE = pytest.StashKey[frozenset[str]]()
+
+
+def _listing() -> frozenset[str]:
+    return frozenset(path.name for path in Path.cwd().iterdir())
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _nothing_runs_on() -> Iterator[None]:
+    """At the end of the session no thread and no worker process of a test is alive."""
+    yield
+    threads = [t.name for t in threading.enumerate() if t is not threading.main_thread() and not t.daemon]
+    processes = [f"{p.name} ({p.pid})" for p in multiprocessing.active_children()]
+    assert not threads, f"threads that no test stopped: {', '.join(threads)}"
+    assert not processes, f"processes that no test stopped: {', '.join(processes)}"

@@ -1,0 +1,209 @@
+"""Each check of the repository finds the fault that it is for, and nothing in a tree without faults."""
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import check_style
+import pytest
+from checks import constraints, junk, length, links, packages, words, yaml_header
+from checks.tree import Tree
+
+ROOT_SETTINGS = """
+[tool.uv.workspace]
+members = ["core", "plugins/*"]
+[tool.uv.sources]
+anysim = { workspace = true }
+anysim-x = { workspace = true }
+[tool.importlinter]
+root_packages = ["anysim", "anysim_x"]
+[tool.pyright]
+extraPaths = ["core", "plugins/x"]
+[dependency-groups]
+dev = ["ruff>=0.9"]
+"""
+MEMBER = """
+[project]
+name = "{name}"
+version = "0.1.0"
+requires-python = ">=3.11"
+license = "Apache-2.0"
+dependencies = {dependencies}
+"""
+CLEAN = {
+    "pyproject.toml": ROOT_SETTINGS,
+    "constraints.txt": "# header\nmujoco==3.17.0\nnumpy==2.4.6\nruff==0.17.5 ; sys_platform == 'linux'\n",
+    "Makefile": "test: venv  ## run\nvenv:\n",
+    "README.md": "Run `make test` to\nmake sure; see [the core](core/anysim/__init__.py#top) and [a page](https://example.com/x).\n",
+    "core/pyproject.toml": MEMBER.format(name="anysim", dependencies=["numpy>=2.0", "mujoco"]),
+    "core/anysim/__init__.py": '"""The core."""\n\nfrom anysim.a import b\n\n__version__ = "0.1.0"\n',
+    "core/anysim/py.typed": "",
+    "plugins/x/pyproject.toml": MEMBER.format(name="anysim-x", dependencies=["anysim"]),
+    "plugins/x/anysim_x/__init__.py": '"""A plugin."""\n',
+    "plugins/x/anysim_x/py.typed": "",
+    "plugins/x/anysim_x/arm.yaml": "# yaml-language-server: $schema=../../../schemas/json/robot.json\nname: arm\n",
+    "schemas/json/robot.json": "{}\n",
+}
+MakeTree = Callable[[dict[str, str]], Tree]
+
+
+@pytest.fixture
+def make_tree(tmp_path: Path) -> MakeTree:
+    """A tree without faults, changed by the files that are given."""
+
+    def make(changes: dict[str, str]) -> Tree:
+        files = CLEAN | changes
+        for name, text in files.items():
+            path = tmp_path / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, "utf-8")
+        return Tree(tmp_path, tuple(sorted(Path(name) for name in files)))
+
+    return make
+
+
+def test_a_clean_tree_has_no_faults(make_tree: MakeTree) -> None:
+    tree = make_tree({})
+    assert [str(fault) for check in check_style.CHECKS for fault in check(tree)] == []
+
+
+@pytest.mark.parametrize(("lines", "expected"), [(350, []), (351, [False]), (600, [False]), (601, [True])])
+def test_length_warns_then_fails(make_tree: MakeTree, lines: int, expected: list[bool]) -> None:
+    assert [fault.fatal for fault in length.check(make_tree({"core/anysim/long.py": "x = 1\n" * lines}))] == expected
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "open('/ro" + "ot/data')",
+        "cd /ho" + "me/ada/anysim",
+        "path: /Us" + "ers/ada/anysim/",
+        r"C:\Us" + r"ers\ada",
+        "--index-url https://py" + "pi.org/simple",
+        "https://files.python" + "hosted.org/packages/x.whl",
+        "registry.npm" + "js.org",
+    ],
+)
+def test_words_of_one_machine_are_found(make_tree: MakeTree, text: str) -> None:
+    faults = list(words.check(make_tree({"docs/page.md": f"first\n{text}\n"})))
+    assert [(fault.path.as_posix(), fault.line) for fault in faults] == [("docs/page.md", 2)]
+
+
+@pytest.mark.parametrize("text", ["~/data", "$HOME/data", "the root/ folder", "https://x.com/home/ada", "a/work/b"])
+def test_other_paths_are_allowed(make_tree: MakeTree, text: str) -> None:
+    assert list(words.check(make_tree({"docs/page.md": text}))) == []
+
+
+@pytest.mark.parametrize(
+    "name", ["MUJOCO_LOG.TXT", "core/anysim/__pycache__/a.pyc", "core/anysim.egg-info/PKG-INFO", "uv.lock", "a.py.orig"]
+)
+def test_junk_is_found(make_tree: MakeTree, name: str) -> None:
+    assert [fault.path.as_posix() for fault in junk.check(make_tree({name: ""}))] == [name]
+
+
+def test_a_large_file_is_found(make_tree: MakeTree) -> None:
+    (fault,) = junk.check(make_tree({"docs/picture.svg": "x" * 1_000_001}))
+    assert "1.0 MB" in fault.message
+
+
+def test_binary_files_are_not_read_as_text(make_tree: MakeTree) -> None:
+    assert list(words.check(make_tree({"a.bin": "\0 /ro" + "ot/x"}))) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("name: arm\n", "its first line must name its schema"),
+        ("# yaml-language-server: $schema=missing.json\n", "missing.json does not exist"),
+    ],
+)
+def test_yaml_without_its_schema_is_found(make_tree: MakeTree, text: str, message: str) -> None:
+    (fault,) = yaml_header.check(make_tree({"plugins/x/anysim_x/arm.yaml": text}))
+    assert message in fault.message
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("x = 1\n", "no docstring"),
+        ('"""P."""\nimport numpy\n', "imports numpy"),
+        ('"""P."""\nfor i in range(3):\n    pass\n', "runs code on import"),
+        ('"""P."""\n' + "a = 1\n" * 60, "at most 60"),
+        ('"""P."""\n__version__ = "0.2.0"\n', "__version__ is '0.2.0'"),
+    ],
+)
+def test_a_heavy_or_wrong_init_is_found(make_tree: MakeTree, source: str, message: str) -> None:
+    faults = list(packages.check(make_tree({"plugins/x/anysim_x/__init__.py": source})))
+    assert any(message in fault.message for fault in faults), faults
+
+
+def test_type_checking_imports_of_an_init_are_free(make_tree: MakeTree) -> None:
+    source = '"""P."""\nfrom typing import TYPE_CHECKING\n\nif TYPE_CHECKING:\n    import numpy\n'
+    assert list(packages.check(make_tree({"plugins/x/anysim_x/__init__.py": source}))) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("0.1.0", "0.2.0", "version is '0.2.0'"),
+        (">=3.11", ">=3.12", "requires-python is '>=3.12'"),
+        ("Apache-2.0", "MIT", "license is 'MIT'"),
+        ("anysim-x", "anysim-y", "add anysim-y"),
+    ],
+)
+def test_distributions_that_disagree_are_found(make_tree: MakeTree, old: str, new: str, message: str) -> None:
+    changed = CLEAN["plugins/x/pyproject.toml"].replace(old, new)
+    faults = list(packages.check(make_tree({"plugins/x/pyproject.toml": changed})))
+    assert any(message in fault.message for fault in faults), faults
+
+
+def test_a_package_unknown_to_the_tools_is_found(make_tree: MakeTree) -> None:
+    settings = ROOT_SETTINGS.replace('"plugins/x"]', "]").replace(', "anysim_x"', "").replace("anysim-x = ", "other = ")
+    messages = [fault.message for fault in packages.check(make_tree({"pyproject.toml": settings}))]
+    assert len(messages) == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("numpy==2.4.6\nmujoco==3.17.0\nruff==0.17.5\n", "mujoco comes after numpy"),
+        ("mujoco==3.17.0\nnumpy==2.4.6\nruff @ https://example.com/ruff.whl\n", "is not 'name==version'"),
+        ("mujoco==3.17.0\nnumpy>=2\nruff==0.17.5\n", "is not 'name==version'"),
+        ("mujoco==3.17.0\nnumpy==1.26.0\nruff==0.17.5\n", "'numpy>=2.0' excludes 1.26.0"),
+        ("mujoco==3.17.0\nnumpy==2.4.6\n", "ruff is not in constraints.txt"),
+        ("mujoco==4.0.0\nnumpy==2.4.6\nruff==0.17.5\n", "mujoco must be 3.17.0"),
+        ("mujoco==3.17.0\nnumpy==2.4.6\nruff==0.17.5\ntorch==2.9.0\n", "torch is not part"),
+    ],
+)
+def test_faults_of_the_constraints_are_found(make_tree: MakeTree, text: str, message: str) -> None:
+    messages = [fault.message for fault in constraints.check(make_tree({"constraints.txt": text}))]
+    assert any(message in found for found in messages), messages
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("See [x](missing.md).", "missing.md leads nowhere"),
+        ("Run `make tets`.", "there is no `make tets`"),
+        ("    $ make demo", "there is no `make demo`"),
+        ("make demo DEMO_OUT=x", "there is no `make demo`"),
+    ],
+)
+def test_names_in_documents_that_do_not_exist_are_found(make_tree: MakeTree, text: str, message: str) -> None:
+    (fault,) = links.check(make_tree({"docs/page.md": text}))
+    assert message in fault.message
+
+
+def test_the_tree_of_a_repository_is_what_git_would_add(tmp_path: Path) -> None:
+    subprocess.run(["git", "init", "-q"], cwd=tmp_path, check=True)
+    for name in (".gitignore", "kept.py", "ignored.log", "deleted.py"):
+        (tmp_path / name).write_text("*.log\n" if name == ".gitignore" else "", "utf-8")
+    subprocess.run(["git", "add", "deleted.py"], cwd=tmp_path, check=True)
+    (tmp_path / "deleted.py").unlink()
+    assert [path.as_posix() for path in Tree.of(tmp_path).files] == [".gitignore", "kept.py"]
+
+
+def test_a_fault_prints_its_place_first() -> None:
+    fault = words.Fault(Path("a/b.py"), 3, "is wrong; do it right")
+    assert str(fault) == "a/b.py:3: is wrong; do it right"
+    assert str(fault._replace(line=0, fatal=False)) == "a/b.py: warning: is wrong; do it right"
