@@ -34,7 +34,8 @@ class PhysicsSpec(Spec):
         default="elliptic", description="shape of the friction cone where the engine offers a choice"
     )
     impratio: Positive = Field(
-        default=1.0, description="ratio of frictional to normal contact impedance; above 1 reduces creep of grasped objects"
+        default=1.0,
+        description="ratio of frictional to normal contact impedance; above 1 reduces creep of grasped objects",
     )
 
     @model_validator(mode="after")

@@ -94,7 +94,7 @@ class TerrainSpec(Spec):
     color: Vec3 = Field(default=(0.45, 0.47, 0.5), description="red, green, blue in [0, 1]")
     heights: tuple[tuple[Number, ...], ...] | None = Field(
         default=None,
-        description="heightfield: rows of heights [m]; the first row is at the lowest y, the first column at the lowest x",
+        description="heightfield: rows of heights [m]; first row at the lowest y, first column at the lowest x",
     )
     size: tuple[Positive, Positive] = Field(default=(10.0, 10.0), description="heightfield: extent along x and y [m]")
 
@@ -110,7 +110,9 @@ class TerrainSpec(Spec):
         if self.heights is not None:
             lengths = sorted({len(row) for row in self.heights})
             if len(lengths) != 1:
-                raise ValueError(f"the rows of heights differ in length: {' and '.join(map(str, lengths)) or 'none given'}")
+                raise ValueError(
+                    f"the rows of heights differ in length: {' and '.join(map(str, lengths)) or 'none given'}"
+                )
             if len(self.heights) < 2 or lengths[0] < 2:
                 raise ValueError("heights needs at least two rows of at least two heights")
         return self

@@ -33,9 +33,7 @@ class RobotSpec(Spec):
     home: dict[str, Number] = Field(
         default_factory=dict, description="joint positions that differ from the catalogue's home"
     )
-    home_noise: NonNegativeValue = Field(
-        default=0.0, description="standard deviation of the arm's home position [rad]"
-    )
+    home_noise: NonNegativeValue = Field(default=0.0, description="standard deviation of the arm's home position [rad]")
     actions: dict[str, ActionSpec] = Field(default_factory=dict, description="channel: controller")
 
 
@@ -85,14 +83,12 @@ class RobotModelSpec(Spec):
     source: str = Field(description="URI of the URDF or MJCF file")
     license: str = Field(description="SPDX expression of the asset's licence")
     license_source: str = Field(description="where the licence is stated")
-    category: Literal["arm", "dual_arm", "hand", "base", "mobile_manipulator", "humanoid", "quadruped", "camera"] = Field(
-        description="what kind of robot it is"
+    category: Literal["arm", "dual_arm", "hand", "base", "mobile_manipulator", "humanoid", "quadruped", "camera"] = (
+        Field(description="what kind of robot it is")
     )
     base: Literal["fixed", "floating"] = Field(default="fixed", description="bolted down, or free to move")
     channels: dict[str, ChannelSpec] = Field(description="the groups of joints that are commanded, by name")
-    home: dict[str, Number] = Field(
-        default_factory=dict, description="joint positions [rad] or [m]; 0 where not given"
-    )
+    home: dict[str, Number] = Field(default_factory=dict, description="joint positions [rad] or [m]; 0 where not given")
     tools: dict[str, ToolSpec] = Field(default_factory=dict, description="frames that tasks refer to, by name")
     surfaces: tuple[SurfaceSpec, ...] = Field(default=(), description="contact parameters of links")
     self_collision: Flag = Field(default=False, description="whether links of this robot collide with each other")

@@ -97,9 +97,7 @@ class TaskSpec(Spec):
     )
     success: Annotated[dict[Name, PredicateTermSpec], ByTerm] = Field(default_factory=dict, description="all must hold")
     hold: Integer = Field(default=1, gt=0, description="consecutive control steps that success must hold")
-    failure: Annotated[dict[Name, PredicateTermSpec], ByTerm] = Field(
-        default_factory=dict, description="any is enough"
-    )
+    failure: Annotated[dict[Name, PredicateTermSpec], ByTerm] = Field(default_factory=dict, description="any is enough")
     events: Annotated[dict[Name, EventTermSpec], ByTerm] = Field(
         default_factory=dict, description="what happens to the world at resets and steps"
     )

@@ -38,7 +38,12 @@ _LABELS = ((Number, "number"), (Positive, "positive"), (NonNegative, "non_negati
 
 
 class Variant(Spec):
-    """Names its variants by what they hold: `Range_positive`."""
+    """Names its variants by what they hold, `Range_positive`, and keeps them where pickle looks for them."""
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        super().__pydantic_init_subclass__(**kwargs)
+        globals().setdefault(cls.__name__, cls)
 
     @classmethod
     def model_parametrized_name(cls, params: tuple[Any, ...]) -> str:
