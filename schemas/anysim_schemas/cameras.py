@@ -5,6 +5,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field, Strict, model_validator
 
 from anysim_schemas.base import Positive, Spec, Vec3
+from anysim_schemas.errors import KeyFault
 
 Channel = Literal["rgb", "depth", "segmentation"]
 Pixels = Annotated[int, Strict(), Field(gt=0)]
@@ -39,5 +40,5 @@ class CameraSpec(Spec):
         if (self.mount is None and not all(view)) or (self.mount is not None and any(view)):
             raise ValueError("give either `from` and `look_at`, or `mount`")
         if self.near >= self.far:
-            raise ValueError(f"near ({self.near} m) must be less than far ({self.far} m)")
+            raise KeyFault(f"near ({self.near:g} m) must be less than far ({self.far:g} m)", "near")
         return self

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from anysim_schemas.base import Positive, Spec, Vec3
+from anysim_schemas.errors import KeyFault
 from anysim_schemas.plugin import PluginSlot
 
 MAX_SUBSTEPS = 1_000_000
@@ -42,9 +43,10 @@ class PhysicsSpec(Spec):
     def _whole_substeps(self) -> "PhysicsSpec":
         ratio = self.control_dt / self.dt
         if not 1 - 1e-6 <= ratio <= MAX_SUBSTEPS or abs(ratio - round(ratio)) > 1e-6:
-            raise ValueError(
+            raise KeyFault(
                 f"control_dt ({self.control_dt:g} s) must be a whole multiple of dt ({self.dt:g} s), "
-                f"but their ratio is {ratio:g}"
+                f"but their ratio is {ratio:g}",
+                "control_dt",
             )
         return self
 

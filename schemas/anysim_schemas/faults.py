@@ -8,13 +8,16 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from anysim_schemas.messages import TYPE_ERRORS, count, sentence, unknown_key
+from anysim_schemas.errors import KeyFault
+from anysim_schemas.messages import MISSING, TYPE_ERRORS, count, sentence, suggest, unknown_key
 from anysim_schemas.nodes import Fault, Mark, Node
 from anysim_schemas.shapes import Shape, Shapes, expectation, field_at, inside, keys, tagged
 from anysim_schemas.values import KINDS, TAG_PREFIX, Drawn
 
 UNKNOWN_KEY = "extra_forbidden"
 LIMITS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
+STRUCTURE = ("missing", UNKNOWN_KEY)
+MISMATCHES = TYPE_ERRORS | {"literal_error", "enum"}
 CONSTANT = TAG_PREFIX + "constant"
 
 
@@ -54,7 +57,8 @@ def locate(
     found = _decide_unions([_follow(details, model, root) for details in error.errors(include_url=False)])
     faults: list[Fault] = []
     for located in _join_lengths(found):
-        path = ".".join(map(str, located.path))
+        short = _is_short_list(located)
+        path = ".".join(map(str, located.path[:-1] if short else located.path))
         full = ".".join(part for part in (prefix, path) if part)
         faults.append(Fault(_mark(located), full, _message(located, more_keys)))
     return faults
@@ -85,11 +89,18 @@ def _follow(error: ErrorDetails, model: type[BaseModel], root: Node) -> _Located
             field, shapes = field_at(shapes, element), inside(shapes, element)
         elif union is None:
             union, branch = tuple(path), element
+    cause = cast("Mapping[str, Any]", error.get("ctx", {})).get("error")
+    for element in cause.path if isinstance(cause, KeyFault) else ():
+        child = node.child(element)
+        if child is None:
+            break
+        node = child
+        path.append(element)
     return _Located(error, tuple(path), len(path), node, shapes, union, branch, field)
 
 
 def _decide_unions(found: Sequence[_Located]) -> Iterator[_Located]:
-    """Of the errors of a union only those of the branch that was meant: the one that reaches deepest."""
+    """Of the errors of a union only those of the branch that was meant: of the right type, with the keys that fit best."""
     unions: dict[tuple[str | int, ...], list[_Located]] = {}
     for located in found:
         if located.union is not None:
@@ -105,17 +116,16 @@ def _decide(errors: Sequence[_Located]) -> Iterator[_Located]:
     branches: dict[str | int, list[_Located]] = {}
     for located in errors:
         branches.setdefault(located.branch, []).append(located)
-    meant = max(branches.values(), key=lambda group: (max(_reach(e) for e in group), -len(group)))
-    if max(map(_reach, meant)) == (0, 0):  # no branch is of the type that was given
-        yield meant[0]
-    else:
-        yield from meant
+    fitting = [group for group in branches.values() if any(_fits_type(e) for e in group)]
+    if fitting:
+        yield from min(fitting, key=lambda group: (sum(e.error["type"] in STRUCTURE for e in group), len(group)))
+    else:  # no branch is of the type that was given
+        yield next((e for e in errors if e.error["type"] in TYPE_ERRORS), errors[0])
 
 
-def _reach(located: _Located) -> tuple[int, int]:
-    """How far an error lies below its union, and whether the value at least had the type of the branch."""
-    union = located.union or ()
-    return len(located.path) - len(union), int(located.error["type"] not in TYPE_ERRORS)
+def _fits_type(located: _Located) -> bool:
+    """Whether the error lies below its union, or is no complaint about the type of the value."""
+    return len(located.path) > len(located.union or ()) or located.error["type"] not in MISMATCHES
 
 
 def _join_lengths(found: Iterator[_Located]) -> Iterator[_Located]:
@@ -124,7 +134,7 @@ def _join_lengths(found: Iterator[_Located]) -> Iterator[_Located]:
     for located in found:
         kind, context = located.error["type"], cast("Mapping[str, Any]", located.error.get("ctx", {}))
         items = located.node.value
-        if kind == "missing" and isinstance(located.path[-1], int):
+        if _is_short_list(located):
             if located.path[:-1] in seen:
                 continue
             seen.add(located.path[:-1])
@@ -132,6 +142,11 @@ def _join_lengths(found: Iterator[_Located]) -> Iterator[_Located]:
         if kind == "too_short" and isinstance(items, list) and len(items) >= context.get("min_length", 0):
             continue
         yield located
+
+
+def _is_short_list(located: _Located) -> bool:
+    """Whether an item of a list of fixed length is missing."""
+    return located.error["type"] == "missing" and bool(located.path) and isinstance(located.path[-1], int)
 
 
 def _mark(located: _Located) -> Mark:
@@ -150,19 +165,21 @@ def _message(located: _Located, more_keys: Sequence[str]) -> str:
     if kind == UNKNOWN_KEY:
         known = [*keys(shapes), *(more_keys if located.depth == 0 else ())]
         return unknown_key(str(located.path[-1]), known, _further_down(shapes))
-    if (kind == "too_long" or (kind == "missing" and isinstance(located.path[-1], int))) and lengths:
+    if (kind == "too_long" or _is_short_list(located)) and lengths:
         items = located.node.value
         got = len(items) if isinstance(items, list) else 0
         return f"expected {count(max(lengths), 'item')}, got {got or 'none'}{_purpose(located)}"
     if kind == "missing":
         field = field_at(shapes, located.path[-1])
         purpose = f": {field.description}" if field is not None and field.description else ""
-        return f"this key is required, but it is not given{purpose}"
+        return MISSING + purpose
     expected = expectation(shapes) if kind in TYPE_ERRORS else ""
     if CONSTANT in error["loc"] and isinstance(located.node.value, dict):
         drawn = ", ".join(f"{{{name}: …}}" for name in KINDS[:-1]) + f" or {{{KINDS[-1]}: …}}"
         expected = f"{expected}, {drawn}" if expected else drawn
     text = sentence(kind, context, given, error["msg"], expected)
+    if CONSTANT in error["loc"] and isinstance(located.node.value, dict):
+        text += next((hint for key in located.node.value if (hint := suggest(key, KINDS))), "")
     return text + _purpose(located) if kind in LIMITS else text
 
 

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 from anysim_schemas.entries import places
 from anysim_schemas.errors import SpecError
 from anysim_schemas.faults import locate
-from anysim_schemas.merging import override
+from anysim_schemas.merging import override, override_name
 from anysim_schemas.messages import suggest
 from anysim_schemas.nodes import Fault, Node, from_data, in_order
 from anysim_schemas.plugin import OptionsResolver
@@ -104,20 +104,22 @@ def load(
         SpecError: holds everything that is wrong, in the order of the files.
     """
     shapes = (Shape(model),)
+    overrides = tuple(overrides)
     reader = Reader(shapes, extends)
     given = [sources] if isinstance(sources, str | Path | Mapping) else list(sources)
     nodes = [None if base_data is None else from_data(base_data), *(reader.read(source) for source in given)]
+    order = [*reader.names, *map(override_name, overrides)]
     faults = reader.faults
     if reader.fatal:
-        raise SpecError(in_order([*reader.fatal, *faults], reader.names))
+        raise SpecError(in_order([*reader.fatal, *faults], order))
     root = override(reader.merged(nodes), overrides, shapes, faults)
+    refused = {fault.mark for fault in faults if fault.mark.line}  # what such a value is taken for says nothing new
     data = root.plain()
     spec, invalid = _validated(model, root, data)
-    faults += invalid
     if resolver is not None:
-        faults += check_slots(model, root, resolver)
-    if spec is None or faults:
-        raise SpecError(in_order(faults, reader.names))
+        invalid += check_slots(model, root, resolver)
+    if spec is None or faults or invalid:
+        raise SpecError(in_order([*faults, *(fault for fault in invalid if fault.mark not in refused)], order))
     provenance = {path: str(mark) or "data" for path, mark in places(root, shapes)}
     return Loaded(spec, provenance, tuple(reader.files), data)
 

@@ -52,7 +52,7 @@ def override(root: Node, overrides: Iterable[str], shapes: Shapes, faults: list[
     empty or null value removes the key.
     """
     for text in overrides:
-        mark = Mark(f"-o {text}" if len(text) <= 80 else f"-o {text[:79]}…", 0, 0)
+        mark = Mark(override_name(text), 0, 0)
         path, equals, value = text.partition("=")
         parts = path.strip().split(".")
         if not equals or not all(parts):
@@ -69,6 +69,11 @@ def override(root: Node, overrides: Iterable[str], shapes: Shapes, faults: list[
         except _CannotStep as error:
             faults.append(Fault(mark, path, str(error)))
     return root
+
+
+def override_name(text: str) -> str:
+    """How errors show an override: as it was given on the command line, cut where it is long."""
+    return f"-o {text}" if len(text) <= 80 else f"-o {text[:79]}…"
 
 
 class _CannotStep(Exception):

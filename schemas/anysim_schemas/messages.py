@@ -87,6 +87,8 @@ BOUNDS: Mapping[str, str] = {
 }
 """Errors about a limit; what was given follows."""
 
+MISSING = "this key is required but missing"
+
 PYDANTIC_TYPES = frozenset(get_args(core_schema.ErrorType))
 
 
@@ -107,7 +109,8 @@ def sentence(kind: str, context: Mapping[str, Any], given: object, raw: str, exp
     if kind in EXPECTED:
         return f"expected {EXPECTED[kind].format_map(_Blank(context))}, got {describe(given)}"
     if kind in BOUNDS:
-        return f"{BOUNDS[kind].format_map(_Blank(context))}, got {shown(given)}"
+        limits = {name: f"{limit:g}" if isinstance(limit, float) else limit for name, limit in context.items()}
+        return f"{BOUNDS[kind].format_map(_Blank(limits))}, got {shown(given)}"
     if kind in ("literal_error", "enum", "union_tag_invalid"):
         return _choice(context, given)
     if kind in ("too_short", "too_long"):
@@ -116,7 +119,7 @@ def sentence(kind: str, context: Mapping[str, Any], given: object, raw: str, exp
         pattern = str(context.get("pattern", ""))
         return f"{PATTERNS.get(pattern, f'must match the pattern {pattern}')}; got {shown(given)}"
     if kind in ("missing", "missing_argument", "missing_keyword_only_argument", "missing_positional_only_argument"):
-        return "this key is required, but it is not given"
+        return MISSING
     if kind in ("extra_forbidden", "unexpected_keyword_argument", "unexpected_positional_argument"):
         return "unknown key"
     return raw if kind not in PYDANTIC_TYPES else f"this value cannot be used here, got {describe(given)}"
@@ -135,7 +138,8 @@ def _choice(context: Mapping[str, Any], given: object) -> str:
     choices = [text or other for text, other in re.findall(r"'((?:[^'\\]|\\.)*)'|([^\s,']+)", listed) if other != "or"]
     got = context.get("tag", given)
     hint = suggest(got, choices) if isinstance(got, str) else ""
-    return f"expected one of {', '.join(choices)}; got {shown(got)}{hint}"
+    scalar = isinstance(got, str | int | float)
+    return f"expected one of {', '.join(choices)}; got {shown(got) if scalar else describe(got)}{hint}"
 
 
 def _length(kind: str, context: Mapping[str, Any]) -> str:
@@ -160,13 +164,13 @@ def describe(value: object) -> str:
     if isinstance(value, int | float):
         return f"the number {shown(value)}"
     if isinstance(value, Mapping):
-        names: list[str] = [str(key) for key in value]  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+        names: list[str] = [f"'{key}'" for key in value]  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
         return (
             f"a mapping with the {'key' if len(names) == 1 else 'keys'} {listing(names)}"
             if names
             else "an empty mapping"
         )
-    if isinstance(value, Sequence):
+    if isinstance(value, Sequence) and not isinstance(value, bytes):
         return f"a list of {count(len(value), 'item')}" if len(value) else "an empty list"  # pyright: ignore[reportUnknownArgumentType]
     return f"a {type(value).__name__}"
 

@@ -5,6 +5,7 @@ from typing import Any, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from anysim_schemas.base import Flag, Integer, Name, Number, Positive, Spec, Vec3
+from anysim_schemas.errors import KeyFault
 from anysim_schemas.values import ColorValue, NonNegativeValue, PositiveValue
 
 SHAPES = ("box", "sphere", "cylinder", "capsule", "mesh", "asset")
@@ -109,12 +110,10 @@ class TerrainSpec(Spec):
             raise ValueError("`heights` goes with kind heightfield, and with no other")
         if self.heights is not None:
             lengths = sorted({len(row) for row in self.heights})
-            if len(lengths) != 1:
-                raise ValueError(
-                    f"the rows of heights differ in length: {' and '.join(map(str, lengths)) or 'none given'}"
-                )
+            if len(lengths) > 1:
+                raise KeyFault(f"the rows differ in length: {' and '.join(map(str, lengths))}", "heights")
             if len(self.heights) < 2 or lengths[0] < 2:
-                raise ValueError("heights needs at least two rows of at least two heights")
+                raise KeyFault("expected at least two rows of at least two heights", "heights")
         return self
 
 

@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 from anysim_schemas.base import Integer, Name, Spec
 from anysim_schemas.cameras import CameraSpec
 from anysim_schemas.engine import EngineSpec, PhysicsSpec
+from anysim_schemas.errors import KeyFault
 from anysim_schemas.layout import PlacementSpec
 from anysim_schemas.objects import ContactSensorSpec, LightSpec, ObjectSpec, TerrainSpec
 from anysim_schemas.record import RecordSpec
@@ -30,9 +31,12 @@ class WorldSpec(Spec):
     def _names_are_unique(self) -> Self:
         shared = sorted(set(self.robots) & set(self.objects))
         if shared:
-            raise ValueError(f"robots and objects share one name space; both have {', '.join(shared)}")
-        if "terrain" in self.robots or "terrain" in self.objects:
-            raise ValueError("the name `terrain` is taken by the ground")
+            raise KeyFault(
+                f"robots and objects share one name space; both have {', '.join(shared)}", "objects", shared[0]
+            )
+        for kind in ("robots", "objects"):
+            if "terrain" in getattr(self, kind):
+                raise KeyFault("the name `terrain` is taken by the ground", kind, "terrain")
         return self
 
 

@@ -130,7 +130,8 @@ def alternatives(shapes: Shapes) -> tuple[tuple[str, ...], ...]:
 
 
 _NAMES: tuple[tuple[type, str], ...] = (
-    (bool, "true or false"), (int, "a whole number"), (float, "a number"), (str, "text"), (PurePath, "text"),
+    (bool, "true or false"), (int, "a whole number"), (float, "a number"), (str, "text"), (bytes, "text"),
+    (PurePath, "text"),
 )  # fmt: skip
 
 
@@ -151,9 +152,8 @@ def _words(shape: Shape) -> str:
         return "a mapping"
     if issubclass(kind, enum.Enum):
         return "one of " + ", ".join(str(cast("enum.Enum", choice).value) for choice in cast("Any", kind))
-    if issubclass(kind, LISTS):
-        return _list_words(shape)
-    return next((words for base, words in _NAMES if issubclass(kind, base)), "")
+    named = next((words for base, words in _NAMES if issubclass(kind, base)), "")
+    return named or (_list_words(shape) if issubclass(kind, LISTS) else "")
 
 
 def _list_words(shape: Shape) -> str:

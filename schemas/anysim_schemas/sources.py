@@ -108,7 +108,7 @@ class Reader:
 
     def _base(self, item: Node, folder: Path, where: str) -> Node | None:
         if not isinstance(item.value, str) or not item.value:
-            message = f"extends names a file, or a list of files; got {describe(item.plain())}"
+            message = f"expected the name of a file or a list of names, got {describe(item.plain())}"
             self.fatal.append(Fault(item.place, where, message))
             return None
         asked = Fault(item.place, where, "")

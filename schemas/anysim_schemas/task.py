@@ -5,6 +5,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import ConfigDict, Field, field_validator
 
 from anysim_schemas.base import Integer, Name, NamedByKey, Number, Spec
+from anysim_schemas.errors import KeyFault
 
 
 class TermSpec(Spec):
@@ -113,5 +114,5 @@ class TaskSpec(Spec):
         cls, groups: dict[str, tuple[ObservationTermSpec, ...]]
     ) -> dict[str, tuple[ObservationTermSpec, ...]]:
         if not groups.get("policy"):
-            raise ValueError("the group `policy` is required and needs at least one term")
+            raise KeyFault("the group `policy` is required and needs at least one term", "policy")
         return groups

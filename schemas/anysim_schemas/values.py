@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, TypeVar, ca
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from anysim_schemas.base import Color, Fraction, NonNegative, Number, Positive, Spec, Vec3
+from anysim_schemas.errors import KeyFault
 
 T = TypeVar("T")
 
@@ -43,6 +44,7 @@ class Variant(Spec):
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
         super().__pydantic_init_subclass__(**kwargs)
+        cls.__doc__ = cls.__doc__ or cls.__base__.__doc__
         globals().setdefault(cls.__name__, cls)
 
     @classmethod
@@ -80,9 +82,10 @@ class Choice(Drawn, Generic[T]):
     @model_validator(mode="after")
     def _weights_match(self) -> "Choice[T]":
         if self.weights is not None and (len(self.weights) != len(self.choice) or sum(self.weights) <= 0):
-            raise ValueError(
-                f"{len(self.choice)} choices need as many weights with a positive sum, got {len(self.weights)} "
-                f"weights with the sum {sum(self.weights):g}"
+            raise KeyFault(
+                f"{len(self.choice)} choices need {len(self.choice)} weights with a positive sum; "
+                f"got {len(self.weights)} with the sum {sum(self.weights):g}",
+                "weights",
             )
         return self
 
@@ -99,7 +102,7 @@ class NormalParameters(Variant, Generic[T]):
     def _ordered(self) -> "NormalParameters[T]":
         _components(self.mean)
         if any(component < 0 for component in _components(self.std)):
-            raise ValueError(f"the standard deviation must not be negative, got {self.std}")
+            raise KeyFault(f"the standard deviation must not be negative, got {self.std}", "std")
         if self.low is not None and self.high is not None:
             _check_order(self.low, self.high, what="limit")
         return self

@@ -264,7 +264,7 @@ _SYNTAX: tuple[tuple[str, str], ...] = (
     (r"found unexpected end of stream", "the quote that is opened at {context} is not closed"),
     (r"found undefined alias '(.+)'", "the alias *{0} has no anchor &{0} before it"),
     (r"found duplicate anchor", "the anchor is defined twice; the first is at {context}"),
-    (r"while parsing a flow node", "a value is missing before this place"),
+    (r"while parsing a flow node", "a key or a value is missing here"),
     (r"expected a single document", "a spec is one document, but a second one starts here with '---'"),
     (
         r"found undefined tag handle",

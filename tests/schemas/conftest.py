@@ -4,9 +4,8 @@ from collections.abc import Callable
 from typing import Annotated, Literal
 
 import pytest
-from pydantic import BaseModel, ConfigDict, Field
-
 from anysim_schemas.plugin import OptionsResolver, UnknownPlugin
+from pydantic import BaseModel, ConfigDict, Field
 
 
 class Closed(BaseModel):
