@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, cast
 
-from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler, Strict, model_validator
-from pydantic.json_schema import JsonSchemaValue
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, Strict, model_validator
 from pydantic_core import CoreSchema, core_schema
 
 
@@ -26,15 +25,6 @@ class Spec(BaseModel):
     def _expand_text(cls, data: object) -> object:
         expanded = cls.from_text(data) if isinstance(data, str) else None
         return data if expanded is None else expanded
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """The schema of the mapping, or of a string where one is enough."""
-        mapping = handler(schema)
-        if cls.from_text("name") is None:
-            return mapping
-        text = f"short for the mapping: {cls.text_means()}"
-        return {"anyOf": [{"type": "string", "description": text}, mapping]}
 
     @classmethod
     def text_means(cls) -> str:

@@ -100,7 +100,7 @@ def _follow(error: ErrorDetails, model: type[BaseModel], root: Node) -> _Located
 
 
 def _decide_unions(found: Sequence[_Located]) -> Iterator[_Located]:
-    """Of the errors of a union only those of the branch that was meant: of the right type, with the keys that fit best."""
+    """Of the errors of a union only those of the branch that was meant: of the right type, the keys that fit best."""
     unions: dict[tuple[str | int, ...], list[_Located]] = {}
     for located in found:
         if located.union is not None:

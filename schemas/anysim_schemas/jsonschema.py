@@ -16,7 +16,9 @@ from typing import Any, cast
 
 from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema
+from pydantic_core import core_schema
 
+from anysim_schemas.base import Spec
 from anysim_schemas.robots import RobotModelSpec
 from anysim_schemas.run import RunSpec
 
@@ -34,7 +36,14 @@ _Schema = dict[str, Any]
 
 
 class _Generator(GenerateJsonSchema):
-    """Leaves out the titles that only repeat the key."""
+    """Leaves out the titles that only repeat the key, and adds the strings that are short for a mapping."""
+
+    def model_schema(self, schema: core_schema.ModelSchema) -> _Schema:
+        mapping, model = super().model_schema(schema), schema["cls"]
+        if not issubclass(model, Spec) or model.from_text("name") is None:
+            return mapping
+        text = {"type": "string", "description": f"short for the mapping: {model.text_means()}"}
+        return {"anyOf": [text, mapping]}
 
     def field_title_should_be_set(self, schema: Any) -> bool:
         return False
@@ -66,8 +75,11 @@ def _titled(schema: _Schema) -> _Schema:
 
 
 def _renamed(value: object, names: Mapping[str, str]) -> object:
+    """The schema with other names for its definitions."""
     if isinstance(value, list):
         return [_renamed(item, names) for item in cast("list[object]", value)]
+    if isinstance(value, float) and value.is_integer():
+        return int(value)  # pydantic's versions differ in how they write a limit of zero
     if not isinstance(value, dict):
         return value
     renamed: _Schema = {}

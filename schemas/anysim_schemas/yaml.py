@@ -181,7 +181,9 @@ class _Builder:
                 first = entries[name].key
                 self._fault(key, f"the key '{name}' is given twice in one mapping; the first is at {first}")
                 continue
-            entries[name] = parts[-1].node.under(self._mark(key))
+            place = self._mark(key)
+            empty = value.start_mark.index == value.end_mark.index
+            entries[name] = Node(parts[-1].node.value, place, place) if empty else parts[-1].node.under(place)
         both = {**{name: child for name, child in merged.items() if name not in entries}, **entries}
         size, depth = sum(part.size for part in parts), max((part.depth for part in parts), default=0)
         return _Built(Node(both, self._mark(node)), 1 + size, 1 + depth)

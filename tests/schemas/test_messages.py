@@ -26,8 +26,8 @@ LEAKS = (
 GOOD = Path(__file__).parent / "good" / "pick.yaml"
 NAN = float("nan")
 JUNK = (
-    *(None, True, -7, 0.5, NAN, float("inf"), "junk", [], ["junk"], [None, -1, {}], {}, {"junk": 1}, [[1, 2], [3]]),
-    *({"range": [3, 1]}, {"range": "x"}, {"choice": []}, {"choice": [[], {}]}, {"normal": {"mean": "x"}}),
+    *(None, True, -7, NAN, "junk", [None, -1, {}], {"junk": 1}, [[1, 2], [3]]),
+    *({"range": [3, 1]}, {"choice": [[], {}]}, {"normal": {"mean": "x"}}),
 )
 
 OWN_WORDS = ("value_error", "assertion_error")
