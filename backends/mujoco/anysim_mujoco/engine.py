@@ -182,5 +182,5 @@ class MujocoEngine(SimEngine):
 
         self._parameters.settle()
         if self._painter is None:
-            self._painter = Painter(self._batch, self._layout, self._parameters, self.options)
+            self._painter = Painter(self._model, self._layout, self._queries, self.options)
         return self._painter.draw(view, ids, channels)
