@@ -29,14 +29,16 @@ class Drives:
         self._input = batch.bind("ctrl")
         self._scratch = np.empty((n, len(actuators)))
         self._mode = np.tile(np.array([MODES.index(a.mode) for a in actuators], dtype=np.int8), (n, 1))
+        self._modes = self._mode.tobytes()  # comparing bytes costs a tenth of comparing arrays
         self.kp = np.tile(np.array([a.kp for a in actuators], dtype=float), (n, 1))
         self.kd = np.tile(np.array([a.kd for a in actuators], dtype=float), (n, 1))
         self._stiffness, self._damping = feedback(self._mode, self.kp, self.kd)
 
     def apply(self, control: Control) -> None:
         """Write the control input of all envs."""
-        if not np.array_equal(control.mode, self._mode):
-            self._mode[...] = control.mode
+        modes = control.mode.tobytes()
+        if modes != self._modes:
+            self._mode[...], self._modes = control.mode, modes
             self.refresh()
         scratch = self._scratch
         np.multiply(control.position, self._stiffness, out=scratch)

@@ -1,6 +1,6 @@
 """MuJoCo as a SimEngine: `num_envs` simulations of one model in a `mujoco.batch.Batch`."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 import mujoco
@@ -14,6 +14,7 @@ from anysim_mujoco.drives import Drives
 from anysim_mujoco.options import MujocoOptions
 from anysim_mujoco.parameters import Parameters
 from anysim_mujoco.query import Queries
+from anysim_mujoco.raw import raw_loop
 from anysim_mujoco.state import StateReader
 from anysim.conventions import Array, wxyz_from_xyzw, xyzw_from_wxyz
 from anysim.engine.base import SimEngine
@@ -64,13 +65,14 @@ class MujocoEngine(SimEngine):
         self._drives = Drives(self._batch, world)
         self._parameters = Parameters(self._batch, world, layout, self._drives)
         self._reader = StateReader(self._batch, layout)
+        self._fields = self._reader.fields
         self._queries = Queries(self._batch, layout, self._parameters)
         self._painter: Any = None
 
     def _free(self) -> None:
         if self._painter is not None:
             self._painter.close()
-        for name in ("_batch", "_rows", "_qpos", "_qvel", "_mocap_pos", "_mocap_quat", "_wrenches", "_model"):
+        for name in ("_batch", "_rows", "_qpos", "_qvel", "_mocap_pos", "_mocap_quat", "_wrenches", "_model", "_fields"):
             setattr(self, name, None)
         self._drives = self._parameters = self._reader = self._queries = self._painter = None  # type: ignore[assignment]
 
@@ -91,7 +93,7 @@ class MujocoEngine(SimEngine):
 
     def _read(self, name: str) -> Array:
         self._parameters.settle()
-        return self._reader.read(name)
+        return self._fields[name]()
 
     def _apply_control(self, control: Control) -> None:
         self._drives.apply(control)
@@ -164,7 +166,23 @@ class MujocoEngine(SimEngine):
         layout, rows = carried
         take_rows(rows, old, layout, self.world, self._batch, self._layout, self._reader, self._parameters)
 
+    def raw_loop(self) -> Callable[[int], None]:
+        """MuJoCo's own batch, stepped without this engine."""
+        with self._lock:
+            self._require_world()
+            self._parameters.settle()
+            self._flush_control()
+            return raw_loop(self._batch)
+
     # ------------------------------------------------------------------ sensing
+
+    def renderer_name(self) -> str:
+        """The OpenGL backend and driver, such as `egl: llvmpipe (LLVM 15.0.6, 256 bits)`."""
+        from anysim_mujoco.gl import gl_thread
+
+        thread = gl_thread()
+        thread.open(self.options.gl)
+        return f"{thread.backend}: {thread.driver()}"
 
     def _raycast(self, origins: Array, directions: Array, ids: Array) -> RayHits:
         self._parameters.settle()
@@ -172,10 +190,14 @@ class MujocoEngine(SimEngine):
 
     def _contacts(self, ids: Array) -> ContactPoints:
         self._parameters.settle()
+        self._flush_control()
+        return self._queries.contacts(ids)
+
+    def _flush_control(self) -> None:
+        """Show MuJoCo commands that wait for the next step."""
         if self._commands.control_changed:
             self._apply_control(self._commands.control)
             self._commands.control_changed = False
-        return self._queries.contacts(ids)
 
     def _render(self, view: CameraView, ids: Array, channels: tuple[str, ...]) -> dict[str, Array]:
         from anysim_mujoco.render import Painter

@@ -48,6 +48,16 @@ class GlThread:
         """
         self.call(lambda: self._open(preference))
 
+    def driver(self) -> str:
+        """What OpenGL calls its renderer; needs an open context."""
+
+        def ask() -> str:
+            from OpenGL import GL
+
+            return GL.glGetString(GL.GL_RENDERER).decode()
+
+        return self.call(ask)
+
     def close(self) -> None:
         """Free the context and end the thread."""
         if self._thread.is_alive():

@@ -33,6 +33,7 @@ class Parameters:
         self._batch, self._world, self._layout, self._drives = batch, world, layout, drives
         self._expanded: set[str] = set()
         self._stale = np.zeros(batch.nsim, dtype=bool)
+        self._any_stale = False
         self._fields = {
             "body.mass": _Field("body_mass", layout.bodies, derives=True),
             "body.com": _Field("body_ipos", layout.bodies, derives=True),
@@ -77,7 +78,7 @@ class Parameters:
             self._drives.refresh()
         elif name == "world.gravity":
             self._expand("opt.gravity")[ids] = values[:, 0]
-            self._stale[ids] = True
+            self._mark(ids)
         elif name == "body.inertia":
             self._set_inertia(values, ids, indices)
         elif name == "actuator.effort_limit":
@@ -86,7 +87,8 @@ class Parameters:
         else:
             field = self._fields[name]
             _column(self._expand(field.name), field)[np.ix_(ids, field.rows[indices])] = values
-            self._stale[ids] |= field.derives
+            if field.derives:
+                self._mark(ids)
 
     def _set_inertia(self, values: Array, ids: Array, indices: Array) -> None:
         split = [[principal(tensor) for tensor in row] for row in values]
@@ -98,7 +100,7 @@ class Parameters:
         self._write_inertia(
             at, np.array([[m for m, _ in row] for row in split]), np.array([[q for _, q in row] for row in split])
         )
-        self._stale[ids] = True
+        self._mark(ids)
 
     def _write_inertia(self, at: Any, moments: Array, frames: Array) -> None:
         self._expand("body_inertia")[at] = moments
@@ -121,13 +123,17 @@ class Parameters:
                 self._rows(name)[ids] = getattr(self._batch.model, name)
         else:
             return
-        self._stale[ids] = True
+        self._mark(ids)
 
     def settle(self) -> None:
         """Bring the constants that MuJoCo derives up to date where parameters changed."""
-        if self._stale.any():
+        if self._any_stale:
             self._batch.set_const(np.flatnonzero(self._stale))
-            self._stale[:] = False
+            self._stale[:] = self._any_stale = False
+
+    def _mark(self, ids: Array) -> None:
+        """MuJoCo's derived constants of these envs are out of date."""
+        self._stale[ids] = self._any_stale = True
 
     @property
     def per_env(self) -> bool:
