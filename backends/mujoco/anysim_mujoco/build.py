@@ -10,7 +10,7 @@ from anysim_mujoco.geoms import add_assets, add_geom, add_look
 from anysim_mujoco.inertia import check_physical, principal
 from anysim_mujoco.layout import Handles, Layout
 from anysim_mujoco.options import MujocoOptions
-from anysim_mujoco.surfaces import STIFF_IMPEDANCE, constraint_solref
+from anysim_mujoco.surfaces import DRY_IMPEDANCE, STIFF_IMPEDANCE, constraint_solref
 from anysim.conventions import WORLD, Array, wxyz_from_xyzw
 from anysim.engine.commands import MODES
 from anysim.errors import EngineError
@@ -149,7 +149,7 @@ def _joint(element: Any, joint: Joint, world: World) -> Any:
     return element.add_joint(
         name=joint.name, type=kinds[joint.type], axis=joint.axis, pos=joint.anchor, armature=joint.armature,
         damping=[joint.damping, 0.0, 0.0], frictionloss=joint.friction, solref_friction=stiff,
-        solimp_friction=STIFF_IMPEDANCE, limited=int(limited),
+        solimp_friction=DRY_IMPEDANCE, limited=int(limited),
         range=(max(joint.lower, -UNLIMITED), min(joint.upper, UNLIMITED)),
         solref_limit=constraint_solref(joint.limit_softness, world.physics.dt), solimp_limit=STIFF_IMPEDANCE,
     )  # fmt: skip
