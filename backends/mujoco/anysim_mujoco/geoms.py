@@ -32,7 +32,7 @@ def add_look(spec: Any, world: World, options: MujocoOptions) -> None:
     )  # fmt: skip
     spec.add_texture(
         name=_GROUND, type=mujoco.mjtTexture.mjTEXTURE_2D, builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
-        rgb1=(1.0, 1.0, 1.0), rgb2=(0.9, 0.91, 0.92), width=128, height=128,
+        rgb1=(1.0, 1.0, 1.0), rgb2=(0.92, 0.93, 0.94), width=128, height=128,
     )  # fmt: skip
     spec.add_material(name=_PLAIN, rgba=_NEUTRAL_RGBA, specular=0.25, shininess=0.4)
     ground = spec.add_material(name=_GROUND, rgba=_NEUTRAL_RGBA, specular=0.05, texuniform=True, texrepeat=(1.0, 1.0))
@@ -44,16 +44,22 @@ def add_look(spec: Any, world: World, options: MujocoOptions) -> None:
     quality = spec.visual.quality
     quality.shadowsize = 1024 if options.shadows else 0
     quality.offsamples = options.antialiasing
-    for light in world.lights or (Light("default", (-0.35, 0.25, -1.0), (1.5, -1.0, 4.0), intensity=0.5),):
-        element = spec.worldbody.add_light(
-            type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, dir=light.direction, pos=light.position or (0.0, 0.0, 5.0),
-            diffuse=[light.intensity * c for c in light.color], specular=[0.2 * light.intensity] * 3,
-            castshadow=options.shadows,
-        )  # fmt: skip
-        if light.position is not None and world.lights:
-            element.type = mujoco.mjtLightType.mjLIGHT_SPOT
-            element.cutoff = 80.0
-            element.exponent = 1.0
+    for light in world.lights or (Light("default", (-0.35, 0.25, -1.0), intensity=0.5),):
+        _add_light(spec, light, world, options.shadows)
+
+
+def _add_light(spec: Any, light: Light, world: World, shadows: bool) -> None:
+    """A light without a position is directional. Its shadow map still has a place: off the middle of the bodies."""
+    direction = np.asarray(light.direction, dtype=float)
+    middle = world.initial_body_pose[:, :3].mean(axis=0) if world.bodies else np.zeros(3)
+    element = spec.worldbody.add_light(
+        dir=direction, pos=middle - 4.0 * direction / np.linalg.norm(direction) if light.position is None else light.position,
+        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, diffuse=[light.intensity * c for c in light.color],
+        specular=[0.2 * light.intensity] * 3, castshadow=shadows,
+    )  # fmt: skip
+    if light.position is not None:
+        element.type = mujoco.mjtLightType.mjLIGHT_SPOT
+        element.cutoff, element.exponent = 80.0, 1.0
 
 
 def add_assets(spec: Any, world: World) -> None:
