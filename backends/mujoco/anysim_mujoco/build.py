@@ -1,0 +1,202 @@
+"""World to MuJoCo model: a natively built MjSpec, compiled."""
+
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from anysim_mujoco.drives import feedback
+from anysim_mujoco.geoms import add_assets, add_geom, add_look
+from anysim_mujoco.inertia import check_physical, principal
+from anysim_mujoco.layout import Handles, Layout
+from anysim_mujoco.options import MujocoOptions
+from anysim_mujoco.surfaces import DRY_IMPEDANCE, STIFF_IMPEDANCE, constraint_solref
+from anysim.conventions import WORLD, Array, wxyz_from_xyzw
+from anysim.engine.commands import MODES
+from anysim.errors import EngineError
+from anysim.world.model import Body, BodyKind, ContactSensor, Joint, JointType, World
+
+UNLIMITED = 1e10
+"""Stands for infinity where MuJoCo wants a number: the open side of a limit."""
+
+
+class Built(NamedTuple):
+    """A compiled model and where the World's things are in it."""
+
+    model: Any
+    layout: Layout
+
+
+def build(world: World, options: MujocoOptions) -> Built:
+    """Compile a World.
+
+    Raises:
+        EngineError: MuJoCo refuses it; carries MuJoCo's words, which name the element.
+    """
+    spec = mujoco.MjSpec()
+    _settings(spec, world, options)
+    add_look(spec, world, options)
+    add_assets(spec, world)
+    bodies = _bodies(spec, world)
+    owner = lambda body: spec.worldbody if body == WORLD else bodies[body]  # noqa: E731
+    joints = [_joint(owner(joint.body), joint, world) for joint in world.joints]
+    geoms = [add_geom(spec, owner(geom.body), geom, world) for geom in world.geoms]
+    _couplings(spec, world)
+    _drives(spec, world)
+    sensors = [_contact_sensor(spec, world, sensor) for sensor in world.contact_sensors]
+    for low, high in sorted(world.excluded_pairs):
+        spec.add_exclude(bodyname1=body_name(world, low), bodyname2=body_name(world, high))
+    try:
+        model = spec.compile()
+    except (ValueError, mujoco.FatalError) as error:
+        said = " ".join(str(error).split())
+        raise EngineError(f"MuJoCo cannot build the world '{world.name}': {said}") from error
+    _forget_shared_frames(model)
+    return Built(model, Layout.of(world, model, Handles(bodies, joints, geoms, sensors)))
+
+
+def _forget_shared_frames(model: Any) -> None:
+    """Undo a shortcut of the compiler: it notes which frames coincide with a body's inertial frame and then takes one
+    for the other, which is wrong in an env whose centre of mass or inertia is changed."""
+    frames = mujoco.mjtSameFrame
+    model.body_sameframe[1:] = int(frames.mjSAMEFRAME_NONE)
+    inertial = (int(frames.mjSAMEFRAME_INERTIA), int(frames.mjSAMEFRAME_INERTIAROT))
+    model.geom_sameframe[np.isin(model.geom_sameframe, inertial)] = int(frames.mjSAMEFRAME_NONE)
+
+
+def initial_row(world: World, model: Any, layout: Layout) -> Array:
+    """The state row of an env after a reset."""
+    data = mujoco.MjData(model)
+    data.qpos[layout.joint_q] = [joint.initial for joint in world.joints]
+    row = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_INTEGRATION))
+    mujoco.mj_getState(model, data, row, mujoco.mjtState.mjSTATE_INTEGRATION)
+    return row
+
+
+def silence() -> None:
+    """Keep MuJoCo from writing MUJOCO_LOG.TXT into the working directory, and to the terminal, in this process.
+
+    Faults are in `State.fault`; compile errors are exceptions. A log file of another name was somebody's choice and stays.
+    """
+    config = mujoco.MjLogConfig.get()
+    config.logto_console = False
+    config.logto_file = config.logto_file and config.logfile != "MUJOCO_LOG.TXT"
+    mujoco.MjLogConfig.set(config)
+
+
+def body_name(world: World, body: int) -> str:
+    """The name of a body in the MjSpec: its own, but for one called `world`, which is taken."""
+    name = "world" if body == WORLD else world.bodies[body].name
+    return "world (body)" if body != WORLD and name == "world" else name
+
+
+def _settings(spec: Any, world: World, options: MujocoOptions) -> None:
+    physics = world.physics
+    spec.modelname = world.name
+    spec.compiler.degree = False
+    spec.compiler.alignfree = False  # a free body's frame is the World's, not that of its inertia
+    spec.compiler.fusestatic = False
+    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    if options.memory_mb:
+        spec.memory = options.memory_mb * 2**20
+    option = spec.option
+    option.timestep = physics.dt
+    option.gravity = physics.gravity
+    option.impratio = physics.impratio
+    option.cone = getattr(mujoco.mjtCone, f"mjCONE_{physics.friction_cone.upper()}")
+    option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{options.integrator.upper()}")
+    option.solver = getattr(mujoco.mjtSolver, f"mjSOL_{options.solver.upper()}")
+    option.jacobian = getattr(mujoco.mjtJacobian, f"mjJAC_{options.jacobian.upper()}")
+    option.iterations = options.iterations
+    option.tolerance = options.tolerance
+    # a diverged env must show it: MuJoCo would put it back to its default pose in silence
+    option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+
+
+def _bodies(spec: Any, world: World) -> list[Any]:
+    made: list[Any] = []
+    for index, body in enumerate(world.bodies):
+        parent = spec.worldbody if body.parent == WORLD else made[body.parent]
+        element = parent.add_body(
+            name=body_name(world, index), pos=body.position, quat=wxyz_from_xyzw(np.asarray(body.quaternion)),
+            gravcomp=float(body.gravity_compensation),
+        )  # fmt: skip
+        # the shortcut for bodies with a diagonal inertia matrix would not hold once their parameters are changed
+        element.simple = False
+        if body.kind is BodyKind.FREE:
+            element.add_freejoint(name=f"{body.name} (free)")
+        elif body.kind is BodyKind.STATIC:
+            # a mocap body stands still like the world, and its pose is part of each env's state
+            element.mocap = True
+        _set_inertia(element, body)
+        made.append(element)
+    return made
+
+
+def _set_inertia(element: Any, body: Body) -> None:
+    moments, frame = principal(np.asarray(body.inertial.inertia))
+    if body.kind is not BodyKind.STATIC and body.inertial.mass > 0 and moments.any():
+        check_physical(body.name, moments)
+    element.explicitinertial = True
+    element.mass, element.ipos = body.inertial.mass, body.inertial.com
+    element.inertia, element.iquat = moments, frame
+
+
+def _joint(element: Any, joint: Joint, world: World) -> Any:
+    limited = bool(np.isfinite(joint.lower) or np.isfinite(joint.upper))
+    kinds = {JointType.REVOLUTE: mujoco.mjtJoint.mjJNT_HINGE, JointType.PRISMATIC: mujoco.mjtJoint.mjJNT_SLIDE}
+    stiff = constraint_solref(0.0, world.physics.dt)
+    return element.add_joint(
+        name=joint.name, type=kinds[joint.type], axis=joint.axis, pos=joint.anchor, armature=joint.armature,
+        damping=[joint.damping, 0.0, 0.0], frictionloss=joint.friction, solref_friction=stiff,
+        solimp_friction=DRY_IMPEDANCE, limited=int(limited),
+        range=(max(joint.lower, -UNLIMITED), min(joint.upper, UNLIMITED)),
+        solref_limit=constraint_solref(joint.limit_softness, world.physics.dt), solimp_limit=STIFF_IMPEDANCE,
+    )  # fmt: skip
+
+
+def _couplings(spec: Any, world: World) -> None:
+    for joint in world.joints:
+        if joint.mimic is None:
+            continue
+        equality = spec.add_equality(
+            name=f"{joint.name} (mimic)", type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT,
+            name1=joint.name, name2=world.joints[joint.mimic.joint].name,
+            solref=constraint_solref(joint.limit_softness, world.physics.dt), solimp=STIFF_IMPEDANCE,
+        )  # fmt: skip
+        data = np.zeros_like(equality.data)
+        data[:2] = joint.mimic.offset, joint.mimic.multiplier
+        equality.data = data
+
+
+def _drives(spec: Any, world: World) -> None:
+    for actuator in world.actuators:
+        element = spec.add_actuator(
+            name=actuator.name, target=world.joints[actuator.joint].name, trntype=mujoco.mjtTrn.mjTRN_JOINT,
+            gaintype=mujoco.mjtGain.mjGAIN_FIXED, biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+            ctrllimited=0, forcelimited=1, forcerange=(-actuator.effort_limit, actuator.effort_limit),
+        )  # fmt: skip
+        gain, bias = np.zeros_like(element.gainprm), np.zeros_like(element.biasprm)
+        gain[0] = 1.0
+        stiffness, damping = feedback(MODES.index(actuator.mode), actuator.kp, actuator.kd)
+        bias[1:3] = -stiffness, -damping
+        element.gainprm, element.biasprm = gain, bias
+
+
+def _contact_sensor(spec: Any, world: World, sensor: ContactSensor) -> list[Any]:
+    """One MuJoCo sensor per pair of a body and what it may touch; their sum is the neutral sensor."""
+    body = mujoco.mjtObj.mjOBJ_BODY
+    parts = []
+    for index in sensor.bodies:
+        for other in sensor.against if sensor.against is not None else (None,):
+            element = spec.add_sensor(
+                name=f"{sensor.name} ({len(parts)})", type=mujoco.mjtSensor.mjSENS_CONTACT,
+                objtype=body, objname=body_name(world, index),
+            )  # fmt: skip
+            if other is not None:
+                element.reftype, element.refname = body, body_name(world, other)
+            setup = np.zeros_like(element.intprm)
+            setup[:3] = 1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 3, 1  # the force, summed over contacts
+            element.intprm = setup
+            parts.append(element)
+    return parts

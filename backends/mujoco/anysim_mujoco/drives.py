@@ -1,0 +1,54 @@
+"""The drives: u = kp (q* - q) + kd (qd* - qd) + ff, clipped, as MuJoCo's affine actuator.
+
+The feedback -kp q - kd qd is the actuator's bias, so that the integrator takes its damping implicitly; the rest is its
+control input. Which terms a mode has is decided here; the bias becomes a per-env array once an env first differs.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.engine.commands import MODES, Control
+from anysim.world.model import ControlMode, World
+
+_POSITION, _EFFORT = MODES.index(ControlMode.POSITION), MODES.index(ControlMode.EFFORT)
+
+
+def feedback(mode: Any, kp: Any, kd: Any) -> tuple[Any, Any]:
+    """The gains that act in a mode (index into MODES): position kp and kd, velocity kd, effort none."""
+    return kp * (mode == _POSITION), kd * (mode != _EFFORT)
+
+
+class Drives:
+    """Gains and modes (N, A) of all envs, and the control input they give."""
+
+    def __init__(self, batch: Any, world: World) -> None:
+        n, actuators = batch.nsim, world.actuators
+        self._batch = batch
+        self._input = batch.bind("ctrl")
+        self._scratch = np.empty((n, len(actuators)))
+        self._mode = np.tile(np.array([MODES.index(a.mode) for a in actuators], dtype=np.int8), (n, 1))
+        self._modes = self._mode.tobytes()  # comparing bytes costs a tenth of comparing arrays
+        self.kp = np.tile(np.array([a.kp for a in actuators], dtype=float), (n, 1))
+        self.kd = np.tile(np.array([a.kd for a in actuators], dtype=float), (n, 1))
+        self._stiffness, self._damping = feedback(self._mode, self.kp, self.kd)
+
+    def apply(self, control: Control) -> None:
+        """Write the control input of all envs."""
+        modes = control.mode.tobytes()
+        if modes != self._modes:
+            self._mode[...], self._modes = control.mode, modes
+            self.refresh()
+        scratch = self._scratch
+        np.multiply(control.position, self._stiffness, out=scratch)
+        scratch += control.effort
+        scratch += control.velocity * self._damping
+        self._input[...] = scratch
+
+    def refresh(self) -> None:
+        """Write the feedback of all envs, after a change of modes or gains."""
+        self._stiffness, self._damping = feedback(self._mode, self.kp, self.kd)
+        bias = self._batch.expand("actuator_biasprm")
+        bias[:, :, 1] = -self._stiffness
+        bias[:, :, 2] = -self._damping

@@ -1,0 +1,208 @@
+"""MuJoCo as a SimEngine: `num_envs` simulations of one model in a `mujoco.batch.Batch`."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch, SimulationError
+
+from anysim_mujoco import declared
+from anysim_mujoco.build import build, initial_row, silence
+from anysim_mujoco.carry import carried_rows, take_rows
+from anysim_mujoco.drives import Drives
+from anysim_mujoco.options import MujocoOptions
+from anysim_mujoco.parameters import Parameters
+from anysim_mujoco.query import Queries
+from anysim_mujoco.raw import raw_loop
+from anysim_mujoco.state import StateReader
+from anysim.conventions import Array, wxyz_from_xyzw, xyzw_from_wxyz
+from anysim.engine.base import SimEngine
+from anysim.engine.cameras import CameraView
+from anysim.engine.capability import Capabilities
+from anysim.engine.commands import Control
+from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
+from anysim.math import pose as P
+from anysim.world.model import World
+
+
+class MujocoEngine(SimEngine):
+    """The engine `mujoco`. Trajectories do not depend on the number of envs, their order or the threads."""
+
+    name: ClassVar[str] = "mujoco"
+    capabilities: ClassVar[Capabilities] = declared.CAPABILITIES
+    parameters: ClassVar[frozenset[str]] = Parameters.NAMES
+    options: MujocoOptions
+
+    @classmethod
+    def availability(cls) -> Availability:
+        """By the installed version alone; imports nothing."""
+        return declared.availability()
+
+    @classmethod
+    def options_model(cls) -> type[MujocoOptions]:
+        """The engine's options."""
+        return MujocoOptions
+
+    @property
+    def version(self) -> str:
+        """MuJoCo's version, with the options that shape trajectories where they are not the defaults."""
+        stamp = self.options.trajectory_stamp()
+        return f"{declared.installed_version()} ({stamp})" if stamp else declared.installed_version()
+
+    # ------------------------------------------------------------------ lifecycle
+
+    def _build(self, world: World, num_envs: int) -> None:
+        silence()
+        model, layout = build(world, self.options)
+        self._model, self._layout = model, layout
+        self._batch = Batch(model, num_envs, nthread=self.options.thread_count(num_envs))
+        self._rows = self._batch.state
+        self._initial = initial_row(world, model, layout)
+        self._qpos, self._qvel = self._batch.bind("qpos"), self._batch.bind("qvel")
+        self._mocap_pos, self._mocap_quat = self._batch.bind("mocap_pos"), self._batch.bind("mocap_quat")
+        self._wrenches = self._batch.bind("xfrc_applied")
+        self._drives = Drives(self._batch, world)
+        self._parameters = Parameters(self._batch, world, layout, self._drives)
+        self._reader = StateReader(self._batch, layout)
+        self._fields = self._reader.fields
+        self._queries = Queries(self._batch, layout, self._parameters)
+        self._painter: Any = None
+
+    def _free(self) -> None:
+        if self._painter is not None:
+            self._painter.close()
+        for name in ("_batch", "_rows", "_qpos", "_qvel", "_mocap_pos", "_mocap_quat", "_wrenches", "_model", "_fields"):
+            setattr(self, name, None)
+        self._drives = self._parameters = self._reader = self._queries = self._painter = None  # type: ignore[assignment]
+
+    def _reset(self, ids: Array) -> None:
+        self._rows[ids] = self._initial
+        self._reader.clear_faults(ids)
+        self._reader.hold(ids, 0.0, 0.0)
+
+    # ------------------------------------------------------------------ stepping
+
+    def _step(self, n_steps: int, ids: Array | None) -> None:
+        self._parameters.settle()
+        try:
+            self._batch.step(None if ids is None else np.sort(ids), n_steps, mujoco.mjtStage.mjSTAGE_VEL.value)
+        except SimulationError as error:
+            self._reader.failed[error.ids] = True
+        self._reader.stepped(ids)
+
+    def _read(self, name: str) -> Array:
+        self._parameters.settle()
+        return self._fields[name]()
+
+    def _apply_control(self, control: Control) -> None:
+        self._drives.apply(control)
+
+    def _apply_wrench(self, wrench: Array | None) -> None:
+        if wrench is None:
+            self._wrenches[...] = 0.0
+        else:
+            self._wrenches[:, self._layout.bodies] = wrench
+
+    # ------------------------------------------------------------------ writing
+
+    def _write_joints(self, ids: Array, joints: Array, position: Array | None, velocity: Array | None) -> None:
+        self._reader.touch(ids)
+        if position is not None:
+            self._qpos[np.ix_(ids, self._layout.joint_q[joints])] = position
+        if velocity is not None:
+            self._qvel[np.ix_(ids, self._layout.joint_v[joints])] = velocity
+
+    def _write_bodies(self, ids: Array, bodies: Array, pose: Array | None, twist: Array | None) -> None:
+        self._reader.touch(ids)
+        rows = ids[:, None, None]
+        static, free = self._layout.static_row[bodies], self._layout.free_row[bodies]
+        if pose is not None and (fixed := static >= 0).any():
+            at = np.ix_(ids, self._layout.mocap[static[fixed]])
+            self._mocap_pos[at] = pose[:, fixed, :3]
+            self._mocap_quat[at] = wxyz_from_xyzw(pose[:, fixed, 3:])
+        if not (loose := free >= 0).any():
+            return
+        q, v = self._layout.free_q[free[loose]], self._layout.free_v[free[loose]]
+        if pose is not None:
+            self._qpos[rows, q[None, :, :3]] = pose[:, loose, :3]
+            self._qpos[rows, q[None, :, 3:]] = wxyz_from_xyzw(pose[:, loose, 3:])
+        if twist is not None:
+            turned = xyzw_from_wxyz(self._qpos[rows, q[None, :, 3:]])
+            self._qvel[rows, v[None, :, :3]] = twist[:, loose, :3]
+            # MuJoCo keeps the angular rate of a free body in its own axes
+            self._qvel[rows, v[None, :, 3:]] = P.rotate_inverse(turned, twist[:, loose, 3:])
+
+    # ------------------------------------------------------------------ parameters and snapshots
+
+    def _get_parameter(self, name: str) -> Array:
+        return self._parameters.get(name)
+
+    def _set_parameter(self, name: str, values: Array, ids: Array, indices: Array) -> None:
+        self._parameters.set(name, values, ids, indices)
+        self._reader.touch(ids)
+
+    def _default_parameter(self, name: str) -> Array:
+        return self._parameters.default(name)
+
+    def _snapshot(self, ids: Array, level: SnapshotLevel) -> dict[str, Array]:
+        reader = self._reader
+        return {
+            "rows": self._rows[ids], "effort": reader.joint_effort()[ids], "contact": reader.contact_force()[ids],
+            "fault": reader.fault()[ids], **self._parameters.rows(ids),
+        }  # fmt: skip
+
+    def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:
+        self._rows[ids] = data["rows"]
+        self._parameters.restore_rows(ids, data)
+        self._reader.clear_faults(ids)
+        self._reader.failed[ids] = data["fault"]
+        self._reader.hold(ids, data["effort"], data["contact"])
+
+    def _carry_rows(self) -> Any:
+        return self._layout, carried_rows(self._batch, self._layout, self._reader, self._parameters)
+
+    def _take_rows(self, carried: Any, old: World) -> None:
+        layout, rows = carried
+        take_rows(rows, old, layout, self.world, self._batch, self._layout, self._reader, self._parameters)
+
+    def raw_loop(self) -> Callable[[int], None]:
+        """MuJoCo's own batch, stepped without this engine."""
+        with self._lock:
+            self._require_world()
+            self._parameters.settle()
+            self._flush_control()
+            return raw_loop(self._batch)
+
+    # ------------------------------------------------------------------ sensing
+
+    def renderer_name(self) -> str:
+        """The OpenGL backend and driver, such as `egl: llvmpipe (LLVM 15.0.6, 256 bits)`."""
+        from anysim_mujoco.gl import gl_thread
+
+        thread = gl_thread()
+        thread.open(self.options.gl)
+        return f"{thread.backend}: {thread.driver()}"
+
+    def _raycast(self, origins: Array, directions: Array, ids: Array) -> RayHits:
+        self._parameters.settle()
+        return self._queries.raycast(origins, directions, ids)
+
+    def _contacts(self, ids: Array) -> ContactPoints:
+        self._parameters.settle()
+        self._flush_control()
+        return self._queries.contacts(ids)
+
+    def _flush_control(self) -> None:
+        """Show MuJoCo commands that wait for the next step."""
+        if self._commands.control_changed:
+            self._apply_control(self._commands.control)
+            self._commands.control_changed = False
+
+    def _render(self, view: CameraView, ids: Array, channels: tuple[str, ...]) -> dict[str, Array]:
+        from anysim_mujoco.render import Painter
+
+        self._parameters.settle()
+        if self._painter is None:
+            self._painter = Painter(self._model, self._layout, self._queries, self.options)
+        return self._painter.draw(view, ids, channels)

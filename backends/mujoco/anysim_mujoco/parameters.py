@@ -1,0 +1,158 @@
+"""Physical and visual parameters per env, as per-env fields of the batch's model."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from anysim_mujoco.drives import Drives
+from anysim_mujoco.inertia import check_physical, full, principal
+from anysim_mujoco.layout import Layout
+from anysim.conventions import Array
+from anysim.world.model import World
+
+
+class _Field(NamedTuple):
+    """A field of MjModel: the rows that belong to the World's things, the column that is the value, and whether
+    MuJoCo derives constants from it."""
+
+    name: str
+    rows: Array
+    column: int | None = None
+    derives: bool = False
+
+
+class Parameters:
+    """Reads and writes neutral parameters. Derived constants are brought up to date by `settle`, for touched envs."""
+
+    NAMES = frozenset({
+        "body.mass", "body.com", "body.inertia", "geom.friction", "geom.color", "joint.damping", "joint.friction",
+        "joint.armature", "actuator.kp", "actuator.kd", "actuator.effort_limit", "world.gravity",
+    })  # fmt: skip
+
+    def __init__(self, batch: Any, world: World, layout: Layout, drives: Drives) -> None:
+        self._batch, self._world, self._layout, self._drives = batch, world, layout, drives
+        self._expanded: set[str] = set()
+        self._stale = np.zeros(batch.nsim, dtype=bool)
+        self._any_stale = False
+        self._fields = {
+            "body.mass": _Field("body_mass", layout.bodies, derives=True),
+            "body.com": _Field("body_ipos", layout.bodies, derives=True),
+            "geom.friction": _Field("geom_friction", layout.geoms, 0),
+            "geom.color": _Field("geom_rgba", layout.geoms),
+            "joint.damping": _Field("dof_damping", layout.joint_v),
+            "joint.friction": _Field("dof_frictionloss", layout.joint_v),
+            "joint.armature": _Field("dof_armature", layout.joint_v, derives=True),
+            "actuator.effort_limit": _Field("actuator_forcerange", np.arange(len(world.actuators)), 1),
+        }
+
+    def get(self, name: str) -> Array:
+        """All values (N, K, ...)."""
+        if name in ("actuator.kp", "actuator.kd"):
+            return getattr(self._drives, name.removeprefix("actuator.")).copy()
+        if name == "world.gravity":
+            return np.array(self._rows("opt.gravity"))[:, None]
+        if name == "body.inertia":
+            bodies = self._layout.bodies
+            return full(self._rows("body_inertia")[:, bodies], self._rows("body_iquat")[:, bodies])
+        field = self._fields[name]
+        return np.array(_column(self._rows(field.name), field)[:, field.rows], dtype=float)
+
+    def default(self, name: str) -> Array:
+        """Values (K, ...) as built."""
+        world, model = self._world, self._batch.model
+        if name in ("actuator.kp", "actuator.kd"):
+            return np.array([getattr(a, name.removeprefix("actuator.")) for a in world.actuators], dtype=float)
+        if name == "world.gravity":
+            return np.array([world.physics.gravity])
+        if name == "body.inertia":
+            bodies = self._layout.bodies
+            return full(model.body_inertia[bodies], model.body_iquat[bodies])
+        field = self._fields[name]
+        return np.array(_column(getattr(model, field.name), field)[field.rows], dtype=float)
+
+    def set(self, name: str, values: Array, ids: Array, indices: Array) -> None:
+        """Write values (E, K, ...)."""
+        at = np.ix_(ids, indices)
+        if name in ("actuator.kp", "actuator.kd"):
+            getattr(self._drives, name.removeprefix("actuator."))[at] = values
+            self._drives.refresh()
+        elif name == "world.gravity":
+            self._expand("opt.gravity")[ids] = values[:, 0]
+            self._mark(ids)
+        elif name == "body.inertia":
+            self._set_inertia(values, ids, indices)
+        elif name == "actuator.effort_limit":
+            limits = self._expand("actuator_forcerange")
+            limits[at] = np.stack([-values, values], axis=-1)
+        else:
+            field = self._fields[name]
+            _column(self._expand(field.name), field)[np.ix_(ids, field.rows[indices])] = values
+            if field.derives:
+                self._mark(ids)
+
+    def _set_inertia(self, values: Array, ids: Array, indices: Array) -> None:
+        split = [[principal(tensor) for tensor in row] for row in values]
+        for row in split:
+            for index, (moments, _) in zip(indices, row, strict=True):
+                if moments.any():
+                    check_physical(self._world.bodies[index].name, moments)
+        at = np.ix_(ids, self._layout.bodies[indices])
+        self._write_inertia(
+            at, np.array([[m for m, _ in row] for row in split]), np.array([[q for _, q in row] for row in split])
+        )
+        self._mark(ids)
+
+    def _write_inertia(self, at: Any, moments: Array, frames: Array) -> None:
+        self._expand("body_inertia")[at] = moments
+        self._expand("body_iquat")[at] = frames
+
+    def rows(self, ids: Array) -> dict[str, Array]:
+        """Principal axes as MuJoCo has them: full tensors would not come back with the same bits."""
+        if "body_inertia" not in self._expanded:
+            return {}
+        bodies = self._layout.bodies
+        return {name: self._rows(name)[ids][:, bodies] for name in ("body_inertia", "body_iquat")}
+
+    def restore_rows(self, ids: Array, data: Any, bodies: Array | None = None) -> None:
+        """Write what `rows` returned (for these World bodies), or the built values if that was nothing."""
+        if "body_inertia" in data:
+            which = self._layout.bodies if bodies is None else self._layout.bodies[bodies]
+            self._write_inertia(np.ix_(ids, which), data["body_inertia"], data["body_iquat"])
+        elif "body_inertia" in self._expanded:
+            for name in ("body_inertia", "body_iquat"):
+                self._rows(name)[ids] = getattr(self._batch.model, name)
+        else:
+            return
+        self._mark(ids)
+
+    def settle(self) -> None:
+        """Bring the constants that MuJoCo derives up to date where parameters changed."""
+        if self._any_stale:
+            self._batch.set_const(np.flatnonzero(self._stale))
+            self._stale[:] = self._any_stale = False
+
+    def _mark(self, ids: Array) -> None:
+        """MuJoCo's derived constants of these envs are out of date."""
+        self._stale[ids] = self._any_stale = True
+
+    @property
+    def per_env(self) -> bool:
+        """Whether envs have models of their own."""
+        return bool(self._expanded) or "actuator_biasprm" in self._batch._expanded  # noqa: SLF001
+
+    def _expand(self, name: str) -> Array:
+        self._expanded.add(name)
+        return self._batch.expand(name)
+
+    def _rows(self, name: str) -> Array:
+        """Values of a model field for all envs, expanded or not."""
+        if name in self._expanded:
+            return self._batch.expand(name)
+        model = self._batch.model
+        base = model.opt.gravity if name == "opt.gravity" else getattr(model, name)
+        return np.broadcast_to(base, (self._batch.nsim, *base.shape))
+
+
+def _column(array: Array, field: _Field) -> Array:
+    """A view of the field's value in each row."""
+    return array if field.column is None else array[..., field.column]

@@ -1,0 +1,73 @@
+"""Rays and contact points, asked of the present state."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from anysim_mujoco.geoms import COLLIDING_GROUPS
+from anysim_mujoco.layout import Layout
+from anysim_mujoco.parameters import Parameters
+from anysim.conventions import Array
+from anysim.engine.state import ContactPoints, RayHits
+
+
+class Queries:
+    """Answers from a scratch MjData that stands in for one env after the other."""
+
+    def __init__(self, batch: Any, layout: Layout, parameters: Parameters) -> None:
+        self._batch, self._layout, self._parameters = batch, layout, parameters
+        self._scratch: tuple[Any, Any] | None = None
+        groups = np.zeros(mujoco.mjNGROUP, dtype=np.uint8)
+        groups[list(COLLIDING_GROUPS)] = 1
+        self._groups = groups
+
+    def raycast(self, origins: Array, directions: Array, ids: Array) -> RayHits:
+        """First hits with collision geometry; meshes are hit at their triangles."""
+        order = np.argsort(ids)
+        distance, geom = self._batch.ray(
+            origins[order], directions[order], geomgroup=self._groups, ids=ids[order]
+        )
+        entity = np.where(geom < 0, -1, self._layout.geom_entity[geom])
+        back = np.argsort(order)
+        return RayHits(np.where(geom < 0, np.inf, distance)[back], entity[back])
+
+    def env(self, index: int) -> tuple[Any, Any]:
+        """Model and data of one env; the data holds the state and nothing derived."""
+        if self._scratch is None:
+            self._scratch = self._batch.get_model(0), mujoco.MjData(self._batch.model)
+        model, data = self._scratch
+        if self._parameters.per_env:
+            self._batch.get_model(index, model)
+        self._batch.get_data(index, data)
+        return model, data
+
+    def contacts(self, ids: Array) -> ContactPoints:
+        """Contacts that exert force, with the force the solver finds for the present controls."""
+        parts = [self._contacts_of(int(index)) for index in ids]
+        joined = [np.concatenate(columns) for columns in zip(*parts, strict=True)] if parts else _nothing()
+        return ContactPoints(*joined)
+
+    def _contacts_of(self, index: int) -> list[Array]:
+        model, data = self.env(index)
+        mujoco.mj_forward(model, data)
+        contact = data.contact
+        chosen = np.flatnonzero(contact.efc_address >= 0) if data.ncon else np.zeros(0, dtype=int)
+        if not len(chosen):
+            return _nothing()
+        bodies = self._layout.world_body[model.geom_bodyid[contact.geom[chosen]]]
+        frames = contact.frame[chosen].reshape(-1, 3, 3)  # rows: normal from the first geom to the second, tangents
+        local = np.zeros(6)
+        force = np.empty((len(chosen), 3))
+        for row, number in enumerate(chosen):
+            mujoco.mj_contactForce(model, data, int(number), local)
+            force[row] = local[0] * frames[row, 0] + local[1] * frames[row, 1] + local[2] * frames[row, 2]
+        return [
+            np.full(len(chosen), index), bodies[:, 0], bodies[:, 1], contact.pos[chosen].copy(), frames[:, 0].copy(),
+            force, -contact.dist[chosen],
+        ]  # fmt: skip
+
+
+def _nothing() -> list[Array]:
+    whole, rows = np.zeros(0, dtype=int), np.zeros((0, 3))
+    return [whole, whole, whole, rows, rows, rows, np.zeros(0)]

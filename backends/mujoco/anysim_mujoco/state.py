@@ -1,0 +1,150 @@
+"""Reads of the neutral state from the batch's arrays."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from anysim_mujoco.layout import Layout, as_slice
+from anysim.conventions import Array
+from anysim.engine.state import FIELDS
+
+_FATAL = [
+    int(kind)
+    for kind in (
+        mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL, mujoco.mjtWarning.mjWARN_BADQPOS,
+        mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC,
+    )
+]  # fmt: skip
+"""Warnings after which an env's state means nothing: it diverged, or contacts were dropped for want of memory."""
+
+
+class _TwistColumns(NamedTuple):
+    """Columns (B, 6) of cvel and of xpos and subtree_com, each flattened to one row per env, that make up the twist.
+
+    The cross product w x r is (wy rz, wz rx, wx ry) - (wz ry, wx rz, wy rx): `first` holds the factors of w in this
+    order, `second` those of r.
+    """
+
+    linear_angular: Array
+    first: Array
+    second: Array
+    second_root: Array
+
+    @classmethod
+    def of(cls, layout: Layout) -> "_TwistColumns":
+        factors = np.array([2, 0, 1, 1, 2, 0])
+        return cls(
+            6 * layout.bodies[:, None] + np.array([3, 4, 5, 0, 1, 2]),
+            6 * layout.bodies[:, None] + np.array([1, 2, 0, 2, 0, 1]),
+            3 * layout.bodies[:, None] + factors,
+            3 * layout.roots[:, None] + factors,
+        )
+
+
+class StateReader:
+    """What the last substep left behind, per env.
+
+    Positions and velocities are those of the state rows. Frames and twists follow from them by a forward pass over the
+    envs that were written to since (`touch`). Efforts and contact forces belong to the last substep: writing a state
+    does not change them, a reset makes them zero, a restored snapshot brings its own; `held` keeps those.
+    """
+
+    def __init__(self, batch: Any, layout: Layout) -> None:
+        self._batch, self._layout = batch, layout
+        self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
+        self._xpos, self._xquat = batch.bind("xpos"), batch.bind("xquat")
+        n = batch.nsim
+        self._velocity, self._position, self._center = (
+            batch.bind(name).reshape(n, -1) for name in ("cvel", "xpos", "subtree_com")
+        )
+        self._take = _TwistColumns.of(layout)
+        self._effort, self._sensordata = batch.bind("qfrc_actuator"), batch.bind("sensordata")
+        self._bodies = as_slice(layout.bodies)
+        self._joint_q, self._joint_v = as_slice(layout.joint_q), as_slice(layout.joint_v)
+        self._stale = np.zeros(n, dtype=bool)
+        self._any_stale = False
+        self._held = np.zeros(n, dtype=bool)
+        self._any_held = False
+        self._held_effort = np.zeros((n, len(layout.joint_v)))
+        self._held_contact = np.zeros((n, len(layout.sensors), 3))
+        self.fields: Mapping[str, Callable[[], Array]] = {name: getattr(self, name) for name in FIELDS}
+        """Reads a fresh array of one of the neutral fields."""
+        self.failed = np.zeros(n, dtype=bool)
+        """Envs that MuJoCo gave up on with an error."""
+
+    def touch(self, ids: Array) -> None:
+        """The state of these envs was written; their efforts and contact forces stay those of the last substep."""
+        self.hold(ids, self.joint_effort()[ids], self.contact_force()[ids])
+        self._stale[ids] = self._any_stale = True
+
+    def hold(self, ids: Array, effort: Array | float, contact: Array | float) -> None:
+        """Make these the efforts and contact forces of the last substep."""
+        self._held[ids] = self._any_held = True
+        self._held_effort[ids], self._held_contact[ids] = effort, contact
+        self._stale[ids] = self._any_stale = True
+
+    def stepped(self, ids: Array | None) -> None:
+        """These envs were stepped; everything of theirs is new."""
+        if self._any_stale or self._any_held:
+            which = slice(None) if ids is None else ids
+            self._stale[which] = self._held[which] = False
+            self._any_stale, self._any_held = bool(self._stale.any()), bool(self._held.any())
+
+    def clear_faults(self, ids: Array) -> None:
+        """A reset forgives."""
+        self.failed[ids] = False
+        self._batch.warning[ids] = 0
+
+    def _forward(self) -> None:
+        # the velocity stage solves no constraints and so leaves the warm start as it is
+        self._batch.forward(np.flatnonzero(self._stale), stage=mujoco.mjtStage.mjSTAGE_VEL)
+        self._stale[:] = self._any_stale = False
+
+    def body_pose(self) -> Array:
+        if self._any_stale:
+            self._forward()
+        quaternion = self._xquat[:, self._bodies]
+        return np.concatenate((self._xpos[:, self._bodies], quaternion[..., 1:], quaternion[..., :1]), axis=2)
+
+    def body_twist(self) -> Array:
+        """cvel is the angular velocity, then the linear one of the point at the centre of mass of the whole tree; the
+        frame's is less by the angular velocity x the arm. Six products at once, then three differences: numpy's cost
+        per call is what counts for one env."""
+        if self._any_stale:
+            self._forward()
+        velocity, take = self._velocity, self._take
+        twist = velocity.take(take.linear_angular, axis=1)
+        arm = self._position.take(take.second, axis=1)
+        arm -= self._center.take(take.second_root, axis=1)
+        arm *= velocity.take(take.first, axis=1)
+        twist[..., :3] += arm[..., :3]
+        twist[..., :3] -= arm[..., 3:]
+        return twist
+
+    def joint_pos(self) -> Array:
+        return self._qpos[:, self._joint_q].copy()
+
+    def joint_vel(self) -> Array:
+        return self._qvel[:, self._joint_v].copy()
+
+    def joint_effort(self) -> Array:
+        effort = self._effort[:, self._joint_v].copy()
+        if self._any_held:
+            effort[self._held] = self._held_effort[self._held]
+        return effort
+
+    def contact_force(self) -> Array:
+        force = np.zeros((len(self._qpos), len(self._layout.sensors), 3))
+        for index, addresses in enumerate(self._layout.sensors):
+            for address in addresses:
+                # MuJoCo reports what the body does to the others
+                force[:, index] -= self._sensordata[:, address]
+        if self._any_held:
+            force[self._held] = self._held_contact[self._held]
+        return force
+
+    def fault(self) -> Array:
+        finite = np.isfinite(self._qpos).all(axis=1) & np.isfinite(self._qvel).all(axis=1)
+        return ~finite | self.failed | (self._batch.warning[:, _FATAL, 1] > 0).any(axis=1)

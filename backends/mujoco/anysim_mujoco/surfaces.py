@@ -1,0 +1,79 @@
+"""How neutral surfaces and constraints become MuJoCo's solref and solimp.
+
+MuJoCo blends the parameters of two geoms by their `solmix` weights; a bouncy geom gets so large a weight that it
+decides the pair, and the bouncier of two outweighs the other, which is the pair rule of `anysim.conventions`.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from math import atan2, exp, log, pi, sqrt
+
+from anysim.world.model import Surface
+
+STIFF_IMPEDANCE = (0.99, 0.999, 0.001, 0.5, 2.0)
+"""Impedance of joint limits and mimic couplings: they give way by next to nothing."""
+
+DRY_IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+"""Impedance of dry friction, MuJoCo's largest: under 95 % of 5 N m a joint of 0.1 kg m^2 creeps by 1e-5 rad/s."""
+
+BOUNCE_FREQUENCY = 0.3
+"""Natural frequency of a bouncy contact [rad per time step]. A bounce takes ten steps and sinks 6 mm per m/s at 2 ms; a
+higher frequency sinks less and gives the coefficient back less exactly, since the impact falls between two steps."""
+
+
+@dataclass(frozen=True, slots=True)
+class ContactParameters:
+    """The fields of a MuJoCo geom that say how it touches."""
+
+    friction: tuple[float, float, float]
+    condim: int
+    priority: int
+    solref: tuple[float, float]
+    solimp: tuple[float, float, float, float, float]
+    solmix: float
+
+
+def contact_parameters(surface: Surface, dt: float) -> ContactParameters:
+    """MuJoCo's contact parameters of a surface, for a time step `dt` [s]."""
+    low, high = surface.impedance
+    solref, solmix = (surface.softness or 0.02, 1.0), 1.0
+    if surface.restitution > 0:
+        ratio = damping_ratio(surface.restitution)
+        solref, solmix = (dt / (BOUNCE_FREQUENCY * ratio), ratio), 10.0 ** (20 + 100 * surface.restitution)
+    return ContactParameters(
+        friction=(surface.friction, surface.torsional_friction, surface.rolling_friction),
+        condim=4 if surface.torsional else 3,
+        priority=surface.priority,
+        solref=solref,
+        solimp=(low, high, 0.001, 0.5, 2.0),
+        solmix=solmix,
+    )
+
+
+def constraint_solref(softness: float, dt: float) -> tuple[float, float]:
+    """Reference of a joint limit or coupling: as stiff as the time step allows unless a time constant [s] is given."""
+    return (max(softness, 2 * dt) if softness > 0 else max(0.004, 2 * dt), 1.0)
+
+
+def rebound(ratio: float) -> float:
+    """Restitution of a damped spring that can push and not pull, by its damping ratio (Schwager & Pöschel 2007).
+
+    The contact ends when its force vanishes, before the spring is back at its rest length. With s = sqrt|1 - ratio^2|:
+    e = exp(-ratio/s * (pi - atan2(2 ratio s, 1 - 2 ratio^2))) below a ratio of 1, and
+    e = exp(-ratio/s * log((ratio + s) / (ratio - s))) above.
+    """
+    if abs(ratio - 1) < 1e-9:
+        return exp(-2.0)
+    s = sqrt(abs(1 - ratio * ratio))
+    span = log((ratio + s) / (ratio - s)) if ratio > 1 else pi - atan2(2 * ratio * s, 1 - 2 * ratio * ratio)
+    return exp(-ratio / s * span)
+
+
+@cache
+def damping_ratio(restitution: float) -> float:
+    """The damping ratio with which a contact gives back `restitution` of the approach speed."""
+    low, high = 1e-4, 1e4
+    for _ in range(200):
+        middle = sqrt(low * high)
+        low, high = (middle, high) if rebound(middle) > restitution else (low, middle)
+    return high
