@@ -1,8 +1,8 @@
 """What an importer makes of a file: parts of a World with local names and local indices.
 
-Every importer (URDF here, MJCF in the package that has a parser for it) returns an `ImportedModel`; `compile_world` puts
-it into a World under an entity's name. Importers of other formats are entry points of the group `anysim.importers`,
-functions with the signature of `Importer`.
+Every importer (URDF here, MJCF in the package that has a parser for it) returns an `ImportedModel`; `compile_world`
+puts it into a World under an entity's name. Importers of other formats are entry points of the group
+`anysim.importers`, functions with the signature of `Importer`.
 """
 
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ from anysim.world.model import Body, ControlMode, Geom, HeightField, Joint, Mesh
 
 
 class ImportNote(NamedTuple):
-    """Something a reader of the file should know: `repaired` values were changed, `dropped` ones left out, `info` is neither."""
+    """What a user of the file should know: `repaired` values were changed, `dropped` ones left out, `info` is neither."""
 
     kind: Literal["repaired", "dropped", "info"]
     where: str  # a link, joint or element of the source
@@ -25,7 +25,7 @@ class ImportNote(NamedTuple):
 
 
 class ActuatorHint(NamedTuple):
-    """A drive that the source itself declares; used where no catalogue entry says otherwise. `joint` is a local index."""
+    """A drive that the source itself declares, used where no catalogue entry says otherwise; `joint` is a local index."""
 
     joint: int
     mode: ControlMode
@@ -39,11 +39,11 @@ class ImportedModel:
     """One kinematic tree. Names are local (`panda_hand`), indices are into the tuples of this model.
 
     - `bodies[0]` is the root, with parent -1 and its own frame at the identity; its kind is what the source says: FREE
-      where it floats, else STATIC (whoever places it may change that). All other bodies are links, depth first, children
-      in source order, each with exactly one joint; `joints[i]` moves `bodies[i + 1]`.
+      where it floats, else STATIC (whoever places it may change that). All other bodies are links, depth first,
+      children in source order, each with exactly one joint; `joints[i]` moves `bodies[i + 1]`.
     - What a source joins rigidly is lumped: masses, centres and inertias are composed, geoms moved along, and the frame
-      of the lumped link is a Site with the link's name. `links` maps every link name of the source, lumped or not, to its
-      body, and `geom_links` tells for each geom the link it was on in the source.
+      of the lumped link is a Site with the link's name. `links` maps every link name of the source, lumped or not, to
+      its body, and `geom_links` tells for each geom the link it was on in the source.
     - Collision geoms have `collides` set; visual ones have `visible` set and do not collide. A mesh that collides holds
       its convex hull. `meshes` have a `hash` of source bytes and processing, names unique within the model.
     - `mimic` inside joints, `excluded_pairs` and hints use local indices.
