@@ -110,7 +110,7 @@ def example_robot_data() -> Path:
 
 
 def _package_candidates(rest: str, file: Path, root: Path) -> list[tuple[Path, Path]]:
-    name, _, tail = rest.partition("/")
+    name, _, tail = rest.lstrip("/").partition("/")  # package:///NAME/rest is met, too
     folders = [folder for folder in file.parents if folder.is_relative_to(root)]
     found = [(root, folder / tail) for folder in folders if folder.name == name]
     found += [(root, folder / name / tail) for folder in folders]

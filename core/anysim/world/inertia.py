@@ -11,7 +11,8 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.math import pose as P
-from anysim.world.model import Box, Capsule, Cylinder, Inertial, Mesh, MeshShape, Shape, Sphere, Vec3
+from anysim.world.model import Box, Capsule, Cylinder, Inertial, Mesh, MeshShape, Shape, Sphere
+from anysim.world.rounding import tidy
 
 BALL_RADIUS = 0.01  # [m] of the solid ball that stands for a body with mass and without any inertia
 _FLOOR = 1e-6  # smallest second moment of a moving body, relative to their sum: engines reject exact equality
@@ -30,12 +31,6 @@ def make(mass: float, com: Array, matrix: Array) -> Inertial:
     moments = (matrix[0, 0], matrix[1, 1], matrix[2, 2], matrix[0, 1], matrix[0, 2], matrix[1, 2])
     inertia = tuple(float(m) if abs(m) > noise else 0.0 for m in moments)
     return Inertial(float(mass), tidy(com), inertia)
-
-
-def tidy(vector: Array) -> Vec3:
-    """Three numbers rounded to 1e-12, without negative zeros."""
-    x, y, z = (round(float(v), 12) + 0.0 for v in vector)
-    return (x, y, z)
 
 
 def moved(inertial: Inertial, pose: Array) -> Inertial:

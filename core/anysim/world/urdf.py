@@ -21,11 +21,12 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.errors import AssetError, listing
+from anysim.errors import AssetError, listing, suggest
 from anysim.math import pose as P
 from anysim.world import inertia
 from anysim.world.imported import ImportedModel, ImportNote
 from anysim.world.model import Body, BodyKind, Inertial, Joint, JointType, Mimic, Site
+from anysim.world.rounding import split, tidy
 from anysim.world.urdf_geometry import GeometryReader
 from anysim.world.urdf_xml import UrdfFile
 
@@ -68,11 +69,11 @@ class _UrdfImport:
             rest = P.compose(frame, self._origin(joint))
             if joint.type == "fixed" or joint.name in self.frozen:
                 body, here = parent, P.compose(rest, self._frozen_motion(joint))
-                self.sites.append(Site(joint.child, body, *_split(here)))
+                self.sites.append(Site(joint.child, body, *split(here)))
                 self._add_link(joint.child, body, here)
             else:
                 body, here = len(self.bodies), _IDENTITY
-                self._add_body(joint.child, Body(joint.child, BodyKind.LINK, parent, *_split(rest)))
+                self._add_body(joint.child, Body(joint.child, BodyKind.LINK, parent, *split(rest)))
                 self.joints.append(self._joint(joint, body))
             stack += [(child, body, here) for child in reversed(self.children[joint.child])]
         self._mimic()
@@ -157,8 +158,8 @@ class _UrdfImport:
             if name in seen:
                 raise AssetError(f"{here} follows itself through '{name}'")
             if name not in by_name:
-                exists = listing(by_name)
-                raise AssetError(f"{here} follows '{name}', which is no joint that moves (joints: {exists})")
+                known = f"{suggest(name, list(by_name))} (joints: {listing(by_name)})"
+                raise AssetError(f"{here} follows '{name}', which is no joint that moves{known}")
             offset += multiplier * (current.mimic.offset or 0.0)
             multiplier *= 1.0 if current.mimic.multiplier is None else current.mimic.multiplier
             seen.add(name)
@@ -213,7 +214,7 @@ class _UrdfImport:
         lower, upper = self._limits(joint)
         limit, dynamics = joint.limit, joint.dynamics
         return Joint(
-            name=joint.name, body=body, type=_TYPES[joint.type], axis=inertia.tidy(self._axis(joint)), lower=lower,
+            name=joint.name, body=body, type=_TYPES[joint.type], axis=tidy(self._axis(joint)), lower=lower,
             upper=upper, velocity_limit=_bound(limit.velocity if limit else None),
             effort_limit=_bound(limit.effort if limit else None), damping=self._number(joint, dynamics, "damping"),
             friction=self._number(joint, dynamics, "friction"), initial=min(max(0.0, lower), upper),
@@ -292,9 +293,3 @@ class _UrdfImport:
 
 def _bound(value: float | None) -> float:
     return float(value) if value is not None and value > 0 else inf
-
-
-def _split(pose: Array) -> tuple[Any, Any]:
-    """Position and quaternion as tuples, rounded so that hashes do not depend on the last bits."""
-    x, y, z, w = (round(float(v), 14) + 0.0 for v in pose[3:])
-    return inertia.tidy(pose[:3]), (x, y, z, w)

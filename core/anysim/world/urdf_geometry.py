@@ -9,11 +9,11 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.errors import AssetError
 from anysim.math import pose as P
-from anysim.world import inertia
 from anysim.world.assets import resolve_reference
 from anysim.world.imported import ImportNote
-from anysim.world.meshes import FORMATS, collision_mesh, visual_parts
+from anysim.world.meshes import collision_mesh, visual_parts
 from anysim.world.model import Box, Cylinder, Geom, Mesh, MeshShape, Shape, Sphere, Vec3
+from anysim.world.rounding import split
 from anysim.world.urdf_xml import UrdfFile
 
 _GREY = (0.7, 0.7, 0.7, 1.0)
@@ -21,7 +21,10 @@ Color = tuple[float, float, float, float]
 
 
 class GeometryReader:
-    """Collects geoms and meshes, link by link. Geoms are named `<link>.collision0`, `<link>.visual0`, `<link>.visual0_1`."""
+    """Collects geoms and meshes, link by link.
+
+    Geoms are named `<link>.collision0`, `<link>.visual0`, and `<link>.visual0_1` where a file has several colours.
+    """
 
     def __init__(self, file: UrdfFile, root: Path, scale: float, notes: list[ImportNote]) -> None:
         self._file, self._root, self._scale, self._notes = file, root, scale, notes
@@ -57,15 +60,15 @@ class GeometryReader:
             self._add(link, Geom(name, body, shape, position, quaternion, color or _GREY, collides=False))
             return
         path = self._path(link, visual.geometry.mesh)
-        if path.suffix.lower() not in FORMATS:
-            self._note("dropped", link, f"shows {path.name}, a format that is not read (read: {', '.join(FORMATS)})")
+        try:
+            parts = visual_parts(path, self._mesh_scale(link, visual.geometry.mesh))
+        except AssetError as error:  # the file is there; what cannot be read of it is only not seen
+            self._note("dropped", link, f"is not fully shown: {error}")
             return
-        for i, part in enumerate(visual_parts(path, self._mesh_scale(link, visual.geometry.mesh))):
-            geom = Geom(
-                name if i == 0 else f"{name}_{i}", body, MeshShape(self._keep(part.mesh)), position, quaternion,
-                color or part.color or _GREY, collides=False,
-            )  # fmt: skip
-            self._add(link, geom)
+        for i, part in enumerate(parts):
+            shape = MeshShape(self._keep(part.mesh))
+            own = name if i == 0 else f"{name}_{i}"
+            self._add(link, Geom(own, body, shape, position, quaternion, color or part.color or _GREY, collides=False))
 
     def _collision(self, link: str, name: str, collision: Any, body: int, pose: Array, *, visible: bool) -> None:
         position, quaternion = self._pose(collision, pose)
@@ -84,8 +87,7 @@ class GeometryReader:
         if element.origin is not None:
             local = np.array([*(element.origin[:3, 3] * self._scale), *P.from_matrix(element.origin[:3, :3])])
             pose = P.compose(pose, local)
-        x, y, z, w = (round(float(v), 14) + 0.0 for v in pose[3:])
-        return inertia.tidy(pose[:3]), (x, y, z, w)
+        return split(pose)
 
     def _primitive(self, link: str, geometry: Any) -> Shape:
         s = self._scale
@@ -98,7 +100,7 @@ class GeometryReader:
         else:
             sizes = [float(geometry.cylinder.radius) * s, float(geometry.cylinder.length) * s]
             shape = Cylinder(sizes[0], sizes[1] / 2)
-        if isinstance(shape, Box) and len(sizes) != 3 or not all(0 < size < inf for size in sizes):
+        if (isinstance(shape, Box) and len(sizes) != 3) or not all(0 < size < inf for size in sizes):
             raise AssetError(f"{self._file.where('link', link)} has a {type(shape).__name__.lower()} of size {sizes}")
         return shape
 

@@ -60,8 +60,8 @@ class UrdfFile:
             for key, value in element.attrib.items():
                 if "$(" in value or "${" in value:
                     raise AssetError(
-                        f'{path}:{element.sourceline}: <{element.tag} {key}="{value}"> is an unexpanded xacro or roslaunch '
-                        "expression; run xacro on the source first"
+                        f'{path}:{element.sourceline}: <{element.tag} {key}="{value}"> is an expression of xacro or '
+                        "roslaunch that was not expanded; run xacro on the source first"
                     )
         for kind in ("link", "joint"):
             elements = root.findall(kind)
@@ -93,9 +93,8 @@ class UrdfFile:
             for element in link.iter("*"):
                 absent = [key for key in _REQUIRED.get(element.tag, ()) if element.get(key) is None]
                 if absent:
-                    raise AssetError(
-                        f"{path}:{element.sourceline}: <{element.tag}> of link '{link.get('name')}' lacks {', '.join(absent)}"
-                    )
+                    owner = f"<{element.tag}> of link '{link.get('name')}'"
+                    raise AssetError(f"{path}:{element.sourceline}: {owner} lacks {', '.join(absent)}")
 
     def _parse(self, root: Any) -> Any:
         import logging
