@@ -64,8 +64,8 @@ def resolve_reference(reference: str, *, file: Path, root: Path, asked_by: str) 
     """The file that a mesh reference in the URDF or MJCF `file` stands for.
 
     `package://NAME/rest` (and `model://`) is searched in the folders from the file's own up to `root`: in one that is
-    called NAME, in its child NAME, then without NAME; `package://example-robot-data/…` also in that pip package. All else
-    is relative to the file. `asked_by` says who asks, as in `link 'panda_hand' of panda.urdf`.
+    called NAME, in its child NAME, then without NAME; `package://example-robot-data/…` also in that pip package. All
+    else is relative to the file. `asked_by` says who asks, as in `link 'panda_hand' of panda.urdf`.
 
     Raises:
         AssetError: missing (says where it was looked for and the nearest name there is), or outside of the root.
@@ -90,9 +90,8 @@ def resolve_reference(reference: str, *, file: Path, root: Path, asked_by: str) 
     if outside is not None:
         raise AssetError(f"{asked_by} refers to '{reference}', which leaves the asset's root {root}: it is {outside}")
     places = listing(dict.fromkeys(str(candidate) for _, candidate in candidates), 4)
-    raise AssetError(
-        f"{asked_by} refers to '{reference}', which does not exist{_nearest(candidates[0][1], root)} (looked for: {places})"
-    )
+    near = _nearest(candidates[0][1], root)
+    raise AssetError(f"{asked_by} refers to '{reference}', which does not exist{near} (looked for: {places})")
 
 
 def example_robot_data() -> Path:
@@ -174,8 +173,11 @@ def _from_robot_descriptions(name: str, uri: str) -> AssetFile:
 
 
 def _folder_root(folder: Path) -> Path:
-    """The root of an asset given by an absolute path: the nearest folder with a package.xml, else its own folder, or the
-    one above where its own is called urdf, robots, xml, mjcf or xacro (meshes then lie in a folder beside it)."""
+    """The root of an asset given by an absolute path.
+
+    The nearest folder with a package.xml, else the file's own folder, or the one above where that is called urdf,
+    robots, xml, mjcf or xacro (meshes then lie in a folder beside it).
+    """
     for candidate in (folder, *folder.parents):
         if (candidate / "package.xml").is_file():
             return candidate

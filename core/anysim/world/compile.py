@@ -1,7 +1,7 @@
 """From a validated spec to a World: robots, objects, their nominal places, cameras, sensors, lights.
 
-Fields that are drawn anew in each episode enter with their nominal value. All faults of a spec are reported at once, each
-with its dotted key.
+Fields that are drawn anew in each episode enter with their nominal value. All faults of a spec are reported at once,
+each with its dotted key.
 """
 
 from collections.abc import Mapping

@@ -13,7 +13,7 @@ from anysim.errors import AssetError, PluginError
 from anysim.world import inertia
 from anysim.world.assets import locate
 from anysim.world.builder import WorldBuilder
-from anysim.world.colors import rgb
+from anysim.world.colors import Rgb, rgb
 from anysim.world.imported import ImportedModel, ImportNote
 from anysim.world.importers import import_asset
 from anysim.world.issues import Issues
@@ -103,11 +103,11 @@ def _inertial(spec: ObjectSpec, solid: Shape, meshes: Mapping[str, Mesh]) -> ine
 
 
 def _mesh_geoms(
-    spec: ObjectSpec, uri: str, touch: Surface, color: tuple[float, float, float], meshes: dict[str, Mesh], base: Path | None
+    spec: ObjectSpec, uri: str, touch: Surface, color: Rgb, meshes: dict[str, Mesh], base: Path | None
 ) -> tuple[list[Geom], Shape]:  # fmt: skip
     """The hull to collide (also the solid that has the mass), and the coloured parts to look at; z up."""
     path = locate(uri, base=base).path
-    scale = (spec.source.scale,) * 3
+    scale = (spec.source.scale, spec.source.scale, spec.source.scale)
     hull = collision_mesh(path, scale, upright=True)
     hull = replace(hull, name=f"{hull.name}_hull")
     meshes[hull.name] = hull
@@ -120,7 +120,7 @@ def _mesh_geoms(
 
 
 def _asset(
-    spec: ObjectSpec, uri: str, touch: Surface, color: tuple[float, float, float], issues: Issues, base: Path | None
+    spec: ObjectSpec, uri: str, touch: Surface, color: Rgb, issues: Issues, base: Path | None
 ) -> ImportedModel | None:  # fmt: skip
     """A URDF or MJCF file. What the spec gives explicitly wins over the file; its mass is that of the whole object."""
     model = import_asset(uri, base=base, scale=spec.source.scale)
@@ -152,11 +152,12 @@ def _asset(
     return replace(model, geoms=tuple(geoms), bodies=bodies)
 
 
-def _color(spec: ObjectSpec, issues: Issues) -> tuple[float, float, float]:
+def _color(spec: ObjectSpec, issues: Issues) -> Rgb:
     """The nominal colour; all colours that may be drawn are checked."""
     try:
         if isinstance(spec.color, Choice):
-            return [rgb(color) for color in spec.color.choice][0]
+            first, *_ = [rgb(color) for color in spec.color.choice]
+            return first
         if isinstance(spec.color, Range):
             low, high = (rgb(color) for color in spec.color.range)
             return (0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]))

@@ -136,15 +136,12 @@ class _Assembly:
                 driven[index] = name
                 limit = spec.gains.effort_limit
                 actuators.append(len(builder.actuators))
+                effort = joints[index].effort_limit if limit is None else limit
+                drive = f"{self.name}.{joints[index].name}"
                 builder.actuators.append(
                     Actuator(
-                        f"{self.name}.{joints[index].name}",
-                        entity.joint_start + index,
-                        ControlMode.POSITION,
-                        spec.gains.kp,
-                        spec.gains.kd,
-                        joints[index].effort_limit if limit is None else limit,
-                    )  # fmt: skip
+                        drive, entity.joint_start + index, ControlMode.POSITION, spec.gains.kp, spec.gains.kd, effort
+                    )
                 )
             for end in ("opened", "closed"):
                 values = getattr(spec, end)

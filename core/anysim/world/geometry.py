@@ -114,7 +114,7 @@ class EntityShape:
 
 
 def ground_top(world: World, low: Array, high: Array) -> Array:
-    """The greatest height (...) [m] of the ground under rectangles from `low` to `high` (..., 2); 0 without a ground."""
+    """The greatest height (...) [m] of the ground under rectangles from `low` to `high` (..., 2); 0 without ground."""
     height = np.full(np.shape(low)[:-1], -np.inf)
     fields = {field.name: field for field in world.heightfields}
     for geom in world.geoms:

@@ -14,7 +14,7 @@ from anysim.world.model import Body, ControlMode, Geom, HeightField, Joint, Mesh
 
 
 class ImportNote(NamedTuple):
-    """What a user of the file should know: `repaired` values were changed, `dropped` ones left out, `info` is neither."""
+    """What a user of a file should know: `repaired` values were changed, `dropped` ones left out, `info` is neither."""
 
     kind: Literal["repaired", "dropped", "info"]
     where: str  # a link, joint or element of the source
@@ -25,7 +25,7 @@ class ImportNote(NamedTuple):
 
 
 class ActuatorHint(NamedTuple):
-    """A drive that the source itself declares, used where no catalogue entry says otherwise; `joint` is a local index."""
+    """A drive that the source itself declares, used where no catalogue entry says otherwise; `joint` is local."""
 
     joint: int
     mode: ControlMode

@@ -29,8 +29,8 @@ def make(mass: float, com: Array, matrix: Array) -> Inertial:
     """An Inertial from arrays; what is only rounding noise becomes zero, so that hashes do not depend on it."""
     noise = _NOISE * max(float(np.trace(matrix)), 0.0)
     moments = (matrix[0, 0], matrix[1, 1], matrix[2, 2], matrix[0, 1], matrix[0, 2], matrix[1, 2])
-    inertia = tuple(float(m) if abs(m) > noise else 0.0 for m in moments)
-    return Inertial(float(mass), tidy(com), inertia)
+    xx, yy, zz, xy, xz, yz = (float(m) if abs(m) > noise else 0.0 for m in moments)
+    return Inertial(float(mass), tidy(com), (xx, yy, zz, xy, xz, yz))
 
 
 def moved(inertial: Inertial, pose: Array) -> Inertial:
@@ -56,8 +56,8 @@ def composed(parts: Sequence[Inertial]) -> Inertial:
 def repaired(inertial: Inertial) -> tuple[Inertial, str | None]:
     """The nearest inertial that a body can have, and what was changed; None where nothing was.
 
-    Negative second moments are set to zero (the nearest positive semidefinite matrix in the Frobenius norm). A body with
-    mass and no inertia at all becomes a solid ball of `BALL_RADIUS`.
+    Negative second moments are set to zero (the nearest positive semidefinite matrix in the Frobenius norm). A body
+    with mass and no inertia at all becomes a solid ball of `BALL_RADIUS`.
     """
     if inertial.mass <= 0:
         return Inertial(0.0), None if not any(inertial.inertia) else "has inertia and no mass; the inertia is dropped"
@@ -93,7 +93,7 @@ def _second_moments(matrix: Array) -> Array:
 
 def scaled(inertial: Inertial, factor: float) -> Inertial:
     """The same body with `factor` times the mass."""
-    return Inertial(inertial.mass * factor, inertial.com, tuple(factor * i for i in inertial.inertia))
+    return make(inertial.mass * factor, np.array(inertial.com), tensor(inertial) * factor)
 
 
 def volume(shape: Shape, meshes: Mapping[str, Mesh]) -> float:
@@ -122,17 +122,17 @@ def of_shape(shape: Shape, mass: float, meshes: Mapping[str, Mesh]) -> Inertial:
     match shape:
         case Box((x, y, z)):
             third = mass / 3
-            diagonal = (third * (y * y + z * z), third * (x * x + z * z), third * (x * x + y * y))
+            xx, yy, zz = third * (y * y + z * z), third * (x * x + z * z), third * (x * x + y * y)
         case Sphere(r):
-            diagonal = (0.4 * mass * r * r,) * 3
+            xx = yy = zz = 0.4 * mass * r * r
         case Cylinder(r, h):
-            across = mass * (3 * r * r + 4 * h * h) / 12
-            diagonal = (across, across, 0.5 * mass * r * r)
+            xx = yy = mass * (3 * r * r + 4 * h * h) / 12
+            zz = 0.5 * mass * r * r
         case Capsule(r, h):
             tube = mass * (2 * h) / (2 * h + 4 / 3 * r)
             caps = mass - tube
-            across = tube * (3 * r * r + 4 * h * h) / 12 + caps * (0.4 * r * r + h * h + 0.75 * r * h)
-            diagonal = (across, across, 0.5 * tube * r * r + 0.4 * caps * r * r)
+            xx = yy = tube * (3 * r * r + 4 * h * h) / 12 + caps * (0.4 * r * r + h * h + 0.75 * r * h)
+            zz = 0.5 * tube * r * r + 0.4 * caps * r * r
         case MeshShape(name):
             size, com, inertia = _solid(meshes[name])
             if size <= 0:
@@ -140,7 +140,7 @@ def of_shape(shape: Shape, mass: float, meshes: Mapping[str, Mesh]) -> Inertial:
             return make(mass, com, inertia * (mass / size))
         case _:
             raise ValueError(f"a {type(shape).__name__} has no mass of its own")
-    return Inertial(mass, (0.0, 0.0, 0.0), (*diagonal, 0.0, 0.0, 0.0))
+    return Inertial(mass, (0.0, 0.0, 0.0), (xx, yy, zz, 0.0, 0.0, 0.0))
 
 
 def _solid(mesh: Mesh) -> tuple[float, Array, Array]:

@@ -27,12 +27,12 @@ def placement_order(layout: Mapping[str, PlacementSpec]) -> tuple[list[str], lis
     state: dict[str, str] = {}
     for start in layout:
         chain: list[str] = []
-        name: str | None = start
+        name = start
         while name in layout and name not in state:
             state[name] = "open"
             chain.append(name)
-            name = layout[name].on
-        broken = name in state and state[name] != "done"
+            name = layout[name].on or ""
+        broken = state.get(name, "done") != "done"
         if broken and name in chain:
             cycles.append(chain[chain.index(name) :])
         for link in reversed(chain):

@@ -9,9 +9,9 @@ from anysim.world.model import Surface
 
 PRESETS: Mapping[str, Surface] = {
     "default": Surface(),
-    # Stiff rubber pads. With an engine's defaults a 40 N grip sinks millimetres into what it holds and thin handles slip
-    # through; 4 ms is twice the usual step of 2 ms, the stiffest that integrates well. The pads' word counts in a pair,
-    # and spin about the contact normal is resisted, else a pinched object turns like on a needle.
+    # Stiff rubber pads. With an engine's defaults a 40 N grip sinks millimetres into what it holds and thin handles
+    # slip through; 4 ms is twice the usual step of 2 ms, the stiffest that integrates well. The pads' word counts in a
+    # pair, and spin about the contact normal is resisted, else a pinched object turns like on a needle.
     "pad": Surface(softness=0.004, impedance=(0.99, 0.999), priority=1, torsional=True),
     # Foam: twice the time constant of the usual defaults and an impedance that stays low.
     "soft": Surface(softness=0.04, impedance=(0.7, 0.9), torsional=True),
