@@ -209,14 +209,16 @@ def _by_color(pieces: list[_Piece]) -> list[_Piece]:
     groups: dict[Color | None, list[_Piece]] = {}
     for piece in pieces:
         groups.setdefault(piece.color, []).append(piece)
-    ranked = sorted(groups, key=lambda c: -sum(len(p.faces) for p in groups[c]))
+    # an order of its own: that of the file is not kept by every parser
+    ranked = sorted(groups, key=lambda c: (-sum(len(p.faces) for p in groups[c]), c or ()))
     kept = ranked[:VISUAL_COLORS]
     for color in ranked[VISUAL_COLORS:]:
         grey = np.array(color or (0.7, 0.7, 0.7, 1.0))
         nearest = min(kept, key=lambda c: float(np.abs(np.array(c or (0.7, 0.7, 0.7, 1.0)) - grey).sum()))
         groups[nearest] += groups.pop(color)
     merged: list[_Piece] = []
-    for color, members in groups.items():
+    for color in kept:
+        members = groups[color]
         starts = np.cumsum([0, *(len(p.vertices) for p in members[:-1])])
         faces = np.concatenate([p.faces + start for p, start in zip(members, starts, strict=True)])
         merged.append(_Piece(np.concatenate([p.vertices for p in members]), faces, color))
