@@ -131,22 +131,18 @@ def ground_top(world: World, low: Array, high: Array) -> Array:
 
 
 def _field_top(field: HeightField, low: Array, high: Array) -> float:
-    """The greatest of a height field's nodes in and of its bilinear surface at the corners of a rectangle."""
+    """The greatest height of the bilinear surface over a rectangle: at a corner of it, or of one of the pieces that the
+    grid cuts it into."""
     rows, cols = field.heights.shape
     steps = np.array([field.size[0] / (cols - 1), field.size[1] / (rows - 1)])
-    corner = np.array(field.size) / 2
-    last = np.array([cols - 1, rows - 1])
-    a, b = (np.clip((v + corner) / steps, 0, last) for v in (low, high))
-    top = max(_bilinear(field.heights, u, v) for u in (a[0], b[0]) for v in (a[1], b[1]))
-    inside = field.heights[int(np.ceil(a[1])) : int(b[1]) + 1, int(np.ceil(a[0])) : int(b[0]) + 1]
-    return max(top, float(inside.max())) if inside.size else top
-
-
-def _bilinear(heights: Array, u: float, v: float) -> float:
-    i, j = min(int(v), heights.shape[0] - 2), min(int(u), heights.shape[1] - 2)
-    s, t = v - i, u - j
-    cell = heights[i : i + 2, j : j + 2]
-    return float((1 - s) * ((1 - t) * cell[0, 0] + t * cell[0, 1]) + s * ((1 - t) * cell[1, 0] + t * cell[1, 1]))
+    a, b = (np.clip((v + np.array(field.size) / 2) / steps, 0, (cols - 1, rows - 1)) for v in (low, high))
+    u, v = (np.array([a[k], *range(int(np.ceil(a[k])), int(b[k]) + 1), b[k]]) for k in (0, 1))
+    j, i = np.minimum(u.astype(int), cols - 2), np.minimum(v.astype(int), rows - 2)
+    t, s = u - j, (v - i)[:, None]
+    h = field.heights
+    near = (1 - t) * h[i][:, j] + t * h[i][:, j + 1]
+    far = (1 - t) * h[i + 1][:, j] + t * h[i + 1][:, j + 1]
+    return float(((1 - s) * near + s * far).max())
 
 
 def _at_origin(quaternion: Array) -> Array:

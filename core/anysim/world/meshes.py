@@ -20,7 +20,7 @@ FORMATS = (".stl", ".obj", ".dae", ".glb", ".ply")
 HULL_VERTICES = 64  # what PhysX takes in a convex mesh with margin; enough for grasping at millimetres
 VISUAL_FACES = 2500  # of one visual: a software renderer draws a robot of ten in milliseconds
 VISUAL_COLORS = 6
-_VERSION = "anysim-mesh-2"  # change with anything that changes the result
+_VERSION = "anysim-mesh-3"  # change with anything that changes the result
 _ONE: Vec3 = (1.0, 1.0, 1.0)
 Color = tuple[float, float, float, float]
 

@@ -25,6 +25,6 @@ def nominal(value: Any) -> Any:
 
 
 def _combine(function: Any, a: Any, b: Any) -> Any:
-    if isinstance(a, tuple):
+    if isinstance(a, tuple | list):
         return tuple(function(x, y) for x, y in zip(a, b, strict=True))
     return function(a, b)
