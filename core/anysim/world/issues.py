@@ -32,7 +32,7 @@ class Issues:
         if self._spec:
             raise SpecError([*self._spec, *self._assets])
         if self._assets:
-            raise AssetError("\n".join(str(issue) for issue in self._assets))
+            raise AssetError(issues=self._assets)
 
     def _join(self, *parts: str | int) -> str:
         return ".".join(str(part) for part in (self._prefix, *parts) if part != "")
