@@ -12,9 +12,7 @@ from anysim.world.model import World
 from anysim.world.urdf import import_urdf
 from anysim_schemas.run import WorldSpec
 
-INERTIAL = (
-    '<inertial><mass value="{m}"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>'
-)
+INERTIAL = '<inertial><mass value="{m}"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>'
 
 
 @pytest.fixture

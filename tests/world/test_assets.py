@@ -111,7 +111,7 @@ def test_references_cannot_leave_the_root(package: Path) -> None:
     root = package / "outer"
     file = root / "arm_description/urdf/arm.urdf"
     for reference in ("../../../stray.stl", f"file://{package}/stray.stl", "package://../../stray.stl"):
-        with pytest.raises(AssetError, match="link 'a' of arm.urdf refers to"):
+        with pytest.raises(AssetError, match=r"link 'a' of arm\.urdf refers to"):
             resolve_reference(reference, file=file, root=root, asked_by="link 'a' of arm.urdf")
 
 
@@ -119,8 +119,12 @@ def test_a_missing_reference_names_link_places_and_the_nearest_file(package: Pat
     root = package / "outer"
     file = root / "arm_description/urdf/arm.urdf"
     with pytest.raises(AssetError) as caught:
-        resolve_reference("package://arm_description/meshes/link.stl", file=file, root=root, asked_by="link 'a' (arm.urdf:3)")
+        resolve_reference(
+            "package://arm_description/meshes/link.stl", file=file, root=root, asked_by="link 'a' (arm.urdf:3)"
+        )
     text = str(caught.value)
-    assert text.startswith("link 'a' (arm.urdf:3) refers to 'package://arm_description/meshes/link.stl', which does not exist")
+    assert text.startswith(
+        "link 'a' (arm.urdf:3) refers to 'package://arm_description/meshes/link.stl', which does not exist"
+    )
     assert "did you mean 'link.STL' in the same folder?" in text
     assert str(root / "arm_description/meshes/link.stl") in text

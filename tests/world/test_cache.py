@@ -63,7 +63,7 @@ def test_an_entry_under_a_wrong_name_is_not_believed(folder: Path) -> None:
 def test_pickles_are_not_read(folder: Path) -> None:
     path = folder / "kind" / f"{KEY}.npz"
     path.parent.mkdir(parents=True)
-    np.savez(path, v=np.array([{"a": 1}], dtype=object), **{"__key__": np.array(KEY)})
+    np.savez(path, v=np.array([{"a": 1}], dtype=object), __key__=np.array(KEY))
     np.testing.assert_array_equal(cache.load_or_make("kind", KEY, _make)["v"], _make()["v"])
 
 

@@ -29,7 +29,10 @@ def body(world: World, name: str) -> int:
 def test_nominal_values_stand_for_drawn_ones(world: Make) -> None:
     made = world(
         objects={
-            "a": {**CUBE, "mass": {"range": [0.05, 0.2]}, "color": {"choice": ["lime", "red"]}, "friction": {"range": [0.4, 0.8]}},
+            "a": {
+                **CUBE, "mass": {"range": [0.05, 0.2]}, "color": {"choice": ["lime", "red"]},
+                "friction": {"range": [0.4, 0.8]},
+            },
             "b": {**CUBE, "density": {"choice": [500, 1000]}, "color": {"range": [[0, 0, 0], [1, 1, 0]]}},
             "c": {**CUBE, "mass": {"normal": {"mean": 0.5, "std": 0.1, "high": 0.4}}},
             "d": CUBE,
@@ -66,7 +69,11 @@ def test_primitives_and_kinds(world: Make) -> None:
 def test_mesh_objects_collide_as_their_hull_and_weigh_like_it(world: Make, tmp_path: Path) -> None:
     trimesh.creation.box((0.1, 0.2, 0.3)).export(str(tmp_path / "brick.stl"))
     made = world(
-        tmp_path, objects={"brick": {"source": "brick.stl", "color": "red"}, "half": {"source": {"mesh": "brick.stl", "scale": 0.5}}}
+        tmp_path,
+        objects={
+            "brick": {"source": "brick.stl", "color": "red"},
+            "half": {"source": {"mesh": "brick.stl", "scale": 0.5}},
+        },
     )  # fmt: skip
     hull, visual = (g for g in made.geoms if g.name.startswith("brick."))
     assert (hull.collides, hull.visible, visual.collides, visual.visible) == (True, False, False, True)
@@ -124,7 +131,9 @@ def test_a_tilted_object_touches_with_its_lowest_corner(world: Make) -> None:
 
 
 def test_on_a_robot_and_without_layout(world: Make) -> None:
-    made = world(robots={"p": {"robot": "franka_panda"}}, objects={"cube": CUBE, "wall": TABLE}, layout={"cube": {"on": "p"}})
+    made = world(
+        robots={"p": {"robot": "franka_panda"}}, objects={"cube": CUBE, "wall": TABLE}, layout={"cube": {"on": "p"}}
+    )
     assert made.bodies[body(made, "cube")].position[2] > 0.6
     alone = world(objects={"cube": CUBE, "wall": TABLE})
     assert alone.bodies[0].position == (0, 0, 0.02)  # set onto the ground
@@ -136,7 +145,11 @@ def test_height_fields_carry_objects_on_the_highest_point_below(world: Make) -> 
     made = world(
         terrain={"kind": "heightfield", "heights": heights, "size": [4, 4]},
         objects={"slab": {"source": {"box": [1, 1, 0.2]}}, "pin": CUBE, "far": CUBE},
-        layout={"slab": {"on": "terrain", "x": 0.2}, "pin": {"on": "terrain", "x": 0.5}, "far": {"on": "terrain", "x": 1.5}},
+        layout={
+            "slab": {"on": "terrain", "x": 0.2},
+            "pin": {"on": "terrain", "x": 0.5},
+            "far": {"on": "terrain", "x": 1.5},
+        },
     )
     z = {b.name: b.position[2] for b in made.bodies}
     assert z["slab"] == pytest.approx(0.6)  # the peak at the origin is under it
@@ -202,7 +215,7 @@ def test_robots_stand_where_the_spec_says(world: Make) -> None:
     np.testing.assert_allclose(made.bodies[0].quaternion, (0, 0, np.sqrt(0.5), np.sqrt(0.5)), atol=1e-12)
     assert made.joints[0].initial == 0.5
     assert made.joints[9].initial == 0
-    left, right = made.robots
+    _, right = made.robots
     assert right.channels["arm"].joints == tuple(range(9, 16))
     assert right.channels["arm"].actuators == tuple(range(9, 16))
     assert made.joints[17].mimic is not None

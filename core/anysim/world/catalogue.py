@@ -4,10 +4,9 @@ import importlib.util
 from pathlib import Path
 from typing import NamedTuple
 
-from anysim_schemas.robots import RobotModelSpec
-
 from anysim import registry
 from anysim.errors import PluginError, SpecError, SpecIssue
+from anysim_schemas.robots import RobotModelSpec
 
 
 class CatalogueEntry(NamedTuple):

@@ -9,9 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from anysim_schemas.engine import PhysicsSpec
-from anysim_schemas.run import RunSpec, WorldSpec
-
 from anysim.world.builder import WorldBuilder
 from anysim.world.compile_object import add_object, add_terrain
 from anysim.world.compile_robot import add_robot
@@ -20,6 +17,8 @@ from anysim.world.imported import ImportNote
 from anysim.world.issues import Issues
 from anysim.world.model import Physics, World
 from anysim.world.placement import check_layout, place_nominally
+from anysim_schemas.engine import PhysicsSpec
+from anysim_schemas.run import RunSpec, WorldSpec
 
 
 class Compiled(NamedTuple):

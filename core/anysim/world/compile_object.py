@@ -5,8 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from anysim_schemas.objects import ObjectSpec, SourceSpec, TerrainSpec
-from anysim_schemas.values import Choice, Range
 
 from anysim.conventions import GROUND, IDENTITY_QUATERNION, WORLD
 from anysim.errors import AssetError, PluginError
@@ -40,6 +38,8 @@ from anysim.world.model import (
 )  # fmt: skip
 from anysim.world.nominal import nominal
 from anysim.world.presets import surface
+from anysim_schemas.objects import ObjectSpec, SourceSpec, TerrainSpec
+from anysim_schemas.values import Choice, Range
 
 DEFAULT_DENSITY = 1000.0  # [kg/m^3], water
 

@@ -6,7 +6,6 @@ from fnmatch import fnmatchcase
 from itertools import combinations
 
 import numpy as np
-from anysim_schemas.robots import RobotModelSpec, RobotSpec
 
 from anysim.errors import AssetError, PluginError, SpecError, listing, suggest
 from anysim.math import pose as P
@@ -31,6 +30,7 @@ from anysim.world.model import (
 )  # fmt: skip
 from anysim.world.presets import GRIPPER_LIMIT_SOFTNESS, surface
 from anysim.world.rounding import split
+from anysim_schemas.robots import RobotModelSpec, RobotSpec
 
 
 def add_robot(builder: WorldBuilder, name: str, spec: RobotSpec, issues: Issues) -> list[ImportNote]:

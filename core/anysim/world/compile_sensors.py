@@ -4,8 +4,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from anysim_schemas.cameras import CameraSpec
-from anysim_schemas.objects import ContactSensorSpec, LightSpec
 
 from anysim.conventions import WORLD
 from anysim.errors import NameLookupError, listing, suggest
@@ -14,6 +12,8 @@ from anysim.world.issues import Issues
 from anysim.world.lookup import find_bodies, find_frame
 from anysim.world.model import Camera, ContactSensor, Light, World
 from anysim.world.rounding import split
+from anysim_schemas.cameras import CameraSpec
+from anysim_schemas.objects import ContactSensorSpec, LightSpec
 
 DEFAULT_LIGHTS = (
     Light("key", direction=(-0.4, 0.3, -0.87), intensity=0.7),  # from the front right, as a lamp beside the viewer

@@ -82,7 +82,7 @@ def joint_phrase(world: World, joint: int) -> str:
 
 
 def shape_name(shape: Shape) -> str:
-    """`box`, `mesh`, `height field`…"""
+    """`box`, `mesh`, `height field` and so on."""
     names = {"MeshShape": "mesh", "HeightFieldShape": "height field"}
     kind = type(shape).__name__
     return names.get(kind, kind.lower())

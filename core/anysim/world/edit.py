@@ -7,10 +7,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
 
-from anysim_schemas.base import Spec
-from anysim_schemas.cameras import CameraSpec
-from anysim_schemas.objects import ObjectSpec
-from anysim_schemas.robots import RobotSpec
 from pydantic import ValidationError
 
 from anysim.conventions import GROUND, WORLD
@@ -22,6 +18,10 @@ from anysim.world.compile_sensors import compile_camera
 from anysim.world.issues import Issues
 from anysim.world.model import Channel, MeshShape, Quat, Robot, Vec3, World
 from anysim.world.rounding import split
+from anysim_schemas.base import Spec
+from anysim_schemas.cameras import CameraSpec
+from anysim_schemas.objects import ObjectSpec
+from anysim_schemas.robots import RobotSpec
 
 S = TypeVar("S", bound=Spec)
 _PLACE = ("position", "roll", "pitch", "yaw", "quaternion")

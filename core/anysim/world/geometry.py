@@ -131,8 +131,10 @@ def ground_top(world: World, low: Array, high: Array) -> Array:
 
 
 def _field_top(field: HeightField, low: Array, high: Array) -> float:
-    """The greatest height of the bilinear surface over a rectangle: at a corner of it, or of one of the pieces that the
-    grid cuts it into."""
+    """The greatest height of the bilinear surface over a rectangle.
+
+    It is at a corner of the rectangle, or of one of the pieces that the grid cuts it into.
+    """
     rows, cols = field.heights.shape
     steps = np.array([field.size[0] / (cols - 1), field.size[1] / (rows - 1)])
     a, b = (np.clip((v + np.array(field.size) / 2) / steps, 0, (cols - 1, rows - 1)) for v in (low, high))

@@ -6,18 +6,24 @@ from anysim.errors import AssetError, SpecError, SpecIssue
 class Issues:
     """Faults found so far. `at(...)` gives a view whose paths start deeper; all views share one list."""
 
-    def __init__(self, prefix: str = "", where: str = "", parent: "Issues | None" = None) -> None:
+    def __init__(
+        self,
+        prefix: str = "",
+        where: str = "",
+        spec: list[SpecIssue] | None = None,
+        assets: list[SpecIssue] | None = None,
+    ) -> None:
         self._prefix, self._where = prefix, where
-        self._spec: list[SpecIssue] = parent._spec if parent is not None else []
-        self._assets: list[SpecIssue] = parent._assets if parent is not None else []
+        self._spec: list[SpecIssue] = [] if spec is None else spec
+        self._assets: list[SpecIssue] = [] if assets is None else assets
 
     def at(self, *parts: str | int) -> "Issues":
         """The same list, at a deeper path."""
-        return Issues(self._join(*parts), self._where, self)
+        return Issues(self._join(*parts), self._where, self._spec, self._assets)
 
     def inside(self, where: str) -> "Issues":
         """The same list, for another file; paths start anew."""
-        return Issues("", where, self)
+        return Issues("", where, self._spec, self._assets)
 
     def add(self, path: str, message: str) -> None:
         """A fault at `path` below this view's path."""

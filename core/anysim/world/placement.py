@@ -5,7 +5,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from anysim_schemas.layout import PlacementSpec
 
 from anysim.conventions import GROUND, Array
 from anysim.errors import listing, suggest
@@ -15,6 +14,7 @@ from anysim.world.issues import Issues
 from anysim.world.model import BodyKind, World
 from anysim.world.nominal import nominal
 from anysim.world.rounding import split
+from anysim_schemas.layout import PlacementSpec
 
 
 def placement_order(layout: Mapping[str, PlacementSpec]) -> tuple[list[str], list[list[str]]]:

@@ -3,9 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from anysim_schemas.objects import ContactSpec
-
 from anysim.world.model import Surface
+from anysim_schemas.objects import ContactSpec
 
 PRESETS: Mapping[str, Surface] = {
     "default": Surface(),

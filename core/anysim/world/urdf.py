@@ -3,8 +3,8 @@
 Rules where a source leaves room or is wrong; each use is a note in the report:
 - Fixed joints are lumped into the parent; the frame survives as a site, the inertia is composed exactly.
 - An inertia that no body can have becomes the nearest possible one (`anysim.world.inertia.repaired`).
-- A revolute joint without limits, or with lower >= upper, is continuous; so is a prismatic one, along its axis. An effort
-  or velocity limit of 0 counts as not given.
+- A revolute joint without limits, or with lower >= upper, is continuous; so is a prismatic one, along its axis. An
+  effort or velocity limit of 0 counts as not given.
 - A moving link without mass that carries links with mass is a virtual one: it weighs a gram. One that carries none
   cannot be simulated: its joint is frozen at zero (or the nearest limit) and it is lumped. A source in which no moving
   link has a mass is refused.
@@ -28,7 +28,7 @@ from anysim.world.imported import ImportedModel, ImportNote
 from anysim.world.model import Body, BodyKind, Inertial, Joint, JointType, Mimic, Site
 from anysim.world.rounding import split, tidy
 from anysim.world.urdf_geometry import GeometryReader
-from anysim.world.urdf_xml import UrdfFile
+from anysim.world.urdf_xml import InertialElement, JointElement, UrdfFile
 
 VIRTUAL_MASS = 0.001  # [kg] of a moving link that has none and carries some
 _TYPES = {"revolute": JointType.REVOLUTE, "continuous": JointType.REVOLUTE, "prismatic": JointType.PRISMATIC}
@@ -50,8 +50,8 @@ class _UrdfImport:
     def __init__(self, file: UrdfFile, root: Path, scale: float) -> None:
         self.file, self.scale = file, scale
         self.notes: list[ImportNote] = []
-        self.links: dict[str, Any] = {link.name: link for link in file.robot.links}
-        self.children: dict[str, list[Any]] = {name: [] for name in self.links}
+        self.links = file.links
+        self.children: dict[str, list[JointElement]] = {name: [] for name in self.links}
         self.base = self._structure()
         self.geometry = GeometryReader(file, root, scale, self.notes)
         self.bodies: list[Body] = []
@@ -80,7 +80,7 @@ class _UrdfImport:
         self._inertials()
         geometry = self.geometry
         return ImportedModel(
-            name=self.file.robot.name, bodies=tuple(self.bodies), joints=tuple(self.joints), geoms=tuple(geometry.geoms),
+            name=self.file.name, bodies=tuple(self.bodies), joints=tuple(self.joints), geoms=tuple(geometry.geoms),
             geom_links=tuple(geometry.geom_links), sites=tuple(self.sites), meshes=tuple(geometry.meshes.values()),
             links=self.place, report=tuple(self.notes),
         )  # fmt: skip
@@ -92,7 +92,7 @@ class _UrdfImport:
         if not self.links:
             raise AssetError(f"{self.file.path}: has no links (a xacro source needs to be expanded first)")
         parent: dict[str, str] = {}
-        for joint in self.file.robot.joints:
+        for joint in self.file.joints:
             here = self.file.where("joint", joint.name)
             for name in (joint.parent, joint.child):
                 if name not in self.links:
@@ -130,9 +130,9 @@ class _UrdfImport:
         mass: dict[str, float] = {}
         for name in reversed(self._order()):
             own = self.links[name].inertial
-            mass[name] = max(0.0, (own.mass or 0.0) if own is not None else 0.0)
+            mass[name] = max(0.0, own.mass) if own is not None else 0.0
             mass[name] += sum(mass[joint.child] for joint in self.children[name])
-        moving = [joint for joint in self.file.robot.joints if joint.type != "fixed"]
+        moving = [joint for joint in self.file.joints if joint.type != "fixed"]
         frozen = {joint.name for joint in moving if mass[joint.child] <= 0}
         if moving and len(frozen) == len(moving):
             raise AssetError(f"{self.file.path}: no link that moves has a mass; add <inertial> elements to simulate it")
@@ -149,7 +149,7 @@ class _UrdfImport:
                 )
         return frozen
 
-    def _leader(self, joint: Any, by_name: Mapping[str, Any]) -> tuple[Any, float, float]:
+    def _leader(self, joint: JointElement, by_name: Mapping[str, JointElement]) -> tuple[JointElement, float, float]:
         """The joint at the end of a chain of mimics, with multiplier and offset."""
         multiplier, offset, seen, current = 1.0, 0.0, {joint.name}, joint
         while current.mimic is not None:
@@ -160,14 +160,14 @@ class _UrdfImport:
             if name not in by_name:
                 known = f"{suggest(name, list(by_name))} (joints: {listing(by_name)})"
                 raise AssetError(f"{here} follows '{name}', which is no joint that moves{known}")
-            offset += multiplier * (current.mimic.offset or 0.0)
-            multiplier *= 1.0 if current.mimic.multiplier is None else current.mimic.multiplier
+            offset += multiplier * current.mimic.offset
+            multiplier *= current.mimic.multiplier
             seen.add(name)
             current = by_name[name]
         return current, multiplier, offset
 
     def _mimic(self) -> None:
-        by_name = {joint.name: joint for joint in self.file.robot.joints if joint.type != "fixed"}
+        by_name = {joint.name: joint for joint in self.file.joints if joint.type != "fixed"}
         number = {joint.name: i for i, joint in enumerate(self.joints)}
         for i, joint in enumerate(self.joints):
             leader, multiplier, offset = self._leader(by_name[joint.name], by_name)
@@ -183,12 +183,10 @@ class _UrdfImport:
 
     # ------------------------------------------------------------------ joints
 
-    def _origin(self, joint: Any) -> Array:
-        if joint.origin is None:
-            return _IDENTITY
-        return np.array([*(joint.origin[:3, 3] * self.scale), *P.from_matrix(joint.origin[:3, :3])])
+    def _origin(self, joint: JointElement) -> Array:
+        return np.concatenate([joint.origin[:3] * self.scale, joint.origin[3:]])
 
-    def _axis(self, joint: Any) -> Array:
+    def _axis(self, joint: JointElement) -> Array:
         length = float(np.linalg.norm(joint.axis))
         if not length > 1e-9:
             raise AssetError(f"{self.file.where('joint', joint.name)} has an axis of length {length:g}")
@@ -196,41 +194,35 @@ class _UrdfImport:
             self._note("repaired", "joint", joint.name, f"has an axis of length {length:g}, now 1")
         return joint.axis / length
 
-    def _limits(self, joint: Any) -> tuple[float, float]:
+    def _limits(self, joint: JointElement) -> tuple[float, float]:
         unit = self.scale if joint.type == "prismatic" else 1.0
         if joint.type == "continuous":
             return -inf, inf
-        limit = joint.limit
-        if limit is None or limit.lower is None or limit.upper is None:
+        if joint.lower is None or joint.upper is None:
             self._note("info", "joint", joint.name, "has no limits and moves without end")
             return -inf, inf
-        if limit.lower >= limit.upper:
-            text = f"has limits [{limit.lower:g}, {limit.upper:g}], which is read as moving without end"
+        if joint.lower >= joint.upper:
+            text = f"has limits [{joint.lower:g}, {joint.upper:g}], which is read as moving without end"
             self._note("repaired", "joint", joint.name, text)
             return -inf, inf
-        return limit.lower * unit, limit.upper * unit
+        return joint.lower * unit, joint.upper * unit
 
-    def _joint(self, joint: Any, body: int) -> Joint:
+    def _joint(self, joint: JointElement, body: int) -> Joint:
         lower, upper = self._limits(joint)
-        limit, dynamics = joint.limit, joint.dynamics
         return Joint(
             name=joint.name, body=body, type=_TYPES[joint.type], axis=tidy(self._axis(joint)), lower=lower,
-            upper=upper, velocity_limit=_bound(limit.velocity if limit else None),
-            effort_limit=_bound(limit.effort if limit else None), damping=self._number(joint, dynamics, "damping"),
-            friction=self._number(joint, dynamics, "friction"), initial=min(max(0.0, lower), upper),
+            upper=upper, velocity_limit=_bound(joint.velocity),
+            effort_limit=_bound(joint.effort), damping=self._positive(joint, "damping"),
+            friction=self._positive(joint, "friction"), initial=min(max(0.0, lower), upper),
         )  # fmt: skip
 
-    def _number(self, joint: Any, dynamics: Any, key: str) -> float:
-        text = getattr(dynamics, key) if dynamics is not None else None
-        try:
-            value = float(text) if text is not None else 0.0
-        except ValueError:
-            raise AssetError(f"{self.file.where('joint', joint.name)}: {key} '{text}' is not a number") from None
+    def _positive(self, joint: JointElement, key: str) -> float:
+        value: float = getattr(joint, key)
         if value < 0:
             self._note("repaired", "joint", joint.name, f"has a {key} of {value:g}, now 0")
         return max(value, 0.0)
 
-    def _frozen_motion(self, joint: Any) -> Array:
+    def _frozen_motion(self, joint: JointElement) -> Array:
         """Where a joint that does not move holds its child, seen from its own rest frame."""
         if joint.type == "fixed":
             return _IDENTITY
@@ -251,23 +243,21 @@ class _UrdfImport:
         self.place[name] = body
         link = self.links[name]
         if link.inertial is not None:
-            self.inertials[body].append(inertia.moved(self._inertial(link), pose))
+            self.inertials[body].append(inertia.moved(self._inertial(name, link.inertial), pose))
         self.geometry.read(link, body, pose)
 
-    def _inertial(self, link: Any) -> Inertial:
-        own, s = link.inertial, self.scale
-        mass = (own.mass or 0.0) * s**3
+    def _inertial(self, link: str, own: InertialElement) -> Inertial:
+        s = self.scale
+        mass = own.mass * s**3
         if mass < 0:
-            raise AssetError(f"{self.file.where('link', link.name)} has a negative mass, {own.mass:g} kg")
-        origin = np.eye(4) if own.origin is None else own.origin
-        matrix = np.zeros((3, 3)) if own.inertia is None else own.inertia * s**5
-        turn = origin[:3, :3]
-        raw = inertia.make(mass, origin[:3, 3] * s, turn @ matrix @ turn.T)
+            raise AssetError(f"{self.file.where('link', link)} has a negative mass, {own.mass:g} kg")
+        matrix, turn = own.inertia * s**5, P.to_matrix(own.origin[3:])
+        raw = inertia.make(mass, own.origin[:3] * s, turn @ matrix @ turn.T)
         if mass > 0 and not matrix.any():
             return raw  # a point mass, which is fine as a part of a body
         fixed, text = inertia.repaired(raw)
         if text is not None:
-            self._note("repaired", "link", link.name, text)
+            self._note("repaired", "link", link, text)
         return fixed
 
     def _inertials(self) -> None:
