@@ -37,13 +37,6 @@ def load_robot(name: str) -> CatalogueEntry:
 
 
 def _read(file: Path) -> RobotModelSpec:
-    import yaml
-    from pydantic import ValidationError
+    from anysim_schemas.load import load
 
-    try:
-        return RobotModelSpec.model_validate(yaml.safe_load(file.read_text(encoding="utf-8")))
-    except yaml.YAMLError as error:
-        raise SpecError([SpecIssue(str(file), "", f"not valid YAML: {error}")]) from error
-    except ValidationError as error:
-        issues = [SpecIssue(str(file), ".".join(map(str, e["loc"])), e["msg"]) for e in error.errors()]
-        raise SpecError(issues) from error
+    return load(RobotModelSpec, file).spec
