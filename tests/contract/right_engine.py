@@ -22,8 +22,9 @@ class Right(NullEngine):
     def _build(self, world, num_envs):
         super()._build(world, num_envs)
         self._wrench = None
-        self._mass = np.array([b.inertial.mass for b in world.bodies])[:, None]
-        self._moment = np.array([b.inertial.inertia[0] for b in world.bodies])[:, None]
+        # what has no mass is fixed and does not move
+        self._mass = np.array([b.inertial.mass or np.inf for b in world.bodies])[:, None]
+        self._moment = np.array([b.inertial.inertia[0] or np.inf for b in world.bodies])[:, None]
 
     def _apply_wrench(self, wrench):
         self._wrench = None if wrench is None else wrench.copy()

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from anysim import registry
-from anysim.errors import PluginError, SpecError, SpecIssue
+from anysim.errors import PluginError
 from anysim_schemas.robots import RobotModelSpec
 
 
