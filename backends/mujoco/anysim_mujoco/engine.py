@@ -26,6 +26,10 @@ from anysim.math import pose as P
 from anysim.world.model import World
 
 
+_VELOCITY_STAGE = mujoco.mjtStage.mjSTAGE_VEL.value
+"""After the last substep frames and velocities are brought up to date, which leaves the trajectory as it is."""
+
+
 class MujocoEngine(SimEngine):
     """The engine `mujoco`. Trajectories do not depend on the number of envs, their order or the threads."""
 
@@ -86,7 +90,7 @@ class MujocoEngine(SimEngine):
     def _step(self, n_steps: int, ids: Array | None) -> None:
         self._parameters.settle()
         try:
-            self._batch.step(None if ids is None else np.sort(ids), n_steps, mujoco.mjtStage.mjSTAGE_VEL.value)
+            self._batch.step(None if ids is None else np.sort(ids), n_steps, _VELOCITY_STAGE)
         except SimulationError as error:
             self._reader.failed[error.ids] = True
         self._reader.stepped(ids)
