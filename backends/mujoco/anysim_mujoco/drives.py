@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from anysim.conventions import Array
 from anysim.engine.commands import MODES, Control
 from anysim.world.model import ControlMode, World
 

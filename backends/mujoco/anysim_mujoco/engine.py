@@ -7,6 +7,14 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch, SimulationError
 
+from anysim.conventions import Array, wxyz_from_xyzw, xyzw_from_wxyz
+from anysim.engine.base import SimEngine
+from anysim.engine.cameras import CameraView
+from anysim.engine.capability import Capabilities
+from anysim.engine.commands import Control
+from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
+from anysim.math import pose as P
+from anysim.world.model import World
 from anysim_mujoco import declared
 from anysim_mujoco.build import build, initial_row, silence
 from anysim_mujoco.carry import carried_rows, take_rows
@@ -16,18 +24,16 @@ from anysim_mujoco.parameters import Parameters
 from anysim_mujoco.query import Queries
 from anysim_mujoco.raw import raw_loop
 from anysim_mujoco.state import StateReader
-from anysim.conventions import Array, wxyz_from_xyzw, xyzw_from_wxyz
-from anysim.engine.base import SimEngine
-from anysim.engine.cameras import CameraView
-from anysim.engine.capability import Capabilities
-from anysim.engine.commands import Control
-from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
-from anysim.math import pose as P
-from anysim.world.model import World
-
 
 _VELOCITY_STAGE = mujoco.mjtStage.mjSTAGE_VEL.value
 """After the last substep frames and velocities are brought up to date, which leaves the trajectory as it is."""
+
+
+_BUILT = (
+    "_model", "_layout", "_batch", "_rows", "_initial", "_qpos", "_qvel", "_mocap_pos", "_mocap_quat", "_wrenches",
+    "_drives", "_parameters", "_reader", "_fields", "_queries",
+)  # fmt: skip
+"""What `_build` makes and `_free` lets go of."""
 
 
 class MujocoEngine(SimEngine):
@@ -74,11 +80,11 @@ class MujocoEngine(SimEngine):
         self._painter: Any = None
 
     def _free(self) -> None:
-        if self._painter is not None:
-            self._painter.close()
-        for name in ("_batch", "_rows", "_qpos", "_qvel", "_mocap_pos", "_mocap_quat", "_wrenches", "_model", "_fields"):
-            setattr(self, name, None)
-        self._drives = self._parameters = self._reader = self._queries = self._painter = None  # type: ignore[assignment]
+        painter = vars(self).pop("_painter", None)
+        if painter is not None:
+            painter.close()
+        for name in _BUILT:
+            vars(self).pop(name, None)
 
     def _reset(self, ids: Array) -> None:
         self._rows[ids] = self._initial

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from anysim_mujoco.layout import Layout, as_slice
 from anysim.conventions import Array
 from anysim.engine.state import FIELDS
+from anysim_mujoco.layout import Layout, as_slice
 
 _FATAL = [
     int(kind)
@@ -120,9 +120,9 @@ class StateReader:
         return np.concatenate((position, quaternion[..., 1:], quaternion[..., :1]), axis=2)
 
     def body_twist(self) -> Array:
-        """cvel is the angular velocity, then the linear one of the point at the centre of mass of the whole tree; the
-        frame's is less by the angular velocity x the arm. Six products at once, then three differences: numpy's cost
-        per call is what counts for one env."""
+        # cvel is the angular velocity, then the linear one of the point at the centre of mass of the whole tree; the
+        # frame's differs by the angular velocity x the arm. Six products at once and then their differences: for one
+        # env it is the number of calls of numpy that costs
         if self._any_stale:
             self._forward()
         velocity, take = self._velocity, self._take

@@ -55,7 +55,7 @@ class CommandBuffer:
                 continue
             if ids is None and which is None:
                 values = np.asarray(values, dtype=np.float64)
-                # a finite sum of squares has finite terms, and is found three times as fast; if it overflows, each is checked
+                # a finite sum of squares has finite terms, and is found three times as fast; else each term is checked
                 if values.shape != buffer.shape or not isfinite(np.vdot(values, values)):
                     values = checked_rows(name, values, buffer.shape)
                 buffer[...] = values
