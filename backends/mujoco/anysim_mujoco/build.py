@@ -9,15 +9,13 @@ from anysim.conventions import WORLD, Array, wxyz_from_xyzw
 from anysim.engine.commands import MODES
 from anysim.errors import EngineError
 from anysim.world.model import Body, BodyKind, ContactSensor, Joint, JointType, World
+from anysim_mujoco.audit import UNLIMITED
 from anysim_mujoco.drives import feedback
 from anysim_mujoco.geoms import add_assets, add_geom, add_look
 from anysim_mujoco.inertia import check_physical, principal
 from anysim_mujoco.layout import Handles, Layout
 from anysim_mujoco.options import MujocoOptions
 from anysim_mujoco.surfaces import DRY_IMPEDANCE, STIFF_IMPEDANCE, constraint_solref
-
-UNLIMITED = 1e10
-"""Stands for infinity where MuJoCo wants a number: the open side of a limit."""
 
 
 class Built(NamedTuple):

@@ -10,7 +10,7 @@ from anysim.engine.state import Availability
 
 MINIMUM = (3, 17)
 WRONG: Mapping[tuple[int, ...], str] = {
-    (4, 0, 0): "its sparse solver gives wrong accelerations where articulated bodies touch each other"
+    (4, 0, 0): "its sparse solver is wrong where articulated bodies touch each other",
 }
 """Versions whose results cannot be trusted, and why."""
 

@@ -16,6 +16,7 @@ from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLe
 from anysim.math import pose as P
 from anysim.world.model import World
 from anysim_mujoco import declared
+from anysim_mujoco.audit import geom_volumes, joint_limits
 from anysim_mujoco.build import build, initial_row, silence
 from anysim_mujoco.carry import carried_rows, take_rows
 from anysim_mujoco.drives import Drives
@@ -175,6 +176,13 @@ class MujocoEngine(SimEngine):
     def _take_rows(self, carried: Any, old: World) -> None:
         layout, rows = carried
         take_rows(rows, old, layout, self.world, self._batch, self._layout, self._reader, self._parameters)
+
+    def read_back(self) -> Mapping[str, Array]:
+        """Limits and volumes as the compiled model has them."""
+        with self._lock:
+            self._require_world()
+            model, layout = self._model, self._layout
+            return {"joint.limits": joint_limits(model, layout), "geom.volume": geom_volumes(model, layout)}
 
     def raw_loop(self) -> Callable[[int], None]:
         """MuJoCo's own batch, stepped without this engine."""

@@ -182,6 +182,21 @@ def test_planes_stand_where_they_are_put(worlds, make):
     assert engine.get_state().body_pose[0, 0, 2] == pytest.approx(0.45, abs=1e-3)
 
 
+def test_limits_and_volumes_are_read_back(worlds, make):
+    """From the compiled model: open sides are infinite, what does not collide has no volume."""
+    world = worlds.scene()
+    world = replace(
+        world,
+        geoms=(*world.geoms, Geom("mesh", 4, MeshShape("pyramid")), Geom("picture", 4, Box((1, 1, 1)), collides=False)),
+        meshes=(_pyramid(),),
+    )
+    found = make(world).read_back()
+    assert found["joint.limits"].tolist() == [[-2.0, 2.0], [-np.inf, np.inf]]
+    ball, box, capsule = 4 / 3 * np.pi * 0.05**3, 0.008, np.pi * 0.03**2 * 0.3 + 4 / 3 * np.pi * 0.03**3
+    wanted = [0.0, ball, box, box, capsule, 8 * 0.1 * 0.02 * 0.02, 0.2**3 / 6, 0.0]
+    assert np.allclose(found["geom.volume"], wanted, rtol=1e-5)
+
+
 def test_options_that_do_not_exist(make, worlds):
     """The nearest and all of them."""
     with pytest.raises(EngineError, match=r"no option 'thread'; did you mean 'threads'"):
