@@ -1,7 +1,7 @@
 """From a name or a file to a running env: load, compile, create, bind."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -11,7 +11,7 @@ import numpy as np
 
 from anysim import registry
 from anysim.engine.factory import create_simulation
-from anysim.errors import SpecError, SpecIssue, TaskError
+from anysim.errors import AssetError, SpecError, SpecIssue, TaskError
 from anysim.plugin_options import resolve_options
 from anysim_schemas.load import Loaded, LoadedRun, load_run
 
@@ -49,17 +49,17 @@ def _extends(uri: str) -> Path:
     return task_path(name)
 
 
-def load(*sources: str | Path | dict[str, Any], overrides: Sequence[str] = ()) -> LoadedRun:
+def load(*sources: str | Path | Mapping[str, Any], overrides: Sequence[str] = ()) -> LoadedRun:
     """Load files (or installed tasks by name), merged in order, with dotted overrides such as `physics.dt=0.004`.
 
     Raises:
         SpecError: every fault with file, line and column.
     """
-    resolved = [s if isinstance(s, dict) else source_path(s) for s in sources]
+    resolved = [s if isinstance(s, Mapping) else source_path(s) for s in sources]
     return load_run(resolved, overrides=overrides, resolver=resolve_options, extends=_extends)
 
 
-def compile_world(source: "str | Path | LoadedRun | RunSpec | dict[str, Any]", overrides: Sequence[str] = ()) -> "World":
+def compile_world(source: "str | Path | LoadedRun | RunSpec | Mapping[str, Any]", overrides: Sequence[str] = ()) -> "World":
     """The neutral World of a file, an installed task, or a spec.
 
     Raises:
@@ -74,13 +74,25 @@ def compile_world(source: "str | Path | LoadedRun | RunSpec | dict[str, Any]", o
     base = loaded.files[-1].parent if loaded.files else None
     try:
         return compile_spec(loaded.spec, base=base)
-    except SpecError as error:
+    except (SpecError, AssetError) as error:
         raise located(error, loaded) from None
 
 
-def located(error: SpecError, loaded: LoadedRun) -> SpecError:
+def located(error: SpecError | AssetError, loaded: LoadedRun) -> SpecError | AssetError:
     """The same issues with the file, line and column of the key at fault."""
-    return SpecError([SpecIssue(i.where or loaded.where(i.path), i.path, i.message) for i in error.issues])
+    issues = [SpecIssue(i.where or _place(loaded, i.path), i.path, i.message) for i in error.issues]
+    if isinstance(error, SpecError):
+        return SpecError(issues)
+    return AssetError(issues=issues) if issues else error
+
+
+def _place(loaded: LoadedRun, path: str) -> str:
+    """Where the key at `path` was written, or the nearest one above it."""
+    while path:
+        if path in loaded.provenance:
+            return loaded.provenance[path]
+        path = path.rpartition(".")[0]
+    return ""
 
 
 def dry_run(loaded: LoadedRun, world: "World") -> None:
@@ -117,7 +129,7 @@ def _env(spec: "RunSpec", world: "World", simulation: "SimEngine", num_envs: int
 
 
 def make(
-    source: str | Path | LoadedRun | dict[str, Any], *, engine: str | None = None, num_envs: int | None = None,
+    source: str | Path | LoadedRun | Mapping[str, Any], *, engine: str | None = None, num_envs: int | None = None,
     seed: int | None = None, overrides: Sequence[str] = (),
 ) -> "TaskEnv":  # fmt: skip
     """An env of a task: `env = anysim.make("pick_cube", engine="mujoco", num_envs=16)`.

@@ -16,7 +16,14 @@ class PluginError(AnysimError):
 
 
 class AssetError(AnysimError):
-    """An asset that is missing, leaves its root, or holds something the neutral model cannot say."""
+    """An asset that is missing, leaves its root, or holds something the neutral model cannot say.
+
+    `issues` holds one entry for each asset where a whole spec was compiled; their paths are the keys that ask for it.
+    """
+
+    def __init__(self, message: str = "", issues: Sequence[SpecIssue] = ()) -> None:
+        self.issues = tuple(issues)
+        super().__init__(message or "\n".join(str(issue) for issue in self.issues))
 
 
 class CapabilityError(AnysimError):

@@ -37,12 +37,13 @@ def reference_kind(annotation: Any) -> str | None:
 def options_model(function: Callable[..., Any]) -> type[BaseModel]:
     """A frozen, closed pydantic model of the keyword-only parameters."""
     fields: dict[str, Any] = {}
+    reference: Any = Reference
     for name, p in parameters(function).items():
         kind = reference_kind(p.annotation)
         if kind == "robot":  # the only robot of a world need not be named
-            fields[name] = (Reference | None, None)
+            fields[name] = (reference | None, None)
         else:
-            annotation = Reference if kind else p.annotation
+            annotation = reference if kind else p.annotation
             fields[name] = (annotation, ... if p.default is inspect.Parameter.empty else p.default)
     config = ConfigDict(extra="forbid", frozen=True)
     return create_model(getattr(function, "__name__", "options"), __config__=config, **fields)

@@ -1,12 +1,14 @@
 """Cameras: a view point in the world, or one that rides on a link."""
 
-from typing import Literal
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, Strict, model_validator
 
 from anysim_schemas.base import Positive, Spec, Vec3
+from anysim_schemas.errors import KeyFault
 
 Channel = Literal["rgb", "depth", "segmentation"]
+Pixels = Annotated[int, Strict(), Field(gt=0)]
 
 
 class CameraSpec(Spec):
@@ -16,22 +18,27 @@ class CameraSpec(Spec):
     frame of that link.
     """
 
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("from", "look_at"),
+        ("mount", "position", "roll_pitch_yaw"),
+    )
+
     from_: Vec3 | None = Field(default=None, alias="from", description="eye [m], world frame")
     look_at: Vec3 | str | None = Field(default=None, description="a point [m], or the name of an object")
     mount: str | None = Field(default=None, description="a link or tool to ride on: `panda.panda_hand`")
-    position: Vec3 = Field(default=(0.0, 0.0, 0.0), description="with `mount`: [m], in the link's frame")
-    roll_pitch_yaw: Vec3 = Field(default=(0.0, 0.0, 0.0), description="with `mount`: [rad], of the optical frame")
-    fov: float = Field(default=60.0, gt=1, lt=170, description="vertical field of view [degrees]")
-    size: tuple[int, int] = Field(default=(320, 240), description="width, height [pixels]")
-    channels: tuple[Channel, ...] = ("rgb",)
-    near: Positive = Field(default=0.01, description="[m]")
-    far: Positive = Field(default=20.0, description="[m]")
+    position: Vec3 = Field(default=(0.0, 0.0, 0.0), description="with `mount`: place in the link's frame [m]")
+    roll_pitch_yaw: Vec3 = Field(default=(0.0, 0.0, 0.0), description="with `mount`: of the optical frame [rad]")
+    fov: float = Field(default=60.0, gt=1, lt=170, strict=True, description="vertical field of view [degrees]")
+    size: tuple[Pixels, Pixels] = Field(default=(320, 240), description="width, height [pixels]")
+    channels: tuple[Channel, ...] = Field(default=("rgb",), description="the images it takes")
+    near: Positive = Field(default=0.01, description="distance of the near clipping plane [m]")
+    far: Positive = Field(default=20.0, description="distance of the far clipping plane [m]")
 
     @model_validator(mode="after")
     def _free_or_mounted(self) -> "CameraSpec":
-        free = self.from_ is not None and self.look_at is not None
-        if free == (self.mount is not None):
+        view = (self.from_ is not None, self.look_at is not None)
+        if (self.mount is None and not all(view)) or (self.mount is not None and any(view)):
             raise ValueError("give either `from` and `look_at`, or `mount`")
-        if min(self.size) < 1:
-            raise ValueError(f"size must be positive, got {self.size}")
+        if self.near >= self.far:
+            raise KeyFault(f"near ({self.near:g} m) must be less than far ({self.far:g} m)", "near")
         return self

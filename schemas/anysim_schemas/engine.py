@@ -5,16 +5,24 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from anysim_schemas.base import Positive, Spec, Vec3
+from anysim_schemas.errors import KeyFault
 from anysim_schemas.plugin import PluginSlot
+
+MAX_SUBSTEPS = 1_000_000
 
 
 class EngineSpec(Spec):
-    """An installed engine by name, with the options that only it understands."""
+    """An installed engine by name, with the options that only it understands. A bare string is the name."""
 
     name: Annotated[str, Field(description="an installed engine, as in `anysim list engines`")] = "mujoco"
     options: Annotated[dict[str, Any], PluginSlot("engine", "name")] = Field(
         default_factory=dict, description="options owned by the engine"
     )
+
+    @classmethod
+    def from_text(cls, text: str) -> dict[str, Any]:
+        """The name of the engine."""
+        return {"name": text}
 
 
 class PhysicsSpec(Spec):
@@ -27,15 +35,18 @@ class PhysicsSpec(Spec):
         default="elliptic", description="shape of the friction cone where the engine offers a choice"
     )
     impratio: Positive = Field(
-        default=1.0, description="ratio of frictional to normal contact impedance; above 1 reduces creep of grasped objects"
+        default=1.0,
+        description="ratio of frictional to normal contact impedance; above 1 reduces creep of grasped objects",
     )
 
     @model_validator(mode="after")
     def _whole_substeps(self) -> "PhysicsSpec":
         ratio = self.control_dt / self.dt
-        if ratio < 1 or abs(ratio - round(ratio)) > 1e-6:
-            raise ValueError(
-                f"control_dt ({self.control_dt} s) must be a whole multiple of dt ({self.dt} s), their ratio is {ratio:g}"
+        if not 1 - 1e-6 <= ratio <= MAX_SUBSTEPS or abs(ratio - round(ratio)) > 1e-6:
+            raise KeyFault(
+                f"control_dt ({self.control_dt:g} s) must be a whole multiple of dt ({self.dt:g} s), "
+                f"but their ratio is {ratio:g}",
+                "control_dt",
             )
         return self
 

@@ -8,6 +8,18 @@ class AnysimError(Exception):
     """Base of every error that anysim raises on purpose. The message says what, where, and the remedy."""
 
 
+class KeyFault(ValueError):
+    """Raised by a validator of a whole spec for a fault of one key, so that the error points there.
+
+    Attributes:
+        path: the keys from the spec that is validated to the one at fault.
+    """
+
+    def __init__(self, message: str, *path: str) -> None:
+        super().__init__(message)
+        self.path = path
+
+
 @dataclass(frozen=True)
 class SpecIssue:
     """One fault of a spec.

@@ -1,15 +1,24 @@
 """Objects: what exists. Where it goes is in layout, how it behaves is in its physical fields."""
 
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from anysim_schemas.base import Name, Positive, Spec, Vec3
+from anysim_schemas.base import Flag, Integer, Name, Number, Positive, Spec, Vec3
+from anysim_schemas.errors import KeyFault
 from anysim_schemas.values import ColorValue, NonNegativeValue, PositiveValue
+
+SHAPES = ("box", "sphere", "cylinder", "capsule", "mesh", "asset")
+MESH_ENDINGS = (".stl", ".obj", ".dae", ".glb", ".ply")
 
 
 class SourceSpec(Spec):
-    """The shape of an object: exactly one of a primitive, a mesh file or an asset file. Sizes are full sizes."""
+    """The shape of an object: exactly one of a primitive, a mesh file or an asset file. Sizes are full sizes.
+
+    A bare string is the URI of an asset, or of a mesh where it ends like one.
+    """
+
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = tuple((shape,) for shape in SHAPES)
 
     box: tuple[Positive, Positive, Positive] | None = Field(default=None, description="edge lengths x, y, z [m]")
     sphere: Positive | None = Field(default=None, description="radius [m]")
@@ -21,45 +30,54 @@ class SourceSpec(Spec):
     asset: str | None = Field(default=None, description="URI of a URDF or MJCF file")
     scale: Positive = Field(default=1.0, description="scale of a mesh or asset")
 
-    @model_validator(mode="before")
     @classmethod
-    def _uri_shorthand(cls, data: object) -> object:
-        """A bare string is the URI of an asset (or of a mesh, by its ending)."""
-        if isinstance(data, str):
-            key = "mesh" if data.lower().endswith((".stl", ".obj", ".dae", ".glb", ".ply")) else "asset"
-            return {key: data}
-        return data
+    def from_text(cls, text: str) -> dict[str, Any]:
+        """The URI of a mesh or an asset."""
+        return {"mesh" if text.lower().endswith(MESH_ENDINGS) else "asset": text}
+
+    @classmethod
+    def text_means(cls) -> str:
+        """What a bare string means, for editors."""
+        return "{asset: URI}, or {mesh: URI} where it ends in " + ", ".join(MESH_ENDINGS)
 
     @model_validator(mode="after")
     def _exactly_one(self) -> "SourceSpec":
-        given = [kind for kind in ("box", "sphere", "cylinder", "capsule", "mesh", "asset") if getattr(self, kind) is not None]
+        given = [shape for shape in SHAPES if getattr(self, shape) is not None]
         if len(given) != 1:
-            raise ValueError(f"expected exactly one of box, sphere, cylinder, capsule, mesh, asset; got {given or 'none'}")
+            raise ValueError(f"expected exactly one of {', '.join(SHAPES)}; got {' and '.join(given) or 'none'}")
         return self
 
 
 class ContactSpec(Spec):
     """How a surface gives, engine-neutrally. Presets: `default`, `pad` (stiff gripper pads), `soft`."""
 
-    preset: Literal["default", "pad", "soft"] = "default"
-    torsional_friction: float = Field(default=0.005, ge=0, description="spin resistance [m]")
-    rolling_friction: float = Field(default=0.0001, ge=0, description="rolling resistance [m]")
-    priority: int = Field(default=0, description="in a pair the surface of higher priority decides friction and stiffness")
+    preset: Literal["default", "pad", "soft"] = Field(default="default", description="stiffness and damping by name")
+    torsional_friction: Number = Field(default=0.005, ge=0, description="spin resistance [m]")
+    rolling_friction: Number = Field(default=0.0001, ge=0, description="rolling resistance [m]")
+    priority: Integer = Field(
+        default=0, description="in a pair the surface of higher priority decides friction and stiffness"
+    )
 
 
 class ObjectSpec(Spec):
     """One object of the world."""
 
-    source: SourceSpec
-    fixed: bool = Field(default=False, description="welded to the world; may still be placed anew at each reset")
-    mass: PositiveValue | None = Field(default=None, description="[kg]; exclusive with density")
-    density: PositiveValue | None = Field(default=None, description="[kg/m^3]; 1000 where neither is given")
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("mass",), ("density",))
+
+    source: SourceSpec = Field(description="its shape: a primitive, a mesh or an asset")
+    fixed: Flag = Field(default=False, description="welded to the world; may still be placed anew at each reset")
+    mass: PositiveValue | None = Field(default=None, description="mass [kg]; exclusive with density")
+    density: PositiveValue | None = Field(
+        default=None, description="density [kg/m^3]; 1000 where neither it nor mass is given"
+    )
     friction: NonNegativeValue = Field(default=0.8, description="sliding friction coefficient")
-    restitution: float = Field(default=0.0, ge=0, lt=1, description="ratio of speeds after and before a bounce")
-    color: ColorValue = Field(default=(0.7, 0.7, 0.7))
-    contact: ContactSpec = ContactSpec()
+    restitution: Number = Field(default=0.0, ge=0, lt=1, description="ratio of speeds after and before a bounce")
+    color: ColorValue = Field(
+        default=(0.7, 0.7, 0.7), description="red, green, blue in [0, 1], or a colour name such as `red`"
+    )
+    contact: ContactSpec = Field(default=ContactSpec(), description="how its surface gives")
     label: str | None = Field(default=None, description="semantic label; the object's name where not given")
-    collides: bool = True
+    collides: Flag = Field(default=True, description="false for something that is only seen")
 
     @model_validator(mode="after")
     def _one_of_mass_and_density(self) -> "ObjectSpec":
@@ -69,38 +87,43 @@ class ObjectSpec(Spec):
 
 
 class TerrainSpec(Spec):
-    """The ground: an infinite plane, nothing, or a height field."""
+    """The ground: an infinite plane, nothing, or a height field. A bare string is the kind."""
 
-    kind: Literal["plane", "none", "heightfield"] = "plane"
-    friction: float = Field(default=0.8, ge=0)
-    restitution: float = Field(default=0.0, ge=0, lt=1)
-    color: tuple[float, float, float] = (0.45, 0.47, 0.5)
-    heights: tuple[tuple[float, ...], ...] | None = Field(
-        default=None, description="heightfield: rows of heights [m]; the first row is at the lowest y, the first column at the lowest x"
+    kind: Literal["plane", "none", "heightfield"] = Field(default="plane", description="what the ground is")
+    friction: Number = Field(default=0.8, ge=0, description="sliding friction coefficient")
+    restitution: Number = Field(default=0.0, ge=0, lt=1, description="ratio of speeds after and before a bounce")
+    color: Vec3 = Field(default=(0.45, 0.47, 0.5), description="red, green, blue in [0, 1]")
+    heights: tuple[tuple[Number, ...], ...] | None = Field(
+        default=None,
+        description="heightfield: rows of heights [m]; first row at the lowest y, first column at the lowest x",
     )
     size: tuple[Positive, Positive] = Field(default=(10.0, 10.0), description="heightfield: extent along x and y [m]")
 
-    @model_validator(mode="before")
     @classmethod
-    def _name_shorthand(cls, data: object) -> object:
-        return {"kind": data} if isinstance(data, str) else data
+    def from_text(cls, text: str) -> dict[str, Any]:
+        """The kind of ground."""
+        return {"kind": text}
 
     @model_validator(mode="after")
     def _heights_given(self) -> "TerrainSpec":
         if (self.kind == "heightfield") != (self.heights is not None):
             raise ValueError("`heights` goes with kind heightfield, and with no other")
-        if self.heights is not None and (len(self.heights) < 2 or len({len(row) for row in self.heights}) != 1):
-            raise ValueError("heights needs at least two rows, all of the same length")
+        if self.heights is not None:
+            lengths = sorted({len(row) for row in self.heights})
+            if len(lengths) > 1:
+                raise KeyFault(f"the rows differ in length: {' and '.join(map(str, lengths))}", "heights")
+            if len(self.heights) < 2 or lengths[0] < 2:
+                raise KeyFault("expected at least two rows of at least two heights", "heights")
         return self
 
 
 class LightSpec(Spec):
     """A directional light, or a point light where it has a position."""
 
-    direction: Vec3 = (0.0, 0.0, -1.0)
-    position: Vec3 | None = None
-    color: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    intensity: Positive = 0.8
+    direction: Vec3 = Field(default=(0.0, 0.0, -1.0), description="where it shines to, world axes")
+    position: Vec3 | None = Field(default=None, description="place of a point light [m], world frame")
+    color: Vec3 = Field(default=(1.0, 1.0, 1.0), description="red, green, blue in [0, 1]")
+    intensity: Positive = Field(default=0.8, description="brightness; 1 lights a white surface fully")
 
 
 class ContactSensorSpec(Spec):

@@ -12,7 +12,9 @@ class RecordSpec(Spec):
     """One directory per trajectory, committed by one rename."""
 
     writer: str = Field(default="mcap", description="an installed writer, as in `anysim list writers`")
-    options: Annotated[dict[str, Any], PluginSlot("writer", "writer")] = Field(default_factory=dict)
+    options: Annotated[dict[str, Any], PluginSlot("writer", "writer")] = Field(
+        default_factory=dict, description="options owned by the writer"
+    )
     cameras: tuple[Name, ...] = Field(default=(), description="cameras of the world whose images become videos")
     fps: Positive = Field(default=25.0, description="frames per second of the videos; every n-th control step")
     keep: Literal["success", "all"] = Field(default="success", description="which trajectories are kept")

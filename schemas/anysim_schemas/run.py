@@ -1,12 +1,13 @@
 """The root of a file: everything about a run."""
 
-from typing import Annotated, Self
+from typing import Self
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, model_validator
 
-from anysim_schemas.base import Name, Spec
+from anysim_schemas.base import Integer, Name, Spec
 from anysim_schemas.cameras import CameraSpec
 from anysim_schemas.engine import EngineSpec, PhysicsSpec
+from anysim_schemas.errors import KeyFault
 from anysim_schemas.layout import PlacementSpec
 from anysim_schemas.objects import ContactSensorSpec, LightSpec, ObjectSpec, TerrainSpec
 from anysim_schemas.record import RecordSpec
@@ -17,37 +18,35 @@ from anysim_schemas.task import TaskSpec
 class WorldSpec(Spec):
     """What exists (robots, objects), where it goes (layout), and what looks at it (cameras, sensors, lights)."""
 
-    name: Name = "world"
-    terrain: TerrainSpec = TerrainSpec()
-    robots: dict[Name, RobotSpec] = Field(default_factory=dict)
-    objects: dict[Name, ObjectSpec] = Field(default_factory=dict)
-    layout: dict[Name, PlacementSpec] = Field(default_factory=dict)
-    cameras: dict[Name, CameraSpec] = Field(default_factory=dict)
-    lights: dict[Name, LightSpec] = Field(default_factory=dict)
-    contact_sensors: dict[Name, ContactSensorSpec] = Field(default_factory=dict)
+    name: Name = Field(default="world", description="the name of the world")
+    terrain: TerrainSpec = Field(default=TerrainSpec(), description="the ground")
+    robots: dict[Name, RobotSpec] = Field(default_factory=dict, description="robots by name")
+    objects: dict[Name, ObjectSpec] = Field(default_factory=dict, description="objects by name")
+    layout: dict[Name, PlacementSpec] = Field(default_factory=dict, description="where each object goes at reset")
+    cameras: dict[Name, CameraSpec] = Field(default_factory=dict, description="cameras by name")
+    lights: dict[Name, LightSpec] = Field(default_factory=dict, description="lights by name")
+    contact_sensors: dict[Name, ContactSensorSpec] = Field(default_factory=dict, description="contact sensors by name")
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> Self:
         shared = sorted(set(self.robots) & set(self.objects))
         if shared:
-            raise ValueError(f"robots and objects share one name space; both have {', '.join(shared)}")
-        if "terrain" in self.robots or "terrain" in self.objects:
-            raise ValueError("the name `terrain` is taken by the ground")
+            raise KeyFault(
+                f"robots and objects share one name space; both have {', '.join(shared)}", "objects", shared[0]
+            )
+        for kind in ("robots", "objects"):
+            if "terrain" in getattr(self, kind):
+                raise KeyFault("the name `terrain` is taken by the ground", kind, "terrain")
         return self
 
 
 class RunSpec(Spec):
     """A world, an engine, and optionally a task and a record."""
 
-    engine: EngineSpec = EngineSpec()
-    num_envs: Annotated[int, Field(gt=0, description="parallel environments")] = 1
-    seed: Annotated[int, Field(ge=0)] = 0
-    physics: PhysicsSpec = PhysicsSpec()
-    world: WorldSpec = WorldSpec()
-    task: TaskSpec | None = None
-    record: RecordSpec = RecordSpec()
-
-    @field_validator("engine", mode="before")
-    @classmethod
-    def _engine_shorthand(cls, data: object, _: ValidationInfo) -> object:
-        return {"name": data} if isinstance(data, str) else data
+    engine: EngineSpec = Field(default=EngineSpec(), description="the engine that runs the world")
+    num_envs: Integer = Field(default=1, gt=0, description="number of parallel environments")
+    seed: Integer = Field(default=0, ge=0, description="seed of everything that is drawn")
+    physics: PhysicsSpec = Field(default=PhysicsSpec(), description="time steps and gravity")
+    world: WorldSpec = Field(default=WorldSpec(), description="what exists, where it goes and what looks at it")
+    task: TaskSpec | None = Field(default=None, description="what is observed, rewarded and counted as success")
+    record: RecordSpec = Field(default=RecordSpec(), description="what is written, and by whom")

@@ -1,10 +1,11 @@
 """Tasks: what is observed, rewarded, and counted as success."""
 
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import ConfigDict, Field, field_validator, model_validator
+from pydantic import ConfigDict, Field, field_validator
 
-from anysim_schemas.base import Name, Spec
+from anysim_schemas.base import Integer, Name, NamedByKey, Number, Spec
+from anysim_schemas.errors import KeyFault
 
 
 class TermSpec(Spec):
@@ -16,12 +17,12 @@ class TermSpec(Spec):
     model_config = ConfigDict(extra="allow", frozen=True)
     plugin_kind: ClassVar[str] = "term"
 
-    term: str
+    term: str = Field(description="an installed term; in a mapping of terms the key is its name where this is left out")
 
-    @model_validator(mode="before")
     @classmethod
-    def _name_shorthand(cls, data: object) -> object:
-        return {"term": data} if isinstance(data, str) else data
+    def from_text(cls, text: str) -> dict[str, Any]:
+        """The name of a term without parameters."""
+        return {"term": text}
 
     @property
     def params(self) -> dict[str, Any]:
@@ -30,25 +31,37 @@ class TermSpec(Spec):
 
 
 class ObservationTermSpec(TermSpec):
+    """A term that is observed: it yields a row of numbers for each environment."""
+
     plugin_kind: ClassVar[str] = "observation"
 
 
 class RewardTermSpec(TermSpec):
+    """A term that is rewarded: it yields one number for each environment, times its weight."""
+
     plugin_kind: ClassVar[str] = "reward"
-    weight: float = 1.0
+
+    weight: Number = Field(default=1.0, description="factor of the term in the sum; negative for a cost")
 
 
 class PredicateTermSpec(TermSpec):
+    """A term that holds or does not, for each environment."""
+
     plugin_kind: ClassVar[str] = "predicate"
 
 
 class CommandTermSpec(TermSpec):
+    """A goal that is drawn at each reset, and that other terms refer to by its key."""
+
     plugin_kind: ClassVar[str] = "command"
 
 
 class EventTermSpec(TermSpec):
+    """Something that happens to the world."""
+
     plugin_kind: ClassVar[str] = "event"
-    when: Literal["reset", "step"] = "reset"
+
+    when: Literal["reset", "step"] = Field(default="reset", description="at each reset, or at each control step")
 
 
 class ExpertSpec(Spec):
@@ -57,7 +70,8 @@ class ExpertSpec(Spec):
     model_config = ConfigDict(extra="allow", frozen=True)
     plugin_kind: ClassVar[str] = "skill"
     plugin_name_field: ClassVar[str] = "skill"
-    skill: str
+
+    skill: str = Field(description="an installed skill, as in `anysim list skills`")
 
     @property
     def params(self) -> dict[str, Any]:
@@ -65,38 +79,40 @@ class ExpertSpec(Spec):
         return dict(self.model_extra or {})
 
 
-def _named_terms(data: object) -> object:
-    """In a mapping of terms the key is the term's name unless the entry says otherwise."""
-    if not isinstance(data, dict):
-        return data
-    return {k: {"term": k, **v} if isinstance(v, dict) else ({"term": k} if v is None else v) for k, v in data.items()}  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+ByTerm = NamedByKey("term")
 
 
 class TaskSpec(Spec):
     """The Markov decision process over a world."""
 
-    description: str = ""
-    horizon: int = Field(default=500, gt=0, description="control steps before an episode is truncated")
-    command: dict[Name, CommandTermSpec] = Field(default_factory=dict)
+    description: str = Field(default="", description="one line for people, and the instruction for language policies")
+    horizon: Integer = Field(default=500, gt=0, description="control steps before an episode is truncated")
+    command: Annotated[dict[Name, CommandTermSpec], ByTerm] = Field(
+        default_factory=dict, description="goals drawn at each reset, by the name that other terms use"
+    )
     observations: dict[Name, tuple[ObservationTermSpec, ...]] = Field(
         description="groups of terms; `policy` is required, `privileged` may hold simulator-only truth"
     )
-    rewards: dict[Name, RewardTermSpec] = Field(default_factory=dict)
-    success: dict[Name, PredicateTermSpec] = Field(default_factory=dict, description="all must hold")
-    hold: int = Field(default=1, gt=0, description="consecutive control steps that success must hold")
-    failure: dict[Name, PredicateTermSpec] = Field(default_factory=dict, description="any is enough")
-    events: dict[Name, EventTermSpec] = Field(default_factory=dict)
-    on_success: Literal["end", "continue"] = "end"
+    rewards: Annotated[dict[Name, RewardTermSpec], ByTerm] = Field(
+        default_factory=dict, description="terms whose weighted sum is the reward"
+    )
+    success: Annotated[dict[Name, PredicateTermSpec], ByTerm] = Field(default_factory=dict, description="all must hold")
+    hold: Integer = Field(default=1, gt=0, description="consecutive control steps that success must hold")
+    failure: Annotated[dict[Name, PredicateTermSpec], ByTerm] = Field(default_factory=dict, description="any is enough")
+    events: Annotated[dict[Name, EventTermSpec], ByTerm] = Field(
+        default_factory=dict, description="what happens to the world at resets and steps"
+    )
+    on_success: Literal["end", "continue"] = Field(default="end", description="whether success ends the episode")
     ended: Literal["error", "hold"] = Field(
         default="error", description="stepping an ended env is an error, or holds it still until it is reset"
     )
-    expert: ExpertSpec | None = None
-
-    _named = field_validator("command", "rewards", "success", "failure", "events", mode="before")(_named_terms)
+    expert: ExpertSpec | None = Field(default=None, description="a scripted solution")
 
     @field_validator("observations")
     @classmethod
-    def _policy_group(cls, groups: dict[str, Any]) -> dict[str, Any]:
+    def _policy_group(
+        cls, groups: dict[str, tuple[ObservationTermSpec, ...]]
+    ) -> dict[str, tuple[ObservationTermSpec, ...]]:
         if not groups.get("policy"):
-            raise ValueError("the group `policy` is required and needs at least one term")
+            raise KeyFault("the group `policy` is required and needs at least one term", "policy")
         return groups

@@ -5,74 +5,144 @@ A field of type `Value[float]` accepts `0.1`, `{range: [0.05, 0.2]}`, `{choice: 
 component-wise.
 """
 
-from typing import Annotated, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, TypeVar, cast
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from anysim_schemas.base import Color, Fraction, NonNegative, Positive, Spec, Vec3
+from anysim_schemas.base import Color, Fraction, NonNegative, Number, Positive, Spec, Vec3
+from anysim_schemas.errors import KeyFault
 
 T = TypeVar("T")
 
+KINDS = ("range", "choice", "normal")
+"""The keys that make a mapping a value that is drawn."""
 
-class Range(Spec, Generic[T]):
+TAG_PREFIX = "as:"
+"""Marks the branch of a value in the location of an error, so that it is never taken for a key."""
+
+
+def _components(value: object) -> tuple[float, ...]:
+    """The numbers of a scalar or vector; a colour name has none."""
+    if isinstance(value, str):
+        raise ValueError(f"the colour name '{value}' has no order; give numbers, or draw from a list with `choice`")
+    return cast("tuple[float, ...]", value) if isinstance(value, tuple) else (cast("float", value),)
+
+
+def _check_order(low: object, high: object, what: str) -> None:
+    for lower, upper in zip(_components(low), _components(high), strict=True):
+        if lower > upper:
+            raise ValueError(f"the lower {what} {lower:g} is above the upper {what} {upper:g}")
+
+
+_LABELS = ((Number, "number"), (Positive, "positive"), (NonNegative, "non_negative"), (Fraction, "fraction"),
+           (Vec3, "vector"), (Color, "color"))  # fmt: skip
+
+
+class Variant(Spec):
+    """Names its variants by what they hold, `Range_positive`, and keeps them where pickle looks for them."""
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        super().__pydantic_init_subclass__(**kwargs)
+        cls.__doc__ = cls.__doc__ or cls.__base__.__doc__
+        globals().setdefault(cls.__name__, cls)
+
+    @classmethod
+    def model_parametrized_name(cls, params: tuple[Any, ...]) -> str:
+        """The name of a variant, as it stands in the JSON Schema."""
+        labels = [label for kind, label in _LABELS if kind is params[0]]
+        return f"{cls.__name__}_{labels[0]}" if labels else super().model_parametrized_name(params)
+
+
+class Drawn(Variant):
+    """What the values that are drawn have in common: the key that says how."""
+
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("range",), ("choice", "weights"), ("normal",))
+
+
+class Range(Drawn, Generic[T]):
     """Uniform between two bounds, component by component."""
 
     range: tuple[T, T] = Field(description="lower and upper bound")
 
     @model_validator(mode="after")
     def _ordered(self) -> "Range[T]":
-        low, high = self.range
-        pairs = zip(low, high, strict=True) if isinstance(low, tuple) and isinstance(high, tuple) else [(low, high)]
-        for lower, upper in pairs:  # pyright: ignore[reportUnknownVariableType]
-            if lower > upper:  # pyright: ignore[reportUnknownVariableType]
-                raise ValueError(f"the lower bound {lower} is above the upper bound {upper}")
+        _check_order(*self.range, what="bound")
         return self
 
 
-class Choice(Spec, Generic[T]):
+class Choice(Drawn, Generic[T]):
     """One of the listed values, each equally likely unless `weights` says otherwise."""
 
-    choice: tuple[T, ...] = Field(min_length=1)
-    weights: tuple[NonNegative, ...] | None = None
+    choice: tuple[T, ...] = Field(min_length=1, description="the values to draw from")
+    weights: tuple[NonNegative, ...] | None = Field(
+        default=None, description="how likely each is, in any unit; equal where not given"
+    )
 
     @model_validator(mode="after")
     def _weights_match(self) -> "Choice[T]":
         if self.weights is not None and (len(self.weights) != len(self.choice) or sum(self.weights) <= 0):
-            raise ValueError(f"{len(self.choice)} choices need as many weights with a positive sum")
+            raise KeyFault(
+                f"{len(self.choice)} choices need {len(self.choice)} weights with a positive sum; "
+                f"got {len(self.weights)} with the sum {sum(self.weights):g}",
+                "weights",
+            )
         return self
 
 
-class NormalParameters(Spec, Generic[T]):
+class NormalParameters(Variant, Generic[T]):
     """Mean and standard deviation; draws outside [low, high] are clipped to it."""
 
-    mean: T
-    std: T
-    low: T | None = None
-    high: T | None = None
+    mean: T = Field(description="mean")
+    std: T = Field(description="standard deviation")
+    low: T | None = Field(default=None, description="smallest value drawn")
+    high: T | None = Field(default=None, description="largest value drawn")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "NormalParameters[T]":
+        _components(self.mean)
+        if any(component < 0 for component in _components(self.std)):
+            raise KeyFault(f"the standard deviation must not be negative, got {self.std}", "std")
+        if self.low is not None and self.high is not None:
+            _check_order(self.low, self.high, what="limit")
+        return self
 
 
-class Normal(Spec, Generic[T]):
+class Normal(Drawn, Generic[T]):
     """Normally distributed."""
 
-    normal: NormalParameters[T]
+    normal: NormalParameters[T] = Field(description="mean, standard deviation and limits")
 
 
-def _kind(value: Any) -> str:
-    for kind in ("range", "choice", "normal"):
-        if (isinstance(value, dict) and kind in value) or hasattr(value, kind):
-            return kind
-    return "constant"
+def _kind(value: object) -> str:
+    mapping = cast("dict[object, object]", value) if isinstance(value, dict) else {}
+    for kind in KINDS:
+        if kind in mapping or (isinstance(value, Drawn) and hasattr(value, kind)):
+            return TAG_PREFIX + kind
+    return TAG_PREFIX + "constant"
 
 
-Value = Annotated[
-    Annotated[T, Tag("constant")]
-    | Annotated[Range[T], Tag("range")]
-    | Annotated[Choice[T], Tag("choice")]
-    | Annotated[Normal[T], Tag("normal")],
-    Discriminator(_kind),
-]
+if TYPE_CHECKING:
+    Value = T | Range[T] | Choice[T] | Normal[T]
+else:
 
-FloatValue = Value[float]
+    class Value:
+        """`Value[X]`: an X, or a distribution over X.
+
+        Built item by item: a typing alias would leave the T of `Range[T]` open, and bounds unchecked.
+        """
+
+        def __class_getitem__(cls, item: Any) -> Any:
+            return Annotated[
+                Annotated[item, Tag(TAG_PREFIX + "constant")]
+                | Annotated[Range[item], Tag(TAG_PREFIX + "range")]
+                | Annotated[Choice[item], Tag(TAG_PREFIX + "choice")]
+                | Annotated[Normal[item], Tag(TAG_PREFIX + "normal")],
+                Discriminator(_kind),
+            ]
+
+
+FloatValue = Value[Number]
 PositiveValue = Value[Positive]
 NonNegativeValue = Value[NonNegative]
 FractionValue = Value[Fraction]

@@ -49,7 +49,7 @@ class GymEnv(gym.Env[dict[str, Array], Array]):
         self.env = env
         self.metadata = _metadata(env)
         self.render_mode = render_mode
-        self.observation_space = observation_space(env)
+        self.observation_space: gym.spaces.Space[Any] = observation_space(env)
         self.action_space = action_space(env)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Array], dict[str, Any]]:
@@ -181,5 +181,6 @@ def make_gym(source: Any, *, autoreset_mode: AutoresetMode | str | None = None, 
     from anysim.api import make
 
     if autoreset_mode is None:
-        return GymEnv(make(source, **(options | {"num_envs": 1})), render_mode)
+        options["num_envs"] = 1
+        return GymEnv(make(source, **options), render_mode)
     return GymVectorEnv(make(source, **options), autoreset_mode, render_mode)

@@ -39,7 +39,7 @@ def check_one(name: str, engine: str | None, all_engines: bool, overrides: list[
     from anysim import registry
     from anysim.engine.capability import check as check_capabilities
     from anysim.engine.needs import needs_of
-    from anysim.errors import AnysimError, SpecError
+    from anysim.errors import AnysimError, AssetError, SpecError
     from anysim.api import compile_world, dry_run, load
 
     try:
@@ -47,8 +47,8 @@ def check_one(name: str, engine: str | None, all_engines: bool, overrides: list[
         world = compile_world(loaded)
         if loaded.spec.task is not None:
             dry_run(loaded, world)
-    except SpecError as error:
-        return [str(issue) for issue in error.issues]
+    except (SpecError, AssetError) as error:
+        return [str(issue) for issue in error.issues] or [f"{name}: {error}"]
     except AnysimError as error:
         return [f"{name}: {error}"]
     engines = registry.names("engines") if all_engines else [engine or loaded.spec.engine.name]

@@ -16,6 +16,8 @@ class Root(StrEnum):
 def schema(root: Annotated[Root, typer.Argument(help="run: worlds and tasks; robot: catalogue entries.")] = Root.RUN) -> None:
     """Print the JSON Schema of a kind of file, for completion and checks in an editor."""
     from anysim.cli.output import print_json
-    from anysim_schemas.jsonschema import schemas
+    from anysim_schemas.jsonschema import json_schema
+    from anysim_schemas.robots import RobotModelSpec
+    from anysim_schemas.run import RunSpec
 
-    print_json(schemas()[root.value])
+    print_json(json_schema(RunSpec if root is Root.RUN else RobotModelSpec))

@@ -49,14 +49,14 @@ class SceneManager(Manager):
         """Scale masses and inertias of all the object's bodies alike, so that its shape stays what it was."""
         bodies = self._bodies[name]
         inertials = [self._world.bodies[b].inertial for b in bodies]
-        nominal = np.array([i.mass for i in inertials])
-        if self._world.bodies[bodies[0]].kind is BodyKind.STATIC and not nominal.sum():
+        masses = np.array([i.mass for i in inertials])
+        if self._world.bodies[bodies[0]].kind is BodyKind.STATIC and not masses.sum():
             return
         if is_random(obj.mass):
-            ratio = draw_rows(obj.mass, f"scene/{name}/mass", self.streams, env_ids) / nominal.sum()
+            ratio = draw_rows(obj.mass, f"scene/{name}/mass", self.streams, env_ids) / masses.sum()
         else:
             ratio = draw_rows(obj.density, f"scene/{name}/density", self.streams, env_ids) / nominal(obj.density)
-        self.engine.set_parameters("body.mass", ratio[:, None] * nominal, env_ids, bodies)
+        self.engine.set_parameters("body.mass", ratio[:, None] * masses, env_ids, bodies)
         inertia = np.array([i.inertia for i in inertials])
         self.engine.set_parameters("body.inertia", ratio[:, None, None] * inertia, env_ids, bodies)
 

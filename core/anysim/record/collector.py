@@ -31,15 +31,19 @@ class Policy(Protocol):
 
     def begin(self, env_ids: Array) -> None:
         """These envs have just been reset."""
+        ...
 
     def act(self, env_ids: Array) -> Array:
         """Actions (N, A); rows other than `env_ids` are ignored."""
+        ...
 
     def gave_up(self, env_ids: Array) -> Array:
         """(n,) bool: it is of no use to go on in these envs."""
+        ...
 
     def describe(self, env: int) -> dict[str, Any]:
         """Plain data about what an env is doing."""
+        ...
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
     """One line: engine, version, counts, and what was skipped for want of which capability."""
     suite = config.stash.get(_SUITE, frozenset())
-    if not suite:
+    if not suite or not config.getoption("engine"):
         return
     outcomes = {
         kind: [r for r in terminalreporter.stats.get(kind, []) if getattr(r, "nodeid", "") in suite]

@@ -85,7 +85,7 @@ def test_collisions_keep_momentum(build, engine_class, restitution):
     assert abs(left + 2.0 * right) < tolerances.MOMENTUM * 4.0, "the sum of momenta was 0 and is no more"
     assert right > left - 0.05, "they pass through each other"
     exact = engine_class.capabilities.supported[C.RESTITUTION].exact
-    allowed = tolerances.BOUNCE["exact" if exact else "approximate"]
+    allowed = tolerances.RESTITUTION["exact" if exact else "approximate"]
     assert_close((right - left) / 3.0, restitution, allowed, "ratio of speeds after and before")
 
 

@@ -1,0 +1,49 @@
+"""The robot catalogue: entries of the group `anysim.robots`, each a package with NAME.yaml."""
+
+import importlib.util
+from pathlib import Path
+from typing import NamedTuple
+
+from anysim import registry
+from anysim.errors import PluginError, SpecError, SpecIssue
+from anysim_schemas.robots import RobotModelSpec
+
+
+class CatalogueEntry(NamedTuple):
+    """A robot of the catalogue: its spec, and the file it was read from (relative assets are relative to it)."""
+
+    spec: RobotModelSpec
+    file: Path
+
+
+def load_robot(name: str) -> CatalogueEntry:
+    """A robot of the catalogue by name (or `dist:name`). The package is found, not imported.
+
+    Raises:
+        PluginError: unknown (lists what is installed), or the package lacks the file.
+        SpecError: the file is not a valid RobotModelSpec.
+    """
+    entry = registry.entry("robots", name)
+    package = entry.value
+    spec = importlib.util.find_spec(package)
+    folders = [Path(folder) for folder in (spec.submodule_search_locations or [])] if spec is not None else []
+    for folder in folders:
+        file = folder / f"{entry.name}.yaml"
+        if file.is_file():
+            return CatalogueEntry(_read(file), file)
+    raise PluginError(
+        f"the robot '{name}' should be in {entry.name}.yaml of the package {package}, which has no such file"
+    )
+
+
+def _read(file: Path) -> RobotModelSpec:
+    import yaml
+    from pydantic import ValidationError
+
+    try:
+        return RobotModelSpec.model_validate(yaml.safe_load(file.read_text(encoding="utf-8")))
+    except yaml.YAMLError as error:
+        raise SpecError([SpecIssue(str(file), "", f"not valid YAML: {error}")]) from error
+    except ValidationError as error:
+        issues = [SpecIssue(str(file), ".".join(map(str, e["loc"])), e["msg"]) for e in error.errors()]
+        raise SpecError(issues) from error

@@ -1,0 +1,74 @@
+"""From a validated spec to a World: robots, objects, their nominal places, cameras, sensors, lights.
+
+Fields that are drawn anew in each episode enter with their nominal value. All faults of a spec are reported at once,
+each with its dotted key.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+from anysim.world.builder import WorldBuilder
+from anysim.world.compile_object import add_object, add_terrain
+from anysim.world.compile_robot import add_robot
+from anysim.world.compile_sensors import compile_lights, with_sensors
+from anysim.world.imported import ImportNote
+from anysim.world.issues import Issues
+from anysim.world.model import Physics, World
+from anysim.world.placement import check_layout, place_nominally
+from anysim_schemas.engine import PhysicsSpec
+from anysim_schemas.run import RunSpec, WorldSpec
+
+
+class Compiled(NamedTuple):
+    """A World, and for each entity what its importer repaired or left out."""
+
+    world: World
+    report: Mapping[str, tuple[ImportNote, ...]]
+
+
+def compile_world(spec: RunSpec | WorldSpec, *, physics: PhysicsSpec | None = None, base: Path | None = None) -> World:
+    """The World of a spec.
+
+    Args:
+        spec: of a run, or of a world alone.
+        physics: time steps and gravity; those of the run where it is one, else the defaults.
+        base: the folder of the YAML file, which relative asset paths are relative to.
+
+    Raises:
+        SpecError: names that do not exist, cycles, values that do not fit; all of them, with dotted keys.
+        AssetError: files that are missing or cannot be used, where the spec is otherwise right.
+    """
+    return compile_with_report(spec, physics=physics, base=base).world
+
+
+def compile_with_report(
+    spec: RunSpec | WorldSpec, *, physics: PhysicsSpec | None = None, base: Path | None = None
+) -> Compiled:
+    """As `compile_world`, with the notes of the importers."""
+    if isinstance(spec, RunSpec):
+        issues, content, steps = Issues("world"), spec.world, physics or spec.physics
+    else:
+        issues, content, steps = Issues(), spec, physics or PhysicsSpec()
+    builder = WorldBuilder(World(name=content.name, physics=neutral_physics(steps)))
+    add_terrain(builder, content.terrain)
+    notes: dict[str, tuple[ImportNote, ...]] = {}
+    for name, robot in content.robots.items():
+        notes[name] = tuple(add_robot(builder, name, robot, issues.at("robots", name)))
+    for name, thing in content.objects.items():
+        notes[name] = tuple(add_object(builder, name, thing, issues.at("objects", name), base=base))
+    order = check_layout(content.layout, list(content.objects), list(content.robots), issues.at("layout"))
+    world = replace(builder.build(), lights=compile_lights(content.lights, issues.at("lights")))
+    missing = {*content.robots, *content.objects} - {entity.name for entity in world.entities}
+    if missing:  # what looks at a thing that could not be made would only repeat its error
+        issues.raise_if_any()
+    world = place_nominally(world, content.layout, order)
+    world = with_sensors(world, content.cameras, content.contact_sensors, issues)
+    issues.raise_if_any()
+    return Compiled(world, notes)
+
+
+def neutral_physics(spec: PhysicsSpec) -> Physics:
+    """The physics part of a World."""
+    return Physics(spec.dt, spec.control_dt, spec.gravity, spec.friction_cone, spec.impratio)

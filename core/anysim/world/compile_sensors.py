@@ -1,0 +1,116 @@
+"""Cameras, contact sensors and lights of a spec, looked up in the World they belong to."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from anysim.conventions import WORLD
+from anysim.errors import NameLookupError, listing, suggest
+from anysim.math import pose as P
+from anysim.world.issues import Issues
+from anysim.world.lookup import find_bodies, find_frame
+from anysim.world.model import Camera, ContactSensor, Light, World
+from anysim.world.rounding import split
+from anysim_schemas.cameras import CameraSpec
+from anysim_schemas.objects import ContactSensorSpec, LightSpec
+
+DEFAULT_LIGHTS = (
+    Light("key", direction=(-0.4, 0.3, -0.87), intensity=0.7),  # from the front right, as a lamp beside the viewer
+    Light("fill", direction=(0.5, -0.6, -0.62), intensity=0.35),  # weaker, from the other side: no side is black
+)
+
+
+def compile_camera(world: World, name: str, spec: CameraSpec, issues: Issues) -> Camera | None:
+    """The camera, or None where a name does not exist; `issues` is at the camera's path."""
+    if spec.mount is not None:
+        try:
+            frame = find_frame(world, spec.mount)
+        except NameLookupError as error:
+            issues.add("mount", str(error))
+            return None
+        local = P.pose(spec.position, P.from_roll_pitch_yaw(np.array(spec.roll_pitch_yaw)))
+        body, looks_at = frame.body, None
+        pose = P.compose(P.pose(frame.position, frame.quaternion), local)
+    else:
+        assert spec.from_ is not None  # the spec has either a mount or a view point
+        body, looks_at = WORLD, spec.look_at if isinstance(spec.look_at, str) else None
+        target = _target(world, spec, issues)
+        if target is None:
+            return None
+        eye = np.array(spec.from_)
+        if np.linalg.norm(target - eye) < 1e-6:
+            issues.add("look_at", "is where the camera is; move one of them")
+            return None
+        pose = np.concatenate([eye, P.look_at(eye, target)])
+    if spec.near >= spec.far:
+        issues.add("far", f"the far plane ({spec.far:g} m) must lie beyond the near one ({spec.near:g} m)")
+    position, quaternion = split(pose)
+    return Camera(
+        name,
+        body,
+        position,
+        quaternion,
+        spec.fov,
+        spec.size[0],
+        spec.size[1],
+        spec.channels,
+        looks_at,
+        spec.near,
+        spec.far,
+    )
+
+
+def _target(world: World, spec: CameraSpec, issues: Issues) -> np.ndarray | None:
+    if not isinstance(spec.look_at, str):
+        return np.array(spec.look_at, dtype=float)
+    for entity in world.entities:
+        if entity.name == spec.look_at:
+            return world.initial_body_pose[entity.root, :3]
+    names = [entity.name for entity in world.entities]
+    known = f"{suggest(spec.look_at, names)} (objects: {listing(names)})"
+    issues.add("look_at", f"there is no object '{spec.look_at}' to look at{known}")
+    return None
+
+
+def compile_contact_sensor(world: World, name: str, spec: ContactSensorSpec, issues: Issues) -> ContactSensor | None:
+    """The sensor, or None where a name does not exist; `issues` is at the sensor's path."""
+    found: dict[str, tuple[int, ...]] = {}
+    for key, reference in (("body", spec.body), ("against", spec.against)):
+        try:
+            if reference is not None:
+                found[key] = find_bodies(world, reference)
+        except NameLookupError as error:
+            issues.add(key, str(error))
+    if "body" not in found or ("against" not in found and spec.against is not None):
+        return None
+    if found["body"] == (WORLD,):
+        issues.add("body", "the ground has no contact sensor; sense the other body `against` it")
+        return None
+    return ContactSensor(name, found["body"], found.get("against"))
+
+
+def compile_lights(specs: Mapping[str, LightSpec], issues: Issues) -> tuple[Light, ...]:
+    """The lights, or a key and a fill light where none is given."""
+    lights: list[Light] = []
+    for name, spec in specs.items():
+        length = float(np.linalg.norm(spec.direction))
+        if length < 1e-9:
+            issues.add(f"{name}.direction", "a light needs a direction that is not zero")
+            continue
+        x, y, z = (component / length for component in spec.direction)
+        lights.append(Light(name, (x, y, z), spec.position, spec.color, spec.intensity))
+    return tuple(lights) if specs else DEFAULT_LIGHTS
+
+
+def with_sensors(
+    world: World, cameras: Mapping[str, CameraSpec], sensors: Mapping[str, ContactSensorSpec], issues: Issues
+) -> World:
+    """The World with these cameras and contact sensors, in the order of the spec; `issues` is at the world's path."""
+    made = [compile_camera(world, name, spec, issues.at("cameras", name)) for name, spec in cameras.items()]
+    felt = [
+        compile_contact_sensor(world, name, spec, issues.at("contact_sensors", name)) for name, spec in sensors.items()
+    ]
+    return replace(
+        world, cameras=tuple(c for c in made if c is not None), contact_sensors=tuple(s for s in felt if s is not None)
+    )

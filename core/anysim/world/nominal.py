@@ -1,0 +1,30 @@
+"""The nominal value of a field that is drawn in each episode: what the World is compiled with."""
+
+from typing import Any
+
+from anysim_schemas.values import Choice, Normal, Range
+
+
+def nominal(value: Any) -> Any:
+    """The middle of a range, the first of a choice, the (clipped) mean of a normal; a constant is itself.
+
+    Vectors are taken component by component; names (of colours) only occur as constants and choices.
+    """
+    if isinstance(value, Choice):
+        return value.choice[0]
+    if isinstance(value, Range):
+        return _combine(lambda low, high: 0.5 * (low + high), *value.range)
+    if isinstance(value, Normal):
+        mean = value.normal.mean
+        if value.normal.low is not None:
+            mean = _combine(max, mean, value.normal.low)
+        if value.normal.high is not None:
+            mean = _combine(min, mean, value.normal.high)
+        return mean
+    return value
+
+
+def _combine(function: Any, a: Any, b: Any) -> Any:
+    if isinstance(a, tuple | list):
+        return tuple(function(x, y) for x, y in zip(a, b, strict=True))
+    return function(a, b)

@@ -1,0 +1,131 @@
+"""Files, `extends:` and overrides to one validated spec, or to every fault with its place."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, TypeVar, cast
+
+from pydantic import BaseModel, ValidationError
+
+from anysim_schemas.entries import places
+from anysim_schemas.errors import SpecError
+from anysim_schemas.faults import locate
+from anysim_schemas.merging import override, override_name
+from anysim_schemas.messages import suggest
+from anysim_schemas.nodes import Fault, Node, from_data, in_order
+from anysim_schemas.plugin import OptionsResolver
+from anysim_schemas.run import RunSpec
+from anysim_schemas.shapes import Shape
+from anysim_schemas.slots import check_slots
+from anysim_schemas.sources import ExtendsResolver, Reader, Source
+
+M = TypeVar("M", bound=BaseModel)
+
+
+@dataclass(frozen=True)
+class Loaded(Generic[M]):
+    """A spec and where it came from.
+
+    Attributes:
+        spec: the validated spec.
+        provenance: dotted path of every value that was written: `pick.yaml:14:7`, `-o physics.dt=0.004`, or `data`.
+        files: the files that were read; what is extended comes before what extends it.
+        data: the merged mapping as plain data, as it was validated.
+    """
+
+    spec: M
+    provenance: Mapping[str, str]
+    files: tuple[Path, ...]
+    data: Mapping[str, Any]
+
+    def where(self, path: str) -> str:
+        """Where the value at a dotted path came from; `default` where no file gives it.
+
+        Raises:
+            KeyError: the spec has no such path.
+        """
+        if path in self.provenance:
+            return self.provenance[path]
+        place: object = self.spec.model_dump(by_alias=True)
+        for part in path.split("."):
+            children = _children(place)
+            if part not in children:
+                raise KeyError(f"the spec has no '{path}'{suggest(part, list(children))}")
+            place = children[part]
+        return "default"
+
+
+def _children(value: object) -> dict[str, object]:
+    """The entries of a mapping by key, the items of a list by index."""
+    if isinstance(value, Mapping):
+        return {str(key): child for key, child in cast("Mapping[object, object]", value).items()}
+    return (
+        {str(i): item for i, item in enumerate(cast("Sequence[object]", value))}
+        if isinstance(value, tuple | list)
+        else {}
+    )
+
+
+LoadedRun = Loaded[RunSpec]
+
+
+def load_run(
+    sources: Source | Sequence[Source],
+    *,
+    overrides: Iterable[str] = (),
+    resolver: OptionsResolver | None = None,
+    extends: ExtendsResolver | None = None,
+    base_data: Mapping[str, Any] | None = None,
+) -> LoadedRun:
+    """`load` for the root of a run."""
+    return load(RunSpec, sources, overrides=overrides, resolver=resolver, extends=extends, base_data=base_data)
+
+
+def load(
+    model: type[M],
+    sources: Source | Sequence[Source],
+    *,
+    overrides: Iterable[str] = (),
+    resolver: OptionsResolver | None = None,
+    extends: ExtendsResolver | None = None,
+    base_data: Mapping[str, Any] | None = None,
+) -> Loaded[M]:
+    """Read, merge and validate a spec.
+
+    Args:
+        model: the spec at the root.
+        sources: files or mappings; of several the later is merged on top.
+        overrides: `physics.dt=0.004`, on top of the files, in order.
+        resolver: the models of plugins' options; without it the slots of plugins are not checked.
+        extends: turns `scheme:name` in `extends:` into the path of a file.
+        base_data: data beneath all files, such as an engine chosen by the environment.
+
+    Raises:
+        SpecError: holds everything that is wrong, in the order of the files.
+    """
+    shapes = (Shape(model),)
+    overrides = tuple(overrides)
+    reader = Reader(shapes, extends)
+    given = [sources] if isinstance(sources, str | Path | Mapping) else list(sources)
+    nodes = [None if base_data is None else from_data(base_data), *(reader.read(source) for source in given)]
+    order = [*reader.names, *map(override_name, overrides)]
+    faults = reader.faults
+    if reader.fatal:
+        raise SpecError(in_order([*reader.fatal, *faults], order))
+    root = override(reader.merged(nodes), overrides, shapes, faults)
+    refused = {fault.mark for fault in faults if fault.mark.line}  # what such a value is taken for says nothing new
+    data = root.plain()
+    spec, invalid = _validated(model, root, data)
+    if resolver is not None:
+        invalid += check_slots(model, root, resolver)
+    if spec is None or faults or invalid:
+        raise SpecError(in_order([*faults, *(fault for fault in invalid if fault.mark not in refused)], order))
+    provenance = {path: str(mark) or "data" for path, mark in places(root, shapes)}
+    return Loaded(spec, provenance, tuple(reader.files), data)
+
+
+def _validated(model: type[M], root: Node, data: Mapping[str, Any]) -> tuple[M | None, list[Fault]]:
+    try:
+        return model.model_validate(data), []
+    except ValidationError as error:
+        return None, locate(error, model, root)
