@@ -5,8 +5,8 @@ A nine-joint arm with a gripper and five boxes, built by hand, so that nothing b
     python benchmarks/step_mujoco.py            # N = 1, 16, 64, 256
     python benchmarks/step_mujoco.py 1 1024     # other numbers of envs
 
-Both loops run interleaved in one process; the best of many short rounds of each counts. `anysim benchmark` measures the
-same with the catalogue's Panda.
+Both loops take turns, one control step each, in one process; of each the fastest tenth counts, which other load on the
+machine disturbs least. `anysim benchmark` measures the same with the catalogue's Panda.
 """
 
 import sys
@@ -17,14 +17,26 @@ import numpy as np
 
 from anysim.engine.factory import create_simulation
 from anysim.world.model import (
-    Actuator, Body, BodyKind, Box, Capsule, ControlMode, Entity, EntityKind, Geom, Inertial, Joint, JointType, Mimic,
-    Plane, World,
-)  # fmt: skip
+    Actuator,
+    Body,
+    BodyKind,
+    Box,
+    Capsule,
+    ControlMode,
+    Entity,
+    EntityKind,
+    Geom,
+    Inertial,
+    Joint,
+    JointType,
+    Mimic,
+    Plane,
+    World,
+)
 
 BOXES = 5
 SUBSTEPS = 10
-ROUNDS = 40
-CHUNK_STEPS = 400
+TURNS = 2000  # of one env; fewer of many
 
 
 def arm_and_boxes() -> World:
@@ -37,8 +49,21 @@ def arm_and_boxes() -> World:
     initial = (0.0, 0.3, 0.0, -1.2, 0.0, 1.2, 0.7)
     for i, (axis, length) in enumerate(zip(axes, lengths, strict=True)):
         inertial = Inertial(2.5 - 0.3 * i, (0.0, 0.0, length / 2), (0.02, 0.02, 0.005, 0.0, 0.0, 0.0))
-        bodies.append(Body(f"arm.link{i}", BodyKind.LINK, i, (0.0, 0.0, (0.0, *lengths)[i]), (0, 0, 0, 1), inertial, True))
-        joints.append(Joint(f"arm.joint{i}", i + 1, JointType.REVOLUTE, axis, lower=-2.8, upper=2.8, armature=0.1, initial=initial[i]))
+        bodies.append(
+            Body(f"arm.link{i}", BodyKind.LINK, i, (0.0, 0.0, (0.0, *lengths)[i]), (0, 0, 0, 1), inertial, True)
+        )
+        joints.append(
+            Joint(
+                f"arm.joint{i}",
+                i + 1,
+                JointType.REVOLUTE,
+                axis,
+                lower=-2.8,
+                upper=2.8,
+                armature=0.1,
+                initial=initial[i],
+            )
+        )
         geoms.append(Geom(f"arm.link{i}", i + 1, Capsule(0.05, length / 4), position=(0.0, 0.0, length / 2)))
         actuators.append(Actuator(f"arm.joint{i}", i, ControlMode.POSITION, 1000.0, 100.0, 87.0))
     for side, y in (("left", 1.0), ("right", -1.0)):
@@ -46,9 +71,18 @@ def arm_and_boxes() -> World:
         bodies.append(Body(f"arm.{side}", BodyKind.LINK, 7, (0.0, 0.0, 0.1), (0, 0, 0, 1), inertial, True))
         mimic = Mimic(7) if side == "right" else None
         joints.append(
-            Joint(f"arm.{side}", len(bodies) - 1, JointType.PRISMATIC, (0.0, y, 0.0), lower=0.0, upper=0.04, armature=0.1,
-                  initial=0.02, mimic=mimic)
-        )  # fmt: skip
+            Joint(
+                f"arm.{side}",
+                len(bodies) - 1,
+                JointType.PRISMATIC,
+                (0.0, y, 0.0),
+                lower=0.0,
+                upper=0.04,
+                armature=0.1,
+                initial=0.02,
+                mimic=mimic,
+            )
+        )
         geoms.append(Geom(f"arm.{side}", len(bodies) - 1, Box((0.01, 0.005, 0.02)), position=(0.0, 0.01 * y, 0.04)))
     actuators.append(Actuator("arm.grip", 7, ControlMode.POSITION, 1000.0, 20.0, 40.0))
     entities = [Entity("arm", EntityKind.ROBOT, 0, len(bodies), 0, len(joints))]
@@ -58,9 +92,13 @@ def arm_and_boxes() -> World:
         geoms.append(Geom(f"box{i}", len(bodies), Box((0.03, 0.03, 0.03))))
         bodies.append(Body(f"box{i}", BodyKind.FREE, position=(0.55, -0.3 + 0.15 * i, 0.03), inertial=cube))
     return World(
-        "arm_and_boxes", bodies=tuple(bodies), joints=tuple(joints), geoms=tuple(geoms), actuators=tuple(actuators),
+        "arm_and_boxes",
+        bodies=tuple(bodies),
+        joints=tuple(joints),
+        geoms=tuple(geoms),
+        actuators=tuple(actuators),
         entities=tuple(entities),
-    )  # fmt: skip
+    )
 
 
 def measure(world: World, num_envs: int) -> tuple[float, float, float]:
@@ -77,23 +115,22 @@ def measure(world: World, num_envs: int) -> tuple[float, float, float]:
             _ = state.joint_pos, state.joint_vel, state.body_pose, state.body_twist
 
         raw = engine.raw_loop()
-        assert raw is not None
-        calls = max(1, CHUNK_STEPS // (num_envs * SUBSTEPS))
-        ours_spent, raw_spent = _interleave(calls, (ours, lambda: raw(SUBSTEPS)))
-    return calls * SUBSTEPS * num_envs / raw_spent[0], raw_spent[0] / ours_spent[0], raw_spent[1] / ours_spent[1]
+        assert raw is not None  # MuJoCo has one
+        turns = max(40, TURNS // num_envs)
+        wall, cpu = _take_turns(turns, ours, lambda: raw(SUBSTEPS))
+    return SUBSTEPS * num_envs / wall[1], wall[1] / wall[0], cpu[1] / cpu[0]
 
 
-def _interleave(calls: int, loops: Sequence[Callable[[], None]]) -> list[tuple[float, float]]:
-    """The best wall and processor time [s] that each loop needed for so many calls."""
-    best = [(np.inf, np.inf)] * len(loops)
-    for _ in range(ROUNDS):
+def _take_turns(turns: int, *loops: Callable[[], None]) -> tuple[list[float], list[float]]:
+    """The wall and the processor time [s] of one call of each loop: the 10th percentile over so many turns."""
+    spent = np.empty((turns, len(loops), 2))
+    for turn in range(turns):
         for index, loop in enumerate(loops):
             wall, cpu = time.perf_counter(), time.process_time()
-            for _ in range(calls):
-                loop()
-            spent = (time.perf_counter() - wall, time.process_time() - cpu)
-            best[index] = (min(best[index][0], spent[0]), min(best[index][1], spent[1]))
-    return best
+            loop()
+            spent[turn, index] = time.perf_counter() - wall, time.process_time() - cpu
+    tenth = np.percentile(spent, 10, axis=0)
+    return tenth[:, 0].tolist(), tenth[:, 1].tolist()
 
 
 def main(sizes: Sequence[int]) -> None:

@@ -5,19 +5,17 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
+from anysim.conventions import WORLD, Array, wxyz_from_xyzw
+from anysim.engine.commands import MODES
+from anysim.errors import EngineError
+from anysim.world.model import Body, BodyKind, ContactSensor, Joint, JointType, World
+from anysim_mujoco.audit import UNLIMITED
 from anysim_mujoco.drives import feedback
 from anysim_mujoco.geoms import add_assets, add_geom, add_look
 from anysim_mujoco.inertia import check_physical, principal
 from anysim_mujoco.layout import Handles, Layout
 from anysim_mujoco.options import MujocoOptions
 from anysim_mujoco.surfaces import DRY_IMPEDANCE, STIFF_IMPEDANCE, constraint_solref
-from anysim.conventions import WORLD, Array, wxyz_from_xyzw
-from anysim.engine.commands import MODES
-from anysim.errors import EngineError
-from anysim.world.model import Body, BodyKind, ContactSensor, Joint, JointType, World
-
-UNLIMITED = 1e10
-"""Stands for infinity where MuJoCo wants a number: the open side of a limit."""
 
 
 class Built(NamedTuple):
@@ -56,8 +54,11 @@ def build(world: World, options: MujocoOptions) -> Built:
 
 
 def _forget_shared_frames(model: Any) -> None:
-    """Undo a shortcut of the compiler: it notes which frames coincide with a body's inertial frame and then takes one
-    for the other, which is wrong in an env whose centre of mass or inertia is changed."""
+    """Undo a shortcut of the compiler.
+
+    It notes which frames coincide with a body's inertial frame and then takes one for the other, which is wrong in an
+    env whose centre of mass or inertia is changed.
+    """
     frames = mujoco.mjtSameFrame
     model.body_sameframe[1:] = int(frames.mjSAMEFRAME_NONE)
     inertial = (int(frames.mjSAMEFRAME_INERTIA), int(frames.mjSAMEFRAME_INERTIAROT))
@@ -76,7 +77,8 @@ def initial_row(world: World, model: Any, layout: Layout) -> Array:
 def silence() -> None:
     """Keep MuJoCo from writing MUJOCO_LOG.TXT into the working directory, and to the terminal, in this process.
 
-    Faults are in `State.fault`; compile errors are exceptions. A log file of another name was somebody's choice and stays.
+    Faults are in `State.fault`, compile errors are exceptions. A log file of another name was
+    somebody's choice and stays.
     """
     config = mujoco.MjLogConfig.get()
     config.logto_console = False

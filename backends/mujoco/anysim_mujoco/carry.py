@@ -4,11 +4,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from anysim.conventions import Array
+from anysim.world.model import World
 from anysim_mujoco.layout import Layout
 from anysim_mujoco.parameters import Parameters
 from anysim_mujoco.state import StateReader
-from anysim.conventions import Array
-from anysim.world.model import World
 
 
 class Carried(NamedTuple):

@@ -1,6 +1,7 @@
 """What the engine declares without importing MuJoCo: capabilities, with measured errors, and availability."""
 
 import re
+from collections.abc import Mapping
 from functools import cache
 from importlib import metadata
 
@@ -8,7 +9,9 @@ from anysim.engine.capability import Capabilities, Capability
 from anysim.engine.state import Availability
 
 MINIMUM = (3, 17)
-WRONG = {(4, 0, 0): "its sparse solver gives wrong accelerations where articulated bodies touch each other"}
+WRONG: Mapping[tuple[int, ...], str] = {
+    (4, 0, 0): "its sparse solver is wrong where articulated bodies touch each other",
+}
 """Versions whose results cannot be trusted, and why."""
 
 REMEDY = "pip install 'mujoco>=3.17,!=4.0.0'"
@@ -17,8 +20,8 @@ _APPROXIMATE = {
     Capability.MIMIC_JOINTS: "a stiff soft constraint: 0.3 mm at 20 N on a gripper's finger of 15 g",
     Capability.JOINT_LIMITS: "a stiff soft constraint: 0.5 mrad beyond, pressed with 87 N m on 0.1 kg m^2",
     Capability.RESTITUTION: (
-        "an underdamped contact: within 0.07 of the coefficient, within 0.04 from 0.5 on, sinking 6 mm per m/s at 2 ms; "
-        "0 gives 0.13"
+        "an underdamped contact: within 0.07 of the coefficient, within 0.04 from 0.5 on; it sinks 6 mm "
+        "per m/s at 2 ms; 0 gives 0.13"
     ),
 }
 _ABSENT = (Capability.LIVE_EDIT_NATIVE,)

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from anysim.conventions import Array
 from anysim.engine.commands import MODES, Control
 from anysim.world.model import ControlMode, World
 
@@ -27,7 +26,6 @@ class Drives:
         n, actuators = batch.nsim, world.actuators
         self._batch = batch
         self._input = batch.bind("ctrl")
-        self._scratch = np.empty((n, len(actuators)))
         self._mode = np.tile(np.array([MODES.index(a.mode) for a in actuators], dtype=np.int8), (n, 1))
         self._modes = self._mode.tobytes()  # comparing bytes costs a tenth of comparing arrays
         self.kp = np.tile(np.array([a.kp for a in actuators], dtype=float), (n, 1))
@@ -40,11 +38,9 @@ class Drives:
         if modes != self._modes:
             self._mode[...], self._modes = control.mode, modes
             self.refresh()
-        scratch = self._scratch
-        np.multiply(control.position, self._stiffness, out=scratch)
-        scratch += control.effort
-        scratch += control.velocity * self._damping
-        self._input[...] = scratch
+        np.multiply(control.position, self._stiffness, out=self._input)
+        self._input += control.effort
+        self._input += control.velocity * self._damping
 
     def refresh(self) -> None:
         """Write the feedback of all envs, after a change of modes or gains."""

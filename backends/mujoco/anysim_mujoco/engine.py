@@ -7,15 +7,6 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch, SimulationError
 
-from anysim_mujoco import declared
-from anysim_mujoco.build import build, initial_row, silence
-from anysim_mujoco.carry import carried_rows, take_rows
-from anysim_mujoco.drives import Drives
-from anysim_mujoco.options import MujocoOptions
-from anysim_mujoco.parameters import Parameters
-from anysim_mujoco.query import Queries
-from anysim_mujoco.raw import raw_loop
-from anysim_mujoco.state import StateReader
 from anysim.conventions import Array, wxyz_from_xyzw, xyzw_from_wxyz
 from anysim.engine.base import SimEngine
 from anysim.engine.cameras import CameraView
@@ -24,6 +15,26 @@ from anysim.engine.commands import Control
 from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
 from anysim.math import pose as P
 from anysim.world.model import World
+from anysim_mujoco import declared
+from anysim_mujoco.audit import geom_volumes, joint_limits
+from anysim_mujoco.build import build, initial_row, silence
+from anysim_mujoco.carry import carried_rows, take_rows
+from anysim_mujoco.drives import Drives
+from anysim_mujoco.options import MujocoOptions
+from anysim_mujoco.parameters import Parameters
+from anysim_mujoco.query import Queries
+from anysim_mujoco.raw import raw_loop
+from anysim_mujoco.state import StateReader
+
+_VELOCITY_STAGE = mujoco.mjtStage.mjSTAGE_VEL.value
+"""After the last substep frames and velocities are brought up to date, which leaves the trajectory as it is."""
+
+
+_BUILT = (
+    "_model", "_layout", "_batch", "_rows", "_initial", "_qpos", "_qvel", "_mocap_pos", "_mocap_quat", "_wrenches",
+    "_drives", "_parameters", "_reader", "_fields", "_queries",
+)  # fmt: skip
+"""What `_build` makes and `_free` lets go of."""
 
 
 class MujocoEngine(SimEngine):
@@ -70,11 +81,11 @@ class MujocoEngine(SimEngine):
         self._painter: Any = None
 
     def _free(self) -> None:
-        if self._painter is not None:
-            self._painter.close()
-        for name in ("_batch", "_rows", "_qpos", "_qvel", "_mocap_pos", "_mocap_quat", "_wrenches", "_model", "_fields"):
-            setattr(self, name, None)
-        self._drives = self._parameters = self._reader = self._queries = self._painter = None  # type: ignore[assignment]
+        painter = vars(self).pop("_painter", None)
+        if painter is not None:
+            painter.close()
+        for name in _BUILT:
+            vars(self).pop(name, None)
 
     def _reset(self, ids: Array) -> None:
         self._rows[ids] = self._initial
@@ -86,7 +97,7 @@ class MujocoEngine(SimEngine):
     def _step(self, n_steps: int, ids: Array | None) -> None:
         self._parameters.settle()
         try:
-            self._batch.step(None if ids is None else np.sort(ids), n_steps, mujoco.mjtStage.mjSTAGE_VEL.value)
+            self._batch.step(None if ids is None else np.sort(ids), n_steps, _VELOCITY_STAGE)
         except SimulationError as error:
             self._reader.failed[error.ids] = True
         self._reader.stepped(ids)
@@ -165,6 +176,13 @@ class MujocoEngine(SimEngine):
     def _take_rows(self, carried: Any, old: World) -> None:
         layout, rows = carried
         take_rows(rows, old, layout, self.world, self._batch, self._layout, self._reader, self._parameters)
+
+    def read_back(self) -> Mapping[str, Array]:
+        """Limits and volumes as the compiled model has them."""
+        with self._lock:
+            self._require_world()
+            model, layout = self._model, self._layout
+            return {"joint.limits": joint_limits(model, layout), "geom.volume": geom_volumes(model, layout)}
 
     def raw_loop(self) -> Callable[[int], None]:
         """MuJoCo's own batch, stepped without this engine."""

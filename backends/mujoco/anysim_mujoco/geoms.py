@@ -5,12 +5,22 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from anysim_mujoco.options import MujocoOptions
-from anysim_mujoco.surfaces import contact_parameters
 from anysim.conventions import Array, wxyz_from_xyzw
 from anysim.world.model import (
-    Box, Capsule, Cylinder, Geom, HeightField, HeightFieldShape, Light, MeshShape, Plane, Sphere, World,
+    Box,
+    Capsule,
+    Cylinder,
+    Geom,
+    HeightField,
+    HeightFieldShape,
+    Light,
+    MeshShape,
+    Plane,
+    Sphere,
+    World,
 )  # fmt: skip
+from anysim_mujoco.options import MujocoOptions
+from anysim_mujoco.surfaces import contact_parameters
 
 VISIBLE, VISUAL_ONLY, COLLISION_ONLY, UNSEEN = range(4)
 """Geom groups: drawn and colliding, drawn, colliding, neither."""
@@ -52,8 +62,9 @@ def _add_light(spec: Any, light: Light, world: World, shadows: bool) -> None:
     """A light without a position is directional. Its shadow map still has a place: off the middle of the bodies."""
     direction = np.asarray(light.direction, dtype=float)
     middle = world.initial_body_pose[:, :3].mean(axis=0) if world.bodies else np.zeros(3)
+    away = middle - 4.0 * direction / np.linalg.norm(direction)
     element = spec.worldbody.add_light(
-        dir=direction, pos=middle - 4.0 * direction / np.linalg.norm(direction) if light.position is None else light.position,
+        dir=direction, pos=away if light.position is None else light.position,
         type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, diffuse=[light.intensity * c for c in light.color],
         specular=[0.2 * light.intensity] * 3, castshadow=shadows,
     )  # fmt: skip

@@ -1,7 +1,8 @@
 """OpenGL without a screen: one context per process, owned by one thread that all drawing is queued to.
 
-MuJoCo's EGL and OSMesa modules set PYOPENGL_PLATFORM when they are imported, which happens here, at the first image; the
-variable is put back to what it was. MUJOCO_GL is read and never written.
+MuJoCo's EGL and OSMesa modules set PYOPENGL_PLATFORM when they are imported, which happens here, at the first image;
+the variable is put back to what it was. MUJOCO_GL is read and never written. (Where a user has set MUJOCO_GL, `import
+mujoco` itself imports that module, and the variable stays.)
 """
 
 import atexit
@@ -54,7 +55,8 @@ class GlThread:
         def ask() -> str:
             from OpenGL import GL
 
-            return GL.glGetString(GL.GL_RENDERER).decode()
+            name: Any = GL.glGetString(GL.GL_RENDERER)
+            return name.decode()
 
         return self.call(ask)
 

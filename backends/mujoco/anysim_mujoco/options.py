@@ -21,7 +21,9 @@ class MujocoOptions(BaseModel):
     iterations: int = Field(default=100, ge=1, description="most iterations of the constraint solver")
     tolerance: float = Field(default=1e-8, ge=0, description="improvement at which the constraint solver stops")
     jacobian: Literal["auto", "dense", "sparse"] = Field(default="auto", description="auto: sparse from 60 dofs on")
-    memory_mb: int = Field(default=0, ge=0, description="memory for contacts per thread [MiB]; 0: MuJoCo's own estimate")
+    memory_mb: int = Field(
+        default=0, ge=0, description="memory for contacts per thread [MiB]; 0: MuJoCo's own estimate"
+    )
     gl: Literal["auto", "egl", "osmesa"] = Field(
         default="auto", description="how images are drawn; auto: what MUJOCO_GL says, else EGL, else OSMesa"
     )
@@ -37,5 +39,7 @@ class MujocoOptions(BaseModel):
         """The options that change trajectories, where they differ from the defaults; else an empty string."""
         shaping = ("integrator", "solver", "iterations", "tolerance", "jacobian")
         defaults = type(self)()
-        changed = [f"{name}={getattr(self, name)}" for name in shaping if getattr(self, name) != getattr(defaults, name)]
+        changed = [
+            f"{name}={getattr(self, name)}" for name in shaping if getattr(self, name) != getattr(defaults, name)
+        ]
         return ",".join(changed)

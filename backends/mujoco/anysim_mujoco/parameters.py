@@ -4,16 +4,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from anysim.conventions import Array
+from anysim.world.model import World
 from anysim_mujoco.drives import Drives
 from anysim_mujoco.inertia import check_physical, full, principal
 from anysim_mujoco.layout import Layout
-from anysim.conventions import Array
-from anysim.world.model import World
 
 
 class _Field(NamedTuple):
-    """A field of MjModel: the rows that belong to the World's things, the column that is the value, and whether
-    MuJoCo derives constants from it."""
+    """A field of MjModel: the rows of the World's things, the value's column, whether constants derive from it."""
 
     name: str
     rows: Array

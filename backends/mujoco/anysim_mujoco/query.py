@@ -5,11 +5,11 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from anysim.conventions import Array
+from anysim.engine.state import ContactPoints, RayHits
 from anysim_mujoco.geoms import COLLIDING_GROUPS
 from anysim_mujoco.layout import Layout
 from anysim_mujoco.parameters import Parameters
-from anysim.conventions import Array
-from anysim.engine.state import ContactPoints, RayHits
 
 
 class Queries:
@@ -25,9 +25,7 @@ class Queries:
     def raycast(self, origins: Array, directions: Array, ids: Array) -> RayHits:
         """First hits with collision geometry; meshes are hit at their triangles."""
         order = np.argsort(ids)
-        distance, geom = self._batch.ray(
-            origins[order], directions[order], geomgroup=self._groups, ids=ids[order]
-        )
+        distance, geom = self._batch.ray(origins[order], directions[order], geomgroup=self._groups, ids=ids[order])
         entity = np.where(geom < 0, -1, self._layout.geom_entity[geom])
         back = np.argsort(order)
         return RayHits(np.where(geom < 0, np.inf, distance)[back], entity[back])

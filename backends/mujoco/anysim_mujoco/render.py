@@ -6,14 +6,14 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from anysim.conventions import Array
+from anysim.engine.cameras import CameraView
+from anysim.math import pose as P
 from anysim_mujoco.geoms import DRAWN_GROUPS
 from anysim_mujoco.gl import gl_thread
 from anysim_mujoco.layout import Layout
 from anysim_mujoco.options import MujocoOptions
 from anysim_mujoco.query import Queries
-from anysim.conventions import Array
-from anysim.engine.cameras import CameraView
-from anysim.math import pose as P
 
 _SEGMENT, _ID_COLOR = int(mujoco.mjtRndFlag.mjRND_SEGMENT), int(mujoco.mjtRndFlag.mjRND_IDCOLOR)
 
@@ -113,6 +113,6 @@ def _make_context(model: Any) -> Any:
 
 
 def _metres(raw: Array, near: float, far: float) -> Array:
-    """Distance along the optical axis from a reversed depth buffer: 1 at the near plane, 0 at the far one and beyond."""
+    """Distance along the optical axis from a reversed depth buffer: 1 at the near plane, 0 from the far one on."""
     inverse = 1 / far + raw.astype(np.float64) * (1 / near - 1 / far)
     return np.where(raw > 0, 1 / inverse, np.inf).astype(np.float32)

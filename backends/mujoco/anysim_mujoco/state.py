@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from anysim_mujoco.layout import Layout, as_slice
 from anysim.conventions import Array
 from anysim.engine.state import FIELDS
+from anysim_mujoco.layout import Layout, as_slice
 
 _FATAL = [
     int(kind)
@@ -43,6 +43,15 @@ class _TwistColumns(NamedTuple):
         )
 
 
+def _columns(at: Array, *arrays: Array) -> Callable[[], tuple[Array, ...]]:
+    """Reads columns of live arrays: views made once where the columns are consecutive, else gathered at each read."""
+    chosen = as_slice(at)
+    if isinstance(chosen, slice):
+        views = tuple(array[:, chosen] for array in arrays)
+        return lambda: views
+    return lambda: tuple(array[:, at] for array in arrays)
+
+
 class StateReader:
     """What the last substep left behind, per env.
 
@@ -54,15 +63,17 @@ class StateReader:
     def __init__(self, batch: Any, layout: Layout) -> None:
         self._batch, self._layout = batch, layout
         self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
-        self._xpos, self._xquat = batch.bind("xpos"), batch.bind("xquat")
+        self._pose_parts = _columns(layout.bodies, batch.bind("xpos"), batch.bind("xquat"))
         n = batch.nsim
         self._velocity, self._position, self._center = (
             batch.bind(name).reshape(n, -1) for name in ("cvel", "xpos", "subtree_com")
         )
         self._take = _TwistColumns.of(layout)
-        self._effort, self._sensordata = batch.bind("qfrc_actuator"), batch.bind("sensordata")
-        self._bodies = as_slice(layout.bodies)
-        self._joint_q, self._joint_v = as_slice(layout.joint_q), as_slice(layout.joint_v)
+        self._sensordata = batch.bind("sensordata")
+        self._joint_pos, self._joint_vel, self._effort = (
+            _columns(at, batch.bind(name))
+            for at, name in ((layout.joint_q, "qpos"), (layout.joint_v, "qvel"), (layout.joint_v, "qfrc_actuator"))
+        )
         self._stale = np.zeros(n, dtype=bool)
         self._any_stale = False
         self._held = np.zeros(n, dtype=bool)
@@ -105,13 +116,13 @@ class StateReader:
     def body_pose(self) -> Array:
         if self._any_stale:
             self._forward()
-        quaternion = self._xquat[:, self._bodies]
-        return np.concatenate((self._xpos[:, self._bodies], quaternion[..., 1:], quaternion[..., :1]), axis=2)
+        position, quaternion = self._pose_parts()
+        return np.concatenate((position, quaternion[..., 1:], quaternion[..., :1]), axis=2)
 
     def body_twist(self) -> Array:
-        """cvel is the angular velocity, then the linear one of the point at the centre of mass of the whole tree; the
-        frame's is less by the angular velocity x the arm. Six products at once, then three differences: numpy's cost
-        per call is what counts for one env."""
+        # cvel is the angular velocity, then the linear one of the point at the centre of mass of the whole tree; the
+        # frame's differs by the angular velocity x the arm. Six products at once and then their differences: for one
+        # env it is the number of calls of numpy that costs
         if self._any_stale:
             self._forward()
         velocity, take = self._velocity, self._take
@@ -124,13 +135,13 @@ class StateReader:
         return twist
 
     def joint_pos(self) -> Array:
-        return self._qpos[:, self._joint_q].copy()
+        return self._joint_pos()[0].copy()
 
     def joint_vel(self) -> Array:
-        return self._qvel[:, self._joint_v].copy()
+        return self._joint_vel()[0].copy()
 
     def joint_effort(self) -> Array:
-        effort = self._effort[:, self._joint_v].copy()
+        effort = self._effort()[0].copy()
         if self._any_held:
             effort[self._held] = self._held_effort[self._held]
         return effort

@@ -173,7 +173,6 @@ class SimEngine(Primitives):
     def get_state(self) -> State:
         """The state of all envs now: read lazily, cached until the engine moves on."""
         with self._lock:
-            self._require_world()
             if self._state is None:
                 self._state = State(self._read_locked, self._ticks * self.world.physics.dt)
             return self._state

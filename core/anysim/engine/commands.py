@@ -1,6 +1,7 @@
 """Commands persist until they are written again; wrenches last for one call. This buffer holds both for all engines."""
 
 from collections.abc import Mapping
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -54,7 +55,8 @@ class CommandBuffer:
                 continue
             if ids is None and which is None:
                 values = np.asarray(values, dtype=np.float64)
-                if values.shape != buffer.shape or not np.isfinite(values).all():
+                # a finite sum of squares has finite terms, and is found three times as fast; else each term is checked
+                if values.shape != buffer.shape or not isfinite(np.vdot(values, values)):
                     values = checked_rows(name, values, buffer.shape)
                 buffer[...] = values
             else:

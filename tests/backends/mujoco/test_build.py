@@ -7,8 +7,18 @@ import pytest
 
 from anysim.errors import EngineError
 from anysim.world.model import (
-    Body, BodyKind, Box, Geom, HeightField, HeightFieldShape, Inertial, Mesh, MeshShape, Plane, World,
-)  # fmt: skip
+    Body,
+    BodyKind,
+    Box,
+    Geom,
+    HeightField,
+    HeightFieldShape,
+    Inertial,
+    Mesh,
+    MeshShape,
+    Plane,
+    World,
+)
 
 
 def test_initial_state_is_the_worlds(worlds, make):
@@ -35,14 +45,20 @@ def test_a_refusal_carries_mujocos_words_and_the_body(worlds, make):
     """A moving body without mass: MuJoCo's message, with the World's name."""
     world = worlds.scene()
     bodies = (replace(world.bodies[0], name="feather", inertial=Inertial(0.0)), *world.bodies[1:])
-    with pytest.raises(EngineError, match=r"cannot build the world 'scene'.*mass and inertia of moving bodies.*'feather'"):
+    with pytest.raises(
+        EngineError, match=r"cannot build the world 'scene'.*mass and inertia of moving bodies.*'feather'"
+    ):
         make(replace(world, bodies=bodies))
 
 
 def test_an_impossible_inertia_is_refused_by_name(worlds, make):
     """The triangle inequality, with the moments in the message."""
     world = worlds.scene()
-    bodies = (world.bodies[0], replace(world.bodies[1], inertial=Inertial(1.0, inertia=(1.0, 0.1, 0.1, 0, 0, 0))), *world.bodies[2:])
+    bodies = (
+        world.bodies[0],
+        replace(world.bodies[1], inertial=Inertial(1.0, inertia=(1.0, 0.1, 0.1, 0, 0, 0))),
+        *world.bodies[2:],
+    )
     with pytest.raises(EngineError, match=r"inertia of body 'box' belongs to no rigid body"):
         make(replace(world, bodies=bodies))
 
@@ -67,7 +83,9 @@ def test_a_base_and_its_first_link_never_collide(worlds, make):
 def test_excluded_pairs_pass_through_each_other(worlds, make):
     """The ball falls through a box under it only if the pair is excluded."""
     half = (0.1, 0.1, 0.1)
-    world = worlds.with_body(worlds.ball(0.5), Body("box", BodyKind.STATIC, position=(0.0, 0.0, 0.1)), Geom("box", 0, Box(half)))
+    world = worlds.with_body(
+        worlds.ball(0.5), Body("box", BodyKind.STATIC, position=(0.0, 0.0, 0.1)), Geom("box", 0, Box(half))
+    )
     heights = []
     for pairs in (frozenset(), frozenset({(0, 1)})):
         engine = make(replace(world, excluded_pairs=pairs))
@@ -98,7 +116,9 @@ def test_height_fields_have_row_0_at_the_lowest_y(make):
     heights = np.zeros((5, 9))
     heights[0, 8] = 0.7  # y = -1, x = 2
     heights[4, 0] = -0.3  # y = 1, x = -2
-    world = World(geoms=(Geom("hills", -1, HeightFieldShape("f")),), heightfields=(HeightField("f", heights, (4.0, 2.0)),))
+    world = World(
+        geoms=(Geom("hills", -1, HeightFieldShape("f")),), heightfields=(HeightField("f", heights, (4.0, 2.0)),)
+    )
     origins = np.array([[[1.999, -0.999, 3.0], [-1.999, 0.999, 3.0], [0.0, 0.0, 3.0]]])
     hits = make(world).raycast(origins, np.broadcast_to([0.0, 0.0, -1.0], origins.shape))
     assert np.allclose(3.0 - hits.distance, [[0.7, -0.3, 0.0]], atol=5e-3)
@@ -124,9 +144,10 @@ def _pyramid() -> Mesh:
 def test_meshes_are_where_their_vertices_are(make):
     """A mesh from memory, on a body, hit by rays at its faces."""
     world = World(
-        bodies=(Body("m", BodyKind.STATIC, position=(0.0, 0.0, 1.0)),), geoms=(Geom("m", 0, MeshShape("pyramid")),),
+        bodies=(Body("m", BodyKind.STATIC, position=(0.0, 0.0, 1.0)),),
+        geoms=(Geom("m", 0, MeshShape("pyramid")),),
         meshes=(_pyramid(),),
-    )  # fmt: skip
+    )
     origins = np.array([[[0.31, 0.01, 3.0], [0.0, 0.0, 3.0]]])
     hits = make(world).raycast(origins, np.broadcast_to([0.0, 0.0, -1.0], origins.shape))
     assert hits.distance[0, 0] == pytest.approx(2.0 - 0.18, abs=1e-5)
@@ -159,6 +180,21 @@ def test_planes_stand_where_they_are_put(worlds, make):
     engine = make(replace(world, geoms=(ground, world.geoms[1])))
     engine.step(1500)
     assert engine.get_state().body_pose[0, 0, 2] == pytest.approx(0.45, abs=1e-3)
+
+
+def test_limits_and_volumes_are_read_back(worlds, make):
+    """From the compiled model: open sides are infinite, what does not collide has no volume."""
+    world = worlds.scene()
+    world = replace(
+        world,
+        geoms=(*world.geoms, Geom("mesh", 4, MeshShape("pyramid")), Geom("picture", 4, Box((1, 1, 1)), collides=False)),
+        meshes=(_pyramid(),),
+    )
+    found = make(world).read_back()
+    assert found["joint.limits"].tolist() == [[-2.0, 2.0], [-np.inf, np.inf]]
+    ball, box, capsule = 4 / 3 * np.pi * 0.05**3, 0.008, np.pi * 0.03**2 * 0.3 + 4 / 3 * np.pi * 0.03**3
+    wanted = [0.0, ball, box, box, capsule, 8 * 0.1 * 0.02 * 0.02, 0.2**3 / 6, 0.0]
+    assert np.allclose(found["geom.volume"], wanted, rtol=1e-5)
 
 
 def test_options_that_do_not_exist(make, worlds):

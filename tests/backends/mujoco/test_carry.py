@@ -17,17 +17,27 @@ def _shared(engine) -> np.ndarray:
     """The state of what is in the plain scene, by name."""
     state = engine.get_state()
     bodies = [engine.index.body(name) for name in ("ball", "box", "base", "upper", "lower")]
-    fields = (state.joint_pos, state.joint_vel, state.joint_effort, state.contact_force, state.body_pose[:, bodies], state.body_twist[:, bodies])
+    fields = (
+        state.joint_pos,
+        state.joint_vel,
+        state.joint_effort,
+        state.contact_force,
+        state.body_pose[:, bodies],
+        state.body_twist[:, bodies],
+    )
     return np.concatenate([np.reshape(f, (engine.num_envs, -1)) for f in fields], axis=1)
 
 
 @pytest.mark.parametrize(
     ("kind", "position", "options"),
-    [("static", (20.0, 0.0, 0.0), {}), ("static", (20.0, 0.0, 0.0), {"jacobian": "sparse"}),
-     ("free", (20.0, 0.0, 100.0), {"jacobian": "sparse"})],
-)  # fmt: skip
+    [
+        ("static", (20.0, 0.0, 0.0), {}),
+        ("static", (20.0, 0.0, 0.0), {"jacobian": "sparse"}),
+        ("free", (20.0, 0.0, 100.0), {"jacobian": "sparse"}),
+    ],
+)
 def test_others_go_on_bit_for_bit(worlds, make, shake, kind, position, options):
-    """An object far away appears and leaves again; 200 control steps each time, against an engine that saw none of it."""
+    """An object far away appears and leaves again, 200 control steps each, beside an engine that saw none of it."""
     engine, alone = make(worlds.scene(), 2, **options), make(worlds.scene(), 2, **options)
     for e in (engine, alone):
         e.set_parameters("body.inertia", [[[0.011, 0.012, 0.013, 0.001, -0.002, 0.0005]]], [1], [1])

@@ -149,7 +149,9 @@ def test_gravity_compensation_holds_an_undriven_link(make, worlds):
     from anysim.world.model import Physics
 
     world = worlds.hinge(0.1, mode="effort")
-    arm = replace(world.bodies[1], gravity_compensation=True, inertial=world.bodies[1].inertial._replace(com=(0.3, 0.0, 0.0)))
+    arm = replace(
+        world.bodies[1], gravity_compensation=True, inertial=world.bodies[1].inertial._replace(com=(0.3, 0.0, 0.0))
+    )
     engine = make(replace(world, physics=Physics(), bodies=(world.bodies[0], arm)))
     engine.step(500)
     assert abs(engine.get_state().joint_pos[0, 0]) < 1e-12

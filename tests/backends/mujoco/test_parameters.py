@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from anysim_mujoco.inertia import full, principal
 
 from anysim.errors import EngineError
+from anysim_mujoco.inertia import full, principal
 
 
 def test_principal_axes_and_back():
@@ -32,8 +32,21 @@ def test_same_values_give_the_same_bits(worlds, make, shake):
     assert all(np.array_equal(a, b) for a, b in zip(shake(plain), shake(written), strict=True))
 
 
-@pytest.mark.parametrize("name", ["body.mass", "body.com", "body.inertia", "joint.damping", "joint.friction",
-                                  "joint.armature", "actuator.kp", "actuator.kd", "world.gravity", "geom.friction"])  # fmt: skip
+@pytest.mark.parametrize(
+    "name",
+    [
+        "body.mass",
+        "body.com",
+        "body.inertia",
+        "joint.damping",
+        "joint.friction",
+        "joint.armature",
+        "actuator.kp",
+        "actuator.kd",
+        "world.gravity",
+        "geom.friction",
+    ],
+)
 def test_a_changed_env_moves_like_a_world_with_that_value(worlds, make, shake, name):
     """Against a model compiled with the value, and the other env against the one without."""
     from dataclasses import replace
@@ -49,7 +62,9 @@ def test_a_changed_env_moves_like_a_world_with_that_value(worlds, make, shake, n
         "actuator.kp": lambda w: replace(w, actuators=tuple(replace(a, kp=70.0) for a in w.actuators)),
         "actuator.kd": lambda w: replace(w, actuators=tuple(replace(a, kd=7.0) for a in w.actuators)),
         "world.gravity": lambda w: replace(w, physics=replace(w.physics, gravity=(1.0, 0.0, -3.0))),
-        "geom.friction": lambda w: replace(w, geoms=tuple(replace(g, surface=replace(g.surface, friction=0.1)) for g in w.geoms)),
+        "geom.friction": lambda w: replace(
+            w, geoms=tuple(replace(g, surface=replace(g.surface, friction=0.1)) for g in w.geoms)
+        ),
     }[name](world)
     engine, compiled, plain = make(world, 2), make(changed), make(world)
     engine.set_parameters(name, compiled.get_parameters(name), [1])
@@ -66,7 +81,10 @@ def _bodies(world, **changes):
     from dataclasses import replace
 
     # the lower link: its geom sits elsewhere than its centre of mass, and must stay there
-    return replace(world, bodies=(*world.bodies[:4], replace(world.bodies[4], inertial=world.bodies[4].inertial._replace(**changes))))
+    return replace(
+        world,
+        bodies=(*world.bodies[:4], replace(world.bodies[4], inertial=world.bodies[4].inertial._replace(**changes))),
+    )
 
 
 def test_geoms_stay_when_the_centre_of_mass_moves(make, worlds):
@@ -76,7 +94,9 @@ def test_geoms_stay_when_the_centre_of_mass_moves(make, worlds):
     from anysim.world.model import Body, BodyKind, Geom, Inertial, Sphere, World
 
     turn = (0.5, 0.5, 0.5, 0.5)
-    body = Body("b", BodyKind.FREE, inertial=Inertial(1.0, (0.0, 0.0, 0.1), (0.011, 0.012, 0.013, 0.001, -0.002, 0.0005)))
+    body = Body(
+        "b", BodyKind.FREE, inertial=Inertial(1.0, (0.0, 0.0, 0.1), (0.011, 0.012, 0.013, 0.001, -0.002, 0.0005))
+    )
     world = World(bodies=(body,), geoms=(Geom("g", 0, Sphere(0.05), (0.0, 0.0, 0.1)),))
     engine = make(world)
     engine.destroy()

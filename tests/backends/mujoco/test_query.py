@@ -1,5 +1,7 @@
 """Rays and contact points."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -23,9 +25,12 @@ def test_rays_hit_the_nearest_and_name_it(worlds, make):
 def test_rays_see_collision_geometry_only(worlds, make):
     """A picture of a wall stops no ray; an invisible wall does, even a transparent one."""
     world = worlds.ball(5.0)
-    for name, x, kwargs in (
-        ("picture", 1.0, {"collides": False}), ("glass", 2.0, {"visible": False}), ("clear", 3.0, {"color": (1.0, 1.0, 1.0, 0.0)}),
-    ):  # fmt: skip
+    looks: list[tuple[str, float, Any]] = [
+        ("picture", 1.0, {"collides": False}),
+        ("glass", 2.0, {"visible": False}),
+        ("clear", 3.0, {"color": (1.0, 1.0, 1.0, 0.0)}),
+    ]
+    for name, x, kwargs in looks:
         body = Body(name, BodyKind.STATIC, position=(x, 0.0, 0.5))
         world = worlds.with_body(world, body, Geom(name, 0, Box((0.1, 0.1, 0.1)), **kwargs))
     engine = make(world)

@@ -154,7 +154,9 @@ def test_lights_and_shadows(make):
     base = two_boxes()
     lamp = Light("lamp", (1.0, 0.0, -0.5), color=(1.0, 1.0, 1.0))
     plain = make(base).render("top")["rgb"]
-    lit, shaded = (make(replace(base, lights=(lamp,)), shadows=s).render("top")["rgb"][0].astype(int) for s in (False, True))
+    lit, shaded = (
+        make(replace(base, lights=(lamp,)), shadows=s).render("top")["rgb"][0].astype(int) for s in (False, True)
+    )
     assert not np.array_equal(plain[0], lit)
     assert (lit[ROW, 26:31].mean(axis=-1) - shaded[ROW, 26:31].mean(axis=-1)).max() > 20
 
@@ -170,7 +172,17 @@ def test_the_same_view_is_the_same_picture(make):
 
 def test_engines_draw_side_by_side_and_after_each_other(make):
     """One context serves them all; destroying one leaves the others."""
-    one, two = make(two_boxes()), make(replace(two_boxes(), bodies=two_boxes().bodies[:1], geoms=two_boxes().geoms[:2], entities=two_boxes().entities[:1]))
+    one, two = (
+        make(two_boxes()),
+        make(
+            replace(
+                two_boxes(),
+                bodies=two_boxes().bodies[:1],
+                geoms=two_boxes().geoms[:2],
+                entities=two_boxes().entities[:1],
+            )
+        ),
+    )
     first = one.render("top")["rgb"]
     second = two.render("top", channels=("segmentation",))["segmentation"]
     assert set(np.unique(second)) == {0, 1}
@@ -204,7 +216,8 @@ def test_drawing_changes_no_trajectory(worlds, make, shake):
     """Images are looks."""
     seen, unseen = make(worlds.scene(), 2), make(worlds.scene(), 2)
     seen.render("default", 64, 64, channels=("rgb", "depth", "segmentation"))
-    shake(seen, 5), shake(unseen, 5)
+    shake(seen, 5)
+    shake(unseen, 5)
     seen.render("default", 64, 64)
     assert all(np.array_equal(a, b) for a, b in zip(shake(seen), shake(unseen), strict=True))
 

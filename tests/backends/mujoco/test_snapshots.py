@@ -54,7 +54,11 @@ def test_a_snapshot_without_parameters_undoes_them(worlds, make, shake):
     shake(engine, seed=1)
     snapshot = engine.snapshot([0])
     wanted = [rows[0] for rows in shake(engine, seed=2)]
-    for name, value in (("body.inertia", [[[0.02, 0.02, 0.02, 0.0, 0.001, 0.0]]]), ("body.mass", [[3.0]]), ("body.com", [[[0.0, 0.1, 0.0]]])):
+    for name, value in (
+        ("body.inertia", [[[0.02, 0.02, 0.02, 0.0, 0.001, 0.0]]]),
+        ("body.mass", [[3.0]]),
+        ("body.com", [[[0.0, 0.1, 0.0]]]),
+    ):
         engine.set_parameters(name, value, [0], [1])
     engine.restore(snapshot, [0])
     assert _equal([rows[0] for rows in shake(engine, seed=2)], wanted)
@@ -109,13 +113,18 @@ def test_partial_steps_leave_the_others_alone(worlds, make, shake):
     reference = make(worlds.scene(), 1)
     shake(reference, 5, seed=1)
     before = engine.get_state()
-    kept = [getattr(before, name).copy() for name in ("body_pose", "body_twist", "joint_vel", "joint_effort", "contact_force")]
+    kept = [
+        getattr(before, name).copy()
+        for name in ("body_pose", "body_twist", "joint_vel", "joint_effort", "contact_force")
+    ]
     stepped = shake(engine, 10, seed=2, ids=[3, 1])
     for rows, one in zip(stepped, shake(reference, 10, seed=2), strict=True):
         assert np.array_equal(rows[0], one[0])
         assert np.array_equal(rows[1], one[0])
     after = engine.get_state()
-    for name, value in zip(("body_pose", "body_twist", "joint_vel", "joint_effort", "contact_force"), kept, strict=True):
+    for name, value in zip(
+        ("body_pose", "body_twist", "joint_vel", "joint_effort", "contact_force"), kept, strict=True
+    ):
         assert np.array_equal(getattr(after, name)[[0, 2]], value[[0, 2]])
     assert np.allclose(after.time, [0.05, 0.15, 0.05, 0.15])
 

@@ -135,7 +135,9 @@ def test_too_little_memory_for_contacts_is_a_fault(worlds, make):
 
     for i in range(30):
         half = (0.2, 0.2, 0.05)
-        body = Body(f"b{i}", BodyKind.FREE, position=(3.0, 0.0, 0.05 + 0.099 * i), inertial=worlds.box_inertial(1.0, half))
+        body = Body(
+            f"b{i}", BodyKind.FREE, position=(3.0, 0.0, 0.05 + 0.099 * i), inertial=worlds.box_inertial(1.0, half)
+        )
         world = worlds.with_body(world, body, Geom(f"b{i}", 0, Box(half)))
     starved, fed = make(world, memory_mb=1, jacobian="dense"), make(world)
     starved.step(5)

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from anysim_mujoco.surfaces import damping_ratio, rebound
 
 from anysim.world.model import Body, BodyKind, Box, Geom, Inertial, Plane, Surface, World
+from anysim_mujoco.surfaces import damping_ratio, rebound
 
 
 @pytest.mark.parametrize("restitution", [0.05, 0.1353, 0.3, 0.5, 0.9, 0.99])
@@ -52,12 +52,13 @@ def _slope(angle: float, surface: Surface, ground: Surface) -> World:
     half = (0.1, 0.1, 0.02)
     turn = (0.0, np.sin(angle / 2), 0.0, np.cos(angle / 2))
     up = np.array([np.sin(angle), 0.0, np.cos(angle)]) * 0.02
-    inertial = Inertial(
-        1.0, inertia=(3.5e-3, 3.5e-3, 6.7e-3, 0.0, 0.0, 0.0)
-    )
+    inertial = Inertial(1.0, inertia=(3.5e-3, 3.5e-3, 6.7e-3, 0.0, 0.0, 0.0))
     return World(
         bodies=(Body("box", BodyKind.FREE, position=tuple(up), quaternion=turn, inertial=inertial),),
-        geoms=(Geom("ground", -1, Plane(), quaternion=turn, surface=ground), Geom("box", 0, Box(half), surface=surface)),
+        geoms=(
+            Geom("ground", -1, Plane(), quaternion=turn, surface=ground),
+            Geom("box", 0, Box(half), surface=surface),
+        ),
     )
 
 
