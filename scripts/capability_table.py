@@ -69,7 +69,9 @@ def main() -> int:
             continue
         drifted += 1
         if check:
-            sys.stderr.write(f"{path.relative_to(ROOT)}: the table of engines has drifted; run python scripts/capability_table.py\n")
+            sys.stderr.write(
+                f"{path.relative_to(ROOT)}: the table of engines has drifted; run python scripts/capability_table.py\n"
+            )
         else:
             path.write_text(new, encoding="utf-8")
     return 1 if check and drifted else 0

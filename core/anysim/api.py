@@ -59,7 +59,9 @@ def load(*sources: str | Path | Mapping[str, Any], overrides: Sequence[str] = ()
     return load_run(resolved, overrides=overrides, resolver=resolve_options, extends=_extends)
 
 
-def compile_world(source: "str | Path | LoadedRun | RunSpec | Mapping[str, Any]", overrides: Sequence[str] = ()) -> "World":
+def compile_world(
+    source: "str | Path | LoadedRun | RunSpec | Mapping[str, Any]", overrides: Sequence[str] = ()
+) -> "World":
     """The neutral World of a file, an installed task, or a spec.
 
     Raises:
@@ -145,7 +147,11 @@ def make(
         SpecError: the file, with line and column.
         CapabilityError: the engine cannot run this world; nothing was built.
     """
-    more = [*overrides, *([f"engine={json.dumps(engine)}"] if engine else []), *([f"num_envs={num_envs}"] if num_envs else [])]
+    more = [
+        *overrides,
+        *([f"engine={json.dumps(engine)}"] if engine else []),
+        *([f"num_envs={num_envs}"] if num_envs else []),
+    ]
     if isinstance(source, Loaded):
         loaded = load(source.data, overrides=more) if more else source
     else:

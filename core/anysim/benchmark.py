@@ -37,7 +37,14 @@ def panda_and_boxes() -> dict[str, Any]:
     """The world of the step benchmark: a Panda and five boxes on the ground."""
     boxes = {f"box{i}": {"source": {"box": [0.06, 0.06, 0.06]}, "density": 500.0} for i in range(BOXES)}
     layout = {f"box{i}": {"on": "terrain", "x": 0.45, "y": -0.3 + 0.15 * i} for i in range(BOXES)}
-    return {"world": {"name": "panda_and_boxes", "robots": {"panda": {"robot": "franka_panda"}}, "objects": boxes, "layout": layout}}
+    return {
+        "world": {
+            "name": "panda_and_boxes",
+            "robots": {"panda": {"robot": "franka_panda"}},
+            "objects": boxes,
+            "layout": layout,
+        }
+    }
 
 
 def engine_cost(engine_name: str, num_envs: int, rounds: int = 7) -> StepCost:
@@ -46,8 +53,8 @@ def engine_cost(engine_name: str, num_envs: int, rounds: int = 7) -> StepCost:
     Raises:
         EngineError: the engine offers no raw loop.
     """
-    from anysim.engine.factory import create_simulation
     from anysim.api import compile_world
+    from anysim.engine.factory import create_simulation
 
     world = compile_world(panda_and_boxes())
     with create_simulation(engine_name) as engine:

@@ -7,10 +7,11 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
-from anysim.adapters.gymnasium import GymEnv, GymVectorEnv
-from anysim.errors import TaskError
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+from anysim.adapters.gymnasium import GymEnv, GymVectorEnv
+from anysim.errors import TaskError
 from tests.task.helpers import arm, blocks
 
 N = 4

@@ -5,6 +5,7 @@ import sysconfig
 from pathlib import Path
 
 import pytest
+
 from anysim.cli.check import check_one
 
 BROKEN = Path(__file__).parent / "broken"
@@ -16,7 +17,11 @@ def test_a_broken_file_gives_its_golden_message(path: Path, monkeypatch: pytest.
     monkeypatch.chdir(BROKEN)
     faults = check_one(path.name, engine=None, all_engines=False, overrides=[])
     text = "".join(f"{fault}\n" for fault in faults)
-    for place, word in ((sysconfig.get_paths()["purelib"], "<site-packages>"), (str(BROKEN), "<here>"), (str(BROKEN.parents[2]), "<root>")):
+    for place, word in (
+        (sysconfig.get_paths()["purelib"], "<site-packages>"),
+        (str(BROKEN), "<here>"),
+        (str(BROKEN.parents[2]), "<root>"),
+    ):
         text = text.replace(place, word)
     golden = path.with_suffix(".expected.txt")
     if os.environ.get("ANYSIM_UPDATE_GOLDENS"):

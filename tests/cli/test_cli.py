@@ -97,7 +97,20 @@ def test_a_replay_in_another_process_is_identical(tmp_path: Path) -> None:
 
 
 def test_a_killed_run_leaves_whole_trajectories_and_goes_on(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "anysim.cli", "run", "pick_cube", "-n", "2", "-k", "8", "--out", str(tmp_path), *FAST]
+    command = [
+        sys.executable,
+        "-m",
+        "anysim.cli",
+        "run",
+        "pick_cube",
+        "-n",
+        "2",
+        "-k",
+        "8",
+        "--out",
+        str(tmp_path),
+        *FAST,
+    ]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     episodes = tmp_path / "episodes"
     deadline = time.monotonic() + 240

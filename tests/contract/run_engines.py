@@ -36,7 +36,10 @@ def run(engine: str, tests: list[str]) -> dict[str, str]:
     outcomes = Outcomes()
     where = [f"{SUITE}/{test}" for test in tests]
     options = ["-q", "--no-header", "--tb=no", "-p", "no:cacheprovider", "--import-mode=importlib"]
-    options += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # the suite is imported before pytest runs, by design
+    options += [
+        "-W",
+        "ignore::pytest.PytestAssertRewriteWarning",
+    ]  # the suite is imported before pytest runs, by design
     pytest.main([*options, "--engine", engine, *where], plugins=[outcomes])
     return outcomes.tests
 

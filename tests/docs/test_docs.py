@@ -25,7 +25,9 @@ def blocks(language: str) -> list[tuple[str, str]]:
 
 
 def run(arguments: list[str], cwd: Path) -> None:
-    result = subprocess.run([sys.executable, *arguments], capture_output=True, text=True, timeout=300, cwd=cwd, check=False)
+    result = subprocess.run(
+        [sys.executable, *arguments], capture_output=True, text=True, timeout=300, cwd=cwd, check=False
+    )
     assert result.returncode == 0, result.stderr
 
 
@@ -34,12 +36,16 @@ def test_an_example_runs(path: Path, tmp_path: Path) -> None:
     run([str(path)], tmp_path)
 
 
-@pytest.mark.parametrize(("where", "code"), blocks("python"), ids=lambda v: v if ":" in v[:60] and "\n" not in v else "code")
+@pytest.mark.parametrize(
+    ("where", "code"), blocks("python"), ids=lambda v: v if ":" in v[:60] and "\n" not in v else "code"
+)
 def test_a_block_of_python_runs(where: str, code: str, tmp_path: Path) -> None:
     run(["-c", code], tmp_path)
 
 
-@pytest.mark.parametrize(("where", "code"), blocks("yaml"), ids=lambda v: v if ":" in v[:60] and "\n" not in v else "code")
+@pytest.mark.parametrize(
+    ("where", "code"), blocks("yaml"), ids=lambda v: v if ":" in v[:60] and "\n" not in v else "code"
+)
 def test_a_block_of_yaml_checks(where: str, code: str, tmp_path: Path) -> None:
     from anysim.cli.check import check_one
 

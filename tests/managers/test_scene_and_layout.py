@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from anysim.errors import TaskError
 from tests.task.helpers import blocks
 
@@ -20,7 +21,10 @@ def test_objects_stand_on_their_support_within_their_ranges() -> None:
 
 
 def test_a_crowded_layout_names_both_objects() -> None:
-    with blocks(1, "world.layout.ball.clearance=3.0") as env, pytest.raises(TaskError, match=r"no place for 'ball'.*from 'red'"):
+    with (
+        blocks(1, "world.layout.ball.clearance=3.0") as env,
+        pytest.raises(TaskError, match=r"no place for 'ball'.*from 'red'"),
+    ):
         env.reset(seed=0)
 
 

@@ -1,6 +1,7 @@
 """Streams: what is drawn depends on the seed, the env and the name alone."""
 
 import numpy as np
+
 from anysim.managers.streams import Streams, stream_key
 from anysim.managers.values import draw, draw_one
 from anysim_schemas.values import Choice, Normal, NormalParameters, Range

@@ -4,8 +4,9 @@ from collections.abc import Callable
 from typing import Annotated, Literal
 
 import pytest
-from anysim_schemas.plugin import OptionsResolver, UnknownPlugin
 from pydantic import BaseModel, ConfigDict, Field
+
+from anysim_schemas.plugin import OptionsResolver, UnknownPlugin
 
 
 class Closed(BaseModel):

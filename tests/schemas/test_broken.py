@@ -9,6 +9,7 @@ import os
 from pathlib import Path
 
 import pytest
+
 from anysim_schemas.errors import SpecError
 from anysim_schemas.load import load
 from anysim_schemas.robots import RobotModelSpec

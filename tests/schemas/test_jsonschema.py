@@ -4,12 +4,13 @@ import json
 from pathlib import Path
 
 import pytest
+from jsonschema import Draft202012Validator
+
 from anysim_schemas.jsonschema import SCHEMAS, json_schema, main
 from anysim_schemas.load import load, load_run
 from anysim_schemas.robots import RobotModelSpec
 from anysim_schemas.run import RunSpec
 from anysim_schemas.yaml import parse
-from jsonschema import Draft202012Validator
 
 HERE = Path(__file__).parent
 WRITTEN = HERE.parents[1] / "schemas" / "json"

@@ -3,12 +3,13 @@
 from pathlib import Path
 
 import pytest
+from pydantic import BaseModel
+
 from anysim_schemas.errors import SpecError
 from anysim_schemas.load import load, load_run
 from anysim_schemas.robots import RobotModelSpec
 from anysim_schemas.run import RunSpec
 from anysim_schemas.values import Choice, Normal, Range
-from pydantic import BaseModel
 
 GOOD = Path(__file__).parent / "good"
 CUBE = "world: {objects: {cube: {source: {sphere: 1}, mass: 2}}}"

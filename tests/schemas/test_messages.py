@@ -4,11 +4,12 @@ import re
 from pathlib import Path
 
 import pytest
+from pydantic import ValidationError
+from pydantic_core._pydantic_core import list_all_errors
+
 from anysim_schemas.errors import SpecError
 from anysim_schemas.load import load_run
 from anysim_schemas.messages import describe, sentence, shown
-from pydantic import ValidationError
-from pydantic_core._pydantic_core import list_all_errors
 
 LEAKS = (
     *(

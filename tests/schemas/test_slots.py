@@ -1,10 +1,11 @@
 """The slots of plugins are checked with the models of the plugins, and only they."""
 
 import pytest
+from pydantic import BaseModel, ConfigDict
+
 from anysim_schemas.errors import AnysimError, SpecError
 from anysim_schemas.load import load_run
 from anysim_schemas.plugin import UnknownPlugin
-from pydantic import BaseModel, ConfigDict
 
 
 def issues(data, resolver):

@@ -5,6 +5,8 @@ import subprocess
 import sys
 
 import pytest
+from pydantic import BaseModel, ValidationError
+
 from anysim_schemas.base import Spec
 from anysim_schemas.load import load_run
 from anysim_schemas.objects import ObjectSpec, TerrainSpec
@@ -12,7 +14,6 @@ from anysim_schemas.robots import RobotModelSpec
 from anysim_schemas.run import RunSpec
 from anysim_schemas.shapes import inside, shapes_of_field
 from anysim_schemas.values import Choice, Normal, Range, Value
-from pydantic import BaseModel, ValidationError
 
 
 def all_models(model, seen=None):

@@ -3,11 +3,12 @@
 import math
 
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
 from anysim_schemas import yaml as spec_yaml
 from anysim_schemas.nodes import Node
 from anysim_schemas.yaml import MAX_DEPTH, parse
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
 
 
 def read(text):

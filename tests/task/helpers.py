@@ -21,7 +21,12 @@ BLOCKS: dict[str, Any] = {
         },
         "layout": {
             "table": {"position": [0.0, 0.0, 0.2]},
-            "red": {"on": "table", "x": {"range": [-0.4, 0.4]}, "y": {"range": [-0.4, 0.4]}, "yaw": {"range": [-3.0, 3.0]}},
+            "red": {
+                "on": "table",
+                "x": {"range": [-0.4, 0.4]},
+                "y": {"range": [-0.4, 0.4]},
+                "yaw": {"range": [-3.0, 3.0]},
+            },
             "ball": {"on": "table", "x": {"range": [-0.4, 0.4]}, "y": {"range": [-0.4, 0.4]}, "clearance": 0.05},
         },
         "cameras": {"eye": {"from": [1.0, 1.0, 1.5], "look_at": "red", "channels": []}},

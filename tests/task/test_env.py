@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from anysim import hooks
 from anysim.errors import SpecError, TaskError
 from anysim.task.contract import Status

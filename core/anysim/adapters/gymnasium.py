@@ -52,7 +52,9 @@ class GymEnv(gym.Env[dict[str, Array], Array]):
         self.observation_space: gym.spaces.Space[Any] = observation_space(env)
         self.action_space = action_space(env)
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Array], dict[str, Any]]:
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Array], dict[str, Any]]:
         """Start an episode; `options={"episode_seed": s}` starts exactly that one."""
         super().reset(seed=seed)
         chosen = (options or {}).get("episode_seed")
@@ -86,7 +88,10 @@ class GymVectorEnv(VectorEnv[dict[str, Array], Array, Any]):
     """
 
     def __init__(
-        self, env: TaskEnv, autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP, render_mode: str | None = None
+        self,
+        env: TaskEnv,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        render_mode: str | None = None,
     ) -> None:
         self.env = env
         self.num_envs = env.num_envs
@@ -112,7 +117,9 @@ class GymVectorEnv(VectorEnv[dict[str, Array], Array, Any]):
             if len(seed) != self.num_envs:
                 raise TaskError(f"{self.num_envs} envs need as many seeds, got {len(seed)}")
             seeded = np.array([s is not None for s in seed]) & mask
-            self.env.streams.seed([int(s) for s, on in zip(seed, seeded, strict=True) if s is not None and on], np.flatnonzero(seeded))
+            self.env.streams.seed(
+                [int(s) for s, on in zip(seed, seeded, strict=True) if s is not None and on], np.flatnonzero(seeded)
+            )
         _, info = self.env.reset(mask=mask)
         self._pending[mask] = False
         return self.env.obs, _with_masks(self._spread(info, mask), mask)
@@ -122,7 +129,9 @@ class GymVectorEnv(VectorEnv[dict[str, Array], Array, Any]):
         fresh = self._pending.copy()
         if self.autoreset_mode is AutoresetMode.DISABLED:
             if fresh.any():
-                raise TaskError(f"envs {np.flatnonzero(fresh).tolist()} have ended; call reset(options={{'reset_mask': mask}})")
+                raise TaskError(
+                    f"envs {np.flatnonzero(fresh).tolist()} have ended; call reset(options={{'reset_mask': mask}})"
+                )
         elif fresh.any():
             self.env.reset(mask=fresh)
         stepped = ~fresh
@@ -156,7 +165,12 @@ class GymVectorEnv(VectorEnv[dict[str, Array], Array, Any]):
             blank = np.full(self.num_envs, None, dtype=object) if value.dtype == object else np.zeros_like(value)
             blank[done] = value[done]
             kept[key] = blank
-        return {"final_obs": final, "_final_obs": done.copy(), "final_info": _with_masks(kept, done), "_final_info": done.copy()}
+        return {
+            "final_obs": final,
+            "_final_obs": done.copy(),
+            "final_info": _with_masks(kept, done),
+            "_final_info": done.copy(),
+        }
 
     def _spread(self, info: dict[str, Array], mask: Array) -> dict[str, Array]:
         spread: dict[str, Array] = {}
@@ -176,7 +190,9 @@ class GymVectorEnv(VectorEnv[dict[str, Array], Array, Any]):
         self.env.close()
 
 
-def make_gym(source: Any, *, autoreset_mode: AutoresetMode | str | None = None, render_mode: str | None = None, **options: Any) -> Any:
+def make_gym(
+    source: Any, *, autoreset_mode: AutoresetMode | str | None = None, render_mode: str | None = None, **options: Any
+) -> Any:
     """`make_gym("pick_cube")` is a single env; with `num_envs` in `options` and an autoreset mode, a vector env."""
     from anysim.api import make
 

@@ -42,7 +42,16 @@ def audit(
     else:
         shown = lines if every else wrong
         if shown:
-            rows = [(x.subject, x.quantity, _numbers(x.expected), _numbers(x.found), {True: "ok", False: "DIFFERS", None: "not reported"}[x.ok]) for x in shown]
+            rows = [
+                (
+                    x.subject,
+                    x.quantity,
+                    _numbers(x.expected),
+                    _numbers(x.found),
+                    {True: "ok", False: "DIFFERS", None: "not reported"}[x.ok],
+                )
+                for x in shown
+            ]
             print_table(f"Audit on {name} {version}", ("what", "quantity", "world", "engine", ""), rows)
         typer.echo(f"{compared} numbers compared on {name} {version}: {len(wrong)} differ")
         if unreported:

@@ -17,7 +17,9 @@ def _group() -> None:
 @app.command("step")
 def step(
     engine: Annotated[str | None, typer.Option("--engine", "-e", help="An installed engine with a raw loop.")] = None,
-    num_envs: Annotated[str, typer.Option("--num-envs", "-n", help="Numbers of envs, separated by commas.")] = "1,16,64,256",
+    num_envs: Annotated[
+        str, typer.Option("--num-envs", "-n", help="Numbers of envs, separated by commas.")
+    ] = "1,16,64,256",
     task: Annotated[str, typer.Option(help="The task of the second half.")] = "pick_cube",
     rounds: Annotated[int, typer.Option(min=1, help="Interleaved rounds; the best of each side counts.")] = 7,
     json: AsJson = False,
@@ -49,7 +51,14 @@ def step(
         f"Physics steps per second on {name}, all envs together",
         ("loop", "envs", "anysim", "raw", "ratio (wall)", "ratio (cpu)"),
         [
-            (c.what if c.what == "engine" else task, c.num_envs, f"{c.ours:,.0f}", f"{c.raw:,.0f}", f"{c.ratio:.3f}", f"{c.cpu_ratio:.3f}")
+            (
+                c.what if c.what == "engine" else task,
+                c.num_envs,
+                f"{c.ours:,.0f}",
+                f"{c.raw:,.0f}",
+                f"{c.ratio:.3f}",
+                f"{c.cpu_ratio:.3f}",
+            )
             for c in costs
         ],
     )

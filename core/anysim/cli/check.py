@@ -37,10 +37,10 @@ def check(
 def check_one(name: str, engine: str | None, all_engines: bool, overrides: list[str]) -> list[str]:
     """Every fault of one file, a sentence each; empty if it can be run."""
     from anysim import registry
+    from anysim.api import compile_world, dry_run, load
     from anysim.engine.capability import check as check_capabilities
     from anysim.engine.needs import needs_of
     from anysim.errors import AnysimError, AssetError, SpecError
-    from anysim.api import compile_world, dry_run, load
 
     try:
         loaded = load(Path(name) if Path(name).exists() else name, overrides=overrides)
@@ -59,4 +59,3 @@ def check_one(name: str, engine: str | None, all_engines: bool, overrides: list[
         except AnysimError as error:
             faults.append(f"{name}: {error}")
     return faults
-

@@ -8,7 +8,10 @@ from anysim.cli.options import AsJson
 
 
 def list_(
-    kind: Annotated[str, typer.Argument(metavar="KIND", help="engines, tasks, robots, controllers, terms, skills, planners, writers…")],
+    kind: Annotated[
+        str,
+        typer.Argument(metavar="KIND", help="engines, tasks, robots, controllers, terms, skills, planners, writers…"),
+    ],
     json: AsJson = False,
 ) -> None:
     """List what is installed of a kind, and where it comes from."""
@@ -17,7 +20,9 @@ def list_(
     from anysim.errors import PluginError, listing, suggest
 
     if kind not in registry.KINDS:
-        raise PluginError(f"there is no kind '{kind}'{suggest(kind, list(registry.KINDS))} (kinds: {listing(registry.KINDS, 20)})")
+        raise PluginError(
+            f"there is no kind '{kind}'{suggest(kind, list(registry.KINDS))} (kinds: {listing(registry.KINDS, 20)})"
+        )
     rows = [{"name": name, "from": _origin(kind, name), "what": _what(kind, name)} for name in registry.names(kind)]
     if json:
         print_json(rows)

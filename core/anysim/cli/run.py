@@ -21,8 +21,12 @@ def run(
     episodes: Annotated[int, typer.Option("--episodes", "-k", min=1, help="Episodes to attempt, over all envs.")] = 1,
     seed: Seed = 0,
     override: Overrides = None,
-    out: Annotated[Path | None, typer.Option(help="Directory of the trajectories; default runs/<task>-<engine>-<id>.")] = None,
-    min_success: Annotated[float, typer.Option(min=0.0, max=1.0, help="Exit with 1 if a smaller share succeeds.")] = 0.0,
+    out: Annotated[
+        Path | None, typer.Option(help="Directory of the trajectories; default runs/<task>-<engine>-<id>.")
+    ] = None,
+    min_success: Annotated[
+        float, typer.Option(min=0.0, max=1.0, help="Exit with 1 if a smaller share succeeds.")
+    ] = 0.0,
     json: AsJson = False,
 ) -> None:
     """Run a task's expert, and keep the trajectories that succeed.
@@ -68,7 +72,9 @@ def _announce(env: "TaskEnv", directory: Path, episodes: int, seed: int, present
         f"{env.name} on {env.engine.name} {env.engine.version}: {episodes} episodes in {env.num_envs} envs, seed {seed}"
     )
     for need in env.engine.approximations:
-        typer.echo(f"approximate: {need.capability} ({need.why}): {env.engine.capabilities.supported[need.capability].note}")
+        typer.echo(
+            f"approximate: {need.capability} ({need.why}): {env.engine.capabilities.supported[need.capability].note}"
+        )
     typer.echo(f"trajectories: {directory}" + (f" (resuming: {present} are there already)" if present else ""))
 
 
@@ -83,7 +89,14 @@ def _progress(total: int, quiet: bool) -> Iterator[Any]:
     if not interactive():
         yield lambda result: typer.echo(_line(result))
         return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
     with Progress(
         TextColumn("episodes"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[good]} succeeded"),
@@ -124,7 +137,15 @@ def _report(results: "list[EpisodeResult]", directory: Path, as_json: bool) -> N
         "Episodes",
         ("env", "episode", "status", "steps", "return", "attempts", "last phase"),
         [
-            (r.env, r.episode, r.status, r.steps, f"{r.total_reward:.2f}", r.outcome.get("attempt"), r.outcome.get("phase"))
+            (
+                r.env,
+                r.episode,
+                r.status,
+                r.steps,
+                f"{r.total_reward:.2f}",
+                r.outcome.get("attempt"),
+                r.outcome.get("phase"),
+            )
             for r in results
         ],
     )

@@ -13,7 +13,9 @@ class Root(StrEnum):
     ROBOT = "robot"
 
 
-def schema(root: Annotated[Root, typer.Argument(help="run: worlds and tasks; robot: catalogue entries.")] = Root.RUN) -> None:
+def schema(
+    root: Annotated[Root, typer.Argument(help="run: worlds and tasks; robot: catalogue entries.")] = Root.RUN,
+) -> None:
     """Print the JSON Schema of a kind of file, for completion and checks in an editor."""
     from anysim.cli.output import print_json
     from anysim_schemas.jsonschema import json_schema

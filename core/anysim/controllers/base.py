@@ -34,7 +34,9 @@ class ChannelView:
         joints = [world.joints[world.actuators[a].joint] for a in channel.actuators]
         contiguous = len(drives) > 0 and (np.diff(drives) == 1).all()
         columns = slice(int(drives[0]), int(drives[-1]) + 1) if contiguous else drives
-        ends = [None if v is None else np.array(v[: len(drives)], dtype=float) for v in (channel.opened, channel.closed)]
+        ends = [
+            None if v is None else np.array(v[: len(drives)], dtype=float) for v in (channel.opened, channel.closed)
+        ]
         return cls(
             channel.name, drives, columns,
             np.array([j.lower for j in joints]), np.array([j.upper for j in joints]),

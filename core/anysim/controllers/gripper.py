@@ -16,7 +16,9 @@ class GripperBinary(Controller):
     def __init__(self, channel: ChannelView, num_envs: int) -> None:
         super().__init__(channel, num_envs)
         if channel.opened is None or channel.closed is None:
-            raise TaskError(f"channel '{channel.name}' has no `opened` and `closed` targets in the catalogue; gripper_binary needs them")
+            raise TaskError(
+                f"channel '{channel.name}' has no `opened` and `closed` targets in the catalogue; gripper_binary needs them"
+            )
         self._opened, self._closed = channel.opened, channel.closed
         self.dim = 1
         self.low, self.high = -np.ones(1), np.ones(1)

@@ -62,12 +62,19 @@ def engine_rows(engine: SimEngine) -> list[AuditRow]:
         mass = engine.get_parameters("body.mass", [0])[0]
         add("mass", bodies, mass[moving])
         add("centre of mass", bodies, engine.get_parameters("body.com", [0])[0, moving])
-        tensors = [inertia.tensor(Inertial(1.0, inertia=tuple(i))) for i in engine.get_parameters("body.inertia", [0])[0, moving]]
+        tensors = [
+            inertia.tensor(Inertial(1.0, inertia=tuple(i)))
+            for i in engine.get_parameters("body.inertia", [0])[0, moving]
+        ]
         add("principal moments", bodies, np.array([np.sort(np.linalg.eigvalsh(t)) for t in tensors]).reshape(-1, 3))
         totals = [mass[e.body_start : e.body_stop].sum() for e in world.entities]
         add("total mass", [e.name for e in world.entities], np.array(totals))
     joints = [joint.name for joint in world.joints]
-    for quantity, parameter in (("damping", "joint.damping"), ("friction", "joint.friction"), ("armature", "joint.armature")):
+    for quantity, parameter in (
+        ("damping", "joint.damping"),
+        ("friction", "joint.friction"),
+        ("armature", "joint.armature"),
+    ):
         if parameter in engine.parameters:
             add(quantity, joints, engine.get_parameters(parameter, [0])[0])
     if "actuator.effort_limit" in engine.parameters:

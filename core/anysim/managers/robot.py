@@ -41,7 +41,11 @@ class RobotManager(Manager):
                 if channel is None:
                     path = f"world.robots.{robot.name}.actions.{channel_name}"
                     hint = suggest(channel_name, list(robot.channels))
-                    issues.append(SpecIssue("", path, f"{robot.model} has no such channel{hint} (channels: {listing(robot.channels)})"))
+                    issues.append(
+                        SpecIssue(
+                            "", path, f"{robot.model} has no such channel{hint} (channels: {listing(robot.channels)})"
+                        )
+                    )
                     continue
                 self._channels.append((robot.name, channel_name, ChannelView.of(world, channel)))
         if issues:
@@ -90,7 +94,9 @@ class RobotManager(Manager):
             s.controller.reset(env_ids, self._targets[np.ix_(env_ids, s.controller.channel.actuators)])
         self.engine.set_control(position=self._targets[env_ids], env_ids=env_ids)
 
-    def _add_noise(self, position: Array, column: int, joint: int, robot: str, deviation: Array, env_ids: Array) -> None:
+    def _add_noise(
+        self, position: Array, column: int, joint: int, robot: str, deviation: Array, env_ids: Array
+    ) -> None:
         """Only joints of channels named base or arm are disturbed: a gripper starts as its home says."""
         found = self._world.joints[joint]
         arm = any(
@@ -140,7 +146,9 @@ class RobotManager(Manager):
         """
         array = np.asarray(action, dtype=np.float64)
         if array.shape != (self.engine.num_envs, self.action_dim):
-            raise TaskError(f"the action must have shape ({self.engine.num_envs}, {self.action_dim}), got {array.shape}")
+            raise TaskError(
+                f"the action must have shape ({self.engine.num_envs}, {self.action_dim}), got {array.shape}"
+            )
         clipped = np.minimum(np.maximum(array, self.action_low), self.action_high)
         if not np.isfinite(clipped).all() or np.isnan(array).any():
             raise TaskError("the action holds a value that is not a number")

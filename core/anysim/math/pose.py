@@ -186,7 +186,9 @@ def step_toward(pose: Array, target: Array, max_distance: float, max_angle: floa
     distance = norm(target[:, :3] - pose[:, :3])
     turn = rotation_vector(multiply(conjugate(pose[:, 3:]), target[:, 3:]))
     angle = norm(turn)
-    share = np.minimum(1.0, np.minimum(max_distance / np.maximum(distance, 1e-12), max_angle / np.maximum(angle, 1e-12)))
+    share = np.minimum(
+        1.0, np.minimum(max_distance / np.maximum(distance, 1e-12), max_angle / np.maximum(angle, 1e-12))
+    )
     position = pose[:, :3] + share[:, None] * (target[:, :3] - pose[:, :3])
     axis = turn / np.maximum(angle, 1e-12)[:, None]
     rotation = normalize(multiply(pose[:, 3:], from_axis_angle(axis, share * angle)))

@@ -135,7 +135,9 @@ class Pick(Skill):
                 distance = speed * self._dt
                 self._command[rows] = P.step_toward(self._command[rows], targets[chosen], distance, 5.0 * distance)
         keys = self.env.streams.episode_seed[ids]
-        found = self._solver.solve(self._command[ids], self._base(ids), self._joints[ids], random_restarts=0, rng_seeds=keys)
+        found = self._solver.solve(
+            self._command[ids], self._base(ids), self._joints[ids], random_restarts=0, rng_seeds=keys
+        )
         solved = ids[found.converged]
         self._joints[solved] = found.joint_pos[found.converged]
 
@@ -144,7 +146,9 @@ class Pick(Skill):
         self.env.scene.look(ids)
         tool, cube = self._tool.pose, self._object.root.position
         targets = self._targets(ids)
-        arrived = (P.norm(targets[:, :3] - tool[:, :3]) < ARRIVED) & (P.angle_between(tool[:, 3:], targets[:, 3:]) < 10 * ARRIVED)
+        arrived = (P.norm(targets[:, :3] - tool[:, :3]) < ARRIVED) & (
+            P.angle_between(tool[:, 3:], targets[:, 3:]) < 10 * ARRIVED
+        )
         speed = np.abs(self.env.scene.state.joint_vel[np.ix_(ids, self._fingers)]).max(axis=1)
         gripped = (self._steps[ids] >= 5) & (speed < SETTLED) | (self._steps[ids] >= CLOSING_STEPS)
         lost = P.norm(cube - tool[:, :3]) > SLIPPED

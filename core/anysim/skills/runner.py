@@ -40,7 +40,9 @@ class SkillPolicy:
     def __init__(self, env: TaskEnv) -> None:
         task = env.spec.task
         if task is None or task.expert is None:
-            raise TaskError(f"task '{env.name}' has no expert; add task.expert, or drive the env with a policy of your own")
+            raise TaskError(
+                f"task '{env.name}' has no expert; add task.expert, or drive the env with a policy of your own"
+            )
         self.env = env
         self.name = task.expert.skill
         self.skill = bind_skill(task.expert, env)

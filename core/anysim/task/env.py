@@ -13,7 +13,14 @@ from anysim.managers.base import RESET_ORDER, Manager
 from anysim.managers.robot import RobotManager
 from anysim.managers.streams import Streams
 from anysim.task.contract import (
-    FAILED, RUNNING, STATUS_NAMES, SUCCESS, TRUNCATED, EnvSnapshot, Obs, StepResult,
+    FAILED,
+    RUNNING,
+    STATUS_NAMES,
+    SUCCESS,
+    TRUNCATED,
+    EnvSnapshot,
+    Obs,
+    StepResult,
 )  # fmt: skip
 from anysim.task.mdp import Mdp
 from anysim.task.view import SceneView
@@ -192,7 +199,9 @@ class TaskEnv:
             return None
         hold = mask is None and self._task.ended == "hold" and running.any() and (self._code >= 0).all()
         if len(ended) and not hold:
-            words = {int(i): "not reset yet" if self._code[i] < 0 else str(STATUS_NAMES[self._code[i]]) for i in ended[:8]}
+            words = {
+                int(i): "not reset yet" if self._code[i] < 0 else str(STATUS_NAMES[self._code[i]]) for i in ended[:8]
+            }
             raise TaskError(f"envs {words} cannot be stepped; call reset(mask=...) before step()")
         return np.flatnonzero(running) if hold else wanted
 

@@ -17,7 +17,9 @@ def _functions(library: str, kind: str) -> Mapping[str, Callable[..., Any]]:
     """The terms of one kind in a library: entry point `anysim.terms`, attribute TERMS[kind], a module or a mapping."""
     tables = getattr(registry.load("terms", library), "TERMS", None)
     if not isinstance(tables, Mapping):
-        raise PluginError(f"the term library '{library}' of {registry.distribution('terms', library)} has no TERMS mapping")
+        raise PluginError(
+            f"the term library '{library}' of {registry.distribution('terms', library)} has no TERMS mapping"
+        )
     table = tables.get(kind, {})
     return {name: getattr(table, name) for name in table.__all__} if isinstance(table, ModuleType) else table
 

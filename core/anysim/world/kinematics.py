@@ -35,5 +35,7 @@ def forward_kinematics(world: World, roots: Array, joint_pos: Array) -> Array:
             continue
         rest = np.broadcast_to(np.array([*body.position, *body.quaternion]), (len(poses), 7))
         parent = poses[:, body.parent]
-        poses[:, i] = P.compose(parent, P.compose(rest, joint_pose(world, world.body_joint[i], joint_pos[:, world.body_joint[i]])))
+        poses[:, i] = P.compose(
+            parent, P.compose(rest, joint_pose(world, world.body_joint[i], joint_pos[:, world.body_joint[i]]))
+        )
     return poses

@@ -37,6 +37,7 @@ def goal_above(
     yaw = 2.0 * np.arctan2(surface.quaternion[:, 2], surface.quaternion[:, 3])
     cosine, sine = np.cos(yaw), np.sin(yaw)
     position = np.stack(
-        [base[:, 0] + cosine * dx - sine * dy, base[:, 1] + sine * dx + cosine * dy, top + draw("height", height)], axis=1
+        [base[:, 0] + cosine * dx - sine * dy, base[:, 1] + sine * dx + cosine * dy, top + draw("height", height)],
+        axis=1,
     )
     return _upright(position)

@@ -25,9 +25,7 @@ def push(scene: SceneView, draw: Draw, *, object: ObjectView, force: Vec3Value, 
     scene.engine.apply_wrench(wrench[:, None], [object.entity.root], due)
 
 
-def set_friction(
-    scene: SceneView, draw: Draw, *, object: ObjectView, friction: NonNegativeValue
-) -> None:
+def set_friction(scene: SceneView, draw: Draw, *, object: ObjectView, friction: NonNegativeValue) -> None:
     """Give all surfaces of an object one friction coefficient."""
     geoms = scene.index.geoms_of(object.entity)
     rows = draw("friction", friction)

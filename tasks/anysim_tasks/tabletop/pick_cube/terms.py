@@ -3,10 +3,11 @@
 from typing import Annotated
 
 import numpy as np
+from pydantic import Field
+
 from anysim.conventions import Array
 from anysim.math.pose import norm
 from anysim.task.view import Frame, ObjectView, SceneView
-from pydantic import Field
 
 
 def lifted_toward(
