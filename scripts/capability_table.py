@@ -30,7 +30,7 @@ def table() -> str:
         for name in names:
             support = engines[name].get(capability)
             if support is None:
-                cells.append("–")
+                cells.append("-")
             elif support.exact:
                 cells.append("yes")
             else:

@@ -1,6 +1,6 @@
 """Objects: what exists. Where it goes is in layout, how it behaves is in its physical fields."""
 
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -52,10 +52,15 @@ class ContactSpec(Spec):
     """How a surface gives, engine-neutrally. Presets: `default`, `pad` (stiff gripper pads), `soft`."""
 
     preset: Literal["default", "pad", "soft"] = Field(default="default", description="stiffness and damping by name")
-    torsional_friction: Number = Field(default=0.005, ge=0, description="spin resistance [m]")
-    rolling_friction: Number = Field(default=0.0001, ge=0, description="rolling resistance [m]")
-    priority: Integer = Field(
-        default=0, description="in a pair the surface of higher priority decides friction and stiffness"
+    torsional_friction: Annotated[Number, Field(ge=0)] | None = Field(
+        default=None, description="spin resistance [m]; the preset's where not given"
+    )
+    rolling_friction: Annotated[Number, Field(ge=0)] | None = Field(
+        default=None, description="rolling resistance [m]; the preset's where not given"
+    )
+    priority: Integer | None = Field(
+        default=None,
+        description="the surface of higher priority decides friction and stiffness; the preset's where not given",
     )
 
 
@@ -70,12 +75,18 @@ class ObjectSpec(Spec):
     density: PositiveValue | None = Field(
         default=None, description="density [kg/m^3]; 1000 where neither it nor mass is given"
     )
-    friction: NonNegativeValue = Field(default=0.8, description="sliding friction coefficient")
-    restitution: Number = Field(default=0.0, ge=0, lt=1, description="ratio of speeds after and before a bounce")
-    color: ColorValue = Field(
-        default=(0.7, 0.7, 0.7), description="red, green, blue in [0, 1], or a colour name such as `red`"
+    friction: NonNegativeValue | None = Field(
+        default=None, description="sliding friction coefficient; 0.8, or an asset's own, where not given"
     )
-    contact: ContactSpec = Field(default=ContactSpec(), description="how its surface gives")
+    restitution: Annotated[Number, Field(ge=0, lt=1)] | None = Field(
+        default=None, description="ratio of speeds after and before a bounce; 0, or an asset's own, where not given"
+    )
+    color: ColorValue | None = Field(
+        default=None, description="red, green, blue in [0, 1], or a colour name such as `red`; grey, or a file's own"
+    )
+    contact: ContactSpec | None = Field(
+        default=None, description="how its surface gives; the default, or an asset's own"
+    )
     label: str | None = Field(default=None, description="semantic label; the object's name where not given")
     collides: Flag = Field(default=True, description="false for something that is only seen")
 

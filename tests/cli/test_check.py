@@ -1,4 +1,4 @@
-"""Every broken file in `broken/` gives exactly the message beside it. ANYSIM_UPDATE_GOLDENS=1 writes the messages anew."""
+"""Every broken file in `broken/` gives exactly the message beside it. ANYSIM_UPDATE_GOLDENS=1 writes them anew."""
 
 import os
 import sysconfig

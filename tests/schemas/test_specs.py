@@ -1,6 +1,6 @@
 """The models themselves: documented, strict where people slip, and whole in another process."""
 
-import pickle
+import pickle  # noqa: TID251  worker processes are sent specs by multiprocessing, which pickles
 import subprocess
 import sys
 

@@ -16,8 +16,8 @@ def audit(
 ) -> None:
     """Build a world on an engine, read everything back, and compare it with the World.
 
-    Masses, centres of mass, principal moments, joint limits, damping, friction, armature, effort limits, collision volumes,
-    and body frames at random joint positions. Exit code 1 if anything differs.
+    Masses, centres of mass, principal moments, joint limits, damping, friction, armature, effort limits, collision
+    volumes, and body frames at random joint positions. Exit code 1 if anything differs.
     """
     from anysim.api import compile_world, load
     from anysim.cli.output import print_json, print_table

@@ -89,7 +89,8 @@ def _try(engine_class: Any) -> tuple[bool, dict[str, str]]:
     inertial = Inertial(1.0, inertia=(0.004, 0.004, 0.004, 0.0, 0.0, 0.0))
     ball = World(
         "ball", bodies=(Body("ball", BodyKind.FREE, position=(0.0, 0.0, 1.0), inertial=inertial),),
-        geoms=(Geom("ball", 0, Sphere(0.1), collides=False),), entities=(Entity("ball", EntityKind.OBJECT, 0, 1, 0, 0),),
+        geoms=(Geom("ball", 0, Sphere(0.1), collides=False),),
+        entities=(Entity("ball", EntityKind.OBJECT, 0, 1, 0, 0),),
     )  # fmt: skip
     what = f"{engine_class.name}: rendering"
     with engine_class() as engine:

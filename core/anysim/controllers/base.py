@@ -69,7 +69,7 @@ class Controller(ABC):
 
     @abstractmethod
     def action_for(self, targets: Array, env_ids: Array) -> Array:
-        """The action (E, dim), within its bounds, that brings the drives nearest to position targets (E, K) in one step."""
+        """The action (E, dim), within its bounds, that brings the drives nearest to targets (E, K) in one step."""
 
     def snapshot(self, env_ids: Array) -> dict[str, Array]:
         """Copies of the controller's own state."""

@@ -17,7 +17,8 @@ class GripperBinary(Controller):
         super().__init__(channel, num_envs)
         if channel.opened is None or channel.closed is None:
             raise TaskError(
-                f"channel '{channel.name}' has no `opened` and `closed` targets in the catalogue; gripper_binary needs them"
+                f"channel '{channel.name}' has no `opened` and `closed` targets in the catalogue, which gripper_binary "
+                "needs; add them to the robot's entry or choose another controller"
             )
         self._opened, self._closed = channel.opened, channel.closed
         self.dim = 1

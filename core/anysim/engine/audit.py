@@ -1,8 +1,8 @@
 """Audit: read a world back from a live engine and compare it with the World it was built from.
 
 Native importers and builders change things in silence. Here the engine's own numbers are made into the same rows as the
-World's, and its body frames are compared with the neutral forward kinematics at random joint positions, which also finds
-a wrong order of bodies or joints.
+World's, and its body frames are compared with the neutral forward kinematics at random joint positions, which also
+finds a wrong order of bodies or joints.
 """
 
 from typing import NamedTuple

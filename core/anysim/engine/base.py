@@ -1,7 +1,8 @@
 """SimEngine: the one interface of all physics engines.
 
 The public methods here check, lock, cache and account; a backend writes the primitives of
-`anysim.engine.primitives` (names with a leading underscore). `num_envs` copies of one World are stepped together, each with its own state.
+`anysim.engine.primitives` (names with a leading underscore). `num_envs` copies of one World are stepped together, each
+with its own state.
 """
 
 import threading

@@ -53,8 +53,8 @@ class LayoutManager(Manager):
                     break
             else:
                 raise TaskError(
-                    f"env {env}: no place for '{name}' in {ATTEMPTS} draws that keeps its clearance of {entry.clearance:g} m "
-                    f"from '{crowding}'; widen world.layout.{name} or lower its clearance"
+                    f"env {env}: no place for '{name}' in {ATTEMPTS} draws that keeps its clearance of "
+                    f"{entry.clearance:g} m from '{crowding}'; widen world.layout.{name} or lower its clearance"
                 )
         return np.stack([placed[name] for name in self._order])
 

@@ -27,7 +27,7 @@ class ActionSlice(NamedTuple):
 
 
 class RobotManager(Manager):
-    """All robots of an env. The action is one flat vector: robots in order, channels in the order of their `actions`."""
+    """All robots of an env. The action is one flat vector: robots in order, channels in the order of `actions`."""
 
     name = "robot"
 

@@ -87,7 +87,9 @@ class Streams:
     def restore(self, env_ids: Array, data: dict[str, object]) -> None:
         """Write what `snapshot` returned."""
         masters, seeds, draws = data["masters"], data["episode_seed"], data["draws"]
-        assert isinstance(masters, list) and isinstance(seeds, list) and isinstance(draws, list)
+        assert isinstance(masters, list)
+        assert isinstance(seeds, list)
+        assert isinstance(draws, list)
         for row, env in enumerate(env_ids):
             self.episode_seed[env] = seeds[row]
             self.draws[env] = dict(draws[row])

@@ -83,7 +83,7 @@ class Collector:
     """Runs episodes and records them. Use it once: `for result in collector.run(): ...`."""
 
     def __init__(self, env: TaskEnv, policy: Policy, out: Path, episodes: int, seed: int) -> None:
-        """`episodes` in all, shared out as evenly as can be: env i runs those numbered i, i + N, i + 2N…"""
+        """Run `episodes` in all, shared out as evenly as can be: env i runs one of every N."""
         self.env, self.policy, self.seed = env, policy, seed
         record = env.spec.record
         writer_class = registry.load("writers", record.writer)

@@ -76,7 +76,7 @@ class Pick(Skill):
         self.phase[ids], self._steps[ids] = APPROACH, 0
 
     def _choose_grasp(self, ids: Array) -> None:
-        """Of four turns about the vertical, the one whose pre-grasp, grasp and goal are reachable with the least motion."""
+        """Of four turns about the vertical, the one that reaches pre-grasp, grasp and goal with the least motion."""
         cube, base = self._object.root.pose, self._base(ids)
         yaw = 2.0 * np.arctan2(cube[:, 5], cube[:, 6])
         seeds = self._joints[ids]

@@ -101,8 +101,8 @@ class TaskEnv:
         """Start new episodes in all envs, or where `mask` (N,) is true.
 
         Args:
-            seed: an int seeds env i with (seed, i), whatever N; a sequence gives each chosen env its own seed; None goes
-                on with the generators as they are.
+            seed: an int seeds env i with (seed, i), whatever N; a sequence gives each chosen env its own seed; None
+                goes on with the generators as they are.
             episode_seeds: draw exactly these episodes instead (for replay).
 
         Returns:

@@ -1,7 +1,7 @@
 """What terms see: handles that read the engine's state for the rows at hand.
 
-A term declares what it refers to by annotation (`a: Frame`, `robot: RobotView`); names become handles once, when the env
-is built. A handle returns arrays for `scene.rows` only: all envs in a step, the reset ones in a reset.
+A term declares what it refers to by annotation (`a: Frame`, `robot: RobotView`); names become handles once, when the
+env is built. A handle returns arrays for `scene.rows` only: all envs in a step, the reset ones in a reset.
 """
 
 from abc import ABC, abstractmethod

@@ -59,7 +59,8 @@ def load_or_make(kind: str, key: str, make: Callable[[], dict[str, Array]]) -> d
 
 def _read(path: Path, key: str) -> dict[str, Array] | None:
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        # opened here: numpy leaves the file open when it is too damaged to read
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}  # reading checks the CRC of each member
         if str(arrays.pop(_KEY)) == key:
             return arrays

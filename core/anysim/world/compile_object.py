@@ -38,10 +38,12 @@ from anysim.world.model import (
 )  # fmt: skip
 from anysim.world.nominal import nominal
 from anysim.world.presets import surface
-from anysim_schemas.objects import ObjectSpec, SourceSpec, TerrainSpec
+from anysim_schemas.objects import ContactSpec, ObjectSpec, SourceSpec, TerrainSpec
 from anysim_schemas.values import Choice, Range
 
 DEFAULT_DENSITY = 1000.0  # [kg/m^3], water
+DEFAULT_FRICTION = 0.8
+DEFAULT_COLOR: Rgb = (0.7, 0.7, 0.7)
 
 
 def add_object(
@@ -65,7 +67,8 @@ def add_object(
 
 def _model(name: str, spec: ObjectSpec, issues: Issues, base: Path | None) -> ImportedModel | None:
     color = _color(spec, issues)
-    touch = surface(spec.contact, float(nominal(spec.friction)), spec.restitution)
+    friction = DEFAULT_FRICTION if spec.friction is None else float(nominal(spec.friction))
+    touch = surface(spec.contact or ContactSpec(), friction, spec.restitution or 0.0)
     if spec.source.asset is not None:
         return _asset(spec, spec.source.asset, touch, color, issues, base)
     meshes: dict[str, Mesh] = {}
@@ -114,7 +117,7 @@ def _mesh_geoms(
     geoms = [Geom("hull", 0, MeshShape(hull.name), surface=touch, collides=spec.collides, visible=False)]
     for i, part in enumerate(visual_parts(path, scale, upright=True)):
         meshes[part.mesh.name] = part.mesh
-        shown = part.color if part.color is not None and "color" not in spec.model_fields_set else (*color, 1.0)
+        shown = part.color if part.color is not None and spec.color is None else (*color, 1.0)
         geoms.append(Geom(f"visual{i}", 0, MeshShape(part.mesh.name), color=shown, collides=False))
     return geoms, MeshShape(hull.name)
 
@@ -124,14 +127,13 @@ def _asset(
 ) -> ImportedModel | None:  # fmt: skip
     """A URDF or MJCF file. What the spec gives explicitly wins over the file; its mass is that of the whole object."""
     model = import_asset(uri, base=base, scale=spec.source.scale)
-    given = spec.model_fields_set
     if spec.density is not None:
         issues.add("density", "an asset file has its own masses; give `mass` to scale them, or leave it out")
     geoms: list[Geom] = []
     for geom in model.geoms:
-        if {"friction", "contact", "restitution"} & given:
+        if not (spec.friction is None and spec.contact is None and spec.restitution is None):
             geom = replace(geom, surface=touch)
-        if "color" in given:
+        if spec.color is not None:
             geom = replace(geom, color=(*color, geom.color[3]))
         geoms.append(geom if spec.collides else replace(geom, collides=False))
     bodies = model.bodies
@@ -161,10 +163,10 @@ def _color(spec: ObjectSpec, issues: Issues) -> Rgb:
         if isinstance(spec.color, Range):
             low, high = (rgb(color) for color in spec.color.range)
             return (0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]))
-        return rgb(nominal(spec.color))
+        return DEFAULT_COLOR if spec.color is None else rgb(nominal(spec.color))
     except ValueError as error:
         issues.add("color", str(error))
-        return (0.7, 0.7, 0.7)
+        return DEFAULT_COLOR
 
 
 def add_terrain(builder: WorldBuilder, spec: TerrainSpec) -> None:

@@ -43,8 +43,6 @@ def compile_camera(world: World, name: str, spec: CameraSpec, issues: Issues) ->
             issues.add("look_at", "is where the camera is; move one of them")
             return None
         pose = np.concatenate([eye, P.look_at(eye, target)])
-    if spec.near >= spec.far:
-        issues.add("far", f"the far plane ({spec.far:g} m) must lie beyond the near one ({spec.near:g} m)")
     position, quaternion = split(pose)
     return Camera(
         name,

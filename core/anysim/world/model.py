@@ -22,17 +22,23 @@ ORIGIN: Vec3 = (0.0, 0.0, 0.0)
 
 
 class BodyKind(StrEnum):
+    """How a body may move."""
+
     FREE = "free"
     STATIC = "static"
     LINK = "link"
 
 
 class JointType(StrEnum):
+    """What one degree of freedom does."""
+
     REVOLUTE = "revolute"  # also continuous ones: limits are infinite
     PRISMATIC = "prismatic"
 
 
 class ControlMode(StrEnum):
+    """Which terms of the drive law act."""
+
     POSITION = "position"  # u = kp (q* - q) + kd (qd* - qd) + ff
     VELOCITY = "velocity"  # u = kd (qd* - qd) + ff
     EFFORT = "effort"  # u = ff
@@ -104,11 +110,15 @@ class Plane:
 
 @dataclass(frozen=True, slots=True)
 class Box:
+    """A box centred on its frame; `half_size` are half its edge lengths."""
+
     half_size: Vec3
 
 
 @dataclass(frozen=True, slots=True)
 class Sphere:
+    """A ball centred on its frame."""
+
     radius: float
 
 
@@ -219,6 +229,8 @@ class Camera:
 
 @dataclass(frozen=True, slots=True)
 class Light:
+    """A directional light, or a point light where it has a position."""
+
     name: str
     direction: Vec3
     position: Vec3 | None = None
@@ -240,7 +252,7 @@ class ContactSensor:
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """Triangles in the owner's frame: vertices (V, 3) [m] float64, faces (F, 3) int32; `hash` of source and processing."""
+    """Triangles in the owner's frame: vertices (V, 3) [m] float64, faces (F, 3) int32; `hash` of source and making."""
 
     name: str
     vertices: Array = field(repr=False, compare=False)
@@ -258,6 +270,8 @@ class HeightField:
 
 
 class EntityKind(StrEnum):
+    """What an entity is."""
+
     ROBOT = "robot"
     OBJECT = "object"
 
@@ -287,7 +301,10 @@ class Entity:
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """Joints of a robot that are commanded together. `joints`, `actuators` index the world; `opened`, `closed` are eef targets."""
+    """Joints of a robot that are commanded together: indices into the world's joints and actuators.
+
+    `opened` and `closed` are the joint targets of a gripper.
+    """
 
     name: str
     joints: tuple[int, ...]
@@ -308,6 +325,8 @@ class Robot:
 
 @dataclass(frozen=True, slots=True)
 class Physics:
+    """Time steps [s], gravity [m/s^2], and what an engine may choose about friction."""
+
     dt: float = 0.002
     control_dt: float = 0.02
     gravity: Vec3 = (0.0, 0.0, -9.81)
@@ -339,7 +358,7 @@ class World:
     meshes: tuple[Mesh, ...] = ()
     heightfields: tuple[HeightField, ...] = ()
     excluded_pairs: frozenset[tuple[int, int]] = frozenset()
-    """Pairs of bodies (low, high) that never collide. Bodies in a parent-child relation never do, and are not listed."""
+    """Pairs of bodies (low, high) that never collide. A parent and its child never do, and are not listed."""
 
     @cached_property
     def hash(self) -> str:

@@ -21,15 +21,14 @@ GRIPPER_LIMIT_SOFTNESS = 0.004
 
 
 def surface(contact: ContactSpec, friction: float, restitution: float = 0.0) -> Surface:
-    """The surface of a contact spec: its preset, with the fields that were given explicitly on top."""
-    given = contact.model_fields_set
+    """The surface of a contact spec: its preset, with what else the spec gives on top."""
     chosen = replace(PRESETS[contact.preset], friction=friction, restitution=restitution)
-    if "torsional_friction" in given:
+    if contact.torsional_friction is not None:
         chosen = replace(
             chosen, torsional_friction=contact.torsional_friction, torsional=contact.torsional_friction > 0
         )
-    if "rolling_friction" in given:
+    if contact.rolling_friction is not None:
         chosen = replace(chosen, rolling_friction=contact.rolling_friction)
-    if "priority" in given:
+    if contact.priority is not None:
         chosen = replace(chosen, priority=contact.priority)
     return chosen

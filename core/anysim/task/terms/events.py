@@ -1,4 +1,4 @@
-"""Events: `(scene, draw, *, parameters)`, run on reset or in each step; they act through the engine's public contract."""
+"""Events: `(scene, draw, *, parameters)`, on reset or in each step; they act through the engine's public methods."""
 
 from collections.abc import Callable
 from typing import Any
