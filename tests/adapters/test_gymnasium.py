@@ -48,7 +48,8 @@ def test_the_vector_view_equals_sync_vector_env(mode: AutoresetMode) -> None:
     native = GymVectorEnv(arm(N, "task.horizon=9"), mode)
     rng = np.random.default_rng(0)
     try:
-        a, b = sync.reset(seed=5), native.reset(seed=5)
+        a: tuple[Any, ...] = sync.reset(seed=5)
+        b: tuple[Any, ...] = native.reset(seed=5)
         assert same(a[0], b[0])
         assert same(a[1], b[1])
         ends = 0
