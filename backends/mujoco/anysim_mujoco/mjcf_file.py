@@ -1,0 +1,60 @@
+"""An MJCF file as a compiled MuJoCo model, after looking where its references lead."""
+
+from pathlib import Path
+from typing import Any
+
+import mujoco
+
+from anysim.errors import AssetError
+from anysim.world.assets import resolve_reference
+
+
+def compiled(path: Path, root: Path) -> Any:
+    """Parse and compile a file: defaults, orientations and inertias are MuJoCo's own reading of it.
+
+    Textures and skins are left out: the neutral model has colours only. No body is fused, no visual geom discarded.
+
+    Raises:
+        AssetError: a missing file, a reference that leaves `root`, or what MuJoCo says against the file.
+    """
+    path, root = path.resolve(), root.resolve()
+    _check_includes(path, path, root, ())
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+        _check_assets(spec, path, root)
+        for texture in list(spec.textures):
+            spec.delete(texture)
+        for skin in list(spec.skins):
+            spec.delete(skin)
+        for material in spec.materials:
+            material.textures = [""] * len(material.textures)
+        spec.compiler.fusestatic = False
+        return spec.compile()
+    except (ValueError, mujoco.FatalError) as error:
+        raise AssetError(f"{path}: MuJoCo cannot read it: {' '.join(str(error).split())}") from error
+
+
+def _check_includes(path: Path, main: Path, root: Path, above: tuple[Path, ...]) -> None:
+    """Follow <include> elements, which MuJoCo resolves against the folder of the main file."""
+    import lxml.etree as etree
+
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
+    try:
+        tree = etree.parse(str(path), parser)
+    except (OSError, etree.XMLSyntaxError) as error:
+        raise AssetError(f"{path}: cannot be read as XML: {error}") from error
+    for element in tree.iter("include"):
+        asked_by = f"<include> of {path.name}, line {element.sourceline},"
+        found = resolve_reference(element.get("file") or "", file=main, root=root, asked_by=asked_by)
+        if found in (path, *above):
+            raise AssetError(f"{asked_by} includes itself through '{found.name}'")
+        _check_includes(found, main, root, (path, *above))
+
+
+def _check_assets(spec: Any, path: Path, root: Path) -> None:
+    for kind, elements in (("mesh", spec.meshes), ("hfield", spec.hfields)):
+        for element in elements:
+            if element.file:
+                reference = Path(element.file).name if spec.strippath else element.file
+                asked_by = f"{kind} '{element.name or element.file}' of {path.name}"
+                resolve_reference(str(Path(spec.meshdir) / reference), file=path, root=root, asked_by=asked_by)
