@@ -41,7 +41,7 @@ test-slow: $(STAMP)  ## run the tests that are marked slow
 test-all: $(STAMP)  ## run every test
 	$(BIN)/python -m pytest $(ARGS)
 
-CHECKS := check-lint check-format check-style check-layers check-schema check-types
+CHECKS := check-lint check-format check-style check-layers check-schema check-tables check-types
 check: $(CHECKS)  ## lint, format, types, layers, style and generated files (make -k check: do not stop at the first)
 .PHONY: $(CHECKS)
 $(CHECKS): $(STAMP)
@@ -55,6 +55,8 @@ check-layers:
 	$(BIN)/lint-imports --no-cache --no-logo
 check-schema:
 	$(BIN)/python -m anysim_schemas.jsonschema --check schemas/json
+check-tables:
+	$(BIN)/python scripts/capability_table.py --check
 check-types:
 	$(BIN)/pyright
 
@@ -69,6 +71,7 @@ schema: $(STAMP)  ## write the JSON Schemas that editors complete YAML from
 	$(BIN)/python -m anysim_schemas.jsonschema schemas/json
 
 docs: schema  ## write what is generated and run the examples of docs/
+	$(BIN)/python scripts/capability_table.py
 	$(BIN)/python -m pytest tests/docs $(ARGS)
 
 bench: $(STAMP)  ## measure speed against the budgets, as ratios

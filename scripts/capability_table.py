@@ -34,7 +34,7 @@ def table() -> str:
             elif support.exact:
                 cells.append("yes")
             else:
-                text = f"{name}, {capability}: {support.note}"
+                text = f"{name}: {support.note}"
                 if text not in notes:
                     notes.append(text)
                 cells.append(f"approx. [{notes.index(text) + 1}]")

@@ -1,6 +1,6 @@
 """Draw what a run recorded: `python scripts/demo_picture.py RUN_DIRECTORY` writes `RUN_DIRECTORY/demo.png`.
 
-One row a trajectory, from the first image of its first camera on the left to the last on the right.
+One row for each camera of a trajectory, from the first image on the left to the last on the right.
 """
 
 import argparse
@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-COLUMNS, ROWS = 6, 8
+COLUMNS, TRAJECTORIES = 6, 4
 PICTURE = "demo.png"
 
 
@@ -45,13 +45,17 @@ def main() -> None:
     """Draw the run that the command line names."""
     parser = argparse.ArgumentParser(description="Draw what a run recorded.")
     parser.add_argument("run", type=Path, help="the directory of the run")
-    run: Path = parser.parse_args().run
-    first = {video.parent: video for video in sorted(run.rglob("*.mp4"), reverse=True)}
-    videos = sorted(first.values())
-    if not videos:
+    parser.add_argument("--trajectories", type=int, default=TRAJECTORIES, help="how many of them are drawn")
+    parser.add_argument("--out", type=Path, help=f"the picture; default RUN/{PICTURE}")
+    arguments = parser.parse_args()
+    run: Path = arguments.run
+    recorded = sorted({video.parent for video in run.rglob("*.mp4")})
+    if not recorded:
         sys.exit(f"{run} holds no video; record with a camera: record: {{writer: mcap, cameras: [front]}}")
-    draw(run, videos[:ROWS], run / PICTURE)
-    print(f"{run / PICTURE}: {min(len(videos), ROWS)} of {len(videos)} trajectories")
+    chosen = recorded[: arguments.trajectories]
+    out: Path = arguments.out or run / PICTURE
+    draw(run, [video for folder in chosen for video in sorted(folder.glob("*.mp4"))], out)
+    print(f"{out}: {len(chosen)} of {len(recorded)} trajectories")
 
 
 if __name__ == "__main__":
