@@ -11,13 +11,12 @@ import pytest
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    """A run of two trajectories with videos of ten images that grow brighter."""
+    """A run of two trajectories, each with a video of ten images that grow brighter."""
     import av
 
     for name in ("env_0000_episode_0000", "env_0001_episode_0000"):
         folder = tmp_path / "episodes" / name
         folder.mkdir(parents=True)
-        (folder / "wrist.mp4").touch()  # of each trajectory only the first camera is read
         with av.open(str(folder / "front.mp4"), "w") as container:
             stream = container.add_stream("mpeg4", rate=10)
             stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"

@@ -63,7 +63,7 @@ def _run_id(env: "TaskEnv", seed: int) -> str:
     import hashlib
     from json import dumps
 
-    text = dumps([env.spec.to_dict(), seed], sort_keys=True)
+    text = dumps([env.spec.to_dict(), seed])
     return f"seed{seed}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"
 
 

@@ -1,4 +1,4 @@
-"""Plain data and the one way to write it as JSON: sorted keys, two spaces, shortest exact floats."""
+"""Plain data and the one way to write it as JSON: mappings in their order, two spaces, shortest exact floats."""
 
 import json
 import math
@@ -43,8 +43,11 @@ def plain(value: Any, where: str = "value") -> Any:
 
 
 def dump_json(value: Any, where: str = "value") -> bytes:
-    """The bytes of a JSON file: equal data gives equal bytes."""
-    text = json.dumps(plain(value, where), sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False)
+    """The bytes of a JSON file: equal data, in the same order, gives equal bytes.
+
+    Keys are not sorted: the order of the objects in a spec is that of the bodies in the world it makes.
+    """
+    text = json.dumps(plain(value, where), indent=2, ensure_ascii=False, allow_nan=False)
     return (text + "\n").encode()
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.record.compare import Drift, compare_states
-from anysim.record.frame import state_rows
+from anysim.record.frame import state_digest, state_rows
 from anysim.record.manifest import Manifest
 from anysim.record.reader import TrajectoryReader, open_trajectory
 from anysim.task.env import TaskEnv
@@ -22,13 +22,15 @@ class ReplayResult:
         manifest: of the recording.
         engine: what it was replayed on, with version.
         same_world: the rebuilt world has the recorded hash.
-        drift: recorded against replayed states, with the initial state as an extra first row where it was recorded.
+        same_start: the state right after the reset is the recorded one to the bit (true where it was not recorded).
+        drift: recorded against replayed states after each step.
         status: how the replayed episode ended; `recorded_status` how the recorded one did.
     """
 
     manifest: Manifest
     engine: str
     same_world: bool
+    same_start: bool
     drift: Drift
     status: str
 
@@ -39,8 +41,8 @@ class ReplayResult:
 
     @property
     def identical(self) -> bool:
-        """The same world, and every state the same to the bit."""
-        return self.same_world and self.drift.identical
+        """The same world, the same start, and every state the same to the bit."""
+        return self.same_world and self.same_start and self.drift.identical
 
 
 def rebuild(manifest: Manifest, engine: str | None = None) -> TaskEnv:
@@ -64,33 +66,30 @@ def replay(directory: str | Path, engine: str | None = None) -> ReplayResult:
     """
     reader = open_trajectory(directory)
     with rebuild(reader.manifest, engine) as env:
-        states, status = _run(env, reader)
-        recorded = {k: _with_first(reader.initial_state.get(k), rows) for k, rows in reader.states.items()}
+        start, states = _run(env, reader)
+        recorded = reader.initial_state
+        same_start = not recorded or state_digest(start) == state_digest(recorded)
         return ReplayResult(
             reader.manifest, f"{env.engine.name} {env.engine.version}",
-            env.engine.world.hash == reader.manifest.world_hash, compare_states(recorded, states), status,
+            env.engine.world.hash == reader.manifest.world_hash, same_start, compare_states(reader.states, states),
+            str(env.status[0]),
         )  # fmt: skip
 
 
-def _with_first(first: Array | None, rows: Array) -> Array:
-    return rows if first is None else np.concatenate([first[None], rows])
-
-
-def _run(env: TaskEnv, reader: TrajectoryReader) -> tuple[dict[str, Array], str]:
-    """States (T, …) of the replayed episode, as far as it goes, and its status at the end."""
+def _run(env: TaskEnv, reader: TrajectoryReader) -> tuple[dict[str, Array], dict[str, Array]]:
+    """The state (…) after the reset, and the states (T, …) after each step as far as the replayed episode goes."""
     fields = tuple(reader.manifest.layout.state)
     env.reset(episode_seeds=[reader.manifest.episode_seed])
-    rows: list[dict[str, Array]] = []
 
-    def keep() -> None:
-        found = state_rows(env.engine.get_state(), 0, fields, env.engine.control)
-        rows.append({name: np.array(values) for name, values in found.items()})
+    def now() -> dict[str, Array]:
+        rows = state_rows(env.engine.get_state(), 0, fields, env.engine.control)
+        return {name: np.array(values) for name, values in rows.items()}
 
-    if reader.manifest.has_initial_frame:
-        keep()
+    start = now()
+    steps: list[dict[str, Array]] = []
     for action in reader.actions:
         if not env.running[0]:
             break
         env.step(action[None])
-        keep()
-    return {name: np.stack([row[name] for row in rows]) for name in fields}, str(env.status[0])
+        steps.append(now())
+    return start, {name: np.stack([step[name] for step in steps]) for name in fields}

@@ -48,8 +48,8 @@ LANGUAGE_SCHEMA = {
 
 
 def json_bytes(value: Any) -> bytes:
-    """Compact, deterministic JSON."""
-    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+    """Compact JSON; mappings keep their order, which means something in a spec."""
+    return json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
 
 
 # ---------------------------------------------------------------------- schemas
