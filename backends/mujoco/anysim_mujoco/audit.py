@@ -17,7 +17,7 @@ def joint_limits(model: Any, layout: Layout) -> Array:
     """(J, 2) [rad, m] as MuJoCo enforces them, infinite where it does not."""
     joints = model.dof_jntid[layout.joint_v]
     limits = np.where(model.jnt_limited[joints, None].astype(bool), model.jnt_range[joints], [-np.inf, np.inf])
-    return np.where(np.abs(limits) >= UNLIMITED, np.sign(limits) * np.inf, limits)
+    return np.where(np.abs(limits) >= UNLIMITED, np.copysign(np.inf, limits), limits)
 
 
 def geom_volumes(model: Any, layout: Layout) -> Array:

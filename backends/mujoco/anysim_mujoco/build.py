@@ -49,20 +49,7 @@ def build(world: World, options: MujocoOptions) -> Built:
     except (ValueError, mujoco.FatalError) as error:
         said = " ".join(str(error).split())
         raise EngineError(f"MuJoCo cannot build the world '{world.name}': {said}") from error
-    _forget_shared_frames(model)
     return Built(model, Layout.of(world, model, Handles(bodies, joints, geoms, sensors)))
-
-
-def _forget_shared_frames(model: Any) -> None:
-    """Undo a shortcut of the compiler.
-
-    It notes which frames coincide with a body's inertial frame and then takes one for the other, which is wrong in an
-    env whose centre of mass or inertia is changed.
-    """
-    frames = mujoco.mjtSameFrame
-    model.body_sameframe[1:] = int(frames.mjSAMEFRAME_NONE)
-    inertial = (int(frames.mjSAMEFRAME_INERTIA), int(frames.mjSAMEFRAME_INERTIAROT))
-    model.geom_sameframe[np.isin(model.geom_sameframe, inertial)] = int(frames.mjSAMEFRAME_NONE)
 
 
 def initial_row(world: World, model: Any, layout: Layout) -> Array:
@@ -123,7 +110,7 @@ def _bodies(spec: Any, world: World) -> list[Any]:
             name=body_name(world, index), pos=body.position, quat=wxyz_from_xyzw(np.asarray(body.quaternion)),
             gravcomp=float(body.gravity_compensation),
         )  # fmt: skip
-        # the shortcut for bodies with a diagonal inertia matrix would not hold once their parameters are changed
+        # the compiler's shortcut for diagonal inertia matrices forbids that the centre of mass is changed later
         element.simple = False
         if body.kind is BodyKind.FREE:
             element.add_freejoint(name=f"{body.name} (free)")

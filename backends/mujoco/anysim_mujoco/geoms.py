@@ -50,11 +50,11 @@ def add_look(spec: Any, world: World, options: MujocoOptions) -> None:
     textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = _GROUND
     ground.textures = textures
     head = spec.visual.headlight
-    head.ambient, head.diffuse, head.specular = [0.38] * 3, [0.32] * 3, [0.1] * 3
+    head.ambient, head.diffuse, head.specular = [0.3] * 3, [0.25] * 3, [0.1] * 3
     quality = spec.visual.quality
     quality.shadowsize = 1024 if options.shadows else 0
     quality.offsamples = options.antialiasing
-    for light in world.lights or (Light("default", (-0.35, 0.25, -1.0), intensity=0.5),):
+    for light in world.lights or (Light("default", (-0.35, 0.25, -1.0), intensity=0.45),):
         _add_light(spec, light, world, options.shadows)
 
 

@@ -3,8 +3,10 @@
 from typing import Any, NamedTuple
 
 import numpy as np
+from mujoco.batch import SimulationError
 
 from anysim.conventions import Array
+from anysim.errors import EngineError
 from anysim.world.model import World
 from anysim_mujoco.drives import Drives
 from anysim_mujoco.inertia import check_physical, full, principal
@@ -125,10 +127,18 @@ class Parameters:
         self._mark(ids)
 
     def settle(self) -> None:
-        """Bring the constants that MuJoCo derives up to date where parameters changed."""
+        """Bring the constants that MuJoCo derives up to date where parameters changed.
+
+        Raises:
+            EngineError: MuJoCo cannot derive them.
+        """
         if self._any_stale:
-            self._batch.set_const(np.flatnonzero(self._stale))
+            touched = np.flatnonzero(self._stale)
             self._stale[:] = self._any_stale = False
+            try:
+                self._batch.set_const(touched)
+            except SimulationError as error:
+                raise EngineError(f"MuJoCo refuses the parameters that were written: {error}") from error
 
     def _mark(self, ids: Array) -> None:
         """MuJoCo's derived constants of these envs are out of date."""

@@ -88,10 +88,9 @@ class StateReader:
     def touch(self, ids: Array) -> None:
         """The state of these envs was written; their efforts and contact forces stay those of the last substep."""
         self.hold(ids, self.joint_effort()[ids], self.contact_force()[ids])
-        self._stale[ids] = self._any_stale = True
 
     def hold(self, ids: Array, effort: Array | float, contact: Array | float) -> None:
-        """Make these the efforts and contact forces of the last substep."""
+        """The state of these envs was written; make these their efforts and contact forces of the last substep."""
         self._held[ids] = self._any_held = True
         self._held_effort[ids], self._held_contact[ids] = effort, contact
         self._stale[ids] = self._any_stale = True

@@ -1,9 +1,13 @@
 """Parameters per env: what is written is what the physics has, and nothing else changes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from anysim.conventions import xyzw_from_wxyz
 from anysim.errors import EngineError
+from anysim.world.model import Body, BodyKind, Geom, Inertial, Sphere, World
 from anysim_mujoco.inertia import full, principal
 
 
@@ -49,8 +53,6 @@ def test_same_values_give_the_same_bits(worlds, make, shake):
 )
 def test_a_changed_env_moves_like_a_world_with_that_value(worlds, make, shake, name):
     """Against a model compiled with the value, and the other env against the one without."""
-    from dataclasses import replace
-
     world = worlds.scene()
     changed = {
         "body.mass": lambda w: _bodies(w, mass=1.7),
@@ -78,8 +80,6 @@ def test_a_changed_env_moves_like_a_world_with_that_value(worlds, make, shake, n
 
 
 def _bodies(world, **changes):
-    from dataclasses import replace
-
     # the lower link: its geom sits elsewhere than its centre of mass, and must stay there
     return replace(
         world,
@@ -87,25 +87,29 @@ def _bodies(world, **changes):
     )
 
 
-def test_geoms_stay_when_the_centre_of_mass_moves(make, worlds):
-    """Also geoms whose frame is that of the inertia, which MuJoCo treats as one."""
-    from dataclasses import replace
-
-    from anysim.world.model import Body, BodyKind, Geom, Inertial, Sphere, World
-
-    turn = (0.5, 0.5, 0.5, 0.5)
-    body = Body(
-        "b", BodyKind.FREE, inertial=Inertial(1.0, (0.0, 0.0, 0.1), (0.011, 0.012, 0.013, 0.001, -0.002, 0.0005))
-    )
-    world = World(bodies=(body,), geoms=(Geom("g", 0, Sphere(0.05), (0.0, 0.0, 0.1)),))
-    engine = make(world)
-    engine.destroy()
-    for quaternion in ((0.0, 0.0, 0.0, 1.0), turn):
-        engine = make(replace(world, geoms=(replace(world.geoms[0], quaternion=quaternion),)))
+def test_geoms_stay_when_the_centre_of_mass_moves(make):
+    """Also a geom in the very frame of the inertia, which MuJoCo's compiler takes for one with it."""
+    tensor = (0.011, 0.012, 0.013, 0.001, -0.002, 0.0005)
+    _, frame = principal(np.array(tensor))
+    x, y, z, w = (float(v) for v in xyzw_from_wxyz(frame))
+    body = Body("b", BodyKind.FREE, inertial=Inertial(1.0, (0.0, 0.0, 0.1), tensor))
+    for quaternion in ((0.0, 0.0, 0.0, 1.0), (x, y, z, w)):
+        engine = make(World(bodies=(body,), geoms=(Geom("g", 0, Sphere(0.05), (0.0, 0.0, 0.1), quaternion),)))
         engine.set_parameters("body.com", [[[0.0, 0.2, 0.0]]])
         hit = engine.raycast([[[0.0, 0.0, 1.0], [0.0, 0.2, 1.0]]], [[[0.0, 0.0, -1.0]] * 2])
         assert hit.distance[0, 0] == pytest.approx(0.85)
         assert np.isinf(hit.distance[0, 1])
+
+
+def test_an_inertia_may_turn_away_from_its_bodys_axes(worlds, make, shake):
+    """Of a body whose own was diagonal, against a model compiled with the new one."""
+    world, tensor = worlds.scene(), (0.011, 0.02, 0.021, 0.004, -0.002, 0.003)
+    upper = replace(world.bodies[3], inertial=world.bodies[3].inertial._replace(inertia=tensor))
+    compiled = make(replace(world, bodies=(*world.bodies[:3], upper, world.bodies[4])))
+    engine = make(world)
+    engine.set_parameters("body.inertia", [[tensor]], indices=[3])
+    for ours, wanted in zip(shake(engine, 10), shake(compiled, 10), strict=True):
+        assert np.allclose(ours, wanted, atol=1e-9)
 
 
 def test_parameters_survive_resets_and_belong_to_their_env(worlds, make):

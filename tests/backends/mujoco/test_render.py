@@ -74,6 +74,9 @@ def test_up_in_the_image_is_the_cameras_up(make):
     rows, columns = np.nonzero(ids == 1)
     assert rows.mean() < ROW - 5
     assert columns.mean() < 32
+    images = engine.render("top", channels=("rgb", "depth"))
+    assert images["rgb"][0, round(rows.mean()), round(columns.mean())].argmax() == 0
+    assert images["depth"][0, round(rows.mean()), round(columns.mean())] == pytest.approx(1.8, abs=2e-4)
     half_turn = P.multiply(np.array(_looking_down()), np.array([0.0, 0.0, 1.0, 0.0]))
     engine.set_camera_pose("top", [[0.0, 0.0, 2.0, *half_turn]])
     rows, columns = np.nonzero(engine.render("top", channels=("segmentation",))["segmentation"][0] == 1)
