@@ -1,6 +1,7 @@
 """From a name or a file to a running env: load, compile, create, bind."""
 
 import json
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.resources import files
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from anysim import registry
-from anysim.engine.factory import create_simulation
+from anysim.engine.factory import ENGINE_VARIABLE, create_simulation
 from anysim.errors import AssetError, SpecError, SpecIssue, TaskError
 from anysim.plugin_options import resolve_options
 from anysim_schemas.load import Loaded, LoadedRun, load_run
@@ -56,11 +57,15 @@ def load(*sources: str | Path | Mapping[str, Any], overrides: Sequence[str] = ()
         SpecError: every fault with file, line and column.
     """
     resolved = [s if isinstance(s, Mapping) else source_path(s) for s in sources]
-    return load_run(resolved, overrides=overrides, resolver=resolve_options, extends=_extends)
+    chosen = os.environ.get(ENGINE_VARIABLE)
+    beneath = {"engine": chosen} if chosen else None
+    return load_run(resolved, overrides=overrides, resolver=resolve_options, extends=_extends, base_data=beneath)
 
 
 def compile_world(
-    source: "str | Path | LoadedRun | RunSpec | Mapping[str, Any]", overrides: Sequence[str] = ()
+    source: "str | Path | LoadedRun | RunSpec | Mapping[str, Any]",
+    overrides: Sequence[str] = (),
+    base: Path | None = None,
 ) -> "World":
     """The neutral World of a file, an installed task, or a spec.
 
@@ -71,9 +76,10 @@ def compile_world(
     from anysim_schemas.run import RunSpec
 
     if isinstance(source, RunSpec):
-        return compile_spec(source)
+        return compile_spec(source, base=base)
     loaded = source if isinstance(source, Loaded) else load(source, overrides=overrides)
-    base = loaded.files[-1].parent if loaded.files else None
+    if base is None and loaded.files:
+        base = loaded.files[-1].parent
     try:
         return compile_spec(loaded.spec, base=base)
     except (SpecError, AssetError) as error:
@@ -132,7 +138,7 @@ def _env(spec: "RunSpec", world: "World", simulation: "SimEngine", num_envs: int
 
 def make(
     source: str | Path | LoadedRun | Mapping[str, Any], *, engine: str | None = None, num_envs: int | None = None,
-    seed: int | None = None, overrides: Sequence[str] = (),
+    seed: int | None = None, overrides: Sequence[str] = (), base: Path | None = None,
 ) -> "TaskEnv":  # fmt: skip
     """An env of a task: `env = anysim.make("pick_cube", engine="mujoco", num_envs=16)`.
 
@@ -142,6 +148,7 @@ def make(
         num_envs: parallel environments; wins over the file.
         seed: seeds the envs now; otherwise the first `reset(seed=...)` does.
         overrides: dotted overrides, as `-o` on the command line.
+        base: the folder that relative asset paths are relative to; that of the file where there is one.
 
     Raises:
         SpecError: the file, with line and column.
@@ -153,11 +160,11 @@ def make(
         *([f"num_envs={num_envs}"] if num_envs else []),
     ]
     if isinstance(source, Loaded):
-        loaded = load(source.data, overrides=more) if more else source
+        loaded = replace(load(source.data, overrides=more), files=source.files) if more else source
     else:
         loaded = load(source, overrides=more)
     spec = loaded.spec
-    world = compile_world(loaded)
+    world = compile_world(loaded, base=base)
     name = str(source) if isinstance(source, str) and "/" not in str(source) else world.name
     try:
         env = _env(spec, world, create_simulation(spec.engine.name, **spec.engine.options), spec.num_envs, name)

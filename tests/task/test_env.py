@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import anysim
 from anysim import hooks
 from anysim.errors import SpecError, TaskError
 from anysim.task.contract import Status
@@ -211,3 +212,11 @@ def test_several_bad_names_are_reported_at_once() -> None:
     with pytest.raises(SpecError) as caught:
         blocks(1, "task.rewards.close.a=redd", "task.failure.fell.frame=tabel")
     assert len(caught.value.issues) == 2
+
+
+def test_the_environment_variable_names_the_engine_unless_the_file_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ANYSIM_ENGINE", "null")
+    assert anysim.load("pick_cube").spec.engine.name == "null"
+    assert anysim.load({"engine": "mujoco"}).spec.engine.name == "mujoco"
+    monkeypatch.delenv("ANYSIM_ENGINE")
+    assert anysim.load("pick_cube").spec.engine.name == "mujoco"

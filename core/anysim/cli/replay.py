@@ -11,6 +11,9 @@ from anysim.cli.options import AsJson, Engine
 def replay(
     directories: Annotated[list[Path], typer.Argument(metavar="DIR…", help="Trajectories, or runs with many of them.")],
     engine: Engine = None,
+    base: Annotated[
+        Path | None, typer.Option(help="Folder of the recorded file, where its world has assets with relative paths.")
+    ] = None,
     json: AsJson = False,
 ) -> None:
     """Replay trajectories from their manifests alone, and compare every recorded state.
@@ -35,16 +38,19 @@ def replay(
         faults = verify(path)
         if faults:
             raise RecordError(f"{path} is damaged: {'; '.join(faults)}")
-        result = replay_one(path, engine)
+        result = replay_one(path, engine, base)
         row = {
             "trajectory": str(path), "engine": result.engine, "identical": result.identical,
             "steps": result.drift.recorded_steps, "first difference": result.drift.first_step,
             "largest difference": max((f.max_abs for f in result.drift.fields.values()), default=0.0),
             "recorded": result.recorded_status, "replayed": result.status, "same world": result.same_world,
+            "same start": result.same_start,
         }  # fmt: skip
         rows.append(row)
         if not json:
-            typer.echo(f"{path.name}: {result.drift}")
+            notes = "" if result.same_world else " (the rebuilt world is another one)"
+            notes += "" if result.same_start else " (it starts from another state)"
+            typer.echo(f"{path.name}: {result.drift}{notes}")
     same = sum(bool(row["identical"]) for row in rows)
     if json:
         print_json({"replayed": len(rows), "identical": same, "trajectories": rows})

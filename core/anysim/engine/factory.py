@@ -8,11 +8,13 @@ from anysim.engine.base import SimEngine
 from anysim.errors import EngineError
 
 DEFAULT_ENGINE = "mujoco"
+ENGINE_VARIABLE = "ANYSIM_ENGINE"
+"""The environment variable that names the engine where neither a file nor the command line does."""
 
 
 def default_engine() -> str:
     """`ANYSIM_ENGINE` if set, else mujoco. A YAML file and the command line win over it."""
-    return os.environ.get("ANYSIM_ENGINE", DEFAULT_ENGINE)
+    return os.environ.get(ENGINE_VARIABLE, DEFAULT_ENGINE)
 
 
 def create_simulation(name: str | None = None, **options: Any) -> SimEngine:

@@ -45,17 +45,20 @@ class ReplayResult:
         return self.same_world and self.same_start and self.drift.identical
 
 
-def rebuild(manifest: Manifest, engine: str | None = None) -> TaskEnv:
-    """The env of a recording, alone: one env, whatever their number was."""
+def rebuild(manifest: Manifest, engine: str | None = None, base: Path | None = None) -> TaskEnv:
+    """The env of a recording, alone: one env, whatever their number was.
+
+    `base` is the folder of the recorded file where its world refers to assets by relative paths.
+    """
     from anysim.api import make
 
     spec: dict[str, Any] = dict(manifest.spec) | {"num_envs": 1}
     if engine is not None and engine != manifest.engine:
         spec["engine"] = {"name": engine}
-    return make(spec)
+    return make(spec, base=base)
 
 
-def replay(directory: str | Path, engine: str | None = None) -> ReplayResult:
+def replay(directory: str | Path, engine: str | None = None, base: Path | None = None) -> ReplayResult:
     """Replay a committed trajectory on the engine it was recorded on, or on another.
 
     On the same engine, version and machine the states are equal to the bit; elsewhere the drift says how far not.
@@ -65,7 +68,7 @@ def replay(directory: str | Path, engine: str | None = None) -> ReplayResult:
         CapabilityError: the other engine cannot run this world.
     """
     reader = open_trajectory(directory)
-    with rebuild(reader.manifest, engine) as env:
+    with rebuild(reader.manifest, engine, base) as env:
         start, states = _run(env, reader)
         recorded = reader.initial_state
         same_start = not recorded or state_digest(start) == state_digest(recorded)
