@@ -146,3 +146,27 @@ def test_sixteen_envs_succeed_and_replay_to_the_bit(tmp_path: Path) -> None:
     assert replayed.returncode == 0, replayed.stderr
     report = json.loads(replayed.stdout)
     assert report["identical"] == report["replayed"] >= 61
+
+
+def test_audit_compares_every_number() -> None:
+    result = anysim("audit", "pick_cube", "--json")
+    assert result.returncode == 0, result.stdout + result.stderr
+    report = json.loads(result.stdout)
+    assert report["different"] == 0
+    assert report["compared"] > 100
+
+
+def test_bench_gives_a_ratio_for_each_loop() -> None:
+    result = anysim("bench", "step", "-n", "1,2", "--rounds", "1", "--json")
+    assert result.returncode == 0, result.stderr
+    rows = json.loads(result.stdout)
+    assert [(row["what"], row["num_envs"]) for row in rows] == [("engine", 1), ("engine", 2), ("env", 1), ("env", 2)]
+    assert all(row["ratio"] > 0 for row in rows)
+
+
+def test_overrides_are_checked_like_files() -> None:
+    result = anysim("run", "pick_cube", "-o", "world.objects.cube.masss=0.1")
+    assert result.returncode == 2
+    assert (
+        "-o world.objects.cube.masss=0.1: world.objects.cube.masss: unknown key; did you mean 'mass'?" in result.stderr
+    )

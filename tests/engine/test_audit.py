@@ -1,0 +1,65 @@
+"""The audit finds what an engine changed, and nothing where it changed nothing."""
+
+from dataclasses import replace
+
+import pytest
+
+import anysim
+from anysim.engine.audit import audit
+from anysim.engine.base import SimEngine
+from anysim.engine.factory import create_simulation
+from anysim.engine.null import NullEngine
+from anysim.world.model import World
+from tests.task.helpers import BLIND
+
+
+@pytest.fixture(scope="module")
+def world() -> World:
+    return anysim.compile_world("pick_cube", overrides=BLIND)
+
+
+def differing(engine: SimEngine, world: World) -> set[tuple[str, str]]:
+    with engine:
+        engine.create_world(world)
+        return {(line.subject, line.quantity) for line in audit(engine) if line.ok is False}
+
+
+@pytest.mark.parametrize("name", ["null", "mujoco"])
+def test_an_engine_that_builds_what_it_is_told_is_clean(name: str, world: World) -> None:
+    assert differing(create_simulation(name), world) == set()
+
+
+def test_mujoco_reports_every_quantity(world: World) -> None:
+    with create_simulation("mujoco") as engine:
+        engine.create_world(world)
+        assert [line for line in audit(engine) if line.ok is None] == []
+
+
+class Spoiled(NullEngine):
+    """Builds another world than it is given, as a native importer would."""
+
+    def _build(self, world: World, num_envs: int) -> None:
+        bodies = list(world.bodies)
+        bodies[3] = replace(bodies[3], inertial=bodies[3].inertial._replace(mass=9.0))
+        bodies[5] = replace(bodies[5], position=(0.0, 0.0, 0.1))
+        joints = list(world.joints)
+        joints[2] = replace(joints[2], damping=0.5)
+        self._spoiled = replace(world, bodies=tuple(bodies), joints=tuple(joints))
+        super()._build(self._spoiled, num_envs)
+
+    def _read(self, name: str):
+        honest, self._world = self._world, self._spoiled
+        try:
+            return super()._read(name)
+        finally:
+            self._world = honest
+
+
+def test_a_spoiled_engine_is_found_out(world: World) -> None:
+    found = differing(Spoiled(), world)
+    names = [b.name for b in world.bodies]
+    assert (names[3], "mass") in found
+    assert ("panda", "total mass") in found
+    assert (world.joints[2].name, "damping") in found
+    assert (names[5], "frame") in found
+    assert (names[1], "frame") not in found
