@@ -50,7 +50,8 @@ def add_look(spec: Any, world: World, options: MujocoOptions) -> None:
     textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = _GROUND
     ground.textures = textures
     head = spec.visual.headlight
-    head.ambient, head.diffuse, head.specular = [0.3] * 3, [0.25] * 3, [0.1] * 3
+    # the viewer's own lamp only fills in where the world brings its lights
+    head.ambient, head.diffuse, head.specular = [0.28] * 3, [0.08 if world.lights else 0.25] * 3, [0.1] * 3
     quality = spec.visual.quality
     quality.shadowsize = 1024 if options.shadows else 0
     quality.offsamples = options.antialiasing
