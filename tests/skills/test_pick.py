@@ -87,5 +87,5 @@ def test_a_task_without_an_expert_says_so() -> None:
     from anysim.errors import TaskError
     from tests.task.helpers import blocks
 
-    with blocks(1) as env, pytest.raises(TaskError, match="has no expert; add task.expert"):
+    with blocks(1) as env, pytest.raises(TaskError, match=r"has no expert; add task\.expert"):
         SkillPolicy(env)
