@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from anysim import registry
-from anysim.engine.capability import Capability
+from anysim.engine.capability import matrix
 from anysim.errors import PluginError
 
 ROOT = Path(__file__).parents[1]
@@ -22,25 +22,10 @@ DISTRIBUTIONS = ("anysim", "anysim-mujoco", "anysim-pybullet", "anysim-sapien")
 def table() -> str:
     """Engines as columns, capabilities as rows; notes of approximations below."""
     names = [n for n in registry.names("engines") if registry.distribution("engines", n) in DISTRIBUTIONS]
-    engines = {name: registry.load("engines", name).capabilities.supported for name in names}
-    lines = [f"| | {' | '.join(names)} |", f"|---|{'---|' * len(names)}"]
-    notes: list[str] = []
-    for capability in Capability:
-        cells = []
-        for name in names:
-            support = engines[name].get(capability)
-            if support is None:
-                cells.append("-")
-            elif support.exact:
-                cells.append("yes")
-            else:
-                text = f"{name}: {support.note}"
-                if text not in notes:
-                    notes.append(text)
-                cells.append(f"approx. [{notes.index(text) + 1}]")
-        lines.append(f"| {capability} | {' | '.join(cells)} |")
-    lines.append("")
-    lines += [f"[{i}] {note}  " for i, note in enumerate(notes, 1)]
+    engines, rows, notes = matrix({name: registry.load("engines", name).capabilities for name in names})
+    lines = [f"| | {' | '.join(engines)} |", f"|---|{'---|' * len(engines)}"]
+    lines += [f"| {' | '.join(row)} |" for row in rows]
+    lines += ["", *(f"[{number}] {note}  " for number, note in enumerate(notes, 1))]
     return "\n".join(lines)
 
 

@@ -26,8 +26,30 @@ def list_(
     rows = [{"name": name, "from": _origin(kind, name), "what": _what(kind, name)} for name in registry.names(kind)]
     if json:
         print_json(rows)
-    else:
-        print_table(f"{kind}: {registry.KINDS[kind]}", ("name", "from", "what"), [tuple(r.values()) for r in rows])
+        return
+    print_table(f"{kind}: {registry.KINDS[kind]}", ("name", "from", "what"), [tuple(r.values()) for r in rows])
+    if kind == "engines":
+        _capabilities()
+
+
+def _capabilities() -> None:
+    """What each engine that loads can do, with the measured error of what is approximate."""
+    from anysim import registry
+    from anysim.cli.output import print_table
+    from anysim.engine.capability import matrix
+    from anysim.errors import PluginError
+
+    declared = {}
+    for name in registry.names("engines"):
+        try:
+            declared[name] = registry.load("engines", name).capabilities
+        except PluginError:
+            continue  # its row above says why
+    engines, rows, notes = matrix(declared)
+    typer.echo()
+    print_table("capabilities", ("capability", *engines), rows)
+    for number, note in enumerate(notes, 1):
+        typer.echo(f"[{number}] {note}")
 
 
 def _origin(kind: str, name: str) -> str:

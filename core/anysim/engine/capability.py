@@ -86,3 +86,34 @@ def check(engine: str, capabilities: Capabilities, needs: Sequence[Need], source
             f"Choose another engine (`anysim list engines` shows what each can do) or change the lines named."
         )
     return [need for need in needs if not capabilities.supported[need.capability].exact]
+
+
+class Matrix(NamedTuple):
+    """What several engines can do.
+
+    `rows` hold a capability and a cell for each engine; a cell ends in the number of its note where it is approximate.
+    `notes` hold `engine: measured error`.
+    """
+
+    engines: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...]
+
+
+def matrix(engines: Mapping[str, Capabilities]) -> Matrix:
+    """The table of capabilities by engine."""
+    notes: list[str] = []
+    rows: list[tuple[str, ...]] = []
+    for capability in Capability:
+        cells: list[str] = []
+        for name, declared in engines.items():
+            support = declared.supported.get(capability)
+            if support is None or support.exact:
+                cells.append("-" if support is None else "yes")
+                continue
+            note = f"{name}: {support.note}"
+            if note not in notes:
+                notes.append(note)
+            cells.append(f"approx. [{notes.index(note) + 1}]")
+        rows.append((str(capability), *cells))
+    return Matrix(tuple(engines), tuple(rows), tuple(notes))
