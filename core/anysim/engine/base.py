@@ -164,8 +164,7 @@ class SimEngine(Primitives):
                 self._apply_wrench(commands.wrench)
             self._step(n_steps, ids)
             if commands.wrench is not None:
-                commands.wrench = None
-                self._apply_wrench(None)
+                self._apply_wrench(commands.spend_wrench(ids))
             if ids is None:
                 self._ticks += n_steps
             else:

@@ -8,7 +8,6 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.checks import rows as checked_rows
-from anysim.errors import EngineError
 from anysim.world.model import ControlMode, World
 
 MODES = tuple(ControlMode)
@@ -42,6 +41,7 @@ class CommandBuffer:
         self.control.velocity[ids] = 0.0
         self.control.effort[ids] = 0.0
         self.control.mode[ids] = self._mode
+        self.spend_wrench(ids)
         self.control_changed = True
 
     def write(self, position: Any, velocity: Any, effort: Any, ids: Array | None, which: Array | None) -> None:
@@ -78,17 +78,25 @@ class CommandBuffer:
             self.wrench = np.zeros((len(self.control.position), self._bodies, 6))
         self.wrench[np.ix_(ids, bodies)] += wrench
 
-    def rows(self, ids: Array) -> dict[str, Array]:
-        """Copies of the commands of envs, for a snapshot."""
+    def spend_wrench(self, ids: Array | None) -> Array | None:
+        """Forget the wrenches of envs (None: of all); returns what still waits for the others."""
         if self.wrench is not None:
-            raise EngineError(
-                "a wrench is waiting for its step; take the snapshot before apply_wrench() or after step()"
-            )
-        return {name: getattr(self.control, name)[ids] for name in Control._fields}
+            if ids is not None:
+                self.wrench[ids] = 0.0
+            if ids is None or not self.wrench.any():
+                self.wrench = None
+        return self.wrench
+
+    def rows(self, ids: Array) -> dict[str, Array]:
+        """Copies of the commands of envs, for a snapshot, with the wrenches that wait for their step."""
+        rows = {name: getattr(self.control, name)[ids] for name in Control._fields}
+        return rows if self.wrench is None else rows | {"wrench": self.wrench[ids]}
 
     def restore(self, ids: Array, data: Mapping[str, Array]) -> None:
         """Write what `rows` returned."""
         for name in Control._fields:
             getattr(self.control, name)[ids] = data[name]
-        self.wrench = None
+        self.spend_wrench(ids)
+        if "wrench" in data:
+            self.add_wrench(data["wrench"], ids, np.arange(self._bodies))
         self.control_changed = True

@@ -230,17 +230,6 @@ def test_wrenches_add_up_in_their_envs(build):
     assert_close(speed, np.array([[0.0, 0.0], [0.0, 1.0]]), tolerances.MOTION, "speeds after 1 s")
 
 
-@needs(C.WRENCHES)
-def test_a_partial_step_uses_the_wrench_up(build):
-    """A wrench that was applied lasts one call only, also where the step covers some envs."""
-    engine = build(worlds.spinning_ball(), 2)
-    engine.apply_wrench([2.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0])
-    engine.step(100, env_ids=[0])
-    engine.step(100)
-    speed = engine.get_state().body_twist[:, 0, 0]
-    assert_close(speed, np.array([0.2, 0.0]), tolerances.MOTION, "only the env of the first call was pushed")
-
-
 @needs(C.GRAVITY_COMPENSATION, C.DYNAMICS)
 def test_gravity_compensation(build):
     """A gravity-compensated link hangs without effort; its neighbour in another world falls."""

@@ -8,7 +8,7 @@ import pytest
 
 from anysim.engine.capability import Capability as C
 from anysim.engine.state import SnapshotLevel
-from anysim.errors import CapabilityError, EngineError, SnapshotError
+from anysim.errors import CapabilityError, SnapshotError
 from anysim.testing import tolerances, worlds
 from anysim.testing.compare import MOTION, assert_close, assert_same, play, read, spread, tape
 from anysim.testing.fixtures import needs, skip_without, skip_without_parameter
@@ -238,9 +238,27 @@ def test_the_number_of_rows_must_fit(build):
 
 
 @needs(C.SNAPSHOT_TRAJECTORY, C.WRENCHES)
-def test_no_snapshot_with_a_wrench_waiting(build):
-    """A wrench that waits for its step is no state: the snapshot says so."""
-    engine = build(worlds.spinning_ball())
-    engine.apply_wrench([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0])
-    with pytest.raises(EngineError, match="wrench is waiting"):
-        engine.snapshot()
+def test_a_waiting_wrench_is_part_of_a_snapshot(build):
+    """A wrench that waits for its step is restored with the rest, and acts in the next step as it would have."""
+    engine, other = build(worlds.spinning_ball(), 2), build(worlds.spinning_ball())
+    engine.apply_wrench([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0], [1])
+    snapshot = engine.snapshot([1])
+    engine.step(3)
+    other.restore(snapshot)
+    other.step(3)
+    assert other.get_state().body_twist[0, 0, 0] > 0.0
+    assert (other.get_state().body_twist[0] == engine.get_state().body_twist[1]).all()
+
+
+@needs(C.WRENCHES)
+def test_a_wrench_waits_for_the_step_of_its_own_env(build):
+    """Stepping one env does not use up the wrench of another; resetting an env does."""
+    engine = build(worlds.spinning_ball(), 3)
+    engine.apply_wrench(np.tile([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], (3, 1, 1)), [0])
+    engine.step(1, [0])
+    engine.reset([2])
+    start = engine.get_state().body_twist[2, 0, 0]
+    engine.step(1, [1, 2])
+    twist = engine.get_state().body_twist[:, 0, 0]
+    assert twist[1] == twist[0]
+    assert twist[2] == start
