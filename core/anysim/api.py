@@ -78,12 +78,24 @@ def compile_world(
     if isinstance(source, RunSpec):
         return compile_spec(source, base=base)
     loaded = source if isinstance(source, Loaded) else load(source, overrides=overrides)
-    if base is None and loaded.files:
-        base = loaded.files[-1].parent
     try:
-        return compile_spec(loaded.spec, base=base)
+        return compile_spec(loaded.spec, base=base or _asset_folders(loaded))
     except (SpecError, AssetError) as error:
         raise located(error, loaded) from None
+
+
+def _asset_folders(loaded: LoadedRun) -> dict[str, Path]:
+    """For each object the folder of the file that says where its asset is; an override is relative to the last file."""
+    files = {path.resolve(): path.parent for path in loaded.files}
+    folders: dict[str, Path] = {}
+    for name, thing in loaded.spec.world.objects.items():
+        kind = "mesh" if thing.source.mesh is not None else "asset"
+        place = Path(_place(loaded, f"world.objects.{name}.source.{kind}").rsplit(":", 2)[0]).resolve()
+        if place in files:
+            folders[name] = files[place]
+        elif loaded.files:
+            folders[name] = loaded.files[-1].parent
+    return folders
 
 
 def located(error: SpecError | AssetError, loaded: LoadedRun) -> SpecError | AssetError:

@@ -148,7 +148,8 @@ class SimEngine(Primitives):
     def step(self, n_steps: int = 1, env_ids: EnvIds = None) -> None:
         """Advance by `n_steps` physics steps of `world.physics.dt`; with `env_ids`, only those envs.
 
-        Commands persist; wrenches last for this call. A non-finite env is marked in `State.fault`, the others go on.
+        Commands persist; a wrench lasts for the next call that steps its env. A non-finite env is marked in
+        `State.fault`, the others go on.
         """
         with self._lock:
             self._require_world()

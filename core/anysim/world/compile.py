@@ -28,13 +28,17 @@ class Compiled(NamedTuple):
     report: Mapping[str, tuple[ImportNote, ...]]
 
 
-def compile_world(spec: RunSpec | WorldSpec, *, physics: PhysicsSpec | None = None, base: Path | None = None) -> World:
+Base = Path | Mapping[str, Path] | None
+"""What relative asset paths are relative to: one folder, or one for each object by name (the files that wrote them)."""
+
+
+def compile_world(spec: RunSpec | WorldSpec, *, physics: PhysicsSpec | None = None, base: Base = None) -> World:
     """The World of a spec.
 
     Args:
         spec: of a run, or of a world alone.
         physics: time steps and gravity; those of the run where it is one, else the defaults.
-        base: the folder of the YAML file, which relative asset paths are relative to.
+        base: the folder that relative asset paths are relative to, or one for each object.
 
     Raises:
         SpecError: names that do not exist, cycles, values that do not fit; all of them, with dotted keys.
@@ -44,7 +48,7 @@ def compile_world(spec: RunSpec | WorldSpec, *, physics: PhysicsSpec | None = No
 
 
 def compile_with_report(
-    spec: RunSpec | WorldSpec, *, physics: PhysicsSpec | None = None, base: Path | None = None
+    spec: RunSpec | WorldSpec, *, physics: PhysicsSpec | None = None, base: Base = None
 ) -> Compiled:
     """As `compile_world`, with the notes of the importers."""
     if isinstance(spec, RunSpec):
@@ -57,7 +61,7 @@ def compile_with_report(
     for name, robot in content.robots.items():
         notes[name] = tuple(add_robot(builder, name, robot, issues.at("robots", name)))
     for name, thing in content.objects.items():
-        notes[name] = tuple(add_object(builder, name, thing, issues.at("objects", name), base=base))
+        notes[name] = tuple(add_object(builder, name, thing, issues.at("objects", name), base=_base(base, name)))
     order = check_layout(content.layout, list(content.objects), list(content.robots), issues.at("layout"))
     world = replace(builder.build(), lights=compile_lights(content.lights, issues.at("lights")))
     missing = {*content.robots, *content.objects} - {entity.name for entity in world.entities}
@@ -67,6 +71,10 @@ def compile_with_report(
     world = with_sensors(world, content.cameras, content.contact_sensors, issues)
     issues.raise_if_any()
     return Compiled(world, notes)
+
+
+def _base(base: Base, name: str) -> Path | None:
+    return base.get(name) if isinstance(base, Mapping) else base
 
 
 def neutral_physics(spec: PhysicsSpec) -> Physics:

@@ -1,0 +1,72 @@
+"""From files to worlds: where relative assets are, and what merged files make."""
+
+from pathlib import Path
+
+import pytest
+
+import anysim
+from anysim.errors import AssetError
+
+TETRAHEDRON = """solid t
+facet normal 0 0 -1
+outer loop
+vertex 0 0 0
+vertex 0 0.1 0
+vertex 0.1 0 0
+endloop
+endfacet
+facet normal 0 -1 0
+outer loop
+vertex 0 0 0
+vertex 0.1 0 0
+vertex 0 0 0.1
+endloop
+endfacet
+facet normal -1 0 0
+outer loop
+vertex 0 0 0
+vertex 0 0 0.1
+vertex 0 0.1 0
+endloop
+endfacet
+facet normal 1 1 1
+outer loop
+vertex 0.1 0 0
+vertex 0 0.1 0
+vertex 0 0 0.1
+endloop
+endfacet
+endsolid t
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A base file with a mesh beside it, extended from another folder."""
+    (tmp_path / "base" / "meshes").mkdir(parents=True)
+    (tmp_path / "base" / "meshes" / "t.stl").write_text(TETRAHEDRON)
+    (tmp_path / "base" / "base.yaml").write_text("world:\n  objects:\n    t: {source: {mesh: meshes/t.stl}}\n")
+    (tmp_path / "child").mkdir()
+    (tmp_path / "child" / "child.yaml").write_text("extends: ../base/base.yaml\nworld: {name: child}\n")
+    return tmp_path
+
+
+def test_an_asset_is_relative_to_the_file_that_names_it(folder: Path) -> None:
+    world = anysim.compile_world(folder / "child" / "child.yaml")
+    assert world.name == "child"
+    assert [entity.name for entity in world.entities] == ["t"]
+
+
+def test_an_override_is_relative_to_the_last_file(folder: Path) -> None:
+    with pytest.raises(AssetError, match=r"-o world\.objects\.t\.source.*meshes/other\.stl"):
+        anysim.compile_world(folder / "child" / "child.yaml", overrides=["world.objects.t.source=meshes/other.stl"])
+
+
+def test_several_files_are_merged_in_order(folder: Path) -> None:
+    more = folder / "more.yaml"
+    more.write_text("world:\n  objects:\n    t: {mass: 0.3}\n    b: {source: {sphere: 0.05}}\n")
+    spec = anysim.load(folder / "child" / "child.yaml", more).spec
+    assert list(spec.world.objects) == ["t", "b"]
+    assert spec.world.objects["t"].mass == 0.3
+    world = anysim.compile_world(anysim.load(folder / "child" / "child.yaml", more))
+    assert len(world.entities) == 2
