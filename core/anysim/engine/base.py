@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine import checks
+from anysim.engine import checks, saving
 from anysim.engine.cameras import CameraRig
 from anysim.engine.capability import Capabilities, Capability, Need, check
 from anysim.engine.commands import CommandBuffer, Control
@@ -306,13 +306,7 @@ class SimEngine(Primitives):
             self._require_world()
             level = SnapshotLevel(level)
             self._require(Capability(f"snapshot: {level}"))
-            ids = self._ids(env_ids)
-            data: dict[str, Array] = {"ticks": self._ticks[ids]}
-            data |= {f"commands.{k}": v for k, v in self._commands.rows(ids).items()}
-            data |= {"cameras": self._rig.poses[ids]}
-            data |= {f"parameter.{name}": self._get_parameter(name)[ids] for name in self._changed}
-            data |= {f"engine.{k}": v for k, v in self._snapshot(ids, level).items()}
-            return Snapshot(self.name, self.version, self.world.hash, level, {k: np.array(v) for k, v in data.items()})
+            return saving.take(self, self._ids(env_ids), level)
 
     def restore(self, snapshot: Snapshot, env_ids: EnvIds = None) -> None:
         """Put snapshot rows into envs (as many as it holds, in order).
@@ -324,20 +318,7 @@ class SimEngine(Primitives):
             self._require_world()
             ids = self._ids(env_ids)
             checks.same_stamp(snapshot, self.name, self.version, self.world.hash, len(ids))
-            data = snapshot.data
-            self._retire_state()
-            for name in PARAMETERS:
-                key = f"parameter.{name}"
-                if key in data:
-                    self._set_parameter(name, data[key], ids, np.arange(int(data[key].shape[1])))
-                    self._changed[name] = None
-                elif name in self._changed:
-                    default = self._default_parameter(name)
-                    self._set_parameter(name, np.repeat(default[None], len(ids), 0), ids, np.arange(len(default)))
-            self._commands.restore(ids, _under("commands.", data))
-            self._rig.poses[ids] = data["cameras"]
-            self._restore(ids, _under("engine.", data), snapshot.level)
-            self._ticks[ids] = data["ticks"]
+            saving.put_back(self, ids, snapshot)
 
     # ------------------------------------------------------------------ sensing
 
@@ -497,8 +478,3 @@ class SimEngine(Primitives):
 
     def _which(self, indices: Indices, size: int, kind: str) -> Array:
         return np.arange(size) if indices is None else checks.indices(indices, size, kind)
-
-
-def _under(prefix: str, data: Mapping[str, Array]) -> dict[str, Array]:
-    """The entries of a snapshot whose names begin with `prefix`, without it."""
-    return {name[len(prefix) :]: rows for name, rows in data.items() if name.startswith(prefix)}

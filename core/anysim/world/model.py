@@ -6,7 +6,7 @@ body; their frames survive as sites. All joints here have one degree of freedom;
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 from math import inf
@@ -15,8 +15,46 @@ from typing import NamedTuple
 import numpy as np
 
 from anysim.conventions import IDENTITY_QUATERNION, WORLD, Array
+from anysim.world.shapes import (
+    ORDINARY,
+)
+from anysim.world.shapes import (
+    Box as Box,
+)
+from anysim.world.shapes import (
+    Capsule as Capsule,
+)
+from anysim.world.shapes import (
+    Cylinder as Cylinder,
+)
+from anysim.world.shapes import (
+    HeightField as HeightField,
+)
+from anysim.world.shapes import (
+    HeightFieldShape as HeightFieldShape,
+)
+from anysim.world.shapes import (
+    Mesh as Mesh,
+)
+from anysim.world.shapes import (
+    MeshShape as MeshShape,
+)
+from anysim.world.shapes import (
+    Plane as Plane,
+)
+from anysim.world.shapes import (
+    Shape as Shape,
+)
+from anysim.world.shapes import (
+    Sphere as Sphere,
+)
+from anysim.world.shapes import (
+    Surface as Surface,
+)
+from anysim.world.shapes import (
+    Vec3 as Vec3,
+)
 
-Vec3 = tuple[float, float, float]
 Quat = tuple[float, float, float, float]
 ORIGIN: Vec3 = (0.0, 0.0, 0.0)
 
@@ -102,78 +140,6 @@ class Joint:
 
 
 @dataclass(frozen=True, slots=True)
-class Plane:
-    """An infinite ground plane, normal +z; `visual_size` is the half extent that is drawn."""
-
-    visual_size: float = 10.0
-
-
-@dataclass(frozen=True, slots=True)
-class Box:
-    """A box centred on its frame; `half_size` are half its edge lengths."""
-
-    half_size: Vec3
-
-
-@dataclass(frozen=True, slots=True)
-class Sphere:
-    """A ball centred on its frame."""
-
-    radius: float
-
-
-@dataclass(frozen=True, slots=True)
-class Capsule:
-    """Along z; `half_length` is half the straight part."""
-
-    radius: float
-    half_length: float
-
-
-@dataclass(frozen=True, slots=True)
-class Cylinder:
-    """Along z."""
-
-    radius: float
-    half_length: float
-
-
-@dataclass(frozen=True, slots=True)
-class MeshShape:
-    """A mesh of the world by name; as a collision shape it is its convex hull."""
-
-    mesh: str
-
-
-@dataclass(frozen=True, slots=True)
-class HeightFieldShape:
-    """A height field of the world by name, centred on its frame."""
-
-    heightfield: str
-
-
-Shape = Plane | Box | Sphere | Capsule | Cylinder | MeshShape | HeightFieldShape
-
-
-@dataclass(frozen=True, slots=True)
-class Surface:
-    """How a geom touches. The pair rule is in `anysim.conventions`.
-
-    `softness` is the time constant [s] with which penetration is pushed out (0: the engine's default); `impedance` the
-    range (near 0 soft, near 1 rigid) of the constraint as penetration grows, as in MuJoCo's solimp.
-    """
-
-    friction: float = 0.8
-    torsional_friction: float = 0.005
-    rolling_friction: float = 0.0001
-    restitution: float = 0.0
-    softness: float = 0.0
-    impedance: tuple[float, float] = (0.9, 0.95)
-    priority: int = 0
-    torsional: bool = False  # torsional friction takes part in contacts of this geom
-
-
-@dataclass(frozen=True, slots=True)
 class Geom:
     """A shape fixed to a body (or to the world: body -1)."""
 
@@ -183,7 +149,7 @@ class Geom:
     position: Vec3 = ORIGIN
     quaternion: Quat = IDENTITY_QUATERNION
     color: tuple[float, float, float, float] = (0.7, 0.7, 0.7, 1.0)
-    surface: Surface = Surface()
+    surface: Surface = ORDINARY
     collides: bool = True
     visible: bool = True
 
@@ -248,25 +214,6 @@ class ContactSensor:
     name: str
     bodies: tuple[int, ...]
     against: tuple[int, ...] | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Mesh:
-    """Triangles in the owner's frame: vertices (V, 3) [m] float64, faces (F, 3) int32; `hash` of source and making."""
-
-    name: str
-    vertices: Array = field(repr=False, compare=False)
-    faces: Array = field(repr=False, compare=False)
-    hash: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class HeightField:
-    """Heights (rows, cols) [m], row 0 at the lowest y, over `size` = full extent (x, y) [m]."""
-
-    name: str
-    heights: Array = field(repr=False, compare=False)
-    size: tuple[float, float] = (10.0, 10.0)
 
 
 class EntityKind(StrEnum):

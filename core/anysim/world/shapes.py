@@ -1,0 +1,102 @@
+"""Shapes of geoms, and how their surfaces touch. Sizes are half sizes, in metres."""
+
+from dataclasses import dataclass, field
+
+from anysim.conventions import Array
+
+Vec3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Plane:
+    """An infinite ground plane, normal +z; `visual_size` is the half extent that is drawn."""
+
+    visual_size: float = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A box centred on its frame; `half_size` are half its edge lengths."""
+
+    half_size: Vec3
+
+
+@dataclass(frozen=True, slots=True)
+class Sphere:
+    """A ball centred on its frame."""
+
+    radius: float
+
+
+@dataclass(frozen=True, slots=True)
+class Capsule:
+    """Along z; `half_length` is half the straight part."""
+
+    radius: float
+    half_length: float
+
+
+@dataclass(frozen=True, slots=True)
+class Cylinder:
+    """Along z."""
+
+    radius: float
+    half_length: float
+
+
+@dataclass(frozen=True, slots=True)
+class MeshShape:
+    """A mesh of the world by name; as a collision shape it is its convex hull."""
+
+    mesh: str
+
+
+@dataclass(frozen=True, slots=True)
+class HeightFieldShape:
+    """A height field of the world by name, centred on its frame."""
+
+    heightfield: str
+
+
+Shape = Plane | Box | Sphere | Capsule | Cylinder | MeshShape | HeightFieldShape
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """How a geom touches. The pair rule is in `anysim.conventions`.
+
+    `softness` is the time constant [s] with which penetration is pushed out (0: the engine's default); `impedance` the
+    range (near 0 soft, near 1 rigid) of the constraint as penetration grows, as in MuJoCo's solimp.
+    """
+
+    friction: float = 0.8
+    torsional_friction: float = 0.005
+    rolling_friction: float = 0.0001
+    restitution: float = 0.0
+    softness: float = 0.0
+    impedance: tuple[float, float] = (0.9, 0.95)
+    priority: int = 0
+    torsional: bool = False  # torsional friction takes part in contacts of this geom
+
+
+ORDINARY = Surface()
+"""A surface of which nothing was said."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mesh:
+    """Triangles in the owner's frame: vertices (V, 3) [m] float64, faces (F, 3) int32; `hash` of source and making."""
+
+    name: str
+    vertices: Array = field(repr=False, compare=False)
+    faces: Array = field(repr=False, compare=False)
+    hash: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class HeightField:
+    """Heights (rows, cols) [m], row 0 at the lowest y, over `size` = full extent (x, y) [m]."""
+
+    name: str
+    heights: Array = field(repr=False, compare=False)
+    size: tuple[float, float] = (10.0, 10.0)
