@@ -28,6 +28,8 @@ def run(arguments: list[str], cwd: Path) -> None:
     result = subprocess.run(
         [sys.executable, *arguments], capture_output=True, text=True, timeout=300, cwd=cwd, check=False
     )
+    if result.returncode and "cannot draw here" in result.stderr:
+        pytest.skip(result.stderr.strip().splitlines()[-1])
     assert result.returncode == 0, result.stderr
 
 

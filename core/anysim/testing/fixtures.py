@@ -1,6 +1,7 @@
 """The fixtures of the contract suite: the engine under test, with worlds built on demand and freed afterwards."""
 
 from collections.abc import Callable, Iterator
+from functools import cache
 from typing import Any, Protocol
 
 import pytest
@@ -8,8 +9,11 @@ import pytest
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capability
 from anysim.engine.needs import needs_of
+from anysim.errors import EngineError
 from anysim.testing import plugin
 from anysim.world.model import World
+
+DRAWING = (Capability.RENDER_RGB, Capability.RENDER_DEPTH, Capability.RENDER_SEGMENTATION)
 
 
 class Build(Protocol):
@@ -45,7 +49,7 @@ def build(new_engine: Callable[[], SimEngine], engine_class: type[SimEngine]) ->
 
     def make(world: World, num_envs: int = 1) -> SimEngine:
         for need in needs_of(world):
-            skip_without(engine_class, need.capability)
+            _skip_undeclared(engine_class, need.capability)
         return new_engine().create_world(world, num_envs)
 
     return make
@@ -60,9 +64,27 @@ def _declared(request: pytest.FixtureRequest) -> None:
 
 
 def skip_without(engine_class: type[SimEngine], capability: Capability) -> None:
-    """Skip the running test, naming the capability."""
+    """Skip the running test, naming the capability; one that draws also where this machine lacks what drawing needs."""
+    _skip_undeclared(engine_class, capability)
+    if capability in DRAWING and (trouble := drawing_trouble(engine_class)):
+        pytest.skip(f"{engine_class.name} cannot draw here: {trouble}")
+
+
+def _skip_undeclared(engine_class: type[SimEngine], capability: Capability) -> None:
     if capability not in engine_class.capabilities:
         pytest.skip(f"{engine_class.name} does not declare '{capability}'")
+
+
+@cache
+def drawing_trouble(engine_class: type[SimEngine]) -> str:
+    """Why the engine cannot draw on this machine (a driver is missing…), or nothing if it can."""
+    with engine_class() as engine:
+        engine.create_world(World())
+        try:
+            engine.render(width=16, height=16)
+        except EngineError as error:
+            return str(error)
+    return ""
 
 
 def needs(*capabilities: Capability) -> pytest.MarkDecorator:
