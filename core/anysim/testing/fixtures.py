@@ -67,7 +67,7 @@ def skip_without(engine_class: type[SimEngine], capability: Capability) -> None:
     """Skip the running test, naming the capability; one that draws also where this machine lacks what drawing needs."""
     _skip_undeclared(engine_class, capability)
     if capability in DRAWING and (trouble := drawing_trouble(engine_class)):
-        pytest.skip(f"{engine_class.name} cannot draw here: {trouble}")
+        pytest.skip(f"{engine_class.name} cannot draw here: {trouble.replace(',', ';')}")
 
 
 def _skip_undeclared(engine_class: type[SimEngine], capability: Capability) -> None:
