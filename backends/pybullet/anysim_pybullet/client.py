@@ -113,7 +113,10 @@ class Env:
 
     def _settings(self, p: Any) -> None:
         physics, options = self.plan.world.physics, self.plan.options
-        # without the first one neither equal runs nor saved states are exact
+        # The usual broad phase keeps boxes that are larger for what moved before, so that touch begins earlier there:
+        # a state would not be all that the future depends on. The simple one knows the present alone.
+        p.resetSimulation(p.RESET_USE_SIMPLE_BROADPHASE, physicsClientId=self.id)
+        # without ordered pairs neither equal runs nor saved states are exact
         p.setPhysicsEngineParameter(
             deterministicOverlappingPairs=1, fixedTimeStep=physics.dt, numSubSteps=0,
             numSolverIterations=options.iterations, solverResidualThreshold=options.residual,
