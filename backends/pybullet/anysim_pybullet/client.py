@@ -21,6 +21,9 @@ STATIC_GROUP, MOVING_GROUP = 2, 1
 MIMIC_FORCE = 1e6
 """[N, N m] that keeps a joint with its leader: more than anything here exerts."""
 
+APART = 500.0
+"""[m] between trees that are moved apart, larger than any of them."""
+
 SPEED_LIMIT = 1e15
 """Bullet cuts joint and root velocities at 100 unless told otherwise."""
 
@@ -225,6 +228,22 @@ class Env:
                 gear, gearRatio=-joint.mimic.multiplier, relativePositionTarget=joint.mimic.offset, erp=0.8,
                 maxForce=MIMIC_FORCE, physicsClientId=self.id,
             )  # fmt: skip
+
+    # ------------------------------------------------------------------ contacts of the past
+
+    def part(self) -> bool:
+        """Move everything that can move far apart, so that Bullet forgets what touched; a restored state keeps it else.
+
+        Returns:
+            False where links of one robot touch each other: those cannot be parted, and the client must be replaced.
+        """
+        p = bullet()
+        for tree, uid in zip(self.plan.trees, self.root_ids, strict=True):
+            if tree.free or len(tree.joints):
+                away = [APART * (tree.number + 1), 0.0, 10 * APART]
+                p.resetBasePositionAndOrientation(uid, away, [0.0, 0.0, 0.0, 1.0], physicsClientId=self.id)
+        p.performCollisionDetection(physicsClientId=self.id)
+        return not p.getContactPoints(physicsClientId=self.id)
 
     # ------------------------------------------------------------------ surfaces
 

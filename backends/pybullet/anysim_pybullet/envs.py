@@ -75,9 +75,7 @@ class Envs:
     def reset(self, ids: Array) -> None:
         """Back to the initial state, with nothing left over."""
         for index in ids.tolist():
-            self.mirror.refresh(index)
-            self._sound(index)
-            self._put_static(index, self._initial["pose"])
+            self._clear(index, self._initial["pose"])
             bullet().restoreState(self._begin[index], physicsClientId=self.clients[index].id)
             for name in _MIRRORED:
                 getattr(self.mirror, name)[index] = self._initial[name]
@@ -85,21 +83,21 @@ class Envs:
             self.laws.effort[index] = 0.0
             self.laws.forget(index)
 
-    def _sound(self, index: int) -> None:
-        """Replace the client of an env that was given up: what is not finite stays in Bullet's collision detection."""
-        if self.mirror.fault[index]:
+    def _clear(self, index: int, pose: Array) -> None:
+        """Make an env forget its contacts, before a state is restored in which fixed bodies are at `pose` (B, 7).
+
+        An env that was given up gets a new client: what is not finite stays in Bullet's collision detection.
+        """
+        self.mirror.refresh(index)
+        if self.mirror.fault[index] or not self.clients[index].part():
             self.clients[index].close()
             self.clients[index] = Env(self.plan)
             self.mirror.fault[index] = False
             self._settle(index)
             self.parameters.renew(index)
-
-    def _put_static(self, index: int, pose: Array) -> None:
-        """Place fixed bodies where they are not yet."""
         for body in self._static:
-            if not np.array_equal(self.mirror.pose[index, body], pose[body]):
-                self.mirror.pose[index, body] = pose[body]
-                self._set_root(index, body, with_pose=True)
+            self.mirror.pose[index, body] = pose[body]
+            self._set_root(index, body, with_pose=True)
 
     # ------------------------------------------------------------------ stepping
 
@@ -181,9 +179,7 @@ class Envs:
         """Write rows that `snapshot` made."""
         exact = level is SnapshotLevel.TRAJECTORY
         for row, index in enumerate(ids.tolist()):
-            self.mirror.refresh(index)
-            self._sound(index)
-            self._put_static(index, data["pose"][row])
+            self._clear(index, data["pose"][row])
             if exact:
                 self._load(index, data["bullet"][row, : int(data["length"][row])].tobytes())
             for name in _MIRRORED:
