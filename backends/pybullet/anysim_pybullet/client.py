@@ -35,7 +35,7 @@ class Plan:
         self.world, self.options = world, options
         self.frames: Frames = frames_of(world)
         self.trees: list[Tree] = trees_of(world, self.frames)
-        self.rules = PairRules(world, self.trees)
+        self.rules = PairRules(world, self.trees, options.contact_erp)
         self._folder = tempfile.TemporaryDirectory(prefix="anysim-pybullet-")
         self.folder = Path(self._folder.name)
         try:
@@ -252,6 +252,9 @@ class Env:
         p, rules = bullet(), self.plan.rules
         numbers = rules.numbers(friction)
         for k, index in enumerate(rules.geoms.tolist()):
+            if self.plan.world.geoms[index].surface.restitution > 0:
+                # Bullet begins a contact before the touch and takes the gap off the speed after it: no bounce is left
+                p.changeDynamics(*self.shape_at[index], contactProcessingThreshold=0.0, physicsClientId=self.id)
             p.changeDynamics(
                 *self.shape_at[index], lateralFriction=float(numbers.friction[k]),
                 spinningFriction=float(numbers.spinning[k]), restitution=float(numbers.restitution[k]),

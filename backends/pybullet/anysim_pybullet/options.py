@@ -10,7 +10,7 @@ class PybulletOptions(BaseModel):
 
     iterations: int = Field(default=50, ge=1, description="most sweeps of the constraint solver in a step")
     residual: float = Field(default=1e-7, ge=0, description="velocity residual at which the constraint solver stops")
-    contact_erp: float = Field(default=0.2, ge=0, le=1, description="share of a penetration that a step takes back")
+    contact_erp: float = Field(default=0.1, ge=0, le=1, description="share of a penetration that a step takes back")
     joint_erp: float = Field(default=0.2, ge=0, le=1, description="share of a limit's error that a step takes back")
     shadows: bool = Field(default=False, description="cast shadows in images; twice the time")
 

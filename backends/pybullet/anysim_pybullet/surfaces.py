@@ -30,7 +30,7 @@ class Surfaces(NamedTuple):
 class PairRules:
     """The pairs of colliding geoms of a World; gives Bullet's numbers for any coefficients."""
 
-    def __init__(self, world: World, trees: list[Tree]) -> None:
+    def __init__(self, world: World, trees: list[Tree], contact_erp: float) -> None:
         self.geoms = np.array([i for i, g in enumerate(world.geoms) if g.collides], dtype=int)
         chosen = [world.geoms[i] for i in self.geoms]
         self.priority = np.array([g.surface.priority for g in chosen], dtype=int)
@@ -38,9 +38,10 @@ class PairRules:
         bounce = np.array([g.surface.restitution for g in chosen], dtype=float)
         tree_of = {WORLD: -1} | {int(b): t.number for t in trees for b in t.bodies}
         self.weight = self._weights(world, [g.body for g in chosen], tree_of, trees)
-        self._bounce = np.sqrt(bounce * bounce)
-        if bounce.any():
-            self._bounce = factors(np.maximum.outer(bounce, bounce), self.weight, _SWEEPS)
+        # What an impact sinks, up to a step's way, is pushed out with `contact_erp` of its speed, which adds to the
+        # bounce: half of that on average.
+        wanted = np.maximum(np.maximum.outer(bounce, bounce) - 0.5 * contact_erp, 0.0)
+        self._bounce = factors(wanted, self.weight, _SWEEPS) if bounce.any() else np.zeros_like(bounce)
 
     def _weights(self, world: World, bodies: list[int], tree_of: dict[int, int], trees: list[Tree]) -> Array:
         tree = np.array([tree_of[b] for b in bodies], dtype=int)
