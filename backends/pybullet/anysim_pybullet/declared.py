@@ -11,12 +11,24 @@ MINIMUM = (3, 2, 7)
 REMEDY = "pip install 'pybullet>=3.2.7'"
 
 _APPROXIMATE = {
-    Capability.CONTACTS: "TBD",
-    Capability.RESTITUTION: "TBD",
-    Capability.TORSIONAL_FRICTION: "TBD",
-    Capability.ARMATURE: "TBD",
-    Capability.MIMIC_JOINTS: "TBD",
-    Capability.JOINT_LIMITS: "TBD",
+    Capability.CONTACTS: (
+        "friction multiplies in Bullet: a pair is as the rule says where things touch the ground, the fixed or a robot "
+        "and 3 or fewer coefficients are about (within 0.005 with 4); between two free objects it can be too high by "
+        "0.45 (0.2 and 0.2 on a ground of 0.8). Surfaces are rigid: softness is not simulated"
+    ),
+    Capability.RESTITUTION: "within 0.05 of the coefficient at 1, 2 and 4.2 ms; an impact sinks up to one step's way",
+    Capability.TORSIONAL_FRICTION: "exact on a surface of equal friction; else off as the friction of the pair is",
+    Capability.ARMATURE: (
+        "a torque computed in each step: exact in free motion; an impact feels the inertia without it, and gets the "
+        "rest over the next steps"
+    ),
+    Capability.MIMIC_JOINTS: "a gear constraint: 2.5e-6 m in a grip with 40 N, fingers of 15 g",
+    Capability.JOINT_LIMITS: "met up to one step's way late (21 mm at 11 m/s and 2 ms); no error at rest under 87 N",
+    Capability.CONTROL_POSITION: (
+        "computed in each step: within 1.3e-3 rad of MuJoCo on a Panda in motion, 1e-7 at rest; what presses against "
+        "something builds its force up: within 2 % after 0.37 s for a finger of 15 g, 0.05 s for 1 kg"
+    ),
+    Capability.CONTROL_VELOCITY: "computed in each step, as position control is",
 }
 _ABSENT = (Capability.LIVE_EDIT_NATIVE,)
 CAPABILITIES = Capabilities.of(

@@ -1,6 +1,6 @@
 """PyBullet as a SimEngine: a DIRECT client for each env, stepped one after the other."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from anysim.conventions import Array
@@ -106,6 +106,20 @@ class PybulletEngine(SimEngine):
 
     def _take_rows(self, carried: Any, old: World) -> None:
         self._envs.take(carried, old)
+
+    def read_back(self) -> Mapping[str, Array]:
+        """Joint limits as Bullet has them."""
+        with self._lock:
+            self._require_world()
+            return {"joint.limits": self._envs.clients[0].joint_limits()}
+
+    def raw_loop(self) -> Callable[[int], None]:
+        """Bullet's own loop, stepped without this engine."""
+        from anysim_pybullet.raw import raw_loop
+
+        with self._lock:
+            self._require_world()
+            return raw_loop(self._envs)
 
     # ------------------------------------------------------------------ sensing
 

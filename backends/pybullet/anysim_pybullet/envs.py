@@ -46,10 +46,9 @@ class Envs:
             raise
 
     def close(self) -> None:
-        """Free all clients and files."""
-        for client in self.clients:
-            client.close()
-        self.clients = []
+        """Free all clients and files. May be called again."""
+        while self.clients:
+            self.clients.pop().close()
         self.plan.close()
 
     # ------------------------------------------------------------------ the initial state

@@ -15,7 +15,7 @@ from anysim_pybullet.kernels import factors
 from anysim_pybullet.tree import Tree
 
 _SWEEPS = 100
-_APART, _LOOSE, _WITHIN = 1.0, 0.3, 0.01
+_APART, _LOOSE, _WITHIN = 1.0, 0.01, 0.001
 """Weights of pairs: of things of different kinds, of two free objects, of links of one robot."""
 
 
