@@ -106,9 +106,7 @@ class Env:
             else:
                 failure = None
         if failure is not None:
-            raise EngineError(
-                f"Bullet cannot build the world '{world.name}': {failure}; {words.tail}"
-            ) from failure
+            raise EngineError(f"Bullet cannot build the world '{world.name}': {failure}; {words.tail}") from failure
         self.local = np.concatenate([plan.frames.inertial, plan.frames.anchor], axis=1)
         for tree, uid in zip(plan.trees, self.root_ids, strict=True):
             info = p.getDynamicsInfo(uid, -1, physicsClientId=self.id)

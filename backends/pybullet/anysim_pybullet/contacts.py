@@ -67,8 +67,8 @@ def contact_points(envs: Sequence[Env], ids: Array) -> ContactPoints:
         depth = -np.array([c[DISTANCE] for c in points], dtype=float)
         parts.append((np.full(len(points), index), a, b, place, normal, -_vectors(points), depth))
     if not parts:
-        none = np.zeros(0, dtype=int)
-        return ContactPoints(none, none, none, *(np.zeros((0, 3)) for _ in range(3)), np.zeros(0))
+        none, nowhere = np.zeros(0, dtype=int), np.zeros((0, 3))
+        return ContactPoints(none, none, none, nowhere, nowhere, nowhere, np.zeros(0))
     return ContactPoints(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 

@@ -14,7 +14,6 @@ from anysim_pybullet import declared
 from anysim_pybullet.options import PybulletOptions
 
 if TYPE_CHECKING:
-    from anysim_pybullet.envs import Envs
     from anysim_pybullet.render import Painter
 
 

@@ -1,7 +1,7 @@
-"""The compiled arithmetic: the drive law over one articulation, frames from centres of mass, factors of pair rules.
+"""The compiled arithmetic: the drive law over one articulation, and frames from centres of mass.
 
-All kernels share one file because numba's cache notices a change of a kernel's own file only. None adds in an order that
-depends on the number of envs, and none is compiled with fast-math: an env's bits are its own.
+Kernels that call each other share one file because numba's cache notices a change of a kernel's own file only. None
+adds in an order that depends on the number of envs, and none is compiled with fast-math: an env's bits are its own.
 
 An articulation has bodies 0 (the root) to n, and body i + 1 is moved by joint i. A link's frame has the body's axes and
 lies on the joint. If the root is free, the generalised velocity is (velocity of the root's frame origin, angular
@@ -274,9 +274,7 @@ def drive_law(
     n = joint_ints.shape[0]
     size = first + n
     matrix, bias, known = np.empty((size, size)), np.empty(size), np.empty(size)
-    dynamics(
-        joint_ints, joint_floats, bodies, wrench, gravity, root, motion, first, matrix, bias, known
-    )
+    dynamics(joint_ints, joint_floats, bodies, wrench, gravity, root, motion, first, matrix, bias, known)
     speed, outer, effort = np.empty(size), np.zeros(size), np.empty(n)
     for k in range(first):
         speed[k] = root[7 + k]
@@ -306,7 +304,7 @@ def drive_law(
         pull[i] = drives[i, PULL] - drives[i, STIFFNESS] * motion[0, i] - drives[i, DRAG] * motion[1, i]
         drag[i] = drives[i, DRAG]
     gained, reduced, right = np.empty(size), np.empty((free, free)), np.empty(free)
-    for attempt in range(MAX_PASSES):
+    for _ in range(MAX_PASSES):
         for r in range(free):
             right[r] = 0.0
             for c in range(free):
@@ -392,39 +390,3 @@ def frames(rows: Array, local: Array, is_root: Array, pose: Array, twist: Array)
             twist[b, k] = rows[b, 14 + k]
             twist[b, 3 + k] = rows[b, 17 + k]
         _add_cross(twist[b, 3:], arm, 1.0, twist[b, :3])
-
-
-@compiled
-def factors(wanted: Array, weight: Array, sweeps: int) -> Array:
-    """Numbers (K,) whose products come nearest to wanted (K, K), by weighted least squares.
-
-    Begins at the solution in logarithms, from where each number in turn takes its best value.
-    """
-    size = wanted.shape[0]
-    logs, floor = np.zeros(size), math.log(0.02)
-    for _ in range(sweeps):
-        for i in range(size):
-            above, below = 0.0, 1e-12
-            for j in range(size):
-                w = weight[i, j]
-                if w == 0.0:
-                    continue
-                target = max(math.log(max(wanted[i, j], 1e-9)), floor)
-                if i == j:
-                    above += w * target
-                    below += 2.0 * w
-                else:
-                    above += w * (target - logs[j])
-                    below += w
-            logs[i] = above / below
-    values = np.exp(logs)
-    for _ in range(sweeps):
-        for i in range(size):
-            above, below = 0.0, 1e-12
-            for j in range(size):
-                if weight[i, j] != 0.0:
-                    above += weight[i, j] * values[j] * wanted[i, j]
-                    below += weight[i, j] * values[j] * values[j]
-            if below > 1e-9:
-                values[i] = above / below
-    return values

@@ -57,8 +57,8 @@ class Laws:
         """Find the articulations that need the law, after a change of parameters."""
         law = np.zeros(len(self._world.joints), dtype=bool)
         law[self._driven] = True
-        law |= (self.drives[:, :, [K.DAMPING, K.ARMATURE]] != 0).any(axis=(0, 2))
-        lifted = self.bodies[:, :, K.COMPENSATED].any(axis=0)
+        law |= np.any(self.drives[:, :, [K.DAMPING, K.ARMATURE]] != 0, axis=(0, 2))
+        lifted: Array = np.any(self.bodies[:, :, K.COMPENSATED] != 0, axis=0)
         self.needs = [bool(law[t.joints].any() or lifted[t.bodies].any()) for t in self._trees]
 
     def apply(self, control: Control) -> None:

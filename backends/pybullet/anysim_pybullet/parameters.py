@@ -1,4 +1,4 @@
-"""Physical and visual parameters per env: those of Bullet through changeDynamics, the others are the drive law's own."""
+"""Physical and visual parameters per env: Bullet's through changeDynamics, the others are the drive law's own."""
 
 import numpy as np
 

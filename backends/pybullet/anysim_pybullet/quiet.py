@@ -1,7 +1,7 @@
 """Bullet writes to the C library's standard output and error. Here its words are caught instead.
 
-File descriptors 1 and 2 belong to the process: while words are caught, those of other threads are caught too. So this is
-for calls that are known to print, and no longer than they last.
+File descriptors 1 and 2 belong to the process: while words are caught, those of other threads are caught too. So this
+is for calls that are known to print, and no longer than they last.
 """
 
 import ctypes

@@ -1,7 +1,7 @@
 """Images by TinyRenderer. Drawing has a client of its own, so that it takes no part in any env's physics.
 
 That client holds each visible geom once, as a body that nothing moves; an env is drawn by putting the geoms where its
-bodies are and giving them its colours. Its bodies are of mass zero and without collision shapes, and it is never stepped.
+bodies are and giving them its colours. Its bodies have no mass and no collision shapes, and it is never stepped.
 """
 
 from math import radians, tan
@@ -13,7 +13,19 @@ from anysim.conventions import WORLD, Array
 from anysim.engine.cameras import CameraView
 from anysim.errors import EngineError
 from anysim.math import pose as P
-from anysim.world.model import Box, Capsule, Cylinder, Geom, HeightField, HeightFieldShape, Mesh, MeshShape, Plane, Sphere, World
+from anysim.world.model import (
+    Box,
+    Capsule,
+    Cylinder,
+    Geom,
+    HeightField,
+    HeightFieldShape,
+    Mesh,
+    MeshShape,
+    Plane,
+    Sphere,
+    World,
+)
 from anysim_pybullet.bullet import bullet, connect, disconnect
 from anysim_pybullet.quiet import quiet
 
@@ -54,7 +66,9 @@ class Painter:
         """Free the client."""
         disconnect(self._client)
 
-    def draw(self, view: CameraView, poses: Array, colors: Array, ids: Array, channels: tuple[str, ...]) -> dict[str, Array]:
+    def draw(
+        self, view: CameraView, poses: Array, colors: Array, ids: Array, channels: tuple[str, ...]
+    ) -> dict[str, Array]:
         """See `SimEngine.render`. `poses` (N, B, 7) and `colors` (N, G, 4) are those of all envs."""
         size = (len(ids), view.height, view.width)
         shapes: dict[str, tuple[tuple[int, ...], Any]] = {

@@ -5,13 +5,14 @@ the numbers of the two shapes. So each shape gets a number such that the product
 wherever the rule can be written as products, else as near as least squares come, pairs that matter more first.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from anysim.conventions import WORLD, Array
 from anysim.world.model import BodyKind, World
-from anysim_pybullet.kernels import factors
+from anysim_pybullet.kernels import compiled
 from anysim_pybullet.tree import Tree
 
 _SWEEPS = 100
@@ -90,3 +91,39 @@ class PairRules:
         apart = self.weight > _WITHIN
         gap = np.abs(np.multiply.outer(values, values) - self.pair_friction(friction))
         return float(gap[apart].max(initial=0.0))
+
+
+@compiled
+def factors(wanted: Array, weight: Array, sweeps: int) -> Array:
+    """Numbers (K,) whose products come nearest to wanted (K, K), by weighted least squares.
+
+    Begins at the solution in logarithms, from where each number in turn takes its best value.
+    """
+    size = wanted.shape[0]
+    logs, floor = np.zeros(size), math.log(0.02)
+    for _ in range(sweeps):
+        for i in range(size):
+            above, below = 0.0, 1e-12
+            for j in range(size):
+                w = weight[i, j]
+                if w == 0.0:
+                    continue
+                target = max(math.log(max(wanted[i, j], 1e-9)), floor)
+                if i == j:
+                    above += w * target
+                    below += 2.0 * w
+                else:
+                    above += w * (target - logs[j])
+                    below += w
+            logs[i] = above / below
+    values = np.exp(logs)
+    for _ in range(sweeps):
+        for i in range(size):
+            above, below = 0.0, 1e-12
+            for j in range(size):
+                if weight[i, j] != 0.0:
+                    above += weight[i, j] * values[j] * wanted[i, j]
+                    below += weight[i, j] * values[j] * values[j]
+            if below > 1e-9:
+                values[i] = above / below
+    return values

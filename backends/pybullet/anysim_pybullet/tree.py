@@ -99,7 +99,14 @@ def _tree(world: World, frames: Frames, number: int, bodies: list[int]) -> Tree:
             leader = world.joints[leader.mimic.joint]
     free = world.bodies[bodies[0]].kind is BodyKind.FREE
     return Tree(
-        number, np.array(bodies, dtype=int), np.array(joints, dtype=int), free, 6 if free else 0, ints, floats, multiplier
+        number,
+        np.array(bodies, dtype=int),
+        np.array(joints, dtype=int),
+        free,
+        6 if free else 0,
+        ints,
+        floats,
+        multiplier,
     )
 
 

@@ -10,6 +10,7 @@ import pytest
 from anysim.engine.base import SimEngine
 from anysim.engine.factory import create_simulation
 from anysim.testing.sketch import Sketch, inertial
+from anysim.world.model import Body as WorldBody
 from anysim.world.model import (
     BodyKind,
     Box,
@@ -22,7 +23,6 @@ from anysim.world.model import (
     Sphere,
     World,
 )
-from anysim.world.model import Body as WorldBody
 
 pytest.importorskip("pybullet", reason="the package pybullet is not installed")
 
@@ -96,7 +96,6 @@ def pressed(mass: float = 1.0, armature: float = 0.01, kp: float = 100.0, kd: fl
     s.fixed("wall", Box((0.05, 0.2, 0.2)), (0.11, 0.0, 0.0))
     s.sensors.append(ContactSensor("carriage", (link,)))
     return s.world()
-
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""What the engine leaves behind in a process, and what it says when something is wrong: as little and as much as due."""
+"""What the engine leaves behind in a process, and what it says when something is wrong."""
 
 import os
 import subprocess

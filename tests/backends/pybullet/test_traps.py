@@ -10,7 +10,7 @@ import anysim_pybullet
 from anysim.testing import worlds
 from anysim.testing.compare import assert_same, play, read, spread, tape
 from anysim.testing.sketch import Sketch
-from anysim.world.model import Box, Geom, HeightField, HeightFieldShape, Mesh, MeshShape, Sphere
+from anysim.world.model import Box, Geom, HeightField, HeightFieldShape, MeshShape, Sphere
 from anysim_pybullet.bullet import bullet
 
 
@@ -128,15 +128,13 @@ def test_height_fields_are_not_centred(build):
 
 def test_meshes_are_written_as_obj(build):
     """One .glb or .ply in a URDF and Bullet refuses the whole file: whatever a mesh was, it becomes an .obj."""
-    s = Sketch("mesh")
-    corners = np.array([[x, y, z] for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (-0.1, 0.1)])
-    s.more["meshes"] = (Mesh("part.glb", corners, np.array([[0, 1, 2], [1, 3, 2]], dtype=np.int32)),)
-    s.free("thing", Box((0.1, 0.1, 0.1)), (0.0, 0.0, 1.0))
-    s.geoms[0] = replace(s.geoms[0], shape=MeshShape("part.glb"))
-    engine = build(s.world())
+    world = worlds.resting_mesh()
+    meshes = (replace(world.meshes[0], name="part.glb"),)
+    geoms = (world.geoms[0], replace(world.geoms[1], shape=MeshShape("part.glb")))
+    engine = build(replace(world, meshes=meshes, geoms=geoms))
     assert [f.name for f in engine._envs.plan.folder.glob("m*")] == ["m0.obj"]
-    hit = engine.raycast([[[0.0, 0.0, 3.0]]], [[[0.0, 0.0, -1.0]]])
-    assert hit.distance[0, 0] == pytest.approx(1.9, abs=2e-3)
+    hit = engine.raycast([[[0.1, 0.1, 3.0]]], [[[0.0, 0.0, -1.0]]])
+    assert hit.distance[0, 0] == pytest.approx(3.0 - 0.202, abs=2e-3)
 
 
 def test_lines_are_short(build, own):
@@ -178,6 +176,7 @@ def test_cylinders_are_round(build):
 
 def test_links_of_one_robot_collide(build):
     """Links do not collide with each other unless asked; parents and children never do, excluded pairs neither."""
+
     def chain(excluded=()):
         s = Sketch("chain", gravity=(0.0, 0.0, 0.0))
         base = s.robot("r")
