@@ -1,0 +1,269 @@
+"""One env: a Bullet client of its own, built from the plan that all envs share."""
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from anysim.conventions import WORLD, Array
+from anysim.errors import EngineError
+from anysim.math import pose as P
+from anysim.world.model import Geom, HeightField, HeightFieldShape, Plane, World
+from anysim_pybullet.bullet import bullet, connect, disconnect
+from anysim_pybullet.options import PybulletOptions
+from anysim_pybullet.quiet import quiet
+from anysim_pybullet.surfaces import PairRules
+from anysim_pybullet.tree import Frames, Tree, frames_of, shapes_of, trees_of
+from anysim_pybullet.urdf import UNLIMITED, body_link, joint_name, shape_link, tree_urdf, world_geom_urdf, write_meshes
+
+STATIC_GROUP, MOVING_GROUP = 2, 1
+MIMIC_FORCE = 1e6
+"""[N, N m] that keeps a joint with its leader: more than anything here exerts."""
+
+APART = 500.0
+"""[m] between trees that are moved apart, larger than any of them."""
+
+SPEED_LIMIT = 1e15
+"""Bullet cuts joint and root velocities at 100 unless told otherwise."""
+
+
+class Plan:
+    """What all envs of an engine share: the trees, their URDF files, the pairs that never touch."""
+
+    def __init__(self, world: World, options: PybulletOptions) -> None:
+        self.world, self.options = world, options
+        self.frames: Frames = frames_of(world)
+        self.trees: list[Tree] = trees_of(world, self.frames)
+        self.rules = PairRules(world, self.trees, options.contact_erp)
+        self._folder = tempfile.TemporaryDirectory(prefix="anysim-pybullet-")
+        self.folder = Path(self._folder.name)
+        try:
+            meshes = write_meshes(world, self.folder)
+            self.urdf: list[str] = []
+            for tree in self.trees:
+                self.urdf.append(self._write(f"t{tree.number}", tree_urdf(world, self.frames, tree, meshes)))
+            self.ground: list[tuple[int, Geom, str]] = []
+            for i, geom in enumerate(world.geoms):
+                if geom.collides and geom.body == WORLD:
+                    whole = isinstance(geom.shape, Plane | HeightFieldShape)
+                    file = "" if whole else self._write(f"w{i}", world_geom_urdf(geom, meshes))
+                    self.ground.append((i, geom, file))
+        except BaseException:
+            self.close()
+            raise
+        self.fields: dict[str, HeightField] = {f.name: f for f in world.heightfields}
+
+    def close(self) -> None:
+        """Remove the files."""
+        self._folder.cleanup()
+
+    def _write(self, name: str, text: str) -> str:
+        path = self.folder / f"{name}.urdf"
+        path.write_text(text, encoding="ascii")
+        return str(path)
+
+
+class Env:
+    """A client with one copy of the World. `root_ids[t]` is the Bullet body of tree t.
+
+    `body_at`, `joint_link`, `shape_at` say where the World's bodies, joints and colliding geoms are.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.id = connect()
+        try:
+            self._build()
+        except BaseException:
+            disconnect(self.id)
+            raise
+
+    def close(self) -> None:
+        """Free the client."""
+        disconnect(self.id)
+
+    # ------------------------------------------------------------------ building
+
+    def _build(self) -> None:
+        p, world, plan = bullet(), self.plan.world, self.plan
+        self.body_at: list[tuple[int, int]] = [(-1, -1)] * len(world.bodies)
+        self.joint_link: list[int] = [-1] * len(world.joints)
+        self.shape_at: dict[int, tuple[int, int]] = {}
+        self.body_of: dict[int, dict[int, int]] = {}  # World body by Bullet body and link, -1 for the world
+        self.root_ids: list[int] = []
+        with quiet() as words:
+            try:
+                self._settings(p)
+                for index, geom, file in plan.ground:
+                    self._add_ground(p, index, geom, file)
+                for tree in plan.trees:
+                    self._add_tree(p, tree)
+                self._filter(p)
+                self._couple(p)
+            except p.error as error:
+                failure: Exception | None = error
+            else:
+                failure = None
+        if failure is not None:
+            raise EngineError(f"Bullet cannot build the world '{world.name}': {failure}; {words.tail}") from failure
+        self.local = np.concatenate([plan.frames.inertial, plan.frames.anchor], axis=1)
+        for tree, uid in zip(plan.trees, self.root_ids, strict=True):
+            info = p.getDynamicsInfo(uid, -1, physicsClientId=self.id)
+            self.local[tree.bodies[0], :7] = [*info[3], *info[4]]
+
+    def _settings(self, p: Any) -> None:
+        physics, options = self.plan.world.physics, self.plan.options
+        # The usual broad phase keeps boxes that are larger for what moved before, so that touch begins earlier there:
+        # a state would not be all that the future depends on. The simple one knows the present alone.
+        p.resetSimulation(p.RESET_USE_SIMPLE_BROADPHASE, physicsClientId=self.id)
+        # without ordered pairs neither equal runs nor saved states are exact
+        p.setPhysicsEngineParameter(
+            deterministicOverlappingPairs=1, fixedTimeStep=physics.dt, numSubSteps=0,
+            numSolverIterations=options.iterations, solverResidualThreshold=options.residual,
+            erp=options.joint_erp, contactERP=options.contact_erp, restitutionVelocityThreshold=0.01,
+            physicsClientId=self.id,
+        )  # fmt: skip
+        p.setGravity(*physics.gravity, physicsClientId=self.id)
+
+    def _add_ground(self, p: Any, index: int, geom: Geom, file: str) -> None:
+        place, turn = np.array(geom.position, dtype=float), geom.quaternion
+        if isinstance(geom.shape, Plane):
+            shape = p.createCollisionShape(p.GEOM_PLANE, planeNormal=[0, 0, 1], physicsClientId=self.id)
+        elif isinstance(geom.shape, HeightFieldShape):
+            shape, middle = self._height_field(p, self.plan.fields[geom.shape.heightfield])
+            # Bullet puts the middle of the range of heights at the frame
+            place = place + P.rotate(np.array(turn), np.array([0.0, 0.0, middle]))
+        else:
+            flags = p.URDF_IGNORE_VISUAL_SHAPES | p.URDF_USE_IMPLICIT_CYLINDER
+            uid = p.loadURDF(file, useFixedBase=1, flags=flags, physicsClientId=self.id)
+            self._know(index, uid, -1)
+            return
+        uid = p.createMultiBody(0, shape, -1, place.tolist(), turn, physicsClientId=self.id)
+        self._know(index, uid, -1)
+
+    def _know(self, index: int, uid: int, link: int) -> None:
+        self.shape_at[index] = (uid, link)
+        self.body_of.setdefault(uid, {})[link] = self.plan.world.geoms[index].body
+
+    def _height_field(self, p: Any, field: HeightField) -> tuple[int, float]:
+        heights = np.asarray(field.heights, dtype=float)
+        rows, cols = heights.shape
+        shape = p.createCollisionShape(
+            p.GEOM_HEIGHTFIELD, meshScale=[field.size[0] / (cols - 1), field.size[1] / (rows - 1), 1.0],
+            heightfieldData=heights.ravel().tolist(), numHeightfieldRows=cols, numHeightfieldColumns=rows,
+            physicsClientId=self.id,
+        )  # fmt: skip
+        return shape, 0.5 * float(heights.min() + heights.max())
+
+    def _add_tree(self, p: Any, tree: Tree) -> None:
+        world, client = self.plan.world, self.id
+        flags = (
+            p.URDF_USE_INERTIA_FROM_FILE | p.URDF_USE_SELF_COLLISION | p.URDF_IGNORE_VISUAL_SHAPES
+            | p.URDF_USE_IMPLICIT_CYLINDER
+        )  # fmt: skip
+        uid = p.loadURDF(
+            self.plan.urdf[tree.number], useFixedBase=0 if tree.free else 1, flags=flags, physicsClientId=client
+        )
+        self.root_ids.append(uid)
+        links: dict[str, int] = {body_link(int(tree.bodies[0])): -1}
+        joints: dict[str, int] = {}
+        for i in range(p.getNumJoints(uid, physicsClientId=client)):
+            info = p.getJointInfo(uid, i, physicsClientId=client)
+            joints[info[1].decode()], links[info[12].decode()] = i, i
+        for body in tree.bodies.tolist():
+            link = links[body_link(body)]
+            self.body_at[body] = (uid, link)
+            self.body_of.setdefault(uid, {})[link] = body
+        for body, shapes in shapes_of(world, tree.bodies).items():
+            for k, (index, _) in enumerate(shapes):
+                self._know(index, uid, links[shape_link(index) if k else body_link(body)])
+        for link in (-1, *links.values()):
+            p.changeDynamics(
+                uid, link, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0, maxJointVelocity=SPEED_LIMIT,
+                physicsClientId=client,
+            )  # fmt: skip
+        for j in tree.joints.tolist():
+            self.joint_link[j] = joints[joint_name(j)]
+            # every joint begins with a motor that holds it; what is left of it is the joint's dry friction
+            self.set_dry_friction(j, world.joints[j].friction)
+
+    def set_dry_friction(self, joint: int, friction: float) -> None:
+        """Bullet's velocity motor with target 0: a constraint with a bounded force, which is dry friction."""
+        p = bullet()
+        uid = self.body_at[self.plan.world.joints[joint].body][0]
+        p.setJointMotorControl2(
+            uid, self.joint_link[joint], p.VELOCITY_CONTROL, targetVelocity=0.0, force=friction, physicsClientId=self.id
+        )
+
+    def _filter(self, p: Any) -> None:
+        """Switch off the pairs of shapes that never collide; the rest of the World collides."""
+        world, shapes = self.plan.world, list(self.shape_at.items())
+        for index, (uid, link) in shapes:
+            body = world.geoms[index].body
+            still = body == WORLD or world.bodies[body].kind == "static"
+            group, mask = (STATIC_GROUP, MOVING_GROUP) if still else (MOVING_GROUP, MOVING_GROUP | STATIC_GROUP)
+            p.setCollisionFilterGroupMask(uid, link, group, mask, physicsClientId=self.id)
+        for k, (first, (uid_a, link_a)) in enumerate(shapes):
+            for second, (uid_b, link_b) in shapes[:k]:
+                low, high = sorted((world.geoms[first].body, world.geoms[second].body))
+                kin = low != WORLD and (world.bodies[high].parent == low and world.bodies[high].kind == "link")
+                if low != WORLD and (low == high or kin or (low, high) in world.excluded_pairs):
+                    p.setCollisionFilterPair(uid_a, uid_b, link_a, link_b, 0, physicsClientId=self.id)
+
+    def _couple(self, p: Any) -> None:
+        world = self.plan.world
+        for index, joint in enumerate(world.joints):
+            if joint.mimic is None:
+                continue
+            uid = self.body_at[joint.body][0]
+            leader = world.joints[joint.mimic.joint]
+            gear = p.createConstraint(
+                uid, self.joint_link[index], self.body_at[leader.body][0], self.joint_link[joint.mimic.joint],
+                p.JOINT_GEAR, [1, 0, 0], [0, 0, 0], [0, 0, 0], physicsClientId=self.id,
+            )  # fmt: skip
+            p.changeConstraint(
+                gear, gearRatio=-joint.mimic.multiplier, relativePositionTarget=joint.mimic.offset, erp=0.8,
+                maxForce=MIMIC_FORCE, physicsClientId=self.id,
+            )  # fmt: skip
+
+    def joint_limits(self) -> Array:
+        """(J, 2) [rad, m] as Bullet enforces them, infinite where it does not."""
+        limits = np.empty((len(self.joint_link), 2))
+        for j, link in enumerate(self.joint_link):
+            uid = self.body_at[self.plan.world.joints[j].body][0]
+            lower, upper = bullet().getJointInfo(uid, link, physicsClientId=self.id)[8:10]
+            limits[j] = (lower, upper) if lower <= upper else (-np.inf, np.inf)
+        return np.where(np.abs(limits) >= UNLIMITED, np.sign(limits) * np.inf, limits)
+
+    # ------------------------------------------------------------------ contacts of the past
+
+    def part(self) -> bool:
+        """Move everything that can move far apart, so that Bullet forgets what touched; a restored state keeps it else.
+
+        Returns:
+            False where links of one robot touch each other: those cannot be parted, and the client must be replaced.
+        """
+        p = bullet()
+        for tree, uid in zip(self.plan.trees, self.root_ids, strict=True):
+            if tree.free or len(tree.joints):
+                away = [APART * (tree.number + 1), 0.0, 10 * APART]
+                p.resetBasePositionAndOrientation(uid, away, [0.0, 0.0, 0.0, 1.0], physicsClientId=self.id)
+        p.performCollisionDetection(physicsClientId=self.id)
+        return not p.getContactPoints(physicsClientId=self.id)
+
+    # ------------------------------------------------------------------ surfaces
+
+    def set_surfaces(self, friction: Array) -> None:
+        """Give Bullet its numbers for the coefficients (K,) of the colliding geoms."""
+        p, rules = bullet(), self.plan.rules
+        numbers = rules.numbers(friction)
+        for k, index in enumerate(rules.geoms.tolist()):
+            if self.plan.world.geoms[index].surface.restitution > 0:
+                # Bullet begins a contact before the touch and takes the gap off the speed after it: no bounce is left
+                p.changeDynamics(*self.shape_at[index], contactProcessingThreshold=0.0, physicsClientId=self.id)
+            p.changeDynamics(
+                *self.shape_at[index], lateralFriction=float(numbers.friction[k]),
+                spinningFriction=float(numbers.spinning[k]), restitution=float(numbers.restitution[k]),
+                physicsClientId=self.id,
+            )  # fmt: skip

@@ -1,0 +1,146 @@
+"""PyBullet as a SimEngine: a DIRECT client for each env, stepped one after the other."""
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from anysim.conventions import Array
+from anysim.engine.base import SimEngine
+from anysim.engine.cameras import CameraView
+from anysim.engine.capability import Capabilities
+from anysim.engine.commands import Control
+from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
+from anysim.world.model import World
+from anysim_pybullet import declared
+from anysim_pybullet.options import PybulletOptions
+
+if TYPE_CHECKING:
+    from anysim_pybullet.render import Painter
+
+
+class PybulletEngine(SimEngine):
+    """The engine `pybullet`. Trajectories do not depend on the number of envs or their order."""
+
+    name: ClassVar[str] = "pybullet"
+    capabilities: ClassVar[Capabilities] = declared.CAPABILITIES
+    parameters: ClassVar[frozenset[str]] = declared.PARAMETERS
+    options: PybulletOptions
+
+    @classmethod
+    def availability(cls) -> Availability:
+        """By the installed version alone; imports nothing."""
+        return declared.availability()
+
+    @classmethod
+    def options_model(cls) -> type[PybulletOptions]:
+        """The engine's options."""
+        return PybulletOptions
+
+    @property
+    def version(self) -> str:
+        """PyBullet's version, with the options that shape trajectories where they are not the defaults."""
+        stamp = self.options.trajectory_stamp()
+        return f"{declared.installed_version()} ({stamp})" if stamp else declared.installed_version()
+
+    # ------------------------------------------------------------------ lifecycle
+
+    def _build(self, world: World, num_envs: int) -> None:
+        # imported here, so that the engine can say that it is not available where PyBullet is not installed
+        from anysim_pybullet.envs import Envs
+
+        self._painter: Painter | None = None
+        self._envs: Envs = Envs(world, num_envs, self.options)
+
+    def _free(self) -> None:
+        if self._painter is not None:
+            self._painter.close()
+        self._envs.close()
+        del self._envs, self._painter
+
+    def _reset(self, ids: Array) -> None:
+        self._envs.reset(ids)
+
+    # ------------------------------------------------------------------ stepping
+
+    def _step(self, n_steps: int, ids: Array | None) -> None:
+        self._envs.step(n_steps, ids)
+
+    def _read(self, name: str) -> Array:
+        return self._envs.mirror.field(name)
+
+    def _apply_control(self, control: Control) -> None:
+        self._envs.laws.apply(control)
+
+    def _apply_wrench(self, wrench: Array | None) -> None:
+        self._envs.laws.wrench = wrench
+
+    # ------------------------------------------------------------------ writing
+
+    def _write_joints(self, ids: Array, joints: Array, position: Array | None, velocity: Array | None) -> None:
+        self._envs.write_joints(ids, joints, position, velocity)
+
+    def _write_bodies(self, ids: Array, bodies: Array, pose: Array | None, twist: Array | None) -> None:
+        self._envs.write_bodies(ids, bodies, pose, twist)
+
+    # ------------------------------------------------------------------ parameters and snapshots
+
+    def _get_parameter(self, name: str) -> Array:
+        return self._envs.parameters.get(name)
+
+    def _set_parameter(self, name: str, values: Array, ids: Array, indices: Array) -> None:
+        self._envs.parameters.set(name, values, ids, indices)
+        if name.startswith("actuator."):
+            self._commands.control_changed = True
+
+    def _default_parameter(self, name: str) -> Array:
+        return self._envs.parameters.default(name)
+
+    def _snapshot(self, ids: Array, level: SnapshotLevel) -> dict[str, Array]:
+        return self._envs.snapshot(ids, level)
+
+    def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:
+        self._envs.restore(ids, data, level)
+
+    def _carry_rows(self) -> Any:
+        return self._envs.carried()
+
+    def _take_rows(self, carried: Any, old: World) -> None:
+        self._envs.take(carried, old)
+
+    def read_back(self) -> Mapping[str, Array]:
+        """Joint limits as Bullet has them."""
+        with self._lock:
+            self._require_world()
+            return {"joint.limits": self._envs.clients[0].joint_limits()}
+
+    def raw_loop(self) -> Callable[[int], None]:
+        """Bullet's own loop, stepped without this engine."""
+        from anysim_pybullet.raw import raw_loop
+
+        with self._lock:
+            self._require_world()
+            return raw_loop(self._envs)
+
+    # ------------------------------------------------------------------ sensing
+
+    def renderer_name(self) -> str:
+        """What draws the images."""
+        return "TinyRenderer, software"
+
+    def _raycast(self, origins: Array, directions: Array, ids: Array) -> RayHits:
+        from anysim_pybullet.contacts import raycast
+
+        return raycast(self.world, self._envs.clients, origins, directions, ids)
+
+    def _contacts(self, ids: Array) -> ContactPoints:
+        from anysim_pybullet.contacts import contact_points
+
+        return contact_points(self._envs.clients, ids)
+
+    def _render(self, view: CameraView, ids: Array, channels: tuple[str, ...]) -> dict[str, Array]:
+        from anysim_pybullet.render import Painter
+
+        if self._painter is None:
+            self._painter = Painter(self.world, self.options.shadows)
+        for index in ids.tolist():
+            self._envs.mirror.refresh(index)
+        return self._painter.draw(view, self._envs.mirror.pose, self._envs.parameters.color, ids, channels)

@@ -1,0 +1,234 @@
+"""All envs of an engine: building, writing, stepping, saving and restoring them."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.engine.state import SnapshotLevel
+from anysim.errors import EngineError
+from anysim.math import pose as P
+from anysim.world.model import BodyKind, World
+from anysim_pybullet.bullet import bullet
+from anysim_pybullet.client import Env, Plan
+from anysim_pybullet.law import Laws, Pusher
+from anysim_pybullet.options import PybulletOptions
+from anysim_pybullet.parameters import Parameters
+from anysim_pybullet.quiet import quiet
+from anysim_pybullet.state import Mirror
+
+_MIRRORED = ("pose", "twist", "position", "velocity", "contact", "fault")
+
+
+class Envs:
+    """The clients, and all that is kept beside them."""
+
+    def __init__(self, world: World, num_envs: int, options: PybulletOptions) -> None:
+        self.world = world
+        self.plan = Plan(world, options)
+        self.clients: list[Env] = []
+        try:
+            for _ in range(num_envs):
+                self.clients.append(Env(self.plan))
+            self.laws = Laws(world, self.plan.frames, self.plan.trees, num_envs)
+            self.parameters = Parameters(world, self.clients, self.laws)
+            self.mirror = Mirror(world, self.clients, self.laws)
+            self._tree_of = np.zeros(len(world.bodies), dtype=int)
+            for tree in self.plan.trees:
+                self._tree_of[tree.bodies] = tree.number
+            self._static = [i for i, b in enumerate(world.bodies) if b.kind is BodyKind.STATIC]
+            self._begin: list[int] = [0] * num_envs
+            for index in range(num_envs):
+                self._settle(index)
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Free all clients and files. May be called again."""
+        while self.clients:
+            self.clients.pop().close()
+        self.plan.close()
+
+    # ------------------------------------------------------------------ the initial state
+
+    def _settle(self, index: int) -> None:
+        """Bring a new client into the World's initial state, and have Bullet remember it."""
+        world, mirror, env = self.world, self.mirror, self.clients[index]
+        env.set_surfaces(self.parameters.friction[index, self.plan.rules.geoms])
+        mirror.pose[index], mirror.twist[index] = world.initial_body_pose, 0.0
+        mirror.position[index], mirror.velocity[index] = [j.initial for j in world.joints], 0.0
+        self._set_joints(index, np.arange(len(world.joints)))
+        for body, part in enumerate(world.bodies):
+            if part.kind is not BodyKind.LINK:
+                self._set_root(index, body, with_pose=True)
+        mirror.hold(index)
+        mirror.wrote(index)
+        mirror.refresh(index)
+        self.laws.roots[index] = mirror.pose[index]
+        self._begin[index] = bullet().saveState(physicsClientId=env.id)
+        if index == 0:
+            self._initial = {name: getattr(mirror, name)[0].copy() for name in _MIRRORED}
+
+    def reset(self, ids: Array) -> None:
+        """Back to the initial state, with nothing left over."""
+        for index in ids.tolist():
+            self._clear(index, self._initial["pose"])
+            bullet().restoreState(self._begin[index], physicsClientId=self.clients[index].id)
+            for name in _MIRRORED:
+                getattr(self.mirror, name)[index] = self._initial[name]
+            self.mirror.hold(index)
+            self.laws.effort[index] = 0.0
+            self.laws.forget(index)
+
+    def _clear(self, index: int, pose: Array) -> None:
+        """Make an env forget its contacts, before a state is restored in which fixed bodies are at `pose` (B, 7).
+
+        An env that was given up gets a new client: what is not finite stays in Bullet's collision detection.
+        """
+        self.mirror.refresh(index)
+        if self.mirror.fault[index] or not self.clients[index].part():
+            self.clients[index].close()
+            self.clients[index] = Env(self.plan)
+            self.mirror.fault[index] = False
+            self._settle(index)
+            self.parameters.renew(index)
+        for body in self._static:
+            self.mirror.pose[index, body] = pose[body]
+            self._set_root(index, body, with_pose=True)
+
+    # ------------------------------------------------------------------ stepping
+
+    def step(self, steps: int, ids: Array | None) -> None:
+        """Advance all envs, or some."""
+        p, dt = bullet(), self.world.physics.dt
+        for index in range(len(self.clients)) if ids is None else ids.tolist():
+            if not self.mirror.fault[index]:
+                sound = Pusher(self.clients[index], index, self.laws, p, dt).run(steps)
+                self.mirror.stepped(index, sound)
+
+    # ------------------------------------------------------------------ writing
+
+    def write_joints(self, ids: Array, joints: Array, position: Array | None, velocity: Array | None) -> None:
+        """See `Primitives._write_joints`."""
+        bodies = np.array([self.world.joints[j].body for j in joints], dtype=int)
+        for row, index in enumerate(ids.tolist()):
+            self.mirror.settle(index)
+            if position is not None:
+                self.mirror.position[index, joints] = position[row]
+            if velocity is not None:
+                self.mirror.velocity[index, joints] = velocity[row]
+            self._set_joints(index, joints)
+            self.mirror.wrote(index)
+            self.laws.forget(index, np.unique(self._tree_of[bodies]))
+
+    def write_bodies(self, ids: Array, bodies: Array, pose: Array | None, twist: Array | None) -> None:
+        """See `Primitives._write_bodies`."""
+        for row, index in enumerate(ids.tolist()):
+            self.mirror.settle(index)
+            for column, body in enumerate(bodies.tolist()):
+                if pose is not None:
+                    self.mirror.pose[index, body] = pose[row, column]
+                if twist is not None:
+                    self.mirror.twist[index, body] = twist[row, column]
+                self._set_root(index, body, with_pose=pose is not None)
+            self.mirror.wrote(index)
+            self.laws.forget(index, np.unique(self._tree_of[bodies]))
+
+    def _set_joints(self, index: int, joints: Array) -> None:
+        p, env, mirror = bullet(), self.clients[index], self.mirror
+        for j in joints.tolist():
+            p.resetJointState(
+                env.body_at[self.world.joints[j].body][0], env.joint_link[j], float(mirror.position[index, j]),
+                float(mirror.velocity[index, j]), physicsClientId=env.id,
+            )  # fmt: skip
+
+    def _set_root(self, index: int, body: int, with_pose: bool) -> None:
+        """Give Bullet the pose of a root's centre of mass, and its velocity, which writing a pose makes zero."""
+        p, env, mirror = bullet(), self.clients[index], self.mirror
+        uid, local, pose = env.body_at[body][0], env.local[body, :7], mirror.pose[index, body]
+        if with_pose:
+            place = P.compose(pose, local)
+            p.resetBasePositionAndOrientation(uid, place[:3].tolist(), place[3:].tolist(), physicsClientId=env.id)
+        if self.world.bodies[body].kind is BodyKind.STATIC:
+            self.laws.roots[index, body] = pose
+            return
+        twist = mirror.twist[index, body]
+        speed = twist[:3] + P.cross(twist[3:], P.rotate(pose[3:], local[:3]))
+        p.resetBaseVelocity(uid, speed.tolist(), twist[3:].tolist(), physicsClientId=env.id)
+
+    # ------------------------------------------------------------------ snapshots
+
+    def snapshot(self, ids: Array, level: SnapshotLevel) -> dict[str, Array]:
+        """Rows of all that is kept; at the level TRAJECTORY with Bullet's own file of each env."""
+        for index in ids.tolist():
+            self.mirror.settle(index)
+        data = {name: getattr(self.mirror, name)[ids] for name in _MIRRORED}
+        data |= {"effort": self.laws.effort[ids], "memory": self.laws.memory[ids]}
+        if level is SnapshotLevel.TRAJECTORY:
+            files = [self._saved(index) for index in ids.tolist()]
+            rows = np.zeros((len(files), max((len(f) for f in files), default=0)), dtype=np.uint8)
+            for row, file in zip(rows, files, strict=True):
+                row[: len(file)] = np.frombuffer(file, dtype=np.uint8)
+            data |= {"bullet": rows, "length": np.array([len(f) for f in files], dtype=np.int64)}
+        return data
+
+    def restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:
+        """Write rows that `snapshot` made."""
+        exact = level is SnapshotLevel.TRAJECTORY
+        for row, index in enumerate(ids.tolist()):
+            self._clear(index, data["pose"][row])
+            if exact:
+                self._load(index, data["bullet"][row, : int(data["length"][row])].tobytes())
+            for name in _MIRRORED:
+                getattr(self.mirror, name)[index] = data[name][row]
+            if not exact:
+                self._set_joints(index, np.arange(len(self.world.joints)))
+                for tree in self.plan.trees:
+                    if tree.free:
+                        self._set_root(index, int(tree.bodies[0]), with_pose=True)
+            self.mirror.hold(index)
+            self.laws.effort[index], self.laws.memory[index] = data["effort"][row], data["memory"][row]
+
+    def _saved(self, index: int) -> bytes:
+        file = self.plan.folder / "state.bullet"
+        bullet().saveBullet(str(file), physicsClientId=self.clients[index].id)
+        return file.read_bytes()
+
+    def _load(self, index: int, content: bytes) -> None:
+        p, failure = bullet(), None
+        file = self.plan.folder / "state.bullet"
+        file.write_bytes(content)
+        with quiet() as words:
+            try:
+                p.restoreState(fileName=str(file), physicsClientId=self.clients[index].id)
+            except p.error as error:
+                failure = error
+        if failure is not None:
+            raise EngineError(f"Bullet cannot restore env {index}: {failure}; {words.tail}") from failure
+
+    # ------------------------------------------------------------------ live editing
+
+    def carried(self) -> dict[str, Any]:
+        """What a rebuild takes over by name."""
+        for index in range(len(self.clients)):
+            self.mirror.settle(index)
+        return {name: getattr(self.mirror, name) for name in _MIRRORED} | {"effort": self.laws.effort}
+
+    def take(self, carried: Mapping[str, Array], old: World) -> None:
+        """Keep the bits of what stays: poses that went through Bullet come back with other last ones."""
+        for kind, names in (
+            ("bodies", ("pose", "twist")), ("joints", ("position", "velocity", "effort")),
+            ("contact_sensors", ("contact",)),
+        ):  # fmt: skip
+            places = {thing.name: i for i, thing in enumerate(getattr(old, kind))}
+            pairs = [(places[t.name], i) for i, t in enumerate(getattr(self.world, kind)) if t.name in places]
+            before, after = np.array(pairs, dtype=int).reshape(-1, 2).T
+            for index in range(len(self.clients)):
+                self.mirror.refresh(index)
+            for name in names:
+                target = self.laws.effort if name == "effort" else getattr(self.mirror, name)
+                target[:, after] = carried[name][:, before]
+        for index in range(len(self.clients)):
+            self.mirror.hold(index)

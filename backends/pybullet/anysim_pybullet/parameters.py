@@ -1,0 +1,119 @@
+"""Physical and visual parameters per env: Bullet's through changeDynamics, the others are the drive law's own."""
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.errors import EngineError
+from anysim.world.inertia import tensor
+from anysim.world.model import Inertial, World
+from anysim_pybullet import kernels as K
+from anysim_pybullet.bullet import bullet
+from anysim_pybullet.client import Env
+from anysim_pybullet.declared import PARAMETERS
+from anysim_pybullet.law import Laws
+
+_JOINT = {"joint.damping": K.DAMPING, "joint.armature": K.ARMATURE}
+
+
+class Parameters:
+    """Reads and writes neutral parameters. The centre of mass and the axes of inertia are fixed by the build."""
+
+    def __init__(self, world: World, envs: list[Env], laws: Laws) -> None:
+        self._world, self._envs, self._laws = world, envs, laws
+        n = len(envs)
+        self.friction = np.tile(np.array([g.surface.friction for g in world.geoms], dtype=float), (n, 1))
+        self.color = np.tile(np.array([g.color for g in world.geoms], dtype=float).reshape(-1, 4), (n, 1, 1))
+        self.dry = np.tile(np.array([j.friction for j in world.joints], dtype=float), (n, 1))
+        self._defaults = {name: self._all(name)[0].copy() for name in PARAMETERS}
+        self._touched: list[dict[str, None]] = [{} for _ in envs]
+
+    def get(self, name: str) -> Array:
+        """All values (N, K, ...)."""
+        return self._all(name).copy()
+
+    def default(self, name: str) -> Array:
+        """Values (K, ...) as built."""
+        return self._defaults[name].copy()
+
+    def set(self, name: str, values: Array, ids: Array, indices: Array) -> None:
+        """Write values (E, K, ...)."""
+        if name == "body.inertia":
+            self._check_axes(values, indices)
+        at = np.ix_(ids, indices)
+        if name in _JOINT:
+            self._laws.drives[:, :, _JOINT[name]][at] = values
+            self._laws.refresh()
+        elif name == "world.gravity":
+            self._laws.gravity[ids] = values[:, 0]
+        elif name == "body.inertia":
+            self._laws.bodies[:, :, K.INERTIA : K.INERTIA + 6][at] = values
+        else:
+            self._array(name)[at] = values
+        for index in ids.tolist():
+            self._touched[index][name] = None
+            self._push(index, name, indices)
+
+    def _push(self, index: int, name: str, indices: Array) -> None:
+        """Give Bullet what it simulates itself."""
+        p, env = bullet(), self._envs[index]
+        if name == "world.gravity":
+            p.setGravity(*self._laws.gravity[index].tolist(), physicsClientId=env.id)
+        elif name == "geom.friction":
+            env.set_surfaces(self.friction[index, env.plan.rules.geoms])
+        elif name == "joint.friction":
+            for joint in indices.tolist():
+                env.set_dry_friction(joint, float(self.dry[index, joint]))
+        elif name in ("body.mass", "body.inertia"):
+            for body in indices.tolist():
+                if self._world.bodies[body].kind != "static":
+                    # a mass without moments would be given those of the shapes
+                    p.changeDynamics(
+                        *env.body_at[body], mass=float(self._laws.bodies[index, body, K.MASS]),
+                        localInertiaDiagonal=self._moments(index, body), physicsClientId=env.id,
+                    )  # fmt: skip
+
+    def renew(self, index: int) -> None:
+        """Give the new client of an env what was changed in the one before."""
+        for name in self._touched[index]:
+            self._push(index, name, np.arange(self._all(name).shape[1]))
+
+    def _array(self, name: str) -> Array:
+        laws = self._laws
+        return {
+            "body.mass": laws.bodies[:, :, K.MASS], "geom.friction": self.friction, "geom.color": self.color,
+            "joint.friction": self.dry, "actuator.kp": laws.kp, "actuator.kd": laws.kd,
+            "actuator.effort_limit": laws.limit,
+        }[name]  # fmt: skip
+
+    def _all(self, name: str) -> Array:
+        laws = self._laws
+        if name in _JOINT:
+            return laws.drives[:, :, _JOINT[name]]
+        if name == "world.gravity":
+            return laws.gravity[:, None]
+        if name == "body.inertia":
+            return laws.bodies[:, :, K.INERTIA : K.INERTIA + 6]
+        return self._array(name)
+
+    def _in_axes(self, body: int, inertia: Array) -> Array:
+        """A tensor in the principal axes of the build (3, 3)."""
+        x, y, z, w = self._envs[0].plan.frames.inertial[body, 3:].tolist()
+        axes = np.empty((3, 3))
+        K.rotation(x, y, z, w, axes)
+        xx, yy, zz, xy, xz, yz = inertia.tolist()
+        return axes.T @ tensor(Inertial(1.0, inertia=(xx, yy, zz, xy, xz, yz))) @ axes
+
+    def _moments(self, index: int, body: int) -> list[float]:
+        return np.diag(self._in_axes(body, self._laws.bodies[index, body, K.INERTIA : K.INERTIA + 6])).tolist()
+
+    def _check_axes(self, values: Array, indices: Array) -> None:
+        for row in values:
+            for body, inertia in zip(indices.tolist(), row, strict=True):
+                matrix = self._in_axes(body, inertia)
+                off = np.abs(matrix - np.diag(np.diag(matrix))).max()
+                if off > 1e-6 * np.abs(matrix).max():
+                    raise EngineError(
+                        f"pybullet cannot turn the axes of inertia of body '{self._world.bodies[body].name}': off by "
+                        f"{off:.3g} kg m^2 in the axes it was built with; change the moments along these axes, or the "
+                        f"world's inertia before the build"
+                    )

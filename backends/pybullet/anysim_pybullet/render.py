@@ -1,0 +1,180 @@
+"""Images by TinyRenderer. Drawing has a client of its own, so that it takes no part in any env's physics.
+
+That client holds each visible geom once, as a body that nothing moves; an env is drawn by putting the geoms where its
+bodies are and giving them its colours. Its bodies have no mass and no collision shapes, and it is never stepped.
+"""
+
+from math import radians, tan
+from typing import Any
+
+import numpy as np
+
+from anysim.conventions import WORLD, Array
+from anysim.engine.cameras import CameraView
+from anysim.errors import EngineError
+from anysim.math import pose as P
+from anysim.world.model import (
+    Box,
+    Capsule,
+    Cylinder,
+    Geom,
+    HeightField,
+    HeightFieldShape,
+    Mesh,
+    MeshShape,
+    Plane,
+    Sphere,
+    World,
+)
+from anysim_pybullet.bullet import bullet, connect, disconnect
+from anysim_pybullet.quiet import quiet
+
+GROUND_TILES = 16
+"""Tiles along an edge of a plane: the renderer is poor at large triangles that reach behind the camera."""
+
+BACKGROUND = (221, 230, 240)
+
+
+class Painter:
+    """Draws the envs of one engine."""
+
+    def __init__(self, world: World, shadows: bool) -> None:
+        self._world, self._shadows = world, shadows
+        self._geoms = [i for i, g in enumerate(world.geoms) if g.visible]
+        self._meshes = {m.name: m for m in world.meshes}
+        self._fields = {f.name: f for f in world.heightfields}
+        self._client = connect()
+        self._uids: list[int] = []
+        p, failure = bullet(), None
+        with quiet() as words:
+            try:
+                self._uids = [self._add(p, world.geoms[i]) for i in self._geoms]
+            except p.error as error:
+                failure = error
+        if failure is not None:
+            self.close()
+            raise EngineError(f"Bullet cannot draw the world '{world.name}': {failure}; {words.tail}") from failure
+        self._local = np.array([[*world.geoms[i].position, *world.geoms[i].quaternion] for i in self._geoms])
+        self._body = np.array([world.geoms[i].body for i in self._geoms], dtype=int)
+        self._colors = np.full((len(self._geoms), 4), -1.0)
+        entity = {WORLD: 0} | {b: e + 1 for b, e in enumerate(world.body_entity)}
+        self._entity = np.zeros(max(self._uids, default=-1) + 2, dtype=np.int32)  # the last one for the background
+        for uid, body in zip(self._uids, self._body.tolist(), strict=True):
+            self._entity[uid] = entity[body]
+
+    def close(self) -> None:
+        """Free the client."""
+        disconnect(self._client)
+
+    def draw(
+        self, view: CameraView, poses: Array, colors: Array, ids: Array, channels: tuple[str, ...]
+    ) -> dict[str, Array]:
+        """See `SimEngine.render`. `poses` (N, B, 7) and `colors` (N, G, 4) are those of all envs."""
+        size = (len(ids), view.height, view.width)
+        shapes: dict[str, tuple[tuple[int, ...], Any]] = {
+            "rgb": ((*size, 3), np.uint8), "depth": (size, np.float32), "segmentation": (size, np.int32)
+        }  # fmt: skip
+        images = {name: np.empty(*shapes[name]) for name in channels}
+        for row, index in enumerate(ids.tolist()):
+            self._arrange(poses[index], colors[index, self._geoms])
+            rgba, raw, owner = self._shoot(view, view.pose[row])
+            near, far = view.near, view.far
+            depth = far * near / (far - (far - near) * raw.astype(np.float64))
+            nothing = (owner < 0) | (raw >= 1.0)
+            if "rgb" in images:
+                images["rgb"][row] = np.where(nothing[..., None], np.array(BACKGROUND, dtype=np.uint8), rgba[..., :3])
+            if "depth" in images:
+                images["depth"][row] = np.where(nothing, np.inf, depth)
+            if "segmentation" in images:
+                images["segmentation"][row] = self._entity[np.where(nothing, -1, owner)]
+        return images
+
+    def _arrange(self, poses: Array, colors: Array) -> None:
+        p, client = bullet(), self._client
+        frame = np.concatenate([poses, [[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]]])[self._body]
+        placed = P.compose(frame, self._local) if len(frame) else frame
+        for uid, place in zip(self._uids, placed.tolist(), strict=True):
+            p.resetBasePositionAndOrientation(uid, place[:3], place[3:], physicsClientId=client)
+        for k in np.flatnonzero((colors != self._colors).any(axis=1)).tolist():
+            p.changeVisualShape(self._uids[k], -1, rgbaColor=colors[k].tolist(), physicsClientId=client)
+        self._colors = colors.copy()
+
+    def _shoot(self, view: CameraView, eye: Array) -> tuple[Array, Array, Array]:
+        p, axes = bullet(), P.to_matrix(eye[3:])
+        turned = np.eye(4)
+        turned[0, :3], turned[1, :3], turned[2, :3] = axes[:, 0], -axes[:, 1], -axes[:, 2]
+        turned[:3, 3] = -turned[:3, :3] @ eye[:3]
+        top = view.near * tan(radians(view.fov) / 2)
+        right = top * view.width / view.height
+        lens = p.computeProjectionMatrix(-right, right, -top, top, view.near, view.far)
+        _, _, rgba, raw, owner = p.getCameraImage(
+            view.width, view.height, turned.T.ravel().tolist(), lens, shadow=int(self._shadows),
+            lightDirection=self._light(), lightAmbientCoeff=0.55, lightDiffuseCoeff=0.45, lightSpecularCoeff=0.05,
+            renderer=p.ER_TINY_RENDERER, physicsClientId=self._client,
+        )  # fmt: skip
+        size = (view.height, view.width)
+        return np.reshape(rgba, (*size, 4)), np.reshape(raw, size), np.reshape(owner, size)
+
+    def _light(self) -> list[float]:
+        """Towards the light, as the renderer wants it."""
+        light = self._world.lights[0].direction if self._world.lights else (-0.35, 0.25, -1.0)
+        return [-float(x) for x in light]
+
+    # ------------------------------------------------------------------ shapes
+
+    def _add(self, p: Any, geom: Geom) -> int:
+        client = self._client
+        match geom.shape:
+            case Box(half):
+                shape = p.createVisualShape(p.GEOM_BOX, halfExtents=half, rgbaColor=geom.color, physicsClientId=client)
+            case Sphere(r):
+                shape = p.createVisualShape(p.GEOM_SPHERE, radius=r, rgbaColor=geom.color, physicsClientId=client)
+            case Capsule(r, h):
+                shape = p.createVisualShape(
+                    p.GEOM_CAPSULE, radius=r, length=2 * h, rgbaColor=geom.color, physicsClientId=client
+                )
+            case Cylinder(r, h):
+                shape = p.createVisualShape(
+                    p.GEOM_CYLINDER, radius=r, length=2 * h, rgbaColor=geom.color, physicsClientId=client
+                )
+            case _:
+                vertices, faces = self._triangles(geom)
+                shape = self._add_mesh(p, vertices, faces, geom.color)
+        if shape < 0:
+            raise p.error(f"createVisualShape failed for geom '{geom.name}'")
+        return p.createMultiBody(0, -1, shape, physicsClientId=client)
+
+    def _triangles(self, geom: Geom) -> tuple[Array, Array]:
+        match geom.shape:
+            case MeshShape(name):
+                mesh: Mesh = self._meshes[name]
+                return np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces)
+            case HeightFieldShape(name):
+                field: HeightField = self._fields[name]
+                return grid(np.asarray(field.heights, dtype=float), field.size)
+            case Plane(half):
+                return grid(np.zeros((GROUND_TILES + 1, GROUND_TILES + 1)), (2 * half, 2 * half))
+            case _:
+                raise EngineError(f"pybullet cannot draw a {type(geom.shape).__name__} (geom '{geom.name}')")
+
+    def _add_mesh(self, p: Any, vertices: Array, faces: Array, color: Any) -> int:
+        """A mesh of flat triangles, each with its own normal."""
+        corners = vertices[faces]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+        points = corners.reshape(-1, 3)
+        return p.createVisualShape(
+            p.GEOM_MESH, vertices=points.tolist(), indices=list(range(len(points))),
+            normals=np.repeat(normal, 3, axis=0).tolist(), rgbaColor=color, physicsClientId=self._client,
+        )  # fmt: skip
+
+
+def grid(heights: Array, size: tuple[float, float]) -> tuple[Array, Array]:
+    """Vertices and triangles of a field of heights (rows, cols) over `size` [m]."""
+    rows, cols = heights.shape
+    x, y = np.meshgrid(np.linspace(-size[0] / 2, size[0] / 2, cols), np.linspace(-size[1] / 2, size[1] / 2, rows))
+    vertices = np.stack([x, y, heights], axis=-1).reshape(-1, 3)
+    corner = (np.arange(rows - 1)[:, None] * cols + np.arange(cols - 1)).ravel()
+    lower = np.stack([corner, corner + 1, corner + cols + 1], axis=1)
+    upper = np.stack([corner, corner + cols + 1, corner + cols], axis=1)
+    return vertices, np.concatenate([lower, upper])

@@ -1,0 +1,127 @@
+"""The World as trees: each root body with its links is one Bullet multibody. Index arrays, made once at build.
+
+A link's frame here has the axes of its body and lies on its joint: at the anchor of a revolute joint, else at the
+body's origin. That is where a URDF wants it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.math import pose as P
+from anysim.world import inertia
+from anysim.world.model import BodyKind, Geom, Inertial, JointType, World
+
+Inertia6 = tuple[float, float, float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Tree:
+    """A root and its links. `bodies` are World indices, the root first; joint i moves body i + 1."""
+
+    number: int
+    bodies: Array  # (n + 1,)
+    joints: Array  # (n,)
+    free: bool
+    first: int  # 6 with a free root: where the joints begin in the generalised velocity
+    joint_ints: Array  # (n, 3), for the kernels
+    joint_floats: Array  # (n, 15)
+    multiplier: Array  # (n,)
+
+    @property
+    def size(self) -> int:
+        """The length of the generalised velocity."""
+        return self.first + len(self.joints)
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Per body: where its link's frame and its principal axes are."""
+
+    anchor: Array  # (B, 3) origin of the link's frame in the body's
+    moments: Array  # (B, 3) principal moments
+    inertial: Array  # (B, 7) principal axes at the centre of mass, in the link's frame
+
+
+def frames_of(world: World) -> Frames:
+    """Anchors and principal axes of all bodies."""
+    anchor = np.zeros((len(world.bodies), 3))
+    for joint in world.joints:
+        if joint.type is JointType.REVOLUTE:
+            anchor[joint.body] = joint.anchor
+    moments, inertial = np.zeros((len(world.bodies), 3)), np.zeros((len(world.bodies), 7))
+    for i, body in enumerate(world.bodies):
+        moments[i], axes = principal(body.inertial)
+        inertial[i] = [*(np.array(body.inertial.com) - anchor[i]), *axes]
+    return Frames(anchor, moments, inertial)
+
+
+def principal(inertial: Inertial) -> tuple[Array, Array]:
+    """Principal moments (3,) and the quaternion (4,) of their axes. A diagonal tensor keeps its axes."""
+    matrix = inertia.tensor(inertial)
+    if not any(inertial.inertia[3:]):
+        return np.diag(matrix).copy(), np.array([0.0, 0.0, 0.0, 1.0])
+    moments, axes = np.linalg.eigh(matrix)
+    for column in range(2):  # equal tensors give equal bits: the largest component of an axis is positive
+        if axes[np.argmax(np.abs(axes[:, column])), column] < 0:
+            axes[:, column] *= -1
+    axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
+    return moments, P.from_matrix(axes)
+
+
+def trees_of(world: World, frames: Frames) -> list[Tree]:
+    """One tree for each root body, in the World's order."""
+    root = []
+    for i, body in enumerate(world.bodies):
+        root.append(i if body.kind is not BodyKind.LINK else root[body.parent])
+    members: dict[int, list[int]] = {}
+    for i, r in enumerate(root):
+        members.setdefault(r, []).append(i)
+    return [_tree(world, frames, number, bodies) for number, bodies in enumerate(members.values())]
+
+
+def _tree(world: World, frames: Frames, number: int, bodies: list[int]) -> Tree:
+    place = {body: i for i, body in enumerate(bodies)}
+    joints = [world.body_joint[b] for b in bodies[1:]]
+    row = {joint: i for i, joint in enumerate(joints)}
+    ints, floats = np.full((len(joints), 3), -1, dtype=np.int64), np.zeros((len(joints), 15))
+    multiplier = np.ones(len(joints))
+    for i, j in enumerate(joints):
+        joint, body = world.joints[j], world.bodies[bodies[i + 1]]
+        ints[i, :2] = place[body.parent], joint.type is JointType.PRISMATIC
+        pose = link_pose(world, frames, bodies[i + 1])
+        floats[i] = [*joint.axis, *pose[:3], *P.to_matrix(pose[3:]).ravel()]
+        leader = joint
+        while leader.mimic is not None and leader.mimic.joint in row:
+            ints[i, 2] = row[leader.mimic.joint]
+            multiplier[i] *= leader.mimic.multiplier
+            leader = world.joints[leader.mimic.joint]
+    free = world.bodies[bodies[0]].kind is BodyKind.FREE
+    return Tree(
+        number,
+        np.array(bodies, dtype=int),
+        np.array(joints, dtype=int),
+        free,
+        6 if free else 0,
+        ints,
+        floats,
+        multiplier,
+    )
+
+
+def link_pose(world: World, frames: Frames, body: int) -> Array:
+    """(7,) a link's frame in its parent link's frame, at zero joint position."""
+    b = world.bodies[body]
+    quaternion = np.array(b.quaternion)
+    place = np.array(b.position) + P.rotate(quaternion, frames.anchor[body]) - frames.anchor[b.parent]
+    return np.concatenate([place, quaternion])
+
+
+def shapes_of(world: World, bodies: Array) -> dict[int, list[tuple[int, Geom]]]:
+    """The colliding geoms of each body, with their World indices."""
+    wanted = {int(b): [] for b in bodies}
+    for i, geom in enumerate(world.geoms):
+        if geom.collides and geom.body in wanted:
+            wanted[geom.body].append((i, geom))
+    return wanted

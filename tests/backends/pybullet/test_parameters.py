@@ -1,0 +1,87 @@
+"""Surfaces and parameters beyond what the contract asks."""
+
+import numpy as np
+import pytest
+
+from anysim.errors import EngineError
+from anysim.testing import worlds
+from anysim.testing.sketch import Sketch
+from anysim.world.model import Box, Sphere, Surface
+from anysim_pybullet.urdf import roll_pitch_yaw
+
+
+def _objects(*coefficients, ground=0.8):
+    s = Sketch("objects")
+    s.ground(Surface(friction=ground))
+    for i, mu in enumerate(coefficients):
+        s.free(f"b{i}", Box((0.1, 0.1, 0.1)), (float(i), 0.0, 0.1), surface=Surface(friction=mu))
+    return s.world()
+
+
+def _products(engine):
+    rules = engine._envs.plan.rules
+    friction = engine._envs.parameters.friction[0, rules.geoms]
+    values = rules.numbers(friction).friction
+    return np.multiply.outer(values, values), rules.pair_friction(friction)
+
+
+def test_equal_frictions_are_exact(build):
+    """One coefficient throughout: every pair has it."""
+    got, wanted = _products(build(_objects(0.8, 0.8, 0.8)))
+    off = ~np.eye(len(got), dtype=bool)
+    assert np.allclose(got[off], wanted[off], rtol=2e-4)
+
+
+def test_friction_with_the_ground_comes_first(build):
+    """With four coefficients the pairs with the ground are right to 0.005; those of two objects pay for it."""
+    got, wanted = _products(build(_objects(0.2, 0.2, 0.5, 1.0)))
+    assert np.abs(got[0, 1:] - wanted[0, 1:]).max() < 0.006
+    assert (got[1:, 1:] - wanted[1:, 1:]).max() < 0.45
+
+
+def test_torsional_friction_slows_a_spin(build):
+    """A ball that spins on the spot is slowed by its torsional coefficient times its weight."""
+    s = Sketch("top")
+    s.ground()
+    s.free("ball", Sphere(0.1), (0.0, 0.0, 0.1), surface=Surface(torsional_friction=0.02, torsional=True))
+    engine = build(s.world())
+    engine.step(200)
+    engine.set_body_state(twist=[0.0, 0.0, 0.0, 0.0, 0.0, 20.0])
+    engine.step(100)
+    lost = 20.0 - engine.get_state().body_twist[0, 0, 5]
+    assert lost == pytest.approx(0.02 * 9.81 / 0.004 * 0.2, rel=0.02)
+
+
+def test_axes_of_inertia_stay(build):
+    """Moments may change along the axes of the build; a tensor with others is refused, and nothing is written."""
+    engine = build(worlds.drifting())
+    before = engine.get_parameters("body.inertia")
+    turned = before.copy()
+    turned[0, 0, 3] = 0.01
+    with pytest.raises(EngineError, match="cannot turn the axes of inertia of body 'box0'"):
+        engine.set_parameters("body.inertia", turned)
+    assert np.array_equal(engine.get_parameters("body.inertia"), before)
+
+
+def test_a_new_client_has_the_old_parameters(build):
+    """An env that was given up gets a new client, with its parameters."""
+    engine = build(worlds.falling_ball())
+    engine.set_parameters("world.gravity", [[[0.0, 0.0, -2.0]]])
+    engine.set_parameters("body.mass", [[3.0]])
+    engine.set_body_state(twist=[1e12, 0.0, 0.0, 0.0, 0.0, 0.0])
+    engine.step(3)
+    assert engine.get_state().fault.all()
+    engine.reset()
+    engine.step(100)
+    assert engine.get_state().body_twist[0, 0, 2] == pytest.approx(-0.4, rel=1e-6)
+    assert engine.get_parameters("body.mass")[0, 0] == 3.0
+
+
+@pytest.mark.parametrize("pitch", [0.0, 0.7, np.pi / 2, -np.pi / 2, 1.57079])
+def test_angles_of_a_rotation(pitch):
+    """Quaternion to roll, pitch, yaw and back, also where two of them turn about one axis."""
+    from anysim.math import pose as P
+
+    wanted = P.from_roll_pitch_yaw(np.array([0.4, pitch, -1.1]))
+    got = P.from_roll_pitch_yaw(np.array(roll_pitch_yaw(wanted)))
+    assert P.angle_between(wanted, got) < 1e-7
