@@ -1,0 +1,349 @@
+"""One env: a sapien.Scene of its own with everything in it, built natively from the World.
+
+A scene is thrown away and built again where PhysX would remember something: at a reset, when a snapshot comes back,
+and for parameters that PhysX reads once. Nothing here knows of rendering, so no graphics device is needed.
+"""
+
+import threading
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from anysim.conventions import WORLD, Array, wxyz_from_xyzw
+from anysim.errors import EngineError
+from anysim.math import pose as P
+from anysim.world.model import BodyKind, HeightFieldShape, Joint, JointType, Plane, World
+from anysim_sapien.exclusions import Group, groups_of
+from anysim_sapien.inertia import Principal, principal
+from anysim_sapien.layout import Layout
+from anysim_sapien.library import physx, sapien
+from anysim_sapien.options import SapienOptions
+from anysim_sapien.shapes import make_shape, to_pose
+from anysim_sapien.surfaces import copies_of
+
+FAST = 1e9
+"""Stands for no limit where PhysX has a highest speed: 100 m/s and 50 rad/s by default."""
+
+STICKING = 1e6
+"""Damping of a dry joint [N m s/rad]: what it may exert is bounded by the friction, so it only has to be large."""
+
+UNBOUNDED = 3.4e38
+
+_configuring = threading.Lock()
+"""PhysX takes the configuration of a scene from a global, at the moment the scene is made."""
+
+
+class Values(NamedTuple):
+    """The parameters of one env that its scene is built with."""
+
+    mass: Array
+    com: Array
+    inertia: Array
+    geom_friction: Array
+    joint_friction: Array
+    armature: Array
+    gravity: Array
+
+
+class Tree(NamedTuple):
+    """An articulation: its handle, its bodies, and its joints in the order of PhysX' degrees of freedom."""
+
+    handle: Any
+    bodies: tuple[int, ...]
+    joints: Array
+
+
+class Recipe:
+    """What all envs of a world are built from."""
+
+    def __init__(self, world: World, options: SapienOptions) -> None:
+        self.world, self.options, self.layout = world, options, Layout.of(world)
+        self.groups = groups_of(world)
+        self.surfaces = [geom.surface for geom in world.geoms]
+        self.solid = [i for i, geom in enumerate(world.geoms) if geom.collides]
+        self.geoms_on: dict[int, list[int]] = {}
+        for i in self.solid:
+            self.geoms_on.setdefault(world.geoms[i].body, []).append(i)
+        self.root_pose = [to_pose(np.array([*b.position, *b.quaternion])) for b in world.bodies]
+        self.frames = [_joint_frames(world, joint) for joint in world.joints]
+        self.initial = np.array([joint.initial for joint in world.joints])
+        self._principal: dict[tuple[str, bytes], Principal] = {}
+        _check(world)
+
+    def principal(self, body: int, inertia: Array) -> Principal:
+        """The principal moments of a body, computed once."""
+        key = (self.world.bodies[body].name, inertia.tobytes())
+        if key not in self._principal:
+            if len(self._principal) > 10000:
+                self._principal.clear()
+            self._principal[key] = principal(key[0], inertia)
+        return self._principal[key]
+
+
+class EnvScene:
+    """A scene, and its parts in the World's order."""
+
+    def __init__(self, recipe: Recipe, values: Values) -> None:
+        world = recipe.world
+        self._recipe, self._values = recipe, values
+        self.system = _system(recipe, values.gravity)
+        self.scene: Any = sapien.Scene([self.system])
+        self.bodies: list[Any] = [None] * len(world.bodies)
+        self.entities: list[Any] = [None] * len(world.bodies)
+        self.shapes: list[list[Any]] = [[] for _ in world.geoms]
+        self.dry: dict[int, Any] = {}
+        self._copies = copies_of(
+            [recipe.surfaces[i] for i in recipe.solid],
+            [float(values.geom_friction[i]) for i in recipe.solid],
+            [bool(recipe.layout.geom_fixed[i]) for i in recipe.solid],
+        )
+        self._place = {geom: place for place, geom in enumerate(recipe.solid)}
+        self.body_of: dict[Any, int] = {}
+        """World body of each PhysX component, -1 for the world's own geoms."""
+        if WORLD in recipe.geoms_on:
+            self._enter(WORLD, physx.PhysxRigidStaticComponent(), sapien.Pose())
+        for body in recipe.layout.actors:
+            self._actor(body)
+        self.trees = [self._tree(members) for members in recipe.layout.trees]
+        self.joints = self._joints()
+        for index in np.flatnonzero(values.joint_friction > 0):
+            self.set_dry(int(index), float(values.joint_friction[index]))
+        self.place_joints(recipe.initial, np.zeros(len(world.joints)))
+
+    # ------------------------------------------------------------------ building
+
+    def _enter(self, body: int, component: Any, pose: Any) -> None:
+        """Give a component its shapes and put it into the scene."""
+        recipe = self._recipe
+        for index in recipe.geoms_on.get(body, ()):
+            for copy in self._copies[self._place[index]]:
+                shape = make_shape(
+                    recipe.world, recipe.world.geoms[index], copy, recipe.groups.get(body, Group()), recipe.options
+                )
+                component.attach(shape)
+                self.shapes[index].append(shape)
+        entity = sapien.Entity()
+        entity.add_component(component)
+        entity.set_pose(pose)
+        self.body_of[component] = body
+        if body == WORLD:
+            self._ground = component
+        else:
+            self.bodies[body], self.entities[body] = component, entity
+            if not isinstance(component, physx.PhysxRigidStaticComponent):
+                self.set_inertial(body, self._values.mass[body], self._values.com[body], self._values.inertia[body])
+                self._free_of_defaults(component, recipe.world.bodies[body].gravity_compensation)
+        self.scene.add_entity(entity)
+
+    def _actor(self, body: int) -> None:
+        recipe, options = self._recipe, self._recipe.options
+        if recipe.world.bodies[body].kind is BodyKind.STATIC:
+            self._enter(body, physx.PhysxRigidStaticComponent(), recipe.root_pose[body])
+            return
+        component = physx.PhysxRigidDynamicComponent()
+        component.set_sleep_threshold(0.0)
+        component.set_solver_position_iterations(options.position_iterations)
+        component.set_solver_velocity_iterations(options.velocity_iterations)
+        self._enter(body, component, recipe.root_pose[body])
+
+    def _free_of_defaults(self, component: Any, weightless: bool) -> None:
+        component.set_linear_damping(0.0)
+        component.set_angular_damping(0.0)
+        component.set_max_linear_velocity(FAST)
+        component.set_max_angular_velocity(FAST)
+        component.set_max_depenetration_velocity(self._recipe.options.depenetration_velocity)
+        component.set_disable_gravity(weightless)
+
+    def _tree(self, members: tuple[int, ...]) -> Tree:
+        recipe, world = self._recipe, self._recipe.world
+        made: dict[int, Any] = {}
+        for body in members:
+            made[body] = physx.PhysxArticulationLinkComponent(made.get(world.bodies[body].parent))
+            joint = made[body].joint
+            if body == members[0]:
+                joint.set_type("fixed" if world.bodies[body].kind is BodyKind.STATIC else "undefined")
+                continue
+            index = world.body_joint[body]
+            spec = world.joints[index]
+            # an unwrapped joint counts its turns; the other kind begins again at half a turn
+            joint.set_type("prismatic" if spec.type is JointType.PRISMATIC else "revolute_unwrapped")
+            in_parent, in_child = recipe.frames[index]
+            joint.set_pose_in_parent(in_parent)
+            joint.set_pose_in_child(in_child)
+            joint.set_limit(np.array([[spec.lower, spec.upper]], dtype=np.float32))
+            joint.set_friction(0.0)
+            joint.set_max_velocity(FAST)
+            joint.set_armature(np.array([self._values.armature[index]], dtype=np.float32))
+            joint.set_drive_properties(0.0, spec.damping, UNBOUNDED, "force")
+            joint.set_drive_velocity_target(0.0)
+            joint.set_name(str(index))
+        handle = made[members[0]].articulation
+        handle.set_sleep_threshold(0.0)
+        handle.set_solver_position_iterations(recipe.options.position_iterations)
+        handle.set_solver_velocity_iterations(recipe.options.velocity_iterations)
+        for body in members:
+            self._enter(body, made[body], recipe.root_pose[members[0]])
+        # PhysX sorts the degrees of freedom in its own way: only names tell
+        order = np.array([int(joint.name) for joint in handle.active_joints], dtype=int)
+        self._tendons(handle, order)
+        return Tree(handle, members, order)
+
+    def _tendons(self, handle: Any, joints: Array) -> None:
+        """Mimic joints: a stiff spring between follower and leader."""
+        world = self._recipe.world
+        for index in sorted(int(j) for j in joints):
+            mimic = world.joints[index].mimic
+            if mimic is not None:
+                chain, coefficients = tendon_chain(world, index)
+                handle.create_fixed_tendon(
+                    [self.bodies[body] for body in chain],
+                    coefficients,
+                    [0.0 if c == 0.0 else 1.0 / c for c in coefficients],
+                    rest_length=mimic.offset, offset=0.0, stiffness=MIMIC_STIFFNESS, damping=MIMIC_DAMPING,
+                )  # fmt: skip
+
+    def _joints(self) -> list[Any]:
+        joints: list[Any] = [None] * len(self._recipe.world.joints)
+        for tree in self.trees:
+            for index, joint in zip(tree.joints, tree.handle.active_joints, strict=True):
+                joints[int(index)] = joint
+        return joints
+
+    # ------------------------------------------------------------------ changing
+
+    def set_inertial(self, body: int, mass: float, com: Array, inertia: Array) -> None:
+        """Mass [kg], centre of mass [m] and inertia about it (6,) [kg m^2], in the body's frame."""
+        component = self.bodies[body]
+        if self._recipe.layout.fixed[body]:
+            # the root of a fixed articulation: it cannot move, and PhysX wants positive numbers
+            component.set_mass(max(float(mass), 1e-3))
+            component.set_inertia([1e-3, 1e-3, 1e-3])
+            component.set_cmass_local_pose(sapien.Pose())
+            return
+        moments, frame = self._recipe.principal(body, inertia)
+        component.set_mass(float(mass))
+        component.set_inertia(moments.tolist())
+        component.set_cmass_local_pose(sapien.Pose(com, wxyz_from_xyzw(frame)))
+
+    def set_dry(self, index: int, friction: float) -> None:
+        """Dry friction [N m] or [N] of a joint: a drive to standstill that may exert this much and no more."""
+        world = self._recipe.world
+        spec = world.joints[index]
+        drive = self.dry.get(index)
+        if drive is None:
+            if friction == 0.0:
+                return
+            drive = physx.PhysxDriveComponent(self.bodies[spec.body])
+            drive.set_parent(self.bodies[world.bodies[spec.body].parent])
+            in_parent, in_child = self._recipe.frames[index]
+            drive.set_pose_in_parent(in_parent)
+            drive.set_pose_in_child(in_child)
+            self.entities[spec.body].add_component(drive)
+            self.dry[index] = drive
+        # PhysX bounds the impulse of these drives, not the force
+        bound = friction * world.physics.dt
+        if spec.type is JointType.PRISMATIC:
+            drive.set_drive_property_x(0.0, STICKING, bound, "force")
+        else:
+            drive.set_drive_property_twist(0.0, STICKING, bound, "force")
+
+    def dry_friction(self, index: int) -> float:
+        """The dry friction [N m] or [N] that a joint has."""
+        drive = self.dry.get(index)
+        if drive is None:
+            return 0.0
+        sliding = self._recipe.world.joints[index].type is JointType.PRISMATIC
+        properties = drive.get_drive_property_x() if sliding else drive.get_drive_property_twist()
+        return float(properties[2]) / self._recipe.world.physics.dt
+
+    def place_joints(self, position: Array | None, velocity: Array | None) -> None:
+        """Write all joint positions and velocities (J,)."""
+        for tree in self.trees:
+            if position is not None:
+                tree.handle.set_qpos(position[tree.joints].astype(np.float32))
+            if velocity is not None:
+                tree.handle.set_qvel(velocity[tree.joints].astype(np.float32))
+
+    def joint_positions(self) -> Array:
+        """(J,) float64."""
+        return self._gather("get_qpos")
+
+    def joint_velocities(self) -> Array:
+        """(J,) float64."""
+        return self._gather("get_qvel")
+
+    def _gather(self, name: str) -> Array:
+        values = np.zeros(len(self.joints))
+        for tree in self.trees:
+            values[tree.joints] = getattr(tree.handle, name)()
+        return values
+
+
+MIMIC_STIFFNESS, MIMIC_DAMPING = 1e5, 0.0
+
+
+def tendon_chain(world: World, follower: int) -> tuple[list[int], list[float]]:
+    """The links of a fixed tendon, and their coefficients, that hold `follower - multiplier * leader` at the offset.
+
+    Raises:
+        EngineError: the two joints do not move links that are neighbours or have one parent.
+    """
+    joint = world.joints[follower]
+    assert joint.mimic is not None
+    leader = world.joints[joint.mimic.joint]
+    child, guide = joint.body, leader.body
+    parent = world.bodies[child].parent
+    if parent == world.bodies[guide].parent:
+        return [parent, guide, child], [0.0, -joint.mimic.multiplier, 1.0]
+    if parent == guide:
+        return [world.bodies[guide].parent, guide, child], [0.0, -joint.mimic.multiplier, 1.0]
+    raise EngineError(
+        f"SAPIEN cannot make joint '{joint.name}' follow '{leader.name}': a tendon joins links with one parent, or a "
+        f"link and its child; drive the joint itself, or use another engine"
+    )
+
+
+def _system(recipe: Recipe, gravity: Array) -> Any:
+    options = recipe.options
+    with _configuring:
+        physx.set_scene_config(
+            gravity=np.asarray(gravity, dtype=np.float32), bounce_threshold=options.bounce_threshold, enable_pcm=True,
+            enable_tgs=options.solver == "tgs", enable_ccd=False, enable_enhanced_determinism=True,
+            enable_friction_every_iteration=True, cpu_workers=0,
+        )  # fmt: skip
+        system = physx.PhysxCpuSystem()
+    system.set_timestep(recipe.world.physics.dt)
+    return system
+
+
+def _joint_frames(world: World, joint: Joint) -> tuple[Any, Any]:
+    """The joint's frame in the parent's and in the child's: PhysX' axis is x."""
+    axis = np.asarray(joint.axis, dtype=float)
+    in_child = np.concatenate([joint.anchor, _turn_x_to(axis)])
+    body = world.bodies[joint.body]
+    in_parent = P.compose(np.array([*body.position, *body.quaternion]), in_child)
+    return to_pose(in_parent), to_pose(in_child)
+
+
+def _turn_x_to(axis: Array) -> Array:
+    """The shortest turn (4,) of the x axis to `axis`."""
+    if axis[0] < -1 + 1e-12:
+        return np.array([0.0, 0.0, 1.0, 0.0])
+    half = np.array([0.0, -axis[2], axis[1], 1.0 + axis[0]])
+    return P.normalize(half)
+
+
+def _check(world: World) -> None:
+    for body in world.bodies:
+        if body.kind is not BodyKind.STATIC and body.inertial.mass <= 0:
+            raise EngineError(f"body '{body.name}' moves and has no mass; give it one, or join it to its parent")
+    for index, joint in enumerate(world.joints):
+        if joint.mimic is not None:
+            tendon_chain(world, index)
+    for geom in world.geoms:
+        loose = geom.body != WORLD and world.bodies[geom.body].kind is not BodyKind.STATIC
+        if loose and geom.collides and isinstance(geom.shape, HeightFieldShape | Plane):
+            raise EngineError(
+                f"geom '{geom.name}' is a {type(geom.shape).__name__} on a body that moves; PhysX collides these with "
+                f"fixed bodies alone"
+            )
