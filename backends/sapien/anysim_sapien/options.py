@@ -6,13 +6,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 
 class SapienOptions(BaseModel):
-    """Options of the engine `sapien`, as in `engine: {name: sapien, options: {solver: pgs}}`."""
+    """Options of the engine `sapien`, as in `engine: {name: sapien, options: {position_iterations: 30}}`."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    solver: Literal["tgs", "pgs"] = Field(
-        default="tgs", description="tgs holds stacks and large mass ratios better; pgs takes the drives' damping exactly"
-    )
     position_iterations: int = Field(default=15, ge=1, le=255, description="iterations of the constraint solver")
     velocity_iterations: int = Field(default=1, ge=0, le=255, description="further iterations on velocities alone")
     contact_offset: float = Field(

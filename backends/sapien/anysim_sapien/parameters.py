@@ -1,6 +1,7 @@
 """Physical and visual parameters per env. They are read back from PhysX' own objects."""
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from anysim_sapien.drives import Drives
 from anysim_sapien.inertia import full, principal
 from anysim_sapien.layout import Layout
 from anysim_sapien.scene import EnvScene, Values
+from anysim_sapien.surfaces import Copy
 
 _DRIVES = {
     "joint.damping": "passive", "actuator.kp": "kp", "actuator.kd": "kd", "actuator.effort_limit": "limit",
@@ -93,7 +95,7 @@ class Parameters:
             row[:] = [scene.dry_friction(index) for index in range(len(row))]
         elif name == "geom.friction":
             for index, shapes in enumerate(scene.shapes):
-                row[index] = _nearest(row[index], shapes)
+                row[index] = _own_friction(row[index], scene.copies.get(index, ()), shapes)
         else:
             row[0] = scene.system.config.gravity
 
@@ -138,7 +140,13 @@ class Parameters:
             self._rebuild(env)
 
 
-def _nearest(wanted: float, shapes: Sequence[object]) -> float:
-    """A geom has a shape for each value its pairs can have; one of them carries its own, if any pair uses it."""
-    found = [float(shape.physical_material.static_friction) for shape in shapes]  # type: ignore[attr-defined]
-    return min(found, key=lambda value: abs(value - wanted), default=wanted)
+def _own_friction(wanted: float, copies: Sequence[Copy], shapes: Sequence[Any]) -> float:
+    """The wanted value where all shapes of a geom have the coefficients that its pairs need, else what one has instead.
+
+    A geom has a shape for each value that its pairs can have, and its own need not be among them.
+    """
+    for copy, shape in zip(copies, shapes, strict=True):
+        found = float(shape.physical_material.static_friction)
+        if abs(found - copy.touch.friction) > 1e-6 * max(1.0, found):
+            return found
+    return wanted

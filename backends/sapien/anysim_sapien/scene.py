@@ -19,7 +19,7 @@ from anysim_sapien.layout import Layout
 from anysim_sapien.library import physx, sapien
 from anysim_sapien.options import SapienOptions
 from anysim_sapien.shapes import make_shape, to_pose
-from anysim_sapien.surfaces import copies_of
+from anysim_sapien.surfaces import Copy, copies_of
 
 FAST = 1e9
 """Stands for no limit where PhysX has a highest speed: 100 m/s and 50 rad/s by default."""
@@ -92,12 +92,13 @@ class EnvScene:
         self.entities: list[Any] = [None] * len(world.bodies)
         self.shapes: list[list[Any]] = [[] for _ in world.geoms]
         self.dry: dict[int, Any] = {}
-        self._copies = copies_of(
+        copies = copies_of(
             [recipe.surfaces[i] for i in recipe.solid],
             [float(values.geom_friction[i]) for i in recipe.solid],
             [bool(recipe.layout.geom_fixed[i]) for i in recipe.solid],
         )
-        self._place = {geom: place for place, geom in enumerate(recipe.solid)}
+        self.copies: dict[int, list[Copy]] = dict(zip(recipe.solid, copies, strict=True))
+        """What the shapes of each geom that collides must be."""
         self.body_of: dict[Any, int] = {}
         """World body of each PhysX component, -1 for the world's own geoms."""
         if WORLD in recipe.geoms_on:
@@ -116,7 +117,7 @@ class EnvScene:
         """Give a component its shapes and put it into the scene."""
         recipe = self._recipe
         for index in recipe.geoms_on.get(body, ()):
-            for copy in self._copies[self._place[index]]:
+            for copy in self.copies[index]:
                 shape = make_shape(
                     recipe.world, recipe.world.geoms[index], copy, recipe.groups.get(body, Group()), recipe.options
                 )
@@ -308,7 +309,7 @@ def _system(recipe: Recipe, gravity: Array) -> Any:
     with _configuring:
         physx.set_scene_config(
             gravity=np.asarray(gravity, dtype=np.float32), bounce_threshold=options.bounce_threshold, enable_pcm=True,
-            enable_tgs=options.solver == "tgs", enable_ccd=False, enable_enhanced_determinism=True,
+            enable_tgs=False, enable_ccd=False, enable_enhanced_determinism=True,
             enable_friction_every_iteration=True, cpu_workers=0,
         )  # fmt: skip
         system = physx.PhysxCpuSystem()

@@ -7,14 +7,17 @@ import numpy as np
 from anysim.conventions import Array, xyzw_from_wxyz
 from anysim.engine.state import FIELDS
 from anysim.math import pose as P
-from anysim.world.model import World
+from anysim.world.model import BodyKind, World
 from anysim_sapien.contacts import sensor_forces
 from anysim_sapien.drives import Drives
 from anysim_sapien.scene import EnvScene
+from anysim_sapien.velocities import LinkVelocities
 
 
 class StateReader:
     """What the last substep left behind, per env.
+
+    Twists of links are made from joint velocities and the links' poses: PhysX' own belong to the poses before the step.
 
     Contact forces belong to the last substep: writing a state does not change them, a reset makes them zero. A scene
     that was built anew has none, so theirs are kept here. Poses and twists are PhysX' own, but after live editing:
@@ -24,7 +27,9 @@ class StateReader:
     def __init__(self, world: World, scenes: Sequence[EnvScene], drives: Drives) -> None:
         n, bodies = len(scenes), len(world.bodies)
         self._world, self._scenes, self._drives = world, scenes, drives
-        self._moving = [i for i, b in enumerate(world.bodies) if b.kind != "static"]
+        self._moving = [i for i, b in enumerate(world.bodies) if b.kind is not BodyKind.STATIC]
+        self._free = [i for i, b in enumerate(world.bodies) if b.kind is BodyKind.FREE]
+        self._velocities = LinkVelocities(world)
         self._held_contact = np.ones(n, dtype=bool)
         self._contact = np.zeros((n, len(world.contact_sensors), 3))
         self._held_motion = np.zeros(n, dtype=bool)
@@ -74,15 +79,17 @@ class StateReader:
         return poses
 
     def _twists(self, env: int) -> Array:
-        # PhysX gives the velocity of the centre of mass; the frame's origin differs by the rate x the arm
-        scene = self._scenes[env]
-        twists, arms = np.zeros((len(self._world.bodies), 6)), np.zeros((len(self._world.bodies), 3))
-        for body in self._moving:
+        scene, poses = self._scenes[env], self._poses(env)
+        twists = np.zeros((len(self._world.bodies), 6))
+        for body in self._free:
+            # PhysX gives the velocity of the centre of mass; the frame's origin differs by the rate x the arm
             component = scene.bodies[body]
-            twists[body, :3], twists[body, 3:] = component.linear_velocity, component.angular_velocity
-            arms[body] = component.cmass_local_pose.p
-        turn = self._poses(env)[:, 3:]
-        twists[:, :3] -= P.cross(twists[:, 3:], P.rotate(turn, arms))
+            rate = np.asarray(component.angular_velocity, dtype=float)
+            arm = P.rotate(poses[body, 3:], np.asarray(component.cmass_local_pose.p, dtype=float))
+            twists[body, :3] = component.linear_velocity - P.cross(rate, arm)
+            twists[body, 3:] = rate
+        if scene.trees:
+            self._velocities.fill(twists, poses, scene.joint_velocities())
         return twists
 
     def body_twist(self) -> Array:

@@ -109,7 +109,9 @@ def copies_of(surfaces: Sequence[Surface], frictions: Sequence[float], fixed: Se
                 mixed.append((first, second))
     for first, second in mixed:
         meet(pair(first, second), first, [second])
+    made = [(key, (stuck if f else loose)[key].copies) for key, f in zip(keys, fixed, strict=True)]
+    # a geom that can touch nothing is still there for rays
     return [
-        [Copy(touch, *bits) for touch, bits in (stuck if f else loose)[key].copies.items()]
-        for key, f in zip(keys, fixed, strict=True)
+        [Copy(touch, *bits) for touch, bits in copies.items()] or [Copy(Touch(key.friction, key.restitution), 0, 0)]
+        for key, copies in made
     ]
