@@ -267,6 +267,12 @@ class SapienEngine(SimEngine):
 
     # ------------------------------------------------------------------ sensing
 
+    def renderer_name(self) -> str:
+        """The Vulkan device, such as `SwiftShader Device (Subzero)`."""
+        from anysim_sapien.vulkan import open_device
+
+        return open_device(self.options.vulkan_icd).name
+
     def _raycast(self, origins: Array, directions: Array, ids: Array) -> RayHits:
         return cast(self._scenes, self._layout, origins, directions, ids)
 

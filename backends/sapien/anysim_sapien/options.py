@@ -26,8 +26,10 @@ class SapienOptions(BaseModel):
         description="Vulkan driver that draws: auto (what the environment says, a system driver, else Chromium's "
         "software driver), none, or the path of a driver's JSON file",
     )
-    shader: Literal["trivial", "minimal", "default"] = Field(
-        default="trivial", description="trivial: flat colours, fast in software; default: lights, slow without a GPU"
+    shader: Literal["auto", "trivial", "default"] = Field(
+        default="auto",
+        description="trivial: flat colours, fast in software; default: lights, half a minute to the first image "
+        "without a graphics card; auto: trivial in software, else default",
     )
 
     def trajectory_stamp(self) -> str:
