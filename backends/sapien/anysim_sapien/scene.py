@@ -29,6 +29,9 @@ STICKING = 1e6
 
 UNBOUNDED = 3.4e38
 
+_FROM_PACKED = np.array([4, 5, 6, 1, 2, 3, 0])
+"""Columns of SAPIEN's packed poses, which are a quaternion wxyz and then the position, in our order."""
+
 _configuring = threading.Lock()
 """PhysX takes the configuration of a scene from a global, at the moment the scene is made."""
 
@@ -60,15 +63,44 @@ class Recipe:
         self.world, self.options, self.layout = world, options, Layout.of(world)
         self.groups = groups_of(world)
         self.surfaces = [geom.surface for geom in world.geoms]
-        self.solid = [i for i, geom in enumerate(world.geoms) if geom.collides]
+        self.solid = np.array([i for i, geom in enumerate(world.geoms) if geom.collides], dtype=int)
         self.geoms_on: dict[int, list[int]] = {}
-        for i in self.solid:
+        for i in self.solid.tolist():
             self.geoms_on.setdefault(world.geoms[i].body, []).append(i)
         self.root_pose = [to_pose(np.array([*b.position, *b.quaternion])) for b in world.bodies]
         self.frames = [_joint_frames(world, joint) for joint in world.joints]
         self.initial = np.array([joint.initial for joint in world.joints])
         self._principal: dict[tuple[str, bytes], Principal] = {}
+        self._copies: dict[bytes, dict[int, list[Copy]]] = {}
+        self._meet = self._may_meet()
         _check(world)
+
+    def _may_meet(self) -> Array:
+        """(C, C) bool: which of the geoms that collide can ever touch."""
+        world, fixed = self.world, self.layout.geom_fixed
+        bodies = [world.geoms[i].body for i in self.solid]
+        parents = [world.bodies[b].parent if b != WORLD else WORLD for b in bodies]
+        excluded = {pair for low, high in world.excluded_pairs for pair in ((low, high), (high, low))}
+        meet = np.zeros((len(bodies), len(bodies)), dtype=bool)
+        for i, first in enumerate(bodies):
+            for k, second in enumerate(bodies):
+                kin = first == second or (second != WORLD and parents[i] == second)
+                kin = kin or (first != WORLD and parents[k] == first)
+                both_fixed = fixed[self.solid[i]] and fixed[self.solid[k]]
+                meet[i, k] = not (kin or both_fixed or (first, second) in excluded)
+        return meet
+
+    def copies(self, friction: Array) -> dict[int, list[Copy]]:
+        """The shapes of each geom that collides, for the coefficients in force (G,)."""
+        key = friction.tobytes()
+        if key not in self._copies:
+            if len(self._copies) > 1000:
+                self._copies.clear()
+            solid = self.solid
+            surfaces = [self.surfaces[i] for i in solid]
+            made = copies_of(surfaces, friction[solid], self.layout.geom_fixed[solid], self._meet)
+            self._copies[key] = dict(zip(solid.tolist(), made, strict=True))
+        return self._copies[key]
 
     def principal(self, body: int, inertia: Array) -> Principal:
         """The principal moments of a body, computed once."""
@@ -92,12 +124,7 @@ class EnvScene:
         self.entities: list[Any] = [None] * len(world.bodies)
         self.shapes: list[list[Any]] = [[] for _ in world.geoms]
         self.dry: dict[int, Any] = {}
-        copies = copies_of(
-            [recipe.surfaces[i] for i in recipe.solid],
-            [float(values.geom_friction[i]) for i in recipe.solid],
-            [bool(recipe.layout.geom_fixed[i]) for i in recipe.solid],
-        )
-        self.copies: dict[int, list[Copy]] = dict(zip(recipe.solid, copies, strict=True))
+        self.copies = recipe.copies(values.geom_friction)
         """What the shapes of each geom that collides must be."""
         self.body_of: dict[Any, int] = {}
         """World body of each PhysX component, -1 for the world's own geoms."""
@@ -110,6 +137,8 @@ class EnvScene:
         for index in np.flatnonzero(values.joint_friction > 0):
             self.set_dry(int(index), float(values.joint_friction[index]))
         self.place_joints(recipe.initial, np.zeros(len(world.joints)))
+        order = {entity: row for row, entity in enumerate(self.scene.entities)}
+        self._rows = np.array([order[entity] for entity in self.entities], dtype=int)
 
     # ------------------------------------------------------------------ building
 
@@ -264,6 +293,11 @@ class EnvScene:
                 tree.handle.set_qpos(position[tree.joints].astype(np.float32))
             if velocity is not None:
                 tree.handle.set_qvel(velocity[tree.joints].astype(np.float32))
+
+    def poses(self) -> Array:
+        """Poses (B, 7) of the bodies' frames, xyzw, float64."""
+        rows = np.frombuffer(self.scene.pack_poses(), dtype=np.float32).reshape(-1, 7)
+        return rows[self._rows[:, None], _FROM_PACKED].astype(float)
 
     def joint_positions(self) -> Array:
         """(J,) float64."""

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from anysim.conventions import Array, xyzw_from_wxyz
+from anysim.conventions import Array
 from anysim.engine.state import FIELDS
 from anysim.math import pose as P
 from anysim.world.model import BodyKind, World
@@ -27,7 +27,6 @@ class StateReader:
     def __init__(self, world: World, scenes: Sequence[EnvScene], drives: Drives) -> None:
         n, bodies = len(scenes), len(world.bodies)
         self._world, self._scenes, self._drives = world, scenes, drives
-        self._moving = [i for i, b in enumerate(world.bodies) if b.kind is not BodyKind.STATIC]
         self._free = [i for i, b in enumerate(world.bodies) if b.kind is BodyKind.FREE]
         self._velocities = LinkVelocities(world)
         self._held_contact = np.ones(n, dtype=bool)
@@ -66,11 +65,7 @@ class StateReader:
     # ------------------------------------------------------------------ fields
 
     def _poses(self, env: int) -> Array:
-        poses = np.empty((len(self._world.bodies), 7))
-        for row, entity in zip(poses, self._scenes[env].entities, strict=True):
-            pose = entity.pose
-            row[:3], row[3:] = pose.p, pose.q
-        return np.concatenate([poses[:, :3], xyzw_from_wxyz(poses[:, 3:])], axis=1)
+        return self._scenes[env].poses()
 
     def body_pose(self) -> Array:
         poses = np.stack([self._poses(env) for env in range(len(self._scenes))])
@@ -117,6 +112,5 @@ class StateReader:
         return np.array([not self._finite(scene) for scene in self._scenes], dtype=bool)
 
     def _finite(self, scene: EnvScene) -> bool:
-        parts = [np.frombuffer(scene.system.pack(), dtype=np.float32)]
-        parts += [scene.entities[body].pose.p for body in self._moving]
-        return all(np.isfinite(part).all() for part in parts)
+        packed = np.frombuffer(scene.system.pack(), dtype=np.float32)
+        return bool(np.isfinite(packed).all() and np.isfinite(scene.poses()).all())

@@ -12,6 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
+from anysim.conventions import Array
 from anysim.errors import EngineError
 from anysim.world.model import Surface
 
@@ -63,8 +66,14 @@ def pair(a: _Class, b: _Class) -> Touch:
     return Touch(friction, max(a.restitution, b.restitution))
 
 
-def copies_of(surfaces: Sequence[Surface], frictions: Sequence[float], fixed: Sequence[bool]) -> list[list[Copy]]:
-    """The shapes of each geom. `frictions` are those in force, which may differ from the surfaces' own.
+def copies_of(surfaces: Sequence[Surface], frictions: Array, fixed: Array, may_meet: Array) -> list[list[Copy]]:
+    """The shapes of each of G geoms.
+
+    Args:
+        surfaces: what the World says.
+        frictions: (G,) those in force, which may differ from the surfaces' own.
+        fixed: (G,) bool, geoms that nothing moves; two of them never meet.
+        may_meet: (G, G) bool; a geom gets no shape for a value that none of its pairs can have.
 
     Raises:
         EngineError: more different pairs than there are bits.
@@ -109,9 +118,12 @@ def copies_of(surfaces: Sequence[Surface], frictions: Sequence[float], fixed: Se
                 mixed.append((first, second))
     for first, second in mixed:
         meet(pair(first, second), first, [second])
-    made = [(key, (stuck if f else loose)[key].copies) for key, f in zip(keys, fixed, strict=True)]
-    # a geom that can touch nothing is still there for rays
-    return [
-        [Copy(touch, *bits) for touch, bits in copies.items()] or [Copy(Touch(key.friction, key.restitution), 0, 0)]
-        for key, copies in made
-    ]
+    partners = [{keys[k] for k in np.flatnonzero(row)} for row in may_meet]
+    result: list[list[Copy]] = []
+    for key, is_fixed, others in zip(keys, fixed, partners, strict=True):
+        wanted = {pair(key, other) for other in others}
+        bits = (stuck if is_fixed else loose)[key].copies
+        copies = [Copy(touch, *marks) for touch, marks in bits.items() if touch in wanted]
+        # a geom that can touch nothing is still there for rays
+        result.append(copies or [Copy(Touch(key.friction, key.restitution), 0, 0)])
+    return result
