@@ -18,9 +18,8 @@ def joint_limits(scene: EnvScene) -> Array:
 
 def geom_volumes(world: World, scene: EnvScene) -> Array:
     """(G,) [m^3] of colliding geoms; 0 for others, for planes and for height fields."""
-    return np.array([
-        _volume(geom.shape, shapes[0]) if shapes else 0.0 for geom, shapes in zip(world.geoms, scene.shapes, strict=True)
-    ])  # fmt: skip
+    pairs = zip(world.geoms, scene.shapes, strict=True)
+    return np.array([_volume(geom.shape, shapes[0]) if shapes else 0.0 for geom, shapes in pairs])
 
 
 def _volume(kind: Any, shape: Any) -> float:

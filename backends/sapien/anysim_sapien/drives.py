@@ -1,15 +1,17 @@
 """The drives: u = kp (q* - q) + kd (qd* - qd) + ff, clipped, with its damping taken implicitly.
 
-Each substep kp (q* - q) + kd qd* + ff goes into PhysX as a force, and the damping as PhysX' own drive, a constraint that
-the solver meets together with contacts and limits. So a free joint moves as MuJoCo's `implicitfast` moves it, and a
-blocked one exerts all of its command; a law computed outside from mass matrix and bias alone would lose most of it.
-Where the law exceeds the effort limit the force is the limit itself and the drive's damping is off.
+Each substep kp (q* - q) + kd qd* + ff goes into PhysX as a force, and the damping as PhysX' own drive, a constraint
+that the solver meets together with contacts and limits. So a free joint moves as MuJoCo's `implicitfast` moves it, and
+a blocked one exerts all of its command; a law computed outside from mass matrix and bias alone would lose most of it.
+Where the law exceeds the effort limit the force is the limit itself and the drive's damping is off. This holds for the
+PGS solver: TGS applies forces at once and damping bit by bit, and damped joints get much too slow.
 """
 
 import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.commands import MODES, Control
+from anysim.errors import EngineError
 from anysim.world.model import ControlMode, World
 from anysim_sapien.scene import UNBOUNDED, EnvScene
 
@@ -21,6 +23,10 @@ class Drives:
 
     def __init__(self, world: World, num_envs: int) -> None:
         actuators, joints, n = world.actuators, world.joints, num_envs
+        driven = [a.joint for a in actuators]
+        for actuator in actuators:
+            if driven.count(actuator.joint) > 1:
+                raise EngineError(f"joint '{joints[actuator.joint].name}' has two drives; sapien takes one per joint")
         self._joint = np.array([a.joint for a in actuators], dtype=int)
         self._mode = np.tile(np.array([MODES.index(a.mode) for a in actuators], dtype=np.int8), (n, 1))
         self.kp = np.tile(np.array([a.kp for a in actuators], dtype=float), (n, 1))

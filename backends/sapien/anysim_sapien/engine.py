@@ -11,17 +11,18 @@ from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Capabilities
 from anysim.engine.commands import Control
 from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
-from anysim.math import pose as P
 from anysim.world.model import World
 from anysim_sapien import declared
 from anysim_sapien.audit import geom_volumes, joint_limits
 from anysim_sapien.carry import Carried, shared
 from anysim_sapien.contacts import contact_points
 from anysim_sapien.drives import Drives
+from anysim_sapien.motion import Motion, motion_of, put_motion, put_twist, twist_of
 from anysim_sapien.options import SapienOptions
 from anysim_sapien.parameters import Parameters
 from anysim_sapien.rays import cast
-from anysim_sapien.scene import EnvScene, Recipe
+from anysim_sapien.recipe import Recipe
+from anysim_sapien.scene import EnvScene
 from anysim_sapien.shapes import to_pose
 from anysim_sapien.state import StateReader
 
@@ -90,9 +91,10 @@ class SapienEngine(SimEngine):
     def _rebuild_env(self, env: int) -> None:
         """A new scene for an env, in its present state."""
         self._reader.keep_contact(env)
-        motion = self._motion_of(env)
+        motion = motion_of(self._scenes[env], self._layout)
         self._renew(env)
-        self._put_motion(env, motion)
+        put_motion(self._scenes[env], self._layout, motion)
+        self._reader.written(env)
 
     # ------------------------------------------------------------------ stepping
 
@@ -150,40 +152,14 @@ class SapienEngine(SimEngine):
         for row, env in enumerate(ids):
             scene = self._scenes[env]
             for column, body in enumerate(bodies):
+                kept = None if twist is None else twist[row, column]
                 if pose is not None:
-                    self._put_pose(scene, int(body), pose[row, column], keep_twist=twist is None)
-                if twist is not None:
-                    self._put_twist(scene, int(body), twist[row, column])
+                    if kept is None and self._layout.free[body]:
+                        kept = twist_of(scene, int(body))
+                    scene.entities[body].set_pose(to_pose(pose[row, column]))
+                if kept is not None:
+                    put_twist(scene, self._layout, int(body), kept)
             self._reader.written(int(env))
-
-    def _put_pose(self, scene: EnvScene, body: int, pose: Array, keep_twist: bool) -> None:
-        """Place a root body; the velocity of its origin stays."""
-        twist = self._twist_of(scene, body) if keep_twist and self._layout.free[body] else None
-        scene.entities[body].set_pose(to_pose(pose))
-        if twist is not None:
-            self._put_twist(scene, body, twist)
-
-    def _arm(self, scene: EnvScene, body: int) -> Array:
-        """From the frame's origin to the centre of mass, in world axes."""
-        turn = np.asarray(scene.entities[body].pose.q, dtype=float)[[1, 2, 3, 0]]
-        return P.rotate(turn, np.asarray(scene.bodies[body].cmass_local_pose.p, dtype=float))
-
-    def _twist_of(self, scene: EnvScene, body: int) -> Array:
-        component = scene.bodies[body]
-        rate = np.asarray(component.angular_velocity, dtype=float)
-        linear = np.asarray(component.linear_velocity, dtype=float) - P.cross(rate, self._arm(scene, body))
-        return np.concatenate([linear, rate])
-
-    def _put_twist(self, scene: EnvScene, body: int, twist: Array) -> None:
-        """PhysX takes the velocity of the centre of mass."""
-        linear = twist[:3] + P.cross(twist[3:], self._arm(scene, body))
-        if self._layout.tree_of[body] >= 0:
-            handle = scene.trees[self._layout.tree_of[body]].handle
-            handle.set_root_linear_velocity(linear)
-            handle.set_root_angular_velocity(twist[3:])
-        else:
-            scene.bodies[body].set_linear_velocity(linear)
-            scene.bodies[body].set_angular_velocity(twist[3:])
 
     # ------------------------------------------------------------------ parameters and snapshots
 
@@ -196,47 +172,16 @@ class SapienEngine(SimEngine):
     def _default_parameter(self, name: str) -> Array:
         return self._parameters.default(name)
 
-    def _motion_of(self, env: int) -> tuple[Array, Array, Array, Array]:
-        """Poses and velocities of root bodies as PhysX has them (B, 7), (B, 6), joint positions and velocities."""
-        scene = self._scenes[env]
-        poses, twists = np.zeros((len(scene.bodies), 7)), np.zeros((len(scene.bodies), 6))
-        for body in np.flatnonzero(self._layout.free | self._layout.fixed):
-            pose = scene.entities[body].pose
-            poses[body] = [*pose.p, *pose.q]
-            if self._layout.free[body]:
-                component = scene.bodies[body]
-                twists[body] = [*component.linear_velocity, *component.angular_velocity]
-        return poses, twists, scene.joint_positions(), scene.joint_velocities()
-
-    def _put_motion(self, env: int, motion: tuple[Array, Array, Array, Array]) -> None:
-        """Write what `_motion_of` returned, with the same bits."""
-        poses, twists, position, velocity = motion
-        scene = self._scenes[env]
-        for body in np.flatnonzero(self._layout.free | self._layout.fixed):
-            turned = np.concatenate([poses[body, :3], poses[body, 4:], poses[body, 3:4]])
-            scene.entities[body].set_pose(to_pose(turned))
-            if self._layout.free[body]:
-                tree = self._layout.tree_of[body]
-                if tree >= 0:
-                    scene.trees[tree].handle.set_root_linear_velocity(twists[body, :3])
-                    scene.trees[tree].handle.set_root_angular_velocity(twists[body, 3:])
-                else:
-                    scene.bodies[body].set_linear_velocity(twists[body, :3])
-                    scene.bodies[body].set_angular_velocity(twists[body, 3:])
-        scene.place_joints(position, velocity)
-        self._reader.written(env)
-
     def _snapshot(self, ids: Array, level: SnapshotLevel) -> dict[str, Array]:
-        parts = [self._motion_of(int(env)) for env in ids]
-        names = ("pose", "twist", "joint_pos", "joint_vel")
-        data = {name: np.stack([part[i] for part in parts]) for i, name in enumerate(names)}
+        parts = [motion_of(self._scenes[env], self._layout) for env in ids]
+        data = {name: np.stack([getattr(part, name) for part in parts]) for name in Motion._fields}
         return data | {"effort": self._drives.effort[ids], "contact": self._reader.contact_force()[ids]}
 
     def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:
         for row, env in enumerate(ids):
             self._renew(int(env))
-            motion = data["pose"][row], data["twist"][row], data["joint_pos"][row], data["joint_vel"][row]
-            self._put_motion(int(env), motion)
+            put_motion(self._scenes[env], self._layout, Motion(*(data[name][row] for name in Motion._fields)))
+            self._reader.written(int(env))
             self._reader.hold_contact(int(env), data["contact"][row])
             self._drives.effort[env] = data["effort"][row]
 

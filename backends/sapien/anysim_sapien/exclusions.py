@@ -58,7 +58,7 @@ def _cover(edges: set[frozenset[int]], allowed: set[frozenset[int]]) -> list[fro
     bodies = sorted({body for pair in allowed for body in pair})
     near = {body: {other for pair in allowed if body in pair for other in pair if other != body} for body in bodies}
     sets: list[frozenset[int]] = []
-    left = sorted((tuple(sorted(pair)) for pair in edges))
+    left = sorted(tuple(sorted(pair)) for pair in edges)
     while left:
         grown = set(left[0])
         for body in bodies:

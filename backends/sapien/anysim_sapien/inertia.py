@@ -27,7 +27,8 @@ def principal(name: str, inertia: Array) -> Principal:
     Raises:
         EngineError: no rigid body has this tensor.
     """
-    matrix = tensor(Inertial(1.0, inertia=tuple(float(v) for v in inertia)))
+    xx, yy, zz, xy, xz, yz = (float(v) for v in inertia)
+    matrix = tensor(Inertial(1.0, inertia=(xx, yy, zz, xy, xz, yz)))
     if not np.any(matrix - np.diag(np.diag(matrix))):
         moments, axes = np.diag(matrix).copy(), np.eye(3)
     else:

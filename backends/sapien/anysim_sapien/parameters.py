@@ -10,7 +10,8 @@ from anysim.world.model import World
 from anysim_sapien.drives import Drives
 from anysim_sapien.inertia import full, principal
 from anysim_sapien.layout import Layout
-from anysim_sapien.scene import EnvScene, Values
+from anysim_sapien.recipe import Values
+from anysim_sapien.scene import EnvScene
 from anysim_sapien.surfaces import Copy
 
 _DRIVES = {

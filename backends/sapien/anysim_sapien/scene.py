@@ -10,22 +10,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anysim.conventions import WORLD, Array, wxyz_from_xyzw
-from anysim.errors import EngineError
-from anysim.math import pose as P
-from anysim.world.model import BodyKind, HeightFieldShape, Joint, JointType, Plane, World
-from anysim_sapien.exclusions import Group, groups_of
-from anysim_sapien.inertia import Principal, principal
-from anysim_sapien.layout import Layout
+from anysim.world.model import BodyKind, JointType
+from anysim_sapien.exclusions import Group
 from anysim_sapien.library import physx, sapien
-from anysim_sapien.options import SapienOptions
-from anysim_sapien.shapes import make_shape, to_pose
-from anysim_sapien.surfaces import Copy, copies_of
+from anysim_sapien.recipe import Recipe, Values, tendon_chain
+from anysim_sapien.shapes import make_shape
 
 FAST = 1e9
 """Stands for no limit where PhysX has a highest speed: 100 m/s and 50 rad/s by default."""
 
 STICKING = 1e6
 """Damping of a dry joint [N m s/rad]: what it may exert is bounded by the friction, so it only has to be large."""
+
+COUPLING = 1e6
+"""Stiffness of a mimic joint's tendon [N m/rad or N/m], taken implicitly."""
 
 UNBOUNDED = 3.4e38
 
@@ -36,80 +34,12 @@ _configuring = threading.Lock()
 """PhysX takes the configuration of a scene from a global, at the moment the scene is made."""
 
 
-class Values(NamedTuple):
-    """The parameters of one env that its scene is built with."""
-
-    mass: Array
-    com: Array
-    inertia: Array
-    geom_friction: Array
-    joint_friction: Array
-    armature: Array
-    gravity: Array
-
-
 class Tree(NamedTuple):
     """An articulation: its handle, its bodies, and its joints in the order of PhysX' degrees of freedom."""
 
     handle: Any
     bodies: tuple[int, ...]
     joints: Array
-
-
-class Recipe:
-    """What all envs of a world are built from."""
-
-    def __init__(self, world: World, options: SapienOptions) -> None:
-        self.world, self.options, self.layout = world, options, Layout.of(world)
-        self.groups = groups_of(world)
-        self.surfaces = [geom.surface for geom in world.geoms]
-        self.solid = np.array([i for i, geom in enumerate(world.geoms) if geom.collides], dtype=int)
-        self.geoms_on: dict[int, list[int]] = {}
-        for i in self.solid.tolist():
-            self.geoms_on.setdefault(world.geoms[i].body, []).append(i)
-        self.root_pose = [to_pose(np.array([*b.position, *b.quaternion])) for b in world.bodies]
-        self.frames = [_joint_frames(world, joint) for joint in world.joints]
-        self.initial = np.array([joint.initial for joint in world.joints])
-        self._principal: dict[tuple[str, bytes], Principal] = {}
-        self._copies: dict[bytes, dict[int, list[Copy]]] = {}
-        self._meet = self._may_meet()
-        _check(world)
-
-    def _may_meet(self) -> Array:
-        """(C, C) bool: which of the geoms that collide can ever touch."""
-        world, fixed = self.world, self.layout.geom_fixed
-        bodies = [world.geoms[i].body for i in self.solid]
-        parents = [world.bodies[b].parent if b != WORLD else WORLD for b in bodies]
-        excluded = {pair for low, high in world.excluded_pairs for pair in ((low, high), (high, low))}
-        meet = np.zeros((len(bodies), len(bodies)), dtype=bool)
-        for i, first in enumerate(bodies):
-            for k, second in enumerate(bodies):
-                kin = first == second or (second != WORLD and parents[i] == second)
-                kin = kin or (first != WORLD and parents[k] == first)
-                both_fixed = fixed[self.solid[i]] and fixed[self.solid[k]]
-                meet[i, k] = not (kin or both_fixed or (first, second) in excluded)
-        return meet
-
-    def copies(self, friction: Array) -> dict[int, list[Copy]]:
-        """The shapes of each geom that collides, for the coefficients in force (G,)."""
-        key = friction.tobytes()
-        if key not in self._copies:
-            if len(self._copies) > 1000:
-                self._copies.clear()
-            solid = self.solid
-            surfaces = [self.surfaces[i] for i in solid]
-            made = copies_of(surfaces, friction[solid], self.layout.geom_fixed[solid], self._meet)
-            self._copies[key] = dict(zip(solid.tolist(), made, strict=True))
-        return self._copies[key]
-
-    def principal(self, body: int, inertia: Array) -> Principal:
-        """The principal moments of a body, computed once."""
-        key = (self.world.bodies[body].name, inertia.tobytes())
-        if key not in self._principal:
-            if len(self._principal) > 10000:
-                self._principal.clear()
-            self._principal[key] = principal(key[0], inertia)
-        return self._principal[key]
 
 
 class EnvScene:
@@ -229,7 +159,7 @@ class EnvScene:
                     [self.bodies[body] for body in chain],
                     coefficients,
                     [0.0 if c == 0.0 else 1.0 / c for c in coefficients],
-                    rest_length=mimic.offset, offset=0.0, stiffness=MIMIC_STIFFNESS, damping=MIMIC_DAMPING,
+                    rest_length=mimic.offset, offset=0.0, stiffness=COUPLING, damping=0.0,
                 )  # fmt: skip
 
     def _joints(self) -> list[Any]:
@@ -314,30 +244,6 @@ class EnvScene:
         return values
 
 
-MIMIC_STIFFNESS, MIMIC_DAMPING = 1e5, 0.0
-
-
-def tendon_chain(world: World, follower: int) -> tuple[list[int], list[float]]:
-    """The links of a fixed tendon, and their coefficients, that hold `follower - multiplier * leader` at the offset.
-
-    Raises:
-        EngineError: the two joints do not move links that are neighbours or have one parent.
-    """
-    joint = world.joints[follower]
-    assert joint.mimic is not None
-    leader = world.joints[joint.mimic.joint]
-    child, guide = joint.body, leader.body
-    parent = world.bodies[child].parent
-    if parent == world.bodies[guide].parent:
-        return [parent, guide, child], [0.0, -joint.mimic.multiplier, 1.0]
-    if parent == guide:
-        return [world.bodies[guide].parent, guide, child], [0.0, -joint.mimic.multiplier, 1.0]
-    raise EngineError(
-        f"SAPIEN cannot make joint '{joint.name}' follow '{leader.name}': a tendon joins links with one parent, or a "
-        f"link and its child; drive the joint itself, or use another engine"
-    )
-
-
 def _system(recipe: Recipe, gravity: Array) -> Any:
     options = recipe.options
     with _configuring:
@@ -349,36 +255,3 @@ def _system(recipe: Recipe, gravity: Array) -> Any:
         system = physx.PhysxCpuSystem()
     system.set_timestep(recipe.world.physics.dt)
     return system
-
-
-def _joint_frames(world: World, joint: Joint) -> tuple[Any, Any]:
-    """The joint's frame in the parent's and in the child's: PhysX' axis is x."""
-    axis = np.asarray(joint.axis, dtype=float)
-    in_child = np.concatenate([joint.anchor, _turn_x_to(axis)])
-    body = world.bodies[joint.body]
-    in_parent = P.compose(np.array([*body.position, *body.quaternion]), in_child)
-    return to_pose(in_parent), to_pose(in_child)
-
-
-def _turn_x_to(axis: Array) -> Array:
-    """The shortest turn (4,) of the x axis to `axis`."""
-    if axis[0] < -1 + 1e-12:
-        return np.array([0.0, 0.0, 1.0, 0.0])
-    half = np.array([0.0, -axis[2], axis[1], 1.0 + axis[0]])
-    return P.normalize(half)
-
-
-def _check(world: World) -> None:
-    for body in world.bodies:
-        if body.kind is not BodyKind.STATIC and body.inertial.mass <= 0:
-            raise EngineError(f"body '{body.name}' moves and has no mass; give it one, or join it to its parent")
-    for index, joint in enumerate(world.joints):
-        if joint.mimic is not None:
-            tendon_chain(world, index)
-    for geom in world.geoms:
-        loose = geom.body != WORLD and world.bodies[geom.body].kind is not BodyKind.STATIC
-        if loose and geom.collides and isinstance(geom.shape, HeightFieldShape | Plane):
-            raise EngineError(
-                f"geom '{geom.name}' is a {type(geom.shape).__name__} on a body that moves; PhysX collides these with "
-                f"fixed bodies alone"
-            )

@@ -55,9 +55,9 @@ def make_shape(world: World, geom: Geom, copy: Copy, group: Group, options: Sapi
     shape.set_collision_groups([copy.kind, copy.meets, group.bits, group.number])
     shape.set_contact_offset(options.contact_offset)
     shape.set_rest_offset(0.0)
-    radius = geom.surface.torsional_friction / friction if geom.surface.torsional and friction > 0 else 0.0
-    shape.set_patch_radius(radius)
-    shape.set_min_patch_radius(radius)
+    # what resists a turn about the normal is the distance of a contact's points; PhysX' own needs another solver
+    shape.set_patch_radius(0.0)
+    shape.set_min_patch_radius(0.0)
     return shape
 
 
@@ -75,7 +75,9 @@ def _shape(world: World, geom: Geom, material: Any) -> Any:
             return physx.PhysxCollisionShapeCylinder(radius, half_length, material)
         case MeshShape(name):
             mesh = next(mesh for mesh in world.meshes if mesh.name == name)
-            return physx.PhysxCollisionShapeConvexMesh(np.asarray(mesh.vertices, dtype=np.float32), UNIT_SCALE, material)
+            return physx.PhysxCollisionShapeConvexMesh(
+                np.asarray(mesh.vertices, dtype=np.float32), UNIT_SCALE, material
+            )
         case HeightFieldShape(name):
             field = next(field for field in world.heightfields if field.name == name)
             vertices, triangles = relief(field)

@@ -6,10 +6,10 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.state import FIELDS
-from anysim.math import pose as P
 from anysim.world.model import BodyKind, World
 from anysim_sapien.contacts import sensor_forces
 from anysim_sapien.drives import Drives
+from anysim_sapien.motion import twist_of
 from anysim_sapien.scene import EnvScene
 from anysim_sapien.velocities import LinkVelocities
 
@@ -77,12 +77,7 @@ class StateReader:
         scene, poses = self._scenes[env], self._poses(env)
         twists = np.zeros((len(self._world.bodies), 6))
         for body in self._free:
-            # PhysX gives the velocity of the centre of mass; the frame's origin differs by the rate x the arm
-            component = scene.bodies[body]
-            rate = np.asarray(component.angular_velocity, dtype=float)
-            arm = P.rotate(poses[body, 3:], np.asarray(component.cmass_local_pose.p, dtype=float))
-            twists[body, :3] = component.linear_velocity - P.cross(rate, arm)
-            twists[body, 3:] = rate
+            twists[body] = twist_of(scene, body)
         if scene.trees:
             self._velocities.fill(twists, poses, scene.joint_velocities())
         return twists
@@ -105,7 +100,7 @@ class StateReader:
     def contact_force(self) -> Array:
         force = self._contact.copy()
         for env in np.flatnonzero(~self._held_contact):
-            force[env] = sensor_forces(self._world, self._scenes[env])
+            force[env] = sensor_forces(self._world, self._scenes[int(env)])
         return force
 
     def fault(self) -> Array:
