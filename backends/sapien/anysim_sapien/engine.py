@@ -1,0 +1,233 @@
+"""SAPIEN as a SimEngine: one scene per env, stepped one after the other on the CPU."""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.engine.base import SimEngine
+from anysim.engine.cameras import CameraView
+from anysim.engine.capability import Capabilities
+from anysim.engine.commands import Control
+from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
+from anysim.world.model import World
+from anysim_sapien import declared
+from anysim_sapien.audit import geom_volumes, joint_limits
+from anysim_sapien.carry import Carried, shared
+from anysim_sapien.contacts import contact_points
+from anysim_sapien.drives import Drives
+from anysim_sapien.motion import Motion, motion_of, put_motion, put_twist, twist_of
+from anysim_sapien.options import SapienOptions
+from anysim_sapien.parameters import Parameters
+from anysim_sapien.rays import cast
+from anysim_sapien.recipe import Recipe
+from anysim_sapien.scene import EnvScene
+from anysim_sapien.shapes import to_pose
+from anysim_sapien.state import StateReader
+
+_BUILT = ("_recipe", "_layout", "_drives", "_parameters", "_reader", "_fields", "_wrench", "_scenes")
+"""What `_build` makes and `_free` lets go of."""
+
+
+class SapienEngine(SimEngine):
+    """The engine `sapien`. Trajectories do not depend on the number of envs or their order."""
+
+    name: ClassVar[str] = "sapien"
+    capabilities: ClassVar[Capabilities] = declared.CAPABILITIES
+    parameters: ClassVar[frozenset[str]] = Parameters.NAMES
+    options: SapienOptions
+
+    @classmethod
+    def availability(cls) -> Availability:
+        """By the installed version alone; imports nothing."""
+        return declared.availability()
+
+    @classmethod
+    def options_model(cls) -> type[SapienOptions]:
+        """The engine's options."""
+        return SapienOptions
+
+    @property
+    def version(self) -> str:
+        """SAPIEN's version, with the options that shape trajectories where they are not the defaults."""
+        stamp = self.options.trajectory_stamp()
+        return f"{declared.installed_version()} ({stamp})" if stamp else declared.installed_version()
+
+    # ------------------------------------------------------------------ lifecycle
+
+    def _build(self, world: World, num_envs: int) -> None:
+        self._recipe = Recipe(world, self.options)
+        self._layout = self._recipe.layout
+        self._scenes: list[EnvScene] = []
+        self._drives = Drives(world, num_envs)
+        self._parameters = Parameters(world, self._layout, self._drives, self._scenes, self._rebuild_env, num_envs)
+        for env in range(num_envs):
+            self._scenes.append(EnvScene(self._recipe, self._parameters.values(env)))
+        self._reader = StateReader(world, self._scenes, self._drives)
+        self._fields = self._reader.fields
+        self._wrench: Array | None = None
+        self._painter: Any = None
+
+    def _free(self) -> None:
+        painter = vars(self).pop("_painter", None)
+        if painter is not None:
+            painter.close()
+        for name in _BUILT:
+            vars(self).pop(name, None)
+
+    def _reset(self, ids: Array) -> None:
+        for env in ids:
+            self._renew(int(env))
+            self._reader.hold_contact(int(env), 0.0)
+            self._reader.written(int(env))
+            self._drives.effort[env] = 0.0
+
+    def _renew(self, env: int) -> None:
+        """A new scene for an env, in the initial state: a used one would remember contacts."""
+        self._scenes[env] = EnvScene(self._recipe, self._parameters.values(env))
+        self._drives.forget(env)
+
+    def _rebuild_env(self, env: int) -> None:
+        """A new scene for an env, in its present state."""
+        self._reader.keep_contact(env)
+        motion = motion_of(self._scenes[env], self._layout)
+        self._renew(env)
+        put_motion(self._scenes[env], self._layout, motion)
+        self._reader.written(env)
+
+    # ------------------------------------------------------------------ stepping
+
+    def _step(self, n_steps: int, ids: Array | None) -> None:
+        for env in range(self.num_envs) if ids is None else ids:
+            self._step_env(int(env), n_steps)
+
+    def _step_env(self, env: int, n_steps: int) -> None:
+        scene, system = self._scenes[env], self._scenes[env].system
+        driven = bool(scene.joints)
+        pushes = self._pushes(env, scene)
+        for _ in range(n_steps):
+            if driven:
+                self._drives.substep(env, scene)
+            for component, force, torque in pushes:
+                component.add_force_torque(force, torque)
+            system.step()
+        if driven:
+            self._drives.note(env, scene)
+        self._reader.stepped(env)
+
+    def _pushes(self, env: int, scene: EnvScene) -> list[tuple[Any, Array, Array]]:
+        """The wrenches of an env that act on bodies that can move."""
+        if self._wrench is None:
+            return []
+        rows = self._wrench[env]
+        pushed = np.flatnonzero(rows.any(axis=1) & ~self._layout.fixed)
+        return [(scene.bodies[body], rows[body, :3], rows[body, 3:]) for body in pushed]
+
+    def _read(self, name: str) -> Array:
+        return self._fields[name]()
+
+    def _apply_control(self, control: Control) -> None:
+        self._drives.apply(control)
+
+    def _apply_wrench(self, wrench: Array | None) -> None:
+        self._wrench = wrench
+
+    # ------------------------------------------------------------------ writing
+
+    def _write_joints(self, ids: Array, joints: Array, position: Array | None, velocity: Array | None) -> None:
+        for row, env in enumerate(ids):
+            scene = self._scenes[env]
+            full_position = full_velocity = None
+            if position is not None:
+                full_position = scene.joint_positions()
+                full_position[joints] = position[row]
+            if velocity is not None:
+                full_velocity = scene.joint_velocities()
+                full_velocity[joints] = velocity[row]
+            scene.place_joints(full_position, full_velocity)
+            self._reader.written(int(env))
+
+    def _write_bodies(self, ids: Array, bodies: Array, pose: Array | None, twist: Array | None) -> None:
+        for row, env in enumerate(ids):
+            scene = self._scenes[env]
+            for column, body in enumerate(bodies):
+                kept = None if twist is None else twist[row, column]
+                if pose is not None:
+                    if kept is None and self._layout.free[body]:
+                        kept = twist_of(scene, int(body))
+                    scene.entities[body].set_pose(to_pose(pose[row, column]))
+                if kept is not None:
+                    put_twist(scene, self._layout, int(body), kept)
+            self._reader.written(int(env))
+
+    # ------------------------------------------------------------------ parameters and snapshots
+
+    def _get_parameter(self, name: str) -> Array:
+        return self._parameters.get(name)
+
+    def _set_parameter(self, name: str, values: Array, ids: Array, indices: Array) -> None:
+        self._parameters.set(name, values, ids, indices)
+
+    def _default_parameter(self, name: str) -> Array:
+        return self._parameters.default(name)
+
+    def _snapshot(self, ids: Array, level: SnapshotLevel) -> dict[str, Array]:
+        parts = [motion_of(self._scenes[env], self._layout) for env in ids]
+        data = {name: np.stack([getattr(part, name) for part in parts]) for name in Motion._fields}
+        return data | {"effort": self._drives.effort[ids], "contact": self._reader.contact_force()[ids]}
+
+    def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:
+        for row, env in enumerate(ids):
+            self._renew(int(env))
+            put_motion(self._scenes[env], self._layout, Motion(*(data[name][row] for name in Motion._fields)))
+            self._reader.written(int(env))
+            self._reader.hold_contact(int(env), data["contact"][row])
+            self._drives.effort[env] = data["effort"][row]
+
+    def _carry_rows(self) -> Any:
+        reader = self._reader
+        return Carried(reader.body_pose(), reader.body_twist(), reader.joint_effort(), reader.contact_force())
+
+    def _take_rows(self, carried: Any, old: World) -> None:
+        new = self.world
+        before, after = shared(old.bodies, new.bodies)
+        joints_before, joints_after = shared(old.joints, new.joints)
+        sensors_before, sensors_after = shared(old.contact_sensors, new.contact_sensors)
+        for env in range(self.num_envs):
+            self._reader.hold_motion(env, after, carried.pose[env, before], carried.twist[env, before])
+            self._drives.effort[env, joints_after] = carried.effort[env, joints_before]
+            contact = np.zeros((len(new.contact_sensors), 3))
+            contact[sensors_after] = carried.contact[env, sensors_before]
+            self._reader.hold_contact(env, contact)
+
+    def read_back(self) -> Mapping[str, Array]:
+        """Limits and volumes as PhysX has them."""
+        with self._lock:
+            self._require_world()
+            return {
+                "joint.limits": joint_limits(self._scenes[0]),
+                "geom.volume": geom_volumes(self.world, self._scenes[0]),
+            }
+
+    # ------------------------------------------------------------------ sensing
+
+    def renderer_name(self) -> str:
+        """The Vulkan device, such as `SwiftShader Device (Subzero)`."""
+        from anysim_sapien.vulkan import open_device
+
+        return open_device(self.options.vulkan_icd).name
+
+    def _raycast(self, origins: Array, directions: Array, ids: Array) -> RayHits:
+        return cast(self._scenes, self._layout, origins, directions, ids)
+
+    def _contacts(self, ids: Array) -> ContactPoints:
+        return contact_points(self.world, self._scenes, ids)
+
+    def _render(self, view: CameraView, ids: Array, channels: tuple[str, ...]) -> dict[str, Array]:
+        from anysim_sapien.render import Painter
+
+        if self._painter is None:
+            self._painter = Painter(self.world, self._layout, self.options)
+        state = self.get_state()
+        return self._painter.draw(view, state.body_pose[ids], self._parameters.get("geom.color")[ids], channels)

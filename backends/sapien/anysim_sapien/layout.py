@@ -1,0 +1,58 @@
+"""Where the things of a World go in SAPIEN: articulations, single bodies, and indices made once at build."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from anysim.conventions import WORLD, Array
+from anysim.world.model import BodyKind, World
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Indices into the World's lists.
+
+    A body with links below it is the root of an articulation; other free and static bodies are actors of their own.
+    """
+
+    trees: tuple[tuple[int, ...], ...]
+    """Per articulation its bodies, the root first, parents before children."""
+    actors: tuple[int, ...]
+    """Bodies that are no part of an articulation."""
+    tree_of: Array
+    """(B,) articulation of each body, -1 for actors."""
+    fixed: Array
+    """(B,) bool: bodies that nothing moves."""
+    free: Array
+    """(B,) bool."""
+    geom_fixed: Array
+    """(G,) bool: geoms of the world and of static bodies."""
+    geom_entity: Array
+    """(G,) segmentation id."""
+    body_entity: Array
+    """(B + 1,) segmentation id; the last is the world's."""
+
+    @classmethod
+    def of(cls, world: World) -> "Layout":
+        """Sort the World's bodies."""
+        root = list(range(len(world.bodies)))
+        for i, body in enumerate(world.bodies):
+            if body.kind is BodyKind.LINK:
+                root[i] = root[body.parent]
+        trees = {r: tuple(i for i, other in enumerate(root) if other == r) for r in dict.fromkeys(root)}
+        articulated = [members for members in trees.values() if len(members) > 1]
+        tree_of = np.full(len(world.bodies), -1)
+        for number, members in enumerate(articulated):
+            tree_of[list(members)] = number
+        fixed = np.array([b.kind is BodyKind.STATIC for b in world.bodies], dtype=bool)
+        entity = np.array([*world.body_entity, -1]) + 1
+        return cls(
+            trees=tuple(articulated),
+            actors=tuple(r for r, members in trees.items() if len(members) == 1),
+            tree_of=tree_of,
+            fixed=fixed,
+            free=np.array([b.kind is BodyKind.FREE for b in world.bodies], dtype=bool),
+            geom_fixed=np.array([g.body == WORLD or fixed[g.body] for g in world.geoms], dtype=bool),
+            geom_entity=entity[[g.body for g in world.geoms]] if world.geoms else np.zeros(0, dtype=int),
+            body_entity=entity,
+        )

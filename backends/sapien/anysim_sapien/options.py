@@ -1,0 +1,44 @@
+"""What can be chosen about SAPIEN and means nothing to another engine."""
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class SapienOptions(BaseModel):
+    """Options of the engine `sapien`, as in `engine: {name: sapien, options: {position_iterations: 30}}`."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    position_iterations: int = Field(default=15, ge=1, le=255, description="iterations of the constraint solver")
+    velocity_iterations: int = Field(default=1, ge=0, le=255, description="further iterations on velocities alone")
+    contact_offset: float = Field(
+        default=0.005, gt=0, description="distance at which contacts are prepared [m]; forces act from touch on"
+    )
+    bounce_threshold: float = Field(
+        default=0.02, ge=0, description="approach speed below which contacts do not bounce [m/s]"
+    )
+    depenetration_velocity: float = Field(
+        default=5.0, gt=0, description="highest speed at which bodies that overlap are pushed apart [m/s]"
+    )
+    vulkan_icd: str = Field(
+        default="auto",
+        description="Vulkan driver that draws: auto (what the environment says, a system driver, else Chromium's "
+        "software driver), none, or the path of a driver's JSON file",
+    )
+    shader: Literal["auto", "trivial", "default"] = Field(
+        default="auto",
+        description="trivial: flat colours, fast in software; default: lights, half a minute to the first image "
+        "without a graphics card; auto: trivial in software, else default",
+    )
+
+    def trajectory_stamp(self) -> str:
+        """The options that change trajectories, where they differ from the defaults; else an empty string."""
+        defaults = type(self)()
+        drawing = ("vulkan_icd", "shader")
+        changed = [
+            f"{name}={getattr(self, name)}"
+            for name in type(self).model_fields
+            if name not in drawing and getattr(self, name) != getattr(defaults, name)
+        ]
+        return ",".join(changed)

@@ -1,0 +1,257 @@
+"""One env: a sapien.Scene of its own with everything in it, built natively from the World.
+
+A scene is thrown away and built again where PhysX would remember something: at a reset, when a snapshot comes back,
+and for parameters that PhysX reads once. Nothing here knows of rendering, so no graphics device is needed.
+"""
+
+import threading
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from anysim.conventions import WORLD, Array, wxyz_from_xyzw
+from anysim.world.model import BodyKind, JointType
+from anysim_sapien.exclusions import Group
+from anysim_sapien.library import physx, sapien
+from anysim_sapien.recipe import Recipe, Values, tendon_chain
+from anysim_sapien.shapes import make_shape
+
+FAST = 1e9
+"""Stands for no limit where PhysX has a highest speed: 100 m/s and 50 rad/s by default."""
+
+STICKING = 1e6
+"""Damping of a dry joint [N m s/rad]: what it may exert is bounded by the friction, so it only has to be large."""
+
+COUPLING = 1e6
+"""Stiffness of a mimic joint's tendon [N m/rad or N/m], taken implicitly."""
+
+UNBOUNDED = 3.4e38
+
+_FROM_PACKED = np.array([4, 5, 6, 1, 2, 3, 0])
+"""Columns of SAPIEN's packed poses, which are a quaternion wxyz and then the position, in our order."""
+
+_configuring = threading.Lock()
+"""PhysX takes the configuration of a scene from a global, at the moment the scene is made."""
+
+
+class Tree(NamedTuple):
+    """An articulation: its handle, its bodies, and its joints in the order of PhysX' degrees of freedom."""
+
+    handle: Any
+    bodies: tuple[int, ...]
+    joints: Array
+
+
+class EnvScene:
+    """A scene, and its parts in the World's order."""
+
+    def __init__(self, recipe: Recipe, values: Values) -> None:
+        world = recipe.world
+        self._recipe, self._values = recipe, values
+        self.system = _system(recipe, values.gravity)
+        self.scene: Any = sapien.Scene([self.system])
+        self.bodies: list[Any] = [None] * len(world.bodies)
+        self.entities: list[Any] = [None] * len(world.bodies)
+        self.shapes: list[list[Any]] = [[] for _ in world.geoms]
+        self.dry: dict[int, Any] = {}
+        self.copies = recipe.copies(values.geom_friction)
+        """What the shapes of each geom that collides must be."""
+        self.body_of: dict[Any, int] = {}
+        """World body of each PhysX component, -1 for the world's own geoms."""
+        if WORLD in recipe.geoms_on:
+            self._enter(WORLD, physx.PhysxRigidStaticComponent(), sapien.Pose())
+        for body in recipe.layout.actors:
+            self._actor(body)
+        self.trees = [self._tree(members) for members in recipe.layout.trees]
+        self.joints = self._joints()
+        for index in np.flatnonzero(values.joint_friction > 0):
+            self.set_dry(int(index), float(values.joint_friction[index]))
+        self.place_joints(recipe.initial, np.zeros(len(world.joints)))
+        order = {entity: row for row, entity in enumerate(self.scene.entities)}
+        self._rows = np.array([order[entity] for entity in self.entities], dtype=int)
+
+    # ------------------------------------------------------------------ building
+
+    def _enter(self, body: int, component: Any, pose: Any) -> None:
+        """Give a component its shapes and put it into the scene."""
+        recipe = self._recipe
+        for index in recipe.geoms_on.get(body, ()):
+            for copy in self.copies[index]:
+                shape = make_shape(
+                    recipe.world, recipe.world.geoms[index], copy, recipe.groups.get(body, Group()), recipe.options
+                )
+                component.attach(shape)
+                self.shapes[index].append(shape)
+        entity = sapien.Entity()
+        entity.add_component(component)
+        entity.set_pose(pose)
+        self.body_of[component] = body
+        if body == WORLD:
+            self._ground = component
+        else:
+            self.bodies[body], self.entities[body] = component, entity
+            if not isinstance(component, physx.PhysxRigidStaticComponent):
+                self.set_inertial(body, self._values.mass[body], self._values.com[body], self._values.inertia[body])
+                self._free_of_defaults(component, recipe.world.bodies[body].gravity_compensation)
+        self.scene.add_entity(entity)
+
+    def _actor(self, body: int) -> None:
+        recipe, options = self._recipe, self._recipe.options
+        if recipe.world.bodies[body].kind is BodyKind.STATIC:
+            self._enter(body, physx.PhysxRigidStaticComponent(), recipe.root_pose[body])
+            return
+        component = physx.PhysxRigidDynamicComponent()
+        component.set_sleep_threshold(0.0)
+        component.set_solver_position_iterations(options.position_iterations)
+        component.set_solver_velocity_iterations(options.velocity_iterations)
+        self._enter(body, component, recipe.root_pose[body])
+
+    def _free_of_defaults(self, component: Any, weightless: bool) -> None:
+        component.set_linear_damping(0.0)
+        component.set_angular_damping(0.0)
+        component.set_max_linear_velocity(FAST)
+        component.set_max_angular_velocity(FAST)
+        component.set_max_depenetration_velocity(self._recipe.options.depenetration_velocity)
+        component.set_disable_gravity(weightless)
+
+    def _tree(self, members: tuple[int, ...]) -> Tree:
+        recipe, world = self._recipe, self._recipe.world
+        made: dict[int, Any] = {}
+        for body in members:
+            made[body] = physx.PhysxArticulationLinkComponent(made.get(world.bodies[body].parent))
+            joint = made[body].joint
+            if body == members[0]:
+                joint.set_type("fixed" if world.bodies[body].kind is BodyKind.STATIC else "undefined")
+                continue
+            index = world.body_joint[body]
+            spec = world.joints[index]
+            # an unwrapped joint counts its turns; the other kind begins again at half a turn
+            joint.set_type("prismatic" if spec.type is JointType.PRISMATIC else "revolute_unwrapped")
+            in_parent, in_child = recipe.frames[index]
+            joint.set_pose_in_parent(in_parent)
+            joint.set_pose_in_child(in_child)
+            joint.set_limit(np.array([[spec.lower, spec.upper]], dtype=np.float32))
+            joint.set_friction(0.0)
+            joint.set_max_velocity(FAST)
+            joint.set_armature(np.array([self._values.armature[index]], dtype=np.float32))
+            joint.set_drive_properties(0.0, spec.damping, UNBOUNDED, "force")
+            joint.set_drive_velocity_target(0.0)
+            joint.set_name(str(index))
+        handle = made[members[0]].articulation
+        handle.set_sleep_threshold(0.0)
+        handle.set_solver_position_iterations(recipe.options.position_iterations)
+        handle.set_solver_velocity_iterations(recipe.options.velocity_iterations)
+        for body in members:
+            self._enter(body, made[body], recipe.root_pose[members[0]])
+        # PhysX sorts the degrees of freedom in its own way: only names tell
+        order = np.array([int(joint.name) for joint in handle.active_joints], dtype=int)
+        self._tendons(handle, order)
+        return Tree(handle, members, order)
+
+    def _tendons(self, handle: Any, joints: Array) -> None:
+        """Mimic joints: a stiff spring between follower and leader."""
+        world = self._recipe.world
+        for index in sorted(int(j) for j in joints):
+            mimic = world.joints[index].mimic
+            if mimic is not None:
+                chain, coefficients = tendon_chain(world, index)
+                handle.create_fixed_tendon(
+                    [self.bodies[body] for body in chain],
+                    coefficients,
+                    [0.0 if c == 0.0 else 1.0 / c for c in coefficients],
+                    rest_length=mimic.offset, offset=0.0, stiffness=COUPLING, damping=0.0,
+                )  # fmt: skip
+
+    def _joints(self) -> list[Any]:
+        joints: list[Any] = [None] * len(self._recipe.world.joints)
+        for tree in self.trees:
+            for index, joint in zip(tree.joints, tree.handle.active_joints, strict=True):
+                joints[int(index)] = joint
+        return joints
+
+    # ------------------------------------------------------------------ changing
+
+    def set_inertial(self, body: int, mass: float, com: Array, inertia: Array) -> None:
+        """Mass [kg], centre of mass [m] and inertia about it (6,) [kg m^2], in the body's frame."""
+        component = self.bodies[body]
+        if self._recipe.layout.fixed[body]:
+            # the root of a fixed articulation: it cannot move, and PhysX wants positive numbers
+            component.set_mass(max(float(mass), 1e-3))
+            component.set_inertia([1e-3, 1e-3, 1e-3])
+            component.set_cmass_local_pose(sapien.Pose())
+            return
+        moments, frame = self._recipe.principal(body, inertia)
+        component.set_mass(float(mass))
+        component.set_inertia(moments.tolist())
+        component.set_cmass_local_pose(sapien.Pose(com, wxyz_from_xyzw(frame)))
+
+    def set_dry(self, index: int, friction: float) -> None:
+        """Dry friction [N m] or [N] of a joint: a drive to standstill that may exert this much and no more."""
+        world = self._recipe.world
+        spec = world.joints[index]
+        drive = self.dry.get(index)
+        if drive is None:
+            if friction == 0.0:
+                return
+            drive = physx.PhysxDriveComponent(self.bodies[spec.body])
+            drive.set_parent(self.bodies[world.bodies[spec.body].parent])
+            in_parent, in_child = self._recipe.frames[index]
+            drive.set_pose_in_parent(in_parent)
+            drive.set_pose_in_child(in_child)
+            self.entities[spec.body].add_component(drive)
+            self.dry[index] = drive
+        # PhysX bounds the impulse of these drives, not the force
+        bound = friction * world.physics.dt
+        if spec.type is JointType.PRISMATIC:
+            drive.set_drive_property_x(0.0, STICKING, bound, "force")
+        else:
+            drive.set_drive_property_twist(0.0, STICKING, bound, "force")
+
+    def dry_friction(self, index: int) -> float:
+        """The dry friction [N m] or [N] that a joint has."""
+        drive = self.dry.get(index)
+        if drive is None:
+            return 0.0
+        sliding = self._recipe.world.joints[index].type is JointType.PRISMATIC
+        properties = drive.get_drive_property_x() if sliding else drive.get_drive_property_twist()
+        return float(properties[2]) / self._recipe.world.physics.dt
+
+    def place_joints(self, position: Array | None, velocity: Array | None) -> None:
+        """Write all joint positions and velocities (J,)."""
+        for tree in self.trees:
+            if position is not None:
+                tree.handle.set_qpos(position[tree.joints].astype(np.float32))
+            if velocity is not None:
+                tree.handle.set_qvel(velocity[tree.joints].astype(np.float32))
+
+    def poses(self) -> Array:
+        """Poses (B, 7) of the bodies' frames, xyzw, float64."""
+        rows = np.frombuffer(self.scene.pack_poses(), dtype=np.float32).reshape(-1, 7)
+        return rows[self._rows[:, None], _FROM_PACKED].astype(float)
+
+    def joint_positions(self) -> Array:
+        """(J,) float64."""
+        return self._gather("get_qpos")
+
+    def joint_velocities(self) -> Array:
+        """(J,) float64."""
+        return self._gather("get_qvel")
+
+    def _gather(self, name: str) -> Array:
+        values = np.zeros(len(self.joints))
+        for tree in self.trees:
+            values[tree.joints] = getattr(tree.handle, name)()
+        return values
+
+
+def _system(recipe: Recipe, gravity: Array) -> Any:
+    options = recipe.options
+    with _configuring:
+        physx.set_scene_config(
+            gravity=np.asarray(gravity, dtype=np.float32), bounce_threshold=options.bounce_threshold, enable_pcm=True,
+            enable_tgs=False, enable_ccd=False, enable_enhanced_determinism=True,
+            enable_friction_every_iteration=True, cpu_workers=0,
+        )  # fmt: skip
+        system = physx.PhysxCpuSystem()
+    system.set_timestep(recipe.world.physics.dt)
+    return system

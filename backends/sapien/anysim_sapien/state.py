@@ -1,0 +1,111 @@
+"""Reads of the neutral state from the scenes of all envs, and what is held where a scene was rebuilt or written."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.engine.state import FIELDS
+from anysim.world.model import BodyKind, World
+from anysim_sapien.contacts import sensor_forces
+from anysim_sapien.drives import Drives
+from anysim_sapien.motion import twist_of
+from anysim_sapien.scene import EnvScene
+from anysim_sapien.velocities import LinkVelocities
+
+
+class StateReader:
+    """What the last substep left behind, per env.
+
+    Twists of links are made from joint velocities and the links' poses: PhysX' own belong to the poses before the step.
+
+    Contact forces belong to the last substep: writing a state does not change them, a reset makes them zero. A scene
+    that was built anew has none, so theirs are kept here. Poses and twists are PhysX' own, but after live editing:
+    putting joint positions back moves a link by a rounding error, so those that were read before are kept as well.
+    """
+
+    def __init__(self, world: World, scenes: Sequence[EnvScene], drives: Drives) -> None:
+        n, bodies = len(scenes), len(world.bodies)
+        self._world, self._scenes, self._drives = world, scenes, drives
+        self._free = [i for i, b in enumerate(world.bodies) if b.kind is BodyKind.FREE]
+        self._velocities = LinkVelocities(world)
+        self._held_contact = np.ones(n, dtype=bool)
+        self._contact = np.zeros((n, len(world.contact_sensors), 3))
+        self._held_motion = np.zeros(n, dtype=bool)
+        self._motion = np.zeros((n, bodies, 13))
+        self.fields: Mapping[str, Callable[[], Array]] = {name: getattr(self, name) for name in FIELDS}
+        """Reads a fresh array of one of the neutral fields."""
+
+    # ------------------------------------------------------------------ what is held
+
+    def stepped(self, env: int) -> None:
+        """Everything of this env is new."""
+        self._held_contact[env] = self._held_motion[env] = False
+
+    def written(self, env: int) -> None:
+        """The env's state was written; its contact forces stay those of the last substep."""
+        self._held_motion[env] = False
+
+    def keep_contact(self, env: int) -> None:
+        """The env's scene is about to be built anew: note its contact forces."""
+        if not self._held_contact[env]:
+            self.hold_contact(env, sensor_forces(self._world, self._scenes[env]))
+
+    def hold_contact(self, env: int, force: Array | float) -> None:
+        """Make these the contact forces (S, 3) of the last substep."""
+        self._held_contact[env] = True
+        self._contact[env] = force
+
+    def hold_motion(self, env: int, bodies: Array, pose: Array, twist: Array) -> None:
+        """Make these the poses (K, 7) and twists (K, 6) of bodies, until the env moves on."""
+        self._motion[env, :, :7], self._motion[env, :, 7:] = self._poses(env), self._twists(env)
+        self._motion[env, bodies, :7], self._motion[env, bodies, 7:] = pose, twist
+        self._held_motion[env] = True
+
+    # ------------------------------------------------------------------ fields
+
+    def _poses(self, env: int) -> Array:
+        return self._scenes[env].poses()
+
+    def body_pose(self) -> Array:
+        poses = np.stack([self._poses(env) for env in range(len(self._scenes))])
+        if self._held_motion.any():
+            poses[self._held_motion] = self._motion[self._held_motion, :, :7]
+        return poses
+
+    def _twists(self, env: int) -> Array:
+        scene, poses = self._scenes[env], self._poses(env)
+        twists = np.zeros((len(self._world.bodies), 6))
+        for body in self._free:
+            twists[body] = twist_of(scene, body)
+        if scene.trees:
+            self._velocities.fill(twists, poses, scene.joint_velocities())
+        return twists
+
+    def body_twist(self) -> Array:
+        twists = np.stack([self._twists(env) for env in range(len(self._scenes))])
+        if self._held_motion.any():
+            twists[self._held_motion] = self._motion[self._held_motion, :, 7:]
+        return twists
+
+    def joint_pos(self) -> Array:
+        return np.stack([scene.joint_positions() for scene in self._scenes])
+
+    def joint_vel(self) -> Array:
+        return np.stack([scene.joint_velocities() for scene in self._scenes])
+
+    def joint_effort(self) -> Array:
+        return self._drives.effort.copy()
+
+    def contact_force(self) -> Array:
+        force = self._contact.copy()
+        for env in np.flatnonzero(~self._held_contact):
+            force[env] = sensor_forces(self._world, self._scenes[int(env)])
+        return force
+
+    def fault(self) -> Array:
+        return np.array([not self._finite(scene) for scene in self._scenes], dtype=bool)
+
+    def _finite(self, scene: EnvScene) -> bool:
+        packed = np.frombuffer(scene.system.pack(), dtype=np.float32)
+        return bool(np.isfinite(packed).all() and np.isfinite(scene.poses()).all())

@@ -1,0 +1,114 @@
+"""Physics needs no graphics device; drawing finds one, or says what to do."""
+
+import os
+import subprocess
+import sys
+import textwrap
+
+import numpy as np
+import pytest
+
+from anysim.errors import EngineError
+from anysim.testing import worlds
+from anysim_sapien import vulkan
+
+NOTHING = "/no/such/driver.json"
+
+
+def run(code, **env):
+    """A program in a process without any Vulkan driver."""
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-c", textwrap.dedent(code)], env={**os.environ, **env}, text=True,
+        capture_output=True, timeout=120, check=False,
+    )  # fmt: skip
+
+
+def test_physics_without_a_vulkan_device():
+    """A world with visible geoms and cameras runs, drawing is an EngineError with a remedy, and the process lives on.
+
+    With render objects in the physics scene SAPIEN would raise at the build, or end the process.
+    """
+    code = """
+        from anysim.engine.factory import create_simulation
+        from anysim.errors import EngineError
+        from anysim.testing import worlds
+        engine = create_simulation("sapien").create_world(worlds.scene(cameras=True), 2)
+        engine.step(20)
+        for _ in range(2):
+            try:
+                engine.render("front")
+            except EngineError as error:
+                print(error)
+        engine.reset()
+        engine.step(5)
+        engine.destroy()
+        print("alive")
+    """
+    done = run(code, VK_ICD_FILENAMES=NOTHING, VK_DRIVER_FILES=NOTHING)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("SAPIEN cannot draw here") == 2
+    assert "apt-get install chromium" in done.stdout
+    assert done.stdout.rstrip().endswith("alive")
+
+
+def test_physics_does_not_touch_rendering(make, monkeypatch):
+    """Nothing of `sapien.render` is made until an image is asked for."""
+    from anysim_sapien.library import sapien
+
+    def refuse(*_, **__):
+        raise AssertionError("physics made a render object")
+
+    for name in ("RenderSystem", "RenderMaterial", "RenderBodyComponent"):
+        monkeypatch.setattr(sapien.render, name, refuse)
+    engine = make(worlds.scene(cameras=True))
+    engine.step(3)
+    engine.reset()
+
+
+def test_the_driver_that_is_chosen(monkeypatch, tmp_path):
+    """The environment's driver, else the system's, else Chromium's; an option names another, or none."""
+    system, software = tmp_path / "icd.d", tmp_path / "swiftshader.json"
+    system.mkdir()
+    for name in vulkan.VARIABLES:
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(vulkan, "SYSTEM", (str(system),))
+    monkeypatch.setattr(vulkan, "SOFTWARE", (str(tmp_path / "missing.json"), str(software)))
+    assert vulkan.driver_file("auto") == ""
+    software.write_text("{}")
+    assert vulkan.driver_file("auto") == str(software)
+    assert vulkan.driver_file(str(software)) == str(software)
+    (system / "card.json").write_text("{}")
+    assert vulkan.driver_file("auto") == ""
+    (system / "card.json").unlink()
+    monkeypatch.setenv("VK_DRIVER_FILES", "mine.json")
+    assert vulkan.driver_file("auto") == ""
+    with pytest.raises(EngineError, match="vulkan_icd=none"):
+        vulkan.driver_file("none")
+    with pytest.raises(EngineError, match="no Vulkan driver file"):
+        vulkan.driver_file(NOTHING)
+
+
+def test_drawing_leaves_the_environment_alone(make):
+    """The driver's name is in the environment only while it is loaded."""
+    before = dict(os.environ)
+    engine = make(worlds.scene(cameras=True))
+    try:
+        engine.render("front")
+    except EngineError as error:
+        pytest.skip(f"no image can be drawn here: {error}")
+    assert dict(os.environ) == before
+
+
+def test_one_scene_draws_all_envs(make):
+    """Envs in different states and colours look different, in any order."""
+    engine = make(worlds.scene(cameras=True), 2)
+    box = engine.index.body("box")
+    engine.set_body_state(pose=[0.8, 0.0, 0.5, 0.0, 0.0, 0.0, 1.0], env_ids=[1], bodies=[box])
+    try:
+        both = engine.render("front", channels=("rgb", "segmentation"))
+    except EngineError as error:
+        pytest.skip(f"no image can be drawn here: {error}")
+    assert not np.array_equal(both["segmentation"][0], both["segmentation"][1])
+    swapped = engine.render("front", env_ids=[1, 0], channels=("rgb", "segmentation"))
+    assert np.array_equal(swapped["rgb"], both["rgb"][::-1])
+    assert np.array_equal(swapped["segmentation"], both["segmentation"][::-1])
