@@ -27,6 +27,8 @@ KINDS: Mapping[str, str] = {
 
 INSTALL_HINTS: Mapping[tuple[str, str], str] = {
     ("engines", "mujoco"): "anysim-mujoco",
+    ("engines", "pybullet"): "anysim-pybullet",
+    ("engines", "sapien"): "anysim-sapien",
     ("writers", "mcap"): "anysim-mcap",
     ("readers", "mcap"): "anysim-mcap",
     ("planners", "numba_ik"): "anysim-ik",
