@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from anysim import registry
 from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.runner import SkillPolicy
 from anysim.task.contract import Status
@@ -22,10 +23,13 @@ def rollout(env: TaskEnv, policy: SkillPolicy, steps: int) -> list[str]:
     return env.status.tolist()
 
 
-def test_it_lifts_the_cube_to_the_goal_in_every_env() -> None:
-    with arm(4, engine="mujoco") as env:
+@pytest.mark.parametrize("engine", ["mujoco", "pybullet", "sapien"])
+def test_it_lifts_the_cube_to_the_goal_in_every_env_on_every_engine(engine: str) -> None:
+    if engine not in registry.names("engines"):
+        pytest.skip(f"{engine} is not installed")
+    with arm(3, engine=engine) as env:
         env.reset(seed=1)
-        assert rollout(env, SkillPolicy(env), 400) == [Status.SUCCESS] * 4
+        assert rollout(env, SkillPolicy(env), 400) == [Status.SUCCESS] * 3
         cube = env.engine.get_state().body_pose[:, env.engine.index.body("cube"), :3]
         assert (np.linalg.norm(cube - env.scene.goals["goal"][:, :3], axis=1) <= 0.025).all()
 
