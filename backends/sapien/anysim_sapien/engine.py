@@ -17,7 +17,7 @@ from anysim_sapien.audit import geom_volumes, joint_limits
 from anysim_sapien.carry import Carried, shared
 from anysim_sapien.contacts import contact_points
 from anysim_sapien.drives import Drives
-from anysim_sapien.motion import Motion, motion_of, put_motion, put_twist, twist_of
+from anysim_sapien.motion import Motion, motion_of, put_motion, put_twist, twists_of
 from anysim_sapien.options import SapienOptions
 from anysim_sapien.parameters import Parameters
 from anysim_sapien.rays import cast
@@ -151,14 +151,21 @@ class SapienEngine(SimEngine):
     def _write_bodies(self, ids: Array, bodies: Array, pose: Array | None, twist: Array | None) -> None:
         for row, env in enumerate(ids):
             scene = self._scenes[env]
-            for column, body in enumerate(bodies):
-                kept = None if twist is None else twist[row, column]
-                if pose is not None:
-                    if kept is None and self._layout.free[body]:
-                        kept = twist_of(scene, int(body))
-                    scene.entities[body].set_pose(to_pose(pose[row, column]))
-                if kept is not None:
-                    put_twist(scene, self._layout, int(body), kept)
+            turn = scene.poses()[bodies, 3:]
+            moved = self._layout.free[bodies]
+            rows = None if twist is None else twist[row]
+            if pose is not None:
+                if rows is None:
+                    # the origin keeps its velocity; PhysX would keep that of the centre of mass
+                    rows = np.zeros((len(bodies), 6))
+                    if moved.any():
+                        rows[moved] = twists_of(scene, bodies[moved].tolist(), turn[moved])
+                for body, place in zip(bodies, pose[row], strict=True):
+                    scene.entities[body].set_pose(to_pose(place))
+                turn = scene.poses()[bodies, 3:]
+            if rows is not None:
+                for column in np.flatnonzero(moved):
+                    put_twist(scene, self._layout, int(bodies[column]), rows[column], turn[column])
             self._reader.written(int(env))
 
     # ------------------------------------------------------------------ parameters and snapshots

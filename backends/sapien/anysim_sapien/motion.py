@@ -1,10 +1,11 @@
 """Poses and velocities of root bodies and joints, in and out of a scene."""
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from anysim.conventions import Array, xyzw_from_wxyz
+from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim_sapien.layout import Layout
 from anysim_sapien.scene import EnvScene
@@ -53,20 +54,23 @@ def _put_velocity(scene: EnvScene, layout: Layout, body: int, linear: Array, rat
         scene.bodies[body].set_angular_velocity(rate)
 
 
-def _arm(scene: EnvScene, body: int) -> Array:
-    """From the frame's origin to the centre of mass, in world axes."""
-    turn = xyzw_from_wxyz(np.asarray(scene.entities[body].pose.q, dtype=float))
-    return P.rotate(turn, np.asarray(scene.bodies[body].cmass_local_pose.p, dtype=float))
+def twists_of(scene: EnvScene, bodies: Sequence[int], turn: Array) -> Array:
+    """Velocities of free roots' frame origins and their rates (K, 6), world axes; `turn` (K, 4) is their orientation.
+
+    PhysX gives the velocity of the centre of mass; the origin's differs by the rate x the arm.
+    """
+    components = [scene.bodies[body] for body in bodies]
+    linear = np.array([component.linear_velocity for component in components], dtype=float)
+    rate = np.array([component.angular_velocity for component in components], dtype=float)
+    return np.concatenate([linear - P.cross(rate, _arms(components, turn)), rate], axis=1)
 
 
-def twist_of(scene: EnvScene, body: int) -> Array:
-    """Velocity of a root's frame origin and its rate (6,), world axes."""
-    component = scene.bodies[body]
-    rate = np.asarray(component.angular_velocity, dtype=float)
-    linear = np.asarray(component.linear_velocity, dtype=float) - P.cross(rate, _arm(scene, body))
-    return np.concatenate([linear, rate])
+def _arms(components: Sequence[Any], turn: Array) -> Array:
+    """From the frames' origins to the centres of mass (K, 3), in world axes."""
+    return P.rotate(turn, np.array([component.cmass_local_pose.p for component in components], dtype=float))
 
 
-def put_twist(scene: EnvScene, layout: Layout, body: int, twist: Array) -> None:
-    """Write what `twist_of` returns."""
-    _put_velocity(scene, layout, body, twist[:3] + P.cross(twist[3:], _arm(scene, body)), twist[3:])
+def put_twist(scene: EnvScene, layout: Layout, body: int, twist: Array, turn: Array) -> None:
+    """Write a root's twist (6,), as `twists_of` returns it, at its orientation (4,)."""
+    arm = _arms([scene.bodies[body]], turn[None])[0]
+    _put_velocity(scene, layout, body, twist[:3] + P.cross(twist[3:], arm), twist[3:])

@@ -9,7 +9,7 @@ from anysim.engine.state import FIELDS
 from anysim.world.model import BodyKind, World
 from anysim_sapien.contacts import sensor_forces
 from anysim_sapien.drives import Drives
-from anysim_sapien.motion import twist_of
+from anysim_sapien.motion import twists_of
 from anysim_sapien.scene import EnvScene
 from anysim_sapien.velocities import LinkVelocities
 
@@ -76,8 +76,8 @@ class StateReader:
     def _twists(self, env: int) -> Array:
         scene, poses = self._scenes[env], self._poses(env)
         twists = np.zeros((len(self._world.bodies), 6))
-        for body in self._free:
-            twists[body] = twist_of(scene, body)
+        if self._free:
+            twists[self._free] = twists_of(scene, self._free, poses[self._free, 3:])
         if scene.trees:
             self._velocities.fill(twists, poses, scene.joint_velocities())
         return twists
