@@ -60,6 +60,19 @@ def test_mujoco_passes(tmp_path):
     assert skipped == 0, why
 
 
+def test_pybullet_passes(tmp_path):
+    try:
+        engine = registry.load("engines", "pybullet")
+    except PluginError as error:
+        pytest.skip(str(error))
+    here = engine.availability()
+    if not here.available:
+        pytest.skip(f"pybullet cannot run here: {'; '.join(here.missing)}")
+    passed, skipped, why = _summary(_run(tmp_path, "--engine", "pybullet"))
+    assert passed > 290
+    assert why == f"parameter body.com: {skipped}"
+
+
 def test_without_an_engine_it_says_how(tmp_path):
     done = _run(tmp_path)
     assert done.returncode == pytest.ExitCode.USAGE_ERROR
