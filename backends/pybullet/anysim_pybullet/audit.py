@@ -16,7 +16,7 @@ def joint_limits(env: Env) -> Array:
         uid = env.body_at[env.plan.world.joints[j].body][0]
         lower, upper = bullet().getJointInfo(uid, link, physicsClientId=env.id)[8:10]
         limits[j] = (lower, upper) if lower <= upper else (-np.inf, np.inf)
-    return np.where(np.abs(limits) >= UNLIMITED, np.sign(limits) * np.inf, limits)
+    return np.where(np.abs(limits) >= UNLIMITED, np.copysign(np.inf, limits), limits)
 
 
 def inertials(env: Env) -> dict[str, Array]:

@@ -95,3 +95,13 @@ def test_an_audit_finds_the_world(build, own):
     assert [line for line in lines if line.ok is False] == []
     for quantity in ("mass", "centre of mass", "principal moments", "limits", "frame"):
         assert any(line.quantity == quantity and line.ok for line in lines), quantity
+
+
+def test_an_audit_of_a_robot_that_does_not_move_its_base(build):
+    """The mass of a fixed base counts; limits at 0 are limits."""
+    from anysim.api import compile_world
+    from anysim.benchmark import panda_and_boxes
+    from anysim.engine.audit import audit
+
+    lines = audit(build(compile_world(panda_and_boxes())))
+    assert [line for line in lines if line.ok is False] == []
