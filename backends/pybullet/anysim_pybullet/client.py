@@ -15,7 +15,7 @@ from anysim_pybullet.options import PybulletOptions
 from anysim_pybullet.quiet import quiet
 from anysim_pybullet.surfaces import PairRules
 from anysim_pybullet.tree import Frames, Tree, frames_of, shapes_of, trees_of
-from anysim_pybullet.urdf import UNLIMITED, body_link, joint_name, shape_link, tree_urdf, world_geom_urdf, write_meshes
+from anysim_pybullet.urdf import body_link, joint_name, shape_link, tree_urdf, world_geom_urdf, write_meshes
 
 STATIC_GROUP, MOVING_GROUP = 2, 1
 MIMIC_FORCE = 1e6
@@ -226,15 +226,6 @@ class Env:
                 gear, gearRatio=-joint.mimic.multiplier, relativePositionTarget=joint.mimic.offset, erp=0.8,
                 maxForce=MIMIC_FORCE, physicsClientId=self.id,
             )  # fmt: skip
-
-    def joint_limits(self) -> Array:
-        """(J, 2) [rad, m] as Bullet enforces them, infinite where it does not."""
-        limits = np.empty((len(self.joint_link), 2))
-        for j, link in enumerate(self.joint_link):
-            uid = self.body_at[self.plan.world.joints[j].body][0]
-            lower, upper = bullet().getJointInfo(uid, link, physicsClientId=self.id)[8:10]
-            limits[j] = (lower, upper) if lower <= upper else (-np.inf, np.inf)
-        return np.where(np.abs(limits) >= UNLIMITED, np.sign(limits) * np.inf, limits)
 
     # ------------------------------------------------------------------ contacts of the past
 

@@ -107,10 +107,13 @@ class PybulletEngine(SimEngine):
         self._envs.take(carried, old)
 
     def read_back(self) -> Mapping[str, Array]:
-        """Joint limits as Bullet has them."""
+        """Joint limits, masses, centres of mass and inertias as Bullet has them."""
+        from anysim_pybullet.audit import inertials, joint_limits
+
         with self._lock:
             self._require_world()
-            return {"joint.limits": self._envs.clients[0].joint_limits()}
+            env = self._envs.clients[0]
+            return {"joint.limits": joint_limits(env), **inertials(env)}
 
     def raw_loop(self) -> Callable[[int], None]:
         """Bullet's own loop, stepped without this engine."""

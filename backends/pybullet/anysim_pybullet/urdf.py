@@ -60,10 +60,10 @@ def tree_urdf(world: World, frames: Frames, tree: Tree, meshes: dict[str, Path])
     lines = [f'<robot name="t{tree.number}">']
     shapes = shapes_of(world, tree.bodies)
     for body in tree.bodies.tolist():
-        static = body == tree.bodies[0] and not tree.free
+        weightless = world.bodies[body].inertial.mass <= 0
         lines += [
             f'<link name="{body_link(body)}">',
-            *([_inertial_of_nothing()] if static else _inertial(world, frames, body)),
+            *([_inertial_of_nothing()] if weightless else _inertial(world, frames, body)),
         ]
         lines += [line for _, geom in shapes[body][:1] for line in _collision(geom, frames.anchor[body], meshes)]
         lines.append("</link>")

@@ -18,6 +18,7 @@ from anysim.world.kinematics import forward_kinematics
 from anysim.world.model import BodyKind, Inertial
 
 CONFIGURATIONS = 20
+INERTIALS = ("body.mass", "body.com", "body.inertia")
 RELATIVE, ABSOLUTE = 1e-5, 1e-8
 """Engines in single precision keep six digits."""
 FRAME_TOLERANCE = 1e-5
@@ -58,14 +59,15 @@ def engine_rows(engine: SimEngine) -> list[AuditRow]:
 
     moving = [i for i, body in enumerate(world.bodies) if body.kind is not BodyKind.STATIC]
     bodies = [world.bodies[i].name for i in moving]
-    if {"body.mass", "body.com", "body.inertia"} <= engine.parameters:
-        mass = engine.get_parameters("body.mass", [0])[0]
+    more = engine.read_back()
+    inertials = {name: more[name] for name in INERTIALS if name in more}
+    for name in engine.parameters.intersection(INERTIALS).difference(inertials):
+        inertials[name] = engine.get_parameters(name, [0])[0]
+    if len(inertials) == len(INERTIALS):
+        mass = inertials["body.mass"]
         add("mass", bodies, mass[moving])
-        add("centre of mass", bodies, engine.get_parameters("body.com", [0])[0, moving])
-        tensors = [
-            inertia.tensor(Inertial(1.0, inertia=tuple(i)))
-            for i in engine.get_parameters("body.inertia", [0])[0, moving]
-        ]
+        add("centre of mass", bodies, inertials["body.com"][moving])
+        tensors = [inertia.tensor(Inertial(1.0, inertia=tuple(i))) for i in inertials["body.inertia"][moving]]
         add("principal moments", bodies, np.array([np.sort(np.linalg.eigvalsh(t)) for t in tensors]).reshape(-1, 3))
         totals = [mass[e.body_start : e.body_stop].sum() for e in world.entities]
         add("total mass", [e.name for e in world.entities], np.array(totals))
@@ -83,7 +85,6 @@ def engine_rows(engine: SimEngine) -> list[AuditRow]:
     geoms = [geom.name for geom in world.geoms]
     if "geom.friction" in engine.parameters:
         add("friction", geoms, engine.get_parameters("geom.friction", [0])[0])
-    more = engine.read_back()
     if "joint.limits" in more:
         add("limits", joints, more["joint.limits"])
     if "geom.volume" in more:

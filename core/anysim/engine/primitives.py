@@ -100,8 +100,9 @@ class Primitives(ABC):
     def read_back(self) -> Mapping[str, Array]:
         """What the engine itself says of env 0, for an audit, beyond its parameters.
 
-        Any of `joint.limits` (J, 2) [rad, m], infinite where there is none, and `geom.volume` (G,) [m^3] of the shapes
-        that collide, 0 for planes and height fields.
+        Any of `joint.limits` (J, 2) [rad, m], infinite where there is none, `geom.volume` (G,) [m^3] of the shapes
+        that collide, 0 for planes and height fields, and `body.mass`, `body.com`, `body.inertia` in the form of the
+        parameters, of an engine that cannot change them all.
         """
         return {}
 

@@ -76,12 +76,13 @@ def compounds(count: int = 5) -> World:
     return s.world()
 
 
-def tower(count: int = 10) -> World:
-    """A stack of boxes that is not quite straight."""
-    s = Sketch("tower")
+def pile(count: int = 24) -> World:
+    """Boxes and balls that fall onto each other."""
+    s, rng = Sketch("pile"), np.random.default_rng(0)
     s.ground()
     for i in range(count):
-        s.free(f"b{i}", Box((0.1, 0.1, 0.1)), (0.03 * (i % 3), 0.02 * (i % 2), 0.1 + 0.201 * i))
+        x, y = (float(v) for v in rng.uniform(-0.15, 0.15, 2))
+        s.free(f"b{i}", Box((0.1, 0.08, 0.06)) if i % 2 else Sphere(0.08), (x, y, 0.2 + 0.2 * i))
     return s.world()
 
 
@@ -101,4 +102,4 @@ def pressed(mass: float = 1.0, armature: float = 0.01, kp: float = 100.0, kd: fl
 @pytest.fixture
 def own() -> SimpleNamespace:
     """The worlds above."""
-    return SimpleNamespace(skew_arm=skew_arm, compounds=compounds, tower=tower, pressed=pressed)
+    return SimpleNamespace(skew_arm=skew_arm, compounds=compounds, pile=pile, pressed=pressed)

@@ -85,3 +85,23 @@ def test_angles_of_a_rotation(pitch):
     wanted = P.from_roll_pitch_yaw(np.array([0.4, pitch, -1.1]))
     got = P.from_roll_pitch_yaw(np.array(roll_pitch_yaw(wanted)))
     assert P.angle_between(wanted, got) < 1e-7
+
+
+def test_an_audit_finds_the_world(build, own):
+    """Masses, centres of mass, moments, limits and frames, as Bullet itself reports them, are the World's."""
+    from anysim.engine.audit import audit
+
+    lines = audit(build(own.skew_arm(free=True)))
+    assert [line for line in lines if line.ok is False] == []
+    for quantity in ("mass", "centre of mass", "principal moments", "limits", "frame"):
+        assert any(line.quantity == quantity and line.ok for line in lines), quantity
+
+
+def test_an_audit_of_a_robot_that_does_not_move_its_base(build):
+    """The mass of a fixed base counts; limits at 0 are limits."""
+    from anysim.api import compile_world
+    from anysim.benchmark import panda_and_boxes
+    from anysim.engine.audit import audit
+
+    lines = audit(build(compile_world(panda_and_boxes())))
+    assert [line for line in lines if line.ok is False] == []

@@ -1,0 +1,32 @@
+"""What Bullet says of an env, for an audit against the World."""
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.math import pose as P
+from anysim_pybullet.bullet import bullet
+from anysim_pybullet.client import Env
+from anysim_pybullet.urdf import UNLIMITED
+
+
+def joint_limits(env: Env) -> Array:
+    """(J, 2) [rad, m] as Bullet enforces them, infinite where it does not."""
+    limits = np.empty((len(env.joint_link), 2))
+    for j, link in enumerate(env.joint_link):
+        uid = env.body_at[env.plan.world.joints[j].body][0]
+        lower, upper = bullet().getJointInfo(uid, link, physicsClientId=env.id)[8:10]
+        limits[j] = (lower, upper) if lower <= upper else (-np.inf, np.inf)
+    return np.where(np.abs(limits) >= UNLIMITED, np.copysign(np.inf, limits), limits)
+
+
+def inertials(env: Env) -> dict[str, Array]:
+    """Masses (B,), centres of mass (B, 3) in the bodies' frames, and inertias (B, 6) in their axes."""
+    count = len(env.body_at)
+    mass, com, inertia = np.zeros(count), np.zeros((count, 3)), np.zeros((count, 6))
+    for i, (uid, link) in enumerate(env.body_at):
+        info = bullet().getDynamicsInfo(uid, link, physicsClientId=env.id)
+        axes = P.to_matrix(np.array(info[4]))
+        tensor = axes @ np.diag(info[2]) @ axes.T
+        mass[i], com[i] = info[0], np.array(info[3]) + env.plan.frames.anchor[i]
+        inertia[i] = tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    return {"body.mass": mass, "body.com": com, "body.inertia": inertia}
