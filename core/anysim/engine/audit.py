@@ -69,7 +69,8 @@ def engine_rows(engine: SimEngine) -> list[AuditRow]:
         add("centre of mass", bodies, inertials["body.com"][moving])
         tensors = [inertia.tensor(Inertial(1.0, inertia=tuple(i))) for i in inertials["body.inertia"][moving]]
         add("principal moments", bodies, np.array([np.sort(np.linalg.eigvalsh(t)) for t in tensors]).reshape(-1, 3))
-        totals = [mass[e.body_start : e.body_stop].sum() for e in world.entities]
+        counted = np.where([body.kind is BodyKind.STATIC for body in world.bodies], 0.0, mass)
+        totals = [counted[e.body_start : e.body_stop].sum() for e in world.entities]
         add("total mass", [e.name for e in world.entities], np.array(totals))
     joints = [joint.name for joint in world.joints]
     for quantity, parameter in (

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from anysim.world import inertia
-from anysim.world.model import HeightFieldShape, Plane, World
+from anysim.world.model import Body, BodyKind, Entity, HeightFieldShape, Plane, World
 
 
 class AuditRow(NamedTuple):
@@ -33,11 +33,11 @@ def world_rows(world: World) -> list[AuditRow]:
     """Masses, principal moments, joint limits and constants, volumes of collision geoms, entity totals."""
     rows: list[AuditRow] = []
     for entity in world.entities:
-        mass = sum(world.bodies[i].inertial.mass for i in range(entity.body_start, entity.body_stop))
+        mass = sum(b.inertial.mass for b in moving_bodies(world, entity))
         rows.append(AuditRow(entity.name, "total mass", (mass,)))
     for body in world.bodies:
-        if body.kind == "static":
-            continue  # engines drop the mass of what cannot move
+        if body.kind is BodyKind.STATIC:
+            continue
         moments = np.sort(np.linalg.eigvalsh(inertia.tensor(body.inertial)))
         rows.append(AuditRow(body.name, "mass", (body.inertial.mass,)))
         rows.append(AuditRow(body.name, "centre of mass", body.inertial.com))
@@ -55,6 +55,11 @@ def world_rows(world: World) -> list[AuditRow]:
             rows.append(AuditRow(geom.name, "volume", (inertia.volume(geom.shape, meshes),)))
             rows.append(AuditRow(geom.name, "friction", (geom.surface.friction,)))
     return rows
+
+
+def moving_bodies(world: World, entity: Entity) -> list[Body]:
+    """The bodies of an entity whose masses count: engines drop the mass of what cannot move."""
+    return [b for b in world.bodies[entity.body_start : entity.body_stop] if b.kind is not BodyKind.STATIC]
 
 
 def differences(
