@@ -9,6 +9,7 @@ from anysim.managers.values import draw
 from anysim.math import pose as P
 from anysim.world.geometry import EntityShape, ground_top
 from anysim.world.model import BodyKind, World
+from anysim.world.placement import placement_order
 from anysim_schemas.layout import PlacementSpec
 
 ATTEMPTS = 100
@@ -23,7 +24,7 @@ class LayoutManager(Manager):
     def build(self, world: World) -> None:
         self._world = world
         entities = {e.name: e for e in world.entities}
-        self._order = [name for name in _support_order(self.spec.world.layout) if name in entities]
+        self._order = [name for name in placement_order(self.spec.world.layout)[0] if name in entities]
         self._roots = np.array([entities[name].root for name in self._order], dtype=int)
         self._free = np.array([world.bodies[r].kind is BodyKind.FREE for r in self._roots], dtype=bool)
         supports = {self.spec.world.layout[name].on for name in self._order} - {None, GROUND}
@@ -85,20 +86,3 @@ class LayoutManager(Manager):
             if gap < entry.clearance:
                 return other
         return None
-
-
-def _support_order(layout: "dict[str, PlacementSpec]") -> list[str]:
-    """Names with every support before what stands on it, otherwise in the order of the file."""
-    order: list[str] = []
-
-    def visit(name: str) -> None:
-        if name in order or name not in layout:
-            return
-        support = layout[name].on
-        if support is not None:
-            visit(support)
-        order.append(name)
-
-    for name in layout:
-        visit(name)
-    return order

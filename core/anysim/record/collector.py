@@ -11,12 +11,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from anysim import registry
 from anysim.conventions import Array
 from anysim.record.frame import Frame, state_rows
 from anysim.record.header import EpisodeHeader, RunHeader, camera_info, image_interval, state_layout
 from anysim.record.provenance import package_versions
 from anysim.record.recorder import Recorder
+from anysim.record.writer import writer_factory
 from anysim.task.contract import Status
 from anysim.task.env import TaskEnv
 
@@ -86,8 +86,7 @@ class Collector:
         """Run `episodes` in all, shared out as evenly as can be: env i runs one of every N."""
         self.env, self.policy, self.seed = env, policy, seed
         record = env.spec.record
-        writer_class = registry.load("writers", record.writer)
-        self.recorder = Recorder(out, lambda: writer_class(**record.options), run_header(env, seed))
+        self.recorder = Recorder(out, writer_factory(record.writer, record.options), run_header(env, seed))
         self._every = image_interval(env.engine.world.physics.control_dt, record.fps)
         self._share = np.array([len(range(i, episodes, env.num_envs)) for i in range(env.num_envs)])
         self._episode = np.full(env.num_envs, -1)
