@@ -30,6 +30,12 @@ CAPABILITIES = Capabilities.of(
 )
 
 
+def versions() -> str:
+    """Which versions are taken, in words."""
+    refused = "; ".join(f"{'.'.join(map(str, numbers))}: {why}" for numbers, why in WRONG.items())
+    return f"{'.'.join(map(str, MINIMUM))} or newer; refused: {refused}"
+
+
 @cache
 def installed_version() -> str:
     """The version of the mujoco distribution, or an empty string."""

@@ -12,6 +12,7 @@ from anysim.engine.base import SimEngine
 from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Capabilities
 from anysim.engine.commands import Control
+from anysim.engine.diagnosis import Finding, Health
 from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
 from anysim.math import pose as P
 from anysim.world.model import World
@@ -54,6 +55,16 @@ class MujocoEngine(SimEngine):
     def options_model(cls) -> type[MujocoOptions]:
         """The engine's options."""
         return MujocoOptions
+
+    @classmethod
+    def findings(cls) -> tuple[Finding, ...]:
+        """Threads, and versions that are refused."""
+        return (
+            Finding(
+                "mujoco: threads", Health.NOTE, f"{MujocoOptions().thread_count(1 << 30)} at most: one per env and CPU"
+            ),
+            Finding("mujoco: versions", Health.NOTE, declared.versions()),
+        )
 
     @property
     def version(self) -> str:
@@ -195,12 +206,14 @@ class MujocoEngine(SimEngine):
     # ------------------------------------------------------------------ sensing
 
     def renderer_name(self) -> str:
-        """The OpenGL backend and driver, such as `egl: llvmpipe (LLVM 15.0.6, 256 bits)`."""
-        from anysim_mujoco.gl import gl_thread
+        """The OpenGL backend and driver, such as `egl: llvmpipe (LLVM 15.0.6, 256 bits), in software`."""
+        from anysim_mujoco.gl import SOFTWARE, gl_thread
 
         thread = gl_thread()
         thread.open(self.options.gl)
-        return f"{thread.backend}: {thread.driver()}"
+        driver = thread.driver()
+        where = "in software" if driver.lower().startswith(SOFTWARE) else "on the GPU"
+        return f"{thread.backend}: {driver}, {where}"
 
     def _raycast(self, origins: Array, directions: Array, ids: Array) -> RayHits:
         self._parameters.settle()

@@ -19,6 +19,9 @@ from anysim.errors import EngineError
 
 T = TypeVar("T")
 BACKENDS = ("egl", "osmesa")
+SOFTWARE = ("llvmpipe", "softpipe", "swrast", "software rasterizer")
+"""How the names of drivers begin that need no graphics card."""
+
 REMEDY = "install a software renderer, e.g. apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri (or libosmesa6)"
 
 

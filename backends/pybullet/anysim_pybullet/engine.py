@@ -8,6 +8,7 @@ from anysim.engine.base import SimEngine
 from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Capabilities
 from anysim.engine.commands import Control
+from anysim.engine.diagnosis import Finding, Health
 from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
 from anysim.world.model import World
 from anysim_pybullet import declared
@@ -34,6 +35,12 @@ class PybulletEngine(SimEngine):
     def options_model(cls) -> type[PybulletOptions]:
         """The engine's options."""
         return PybulletOptions
+
+    @classmethod
+    def findings(cls) -> tuple[Finding, ...]:
+        """Threads."""
+        words = "one per process, it keeps the interpreter's lock: `shards` uses more"
+        return (Finding("pybullet: threads", Health.NOTE, words),)
 
     @property
     def version(self) -> str:
@@ -127,7 +134,7 @@ class PybulletEngine(SimEngine):
 
     def renderer_name(self) -> str:
         """What draws the images."""
-        return "TinyRenderer, software"
+        return "TinyRenderer, in software"
 
     def _raycast(self, origins: Array, directions: Array, ids: Array) -> RayHits:
         from anysim_pybullet.contacts import raycast

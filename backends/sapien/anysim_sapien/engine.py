@@ -10,6 +10,7 @@ from anysim.engine.base import SimEngine
 from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Capabilities
 from anysim.engine.commands import Control
+from anysim.engine.diagnosis import Finding
 from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
 from anysim.world.model import World
 from anysim_sapien import declared
@@ -47,6 +48,13 @@ class SapienEngine(SimEngine):
     def options_model(cls) -> type[SapienOptions]:
         """The engine's options."""
         return SapienOptions
+
+    @classmethod
+    def findings(cls) -> tuple[Finding, ...]:
+        """The Vulkan driver and how to choose one; threads."""
+        from anysim_sapien.diagnosis import findings
+
+        return findings()
 
     @property
     def version(self) -> str:
@@ -220,10 +228,11 @@ class SapienEngine(SimEngine):
     # ------------------------------------------------------------------ sensing
 
     def renderer_name(self) -> str:
-        """The Vulkan device, such as `SwiftShader Device (Subzero)`."""
+        """The Vulkan device, such as `SwiftShader Device (Subzero), in software`."""
         from anysim_sapien.vulkan import open_device
 
-        return open_device(self.options.vulkan_icd).name
+        device = open_device(self.options.vulkan_icd)
+        return f"{device.name}, {'in software' if device.is_cpu else 'on the GPU'}"
 
     def _raycast(self, origins: Array, directions: Array, ids: Array) -> RayHits:
         return cast(self._scenes, self._layout, origins, directions, ids)

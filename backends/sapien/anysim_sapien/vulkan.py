@@ -29,6 +29,10 @@ SOFTWARE = (
 )
 
 
+SOFTWARE_NAMES = ("swiftshader", "llvmpipe", "lavapipe")
+"""How the names of devices begin that compute on the CPU; SAPIEN's own `is_cpu` says no to SwiftShader."""
+
+
 class Device(NamedTuple):
     """What draws: the driver's file (empty: as the environment says), its name, and whether it is the CPU."""
 
@@ -98,7 +102,8 @@ def open_device(option: str) -> Device:
                 try:
                     _kept.append(sapien.render.RenderSystem())
                     device: Any = _kept[0].device
-                    _opened = Device(icd, str(device.name), bool(device.is_cpu()))
+                    software = str(device.name).lower().startswith(SOFTWARE_NAMES)
+                    _opened = Device(icd, str(device.name), software or bool(device.is_cpu()))
                 except RuntimeError as error:
                     _opened = f"{error}; driver: {icd or 'none was found'}"
         if isinstance(_opened, str):

@@ -1,7 +1,8 @@
 """Tables on a terminal, plain tab-separated lines in a pipe."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import typer
@@ -19,8 +20,10 @@ def print_json(data: Any) -> None:
     typer.echo(json.dumps(data, indent=2, default=str))
 
 
-def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
-    """A table for people; in a pipe a header line and a line for each row, separated by tabs."""
+def print_table(
+    title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]], styles: Mapping[str, str] | None = None
+) -> None:
+    """A table for people, cells in the colour that `styles` gives their text; in a pipe lines separated by tabs."""
     cells = [["" if cell is None else str(cell) for cell in row] for row in rows]
     if not interactive():
         typer.echo("\t".join(columns))
@@ -35,5 +38,19 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]
     for column in columns:
         table.add_column(column)
     for row in cells:
-        table.add_row(*(Text(cell) for cell in row))
+        table.add_row(*(Text(cell, (styles or {}).get(cell, "")) for cell in row))
     Console().print(table)
+
+
+@contextmanager
+def working_on(what: str) -> Iterator[None]:
+    """A spinner with a few words while something takes seconds; nothing where nobody looks."""
+    import sys
+
+    if not sys.stderr.isatty():
+        yield
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status(f"{what}…"):
+        yield

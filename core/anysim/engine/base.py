@@ -17,6 +17,7 @@ from anysim.engine import checks, saving
 from anysim.engine.cameras import CameraRig
 from anysim.engine.capability import Capabilities, Capability, Need, check
 from anysim.engine.commands import CommandBuffer, Control
+from anysim.engine.diagnosis import Finding
 from anysim.engine.index import Index
 from anysim.engine.needs import needs_of
 from anysim.engine.parameters import PARAMETERS, count
@@ -65,6 +66,11 @@ class SimEngine(Primitives):
     def options_model(cls) -> Any:
         """The pydantic model of the engine's options, or None if it has none."""
         return None
+
+    @classmethod
+    def findings(cls) -> Sequence[Finding]:
+        """What else `anysim doctor` should say of the engine on this machine: threads, drivers, versions to avoid."""
+        return ()
 
     @property
     def version(self) -> str:

@@ -10,7 +10,8 @@ import pytest
 
 from anysim.errors import EngineError
 from anysim.testing import worlds
-from anysim_sapien import vulkan
+from anysim_sapien import diagnosis, vulkan
+from anysim_sapien.render import Painter
 
 NOTHING = "/no/such/driver.json"
 
@@ -86,6 +87,39 @@ def test_the_driver_that_is_chosen(monkeypatch, tmp_path):
         vulkan.driver_file("none")
     with pytest.raises(EngineError, match="no Vulkan driver file"):
         vulkan.driver_file(NOTHING)
+
+
+def test_the_doctor_names_the_driver_and_how_to_choose_it(monkeypatch, tmp_path):
+    """What the environment names, what the system has, what Chromium brings, or what to install."""
+    system, software = tmp_path / "icd.d", tmp_path / "swiftshader.json"
+    system.mkdir()
+    for name in vulkan.VARIABLES:
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(vulkan, "SYSTEM", (str(system),))
+    monkeypatch.setattr(vulkan, "SOFTWARE", (str(software),))
+    none = diagnosis.driver()
+    assert (none.state, none.remedy) == ("missing", vulkan.REMEDY)
+    software.write_text("{}")
+    assert f"vulkan_icd={software}" in diagnosis.driver().remedy
+    (system / "card.json").write_text("{}")
+    assert str(system / "card.json") in diagnosis.driver().found
+    monkeypatch.setenv("VK_ICD_FILENAMES", str(tmp_path / "gone.json"))
+    gone = diagnosis.driver()
+    assert (gone.state, gone.remedy) == ("broken", "unset VK_ICD_FILENAMES")
+
+
+def test_a_driver_in_software_gets_the_cheap_shader(make):
+    """SwiftShader does not call itself a CPU; the shader with lights takes half a minute to its first image there."""
+    engine = make(worlds.scene(cameras=True))
+    try:
+        where = engine.renderer_name().rpartition(", ")[2]
+    except EngineError as error:
+        pytest.skip(f"no image can be drawn here: {error}")
+    device = vulkan.open_device("auto")
+    computes = any(word in device.name.lower() for word in ("swiftshader", "llvmpipe"))
+    assert device.is_cpu == computes
+    assert where == ("in software" if computes else "on the GPU")
+    assert Painter(engine.world, engine._layout, engine.options)._shader == ("trivial" if computes else "default")
 
 
 def test_drawing_leaves_the_environment_alone(make):
