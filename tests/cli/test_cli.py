@@ -95,6 +95,10 @@ def test_a_replay_in_another_process_is_identical(tmp_path: Path) -> None:
     assert result.returncode == 0, result.stderr
     report = json.loads(result.stdout)
     assert report["replayed"] == report["identical"] == 2
+    elsewhere = anysim("replay", str(tmp_path), "--engine", "pybullet")
+    assert elsewhere.returncode == 0, elsewhere.stderr
+    assert "joint_pos\t0 of 2" in elsewhere.stdout
+    assert "0 of 2 replays are identical to the bit" in elsewhere.stdout
 
 
 def test_a_killed_run_leaves_whole_trajectories_and_goes_on(tmp_path: Path) -> None:

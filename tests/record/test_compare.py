@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from anysim.errors import RecordError
-from anysim.record.compare import compare_states
+from anysim.record.compare import compare_states, summarise
 
 
 def states(steps=5):
@@ -69,3 +69,16 @@ def test_another_world():
         compare_states(states(), {"joint_pos": states()["joint_pos"]})
     with pytest.raises(RecordError, match=r"'joint_pos' was recorded as \(3,\) and replayed as \(4,\)"):
         compare_states(states(), {**states(), "joint_pos": np.zeros((5, 4))})
+
+
+def test_a_summary_finds_the_worst_of_many_replays():
+    drifts = {}
+    for name, shift in (("a", 0.0), ("b", 0.3), ("c", 0.1)):
+        other = states()
+        other["joint_pos"][3:] += shift
+        drifts[name] = compare_states(states(), other)
+    pose, joints = summarise(drifts)
+    assert (pose.name, pose.identical, pose.first_step, pose.worst) == ("body_pose", 3, None, 0.0)
+    assert (joints.name, joints.identical, joints.first_step, joints.worst_replay) == ("joint_pos", 1, 4, "b")
+    assert joints.worst == pytest.approx(0.3)
+    assert joints.median == pytest.approx(0.1)

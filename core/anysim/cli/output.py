@@ -1,7 +1,7 @@
 """Tables on a terminal, plain tab-separated lines in a pipe."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -54,3 +54,28 @@ def working_on(what: str) -> Iterator[None]:
 
     with Console(stderr=True).status(f"{what}…"):
         yield
+
+
+@contextmanager
+def counting(what: str, total: int, quiet: bool = False) -> Iterator[Callable[[str], None]]:
+    """Call what it gives once per finished thing: a progress bar for a person, the line in a pipe, else nothing."""
+    if quiet:
+        yield lambda line: None
+        return
+    if not interactive():
+        yield typer.echo
+        return
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    with Progress(
+        TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn()
+    ) as progress:
+        bar = progress.add_task(what, total=total)
+        yield lambda line: progress.advance(bar)

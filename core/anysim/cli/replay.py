@@ -1,11 +1,15 @@
 """`anysim replay`: rebuild recorded runs and compare every state."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from anysim.cli.options import AsJson, Engine
+
+if TYPE_CHECKING:
+    from anysim.record.compare import FieldSummary
+    from anysim.record.replay import ReplayResult
 
 
 def replay(
@@ -18,14 +22,41 @@ def replay(
 ) -> None:
     """Replay trajectories from their manifests alone, and compare every recorded state.
 
-    On the engine that recorded them they must be equal to the bit (exit code 1 if not); on another engine the drift is
-    reported.
+    On the engine that recorded them they must be equal to the bit (exit code 1 if not). On another engine the same
+    actions lead elsewhere: the drift of every state array is reported, and whether the episodes end alike.
     """
-    from anysim.cli.output import print_json, print_table
+    from anysim.cli.output import counting, print_json
     from anysim.errors import RecordError
-    from anysim.record.layout import MANIFEST_FILE, trajectories
     from anysim.record.replay import replay as replay_one
     from anysim.record.verify import verify
+
+    found = _found(directories)
+    results: dict[str, ReplayResult] = {}
+    with counting("replays", len(found), quiet=json) as show:
+        for path in found:
+            faults = verify(path)
+            if faults:
+                raise RecordError(f"{path} is damaged: {'; '.join(faults)}")
+            result = results[str(path)] = replay_one(path, engine, base)
+            notes = "" if result.same_world else " (the rebuilt world is another one)"
+            notes += "" if result.same_start else " (it starts from another state)"
+            show(f"{path.name}: {result.drift}{notes}")
+    same = sum(result.identical for result in results.values())
+    if json:
+        print_json({
+            "replayed": len(results), "identical": same, "same_outcome": sum(map(_same_outcome, results.values())),
+            "drift": [row._asdict() for row in _summary(results)],
+            "trajectories": [_row(path, result) for path, result in results.items()],
+        })  # fmt: skip
+    else:
+        _report(results, same)
+    if engine is None and same < len(results):
+        raise typer.Exit(1)
+
+
+def _found(directories: list[Path]) -> list[Path]:
+    from anysim.errors import RecordError
+    from anysim.record.layout import MANIFEST_FILE, trajectories
 
     found: list[Path] = []
     for directory in directories:
@@ -33,30 +64,47 @@ def replay(
         if not inside:
             raise RecordError(f"{directory} holds no trajectory; expected a directory with a {MANIFEST_FILE}, or a run")
         found.extend(inside)
-    rows: list[dict[str, object]] = []
-    for path in found:
-        faults = verify(path)
-        if faults:
-            raise RecordError(f"{path} is damaged: {'; '.join(faults)}")
-        result = replay_one(path, engine, base)
-        row = {
-            "trajectory": str(path), "engine": result.engine, "identical": result.identical,
-            "steps": result.drift.recorded_steps, "first difference": result.drift.first_step,
-            "largest difference": max((f.max_abs for f in result.drift.fields.values()), default=0.0),
-            "recorded": result.recorded_status, "replayed": result.status, "same world": result.same_world,
-            "same start": result.same_start,
-        }  # fmt: skip
-        rows.append(row)
-        if not json:
-            notes = "" if result.same_world else " (the rebuilt world is another one)"
-            notes += "" if result.same_start else " (it starts from another state)"
-            typer.echo(f"{path.name}: {result.drift}{notes}")
-    same = sum(bool(row["identical"]) for row in rows)
-    if json:
-        print_json({"replayed": len(rows), "identical": same, "trajectories": rows})
-    else:
-        if same < len(rows):
-            print_table("Replays", list(rows[0]), [list(row.values()) for row in rows])
-        typer.echo(f"{same} of {len(rows)} replays are identical to the bit")
-    if engine is None and same < len(rows):
-        raise typer.Exit(1)
+    return found
+
+
+def _same_outcome(result: "ReplayResult") -> bool:
+    return result.status == result.recorded_status
+
+
+def _summary(results: "dict[str, ReplayResult]") -> "list[FieldSummary]":
+    from anysim.record.compare import summarise
+
+    return summarise({Path(path).name: result.drift for path, result in results.items()})
+
+
+def _row(path: str, result: "ReplayResult") -> dict[str, object]:
+    return {
+        "trajectory": path, "engine": result.engine, "identical": result.identical,
+        "steps": result.drift.recorded_steps, "first_difference": result.drift.first_step,
+        "largest_difference": {name: field.max_abs for name, field in result.drift.fields.items()},
+        "recorded": result.recorded_status, "replayed": result.status, "same_world": result.same_world,
+        "same_start": result.same_start,
+    }  # fmt: skip
+
+
+def _report(results: "dict[str, ReplayResult]", same: int) -> None:
+    """The drift where there is any, how the episodes ended where that differs, and one line that sums up."""
+    from anysim.cli.output import print_table
+
+    total, first = len(results), next(iter(results.values()))
+    if same < total:
+        print_table(
+            f"Largest differences, recorded on {first.manifest.engine}, replayed on {first.engine}",
+            ("state", "identical", "from step", "median", "worst", "in"),
+            [
+                (row.name, f"{row.identical} of {total}", row.first_step, f"{row.median:.3g}", f"{row.worst:.3g}",
+                 row.worst_replay)
+                for row in _summary(results)
+            ],
+        )  # fmt: skip
+        other = {path: result for path, result in results.items() if not _same_outcome(result)}
+        if other:
+            rows = [(Path(path).name, result.recorded_status, result.status) for path, result in other.items()]
+            print_table("Episodes that end otherwise", ("trajectory", "recorded", "replayed"), rows)
+        typer.echo(f"{total - len(other)} of {total} episodes end as recorded")
+    typer.echo(f"{same} of {total} replays are identical to the bit")
