@@ -90,7 +90,7 @@ def _asset_folders(loaded: LoadedRun) -> dict[str, Path]:
     folders: dict[str, Path] = {}
     for name, thing in loaded.spec.world.objects.items():
         kind = "mesh" if thing.source.mesh is not None else "asset"
-        place = Path(_place(loaded, f"world.objects.{name}.source.{kind}").rsplit(":", 2)[0]).resolve()
+        place = Path(place_of(loaded, f"world.objects.{name}.source.{kind}").rsplit(":", 2)[0]).resolve()
         if place in files:
             folders[name] = files[place]
         elif loaded.files:
@@ -100,13 +100,13 @@ def _asset_folders(loaded: LoadedRun) -> dict[str, Path]:
 
 def located(error: SpecError | AssetError, loaded: LoadedRun) -> SpecError | AssetError:
     """The same issues with the file, line and column of the key at fault."""
-    issues = [SpecIssue(i.where or _place(loaded, i.path), i.path, i.message) for i in error.issues]
+    issues = [SpecIssue(i.where or place_of(loaded, i.path), i.path, i.message) for i in error.issues]
     if isinstance(error, SpecError):
         return SpecError(issues)
     return AssetError(issues=issues) if issues else error
 
 
-def _place(loaded: LoadedRun, path: str) -> str:
+def place_of(loaded: LoadedRun, path: str) -> str:
     """Where the key at `path` was written, or the nearest one above it."""
     while path:
         if path in loaded.provenance:
@@ -121,15 +121,23 @@ def dry_run(loaded: LoadedRun, world: "World") -> None:
     Raises:
         SpecError: with file, line and column.
     """
-    from anysim.engine.null import NullEngine
     from anysim.skills.runner import bind_skill
 
-    spec = loaded.spec
+    try:
+        with blind_env(loaded, world, "check") as env:
+            if env.spec.task is not None and env.spec.task.expert is not None:
+                bind_skill(env.spec.task.expert, env)
+    except SpecError as error:
+        raise located(error, loaded) from None
+
+
+def blind_env(loaded: LoadedRun, world: "World", name: str) -> "TaskEnv":
+    """One env on the kinematic engine, which draws no images and can run any world."""
+    from anysim.engine.null import NullEngine
+
     blind = replace(world, cameras=tuple(replace(camera, channels=()) for camera in world.cameras))
     try:
-        with _env(spec, blind, NullEngine(), 1, "check") as env:
-            if spec.task is not None and spec.task.expert is not None:
-                bind_skill(spec.task.expert, env)
+        return _env(loaded.spec, blind, NullEngine(), 1, name)
     except SpecError as error:
         raise located(error, loaded) from None
 

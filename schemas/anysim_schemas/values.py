@@ -1,20 +1,20 @@
-"""Values that are drawn anew in each episode: a constant, a range, a choice or a normal distribution.
+"""Values that are drawn anew in each episode: a constant, a range, a choice, a normal or log-uniform distribution.
 
-A field of type `Value[float]` accepts `0.1`, `{range: [0.05, 0.2]}`, `{choice: [0.1, 0.2]}` and
-`{normal: {mean: 0.1, std: 0.02, low: 0.0}}`. For vectors the bounds of a range and the moments of a normal are
-component-wise.
+A field of type `Value[float]` accepts `0.1`, `{range: [0.05, 0.2]}`, `{log_uniform: [0.01, 1.0]}`, `{choice: [0.1,
+0.2]}` and `{normal: {mean: 0.1, std: 0.02, low: 0.0}}`. For vectors the bounds of a range and the moments of a normal
+are component-wise. What is drawn may be gated (`ratio`, `otherwise`) and shared by several fields (`shared`).
 """
 
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, TypeVar, cast
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from anysim_schemas.base import Color, Fraction, NonNegative, Number, Positive, Spec, Vec3
+from anysim_schemas.base import Color, Fraction, Name, NonNegative, Number, Positive, Spec, Vec3
 from anysim_schemas.errors import KeyFault
 
 T = TypeVar("T")
 
-KINDS = ("range", "choice", "normal")
+KINDS = ("range", "log_uniform", "choice", "normal")
 """The keys that make a mapping a value that is drawn."""
 
 TAG_PREFIX = "as:"
@@ -54,13 +54,30 @@ class Variant(Spec):
         return f"{cls.__name__}_{labels[0]}" if labels else super().model_parametrized_name(params)
 
 
-class Drawn(Variant):
-    """What the values that are drawn have in common: the key that says how."""
+class Drawn(Variant, Generic[T]):
+    """What the values that are drawn have in common: the key that says how, whether at all, and with whom."""
 
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("range",), ("choice", "weights"), ("normal",))
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("range",), ("log_uniform",), ("choice", "weights"), ("normal",),
+    )  # fmt: skip
+
+    ratio: Fraction = Field(default=1.0, description="share of the episodes in which it is drawn at all")
+    otherwise: T | None = Field(
+        default=None, description="the value of the other episodes; the nominal one where not given"
+    )
+    shared: Name | None = Field(
+        default=None,
+        description="fields that share a name share one draw in each episode: all high in theirs, or all low",
+    )
+
+    @model_validator(mode="after")
+    def _gated(self) -> "Drawn[T]":
+        if self.otherwise is not None and self.ratio == 1.0:
+            raise KeyFault("`otherwise` is for the episodes that a `ratio` below 1 leaves out", "otherwise")
+        return self
 
 
-class Range(Drawn, Generic[T]):
+class Range(Drawn[T], Generic[T]):
     """Uniform between two bounds, component by component."""
 
     range: tuple[T, T] = Field(description="lower and upper bound")
@@ -71,7 +88,20 @@ class Range(Drawn, Generic[T]):
         return self
 
 
-class Choice(Drawn, Generic[T]):
+class LogUniform(Drawn[T], Generic[T]):
+    """Uniform in the logarithm between two positive bounds, component by component: each decade is equally likely."""
+
+    log_uniform: tuple[T, T] = Field(description="lower and upper bound, above 0")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "LogUniform[T]":
+        if min(_components(self.log_uniform[0])) <= 0:
+            raise KeyFault(f"a log-uniform value needs bounds above 0, got {self.log_uniform[0]}", "log_uniform")
+        _check_order(*self.log_uniform, what="bound")
+        return self
+
+
+class Choice(Drawn[T], Generic[T]):
     """One of the listed values, each equally likely unless `weights` says otherwise."""
 
     choice: tuple[T, ...] = Field(min_length=1, description="the values to draw from")
@@ -108,7 +138,7 @@ class NormalParameters(Variant, Generic[T]):
         return self
 
 
-class Normal(Drawn, Generic[T]):
+class Normal(Drawn[T], Generic[T]):
     """Normally distributed."""
 
     normal: NormalParameters[T] = Field(description="mean, standard deviation and limits")
@@ -117,13 +147,13 @@ class Normal(Drawn, Generic[T]):
 def _kind(value: object) -> str:
     mapping = cast("dict[object, object]", value) if isinstance(value, dict) else {}
     for kind in KINDS:
-        if kind in mapping or (isinstance(value, Drawn) and hasattr(value, kind)):
+        if kind in mapping or (isinstance(value, Drawn) and hasattr(cast("object", value), kind)):
             return TAG_PREFIX + kind
     return TAG_PREFIX + "constant"
 
 
 if TYPE_CHECKING:
-    Value = T | Range[T] | Choice[T] | Normal[T]
+    Value = T | Range[T] | LogUniform[T] | Choice[T] | Normal[T]
 else:
 
     class Value:
@@ -136,6 +166,7 @@ else:
             return Annotated[
                 Annotated[item, Tag(TAG_PREFIX + "constant")]
                 | Annotated[Range[item], Tag(TAG_PREFIX + "range")]
+                | Annotated[LogUniform[item], Tag(TAG_PREFIX + "log_uniform")]
                 | Annotated[Choice[item], Tag(TAG_PREFIX + "choice")]
                 | Annotated[Normal[item], Tag(TAG_PREFIX + "normal")],
                 Discriminator(_kind),

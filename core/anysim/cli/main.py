@@ -5,7 +5,7 @@ import sys
 import typer
 
 from anysim import __version__
-from anysim.cli import audit, bench, check, doctor, listing, replay, run, schema
+from anysim.cli import audit, bench, check, doctor, explain, listing, replay, run, schema
 
 EXIT_CODES = """Exit codes: 0 done; 1 it ran, and the answer is no (a replay that differs, a file with faults, too few
 successes); 2 bad input; 130 interrupted."""
@@ -23,6 +23,7 @@ app.command("run")(run.run)
 app.command("replay")(replay.replay)
 app.command("check")(check.check)
 app.command("list")(listing.list_)
+app.command("explain")(explain.explain)
 app.command("doctor")(doctor.doctor)
 app.command("audit")(audit.audit)
 app.command("schema")(schema.schema)

@@ -1,5 +1,7 @@
 """LayoutManager: a pose for every placed object, from the declarative layout of the spec."""
 
+from typing import Any
+
 import numpy as np
 
 from anysim.conventions import GROUND, Array
@@ -61,11 +63,11 @@ class LayoutManager(Manager):
 
     def _draw_pose(self, env: int, name: str, entry: PlacementSpec, placed: dict[str, Array], attempt: int) -> Array:
         def value(field: str) -> float:
-            return draw(getattr(entry, field), f"layout/{name}/{field}", self.streams, env, attempt)
+            return self._draw(env, name, entry, field, attempt)
 
         turn = P.from_roll_pitch_yaw(np.array([value("roll"), value("pitch"), value("yaw")]))
         if entry.on is None:
-            position = draw(entry.position, f"layout/{name}/position", self.streams, env, attempt)
+            position = self._draw(env, name, entry, "position", attempt)
             return np.concatenate([np.asarray(position, dtype=float), turn])
         shape, x, y = self._shapes[name], value("x"), value("y")
         if entry.on == GROUND:
@@ -74,6 +76,10 @@ class LayoutManager(Manager):
         else:
             top = self._shapes[entry.on].top_height(placed[entry.on])
         return shape.resting_on(top, np.asarray(x), np.asarray(y), turn)
+
+    def _draw(self, env: int, name: str, entry: PlacementSpec, field: str, attempt: int) -> Any:
+        source = f"world.layout.{name}.{field}"
+        return draw(getattr(entry, field), f"layout/{name}/{field}", self.streams, env, attempt, source=source)
 
     def _crowding(self, name: str, entry: PlacementSpec, pose: Array, placed: dict[str, Array]) -> str | None:
         """The first placed object that is nearer than the clearance, measured between balls around both."""

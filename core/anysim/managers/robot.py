@@ -11,6 +11,7 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.errors import SpecError, SpecIssue, TaskError, listing, suggest
 from anysim.managers.base import Manager
+from anysim.managers.streams import Origin
 from anysim.managers.values import draw_rows
 from anysim.signatures import options_model
 from anysim.world.model import World
@@ -78,7 +79,10 @@ class RobotManager(Manager):
             joints = np.arange(entity.joint_start, entity.joint_stop)
             home = np.array([self._world.joints[j].initial for j in joints])
             position = np.tile(home, (len(env_ids), 1))
-            deviation = draw_rows(spec.home_noise, f"robot/{robot.name}/home_noise_std", self.streams, env_ids)
+            deviation = draw_rows(
+                spec.home_noise, f"robot/{robot.name}/home_noise_std", self.streams, env_ids,
+                source=f"world.robots.{robot.name}.home_noise",
+            )  # fmt: skip
             if deviation.any():
                 for column, joint in enumerate(joints):
                     self._add_noise(position, column, int(joint), robot.name, deviation, env_ids)
@@ -107,9 +111,10 @@ class RobotManager(Manager):
         if not arm:
             return
         for row, env in enumerate(env_ids):
-            generator = self.streams.generator(int(env), f"robot/{found.name}/home_noise")
-            noisy = position[row, column] + deviation[row] * generator.standard_normal()
-            position[row, column] = min(max(noisy, found.lower), found.upper)
+            stream = f"robot/{found.name}/home_noise"
+            noise = deviation[row] * self.streams.generator(int(env), stream).standard_normal()
+            self.streams.note(int(env), stream, noise, Origin(stream, f"world.robots.{robot}.home_noise"))
+            position[row, column] = min(max(position[row, column] + noise, found.lower), found.upper)
 
     def act(self, action: Array, env_ids: Array | None) -> None:
         """Turn actions (N, A) into drive targets of all envs, or of `env_ids`; the others keep their commands."""

@@ -40,7 +40,7 @@ class SceneManager(Manager):
             if is_random(obj.mass) or is_random(obj.density):
                 self._write_mass(name, obj, env_ids)
             if is_random(obj.friction):
-                rows = draw_rows(obj.friction, f"scene/{name}/friction", self.streams, env_ids)
+                rows = self._drawn(name, "friction", env_ids)
                 self._write_geoms("geom.friction", name, rows[:, None], env_ids)
             if is_random(obj.color):
                 self._write_color(name, obj, env_ids)
@@ -53,16 +53,22 @@ class SceneManager(Manager):
         if self._world.bodies[bodies[0]].kind is BodyKind.STATIC and not masses.sum():
             return
         if is_random(obj.mass):
-            ratio = draw_rows(obj.mass, f"scene/{name}/mass", self.streams, env_ids) / masses.sum()
+            ratio = self._drawn(name, "mass", env_ids) / masses.sum()
         else:
-            ratio = draw_rows(obj.density, f"scene/{name}/density", self.streams, env_ids) / nominal(obj.density)
+            ratio = self._drawn(name, "density", env_ids) / nominal(obj.density)
         self.engine.set_parameters("body.mass", ratio[:, None] * masses, env_ids, bodies)
         inertia = np.array([i.inertia for i in inertials])
         self.engine.set_parameters("body.inertia", ratio[:, None, None] * inertia, env_ids, bodies)
 
     def _write_color(self, name: str, obj: ObjectSpec, env_ids: Array) -> None:
-        rows = [rgb(draw(obj.color, f"scene/{name}/color", self.streams, int(e))) for e in env_ids]
+        source = f"world.objects.{name}.color"
+        rows = [rgb(draw(obj.color, f"scene/{name}/color", self.streams, int(e), source=source)) for e in env_ids]
         self._write_geoms("geom.color", name, np.array([[[*c, 1.0]] for c in rows]), env_ids)
+
+    def _drawn(self, name: str, field: str, env_ids: Array) -> Array:
+        """One draw of an object's field for each env."""
+        value, source = getattr(self._random[name], field), f"world.objects.{name}.{field}"
+        return draw_rows(value, f"scene/{name}/{field}", self.streams, env_ids, source=source)
 
     def _write_geoms(self, parameter: str, name: str, rows: Array, env_ids: Array) -> None:
         geoms = self._geoms[name]

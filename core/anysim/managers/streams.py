@@ -9,6 +9,7 @@ from its `episode_seed`.
 import hashlib
 from collections.abc import Sequence
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,18 +23,42 @@ def stream_key(name: str) -> int:
     return int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "little")
 
 
+class Origin(NamedTuple):
+    """Where a draw comes from: the name of its stream, and the dotted path of the value in the spec."""
+
+    stream: str
+    source: str = ""
+
+
+def _master(entropy: Sequence[int]) -> np.random.Generator:
+    """What draws the episode seeds of an env."""
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(entropy)))
+
+
+def episode_seed(seed: int, env: int, episode: int) -> int:
+    """The seed of an env's episode, counted from 0, under a global seed."""
+    master = _master([seed, env])
+    return [_next_episode(master) for _ in range(episode + 1)][-1]
+
+
+def _next_episode(master: np.random.Generator) -> int:
+    return int(master.integers(0, 2**63))
+
+
 class Streams:
     """The streams of all envs, and the draws of their current episodes.
 
     Attributes:
         episode_seed: (N,) uint64, what the current episode of each env was drawn from.
         draws: for each env, what was drawn in its current episode by name.
+        origins: for each env, where each of its draws comes from, by the same names.
     """
 
     def __init__(self, num_envs: int) -> None:
         self.num_envs = num_envs
         self.episode_seed = np.zeros(num_envs, dtype=np.uint64)
         self.draws: list[dict[str, object]] = [{} for _ in range(num_envs)]
+        self.origins: list[dict[str, Origin]] = [{} for _ in range(num_envs)]
         self._masters: list[np.random.Generator | None] = [None] * num_envs
 
     @property
@@ -52,7 +77,7 @@ class Streams:
         for env, entropy in zip(env_ids, entropies, strict=True):
             if min(entropy) < 0:
                 raise TaskError(f"a seed must not be negative, got {min(entropy)}")
-            self._masters[env] = np.random.Generator(np.random.PCG64(np.random.SeedSequence(entropy)))
+            self._masters[env] = _master(entropy)
 
     def begin(self, env_ids: Array, episode_seeds: Sequence[int] | Array | None = None) -> None:
         """Start new episodes: draw their seeds, or take those given. Envs never seeded get entropy from the system."""
@@ -60,9 +85,13 @@ class Streams:
             master = self._masters[env]
             if master is None:
                 master = self._masters[env] = np.random.default_rng()
-            drawn = int(master.integers(0, 2**63)) if episode_seeds is None else int(episode_seeds[row])
+            drawn = _next_episode(master) if episode_seeds is None else int(episode_seeds[row])
             self.episode_seed[env] = drawn
-            self.draws[env] = {}
+            self.draws[env], self.origins[env] = {}, {}
+
+    def note(self, env: int, name: str, drawn: object, origin: Origin) -> None:
+        """Keep what was drawn in an env's episode."""
+        self.draws[env][name], self.origins[env][name] = drawn, origin
 
     def skip(self, env: int, episodes: int) -> None:
         """Pass over the next episodes of an env, as if they had been begun."""
@@ -92,7 +121,7 @@ class Streams:
         assert isinstance(draws, list)
         for row, env in enumerate(env_ids):
             self.episode_seed[env] = seeds[row]
-            self.draws[env] = dict(draws[row])
+            self.draws[env], self.origins[env] = dict(draws[row]), {}
             master = None
             if masters[row] is not None:
                 master = np.random.Generator(np.random.PCG64())

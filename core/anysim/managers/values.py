@@ -1,53 +1,81 @@
-"""Drawing the values of a spec: constants, ranges, choices, normals; one stream for each value, by its name."""
+"""Drawing the values of a spec: one stream for each value, by its name.
 
+A draw is a quantile in [0, 1) for each component, and the value's own map from quantiles to values. Fields that share a
+name (`shared: heavy`) take their quantiles from that name's stream, so that all are high together, or low together.
+"""
+
+from collections.abc import Callable
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.managers.streams import Streams
-from anysim_schemas.values import Choice, Normal, Range
+from anysim.managers.streams import Origin, Streams
+from anysim.world.nominal import nominal
+from anysim_schemas.values import Choice, Drawn, LogUniform, Normal, Range
+
+_STANDARD = NormalDist()
+_LOWEST = 2.0**-54
+"""Half a step of the generator: a normal draw's quantile must not be 0."""
+
+Quantiles = Callable[[Any], Array]
+"""Quantiles in [0, 1) of a shape."""
 
 
 def is_random(value: Any) -> bool:
     """Whether a value differs between episodes."""
-    return isinstance(value, Range | Choice | Normal)
+    return isinstance(value, Drawn)
 
 
-def draw_one(value: Any, generator: np.random.Generator) -> Any:
+def draw_one(value: Any, quantiles: Quantiles) -> Any:
     """One draw of a value: a float, a tuple of floats or, for choices, whatever is chosen."""
-    if isinstance(value, Range):
-        low, high = np.asarray(value.range[0], dtype=float), np.asarray(value.range[1], dtype=float)
-        drawn = low + (high - low) * generator.random(low.shape)
-        return float(drawn) if drawn.ndim == 0 else tuple(float(x) for x in drawn)
     if isinstance(value, Choice):
         weights = value.weights or (1.0,) * len(value.choice)
         edges = np.cumsum(weights) / np.sum(weights)
-        index = int(np.searchsorted(edges, generator.random(), side="right"))
+        index = int(np.searchsorted(edges, float(quantiles(())), side="right"))
         return value.choice[min(index, len(value.choice) - 1)]
+    if isinstance(value, Range):
+        low, high = (np.asarray(bound, dtype=float) for bound in value.range)
+        return _plain(low + (high - low) * quantiles(low.shape))
+    if isinstance(value, LogUniform):
+        low, high = (np.log(np.asarray(bound, dtype=float)) for bound in value.log_uniform)
+        return _plain(np.clip(np.exp(low + (high - low) * quantiles(low.shape)), *value.log_uniform))
     if isinstance(value, Normal):
         p = value.normal
         mean = np.asarray(p.mean, dtype=float)
-        drawn = mean + np.asarray(p.std, dtype=float) * generator.standard_normal(mean.shape)
-        drawn = np.clip(drawn, -np.inf if p.low is None else p.low, np.inf if p.high is None else p.high)
-        return float(drawn) if drawn.ndim == 0 else tuple(float(x) for x in drawn)
+        standard = np.vectorize(_STANDARD.inv_cdf, otypes=[float])(np.maximum(quantiles(mean.shape), _LOWEST))
+        drawn = mean + np.asarray(p.std, dtype=float) * standard
+        return _plain(np.clip(drawn, -np.inf if p.low is None else p.low, np.inf if p.high is None else p.high))
     return value
 
 
-def draw(value: Any, name: str, streams: Streams, env: int, tick: int = 0) -> Any:
-    """Draw a value of an env's episode from the stream `name`, and note it in `streams.draws`."""
+def _plain(drawn: Array) -> float | tuple[float, ...]:
+    return float(drawn) if drawn.ndim == 0 else tuple(float(x) for x in drawn)
+
+
+def draw(value: Any, name: str, streams: Streams, env: int, tick: int = 0, *, source: str = "") -> Any:
+    """Draw a value of an env's episode from the stream `name`, and note it in `streams.draws`.
+
+    `source` is the dotted path of the value in the spec, for whoever asks where a draw comes from. A shared draw is one
+    for the episode: it is the same at every tick.
+    """
     if not is_random(value):
         return value
-    drawn = draw_one(value, streams.generator(env, name, tick))
-    streams.draws[env][name if tick == 0 else f"{name}@{tick}"] = drawn
+    stream = name if value.shared is None else f"shared/{value.shared}"
+    if value.ratio < 1.0 and streams.generator(env, f"{name}/ratio", tick).random() >= value.ratio:
+        stream, drawn = f"{name}/ratio", nominal(value)
+    else:
+        drawn = draw_one(value, streams.generator(env, stream, tick if value.shared is None else 0).random)
+    streams.note(env, name if tick == 0 else f"{name}@{tick}", drawn, Origin(stream, source))
     return drawn
 
 
-def draw_rows(value: Any, name: str, streams: Streams, env_ids: Array, tick: Any = 0) -> Array:
+def draw_rows(value: Any, name: str, streams: Streams, env_ids: Array, tick: Any = 0, *, source: str = "") -> Array:
     """Draw a number or vector for each env: (E,) or (E, k) float64. `tick` is one step number, or one for each env."""
     if not is_random(value):
         constant = np.asarray(value, dtype=float)
         return np.broadcast_to(constant, (len(env_ids), *constant.shape)).copy()
     ticks = np.broadcast_to(np.asarray(tick), len(env_ids))
-    rows = [draw(value, name, streams, int(e), int(t)) for e, t in zip(env_ids, ticks, strict=True)]
+    rows = [draw(value, name, streams, int(e), int(t), source=source) for e, t in zip(env_ids, ticks, strict=True)]
     return np.array(rows, dtype=float)

@@ -60,7 +60,7 @@ class Mdp:
         self.held[env_ids] = 0
         self._run_events("reset", 0)
         for name, term in self._commands.items():
-            self.scene.goals[name][env_ids] = term(partial(self._draw, f"task/command/{name}", 0))
+            self.scene.goals[name][env_ids] = term(partial(self._draw, f"command/{name}", 0))
         self.scene.moment += 1  # goals have moved
 
     def interval_events(self) -> None:
@@ -70,10 +70,12 @@ class Mdp:
     def _run_events(self, when: str, tick: Any) -> None:
         for name, term in self._events.items():
             if self.spec.events[name].when == when:
-                term(partial(self._draw, f"task/event/{name}", tick))
+                term(partial(self._draw, f"event/{name}", tick))
 
     def _draw(self, stream: str, tick: Any, name: str, value: Any) -> Array:
-        return draw_rows(value, f"{stream}/{name}", self.streams, self.scene.env_ids, tick)
+        section, _, term = stream.partition("/")
+        source = f"task.{'events' if section == 'event' else section}.{term}.{name}"
+        return draw_rows(value, f"task/{stream}/{name}", self.streams, self.scene.env_ids, tick, source=source)
 
     def observe(self) -> Obs:
         """All groups for the rows at hand, float32 (n, D)."""

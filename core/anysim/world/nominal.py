@@ -1,19 +1,25 @@
 """The nominal value of a field that is drawn in each episode: what the World is compiled with."""
 
+from math import sqrt
 from typing import Any
 
-from anysim_schemas.values import Choice, Normal, Range
+from anysim_schemas.values import Choice, Drawn, LogUniform, Normal, Range
 
 
 def nominal(value: Any) -> Any:
-    """The middle of a range, the first of a choice, the (clipped) mean of a normal; a constant is itself.
+    """The middle of a range (of the logarithms for log-uniform), the first of a choice, the (clipped) mean of a normal.
 
+    A constant is itself; where a `ratio` gates a value it is what the other episodes have, if that is given.
     Vectors are taken component by component; names (of colours) only occur as constants and choices.
     """
+    if isinstance(value, Drawn) and value.otherwise is not None:
+        return value.otherwise
     if isinstance(value, Choice):
         return value.choice[0]
     if isinstance(value, Range):
         return _combine(lambda low, high: 0.5 * (low + high), *value.range)
+    if isinstance(value, LogUniform):
+        return _combine(lambda low, high: sqrt(low * high), *value.log_uniform)
     if isinstance(value, Normal):
         mean = value.normal.mean
         if value.normal.low is not None:

@@ -1,0 +1,44 @@
+"""`anysim explain`: what an episode drew, and why."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from anysim.cli.options import AsJson, Overrides, Seed, Task
+
+
+def explain(
+    task: Task,
+    seed: Seed = 0,
+    episode: Annotated[int, typer.Option("--episode", "-E", min=0, help="The env's episode, counted from 0.")] = 0,
+    env: Annotated[int, typer.Option("--env", "-i", min=0, help="The env, counted from 0.")] = 0,
+    override: Overrides = None,
+    json: AsJson = False,
+) -> None:
+    """Say what was drawn in an episode: each value, the stream it comes from, and the line of YAML that asks for it.
+
+    The same on every engine, and whatever the number of envs. `anysim run TASK --seed S` has this episode in env I.
+    """
+    from anysim.cli.output import print_json, print_table
+    from anysim.explain import explain as explain_one
+
+    found = explain_one(
+        Path(task) if Path(task).exists() else task, seed=seed, env=env, episode=episode, overrides=override or []
+    )
+    if json:
+        print_json({"episode_seed": found.episode_seed, "draws": [draw._asdict() for draw in found.draws]})
+        return
+    print_table(
+        f"Env {env}, episode {episode} of seed {seed}", ("drawn", "value", "stream", "where"),
+        [(draw.path or draw.name, _text(draw.value), draw.stream, draw.where) for draw in found.draws],
+    )  # fmt: skip
+    if not found.draws:
+        typer.echo("nothing in this file is random")
+    typer.echo(f"episode seed {found.episode_seed}")
+
+
+def _text(value: object) -> str:
+    if isinstance(value, tuple):
+        return " ".join(map(_text, value))
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
