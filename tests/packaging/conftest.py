@@ -18,10 +18,12 @@ ROOT = Path(__file__).parents[2]
 EXTERNAL = ROOT / "tests" / "external"
 
 
-def run(*command: str | Path, cwd: Path = ROOT, ok: bool = True) -> subprocess.CompletedProcess[str]:
+def run(
+    *command: str | Path, cwd: Path = ROOT, ok: bool = True, timeout: float = 900
+) -> subprocess.CompletedProcess[str]:
     """Run a program; one that fails fails the test with what it said, unless that is what the test is about."""
     words = [str(word) for word in command]
-    done = subprocess.run(words, cwd=cwd, capture_output=True, text=True, timeout=900, check=False)
+    done = subprocess.run(words, cwd=cwd, capture_output=True, text=True, timeout=timeout, check=False)
     assert done.returncode == 0 or not ok, f"{' '.join(words)}\n{done.stdout[-8000:]}\n{done.stderr[-4000:]}"
     return done
 
