@@ -37,4 +37,4 @@ def _numbers(version: str) -> Version:
     """The release as three numbers: 4.0, 4.0.0 and 4.0.0rc1 are one."""
     release = re.match(r"\d+(?:\.\d+)*", version)
     numbers = [int(n) for n in release[0].split(".")[:3]] if release else []
-    return tuple((numbers + [0, 0, 0])[:3])
+    return tuple([*numbers, 0, 0, 0][:3])
