@@ -14,6 +14,21 @@ PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
+EXCERPT = re.compile(r"^```(\w+) (\S+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+FENCE = re.compile(r"^```(\w+)$", re.MULTILINE)
+SOURCES = (ROOT / "tests" / "external" / "anysim-ballistic", ROOT)
+"""Where the file at the head of an excerpt is looked for."""
+
+
+def excerpts() -> list[tuple[str, str, str]]:
+    return [
+        (f"{page.relative_to(ROOT)}:{text[: m.start()].count(chr(10)) + 1}", m[2], m[3])
+        for page in PAGES
+        for text in [page.read_text()]
+        for m in EXCERPT.finditer(text)
+    ]
+
+
 def blocks(language: str) -> list[tuple[str, str]]:
     return [
         (f"{page.relative_to(ROOT)}:{text[: m.start()].count(chr(10)) + 1}", m[2])
@@ -55,6 +70,35 @@ def test_a_block_of_yaml_checks(where: str, code: str, tmp_path: Path) -> None:
     path.write_text(code)
     assert yaml.safe_load(code)
     assert check_one(str(path), engine=None, all_engines=False, overrides=[]) == []
+
+
+def _words(text: str) -> str:
+    """Lines without indentation and blank ones: `make format` sets those of a block as if it were a file."""
+    return "".join(f"\n{line.strip()}" for line in text.splitlines() if line.strip()) + "\n"
+
+
+@pytest.mark.parametrize(("where", "name", "code"), excerpts(), ids=lambda v: v if "\n" not in v else "code")
+def test_an_excerpt_is_what_its_file_says(where: str, name: str, code: str) -> None:
+    """Line by line, without gaps but where a line of three dots says so. The file itself is run by other tests."""
+    text = next((root / name).read_text() for root in SOURCES if (root / name).is_file())
+    rest = _words(text)
+    for part in code.split("...\n"):
+        _, found, rest = rest.partition(_words(part))
+        assert found, f"{where}: not in {name}, or not in this order:\n{part}"
+
+
+def test_every_block_is_run_or_taken_from_a_file() -> None:
+    languages = {m[1] for page in PAGES for m in FENCE.finditer(page.read_text())}
+    assert languages <= {"python", "yaml"}, "a block of another language needs the file that it is taken from"
+
+
+def test_the_tests_that_the_guide_names_exist() -> None:
+    suite = ROOT / "core" / "anysim" / "testing"
+    known = set(re.findall(r"def (test_\w+)", "\n".join(path.read_text() for path in suite.glob("test_*.py"))))
+    known |= {path.name for path in suite.glob("test_*.py")}
+    named = set(re.findall(r"`(test_[\w.]+)`", (ROOT / "docs" / "write_an_engine.md").read_text()))
+    assert len(named) > 20
+    assert named <= known
 
 
 def test_there_are_examples_and_blocks() -> None:

@@ -1,16 +1,10 @@
 """The distributions as users get them: built, installed without the repository, imported."""
 
-import subprocess
-import sys
 import zipfile
-from email.parser import HeaderParser
 from pathlib import Path
 
 import pytest
-from checks.constraints import FILE as CONSTRAINTS
 from checks.tree import Tree
-from lock import find_uv
-from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name, parse_wheel_filename
 
 ROOT = Path(__file__).parents[2]
@@ -35,51 +29,9 @@ print(*missing, sep="\\n", end="")
 """
 
 
-def call(*command: str | Path, cwd: Path = ROOT) -> str:
-    """Run a program, show what it says if it fails, and return what it printed."""
-    words = [str(word) for word in command]
-    done = subprocess.run(words, cwd=cwd, capture_output=True, text=True, timeout=900, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
 @pytest.fixture(scope="module")
 def tree() -> Tree:
     return Tree.of(ROOT)
-
-
-@pytest.fixture(scope="module")
-def wheels(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """Wheels of all members, each built from its source distribution."""
-    out = tmp_path_factory.mktemp("dist")
-    call(find_uv(ROOT), "build", "--quiet", "--all-packages", "--out-dir", out)
-    return sorted(out.glob("*.whl"))
-
-
-@pytest.fixture(scope="module")
-def interpreter(wheels: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A fresh environment with the wheels and what they depend on. Our own names never come from a registry."""
-    uv, venv = find_uv(ROOT), tmp_path_factory.mktemp("env") / "venv"
-    call(uv, "venv", "--quiet", "--python", sys.executable, venv)
-    python = venv / "bin" / "python"
-    install = (uv, "pip", "install", "--quiet", "--python", python)
-    call(*install, "--no-deps", *wheels)
-    call(*install, "--constraint", ROOT / CONSTRAINTS, *_foreign_requirements(wheels))
-    call(uv, "pip", "check", "--python", python)
-    return python
-
-
-def _foreign_requirements(wheels: list[Path]) -> list[str]:
-    own = {parse_wheel_filename(wheel.name)[0] for wheel in wheels}
-    found: set[str] = set()
-    for wheel in wheels:
-        with zipfile.ZipFile(wheel) as archive:
-            name = next(name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
-            lines = HeaderParser().parsestr(archive.read(name).decode()).get_all("Requires-Dist", [])
-        for requirement in map(Requirement, lines):
-            if requirement.marker is None and canonicalize_name(requirement.name) not in own:
-                found.add(str(requirement))
-    return sorted(found)
 
 
 def test_there_is_one_wheel_for_each_member(wheels: list[Path], tree: Tree) -> None:
@@ -97,6 +49,7 @@ def test_a_wheel_holds_every_file_of_its_package_and_nothing_else(wheels: list[P
         assert held == expected
 
 
-def test_installed_packages_import_and_their_entry_points_exist(interpreter: Path, tree: Tree, tmp_path: Path) -> None:
-    missing = call(interpreter, "-I", "-c", SEE_ALL, *(member.package for member in tree.members), cwd=tmp_path)
-    assert missing == ""
+def test_installed_packages_import_and_their_entry_points_exist(environment, program, tree: Tree, tmp_path) -> None:
+    interpreter = environment(*(member.project["name"] for member in tree.members))
+    packages = [member.package for member in tree.members]
+    assert program(interpreter, "-I", "-c", SEE_ALL, *packages, cwd=tmp_path).stdout == ""

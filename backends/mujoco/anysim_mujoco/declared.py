@@ -1,14 +1,14 @@
 """What the engine declares without importing MuJoCo: capabilities, with measured errors, and availability."""
 
-import re
 from collections.abc import Mapping
 from functools import cache
 from importlib import metadata
 
 from anysim.engine.capability import Capabilities, Capability
 from anysim.engine.state import Availability
+from anysim.engine.versions import judge
 
-MINIMUM = (3, 17)
+MINIMUM = (3, 17, 0)
 WRONG: Mapping[tuple[int, ...], str] = {
     (4, 0, 0): "its sparse solver is wrong where articulated bodies touch each other",
 }
@@ -47,12 +47,4 @@ def installed_version() -> str:
 
 def availability() -> Availability:
     """See `SimEngine.availability`."""
-    version = installed_version()
-    if not version:
-        return Availability(False, "", ("the package mujoco is not installed",), REMEDY)
-    numbers = tuple(int(n) for n in re.findall(r"\d+", version)[:3])
-    if numbers < MINIMUM:
-        return Availability(False, version, (f"mujoco {version} has no mujoco.batch, which came with 3.17",), REMEDY)
-    if numbers in WRONG:
-        return Availability(False, version, (f"mujoco {version} is unusable: {WRONG[numbers]}",), REMEDY)
-    return Availability(True, version)
+    return judge("mujoco", installed_version(), MINIMUM, "has no mujoco.batch", WRONG, REMEDY)

@@ -101,6 +101,8 @@ class Env:
                     self._add_tree(p, tree)
                 self._filter(p)
                 self._couple(p)
+                # else Bullet keeps the first file of a name that it reads, and restores that state again and again
+                p.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self.id)
             except p.error as error:
                 failure: Exception | None = error
             else:

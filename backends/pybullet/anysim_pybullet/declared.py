@@ -1,11 +1,11 @@
 """What the engine declares without importing PyBullet: capabilities, with measured errors, and availability."""
 
-import re
 from functools import cache
 from importlib import metadata
 
 from anysim.engine.capability import Capabilities, Capability
 from anysim.engine.state import Availability
+from anysim.engine.versions import judge
 
 MINIMUM = (3, 2, 7)
 REMEDY = "pip install 'pybullet>=3.2.7'"
@@ -53,10 +53,4 @@ def installed_version() -> str:
 
 def availability() -> Availability:
     """See `SimEngine.availability`."""
-    version = installed_version()
-    if not version:
-        return Availability(False, "", ("the package pybullet is not installed",), REMEDY)
-    numbers = tuple(int(n) for n in re.findall(r"\d+", version)[:3])
-    if numbers < MINIMUM:
-        return Availability(False, version, (f"pybullet {version} is older than 3.2.7",), REMEDY)
-    return Availability(True, version)
+    return judge("pybullet", installed_version(), MINIMUM, "is not what this backend was measured with", {}, REMEDY)

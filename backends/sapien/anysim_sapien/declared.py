@@ -1,13 +1,13 @@
 """What the engine declares without importing SAPIEN: capabilities, with measured errors, and availability."""
 
 import platform
-import re
 import sys
 from functools import cache
 from importlib import metadata
 
 from anysim.engine.capability import Capabilities, Capability
 from anysim.engine.state import Availability
+from anysim.engine.versions import judge
 
 MINIMUM = (3, 0, 3)
 REMEDY = "pip install 'sapien>=3.0.3'"
@@ -41,13 +41,8 @@ def installed_version() -> str:
 
 def availability() -> Availability:
     """See `SimEngine.availability`."""
-    version = installed_version()
-    if not version:
-        missing = "the package sapien is not installed"
-        if sys.platform.startswith("linux") and platform.machine() not in ("x86_64", "aarch64"):
-            missing += f" and has no wheel for {platform.machine()}"
-        return Availability(False, "", (missing,), REMEDY)
-    numbers = tuple(int(n) for n in re.findall(r"\d+", version)[:3])
-    if numbers < MINIMUM:
-        return Availability(False, version, (f"sapien {version} is older than 3.0.3",), REMEDY)
-    return Availability(True, version)
+    lacks = "has other joint frames and collision groups"
+    here = judge("sapien", installed_version(), MINIMUM, lacks, {}, REMEDY)
+    if not here.version and sys.platform.startswith("linux") and platform.machine() not in ("x86_64", "aarch64"):
+        return here._replace(missing=(f"{here.missing[0]} and has no wheel for {platform.machine()}",))
+    return here

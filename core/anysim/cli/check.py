@@ -39,6 +39,7 @@ def check_one(name: str, engine: str | None, all_engines: bool, overrides: list[
     from anysim import registry
     from anysim.api import compile_world, dry_run, load
     from anysim.engine.capability import check as check_capabilities
+    from anysim.engine.factory import engine_class
     from anysim.engine.needs import needs_of
     from anysim.errors import AnysimError, AssetError, SpecError
 
@@ -55,7 +56,7 @@ def check_one(name: str, engine: str | None, all_engines: bool, overrides: list[
     faults: list[str] = []
     for one in engines:
         try:
-            check_capabilities(one, registry.load("engines", one).capabilities, needs_of(world), name)
+            check_capabilities(one, engine_class(one).capabilities, needs_of(world), name)
         except AnysimError as error:
             faults.append(f"{name}: {error}")
     return faults

@@ -37,12 +37,13 @@ def _capabilities() -> None:
     from anysim import registry
     from anysim.cli.output import print_table
     from anysim.engine.capability import matrix
+    from anysim.engine.factory import engine_class
     from anysim.errors import PluginError
 
     declared = {}
     for name in registry.names("engines"):
         try:
-            declared[name] = registry.load("engines", name).capabilities
+            declared[name] = engine_class(name).capabilities
         except PluginError:
             continue  # its row above says why
     engines, rows, notes = matrix(declared)
@@ -69,7 +70,9 @@ def _what(kind: str, name: str) -> str:
 
     try:
         if kind == "engines":
-            here = registry.load(kind, name).availability()
+            from anysim.engine.factory import availability
+
+            here = availability(name)
             return here.version if here.available else f"not available: {'; '.join(here.missing)}. {here.remedy}"
         if kind == "tasks":
             from anysim.api import load, task_path

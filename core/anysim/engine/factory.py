@@ -5,7 +5,9 @@ from typing import Any
 
 from anysim import registry
 from anysim.engine.base import SimEngine
-from anysim.errors import EngineError
+from anysim.engine.capability import Capabilities
+from anysim.engine.state import Availability
+from anysim.errors import EngineError, PluginError
 
 DEFAULT_ENGINE = "mujoco"
 ENGINE_VARIABLE = "ANYSIM_ENGINE"
@@ -17,16 +19,48 @@ def default_engine() -> str:
     return os.environ.get(ENGINE_VARIABLE, DEFAULT_ENGINE)
 
 
+def engine_class(name: str) -> type[SimEngine]:
+    """The class of an installed engine.
+
+    Raises:
+        PluginError: unknown, its import failed, or its entry point is no engine; names the distribution and the cause.
+    """
+    found = registry.load("engines", name)
+    if not (isinstance(found, type) and issubclass(found, SimEngine)):
+        problem = "is no subclass of anysim.engine.base.SimEngine"
+    elif not isinstance(getattr(found, "capabilities", None), Capabilities):
+        problem = "declares no capabilities"
+    else:
+        return found
+    entry = registry.entry("engines", name)
+    raise PluginError(f"the engine '{name}' of {registry.distribution('engines', name)} {problem} ({entry.value})")
+
+
+def availability(name: str) -> Availability:
+    """Whether an installed engine can run here, as it says itself.
+
+    Raises:
+        PluginError: as `engine_class`, or it broke its promise to answer; names the distribution and the cause.
+    """
+    found = engine_class(name)
+    try:
+        return found.availability()
+    except Exception as error:
+        raise PluginError(
+            f"the engine '{name}' of {registry.distribution('engines', name)} does not know whether it can run here: "
+            f"{type(error).__name__}: {error}"
+        ) from error
+
+
 def create_simulation(name: str | None = None, **options: Any) -> SimEngine:
     """An engine by name or alias, without a world: `create_simulation("mujoco", threads=2).create_world(world)`.
 
     Raises:
-        PluginError: no such engine; lists what is installed and what could be.
+        PluginError: no such engine; lists what is installed and what could be. Or it does not load; says why.
         EngineError: it is installed but cannot run here; says what is missing and the remedy.
     """
     chosen = name or default_engine()
-    engine_class: type[SimEngine] = registry.load("engines", chosen)
-    here = engine_class.availability()
+    here = availability(chosen)
     if not here.available:
         raise EngineError(f"engine '{chosen}' cannot run here: {'; '.join(here.missing)}. {here.remedy}")
-    return engine_class(**options)
+    return engine_class(chosen)(**options)

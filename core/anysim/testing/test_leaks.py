@@ -17,7 +17,8 @@ _PROC = Path("/proc/self")
 
 def _cycle(new_engine, rounds, render=False):
     for _ in range(rounds):
-        engine = new_engine().create_world(worlds.scene(cameras=render), 2)
+        engine = new_engine()
+        engine.create_world(worlds.everyday(engine.capabilities, cameras=render), 2)
         engine.step(2)
         _ = engine.get_state().body_pose
         if render:
@@ -59,11 +60,11 @@ def test_renderers_are_freed(new_engine, engine_class):
     assert _handles() <= handles
 
 
-def test_resets_do_not_grow(build):
+def test_resets_do_not_grow(build, engine_class):
     """Many resets and states leave no growing memory."""
     if not (_PROC / "statm").exists():
         pytest.skip("no /proc here: memory cannot be measured")
-    engine = build(worlds.scene(), 4)
+    engine = build(worlds.everyday(engine_class.capabilities), 4)
 
     def rounds(n):
         for _ in range(n):

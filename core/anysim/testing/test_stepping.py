@@ -93,7 +93,8 @@ def test_the_same_run_in_another_process(new_engine, pytestconfig):
     arguments = (pytestconfig.getoption("engine"), plugin.engine_options(pytestconfig))
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         there = pool.submit(run_elsewhere, *arguments)
-        here = run_and_read(new_engine(), worlds.scene())
+        engine = new_engine()
+        here = run_and_read(engine, worlds.everyday(engine.capabilities))
         assert_same(there.result(timeout=300), here, "the other process")
 
 

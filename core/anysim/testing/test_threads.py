@@ -113,7 +113,8 @@ def test_images_from_another_thread(build):
 
 def test_an_engine_made_in_a_thread_serves_another(new_engine):
     """An engine built in one thread is stepped and freed in another."""
-    engine, world = new_engine(), worlds.scene()
+    engine = new_engine()
+    world = worlds.everyday(engine.capabilities)
     builder = threading.Thread(target=lambda: engine.create_world(world))
     builder.start()
     builder.join(timeout=60)

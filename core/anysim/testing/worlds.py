@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import WORLD
+from anysim.engine.capability import Capabilities
+from anysim.engine.needs import needs_of
 from anysim.math import pose as P
 from anysim.testing.sketch import ORIGIN, Sketch, inertial
 from anysim.world.model import (
@@ -103,6 +105,25 @@ def drifting(com: Vec3 = ORIGIN, count: int = 1, gravity: Vec3 = WEIGHTLESS, dt:
     for i in range(count):
         s.free(f"box{i}", shape, (2.0 * i, 0.0, 1.0), 2.0, com=com, collides=False)
     return s.world()
+
+
+def loose() -> World:
+    """Free bodies with their centres off their frames, and a fixed post, under gravity; nothing collides.
+
+    The everyday scene of engines without joints or contacts, in which every engine of rigid bodies is exact.
+    """
+    s = Sketch("loose")
+    s.fixed("post", Box((0.1, 0.1, 1.0)), (-2.0, 0.0, 1.0), collides=False)
+    s.free("box", Box((0.1, 0.2, 0.3)), (0.0, 0.0, 4.0), 2.0, com=(0.05, -0.02, 0.1), collides=False)
+    s.free("ball", Sphere(0.05), (1.0, 0.0, 5.0), 0.5, collides=False)
+    s.free("slab", Box((0.4, 0.3, 0.02)), (2.0, 0.0, 6.0), 1.0, quaternion=turn(X, 0.7), collides=False)
+    return s.world()
+
+
+def everyday(capabilities: Capabilities, cameras: bool = False) -> World:
+    """The scene, or the loose bodies for an engine that lacks joints or contacts."""
+    whole = scene(cameras)
+    return whole if all(need.capability in capabilities for need in needs_of(whole)) else loose()
 
 
 def spinning_ball(dt: float = 0.002) -> World:

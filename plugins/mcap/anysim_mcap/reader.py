@@ -53,7 +53,8 @@ class McapReader(TrajectoryReader):
 
     @cached_property
     def actions(self) -> Array:
-        return np.array(self._rows.action, dtype=np.float64).reshape(-1, len(self.manifest.layout.action))
+        rows = self._rows.action  # their number and width both count: a robot without channels has no action
+        return np.array(rows, dtype=np.float64).reshape(len(rows), len(self.manifest.layout.action))
 
     @cached_property
     def states(self) -> Mapping[str, Array]:

@@ -56,6 +56,17 @@ def test_options_change_nothing_that_is_read(tmp_path, record, options):
     assert a.annotations == b.annotations
 
 
+def test_a_robot_without_channels_has_empty_actions(tmp_path):
+    layout = StateLayout(action=(), state={"x": (1,)})
+    run = RunHeader(task="t", seed=0, engine="e", engine_version="1", world_hash="w", control_dt=0.01, layout=layout)
+    with Recorder(tmp_path, writer_factory("mcap", {}), run) as recorder:
+        recorder.start(EpisodeHeader(env=0, episode=0, episode_seed=1))
+        for step in (1, 2, 3):
+            recorder.append(0, Frame(step, 0.0, np.zeros(0), {"x": np.full(1, float(step))}, reward=0.0))
+        reader = open_trajectory(recorder.commit(0, "success"))
+    assert reader.actions.shape == (3, 0)
+
+
 finite = hnp.arrays(np.float64, (6, 5), elements=st.floats(allow_nan=False, allow_infinity=False, allow_subnormal=True))
 loose = hnp.arrays(np.float32, (6, 2), elements=st.floats(width=32, allow_nan=False))
 

@@ -1,0 +1,1 @@
+"""A task in which a free flyer falls, pushed by gusts."""

@@ -1,0 +1,1 @@
+"""Engines that do not work, for a test."""
