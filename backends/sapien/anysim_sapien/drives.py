@@ -36,7 +36,7 @@ class Drives:
         self.passive = np.tile(np.array([j.damping for j in joints], dtype=float), (n, 1))
         self._control: Control | None = None
         self._packed = np.zeros((n, 0))  # the same numbers, a row per env
-        self._changes = 0
+        self._commanded, self._tuned = 0, 0  # how often commands, and gains, were written
         self._push = np.zeros((n, len(joints)))
         self._stiffness = np.zeros((n, len(joints)))
         self._damping = np.zeros((n, len(joints)))
@@ -49,11 +49,16 @@ class Drives:
         """Take over the commands of all envs."""
         self._packed = np.concatenate(control, axis=1)
         self._control = Control(*np.split(self._packed, 4, axis=1))
-        self.refresh()
+        self._commanded += 1
+        self._update()
 
     def refresh(self) -> None:
-        """Make the terms of the law, after a change of commands, gains or limits."""
-        self._changes += 1
+        """Take over gains, limits or passive damping that were written."""
+        self._tuned += 1
+        self._update()
+
+    def _update(self) -> None:
+        """Make the terms of the law."""
         for array in (self._push, self._stiffness, self._damping):
             array[...] = 0.0
         self._bound[...] = np.inf
@@ -74,17 +79,18 @@ class Drives:
 
     def record(self, env: int, journal: Journal) -> None:
         """Have a journal know what moves the env from here on."""
-        if journal.seen == self._changes:
-            return
-        journal.seen = self._changes
-        control = self._packed[env].tobytes()
-        if control != journal.control:
-            journal.control = control
-            journal.record(Op.CONTROL, control)
-        gains = b"".join(part[env].tobytes() for part in (self.kp, self.kd, self.limit, self.passive))
-        if gains != journal.gains:
-            journal.gains = gains
-            journal.record(Op.GAINS, gains)
+        if journal.commanded != self._commanded:
+            journal.commanded = self._commanded
+            control = self._packed[env].tobytes()
+            if control != journal.control:
+                journal.control = control
+                journal.record(Op.CONTROL, control)
+        if journal.tuned != self._tuned:
+            journal.tuned = self._tuned
+            gains = b"".join(part[env].tobytes() for part in (self.kp, self.kd, self.limit, self.passive))
+            if gains != journal.gains:
+                journal.gains = gains
+                journal.record(Op.GAINS, gains)
 
     def forget(self, env: int) -> None:
         """The env's scene is new: PhysX has none of these numbers."""

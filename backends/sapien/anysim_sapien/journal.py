@@ -50,7 +50,7 @@ _WRITES = frozenset({Op.JOINTS, Op.POSE, Op.VELOCITY, Op.INERTIAL, Op.DRY, Op.AR
 class Journal:
     """What was done to one scene."""
 
-    __slots__ = ("_bytes", "_waiting", "control", "gains", "seen", "steps", "writes")
+    __slots__ = ("_bytes", "_waiting", "commanded", "control", "gains", "steps", "tuned", "writes")
 
     def __init__(self) -> None:
         self.clear()
@@ -61,8 +61,10 @@ class Journal:
         self._waiting = 0
         self.steps, self.writes = 0, 0
         """Physics steps and writes since the last BASE."""
-        self.control, self.gains, self.seen = b"", b"", -1
-        """The latest entries CONTROL and GAINS, and a mark of their owner's by which it knows that nothing changed."""
+        self.control, self.gains = b"", b""
+        """The latest entries CONTROL and GAINS."""
+        self.commanded, self.tuned = -1, -1
+        """Marks of the drives', by which they know that neither changed since."""
 
     def record(self, op: Op, numbers: bytes) -> None:
         """Add an entry; `numbers` are the bytes of 64-bit floats."""

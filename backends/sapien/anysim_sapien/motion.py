@@ -36,7 +36,7 @@ def motion_of(scene: EnvScene, layout: Layout) -> Motion:
 def motions_of(scenes: Sequence[EnvScene], layout: Layout) -> dict[str, Array]:
     """Those of several scenes (E, ...), by the names of `Motion`."""
     parts = [motion_of(scene, layout) for scene in scenes]
-    return {name: np.stack([getattr(part, name) for part in parts]) for name in Motion._fields}
+    return {name: np.array([getattr(part, name) for part in parts]) for name in Motion._fields}
 
 
 def put_motion(scene: EnvScene, layout: Layout, motion: Motion) -> None:

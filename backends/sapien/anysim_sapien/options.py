@@ -22,7 +22,7 @@ class SapienOptions(BaseModel):
         default=5.0, gt=0, description="highest speed at which bodies that overlap are pushed apart [m/s]"
     )
     rebase_steps: int = Field(
-        default=2000,
+        default=5000,
         ge=1,
         description="physics steps after which an env's scene is built anew from its motion, which bounds what an exact "
         "snapshot holds and how long it takes to restore",

@@ -77,7 +77,7 @@ def replay(scene: EnvScene, world: World, rows: Array) -> Drives:
 
 def pasts_of(scenes: Sequence[EnvScene]) -> dict[str, Array]:
     """What scenes were built with, and their journals (E, L), each as long as `length` says, then zeros."""
-    data = {f"base.{name}": np.stack([getattr(s.values, name) for s in scenes]) for name in Values._fields}
+    data = {f"base.{name}": np.array([getattr(s.values, name) for s in scenes]) for name in Values._fields}
     journals = [scene.journal.rows() for scene in scenes]
     length = np.array([len(journal) for journal in journals], dtype=np.int64)
     rows = np.zeros((len(scenes), length.max(initial=0)))
