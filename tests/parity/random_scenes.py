@@ -196,7 +196,23 @@ def state_digest(engine: SimEngine, rows: list[int]) -> str:
     digest, state = hashlib.sha256(), engine.get_state()
     for name in FIELDS:
         digest.update(np.ascontiguousarray(getattr(state, name)[rows]).tobytes())
+    if Capability.CONTACT_POINTS in engine.capabilities:
+        for env in rows:
+            for column in engine.contacts([env])[1:]:
+                digest.update(np.ascontiguousarray(column).tobytes())
     return digest.hexdigest()
+
+
+def until_touch(engine: SimEngine, number: int, most: int) -> bool:
+    """Go on until something touches something in all envs, for so many rounds at most; whether it does."""
+    if Capability.CONTACT_POINTS not in engine.capabilities:
+        return False
+    rows = list(range(engine.num_envs))
+    for part in range(most):
+        if set(engine.contacts().env.tolist()) == set(rows):
+            return True
+        treat(engine, number, 100 + part, 1, rows)
+    return False
 
 
 def wild(engine: SimEngine, number: int) -> None:

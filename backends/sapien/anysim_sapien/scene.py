@@ -74,6 +74,7 @@ class EnvScene:
         self.place_joints(recipe.initial, np.zeros(len(world.joints)))
         order = {entity: row for row, entity in enumerate(self.scene.entities)}
         self._rows = np.array([order[entity] for entity in self.entities], dtype=int)
+        self._number = {shape: i for i, shape in enumerate(s for shapes in self.shapes for s in shapes)}
         self.journal.clear()
 
     # ------------------------------------------------------------------ building
@@ -257,6 +258,10 @@ class EnvScene:
                 tree.handle.set_qpos(position[tree.joints].astype(np.float32))
             if velocity is not None:
                 tree.handle.set_qvel(velocity[tree.joints].astype(np.float32))
+
+    def contacts(self) -> list[Any]:
+        """PhysX' contacts of the last step, by the numbers of their shapes: its own order is that of addresses."""
+        return sorted(self.system.get_contacts(), key=lambda c: [self._number[shape] for shape in c.shapes])
 
     def poses(self) -> Array:
         """Poses (B, 7) of the bodies' frames, xyzw, float64."""
