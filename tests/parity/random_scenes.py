@@ -171,7 +171,10 @@ def treat(engine: SimEngine, number: int, part: int, length: int, rows: list[int
     for _ in range(length):
         shape = (len(rows), len(world.actuators))
         engine.set_control(
-            initial + 0.3 * rng.standard_normal(shape), rng.standard_normal(shape), 2.0 * rng.standard_normal(shape), rows
+            initial + 0.3 * rng.standard_normal(shape),
+            rng.standard_normal(shape),
+            2.0 * rng.standard_normal(shape),
+            rows,
         )
         if shape[1] and rng.random() < 0.1:
             engine.set_control_mode(rng.choice(list(ControlMode)), [rows[0]], [int(rng.integers(shape[1]))])

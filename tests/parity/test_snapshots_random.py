@@ -14,7 +14,7 @@ from anysim.testing import tolerances
 from anysim.testing.compare import MOTION
 from tests.parity import random_scenes as scenes
 
-SCENES = int(__import__("os").environ.get("SC","100"))
+SCENES = 100
 BEFORE, LONGEST_FALL, AFTER = 15, 60, 10
 """Rounds of new commands, of 1 to 4 physics steps each."""
 
