@@ -261,7 +261,10 @@ def stored(file: Path) -> dict[int, Snapshot]:
                 stamps[int(number)] = arrays[key].tolist()
             else:
                 data.setdefault(int(number), {})[name.removeprefix("data/")] = arrays[key]
-    return {n: Snapshot(*stamp[:3], SnapshotLevel(stamp[3]), data[n]) for n, stamp in stamps.items()}
+    found: dict[int, Snapshot] = {}
+    for number, (engine, version, world, level) in stamps.items():
+        found[number] = Snapshot(engine, version, world, SnapshotLevel(level), data[number])
+    return found
 
 
 def go_on(name: str, file: Path, length: int) -> dict[int, list[str]]:

@@ -1,4 +1,4 @@
-"""Snapshots of a hundred random scenes per engine: going on from them is the run that was not interrupted, to the bit."""
+"""Snapshots of a hundred random scenes per engine: going on from one is the uninterrupted run, to the bit."""
 
 import json
 import subprocess

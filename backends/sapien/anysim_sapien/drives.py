@@ -96,9 +96,13 @@ class Drives:
         """The env's scene is new: PhysX has none of these numbers."""
         self._set[env] = np.nan
 
-    def adopt(self, env: int, other: "Drives") -> None:
-        """Take over, into an env, what PhysX was given by drives of one env."""
-        self._set[env] = other._set[0]
+    def given(self, env: int) -> Array:
+        """The damping (J,) that PhysX has of an env; not a number where it has none yet."""
+        return self._set[env].copy()
+
+    def adopt(self, env: int, damping: Array) -> None:
+        """The env's scene is another one, which was given this."""
+        self._set[env] = damping
 
     def substep(self, env: int, scene: EnvScene) -> None:
         """Give PhysX the law's terms at the present state."""

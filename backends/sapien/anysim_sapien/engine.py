@@ -192,7 +192,7 @@ class SapienEngine(SimEngine):
         for row, env in enumerate(ids.tolist()):
             if level is SnapshotLevel.TRAJECTORY:
                 self._scenes[env], drives = relive(self._recipe, data, row)
-                self._drives.adopt(env, drives)
+                self._drives.adopt(env, drives.given(0))
             else:
                 self._place(env, Motion(*(data[name][row] for name in Motion._fields)))
             self._reader.put_rows(env, data, row)

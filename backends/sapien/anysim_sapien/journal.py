@@ -1,5 +1,7 @@
-"""What was done to a scene since it was built: PhysX keeps contact memory that nothing reads out, but the same scene
-built again and treated alike comes to the same bits, in any process.
+"""What was done to a scene since it was built.
+
+PhysX keeps contact memory that nothing reads out, but the same scene built again and treated alike comes to the same
+bits, in any process.
 
 A journal is a sequence of entries of 64-bit floats: what was done, how many numbers follow, and these numbers.
 """

@@ -24,7 +24,7 @@ class SapienOptions(BaseModel):
     rebase_steps: int = Field(
         default=5000,
         ge=1,
-        description="physics steps after which an env's scene is built anew from its motion, which bounds what an exact "
+        description="physics steps after which an env's scene is built anew from its motion; this bounds what an exact "
         "snapshot holds and how long it takes to restore",
     )
     vulkan_icd: str = Field(
