@@ -50,7 +50,7 @@ def test_the_null_engine_passes(tmp_path):
 DYNAMIC = {
     "mujoco": {"render: rgb"},
     "pybullet": {"render: rgb", "parameter body.com"},
-    "sapien": {"render: rgb", "snapshot: trajectory"},
+    "sapien": {"render: rgb"},
 }
 """The engines of the repository that move things, and for want of what a test of theirs may be skipped."""
 

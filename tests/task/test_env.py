@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import anysim
-from anysim import hooks
+from anysim import hooks, registry
 from anysim.errors import SpecError, TaskError
 from anysim.task.contract import Status
 from tests.task.helpers import arm, blocks
@@ -128,10 +128,15 @@ def test_an_episode_is_drawn_again_from_its_seed() -> None:
         assert (again["policy"] == obs["policy"]).all()
 
 
-@pytest.mark.parametrize("n", [1, 3])
-def test_continuing_from_a_snapshot_equals_the_uninterrupted_run(n: int) -> None:
+@pytest.mark.parametrize(
+    ("engine", "n"), [("null", 1), ("null", 3), ("mujoco", 2), ("pybullet", 2), ("sapien", 2)]
+)  # fmt: skip
+def test_continuing_from_a_snapshot_equals_the_uninterrupted_run(engine: str, n: int) -> None:
+    here = registry.load("engines", engine).availability()
+    if not here.available:
+        pytest.skip(f"{engine} is not available: {here.remedy}")
     rng = np.random.default_rng(0)
-    with arm(n) as env:
+    with arm(n, engine=engine) as env:
         env.reset(seed=1)
         actions = rng.uniform(-1, 1, (20, n, env.action_dim))
         for action in actions[:10]:

@@ -20,6 +20,12 @@ REACHES = (10.0, 100.0, 10000.0)
 _BATCH = 8192
 
 
+def _points(env: Env) -> list[Any]:
+    """Bullet's contact points, in an order of their own: a restored state lists the same ones in another."""
+    points = bullet().getContactPoints(physicsClientId=env.id) or ()
+    return sorted(points, key=lambda c: (c[BODY_A], c[BODY_B], c[LINK_A], c[LINK_B], c[POINT], c[NORMAL], c[FORCE]))
+
+
 def _vectors(points: Any) -> Array:
     """Forces on a (C, 3) [N] of Bullet's contact points: along the normal and by friction."""
     normal = np.array([c[NORMAL] for c in points], dtype=float).reshape(-1, 3)
@@ -41,8 +47,7 @@ def sensor_forces(world: World, env: Env) -> Array:
     forces = np.zeros((len(world.contact_sensors), 3))
     if not world.contact_sensors:
         return forces
-    points = bullet().getContactPoints(physicsClientId=env.id) or ()
-    points = [c for c in points if c[FORCE] != 0.0]
+    points = [c for c in _points(env) if c[FORCE] != 0.0]
     if not points:
         return forces
     on_a, (a, b) = _vectors(points), _bodies(env, points)
@@ -57,10 +62,9 @@ def sensor_forces(world: World, env: Env) -> Array:
 
 def contact_points(envs: Sequence[Env], ids: Array) -> ContactPoints:
     """All contact points of envs."""
-    p, parts = bullet(), []
+    parts = []
     for index in ids.tolist():
-        points = p.getContactPoints(physicsClientId=envs[index].id) or ()
-        points = [c for c in points if c[DISTANCE] <= 0.0 or c[FORCE] != 0.0]
+        points = [c for c in _points(envs[index]) if c[DISTANCE] <= 0.0 or c[FORCE] != 0.0]
         a, b = _bodies(envs[index], points)
         place = np.array([c[POINT] for c in points], dtype=float).reshape(-1, 3)
         normal = -np.array([c[NORMAL] for c in points], dtype=float).reshape(-1, 3)

@@ -16,7 +16,7 @@ from anysim_sapien.scene import EnvScene
 
 def _touching(scene: EnvScene) -> Iterator[tuple[int, int, Any]]:
     """Bodies and the contact of each pair of shapes that PhysX looked at."""
-    for contact in scene.system.get_contacts():
+    for contact in scene.contacts():
         first, second = contact.bodies
         yield scene.body_of[first], scene.body_of[second], contact
 

@@ -24,7 +24,7 @@ _APPROXIMATE = {
     Capability.CONTACT_SENSORS: "normal forces alone: PhysX 5.3 does not report friction, up to mu times as much",
     Capability.CONTACT_POINTS: "normal forces alone: PhysX 5.3 does not report friction, up to mu times as much",
 }
-_ABSENT = (Capability.LIVE_EDIT_NATIVE, Capability.SNAPSHOT_TRAJECTORY)
+_ABSENT = (Capability.LIVE_EDIT_NATIVE,)
 CAPABILITIES = Capabilities.of(
     *(c for c in Capability if c not in _APPROXIMATE and c not in _ABSENT), approximate=_APPROXIMATE
 )

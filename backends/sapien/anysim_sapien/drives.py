@@ -13,6 +13,7 @@ from anysim.conventions import Array
 from anysim.engine.commands import MODES, Control
 from anysim.errors import EngineError
 from anysim.world.model import ControlMode, World
+from anysim_sapien.journal import Journal, Op
 from anysim_sapien.scene import UNBOUNDED, EnvScene
 
 _POSITION, _EFFORT = MODES.index(ControlMode.POSITION), MODES.index(ControlMode.EFFORT)
@@ -34,6 +35,8 @@ class Drives:
         self.limit = np.tile(np.array([a.effort_limit for a in actuators], dtype=float), (n, 1))
         self.passive = np.tile(np.array([j.damping for j in joints], dtype=float), (n, 1))
         self._control: Control | None = None
+        self._packed = np.zeros((n, 0))  # the same numbers, a row per env
+        self._commanded, self._tuned = 0, 0  # how often commands, and gains, were written
         self._push = np.zeros((n, len(joints)))
         self._stiffness = np.zeros((n, len(joints)))
         self._damping = np.zeros((n, len(joints)))
@@ -44,11 +47,18 @@ class Drives:
 
     def apply(self, control: Control) -> None:
         """Take over the commands of all envs."""
-        self._control = Control(*(array.copy() for array in control))
-        self.refresh()
+        self._packed = np.concatenate(control, axis=1)
+        self._control = Control(*np.split(self._packed, 4, axis=1))
+        self._commanded += 1
+        self._update()
 
     def refresh(self) -> None:
-        """Make the terms of the law, after a change of commands, gains or limits."""
+        """Take over gains, limits or passive damping that were written."""
+        self._tuned += 1
+        self._update()
+
+    def _update(self) -> None:
+        """Make the terms of the law."""
         for array in (self._push, self._stiffness, self._damping):
             array[...] = 0.0
         self._bound[...] = np.inf
@@ -60,9 +70,39 @@ class Drives:
         self._stiffness[:, self._joint], self._damping[:, self._joint] = kp, kd
         self._bound[:, self._joint] = self.limit
 
+    def set_gains(self, env: int, values: Array) -> None:
+        """Write an env's kp, kd, limits (A,) and passive damping (J,), one after the other."""
+        a = len(self._joint)
+        self.kp[env], self.kd[env], self.limit[env] = values[: 3 * a].reshape(3, a)
+        self.passive[env] = values[3 * a :]
+        self.refresh()
+
+    def record(self, env: int, journal: Journal) -> None:
+        """Have a journal know what moves the env from here on."""
+        if journal.commanded != self._commanded:
+            journal.commanded = self._commanded
+            control = self._packed[env].tobytes()
+            if control != journal.control:
+                journal.control = control
+                journal.record(Op.CONTROL, control)
+        if journal.tuned != self._tuned:
+            journal.tuned = self._tuned
+            gains = b"".join(part[env].tobytes() for part in (self.kp, self.kd, self.limit, self.passive))
+            if gains != journal.gains:
+                journal.gains = gains
+                journal.record(Op.GAINS, gains)
+
     def forget(self, env: int) -> None:
         """The env's scene is new: PhysX has none of these numbers."""
         self._set[env] = np.nan
+
+    def given(self, env: int) -> Array:
+        """The damping (J,) that PhysX has of an env; not a number where it has none yet."""
+        return self._set[env].copy()
+
+    def adopt(self, env: int, damping: Array) -> None:
+        """The env's scene is another one, which was given this."""
+        self._set[env] = damping
 
     def substep(self, env: int, scene: EnvScene) -> None:
         """Give PhysX the law's terms at the present state."""

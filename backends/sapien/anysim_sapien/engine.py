@@ -18,14 +18,14 @@ from anysim_sapien.audit import geom_volumes, joint_limits
 from anysim_sapien.carry import Carried, shared
 from anysim_sapien.contacts import contact_points
 from anysim_sapien.drives import Drives
-from anysim_sapien.motion import Motion, motion_of, put_motion, put_twist, twists_of
+from anysim_sapien.motion import Motion, motion_of, motions_of, put_motion, put_twist, twists_of
 from anysim_sapien.options import SapienOptions
 from anysim_sapien.parameters import Parameters
 from anysim_sapien.rays import cast
 from anysim_sapien.recipe import Recipe
 from anysim_sapien.scene import EnvScene
-from anysim_sapien.shapes import to_pose
 from anysim_sapien.state import StateReader
+from anysim_sapien.stepping import advance, pasts_of, relive, wrenches
 
 _BUILT = ("_recipe", "_layout", "_drives", "_parameters", "_reader", "_fields", "_wrench", "_scenes")
 """What `_build` makes and `_free` lets go of."""
@@ -99,10 +99,14 @@ class SapienEngine(SimEngine):
     def _rebuild_env(self, env: int) -> None:
         """A new scene for an env, in its present state."""
         self._reader.keep_contact(env)
-        motion = motion_of(self._scenes[env], self._layout)
+        self._place(env, motion_of(self._scenes[env], self._layout))
+        self._reader.written(env)
+
+    def _place(self, env: int, motion: Motion) -> None:
+        """A new scene for an env, in a given state."""
         self._renew(env)
         put_motion(self._scenes[env], self._layout, motion)
-        self._reader.written(env)
+        self._scenes[env].journal.base()
 
     # ------------------------------------------------------------------ stepping
 
@@ -111,26 +115,15 @@ class SapienEngine(SimEngine):
             self._step_env(int(env), n_steps)
 
     def _step_env(self, env: int, n_steps: int) -> None:
-        scene, system = self._scenes[env], self._scenes[env].system
-        driven = bool(scene.joints)
-        pushes = self._pushes(env, scene)
-        for _ in range(n_steps):
-            if driven:
-                self._drives.substep(env, scene)
-            for component, force, torque in pushes:
-                component.add_force_torque(force, torque)
-            system.step()
-        if driven:
-            self._drives.note(env, scene)
+        pushes = None if self._wrench is None else wrenches(self._wrench[env], self._layout.fixed)
+        while n_steps:
+            room = self.options.rebase_steps - self._scenes[env].journal.steps
+            if room <= 0:
+                self._place(env, motion_of(self._scenes[env], self._layout))
+                continue
+            advance(self._scenes[env], self._drives, env, pushes, min(n_steps, room))
+            n_steps -= min(n_steps, room)
         self._reader.stepped(env)
-
-    def _pushes(self, env: int, scene: EnvScene) -> list[tuple[Any, Array, Array]]:
-        """The wrenches of an env that act on bodies that can move."""
-        if self._wrench is None:
-            return []
-        rows = self._wrench[env]
-        pushed = np.flatnonzero(rows.any(axis=1) & ~self._layout.fixed)
-        return [(scene.bodies[body], rows[body, :3], rows[body, 3:]) for body in pushed]
 
     def _read(self, name: str) -> Array:
         return self._fields[name]()
@@ -154,7 +147,7 @@ class SapienEngine(SimEngine):
                 full_velocity = scene.joint_velocities()
                 full_velocity[joints] = velocity[row]
             scene.place_joints(full_position, full_velocity)
-            self._reader.written(int(env))
+            self._written(int(env))
 
     def _write_bodies(self, ids: Array, bodies: Array, pose: Array | None, twist: Array | None) -> None:
         for row, env in enumerate(ids):
@@ -169,12 +162,21 @@ class SapienEngine(SimEngine):
                     if moved.any():
                         rows[moved] = twists_of(scene, bodies[moved].tolist(), turn[moved])
                 for body, place in zip(bodies, pose[row], strict=True):
-                    scene.entities[body].set_pose(to_pose(place))
+                    scene.place_body(int(body), place)
                 turn = scene.poses()[bodies, 3:]
             if rows is not None:
                 for column in np.flatnonzero(moved):
-                    put_twist(scene, self._layout, int(bodies[column]), rows[column], turn[column])
-            self._reader.written(int(env))
+                    put_twist(scene, int(bodies[column]), rows[column], turn[column])
+            self._written(int(env))
+
+    def _written(self, env: int) -> None:
+        self._reader.written(env)
+        self._bound(env)
+
+    def _bound(self, env: int) -> None:
+        """What is written again and again and never stepped has its scene built anew, too."""
+        if self._scenes[env].journal.writes > self.options.rebase_steps:
+            self._rebuild_env(env)
 
     # ------------------------------------------------------------------ parameters and snapshots
 
@@ -183,21 +185,25 @@ class SapienEngine(SimEngine):
 
     def _set_parameter(self, name: str, values: Array, ids: Array, indices: Array) -> None:
         self._parameters.set(name, values, ids, indices)
+        for env in ids:
+            self._bound(int(env))
 
     def _default_parameter(self, name: str) -> Array:
         return self._parameters.default(name)
 
     def _snapshot(self, ids: Array, level: SnapshotLevel) -> dict[str, Array]:
-        parts = [motion_of(self._scenes[env], self._layout) for env in ids]
-        data = {name: np.stack([getattr(part, name) for part in parts]) for name in Motion._fields}
-        return data | {"effort": self._drives.effort[ids], "contact": self._reader.contact_force()[ids]}
+        scenes = [self._scenes[env] for env in ids]
+        data = pasts_of(scenes) if level is SnapshotLevel.TRAJECTORY else motions_of(scenes, self._layout)
+        return data | {"effort": self._drives.effort[ids]} | self._reader.rows(ids)
 
     def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:
-        for row, env in enumerate(ids):
-            self._renew(int(env))
-            put_motion(self._scenes[env], self._layout, Motion(*(data[name][row] for name in Motion._fields)))
-            self._reader.written(int(env))
-            self._reader.hold_contact(int(env), data["contact"][row])
+        for row, env in enumerate(ids.tolist()):
+            if level is SnapshotLevel.TRAJECTORY:
+                self._scenes[env], drives = relive(self._recipe, data, row)
+                self._drives.adopt(env, drives.given(0))
+            else:
+                self._place(env, Motion(*(data[name][row] for name in Motion._fields)))
+            self._reader.put_rows(env, data, row)
             self._drives.effort[env] = data["effort"][row]
 
     def _carry_rows(self) -> Any:

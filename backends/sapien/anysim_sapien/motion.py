@@ -9,7 +9,6 @@ from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim_sapien.layout import Layout
 from anysim_sapien.scene import EnvScene
-from anysim_sapien.shapes import to_pose
 
 
 class Motion(NamedTuple):
@@ -34,24 +33,19 @@ def motion_of(scene: EnvScene, layout: Layout) -> Motion:
     return Motion(np.where(roots, scene.poses(), 0.0), velocity, scene.joint_positions(), scene.joint_velocities())
 
 
+def motions_of(scenes: Sequence[EnvScene], layout: Layout) -> dict[str, Array]:
+    """Those of several scenes (E, ...), by the names of `Motion`."""
+    parts = [motion_of(scene, layout) for scene in scenes]
+    return {name: np.array([getattr(part, name) for part in parts]) for name in Motion._fields}
+
+
 def put_motion(scene: EnvScene, layout: Layout, motion: Motion) -> None:
     """Write what `motion_of` returned."""
     for body in np.flatnonzero(layout.free | layout.fixed):
-        scene.entities[body].set_pose(to_pose(motion.pose[body]))
+        scene.place_body(int(body), motion.pose[body])
         if layout.free[body]:
-            _put_velocity(scene, layout, int(body), motion.velocity[body, :3], motion.velocity[body, 3:])
+            scene.push_body(int(body), motion.velocity[body, :3], motion.velocity[body, 3:])
     scene.place_joints(motion.joint_pos, motion.joint_vel)
-
-
-def _put_velocity(scene: EnvScene, layout: Layout, body: int, linear: Array, rate: Array) -> None:
-    """Of the centre of mass, which is what PhysX takes."""
-    tree = layout.tree_of[body]
-    if tree >= 0:
-        scene.trees[tree].handle.set_root_linear_velocity(linear)
-        scene.trees[tree].handle.set_root_angular_velocity(rate)
-    else:
-        scene.bodies[body].set_linear_velocity(linear)
-        scene.bodies[body].set_angular_velocity(rate)
 
 
 def twists_of(scene: EnvScene, bodies: Sequence[int], turn: Array) -> Array:
@@ -70,7 +64,7 @@ def _arms(components: Sequence[Any], turn: Array) -> Array:
     return P.rotate(turn, np.array([component.cmass_local_pose.p for component in components], dtype=float))
 
 
-def put_twist(scene: EnvScene, layout: Layout, body: int, twist: Array, turn: Array) -> None:
+def put_twist(scene: EnvScene, body: int, twist: Array, turn: Array) -> None:
     """Write a root's twist (6,), as `twists_of` returns it, at its orientation (4,)."""
     arm = _arms([scene.bodies[body]], turn[None])[0]
-    _put_velocity(scene, layout, body, twist[:3] + P.cross(twist[3:], arm), twist[3:])
+    scene.push_body(body, twist[:3] + P.cross(twist[3:], arm), twist[3:])

@@ -21,6 +21,12 @@ class SapienOptions(BaseModel):
     depenetration_velocity: float = Field(
         default=5.0, gt=0, description="highest speed at which bodies that overlap are pushed apart [m/s]"
     )
+    rebase_steps: int = Field(
+        default=5000,
+        ge=1,
+        description="physics steps after which an env's scene is built anew from its motion; this bounds what an exact "
+        "snapshot holds and how long it takes to restore",
+    )
     vulkan_icd: str = Field(
         default="auto",
         description="Vulkan driver that draws: auto (what the environment says, a system driver, else Chromium's "

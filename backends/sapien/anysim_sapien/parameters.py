@@ -133,7 +133,7 @@ class Parameters:
                     scene.set_inertial(int(body), *(wanted[part][env, body] for part in _BODIES))
         elif name == "joint.armature":
             for index in indices:
-                scene.joints[index].set_armature(np.array([wanted[name][env, index]], dtype=np.float32))
+                scene.set_armature(int(index), float(wanted[name][env, index]))
         elif name == "joint.friction":
             for index in indices:
                 scene.set_dry(int(index), float(wanted[name][env, index]))

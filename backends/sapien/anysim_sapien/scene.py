@@ -12,9 +12,10 @@ import numpy as np
 from anysim.conventions import WORLD, Array, wxyz_from_xyzw
 from anysim.world.model import BodyKind, JointType
 from anysim_sapien.exclusions import Group
+from anysim_sapien.journal import Journal, Op
 from anysim_sapien.library import physx, sapien
 from anysim_sapien.recipe import Recipe, Values, tendon_chain
-from anysim_sapien.shapes import make_shape
+from anysim_sapien.shapes import make_shape, to_pose
 
 FAST = 1e9
 """Stands for no limit where PhysX has a highest speed: 100 m/s and 50 rad/s by default."""
@@ -47,7 +48,11 @@ class EnvScene:
 
     def __init__(self, recipe: Recipe, values: Values) -> None:
         world = recipe.world
-        self._recipe, self._values = recipe, values
+        self._recipe = recipe
+        self.values = Values(*(np.array(part) for part in values))
+        """The parameters that it was built with."""
+        self.journal = Journal()
+        """What was done to it since it was built."""
         self.system = _system(recipe, values.gravity)
         self.scene: Any = sapien.Scene([self.system])
         self.bodies: list[Any] = [None] * len(world.bodies)
@@ -69,6 +74,8 @@ class EnvScene:
         self.place_joints(recipe.initial, np.zeros(len(world.joints)))
         order = {entity: row for row, entity in enumerate(self.scene.entities)}
         self._rows = np.array([order[entity] for entity in self.entities], dtype=int)
+        self._number = {shape: i for i, shape in enumerate(s for shapes in self.shapes for s in shapes)}
+        self.journal.clear()
 
     # ------------------------------------------------------------------ building
 
@@ -91,7 +98,7 @@ class EnvScene:
         else:
             self.bodies[body], self.entities[body] = component, entity
             if not isinstance(component, physx.PhysxRigidStaticComponent):
-                self.set_inertial(body, self._values.mass[body], self._values.com[body], self._values.inertia[body])
+                self.set_inertial(body, self.values.mass[body], self.values.com[body], self.values.inertia[body])
                 self._free_of_defaults(component, recipe.world.bodies[body].gravity_compensation)
         self.scene.add_entity(entity)
 
@@ -133,7 +140,7 @@ class EnvScene:
             joint.set_limit(np.array([[spec.lower, spec.upper]], dtype=np.float32))
             joint.set_friction(0.0)
             joint.set_max_velocity(FAST)
-            joint.set_armature(np.array([self._values.armature[index]], dtype=np.float32))
+            joint.set_armature(np.array([self.values.armature[index]], dtype=np.float32))
             joint.set_drive_properties(0.0, spec.damping, UNBOUNDED, "force")
             joint.set_drive_velocity_target(0.0)
             joint.set_name(str(index))
@@ -173,6 +180,7 @@ class EnvScene:
 
     def set_inertial(self, body: int, mass: float, com: Array, inertia: Array) -> None:
         """Mass [kg], centre of mass [m] and inertia about it (6,) [kg m^2], in the body's frame."""
+        self.journal.note(Op.INERTIAL, body, mass, com, inertia)
         component = self.bodies[body]
         if self._recipe.layout.fixed[body]:
             # the root of a fixed articulation: it cannot move, and PhysX wants positive numbers
@@ -189,6 +197,7 @@ class EnvScene:
         """Dry friction [N m] or [N] of a joint: a drive to standstill that may exert this much and no more."""
         world = self._recipe.world
         spec = world.joints[index]
+        self.journal.note(Op.DRY, index, friction)
         drive = self.dry.get(index)
         if drive is None:
             if friction == 0.0:
@@ -216,13 +225,43 @@ class EnvScene:
         properties = drive.get_drive_property_x() if sliding else drive.get_drive_property_twist()
         return float(properties[2]) / self._recipe.world.physics.dt
 
+    def set_armature(self, index: int, armature: float) -> None:
+        """Armature [kg m^2] or [kg] of a joint."""
+        self.journal.note(Op.ARMATURE, index, armature)
+        self.joints[index].set_armature(np.array([armature], dtype=np.float32))
+
+    def place_body(self, body: int, pose: Array) -> None:
+        """Write the pose (7,) of a root body's frame."""
+        self.journal.note(Op.POSE, body, pose)
+        self.entities[body].set_pose(to_pose(pose))
+
+    def push_body(self, body: int, linear: Array, rate: Array) -> None:
+        """Write the velocity of a free root's centre of mass [m/s], and its angular rate [rad/s], world axes."""
+        self.journal.note(Op.VELOCITY, body, linear, rate)
+        tree = self._recipe.layout.tree_of[body]
+        if tree >= 0:
+            self.trees[tree].handle.set_root_linear_velocity(linear)
+            self.trees[tree].handle.set_root_angular_velocity(rate)
+        else:
+            self.bodies[body].set_linear_velocity(linear)
+            self.bodies[body].set_angular_velocity(rate)
+
     def place_joints(self, position: Array | None, velocity: Array | None) -> None:
         """Write all joint positions and velocities (J,)."""
+        nothing = np.zeros(len(self._recipe.world.joints))
+        self.journal.note(
+            Op.JOINTS, position is not None, velocity is not None, nothing if position is None else position,
+            nothing if velocity is None else velocity,
+        )  # fmt: skip
         for tree in self.trees:
             if position is not None:
                 tree.handle.set_qpos(position[tree.joints].astype(np.float32))
             if velocity is not None:
                 tree.handle.set_qvel(velocity[tree.joints].astype(np.float32))
+
+    def contacts(self) -> list[Any]:
+        """PhysX' contacts of the last step, by the numbers of their shapes: its own order is that of addresses."""
+        return sorted(self.system.get_contacts(), key=lambda c: [self._number[shape] for shape in c.shapes])
 
     def poses(self) -> Array:
         """Poses (B, 7) of the bodies' frames, xyzw, float64."""

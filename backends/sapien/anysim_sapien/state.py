@@ -62,6 +62,16 @@ class StateReader:
         self._motion[env, bodies, :7], self._motion[env, bodies, 7:] = pose, twist
         self._held_motion[env] = True
 
+    def rows(self, ids: Array) -> dict[str, Array]:
+        """What a snapshot holds of this: contact forces, and motions where they are held."""
+        motion = np.where(self._held_motion[ids, None, None], self._motion[ids], 0.0)
+        return {"contact": self.contact_force()[ids], "held": self._held_motion[ids], "held_motion": motion}
+
+    def put_rows(self, env: int, data: Mapping[str, Array], row: int) -> None:
+        """Write a row that `rows` made."""
+        self.hold_contact(env, data["contact"][row])
+        self._held_motion[env], self._motion[env] = data["held"][row], data["held_motion"][row]
+
     # ------------------------------------------------------------------ fields
 
     def _poses(self, env: int) -> Array:

@@ -72,7 +72,11 @@ class Primitives(ABC):
 
     @abstractmethod
     def _snapshot(self, ids: Array, level: SnapshotLevel) -> dict[str, Array]:
-        """Everything beyond commands, parameters and cameras that continuing needs; arrays with leading env axis."""
+        """Everything beyond commands, parameters and cameras that continuing needs; arrays with leading env axis.
+
+        Each row stands for itself. Rows of one axis may have any length that the engine keeps beside: further zeros at
+        their end are to be passed over, since rows of several engines may be joined.
+        """
 
     @abstractmethod
     def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:

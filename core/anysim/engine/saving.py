@@ -1,6 +1,6 @@
-"""What a snapshot holds beside the engine's own rows, and in which order it is put back."""
+"""What a snapshot holds beside the engine's own rows, in which order it is put back, and how snapshots are joined."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.engine.parameters import PARAMETERS
 from anysim.engine.state import Snapshot, SnapshotLevel
+from anysim.errors import SnapshotError
 
 if TYPE_CHECKING:
     from anysim.engine.base import SimEngine
@@ -48,3 +49,55 @@ def put_back(engine: "SimEngine", ids: Array, snapshot: Snapshot) -> None:
 def _under(prefix: str, data: Mapping[str, Array]) -> dict[str, Array]:
     """The entries of a snapshot whose names begin with `prefix`, without it."""
     return {name[len(prefix) :]: rows for name, rows in data.items() if name.startswith(prefix)}
+
+
+def joined(snapshots: Sequence[Snapshot]) -> Snapshot:
+    """One snapshot of the envs of several, in order, such as those of engines that share the envs of a world.
+
+    Raises:
+        SnapshotError: there is none, they have different stamps, or a parameter was changed in one engine only.
+    """
+    if not snapshots:
+        raise SnapshotError("there is no snapshot to join; pass one or more")
+    first, waiting = snapshots[0], "commands.wrench"
+    for other in snapshots[1:]:
+        for name in ("engine", "engine_version", "world_hash", "level"):
+            ours, theirs = getattr(first, name), getattr(other, name)
+            if ours != theirs:
+                raise SnapshotError(f"snapshots of {name.replace('_', ' ')} {ours} and {theirs} cannot be joined")
+    parts = [dict(snapshot.data) for snapshot in snapshots]
+    wrench = next((part[waiting] for part in parts if waiting in part), None)
+    if wrench is not None:
+        # where none waits, none is kept: it is a wrench of zero
+        for part, snapshot in zip(parts, snapshots, strict=True):
+            part.setdefault(waiting, np.zeros((snapshot.num_envs, *wrench.shape[1:])))
+    return Snapshot(first.engine, first.engine_version, first.world_hash, first.level, joined_rows(parts))
+
+
+def joined_rows(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
+    """Rows of several mappings, one after the other, by name.
+
+    Rows of an engine may have different lengths, such as saved files: the shorter ones get zeros at their end, which
+    the engine passes over.
+
+    Raises:
+        SnapshotError: a name is not in all of them, or rows differ in more than their length.
+    """
+    names = dict.fromkeys(name for part in parts for name in part)
+    for name in names:
+        if not all(name in part for part in parts):
+            raise SnapshotError(
+                f"'{name}' is in some of the snapshots and not in all, so they cannot be joined; change a parameter in "
+                f"all engines, or in none"
+            )
+    return {name: _stacked(name, [part[name] for part in parts]) for name in names}
+
+
+def _stacked(name: str, rows: Sequence[Array]) -> Array:
+    shapes = sorted({r.shape[1:] for r in rows})
+    if len(shapes) == 1:
+        return np.concatenate(rows)
+    if any(len(shape) != 1 for shape in shapes):
+        raise SnapshotError(f"rows of '{name}' have shapes {shapes[0]} and {shapes[-1]}; they cannot be joined")
+    width = max(shape[0] for shape in shapes)
+    return np.concatenate([np.pad(r, ((0, 0), (0, width - r.shape[1]))) for r in rows])

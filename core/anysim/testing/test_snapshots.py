@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from anysim.engine.capability import Capability as C
+from anysim.engine.saving import joined
 from anysim.engine.state import SnapshotLevel
 from anysim.errors import CapabilityError, SnapshotError
 from anysim.testing import tolerances, worlds
@@ -127,6 +128,39 @@ def test_a_second_engine_takes_over(build):
     other.restore(snapshot)
     play(other, targets[:, [1]])
     assert_same(read(other), read(engine, [1]), "the run in the second engine")
+
+
+@exact
+def test_rows_of_several_engines_can_be_joined(build):
+    """Rows of engines with different pasts, of different lengths, become one snapshot that goes on as each did."""
+    world = worlds.scene()
+    engines = [_running(build, 1, world), _running(build, 2, world)]
+    play(engines[1], tape(world, [5, 6], 40, seed=5))
+    if C.WRENCHES in engines[1].capabilities:
+        engines[1].apply_wrench([[0.0, 0.0, 2.0, 0.0, 0.1, 0.0]], [engines[1].index.body("ball")], [1])
+    snapshot = joined([e.snapshot() for e in engines])
+    assert snapshot.num_envs == 3
+    targets = tape(world, [0, 1, 2], 20, seed=3)
+    play(engines[0], targets[:, :1])
+    play(engines[1], targets[:, 1:])
+    other = build(world, 3)
+    other.restore(snapshot)
+    play(other, targets)
+    assert_same(read(other, [0]), read(engines[0]), "the row of the first engine")
+    assert_same(read(other, [1, 2]), read(engines[1]), "the rows of the second engine")
+
+
+def test_foreign_snapshots_are_not_joined(build, engine_class):
+    """Snapshots of different stamps, or none at all, are a SnapshotError that says what is wrong."""
+    level = next((x for x in LEVELS if C(f"snapshot: {x}") in engine_class.capabilities), None)
+    skip_without(engine_class, C.SNAPSHOT_STATE if level is None else C(f"snapshot: {level}"))
+    snapshot = build(worlds.scene()).snapshot(level=level)
+    with pytest.raises(SnapshotError, match="world hash"):
+        joined([snapshot, replace(snapshot, world_hash="feed")])
+    with pytest.raises(SnapshotError, match="no snapshot"):
+        joined([])
+    with pytest.raises(SnapshotError, match=r"'ticks' is in some"):
+        joined([snapshot, replace(snapshot, data={k: v for k, v in snapshot.data.items() if k != "ticks"})])
 
 
 @exact

@@ -1,0 +1,98 @@
+"""How an env moves on: in a run, and in the same way when its journal is played again."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.engine.commands import Control
+from anysim.world.model import World
+from anysim_sapien.drives import Drives
+from anysim_sapien.journal import Op, entries
+from anysim_sapien.recipe import Recipe, Values
+from anysim_sapien.scene import EnvScene
+
+
+def advance(scene: EnvScene, drives: Drives, row: int, pushes: Array | None, n_steps: int) -> None:
+    """Step a scene under the commands in a row of the drives.
+
+    `pushes` (K, 7) are bodies and the wrenches on them, in each of the steps.
+    """
+    system, driven, journal = scene.system, bool(scene.joints), scene.journal
+    if driven:
+        drives.record(row, journal)
+    pushed: list[tuple[Any, Array, Array]] = []
+    if pushes is not None and len(pushes):
+        journal.record(Op.WRENCH, pushes.tobytes())
+        pushed = [(scene.bodies[int(push[0])], push[1:4], push[4:]) for push in pushes]
+    for _ in range(n_steps):
+        if driven:
+            drives.substep(row, scene)
+        for component, force, torque in pushed:
+            component.add_force_torque(force, torque)
+        system.step()
+    journal.stepped(n_steps)
+    if pushed:
+        journal.flush()
+    if driven:
+        drives.note(row, scene)
+
+
+def replay(scene: EnvScene, world: World, rows: Array) -> Drives:
+    """Do to a scene as built what a journal says; the scene's own says the same afterwards.
+
+    Returns the drives of one env that moved it.
+    """
+    drives = Drives(world, 1)
+    pushes: Array | None = None
+    for op, values in entries(rows):
+        match op:
+            case Op.STEP:
+                advance(scene, drives, 0, pushes, int(values[0]))
+                pushes = None
+            case Op.WRENCH:
+                pushes = values.reshape(-1, 7)
+            case Op.CONTROL:
+                drives.apply(Control(*values.reshape(4, 1, -1)))
+            case Op.GAINS:
+                drives.set_gains(0, values)
+            case Op.JOINTS:
+                position, velocity = values[2:].reshape(2, -1)
+                scene.place_joints(position if values[0] else None, velocity if values[1] else None)
+            case Op.POSE:
+                scene.place_body(int(values[0]), values[1:])
+            case Op.VELOCITY:
+                scene.push_body(int(values[0]), values[1:4], values[4:])
+            case Op.INERTIAL:
+                scene.set_inertial(int(values[0]), float(values[1]), values[2:5], values[5:])
+            case Op.DRY:
+                scene.set_dry(int(values[0]), float(values[1]))
+            case Op.ARMATURE:
+                scene.set_armature(int(values[0]), float(values[1]))
+            case Op.BASE:
+                scene.journal.base()
+    return drives
+
+
+def pasts_of(scenes: Sequence[EnvScene]) -> dict[str, Array]:
+    """What scenes were built with, and their journals (E, L), each as long as `length` says, then zeros."""
+    data = {f"base.{name}": np.array([getattr(s.values, name) for s in scenes]) for name in Values._fields}
+    journals = [scene.journal.rows() for scene in scenes]
+    length = np.array([len(journal) for journal in journals], dtype=np.int64)
+    rows = np.zeros((len(scenes), length.max(initial=0)))
+    for row, journal in zip(rows, journals, strict=True):
+        row[: len(journal)] = journal
+    return data | {"journal": rows, "length": length}
+
+
+def relive(recipe: Recipe, data: Mapping[str, Array], row: int) -> tuple[EnvScene, Drives]:
+    """The scene of a row that `pasts_of` made, in the same state to the bit, and the drives that moved it."""
+    scene = EnvScene(recipe, Values(*(data[f"base.{name}"][row] for name in Values._fields)))
+    return scene, replay(scene, recipe.world, data["journal"][row, : int(data["length"][row])])
+
+
+def wrenches(rows: Array, fixed: Array) -> Array:
+    """The (K, 7) bodies and wrenches, of an env's (B, 6), that act on something that can move."""
+    pushed = np.flatnonzero(rows.any(axis=1) & ~fixed)
+    return np.concatenate([pushed[:, None].astype(float), rows[pushed]], axis=1)
