@@ -142,16 +142,17 @@ def _discs(origin: Array, along: Array, radius: float, half_length: float) -> Ar
 
 
 def _triangles(corners: Array, directions: Array, view: CameraView) -> Array:
-    """The nearest of triangles (T, 3, 3) in the optical frame; their fronts are counterclockwise, backs are not seen."""
+    """The nearest of triangles (T, 3, 3) in the optical frame. Counterclockwise is their front; backs are not seen."""
     depth = np.full(directions.shape[:2], np.inf)
     f, size = focal_length(view.fov, view.height), np.array([view.width, view.height])
-    ahead = (corners[..., 2] > view.near).all(axis=1)
+    ahead = np.all(corners[..., 2] > view.near, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        flat = corners[..., :2] / corners[..., 2:] * f + size / 2 - 0.5
-    low = np.where(ahead[:, None], np.ceil(flat.min(axis=1)), 0)
-    high = np.where(ahead[:, None], np.floor(flat.max(axis=1)), size - 1)
-    low, high = np.clip(low, 0, size).astype(int), np.clip(high, -1, size - 1).astype(int)
-    some = (low <= high).all(axis=1) & (corners[..., 2] > view.near).any(axis=1)
+        flat = np.asarray(corners[..., :2] / corners[..., 2:] * f + size / 2 - 0.5)
+    first_pixel = np.where(ahead[:, None], np.ceil(flat.min(axis=1)), 0)
+    last_pixel = np.where(ahead[:, None], np.floor(flat.max(axis=1)), size - 1)
+    low: Array = np.clip(first_pixel, 0, size).astype(int)
+    high: Array = np.clip(last_pixel, -1, size - 1).astype(int)
+    some = np.all(low <= high, axis=1) & np.any(corners[..., 2] > view.near, axis=1)
     for k in np.flatnonzero(some).tolist():
         (u, v), (right, down) = low[k].tolist(), high[k].tolist()
         window = (slice(v, down + 1), slice(u, right + 1))
