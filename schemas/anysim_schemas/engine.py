@@ -28,8 +28,8 @@ class EngineSpec(Spec):
     )
     shard_timeout: Positive = Field(
         default=120.0,
-        description="longest time a worker may take for one control step, or to build its envs, before it is replaced "
-        "and its envs are faulted [s]",
+        description="longest time a worker may take for one control step before it is replaced and its envs are "
+        "faulted [s]",
     )
 
     @classmethod

@@ -29,7 +29,7 @@ from anysim.errors import EngineError
 from anysim.world.model import World
 
 TIMEOUT_S = 120.0
-"""The longest that a worker may take for one control step, or for any other command, unless it is set [s]."""
+"""The longest that a worker may take for one control step, or for another command but a build, unless it is set [s]."""
 
 
 class WorkerWarning(RuntimeWarning):

@@ -16,6 +16,9 @@ from anysim.engine.shards.process import Worker, WorkerLost
 from anysim.errors import AnysimError, EngineError
 from anysim.world.model import World
 
+START_S = 120.0
+"""The least time to load an engine and to build a world: a short limit is meant for steps [s]."""
+
 _POOLS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "LP_NUM_THREADS")
 """The variables that size the thread pools of the libraries engines compute and draw with."""
 
@@ -84,7 +87,7 @@ class Crew:
 
     def _settle(self, messages: Mapping[int, tuple[Any, ...]], descriptor: int | None = None) -> None:
         """Ask, and raise if anything is wrong."""
-        _, raised, lost = self.ask(messages, None, descriptor)
+        _, raised, lost = self.ask(messages, max(START_S, self._timeout), descriptor)
         for k in sorted(lost):
             raise EngineError(f"worker {k} {lost[k]} in '{messages[k][0]}'")
         for k in sorted(raised):
