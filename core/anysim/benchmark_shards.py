@@ -3,11 +3,11 @@
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from statistics import median
 from typing import NamedTuple
 
 from anysim.benchmark import panda_and_boxes
 from anysim.engine.base import SimEngine
+from anysim.engine.sharded import ShardedEngine
 from anysim.errors import EngineError
 
 CHUNK_STEPS = 4000
@@ -21,15 +21,16 @@ class ShardGain(NamedTuple):
         shards: worker processes; 1 is the engine without any.
         num_envs: envs.
         rate: physics steps per second of all envs together, best round [steps/s, wall].
-        ratio: that over the rate of the first number of shards.
-        typical: the median over the rounds of the ratio within a round, which a busy machine lowers.
+        ratio: that over the rate of the first number of shards; it says something where as many cores are idle.
+        cpu_ratio: the same by the processor time of the longest path, which is that of the parent and of its slowest
+            worker: what idle cores would gain, and other load on the machine disturbs less.
     """
 
     shards: int
     num_envs: int
     rate: float
     ratio: float
-    typical: float
+    cpu_ratio: float
 
 
 def shard_gains(engine_name: str, num_envs: int, shards: Sequence[int], rounds: int = 7) -> list[ShardGain]:
@@ -47,29 +48,38 @@ def shard_gains(engine_name: str, num_envs: int, shards: Sequence[int], rounds: 
     world = compile_world(panda_and_boxes())
     substeps = world.physics.substeps
     calls = max(10, CHUNK_STEPS // (num_envs * substeps))
-    spent: dict[int, list[float]] = {count: [] for count in shards}
+    best: dict[int, tuple[float, float]] = {}
     with ExitStack() as stack:
-        loops: dict[int, Callable[[], None]] = {}
-        for count in spent:
+        engines: dict[int, SimEngine] = {}
+        for count in dict.fromkeys(shards):
             engine = stack.enter_context(create_simulation(engine_name, shards=count)).create_world(world, num_envs)
             engine.step(100)  # the boxes come to rest, kernels are compiled
-            loops[count] = control_loop(engine, substeps)
-            loops[count]()
+            engines[count] = engine
+        loops = {count: control_loop(engine, substeps) for count, engine in engines.items()}
+        for loop in loops.values():
+            for _ in range(3):
+                loop()
         for _ in range(rounds):
             for count, loop in loops.items():
-                start = time.perf_counter()
-                for _ in range(calls):
-                    loop()
-                spent[count].append(time.perf_counter() - start)
+                spent = _timed(engines[count], loop, calls)
+                best[count] = min(spent[0], best.get(count, spent)[0]), min(spent[1], best.get(count, spent)[1])
     steps = calls * substeps * num_envs
-    first = spent[shards[0]]
-    return [
-        ShardGain(
-            count, num_envs, steps / min(times), min(first) / min(times),
-            median(one / other for one, other in zip(first, times, strict=True)),
-        )
-        for count, times in spent.items()
-    ]  # fmt: skip
+    wall, cpu = best[shards[0]]
+    return [ShardGain(count, num_envs, steps / w, wall / w, cpu / c) for count, (w, c) in best.items()]
+
+
+def _timed(engine: SimEngine, loop: Callable[[], None], calls: int) -> tuple[float, float]:
+    """Wall time, and processor time of the parent and the slowest worker one after the other [s]."""
+    workers = _processor_times(engine)
+    wall, cpu = time.perf_counter(), time.process_time()
+    for _ in range(calls):
+        loop()
+    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
+    return wall, cpu + max(after - before for after, before in zip(_processor_times(engine), workers, strict=True))
+
+
+def _processor_times(engine: SimEngine) -> tuple[float, ...]:
+    return engine.processor_times() if isinstance(engine, ShardedEngine) else (0.0,)
 
 
 def control_loop(engine: SimEngine, substeps: int) -> Callable[[], None]:

@@ -73,6 +73,12 @@ class ShardedEngine(SimEngine):
         """The process ids of the workers, in the order of their blocks of envs; empty without a world."""
         return () if self._crew is None else self._crew.pids
 
+    def processor_times(self) -> tuple[float, ...]:
+        """Processor time [s] that each worker has spent so far, for benchmarks."""
+        with self._lock:
+            self._require_world()
+            return tuple(self._ask("processor_time", self._everyone()).values())
+
     # ------------------------------------------------------------------ lifecycle
 
     def _build(self, world: World, num_envs: int) -> None:
@@ -220,15 +226,20 @@ class ShardedEngine(SimEngine):
     def _read(self, name: str) -> Array:
         assert self._memory is not None
         self._noted.add(name)
-        parts = {
-            k: (sorted((self._wanted | {name}) - fresh),) for k, fresh in enumerate(self._fresh) if name not in fresh
-        }
-        if parts:
-            self._ask("read", parts)
-            for k, (names,) in parts.items():
-                self._fresh[k].update(names)
+        for fresh in self._fresh:
+            if name not in fresh:
+                self._fetch(name)
+                break
         array = self._memory[name].copy()
         return array | self._lost if name == "fault" else array
+
+    def _fetch(self, name: str) -> None:
+        """Have a field written to the shared memory where it is not of this moment, with those that will follow it."""
+        stale = [k for k, fresh in enumerate(self._fresh) if name not in fresh]
+        parts = {k: (sorted((self._wanted | {name}) - self._fresh[k]),) for k in stale}
+        self._ask("read", parts)
+        for k, (names,) in parts.items():
+            self._fresh[k].update(names)
 
     def _apply_control(self, control: Control) -> None:
         assert self._memory is not None

@@ -7,6 +7,7 @@ and the frozen World, over a socket pair that no other process can reach.
 
 import json
 import os
+import select
 import signal
 import socket
 import struct
@@ -60,6 +61,8 @@ class Worker:
         own.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, limit)
         own.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, limit)
         self._connection = Connection(os.dup(own.fileno()))
+        self._arrival = select.poll()  # once: Connection.poll makes a selector for each call
+        self._arrival.register(own, select.POLLIN)
 
     @property
     def pid(self) -> int:
@@ -98,12 +101,12 @@ class Worker:
 
     def _receive(self, deadline: float, limit: float | None = None) -> tuple[Any, ...]:
         try:
-            if not self._connection.poll(max(0.0, deadline - time.perf_counter())):
+            if not self._arrival.poll(max(0.0, deadline - time.perf_counter()) * 1e3):
                 raise WorkerLost(self._hangs(self._timeout if limit is None else limit))
             answer = self._connection.recv()
         except BlockingIOError:
             raise WorkerLost(self._hangs(self._timeout)) from None
-        except (EOFError, OSError):
+        except (EOFError, OSError, ValueError):  # ValueError: closed here, when it was lost before
             raise WorkerLost(self._how_it_ended()) from None
         self._owed -= 1
         return answer

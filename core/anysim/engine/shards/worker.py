@@ -4,6 +4,7 @@ import faulthandler
 import importlib
 import signal
 import socket
+import time
 import traceback
 from collections.abc import Mapping, Sequence
 from multiprocessing.connection import Connection
@@ -172,6 +173,9 @@ class Host:
     def write_bodies(self, ids: Array, bodies: Array, pose: Array | None, twist: Array | None) -> None:
         self._here._retire_state()
         self._here._write_bodies(ids, bodies, pose, twist)
+
+    def processor_time(self) -> float:
+        return time.process_time()
 
     # ------------------------------------------------------------------ parameters, snapshots, live editing
 
