@@ -50,3 +50,12 @@ class Fragile(NullEngine):
 
     def _get_parameter(self, name):
         os._exit(4)
+
+
+class Balks(NullEngine):
+    """Its process ends when it has to build a world with a crate in it."""
+
+    def _build(self, world, num_envs):
+        if any(entity.name == "crate" for entity in world.entities):
+            os._exit(5)
+        super()._build(world, num_envs)

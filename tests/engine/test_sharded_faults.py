@@ -187,6 +187,32 @@ def test_a_live_edit_keeps_the_fault():
         assert not engine.get_state().fault.any()
 
 
+def test_an_edit_that_kills_the_workers_leaves_the_old_world(moody):
+    """New workers hold the world from before the edit, in its state."""
+    alone, engine = _pair(moody.Balks)
+    with alone, engine:
+        before = read(engine)
+        with pytest.raises(EngineError, match="exit code 5 in 'build'"):
+            engine.add_object("crate", {"box": [0.2, 0.2, 0.2]}, position=(3.0, 3.0, 0.5))
+        assert_same(read(engine), before, "right after")
+        for e in (alone, engine):
+            e.step(3)
+        assert_same(read(engine), read(alone), "later")
+
+
+def test_a_snapshot_mends_a_lost_env():
+    """A restore puts an env into a sound state, as a reset does."""
+    alone, engine = _pair()
+    with alone, engine:
+        kept = engine.snapshot([3])
+        _lose(engine, lambda: os.kill(engine.workers[1], signal.SIGKILL), "worker 1")
+        for e in (alone, engine):
+            e.restore(kept, [3])
+            e.step(2, [3])
+        assert engine.get_state().fault.tolist() == [False, False, False, False, True]
+        assert_same(read(engine, [3]), read(alone, [3]), "the restored env")
+
+
 def test_an_interrupted_call_leaves_a_usable_engine(moody, monkeypatch):
     """Ctrl-C while the workers step: their late answers are not taken for those to the next question."""
     alone, engine = _pair()

@@ -290,8 +290,8 @@ class ShardedEngine(SimEngine):
     def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:
         parts = self._blocks.split(ids)
         rows = {p.worker: {name: values[p.rows] for name, values in data.items()} for p in parts}
+        self._lost[ids] = False  # before: a worker lost on the way has not got the snapshot's commands
         self._write("restore", {p.worker: (p.ids, rows[p.worker], level) for p in parts})
-        self._lost[ids] = False
 
     def _carry_rows(self) -> Any:
         self._ask("carry", self._everyone())  # what is carried stays in the workers

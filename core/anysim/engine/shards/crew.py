@@ -5,7 +5,7 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -55,7 +55,7 @@ class Crew:
         try:
             for k in range(count):
                 self._start(k)
-            self._settle({k: ("load", None, self._path, self._options) for k in range(count)})
+            self._load(range(count))
         except BaseException:
             self.close()
             raise
@@ -72,6 +72,9 @@ class Crew:
         limits = {name: str(self._threads) for name in _POOLS}
         self._workers[k] = Worker({**limits, **os.environ, "TMPDIR": str(folder)}, self._timeout)
 
+    def _load(self, places: Iterable[int]) -> None:
+        self._settle({k: ("load", None, self._path, self._options) for k in places})
+
     def build(self, world: World, blocks: Blocks, memory: SharedArrays) -> None:
         """Build each worker's block of envs.
 
@@ -79,6 +82,10 @@ class Crew:
             AnysimError: the first error of a worker.
         """
         everyone = range(len(self._workers))
+        empty = [k for k in everyone if self._workers[k] is None]
+        for k in empty:
+            self._start(k)
+        self._load(empty)
         self._settle({k: self._order(world, blocks, memory, k) for k in everyone}, memory.descriptor)
 
     @staticmethod
@@ -88,6 +95,8 @@ class Crew:
     def _settle(self, messages: Mapping[int, tuple[Any, ...]], descriptor: int | None = None) -> None:
         """Ask, and raise if anything is wrong."""
         _, raised, lost = self.ask(messages, max(START_S, self._timeout), descriptor)
+        for k in lost:
+            self.discard(k)
         for k in sorted(lost):
             raise EngineError(f"worker {k} {lost[k]} in '{messages[k][0]}'")
         for k in sorted(raised):
@@ -130,7 +139,7 @@ class Crew:
         """
         self.discard(k)
         self._start(k)
-        self._settle({k: ("load", None, self._path, self._options)})
+        self._load([k])
         self._settle({k: self._order(world, blocks, memory, k)}, memory.descriptor)
 
     def discard(self, k: int) -> None:
