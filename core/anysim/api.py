@@ -150,7 +150,7 @@ def _env(spec: "RunSpec", world: "World", simulation: "SimEngine", num_envs: int
 
 def simulation(spec: "RunSpec") -> "SimEngine":
     """The engine that a spec asks for, without a world."""
-    from anysim.engine.sharded import shard_count
+    from anysim.engine.shards.blocks import shard_count
 
     chosen = spec.engine
     shards = shard_count(chosen.shards, registry.load("engines", chosen.name), spec.num_envs)

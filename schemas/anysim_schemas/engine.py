@@ -27,7 +27,7 @@ class EngineSpec(Spec):
         "but none for an engine that uses all cores by itself. Results do not depend on it",
     )
     shard_timeout: Positive = Field(
-        default=120.0,
+        default=300.0,
         description="longest time a worker may take for one control step before it is replaced and its envs are "
         "faulted [s]",
     )

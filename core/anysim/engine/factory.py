@@ -39,7 +39,8 @@ def create_simulation(
     if not here.available:
         raise EngineError(f"engine '{chosen}' cannot run here: {'; '.join(here.missing)}. {here.remedy}")
     if shards != 1:
-        from anysim.engine.sharded import TIMEOUT_S, shard_count, sharded
+        from anysim.engine.sharded import TIMEOUT_S, sharded
+        from anysim.engine.shards.blocks import shard_count
 
         count = shard_count(shards, engine_class)
         if count != 1:

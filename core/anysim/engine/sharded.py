@@ -11,7 +11,7 @@ import weakref
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from anysim.engine.base import SimEngine
 from anysim.engine.cameras import CameraView
 from anysim.engine.commands import Control
 from anysim.engine.shards.blocks import Blocks, joined, joined_by_name, joined_contacts, rows_of, usable_cores
-from anysim.engine.shards.crew import Crew, importable_path
+from anysim.engine.shards.crew import START_S, Crew, importable_path
 from anysim.engine.shards.memory import SharedArrays, state_layout
 from anysim.engine.shards.process import WorkerLost
 from anysim.engine.shards.worker import News
@@ -28,8 +28,8 @@ from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLe
 from anysim.errors import EngineError
 from anysim.world.model import World
 
-TIMEOUT_S = 120.0
-"""The longest that a worker may take for one control step, or for another command but a build, unless it is set [s]."""
+TIMEOUT_S = 300.0
+"""The longest that a worker may take for a control step or another command, but to build or draw, if not set [s]."""
 
 
 class WorkerWarning(RuntimeWarning):
@@ -316,9 +316,8 @@ class ShardedEngine(SimEngine):
 
     def _render(self, view: CameraView, ids: Array, channels: tuple[str, ...]) -> dict[str, Array]:
         parts = self._blocks.split_query(ids)
-        answers = self._ask(
-            "render", {p.worker: (replace(view, pose=view.pose[p.rows]), p.ids, channels) for p in parts}
-        )
+        orders = {p.worker: (replace(view, pose=view.pose[p.rows]), p.ids, channels) for p in parts}
+        answers = self._ask("render", orders, max(START_S, self.timeout_s))  # the first image may compile shaders
         return joined_by_name(((p.rows, answers[p.worker]) for p in parts), len(ids))
 
     def _raycast(self, origins: Array, directions: Array, ids: Array) -> RayHits:
@@ -348,12 +347,3 @@ def sharded(engine_class: type[SimEngine], shards: int, timeout_s: float = TIMEO
         "capabilities": engine_class.capabilities, "parameters": engine_class.parameters,
     }  # fmt: skip
     return type(f"Sharded{engine_class.__name__}", (ShardedEngine,), body)
-
-
-def shard_count(shards: int | Literal["auto"], engine_class: type[SimEngine], num_envs: int | None = None) -> int:
-    """How many workers `shards` means: `auto` is one per usable core, and one for an engine that is parallel itself.
-
-    With `num_envs`, no more than that.
-    """
-    wanted = shards if isinstance(shards, int) else 1 if engine_class.parallel else usable_cores()
-    return wanted if num_envs is None else min(wanted, num_envs)

@@ -2,12 +2,15 @@
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.state import ContactPoints
+
+if TYPE_CHECKING:
+    from anysim.engine.base import SimEngine
 
 
 class Part(NamedTuple):
@@ -74,3 +77,12 @@ def joined_contacts(found: Sequence[tuple[ContactPoints, Part]], blocks: Blocks,
 def rows_of(rows: Array, *arrays: Array | None) -> list[Array | None]:
     """These rows of the arrays that there are."""
     return [None if array is None else array[rows] for array in arrays]
+
+
+def shard_count(shards: int | Literal["auto"], engine_class: "type[SimEngine]", num_envs: int | None = None) -> int:
+    """How many workers `shards` means: `auto` is one per usable core, and one for an engine that is parallel itself.
+
+    With `num_envs`, no more than that.
+    """
+    wanted = shards if isinstance(shards, int) else 1 if engine_class.parallel else usable_cores()
+    return wanted if num_envs is None else min(wanted, num_envs)

@@ -16,8 +16,8 @@ from anysim.engine.shards.process import Worker, WorkerLost
 from anysim.errors import AnysimError, EngineError
 from anysim.world.model import World
 
-START_S = 120.0
-"""The least time to load an engine and to build a world: a short limit is meant for steps [s]."""
+START_S = 300.0
+"""The least time to load an engine, to build a world and to draw: a short limit is meant for steps [s]."""
 
 _POOLS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "LP_NUM_THREADS")
 """The variables that size the thread pools of the libraries engines compute and draw with."""
