@@ -9,8 +9,8 @@ from anysim import registry
 from anysim.engine import factory
 from anysim.engine.capability import Capability
 from anysim.engine.null import NullEngine
-from anysim.engine.sharded import ShardedEngine, shard_count, sharded
-from anysim.engine.shards.blocks import Blocks, joined, usable_cores
+from anysim.engine.sharded import ShardedEngine, sharded
+from anysim.engine.shards.blocks import Blocks, joined, shard_count, usable_cores
 from anysim.errors import EngineError, PluginError, SnapshotError
 from anysim.testing import worlds
 from anysim.testing.compare import assert_same, play, read, spread, tape
