@@ -8,6 +8,7 @@ from anysim.cli.main import app
 from anysim.errors import EngineError
 
 
+@pytest.mark.slow
 def test_gains_are_ratios_to_the_first():
     first, second = shard_gains("null", 4, [1, 2], rounds=2)
     assert (first.shards, first.num_envs, first.ratio, first.cpu_ratio) == (1, 4, 1.0, 1.0)
