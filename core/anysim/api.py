@@ -156,6 +156,15 @@ def _env(spec: "RunSpec", world: "World", simulation: "SimEngine", num_envs: int
         raise
 
 
+def simulation(spec: "RunSpec") -> "SimEngine":
+    """The engine that a spec asks for, without a world."""
+    from anysim.engine.shards.blocks import shard_count
+
+    chosen = spec.engine
+    shards = shard_count(chosen.shards, registry.load("engines", chosen.name), spec.num_envs)
+    return create_simulation(chosen.name, shards=shards, shard_timeout=chosen.shard_timeout, **chosen.options)
+
+
 def make(
     source: str | Path | LoadedRun | Mapping[str, Any], *, engine: str | None = None, num_envs: int | None = None,
     seed: int | None = None, overrides: Sequence[str] = (), base: Path | None = None,
@@ -187,7 +196,7 @@ def make(
     world = compile_world(loaded, base=base)
     name = str(source) if isinstance(source, str) and "/" not in str(source) else world.name
     try:
-        env = _env(spec, world, create_simulation(spec.engine.name, **spec.engine.options), spec.num_envs, name)
+        env = _env(spec, world, simulation(spec), spec.num_envs, name)
     except SpecError as error:
         raise located(error, loaded) from None
     if seed is not None:

@@ -15,6 +15,9 @@ class Spec(BaseModel):
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()
     """Groups of keys that exclude each other. A file that gives one group drops what it inherited of the others."""
 
+    kept_under_text: ClassVar[tuple[str, ...]] = ()
+    """Keys that stay where a file or an override replaces an inherited mapping by a bare string."""
+
     @classmethod
     def from_text(cls, text: str) -> dict[str, Any] | None:
         """The mapping that a bare string stands for; None where a string is not enough."""

@@ -1,6 +1,6 @@
 """Which engine runs the world, how, and with which time steps."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -14,9 +14,22 @@ MAX_SUBSTEPS = 1_000_000
 class EngineSpec(Spec):
     """An installed engine by name, with the options that only it understands. A bare string is the name."""
 
+    kept_under_text: ClassVar[tuple[str, ...]] = ("shards", "shard_timeout")
+    """These are of any engine: `--engine NAME` changes the engine and leaves them; options go with their engine."""
+
     name: Annotated[str, Field(description="an installed engine, as in `anysim list engines`")] = "mujoco"
     options: Annotated[dict[str, Any], PluginSlot("engine", "name")] = Field(
         default_factory=dict, description="options owned by the engine"
+    )
+    shards: Annotated[int, Field(ge=1)] | Literal["auto"] = Field(
+        default=1,
+        description="worker processes that share the envs, at most one for each; 1: none; auto: one for each core, "
+        "but none for an engine that uses all cores by itself. Results do not depend on it",
+    )
+    shard_timeout: Positive = Field(
+        default=300.0,
+        description="longest time a worker may take for one control step before it is replaced and its envs are "
+        "faulted [s]",
     )
 
     @classmethod

@@ -15,10 +15,11 @@ def merge(base: Node, over: Node, shapes: Shapes) -> Node:
 
     A mapping is merged key by key; a bare string that is short for a mapping counts as one under a mapping. Scalars
     and lists replace what they meet. A key set to null is removed if it was inherited. A key of one alternative
-    (`mass`) removes the inherited keys of the others (`density`).
+    (`mass`) removes the inherited keys of the others (`density`). Of what a bare string replaces, the keys stay that
+    its spec names in `kept_under_text`.
     """
     if not isinstance(over.value, dict):
-        return over
+        return _with_kept(base, over, shapes)
     below = as_mapping(base, shapes)
     if below is None:
         return over
@@ -31,6 +32,15 @@ def merge(base: Node, over: Node, shapes: Shapes) -> Node:
         else:
             merged[key] = merge(merged[key], child, inside(shapes, key))
     return replace(over, value=_without_rivals(merged, over.value, shapes))
+
+
+def _with_kept(base: Node, over: Node, shapes: Shapes) -> Node:
+    """`over`, and of what it replaces the keys that outlive a bare string."""
+    names = {name for shape in shapes if shape.spec is not None for name in shape.spec.kept_under_text}
+    below = as_mapping(base, shapes) if names and isinstance(over.value, str) else None
+    kept = {name: node for name, node in (below or {}).items() if name in names}
+    given = as_mapping(over, shapes) if kept else None
+    return over if given is None else replace(over, value={**given, **kept})
 
 
 def _without_rivals(merged: dict[str, Node], given: dict[str, Node], shapes: Shapes) -> dict[str, Node]:

@@ -11,7 +11,8 @@ from anysim import registry
 from anysim.errors import PluginError
 
 SUMMARY = re.compile(
-    r"anysim contract: engine (\S+) (\S+): (\d+) passed(?:, (\d+) failed)?, (\d+) skipped(?: \((.*)\))?"
+    r"anysim contract: engine (\S+) (\S+?)(?: in \d+ shards)?: "
+    r"(\d+) passed(?:, (\d+) failed)?, (\d+) skipped(?: \((.*)\))?"
 )
 
 
@@ -57,6 +58,24 @@ DYNAMIC = {
 
 @pytest.mark.parametrize("name", DYNAMIC)
 def test_an_engine_with_dynamics_passes(name, tmp_path):
+    _runs_here(name)
+    _passes(name, *_summary(_run(tmp_path, "--engine", name)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["null", *DYNAMIC])
+def test_an_engine_in_worker_processes_passes(name, tmp_path):
+    """Every engine keeps the contract in two shards too: nothing can be seen of them but the processes."""
+    _runs_here(name)
+    done = _run(tmp_path, "--engine", name, "--shards", "2")
+    assert " in 2 shards: " in done.stdout
+    if name == "null":
+        assert _summary(done)[0] > 215
+    else:
+        _passes(name, *_summary(done))
+
+
+def _runs_here(name):
     try:
         engine = registry.load("engines", name)
     except PluginError as error:
@@ -64,7 +83,9 @@ def test_an_engine_with_dynamics_passes(name, tmp_path):
     here = engine.availability()
     if not here.available:
         pytest.skip(f"{name} cannot run here: {'; '.join(here.missing)}")
-    passed, _, why = _summary(_run(tmp_path, "--engine", name))
+
+
+def _passes(name, passed, _, why):
     assert passed > 250
     for part in filter(None, why.split(", ")):
         reason = part.rpartition(": ")[0]

@@ -127,6 +127,24 @@ def test_an_engine_by_name_takes_options_from_above():
     assert (spec.engine.name, spec.engine.options) == ("other", {})
 
 
+def test_another_engine_by_name_keeps_the_shards():
+    """Options belong to the engine that is replaced; how many processes run it does not."""
+    base = {"engine": {"name": "mujoco", "options": {"x": 1}, "shards": 4, "shard_timeout": 9.0}}
+    spec = load_run([base, {"engine": "other"}]).spec
+    assert (spec.engine.name, spec.engine.options) == ("other", {})
+    assert (spec.engine.shards, spec.engine.shard_timeout) == (4, 9.0)
+    for overrides in (["engine.shards=auto", "engine=other"], ["engine=other", "engine.shards=auto"]):
+        spec = load_run([base], overrides=overrides).spec
+        assert (spec.engine.name, spec.engine.options, spec.engine.shards) == ("other", {}, "auto")
+    assert load_run([{"engine": "mujoco"}, {"engine": "other"}]).spec.engine.shards == 1
+
+
+@pytest.mark.parametrize("shards", [0, -1, 1.5, "many"])
+def test_shards_are_a_number_or_auto(shards):
+    with pytest.raises(SpecError, match=r"engine\.shards"):
+        load_run({"engine": {"name": "mujoco", "shards": shards}})
+
+
 def test_base_data_lies_beneath_everything(write):
     write(a="num_envs: 2")
     spec = load_run("a.yaml", base_data={"engine": "other", "num_envs": 7}).spec

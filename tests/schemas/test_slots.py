@@ -64,11 +64,11 @@ def test_a_default_name_is_checked_where_its_options_are_given():
 def test_slots_are_checked_although_the_core_is_wrong(resolver):
     data = {
         "seed": -1,
-        "engine": {"name": "mujoco", "options": {"iterations": 0}, "shards": 2},
+        "engine": {"name": "mujoco", "options": {"iterations": 0}, "shard": 2},
         "task": {"expert": {"skill": "x"}},
     }
     assert [line.split(": ")[0] for line in issues(data, resolver)] == [
-        "engine.shards", "seed", "task.observations", "engine.options.iterations", "task.expert.skill",
+        "engine.shard", "seed", "task.observations", "engine.options.iterations", "task.expert.skill",
     ]  # fmt: skip
 
 

@@ -44,7 +44,13 @@ class MujocoEngine(SimEngine):
     name: ClassVar[str] = "mujoco"
     capabilities: ClassVar[Capabilities] = declared.CAPABILITIES
     parameters: ClassVar[frozenset[str]] = Parameters.NAMES
+    parallel: ClassVar[bool] = True  # a Batch steps its envs in C threads, without Python's lock
     options: MujocoOptions
+
+    @classmethod
+    def share_of_threads(cls, options: Mapping[str, Any], threads: int) -> dict[str, Any]:
+        """A Batch takes all cores unless it is told otherwise."""
+        return {**options, "threads": options.get("threads") or threads}
 
     @classmethod
     def availability(cls) -> Availability:

@@ -62,3 +62,33 @@ def step(
             for c in costs
         ],
     )
+
+
+@app.command("shards")
+def shards(
+    engine: Annotated[str | None, typer.Option("--engine", "-e", help="An installed engine.")] = None,
+    num_envs: Annotated[int, typer.Option("--num-envs", "-n", min=1, help="Envs of all shards together.")] = 16,
+    counts: Annotated[str, typer.Option("--shards", help="Numbers of shards, separated by commas.")] = "1,2",
+    rounds: Annotated[int, typer.Option(min=1, help="Interleaved rounds; the best of each side counts.")] = 7,
+    json: AsJson = False,
+) -> None:
+    """Step a Panda with five boxes in one process and in several, and compare with the first number of shards."""
+    from anysim.benchmark_shards import shard_gains
+    from anysim.cli.output import print_json, print_table
+    from anysim.engine.factory import default_engine
+    from anysim.errors import EngineError
+
+    try:
+        numbers = list(dict.fromkeys(int(n) for n in counts.split(",")))
+    except ValueError:
+        raise EngineError(f"--shards takes whole numbers separated by commas, got '{counts}'") from None
+    name = engine or default_engine()
+    gains = shard_gains(name, num_envs, numbers, rounds)
+    if json:
+        print_json([gain._asdict() for gain in gains])
+        return
+    print_table(
+        f"Physics steps per second on {name}, {num_envs} envs together",
+        ("shards", "steps/s", f"ratio to {numbers[0]} (wall)", "ratio (cpu)"),
+        [(g.shards, f"{g.rate:,.0f}", f"{g.ratio:.3f}", f"{g.cpu_ratio:.3f}") for g in gains],
+    )

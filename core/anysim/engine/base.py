@@ -47,6 +47,8 @@ class SimEngine(Primitives):
     capabilities: ClassVar[Capabilities]
     parameters: ClassVar[frozenset[str]] = frozenset()
     """The names of `anysim.engine.parameters` that the engine can change per env."""
+    parallel: ClassVar[bool] = False
+    """Whether it steps its envs on several cores by itself, so that more processes (`shards: auto`) gain nothing."""
 
     def __init__(self, **options: Any) -> None:
         """Options are those of `options_model`; a wrong one raises EngineError with what exists."""
@@ -71,6 +73,15 @@ class SimEngine(Primitives):
     def findings(cls) -> Sequence[Finding]:
         """What else `anysim doctor` should say of the engine on this machine: threads, drivers, versions to avoid."""
         return ()
+
+    @classmethod
+    def share_of_threads(cls, options: Mapping[str, Any], threads: int) -> dict[str, Any]:
+        """The options of one of several processes that share the machine, each to use about that many threads.
+
+        What the user chose stays. They must not change results.
+        """
+        del threads
+        return dict(options)
 
     @property
     def version(self) -> str:

@@ -1,7 +1,7 @@
 """Engines by name."""
 
 import os
-from typing import Any
+from typing import Any, Literal
 
 from anysim import registry
 from anysim.engine.base import SimEngine
@@ -52,8 +52,17 @@ def availability(name: str) -> Availability:
         ) from error
 
 
-def create_simulation(name: str | None = None, **options: Any) -> SimEngine:
+def create_simulation(
+    name: str | None = None, *, shards: int | Literal["auto"] = 1, shard_timeout: float | None = None, **options: Any
+) -> SimEngine:
     """An engine by name or alias, without a world: `create_simulation("mujoco", threads=2).create_world(world)`.
+
+    Args:
+        name: an installed engine; None for the default.
+        shards: in how many worker processes it runs, at most one for each env; 1: in this process, auto: one for each
+            usable core, but 1 where the engine steps its envs in parallel by itself. Results do not depend on it.
+        shard_timeout: the longest [s] that a worker may take for a control step before it counts as lost.
+        options: those of the engine.
 
     Raises:
         PluginError: no such engine; lists what is installed and what could be. Or it does not load; says why.
@@ -63,4 +72,12 @@ def create_simulation(name: str | None = None, **options: Any) -> SimEngine:
     here = availability(chosen)
     if not here.available:
         raise EngineError(f"engine '{chosen}' cannot run here: {'; '.join(here.missing)}. {here.remedy}")
-    return engine_class(chosen)(**options)
+    simulation = engine_class(chosen)
+    if shards != 1:
+        from anysim.engine.sharded import TIMEOUT_S, sharded
+        from anysim.engine.shards.blocks import shard_count
+
+        count = shard_count(shards, simulation)
+        if count != 1:
+            simulation = sharded(simulation, count, TIMEOUT_S if shard_timeout is None else shard_timeout)
+    return simulation(**options)

@@ -1,4 +1,4 @@
-"""The pytest plugin of the contract suite: `--engine`, `--engine-option`, and the line that sums a run up.
+"""The pytest plugin of the contract suite: `--engine`, `--engine-option`, `--shards`, and the line that sums a run up.
 
 It is loaded by every pytest run on a machine that has anysim, so it imports nothing but the standard library and
 pytest until `--engine` is given.
@@ -27,6 +27,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--engine-option", metavar="KEY=VALUE", action="append", default=[],
         help="an option of the engine, may be repeated; the value is read as JSON, else as text",
     )  # fmt: skip
+    group.addoption(
+        "--shards", metavar="N", type=int, default=0, help="run the engine in N worker processes, fewer for fewer envs"
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -69,12 +72,18 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     counts += [f"{len(outcomes['skipped'])} skipped" + (f" ({detail})" if detail else "")]
     engine = engine_class(config)
     version = engine.availability().version
-    terminalreporter.write_line(f"anysim contract: engine {engine.name} {version}: {', '.join(counts)}")
+    where = f" in {config.getoption('shards')} shards" if config.getoption("shards") else ""
+    terminalreporter.write_line(f"anysim contract: engine {engine.name} {version}{where}: {', '.join(counts)}")
 
 
 def engine_class(config: pytest.Config) -> Any:
-    """The SimEngine class that `--engine` names."""
-    return load_engine(str(config.getoption("engine")))
+    """The SimEngine class that `--engine` names, in worker processes if `--shards` says so."""
+    engine = load_engine(str(config.getoption("engine")))
+    if not (shards := config.getoption("shards")):
+        return engine
+    from anysim.engine.sharded import sharded
+
+    return sharded(engine, shards)
 
 
 def load_engine(name: str) -> Any:

@@ -1,0 +1,88 @@
+"""Which worker holds which envs, and how rows of several workers become one array again."""
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.engine.state import ContactPoints
+
+if TYPE_CHECKING:
+    from anysim.engine.base import SimEngine
+
+
+class Part(NamedTuple):
+    """The envs of a call that one worker holds: their rows in the call, and their numbers in the worker."""
+
+    worker: int
+    rows: Array
+    ids: Array
+
+
+class Blocks:
+    """Contiguous blocks of nearly equal size: `bounds[k]` are the first env of worker k and the one after its last."""
+
+    def __init__(self, num_envs: int, workers: int) -> None:
+        size, more = divmod(num_envs, workers)
+        stops = np.cumsum([size + (k < more) for k in range(workers)]).tolist()
+        self.bounds = tuple(zip([0, *stops[:-1]], stops, strict=True))
+
+    def split(self, ids: Array) -> list[Part]:
+        """Parts of a call for envs `ids`, without workers that have none of them."""
+        parts: list[Part] = []
+        for worker, (first, stop) in enumerate(self.bounds):
+            rows = np.flatnonzero((ids >= first) & (ids < stop))
+            if len(rows):
+                parts.append(Part(worker, rows, ids[rows] - first))
+        return parts
+
+    def split_query(self, ids: Array) -> list[Part]:
+        """The same; a query for no env goes to the first worker, which knows the shapes of nothing."""
+        return self.split(ids) or [Part(0, np.arange(0), ids)]
+
+
+def usable_cores() -> int:
+    """The cores that this process may run on."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def joined(pieces: Sequence[tuple[Array, Array]], size: int) -> Array:
+    """One array (size, ...) of pieces (rows, values); where trailing sizes differ, the smaller are padded with 0."""
+    first = pieces[0][1]
+    shape = tuple(max(sizes) for sizes in zip(*(values.shape[1:] for _, values in pieces), strict=True))
+    whole = np.zeros((size, *shape), first.dtype)
+    for rows, values in pieces:
+        whole[(rows, *(slice(n) for n in values.shape[1:]))] = values
+    return whole
+
+
+def joined_by_name(pieces: Iterable[tuple[Array, Mapping[str, Array]]], size: int) -> dict[str, Array]:
+    """`joined` for each of the arrays that all pieces have."""
+    held = list(pieces)
+    return {name: joined([(rows, data[name]) for rows, data in held], size) for name in held[0][1]}
+
+
+def joined_contacts(found: Sequence[tuple[ContactPoints, Part]], blocks: Blocks, ids: Array) -> ContactPoints:
+    """The contacts of all workers, with the envs' numbers, in the order in which `ids` asks for the envs."""
+    columns = zip(*(c._replace(env=c.env + blocks.bounds[part.worker][0]) for c, part in found), strict=True)
+    points = ContactPoints(*map(np.concatenate, columns))
+    place = np.zeros(blocks.bounds[-1][1], dtype=int)
+    place[ids] = np.arange(len(ids))
+    order = np.argsort(place[points.env], kind="stable")
+    return ContactPoints(*(column[order] for column in points))
+
+
+def rows_of(rows: Array, *arrays: Array | None) -> list[Array | None]:
+    """These rows of the arrays that there are."""
+    return [None if array is None else array[rows] for array in arrays]
+
+
+def shard_count(shards: int | Literal["auto"], engine_class: "type[SimEngine]", num_envs: int | None = None) -> int:
+    """How many workers `shards` means: `auto` is one per usable core, and one for an engine that is parallel itself.
+
+    With `num_envs`, no more than that.
+    """
+    wanted = shards if isinstance(shards, int) else 1 if engine_class.parallel else usable_cores()
+    return wanted if num_envs is None else min(wanted, num_envs)

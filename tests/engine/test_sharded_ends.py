@@ -1,0 +1,190 @@
+"""However a program ends, its workers end with it, and no shared memory stays. Programs are plain scripts."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.engine.shards_help import PROC, alive, gone, segments
+
+pytestmark = pytest.mark.skipif(not PROC.exists(), reason="no /proc here: processes cannot be seen from outside")
+
+# no `if __name__ == "__main__"`, and what a second run of the script would do shows
+SCRIPT = """
+    import sys
+    from pathlib import Path
+    Path(sys.argv[1]).open("a").write("run\\n")
+    import anysim
+    env = anysim.make("pick_cube", engine="null", num_envs=4, overrides=[
+        "engine.shards=2", "record.cameras=[]", "world.cameras.front.channels=[]", "world.cameras.wrist.channels=[]",
+    ])
+    env.reset(seed=1)
+    print(*env.engine.workers, flush=True)
+"""
+STEP_FOR_EVER = """
+    import numpy as np
+    action = np.zeros((4, env.action_dim))
+    while True:
+        env.reset()
+        env.step(action)
+"""
+WAIT = """
+    sys.stdin.read()
+"""
+
+
+def _start(tmp_path, more, **options):
+    script = tmp_path / "script.py"
+    script.write_text(textwrap.dedent(SCRIPT) + textwrap.dedent(more))
+    environment = {**os.environ, "TMPDIR": str(tmp_path / "tmp")}
+    (tmp_path / "tmp").mkdir()
+    return subprocess.Popen(
+        [sys.executable, str(script), str(tmp_path / "runs")], cwd=tmp_path, env=environment, text=True,
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **options,
+    )  # fmt: skip
+
+
+def _workers(process):
+    line = process.stdout.readline()
+    if not line:
+        raise AssertionError(process.communicate()[1])
+    return [int(pid) for pid in line.split()]
+
+
+def _finish(process):
+    """What it printed; it is ended if it does not end by itself."""
+    try:
+        return process.communicate(timeout=60)
+    finally:
+        process.kill()
+        process.wait()
+
+
+@pytest.fixture
+def shared_memory():
+    """Checks that nothing is added to the named shared memory."""
+    before = segments()
+    yield
+    assert segments() <= before
+
+
+@pytest.mark.parametrize("ending", ["", "env.close()", "raise SystemExit(0)"])
+def test_a_plain_script(tmp_path, shared_memory, ending):
+    """Without a guard for the main module, and without closing: it runs once, says nothing, and leaves nothing."""
+    process = _start(tmp_path, ending)
+    pids = _workers(process)
+    assert len(pids) == 2
+    assert _finish(process) == ("", "")
+    assert process.returncode == 0
+    assert gone(pids, 1.0)
+    assert (tmp_path / "runs").read_text() == "run\n"
+    assert list((tmp_path / "tmp").iterdir()) == []
+
+
+def test_a_killed_parent(tmp_path, shared_memory):
+    """`kill -9`: the workers, one of them stopped, go with it."""
+    process = _start(tmp_path, WAIT)
+    pids = _workers(process)
+    assert all(map(alive, pids))
+    os.kill(pids[1], signal.SIGSTOP)
+    process.kill()
+    _finish(process)
+    assert gone(pids)
+
+
+@pytest.mark.parametrize("more", [STEP_FOR_EVER, WAIT], ids=["stepping", "waiting"])
+def test_a_parent_that_is_asked_to_end(tmp_path, shared_memory, more):
+    """SIGTERM, which ends a Python program at once."""
+    process = _start(tmp_path, more)
+    pids = _workers(process)
+    process.terminate()
+    _finish(process)
+    assert process.returncode == -signal.SIGTERM
+    assert gone(pids)
+
+
+@pytest.mark.parametrize("more", [STEP_FOR_EVER, WAIT], ids=["stepping", "waiting"])
+def test_ctrl_c(tmp_path, shared_memory, more):
+    """SIGINT to the whole group, as a terminal sends it: one traceback, that of the program, and nothing is left."""
+    process = _start(tmp_path, more, start_new_session=True)
+    pids = _workers(process)
+    time.sleep(0.3)
+    os.killpg(process.pid, signal.SIGINT)
+    _, said = _finish(process)
+    assert process.returncode == -signal.SIGINT
+    assert said.count("Traceback") == 1
+    assert said.rstrip().endswith("KeyboardInterrupt")
+    assert gone(pids)
+    assert list((tmp_path / "tmp").iterdir()) == []
+
+
+def test_ctrl_c_that_is_caught(tmp_path, shared_memory):
+    """A program that goes on after Ctrl-C has its workers still."""
+    process = _start(
+        tmp_path,
+        """
+        import numpy as np
+        import warnings
+        warnings.simplefilter("error")
+        try:
+            while True:
+                env.engine.step(10)
+        except KeyboardInterrupt:
+            env.reset(seed=2)
+            env.step(np.zeros((4, env.action_dim)))
+            print(*env.engine.workers, flush=True)
+        """,
+        start_new_session=True,
+    )
+    pids = _workers(process)
+    time.sleep(0.3)
+    os.killpg(process.pid, signal.SIGINT)
+    said, complaints = _finish(process)
+    assert complaints == ""
+    assert [int(pid) for pid in said.split()] == pids
+    assert gone(pids)
+
+
+def test_a_fork_does_not_keep_the_workers(tmp_path, shared_memory):
+    """A fork of the program that lives on holds nothing that the workers wait for, and ends without ending them."""
+    process = _start(
+        tmp_path,
+        """
+        import os, time
+        child = os.fork()
+        if child == 0:
+            time.sleep(3.0)
+            os._exit(0)
+        short = os.fork()
+        if short == 0:
+            sys.exit(0)
+        os.waitpid(short, 0)
+        env.engine.step(10)
+        print(child, bool(env.engine.get_state().fault.any()), flush=True)
+        sys.stdin.read()
+        """,
+    )
+    pids = _workers(process)
+    child, fault = process.stdout.readline().split()
+    assert fault == "False"
+    process.kill()
+    assert gone(pids, 2.0)
+    assert alive(int(child))
+    os.kill(int(child), signal.SIGKILL)
+    _finish(process)
+    assert gone([int(child)])
+
+
+def test_the_module_of_the_worker_is_light():
+    """A worker imports what it needs: starting one costs little more than Python and numpy."""
+    code = (
+        "import sys; import anysim.engine.shards.worker; "
+        "loaded = {name.split('.')[0] for name in sys.modules}; "
+        "assert not loaded & {'mujoco', 'pybullet', 'sapien', 'scipy', 'trimesh', 'numba', 'typer'}, loaded"
+    )
+    subprocess.run([sys.executable, "-c", code], cwd=Path.home(), check=True)
