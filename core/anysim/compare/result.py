@@ -17,12 +17,30 @@ class Measure(NamedTuple):
         tolerance: the largest difference from the reference, or between two engines without one, that counts as
             agreement; None where the number only informs.
         explanation: what accounts for a difference where one is known, in a sentence.
+        intervals: by engine, the 95 % confidence interval of a value that was estimated; with them two engines agree
+            where theirs overlap.
     """
 
     subject: str
     unit: str
     values: Mapping[str, float]
     reference: float | None = None
+    tolerance: float | None = None
+    explanation: str = ""
+    intervals: Mapping[str, tuple[float, float]] = {}
+
+
+class Gap(NamedTuple):
+    """A difference between two engines that is no difference of two numbers: the largest over a curve or a set.
+
+    `first` and `second` are engines; `tolerance` and `explanation` are those of a Measure.
+    """
+
+    subject: str
+    unit: str
+    first: str
+    second: str
+    value: float
     tolerance: float | None = None
     explanation: str = ""
 
@@ -63,6 +81,7 @@ class Layer(NamedTuple):
         plots: curves.
         pictures: images.
         refused: engine: why it took no part.
+        gaps: differences between pairs of engines beyond the measures.
     """
 
     name: str
@@ -71,3 +90,4 @@ class Layer(NamedTuple):
     plots: tuple[Plot, ...] = ()
     pictures: tuple[Picture, ...] = ()
     refused: Mapping[str, str] = {}
+    gaps: tuple[Gap, ...] = ()

@@ -1,0 +1,119 @@
+"""The top of the page: who agrees with whom in which layer, who is nearest to the answers, what differs and why."""
+
+from collections.abc import Sequence
+from html import escape
+from itertools import combinations
+
+from anysim.compare.html_tables import badge, number, table
+from anysim.compare.report import Comparison
+from anysim.compare.verdict import (
+    ANALYTIC,
+    Finding,
+    between,
+    disagreements,
+    findings,
+    nearest_counts,
+    worst,
+)  # fmt: skip
+
+LISTED = 12
+"""Differences that the summary tells; the tables have all of them."""
+
+
+def summary(comparison: Comparison) -> list[str]:
+    """The sections above the layers."""
+    return [*_agreement(comparison), *_nearest(comparison), *_differences(comparison)]
+
+
+def _agreement(comparison: Comparison) -> list[str]:
+    names = list(comparison.engines)
+    pairs = list(combinations(names, 2))
+    rows = []
+    for layer in comparison.layers:
+        found = findings(layer)
+        cells = "".join(f"<td>{_cell(between(found, a, b))}</td>" for a, b in pairs)
+        cells += "".join(f"<td>{_cell(between(found, name, ANALYTIC))}</td>" for name in names)
+        link = f'<a href="#{escape(layer.name)}">{escape(layer.name)}</a>'
+        rows.append(f'<tr><th scope="row">{link}</th>{cells}</tr>')
+    heads = ["layer", *(f"{a} / {b}" for a, b in pairs), *(f"{name} / answer" for name in names)]
+    return ["<h2>In short</h2>", _sentence(comparison), table(heads, rows, range(0))]
+
+
+def _sentence(comparison: Comparison) -> str:
+    agree, differ = [], []
+    for layer in comparison.layers:
+        found = findings(layer)
+        if found:
+            (agree if all(f.agree for f in found) else differ).append(layer.name)
+    parts = []
+    if agree:
+        parts.append(f"Within all tolerances: <b>{', '.join(agree)}</b>.")
+    if differ:
+        parts.append(f"Not everywhere: <b>{', '.join(differ)}</b>.")
+    return f"<p>{' '.join(parts) or 'Nothing could be compared.'}</p>"
+
+
+def _cell(found: Sequence[Finding]) -> str:
+    if not found:
+        return ''
+    top = worst(found)
+    assert top is not None
+    text = badge(sum(not f.agree for f in found), len(found))
+    if top.agree:
+        return text
+    return f'{text}<br/><span class="soft">{escape(top.subject)}: {number(top.gap)} {escape(top.unit)}</span>'
+
+
+def _nearest(comparison: Comparison) -> list[str]:
+    names = list(comparison.engines)
+    counts = {layer.name: nearest_counts(layer, names) for layer in comparison.layers}
+    told = {name: row for name, row in counts.items() if any(row.values())}
+    if not told:
+        return []
+    rows = [
+        f'<tr><th scope="row">{escape(layer)}</th>' + "".join(f'<td class="n">{row[n]}</td>' for n in names) + "</tr>"
+        for layer, row in told.items()
+    ]
+    total = {name: sum(row[name] for row in told.values()) for name in names}
+    rows.append(
+        '<tr><th scope="row">together</th>' + "".join(f'<td class="n"><b>{total[n]}</b></td>' for n in names) + "</tr>"
+    )
+    return [
+        "<h3>Nearest to the analytic answer</h3>",
+        '<p class="soft">In how many measures each engine is nearest to the answer, where that tells them apart.</p>',
+        table(["layer", *names], rows, range(1, 1 + len(names))),
+    ]
+
+
+def _differences(comparison: Comparison) -> list[str]:
+    found = disagreements(comparison.layers)
+    refused = [(layer.name, name, why) for layer in comparison.layers for name, why in layer.refused.items()]
+    parts: list[str] = []
+    if found:
+        subjects: dict[tuple[str, str], list[Finding]] = {}
+        for f in found:
+            subjects.setdefault((f.layer, f.subject), []).append(f)
+        items = [_item(group) for group in list(subjects.values())[:LISTED]]
+        more = len(subjects) - len(items)
+        tail = f'<p class="soft">and {more} more, in the tables below</p>' if more > 0 else ""
+        parts += ["<h3>What differs, and what explains it</h3>", f'<ol class="why">{"".join(items)}</ol>{tail}']
+    if refused:
+        items = [f"<li><b>{escape(layer)}</b>, {escape(name)}: {escape(why)}</li>" for layer, name, why in refused]
+        parts += ["<h3>What could not be compared</h3>", f"<ul>{''.join(items)}</ul>"]
+    return parts
+
+
+def _item(group: Sequence[Finding]) -> str:
+    """One subject: the engines that are off its answer, else the pairs that differ."""
+    first = group[0]
+    own = [f for f in group if f.second == ANALYTIC] or list(group)
+    told = ", ".join(
+        escape(f"{f.first} {number(f.gap)} {f.unit}".rstrip())
+        if f.second == ANALYTIC
+        else escape(f"{f.first} and {f.second} {number(f.gap)} {f.unit}".rstrip())
+        for f in own
+    )
+    what = "from the answer" if own[0].second == ANALYTIC else "apart"
+    allowed = f" (tolerance {number(own[0].tolerance)})" if own[0].tolerance > 0 else ""
+    why = f'<br/><span class="soft">{escape(first.explanation)}</span>' if first.explanation else ""
+    return f"<li><b>{escape(first.layer)}, {escape(first.subject)}</b>: {told} {what}{allowed}.{why}</li>"
