@@ -49,15 +49,17 @@ def _measure(quantity: str, lines: Mapping[str, Sequence[AuditLine]]) -> Measure
 
 
 def _error(line: AuditLine) -> float:
-    """Relative to the value, and to a floor below which the audit counts absolutely."""
+    """What exceeds the audit's absolute tolerance, relative to the value; of what is of order one the difference."""
     if len(line.found) != len(line.expected):
         return float("inf")
     found, expected = np.array(line.found), np.array(line.expected)
-    same = found == expected  # also where both are infinite
-    scale = 1.0 if line.quantity in _OF_ORDER_ONE else ABSOLUTE / RELATIVE + np.abs(expected)
-    with np.errstate(invalid="ignore"):
-        error = np.abs(found - expected) / scale
-    return float(np.where(same, 0.0, np.where(np.isfinite(error), error, np.inf)).max(initial=0.0))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        error = np.abs(found - expected)
+        if line.quantity not in _OF_ORDER_ONE:
+            beyond = np.maximum(error - ABSOLUTE, 0.0)
+            error = np.where(beyond == 0.0, 0.0, beyond / np.abs(expected))
+    error = np.where(np.isnan(error), np.inf, error)  # infinite on one side, or not a number
+    return float(np.where(found == expected, 0.0, error).max(initial=0.0))
 
 
 def _text(values: Sequence[float]) -> str:

@@ -55,7 +55,7 @@ def _sentence(comparison: Comparison) -> str:
 
 def _cell(found: Sequence[Finding]) -> str:
     if not found:
-        return ''
+        return ""
     top = worst(found)
     assert top is not None
     text = badge(sum(not f.agree for f in found), len(found))

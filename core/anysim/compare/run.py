@@ -8,7 +8,8 @@ from anysim import registry
 from anysim.api import compile_world
 from anysim.compare.actuation import actuation_layer
 from anysim.compare.asset import asset_layer
-from anysim.compare.engines import Engines
+from anysim.compare.contact import contact_layer
+from anysim.compare.engines import Engines, guarded
 from anysim.compare.kinematics import kinematics_layer
 from anysim.compare.report import Comparison
 from anysim.compare.result import Layer
@@ -68,6 +69,7 @@ _KINDS: dict[str, _Kind] = {
     "asset": _Kind(lambda plan: "", lambda plan: asset_layer(plan.world, plan.engines)),
     "kinematics": _Kind(_no_joints, lambda plan: kinematics_layer(plan.world, plan.engines, seed=plan.seed)),
     "actuation": _Kind(_no_drives, lambda plan: actuation_layer(plan.world, plan.engines, seed=plan.seed)),
+    "contact": _Kind(lambda plan: "", lambda plan: contact_layer(plan.engines, dt=plan.world.physics.dt)),
     "task": _Kind(_no_expert, _task),
 }
 
@@ -106,12 +108,20 @@ def compare(
     found = []
     for number, layer in enumerate(chosen):
         report(layer, 0, 0)
-        found.append(_KINDS[layer].measure(plan))
+        found.append(_measured(plan, layer))
         report(layer, number + 1, len(chosen))
     words = f"{len(world.bodies)} bodies, {len(world.joints)} joints, {len(world.geoms)} geoms"
     return Comparison(
         name or world.name, versions, seed, episodes if "task" in chosen else 0, world.hash, words, tuple(found)
     )
+
+
+def _measured(plan: _Plan, layer: str) -> Layer:
+    """One layer; engines that fail are noted in it, and a layer that fails as a whole is refused for all of them."""
+    whole = guarded({layer: lambda: _KINDS[layer].measure(plan)})
+    if layer in whole.found:
+        return whole.found[layer]
+    return Layer(layer, "It could not be measured.", refused=dict.fromkeys(plan.names, whole.refused[layer]))
 
 
 def engines_here() -> tuple[str, ...]:
