@@ -4,6 +4,7 @@ import re
 from functools import cache
 from importlib import metadata
 
+from anysim.engine.allowance import Allowance
 from anysim.engine.capability import Capabilities, Capability
 from anysim.engine.state import Availability
 
@@ -40,6 +41,10 @@ PARAMETERS = frozenset({
     "actuator.kp", "actuator.kd", "actuator.effort_limit", "world.gravity",
 })  # fmt: skip
 """What can be changed per env. Bullet fixes the centre of mass at the build."""
+
+AUDIT_ALLOWANCES = {
+    "volume": Allowance(0.001, "Bullet moves the corners of a hull by up to 1e-4 of its size: 0.05 % less volume")
+}
 
 
 @cache
