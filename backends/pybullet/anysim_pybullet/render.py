@@ -106,7 +106,9 @@ class Painter:
         turned[:3, 3] = -turned[:3, :3] @ eye[:3]
         top = view.near * tan(radians(view.fov) / 2)
         right = top * view.width / view.height
-        lens = p.computeProjectionMatrix(-right, right, -top, top, view.near, view.far)
+        # TinyRenderer looks through the lower left corner of a pixel: shifted by half a pixel, that is its middle
+        aside, up = right / view.width, top / view.height
+        lens = p.computeProjectionMatrix(aside - right, aside + right, up - top, up + top, view.near, view.far)
         _, _, rgba, raw, owner = p.getCameraImage(
             view.width, view.height, turned.T.ravel().tolist(), lens, shadow=int(self._shadows),
             lightDirection=self._light(), lightAmbientCoeff=0.55, lightDiffuseCoeff=0.45, lightSpecularCoeff=0.05,

@@ -3,7 +3,7 @@
 import numpy as np
 
 from anysim.compare.probes import tolerances as T
-from anysim.compare.probes.probe import Found, G, Probe, Quantity, Z, lane, record, threshold
+from anysim.compare.probes.probe import Found, G, Probe, Quantity, Z, cube, lane, record, threshold
 from anysim.compare.result import Plot, Series
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
