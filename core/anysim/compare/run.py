@@ -8,6 +8,7 @@ from anysim import registry
 from anysim.api import compile_world
 from anysim.compare.actuation import actuation_layer
 from anysim.compare.asset import asset_layer
+from anysim.compare.camera import camera_layer
 from anysim.compare.contact import contact_layer
 from anysim.compare.engines import Engines, guarded
 from anysim.compare.kinematics import kinematics_layer
@@ -50,6 +51,10 @@ def _no_drives(plan: _Plan) -> str:
     return "" if plan.world.actuators else "nothing in this world has drives"
 
 
+def _no_cameras(plan: _Plan) -> str:
+    return "" if plan.world.cameras else "this world has no cameras"
+
+
 def _no_expert(plan: _Plan) -> str:
     task = plan.loaded.spec.task
     if task is None:
@@ -70,6 +75,7 @@ _KINDS: dict[str, _Kind] = {
     "kinematics": _Kind(_no_joints, lambda plan: kinematics_layer(plan.world, plan.engines, seed=plan.seed)),
     "actuation": _Kind(_no_drives, lambda plan: actuation_layer(plan.world, plan.engines, seed=plan.seed)),
     "contact": _Kind(lambda plan: "", lambda plan: contact_layer(plan.engines, dt=plan.world.physics.dt)),
+    "camera": _Kind(_no_cameras, lambda plan: camera_layer(plan.world, plan.engines)),
     "task": _Kind(_no_expert, _task),
 }
 
