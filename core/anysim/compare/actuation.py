@@ -19,7 +19,7 @@ from anysim.world.model import JointType, World
 TRANSIENT, AT_REST = 5e-3, 1e-3
 """[rad or m] on the way and at the end: engines take the law in steps of 2 ms, each with an error of first order."""
 
-PLOTS = 3
+PLOTS = 4
 """Of the joints in which engines differ most."""
 
 _QUESTION = "Do drives follow the same targets in the same way, where nothing is touched and nothing falls?"

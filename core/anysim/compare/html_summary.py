@@ -1,6 +1,6 @@
 """The top of the page: who agrees with whom in which layer, who is nearest to the answers, what differs and why."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from itertools import combinations
 
@@ -16,8 +16,8 @@ from anysim.compare.verdict import (
     worst,
 )  # fmt: skip
 
-LISTED = 12
-"""Differences that the summary tells; the tables have all of them."""
+LISTED, SUBJECTS = 12, 6
+"""Reasons that the summary tells, and measures of each; the tables have all of them."""
 
 
 def summary(comparison: Comparison) -> list[str]:
@@ -90,11 +90,11 @@ def _differences(comparison: Comparison) -> list[str]:
     refused = [(layer.name, name, why) for layer in comparison.layers for name, why in layer.refused.items()]
     parts: list[str] = []
     if found:
-        subjects: dict[tuple[str, str], list[Finding]] = {}
+        reasons: dict[tuple[str, str], dict[str, list[Finding]]] = {}
         for f in found:
-            subjects.setdefault((f.layer, f.subject), []).append(f)
-        items = [_item(group) for group in list(subjects.values())[:LISTED]]
-        more = len(subjects) - len(items)
+            reasons.setdefault((f.layer, f.explanation), {}).setdefault(f.subject, []).append(f)
+        items = [_item(layer, why, subjects) for (layer, why), subjects in list(reasons.items())[:LISTED]]
+        more = len(reasons) - len(items)
         tail = f'<p class="soft">and {more} more, in the tables below</p>' if more > 0 else ""
         parts += ["<h3>What differs, and what explains it</h3>", f'<ol class="why">{"".join(items)}</ol>{tail}']
     if refused:
@@ -103,17 +103,24 @@ def _differences(comparison: Comparison) -> list[str]:
     return parts
 
 
-def _item(group: Sequence[Finding]) -> str:
+def _item(layer: str, why: str, subjects: Mapping[str, Sequence[Finding]]) -> str:
+    """All that one reason explains."""
+    told = [_told(subject, group) for subject, group in list(subjects.items())[:SUBJECTS]]
+    if len(subjects) > SUBJECTS:
+        told.append(f"and {len(subjects) - SUBJECTS} more")
+    reason = escape(why) if why else "Nothing declared explains it."
+    return f'<li><b>{escape(layer)}</b>: {"; ".join(told)}.<br/><span class="soft">{reason}</span></li>'
+
+
+def _told(subject: str, group: Sequence[Finding]) -> str:
     """One subject: the engines that are off its answer, else the pairs that differ."""
-    first = group[0]
-    own = [f for f in group if f.second == ANALYTIC] or list(group)
-    told = ", ".join(
-        escape(f"{f.first} {number(f.gap)} {f.unit}".rstrip())
-        if f.second == ANALYTIC
-        else escape(f"{f.first} and {f.second} {number(f.gap)} {f.unit}".rstrip())
-        for f in own
-    )
-    what = "from the answer" if own[0].second == ANALYTIC else "apart"
+    own = [f for f in group if f.second == ANALYTIC]
+    if own:
+        parts = [f"{f.first} {number(f.gap)} {f.unit}".rstrip() for f in own]
+        text = f"{', '.join(parts)} from the answer"
+    else:
+        own = list(group)
+        parts = [f"{f.first} and {f.second} {number(f.gap)} {f.unit}".rstrip() for f in own]
+        text = f"{', '.join(parts)} apart"
     allowed = f" (tolerance {number(own[0].tolerance)})" if own[0].tolerance > 0 else ""
-    why = f'<br/><span class="soft">{escape(first.explanation)}</span>' if first.explanation else ""
-    return f"<li><b>{escape(first.layer)}, {escape(first.subject)}</b>: {told} {what}{allowed}.{why}</li>"
+    return f"<b>{escape(subject)}</b> {escape(text)}{allowed}"

@@ -23,13 +23,18 @@ def badge(beyond: int, compared: int) -> str:
 
 
 def measure_table(layer: Layer, engines: Sequence[str]) -> str:
-    """One row a measure; numbers beyond the tolerance are marked, and the engine nearest to the answer."""
+    """One row a measure; numbers beyond the tolerance are marked, and the engine nearest to the answer.
+
+    What explains a number stands below the table, once for all that it explains.
+    """
     heads = ["measure", "unit", *engines, "answer", "tolerance"]
-    rows = [_measure_row(measure, engines) for measure in layer.measures]
-    return table(heads, rows, range(2, 4 + len(engines)))
+    notes = list(dict.fromkeys(m.explanation for m in layer.measures if m.explanation))
+    rows = [_measure_row(measure, engines, notes) for measure in layer.measures]
+    told = "".join(f"<li>{escape(note)}</li>" for note in notes)
+    return table(heads, rows, range(2, 4 + len(engines))) + (f'<ol class="notes">{told}</ol>' if told else "")
 
 
-def _measure_row(measure: Measure, engines: Sequence[str]) -> str:
+def _measure_row(measure: Measure, engines: Sequence[str], notes: Sequence[str]) -> str:
     near = nearest(measure)
     tells = 0 < len(near) < len(measure.values)
     cells = []
@@ -48,13 +53,10 @@ def _measure_row(measure: Measure, engines: Sequence[str]) -> str:
         cells.append(f'<td class="{classes}">{text}</td>')
     answer = "" if measure.reference is None else number(measure.reference)
     tolerance = "overlap" if measure.intervals else "" if measure.tolerance is None else number(measure.tolerance)
-    why = ""
-    if measure.explanation:
-        why = f'<tr class="why"><td colspan="{4 + len(engines)}">{escape(measure.explanation)}</td></tr>'
-    kind = ' class="told"' if why else ""
+    note = f" <sup>{notes.index(measure.explanation) + 1}</sup>" if measure.explanation else ""
     return (
-        f'<tr{kind}><th scope="row">{escape(measure.subject)}</th><td>{escape(measure.unit)}</td>{"".join(cells)}'
-        f'<td class="n">{answer}</td><td class="n">{tolerance}</td></tr>{why}'
+        f'<tr><th scope="row">{escape(measure.subject)}{note}</th><td>{escape(measure.unit)}</td>{"".join(cells)}'
+        f'<td class="n">{answer}</td><td class="n">{tolerance}</td></tr>'
     )
 
 
