@@ -5,7 +5,7 @@ from functools import cache
 from typing import Any
 
 from anysim.errors import EngineError
-from anysim_pybullet.quiet import quiet
+from anysim.quiet import quiet
 
 
 @cache

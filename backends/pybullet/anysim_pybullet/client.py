@@ -9,10 +9,10 @@ import numpy as np
 from anysim.conventions import WORLD, Array
 from anysim.errors import EngineError
 from anysim.math import pose as P
+from anysim.quiet import quiet
 from anysim.world.model import Geom, HeightField, HeightFieldShape, Plane, World
 from anysim_pybullet.bullet import bullet, connect, disconnect
 from anysim_pybullet.options import PybulletOptions
-from anysim_pybullet.quiet import quiet
 from anysim_pybullet.surfaces import PairRules
 from anysim_pybullet.tree import Frames, Tree, frames_of, shapes_of, trees_of
 from anysim_pybullet.urdf import body_link, joint_name, shape_link, tree_urdf, world_geom_urdf, write_meshes

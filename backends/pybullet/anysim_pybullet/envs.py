@@ -9,13 +9,13 @@ from anysim.conventions import Array
 from anysim.engine.state import SnapshotLevel
 from anysim.errors import EngineError
 from anysim.math import pose as P
+from anysim.quiet import quiet
 from anysim.world.model import BodyKind, World
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.client import Env, Plan
 from anysim_pybullet.law import Laws, Pusher
 from anysim_pybullet.options import PybulletOptions
 from anysim_pybullet.parameters import Parameters
-from anysim_pybullet.quiet import quiet
 from anysim_pybullet.state import Mirror
 
 _MIRRORED = ("pose", "twist", "position", "velocity", "contact", "fault")

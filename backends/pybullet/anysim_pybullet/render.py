@@ -13,6 +13,7 @@ from anysim.conventions import WORLD, Array
 from anysim.engine.cameras import CameraView
 from anysim.errors import EngineError
 from anysim.math import pose as P
+from anysim.quiet import quiet
 from anysim.world.model import (
     Box,
     Capsule,
@@ -27,7 +28,6 @@ from anysim.world.model import (
     World,
 )
 from anysim_pybullet.bullet import bullet, connect, disconnect
-from anysim_pybullet.quiet import quiet
 
 GROUND_TILES = 16
 """Tiles along an edge of a plane: the renderer is poor at large triangles that reach behind the camera."""

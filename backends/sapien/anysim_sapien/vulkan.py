@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from anysim.errors import EngineError
+from anysim.quiet import quiet
 from anysim_sapien.library import sapien
 
 REMEDY = (
@@ -84,6 +85,20 @@ drawing = threading.RLock()
 """Held while anything is drawn: all scenes of a process share the device."""
 
 
+def _open(icd: str) -> Device | str:
+    """The device of a driver, or why there is none. Software drivers warn at length of what they lack."""
+    failure = ""
+    with _environment(icd), quiet() as words:
+        try:
+            _kept.append(sapien.render.RenderSystem())
+        except RuntimeError as error:
+            failure = str(error)
+    if failure:
+        return f"{words.after(failure)}; driver: {icd or 'none was found'}"
+    device: Any = _kept[0].device
+    return Device(icd, str(device.name), bool(device.is_cpu()))
+
+
 def open_device(option: str) -> Device:
     """The process's device.
 
@@ -94,13 +109,7 @@ def open_device(option: str) -> Device:
     with drawing:
         icd = driver_file(option)
         if _opened is None:
-            with _environment(icd):
-                try:
-                    _kept.append(sapien.render.RenderSystem())
-                    device: Any = _kept[0].device
-                    _opened = Device(icd, str(device.name), bool(device.is_cpu()))
-                except RuntimeError as error:
-                    _opened = f"{error}; driver: {icd or 'none was found'}"
+            _opened = _open(icd)
         if isinstance(_opened, str):
             raise EngineError(f"SAPIEN cannot draw here ({_opened}); {REMEDY}")
         if option != "auto" and _opened.icd != icd:

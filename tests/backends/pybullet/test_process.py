@@ -13,10 +13,10 @@ import pytest
 
 from anysim.engine.factory import create_simulation
 from anysim.errors import EngineError
+from anysim.quiet import quiet
 from anysim.testing import worlds
 from anysim.world.model import Plane
 from anysim_pybullet import declared
-from anysim_pybullet.quiet import quiet
 
 
 def _run(code: str, cwd: Path) -> subprocess.CompletedProcess[str]:

@@ -112,3 +112,36 @@ def test_one_scene_draws_all_envs(make):
     swapped = engine.render("front", env_ids=[1, 0], channels=("rgb", "segmentation"))
     assert np.array_equal(swapped["rgb"], both["rgb"][::-1])
     assert np.array_equal(swapped["segmentation"], both["segmentation"][::-1])
+
+
+@pytest.mark.slow
+def test_drawing_says_nothing(make):
+    """The first image of a process writes nothing to its standard error: software drivers warn of what they lack."""
+    try:
+        make(worlds.scene(cameras=True)).render("front")
+    except EngineError as error:
+        pytest.skip(f"no image can be drawn here: {error}")
+    code = """
+        from anysim.engine.factory import create_simulation
+        from anysim.testing import worlds
+        with create_simulation("sapien").create_world(worlds.scene(cameras=True)) as engine:
+            engine.render("front", channels=("rgb", "depth", "segmentation"))
+    """
+    done = run(code)
+    assert done.returncode == 0
+    assert done.stderr == ""
+    assert done.stdout == ""
+
+
+def test_what_a_driver_says_is_in_the_error(monkeypatch):
+    """Where no device opens, the driver's own words are in the message."""
+    from anysim_sapien.library import sapien
+
+    def fail():
+        os.write(2, b"vk: the card is on fire\n")
+        raise RuntimeError("no device")
+
+    monkeypatch.setattr(vulkan, "_opened", None)
+    monkeypatch.setattr(sapien.render, "RenderSystem", fail)
+    with pytest.raises(EngineError, match="no device; vk: the card is on fire; driver: "):
+        vulkan.open_device("auto")

@@ -1,4 +1,4 @@
-"""Bullet writes to the C library's standard output and error. Here its words are caught instead.
+"""Engines in C and C++ write to the process's standard output and error. Here their words are caught instead.
 
 File descriptors 1 and 2 belong to the process: while words are caught, those of other threads are caught too. So this
 is for calls that are known to print, and no longer than they last.
@@ -20,6 +20,10 @@ class Words:
     """What was said. `text` is complete when the block is left."""
 
     text = ""
+
+    def after(self, message: object) -> str:
+        """A message with the last of what was said, if anything was."""
+        return f"{message}; {self.tail}" if self.text.strip() else str(message)
 
     @property
     def tail(self) -> str:
