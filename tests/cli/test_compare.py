@@ -33,7 +33,16 @@ def test_strict_answers_with_the_exit_code(tmp_path: Path) -> None:
     assert json.loads(fine.stdout)["differ"] == 0
     # Bullet's hulls have less volume than the World's; it declares so, and it is a difference all the same
     differs = anysim(
-        "compare", "pick_cube", "-e", "pybullet", "--strict", "--json", "--layers", "asset", "--out", str(tmp_path / "b")
+        "compare",
+        "pick_cube",
+        "-e",
+        "pybullet",
+        "--strict",
+        "--json",
+        "--layers",
+        "asset",
+        "--out",
+        str(tmp_path / "b"),
     )
     assert differs.returncode == 1, differs.stderr
     layer = json.loads(differs.stdout)["layers"][0]

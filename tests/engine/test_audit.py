@@ -111,4 +111,6 @@ def test_what_is_declared_counts_as_equal_and_is_told(world: World) -> None:
     masses = [line for line in lines if line.quantity == "mass"]
     assert all(line.ok for line in masses)
     assert {line.note for line in masses} == {"within the declared 0.5 %: scales are coarse"}
-    assert all(line.ok is False for line in lines if line.quantity == "principal moments")
+    moments = [line for line in lines if line.quantity == "principal moments" and min(line.expected) > 1e-4]
+    assert moments
+    assert all(line.ok is False and not line.note for line in moments)

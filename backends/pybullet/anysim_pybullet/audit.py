@@ -6,6 +6,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.math import pose as P
+from anysim.world.model import HeightFieldShape, Plane
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.client import Env
 from anysim_pybullet.urdf import UNLIMITED
@@ -38,6 +39,8 @@ def geom_volumes(env: Env) -> Array:
     """(G,) [m^3] of colliding geoms; 0 for others, for planes and for height fields."""
     volumes = np.zeros(len(env.plan.world.geoms))
     for index, (uid, link) in env.shape_at.items():
+        if isinstance(env.plan.world.geoms[index].shape, Plane | HeightFieldShape):
+            continue
         for shape in bullet().getCollisionShapeData(uid, link, physicsClientId=env.id):
             volumes[index] = _volume(shape[2], shape[3], env, uid, link)
     return volumes
