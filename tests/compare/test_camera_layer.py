@@ -49,12 +49,10 @@ def zoo() -> World:
     world = worlds.wall()
     turned = tuple(float(v) for v in P.normalize(np.array([0.3, -0.2, 0.5, 0.8])))
     shapes = (Sphere(0.12), Cylinder(0.08, 0.15), Capsule(0.06, 0.12), Box((0.1, 0.06, 0.12)))
-    places = ((0.9, 0.28, 0.22), (0.9, -0.28, 0.22), (0.9, 0.28, -0.25), (0.9, -0.28, -0.25))
     geoms = [
-        Geom(f"extra{i}", 2 + i % 3, shape, (0.0, 0.0, 0.0), turned)
-        for i, shape in enumerate(shapes)  # bodies wall, red, green
-    ]
-    del places
+        Geom(f"extra{i}", body, shape, (-0.1, 0.0, height), turned)
+        for i, (shape, body, height) in enumerate(zip(shapes, (3, 3, 4, 4), (0.2, -0.2, 0.2, -0.2), strict=True))
+    ]  # on the red and the green cube
     return replace(world, geoms=(*world.geoms, *geoms))
 
 

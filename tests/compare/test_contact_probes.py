@@ -188,6 +188,6 @@ def test_an_engine_that_fails_is_refused_with_its_words() -> None:
 
 
 def test_an_unknown_probe_is_an_error_that_lists_them() -> None:
-    with pytest.raises(EngineError, match="there is no probe 'fly'.*drop, bounce"):
+    with pytest.raises(EngineError, match=r"there is no probe 'fly'.*drop, bounce"):
         contact_layer({}, probes=["fly"])
-    assert list(PROBES)[0] == "drop"
+    assert next(iter(PROBES)) == "drop"

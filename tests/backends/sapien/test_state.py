@@ -26,7 +26,7 @@ def test_packed_poses_are_the_entities_poses(make):
 
 
 def test_links_are_where_their_joints_put_them_whatever_shapes_they_have(make):
-    """PhysX rounds the joints' frames with each shape and inertial that comes; stated last, they are as for no shapes."""
+    """PhysX rounds the joints' frames with each shape and inertial; stated last, they are as without shapes."""
     robot = {"source": {"asset": "example-robot-data:talos_data/robots/talos_reduced.urdf"}, "fixed": True}
     world = compile_world(WorldSpec.model_validate({"objects": {"talos": robot}}))
     engine = make(world)
