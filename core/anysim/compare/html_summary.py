@@ -109,7 +109,7 @@ def _item(layer: str, why: str, subjects: Mapping[str, Sequence[Finding]]) -> st
     if len(subjects) > SUBJECTS:
         told.append(f"and {len(subjects) - SUBJECTS} more")
     reason = escape(why) if why else "Nothing declared explains it."
-    return f'<li><b>{escape(layer)}</b>: {"; ".join(told)}.<br/><span class="soft">{reason}</span></li>'
+    return f'<li>{escape(layer)}, {"; ".join(told)}.<br/><span class="soft">{reason}</span></li>'
 
 
 def _told(subject: str, group: Sequence[Finding]) -> str:
@@ -123,4 +123,4 @@ def _told(subject: str, group: Sequence[Finding]) -> str:
         parts = [f"{f.first} and {f.second} {number(f.gap)} {f.unit}".rstrip() for f in own]
         text = f"{', '.join(parts)} apart"
     allowed = f" (tolerance {number(own[0].tolerance)})" if own[0].tolerance > 0 else ""
-    return f"<b>{escape(subject)}</b> {escape(text)}{allowed}"
+    return f"<b>{escape(subject)}</b>: {escape(text)}{allowed}"
