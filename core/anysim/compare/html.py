@@ -8,7 +8,7 @@ from anysim.compare.drawing import interval_svg, picture_uri, plot_svg
 from anysim.compare.html_summary import summary
 from anysim.compare.html_tables import badge, gap_table, measure_table
 from anysim.compare.report import Comparison
-from anysim.compare.result import Layer
+from anysim.compare.result import Layer, Picture
 from anysim.compare.verdict import findings
 
 _HOW_TO_READ = (
@@ -71,11 +71,17 @@ def _section(layer: Layer, names: list[str], prefix: str) -> list[str]:
         for i, measure in enumerate(layer.measures)
         if measure.intervals
     ]
-    figures += [
-        f'<figure><img src="{picture_uri(picture)}" alt="{escape(f"{picture.title} on {picture.engine}")}"/>'
-        f"<figcaption>{escape(picture.title)}: {escape(picture.engine)}</figcaption></figure>"
-        for picture in layer.pictures
-    ]
     if figures:
         parts.append('<div class="grid">' + "\n".join(figures) + "</div>")
+    for title in dict.fromkeys(picture.title for picture in layer.pictures):
+        same = [picture for picture in layer.pictures if picture.title == title]
+        parts.append('<div class="side">' + "\n".join(_figure(picture) for picture in same) + "</div>")
     return [*parts, "</section>"]
+
+
+def _figure(picture: Picture) -> str:
+    alt = escape(f"{picture.title} on {picture.engine}")
+    return (
+        f'<figure><img src="{picture_uri(picture)}" alt="{alt}"/>'
+        f"<figcaption>{escape(picture.title)}: {escape(picture.engine)}</figcaption></figure>"
+    )
