@@ -5,10 +5,12 @@ MEMBERS := $(patsubst %/,%,$(dir $(wildcard schemas/pyproject.toml core/pyprojec
              plugins/*/pyproject.toml tasks/pyproject.toml)))
 STAMP   := .venv/installed
 
-# The demo: a scripted robot picks cubes in four worlds at once, records it, and a picture shows what happened.
+# The demo: a scripted robot picks cubes in four worlds at once, records it, and a picture shows what happened. Then
+# every installed engine gets the same world, and a page shows how far they agree.
 DEMO_OUT     ?= runs/demo
 DEMO_RUN      = $(BIN)/anysim run pick_cube --num-envs 4 --episodes 8 --seed 1 --out $(DEMO_OUT)
 DEMO_PICTURE  = $(BIN)/python scripts/demo_picture.py $(DEMO_OUT)
+DEMO_COMPARE  = $(BIN)/anysim compare pick_cube --episodes 4 --seed 1 --out $(DEMO_OUT)/compare
 
 # More words for pytest: make test ARGS="-k pose -x"
 ARGS ?=
@@ -27,10 +29,11 @@ $(STAMP): pyproject.toml constraints.txt scripts/setup.sh $(addsuffix /pyproject
 	@scripts/setup.sh $(MEMBERS)
 	@touch $@
 
-demo: $(STAMP)  ## run a pick-and-place task in four worlds, record it and draw a picture
+demo: $(STAMP)  ## run a pick-and-place task in four worlds, record it, draw a picture, and compare the engines
 	@$(if $(filter runs/demo,$(DEMO_OUT)),rm -rf runs/demo)
 	$(DEMO_RUN)
 	@$(DEMO_PICTURE)
+	$(DEMO_COMPARE)
 
 test: $(STAMP)  ## run all tests that are not marked slow (minutes)
 	$(BIN)/python -m pytest -m "not slow" $(ARGS)

@@ -29,7 +29,7 @@ def manifests(out: Path) -> dict[str, dict[str, object]]:
 
 def test_help_teaches() -> None:
     text = anysim("--help").stdout
-    for word in ("run", "replay", "check", "list", "doctor", "audit", "schema", "bench", "Exit codes"):
+    for word in ("run", "replay", "check", "list", "doctor", "audit", "compare", "schema", "bench", "Exit codes"):
         assert word in text
     assert "anysim run pick_cube --num-envs 16" in anysim("run", "--help").stdout
 

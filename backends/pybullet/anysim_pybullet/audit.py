@@ -1,9 +1,12 @@
 """What Bullet says of an env, for an audit against the World."""
 
+from math import pi
+
 import numpy as np
 
 from anysim.conventions import Array
 from anysim.math import pose as P
+from anysim.world.model import HeightFieldShape, Plane
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.client import Env
 from anysim_pybullet.urdf import UNLIMITED
@@ -30,3 +33,33 @@ def inertials(env: Env) -> dict[str, Array]:
         mass[i], com[i] = info[0], np.array(info[3]) + env.plan.frames.anchor[i]
         inertia[i] = tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     return {"body.mass": mass, "body.com": com, "body.inertia": inertia}
+
+
+def geom_volumes(env: Env) -> Array:
+    """(G,) [m^3] of colliding geoms; 0 for others, for planes and for height fields."""
+    volumes = np.zeros(len(env.plan.world.geoms))
+    for index, (uid, link) in env.shape_at.items():
+        if isinstance(env.plan.world.geoms[index].shape, Plane | HeightFieldShape):
+            continue
+        for shape in bullet().getCollisionShapeData(uid, link, physicsClientId=env.id):
+            volumes[index] = _volume(shape[2], shape[3], env, uid, link)
+    return volumes
+
+
+def _volume(kind: int, size: tuple[float, ...], env: Env, uid: int, link: int) -> float:
+    """Bullet gives a box by its edges, a ball by its radius, cylinders and capsules by length and radius."""
+    p = bullet()
+    if kind == p.GEOM_BOX:
+        return size[0] * size[1] * size[2]
+    if kind == p.GEOM_SPHERE:
+        return 4 / 3 * pi * size[0] ** 3
+    if kind == p.GEOM_CYLINDER:
+        return pi * size[1] ** 2 * size[0]
+    if kind == p.GEOM_CAPSULE:
+        return pi * size[1] ** 2 * size[0] + 4 / 3 * pi * size[1] ** 3
+    if kind == p.GEOM_MESH:
+        from scipy.spatial import ConvexHull
+
+        _, corners = p.getMeshData(uid, link, physicsClientId=env.id)
+        return float(ConvexHull(np.array(corners)).volume)
+    return 0.0

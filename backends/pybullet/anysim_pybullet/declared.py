@@ -3,6 +3,7 @@
 from functools import cache
 from importlib import metadata
 
+from anysim.engine.allowance import Allowance
 from anysim.engine.capability import Capabilities, Capability
 from anysim.engine.state import Availability
 from anysim.engine.versions import judge
@@ -41,6 +42,10 @@ PARAMETERS = frozenset({
     "actuator.kp", "actuator.kd", "actuator.effort_limit", "world.gravity",
 })  # fmt: skip
 """What can be changed per env. Bullet fixes the centre of mass at the build."""
+
+AUDIT_ALLOWANCES = {
+    "volume": Allowance(0.001, "Bullet moves the corners of a hull by up to 1e-4 of its size: 0.05 % less volume")
+}
 
 
 @cache

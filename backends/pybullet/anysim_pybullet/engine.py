@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from anysim.conventions import Array
+from anysim.engine.allowance import Allowance
 from anysim.engine.base import SimEngine
 from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Capabilities
@@ -24,6 +25,7 @@ class PybulletEngine(SimEngine):
     name: ClassVar[str] = "pybullet"
     capabilities: ClassVar[Capabilities] = declared.CAPABILITIES
     parameters: ClassVar[frozenset[str]] = declared.PARAMETERS
+    audit_allowances: ClassVar[Mapping[str, Allowance]] = declared.AUDIT_ALLOWANCES
     options: PybulletOptions
 
     @classmethod
@@ -114,13 +116,13 @@ class PybulletEngine(SimEngine):
         self._envs.take(carried, old)
 
     def read_back(self) -> Mapping[str, Array]:
-        """Joint limits, masses, centres of mass and inertias as Bullet has them."""
-        from anysim_pybullet.audit import inertials, joint_limits
+        """Joint limits, volumes, masses, centres of mass and inertias as Bullet has them."""
+        from anysim_pybullet.audit import geom_volumes, inertials, joint_limits
 
         with self._lock:
             self._require_world()
             env = self._envs.clients[0]
-            return {"joint.limits": joint_limits(env), **inertials(env)}
+            return {"joint.limits": joint_limits(env), "geom.volume": geom_volumes(env), **inertials(env)}
 
     def raw_loop(self) -> Callable[[int], None]:
         """Bullet's own loop, stepped without this engine."""

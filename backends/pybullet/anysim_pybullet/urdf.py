@@ -145,10 +145,14 @@ def _origin(pose: Array) -> str:
 
 
 def roll_pitch_yaw(quaternion: Array) -> tuple[float, float, float]:
-    """Fixed-axis roll, pitch and yaw of a rotation, as in URDF. At a pitch of a right angle the yaw is 0."""
+    """Fixed-axis roll, pitch and yaw [rad] of a rotation, as in URDF; the rotation is met within 1e-8.
+
+    Near a pitch of a right angle roll and yaw turn about almost the same axis: there the yaw is 0, because the small
+    numbers that would tell them apart are rounding errors.
+    """
     m = P.to_matrix(np.asarray(quaternion, dtype=float)).tolist()
     level = hypot(m[0][0], m[1][0])
     pitch = atan2(-m[2][0], level)
-    if level < 1e-12:
+    if level < 1e-8:  # error of the one way: level; of the other: 1e-16 / level
         return atan2(-m[1][2], m[1][1]), pitch, 0.0
     return atan2(m[2][1], m[2][2]), pitch, atan2(m[1][0], m[0][0])

@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.engine.allowance import Allowance
 from anysim.engine.base import SimEngine
 from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Capabilities
@@ -37,6 +38,7 @@ class SapienEngine(SimEngine):
     name: ClassVar[str] = "sapien"
     capabilities: ClassVar[Capabilities] = declared.CAPABILITIES
     parameters: ClassVar[frozenset[str]] = Parameters.NAMES
+    audit_allowances: ClassVar[Mapping[str, Allowance]] = declared.AUDIT_ALLOWANCES
     options: SapienOptions
 
     @classmethod

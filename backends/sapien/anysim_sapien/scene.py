@@ -134,9 +134,6 @@ class EnvScene:
             spec = world.joints[index]
             # an unwrapped joint counts its turns; the other kind begins again at half a turn
             joint.set_type("prismatic" if spec.type is JointType.PRISMATIC else "revolute_unwrapped")
-            in_parent, in_child = recipe.frames[index]
-            joint.set_pose_in_parent(in_parent)
-            joint.set_pose_in_child(in_child)
             joint.set_limit(np.array([[spec.lower, spec.upper]], dtype=np.float32))
             joint.set_friction(0.0)
             joint.set_max_velocity(FAST)
@@ -150,10 +147,22 @@ class EnvScene:
         handle.set_solver_velocity_iterations(recipe.options.velocity_iterations)
         for body in members:
             self._enter(body, made[body], recipe.root_pose[members[0]])
+        for body in members[1:]:
+            self._join(body)
         # PhysX sorts the degrees of freedom in its own way: only names tell
         order = np.array([int(joint.name) for joint in handle.active_joints], dtype=int)
         self._tendons(handle, order)
         return Tree(handle, members, order)
+
+    def _join(self, body: int) -> None:
+        """Say where a link's joint is, which must follow what moves centres of mass.
+
+        PhysX keeps the frames of joints relative to the centres of mass, and shifts them, rounding, whenever one moves:
+        with each shape and with the inertial. Said last, links are where they should be three times as closely.
+        """
+        in_parent, in_child = self._recipe.frames[self._recipe.world.body_joint[body]]
+        self.bodies[body].joint.set_pose_in_parent(in_parent)
+        self.bodies[body].joint.set_pose_in_child(in_child)
 
     def _tendons(self, handle: Any, joints: Array) -> None:
         """Mimic joints: a stiff spring between follower and leader."""

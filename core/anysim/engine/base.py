@@ -14,6 +14,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine import checks, saving
+from anysim.engine.allowance import Allowance
 from anysim.engine.cameras import CameraRig
 from anysim.engine.capability import Capabilities, Capability, Need, check
 from anysim.engine.commands import CommandBuffer, Control
@@ -49,6 +50,8 @@ class SimEngine(Primitives):
     """The names of `anysim.engine.parameters` that the engine can change per env."""
     parallel: ClassVar[bool] = False
     """Whether it steps its envs on several cores by itself, so that more processes (`shards: auto`) gain nothing."""
+    audit_allowances: ClassVar[Mapping[str, Allowance]] = {}
+    """By quantity of the audit what the engine declares to be off; all else is taken over to single precision."""
 
     def __init__(self, **options: Any) -> None:
         """Options are those of `options_model`; a wrong one raises EngineError with what exists."""
