@@ -2,11 +2,13 @@
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from anysim.errors import EngineError
+from anysim.world.model import Actuation
 
 BOXES = 5
 CHUNK_STEPS = 4000
@@ -17,7 +19,9 @@ class StepCost(NamedTuple):
     """Physics steps per second of all envs together, for one number of envs.
 
     Attributes:
+        engine: its name.
         what: `engine` (control write, step, state read) or `env` (a whole task step).
+        actuation: who computes the drives; the raw loop always has the engine's own.
         num_envs: envs.
         ours: through anysim [steps/s, wall].
         raw: the engine's own loop [steps/s, wall].
@@ -25,7 +29,9 @@ class StepCost(NamedTuple):
         cpu_ratio: the same of processor time, which other load on the machine disturbs less.
     """
 
+    engine: str
     what: str
+    actuation: str
     num_envs: int
     ours: float
     raw: float
@@ -47,7 +53,18 @@ def panda_and_boxes() -> dict[str, Any]:
     }
 
 
-def engine_cost(engine_name: str, num_envs: int, rounds: int = 7) -> StepCost:
+def engines_with_raw_loop() -> list[str]:
+    """The installed engines that can run here and have a loop of their own to compare with."""
+    from anysim import registry
+    from anysim.engine.base import SimEngine
+
+    kinds = ((name, registry.load("engines", name)) for name in registry.names("engines"))
+    return [name for name, kind in kinds if kind.raw_loop is not SimEngine.raw_loop and kind.availability().available]
+
+
+def engine_cost(
+    engine_name: str, num_envs: int, rounds: int = 7, actuation: Actuation = Actuation.IMPLICIT_PD
+) -> StepCost:
     """Stepping through SimEngine, writing commands and reading the state every control step, against the raw loop.
 
     Raises:
@@ -57,6 +74,7 @@ def engine_cost(engine_name: str, num_envs: int, rounds: int = 7) -> StepCost:
     from anysim.engine.factory import create_simulation
 
     world = compile_world(panda_and_boxes())
+    world = replace(world, physics=replace(world.physics, actuation=actuation))
     with create_simulation(engine_name) as engine:
         engine.create_world(world, num_envs)
         substeps = world.physics.substeps
@@ -98,5 +116,9 @@ def _compare(what: str, num_envs: int, ours: Callable[[], Any], engine: Any, sub
             spent = (time.perf_counter() - wall, time.process_time() - cpu)
             best[name] = tuple(map(min, spent, best.get(name, spent)))
     steps = calls * substeps * num_envs
+    actuation = str(engine.world.physics.actuation)
     (our_wall, our_cpu), (raw_wall, raw_cpu) = best["ours"], best["raw"]
-    return StepCost(what, num_envs, steps / our_wall, steps / raw_wall, raw_wall / our_wall, raw_cpu / our_cpu)
+    return StepCost(
+        engine.name, what, actuation, num_envs, steps / our_wall, steps / raw_wall, raw_wall / our_wall,
+        raw_cpu / our_cpu,
+    )  # fmt: skip

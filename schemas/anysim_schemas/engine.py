@@ -52,6 +52,27 @@ class PhysicsSpec(Spec):
         description="ratio of frictional to normal contact impedance; above 1 reduces creep of grasped objects",
     )
 
+    actuation: Literal["implicit_pd", "explicit_pd", "native"] = Field(
+        default="implicit_pd",
+        description="implicit_pd: the drive law with its damping taken implicitly, the same on every engine; "
+        "explicit_pd: the plain law of the state at the beginning of a step, for low gains; "
+        "native: the engine's own drives, faster, their error declared by each engine",
+    )
+    velocity_limits: Literal["ignore", "enforce"] = Field(
+        default="ignore",
+        description="enforce: a drive asks for no more than its joint's velocity limit; ignore: planners alone heed it",
+    )
+
+    @model_validator(mode="after")
+    def _limits_by_the_law(self) -> "PhysicsSpec":
+        if self.velocity_limits == "enforce" and self.actuation == "native":
+            raise KeyFault(
+                "velocity_limits: enforce is part of the drive law, which actuation: native leaves to the engine; "
+                "choose actuation: implicit_pd or explicit_pd",
+                "velocity_limits",
+            )
+        return self
+
     @model_validator(mode="after")
     def _whole_substeps(self) -> "PhysicsSpec":
         ratio = self.control_dt / self.dt

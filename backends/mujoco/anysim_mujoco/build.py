@@ -8,7 +8,7 @@ import numpy as np
 from anysim.conventions import WORLD, Array, wxyz_from_xyzw
 from anysim.engine.commands import MODES
 from anysim.errors import EngineError
-from anysim.world.model import Body, BodyKind, ContactSensor, Joint, JointType, World
+from anysim.world.model import Actuation, Body, BodyKind, ContactSensor, Joint, JointType, World
 from anysim_mujoco.audit import UNLIMITED
 from anysim_mujoco.drives import feedback
 from anysim_mujoco.geoms import add_assets, add_geom, add_look
@@ -93,7 +93,9 @@ def _settings(spec: Any, world: World, options: MujocoOptions) -> None:
     option.gravity = physics.gravity
     option.impratio = physics.impratio
     option.cone = getattr(mujoco.mjtCone, f"mjCONE_{physics.friction_cone.upper()}")
-    option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{options.integrator.upper()}")
+    # Euler takes the joints' own damping implicitly and that of drives explicitly: the one difference between the two
+    explicit = physics.actuation is Actuation.EXPLICIT_PD
+    option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{'EULER' if explicit else options.integrator.upper()}")
     option.solver = getattr(mujoco.mjtSolver, f"mjSOL_{options.solver.upper()}")
     option.jacobian = getattr(mujoco.mjtJacobian, f"mjJAC_{options.jacobian.upper()}")
     option.iterations = options.iterations

@@ -21,6 +21,10 @@ _APPROXIMATE = {
         "soft: a body sinks 0.1 mm under its own weight, 5 mm under 50 times that, a finger of 50 g 0.45 mm at 3 N; "
         "friction creeps by 0.7 mm/s at 15 degrees and a coefficient of 0.4, a tenth of that with physics.impratio=10"
     ),
+    Capability.EFFORT_LIMITS: (
+        "clipped at the speed of the step's beginning: exact when blocked; a stiff drive that is clipped in motion "
+        "swings about its limit (kp 4500, kd 450 on 0.05 kg m^2 at 2 ms: 0.034 rad off the solution, 0.5 ms: 0.01)"
+    ),
     Capability.MIMIC_JOINTS: "a stiff soft constraint: 0.3 mm at 20 N on a gripper's finger of 15 g",
     Capability.JOINT_LIMITS: "a stiff soft constraint: 0.5 mrad beyond, pressed with 87 N m on 0.1 kg m^2",
     Capability.RESTITUTION: (

@@ -2,14 +2,19 @@
 
 The feedback -kp q - kd qd is the actuator's bias, so that the integrator takes its damping implicitly; the rest is its
 control input. Which terms a mode has is decided here; the bias becomes a per-env array once an env first differs.
+
+Where velocity limits are enforced, kp (q* - q) + kd qd* is clipped to kd times the limit, which depends on the state:
+the control input is then made anew before each substep.
 """
 
 from typing import Any
 
 import numpy as np
 
+from anysim.engine.actuation import speed_bound
 from anysim.engine.commands import MODES, Control
 from anysim.world.model import ControlMode, World
+from anysim_mujoco.layout import Layout
 
 _POSITION, _EFFORT = MODES.index(ControlMode.POSITION), MODES.index(ControlMode.EFFORT)
 
@@ -22,8 +27,14 @@ def feedback(mode: Any, kp: Any, kd: Any) -> tuple[Any, Any]:
 class Drives:
     """Gains and modes (N, A) of all envs, and the control input they give."""
 
-    def __init__(self, batch: Any, world: World) -> None:
+    def __init__(self, batch: Any, world: World, layout: Layout) -> None:
         n, actuators = batch.nsim, world.actuators
+        speeds = np.array([world.joints[a.joint].velocity_limit for a in actuators], dtype=float)
+        self.limited = world.physics.velocity_limits and bool(np.isfinite(speeds).any())
+        """Whether `limit` must be called before each substep."""
+        self._speeds = speeds
+        self._qpos, self._driven = batch.bind("qpos"), layout.joint_q[[a.joint for a in actuators]]
+        self._control: Control | None = None
         self._batch = batch
         self._input = batch.bind("ctrl")
         self._mode = np.tile(np.array([MODES.index(a.mode) for a in actuators], dtype=np.int8), (n, 1))
@@ -38,9 +49,21 @@ class Drives:
         if modes != self._modes:
             self._mode[...], self._modes = control.mode, modes
             self.refresh()
+        if self.limited:
+            self._control = Control(*(array.copy() for array in control))
+            return
         np.multiply(control.position, self._stiffness, out=self._input)
         self._input += control.effort
         self._input += control.velocity * self._damping
+
+    def limit(self) -> None:
+        """Write the control input of all envs for the next substep, the velocity that it asks for limited."""
+        if self._control is None:
+            return
+        held = self._stiffness * self._qpos[:, self._driven]
+        bound = speed_bound(self._damping, self._speeds)
+        push = self._stiffness * self._control.position - held + self._damping * self._control.velocity
+        self._input[...] = np.clip(push, -bound, bound) + held + self._control.effort
 
     def refresh(self) -> None:
         """Write the feedback of all envs, after a change of modes or gains."""

@@ -90,7 +90,7 @@ class MujocoEngine(SimEngine):
         self._qpos, self._qvel = self._batch.bind("qpos"), self._batch.bind("qvel")
         self._mocap_pos, self._mocap_quat = self._batch.bind("mocap_pos"), self._batch.bind("mocap_quat")
         self._wrenches = self._batch.bind("xfrc_applied")
-        self._drives = Drives(self._batch, world)
+        self._drives = Drives(self._batch, world, layout)
         self._parameters = Parameters(self._batch, world, layout, self._drives)
         self._reader = StateReader(self._batch, layout)
         self._fields = self._reader.fields
@@ -113,11 +113,20 @@ class MujocoEngine(SimEngine):
 
     def _step(self, n_steps: int, ids: Array | None) -> None:
         self._parameters.settle()
+        rows = None if ids is None else np.sort(ids)
+        if self._drives.limited:
+            for _ in range(n_steps):
+                self._drives.limit()
+                self._advance(rows, 1)
+        else:
+            self._advance(rows, n_steps)
+        self._reader.stepped(ids)
+
+    def _advance(self, rows: Array | None, n_steps: int) -> None:
         try:
-            self._batch.step(None if ids is None else np.sort(ids), n_steps, _VELOCITY_STAGE)
+            self._batch.step(rows, n_steps, _VELOCITY_STAGE)
         except SimulationError as error:
             self._reader.failed[error.ids] = True
-        self._reader.stepped(ids)
 
     def _read(self, name: str) -> Array:
         self._parameters.settle()

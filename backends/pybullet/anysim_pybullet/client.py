@@ -109,6 +109,7 @@ class Env:
                 failure = None
         if failure is not None:
             raise EngineError(f"Bullet cannot build the world '{world.name}': {failure}; {words.tail}") from failure
+        self.tree_links = [[self.joint_link[j] for j in tree.joints.tolist()] for tree in plan.trees]
         self.local = np.concatenate([plan.frames.inertial, plan.frames.anchor], axis=1)
         for tree, uid in zip(plan.trees, self.root_ids, strict=True):
             info = p.getDynamicsInfo(uid, -1, physicsClientId=self.id)

@@ -97,7 +97,7 @@ class PybulletEngine(SimEngine):
 
     def _set_parameter(self, name: str, values: Array, ids: Array, indices: Array) -> None:
         self._envs.parameters.set(name, values, ids, indices)
-        if name.startswith("actuator."):
+        if name.startswith(("actuator.", "joint.")):
             self._commands.control_changed = True
 
     def _default_parameter(self, name: str) -> Array:
@@ -130,7 +130,7 @@ class PybulletEngine(SimEngine):
 
         with self._lock:
             self._require_world()
-            return raw_loop(self._envs)
+            return raw_loop(self._envs, self.control)
 
     # ------------------------------------------------------------------ sensing
 

@@ -31,7 +31,7 @@ class Envs:
         try:
             for _ in range(num_envs):
                 self.clients.append(Env(self.plan))
-            self.laws = Laws(world, self.plan.frames, self.plan.trees, num_envs)
+            self.laws = Laws(world, self.plan.frames, self.plan.trees, self.clients)
             self.parameters = Parameters(world, self.clients, self.laws)
             self.mirror = Mirror(world, self.clients, self.laws)
             self._tree_of = np.zeros(len(world.bodies), dtype=int)
@@ -105,7 +105,11 @@ class Envs:
         p, dt = bullet(), self.world.physics.dt
         for index in range(len(self.clients)) if ids is None else ids.tolist():
             if not self.mirror.fault[index]:
-                sound = Pusher(self.clients[index], index, self.laws, p, dt).run(steps)
+                env, lifter = self.clients[index], self.laws.lifter(self.clients[index], index)
+                if lifter is None:
+                    sound = Pusher(env, index, self.laws, p, dt).run(steps)
+                else:
+                    sound = lifter.run(p, steps, self.mirror.known_position(index))
                 self.mirror.stepped(index, sound)
 
     # ------------------------------------------------------------------ writing
@@ -166,6 +170,7 @@ class Envs:
             self.mirror.settle(index)
         data = {name: getattr(self.mirror, name)[ids] for name in _MIRRORED}
         data |= {"effort": self.laws.effort[ids], "memory": self.laws.memory[ids]}
+        data |= {"lift": self.laws.lift.torque[ids], "lift_age": self.laws.lift.age[ids]}
         if level is SnapshotLevel.TRAJECTORY:
             files = [self._saved(index) for index in ids.tolist()]
             rows = np.zeros((len(files), max((len(f) for f in files), default=0)), dtype=np.uint8)
@@ -190,6 +195,7 @@ class Envs:
                         self._set_root(index, int(tree.bodies[0]), with_pose=True)
             self.mirror.hold(index)
             self.laws.effort[index], self.laws.memory[index] = data["effort"][row], data["memory"][row]
+            self.laws.lift.torque[index], self.laws.lift.age[index] = data["lift"][row], data["lift_age"][row]
 
     def _saved(self, index: int) -> bytes:
         file = self.plan.folder / "state.bullet"

@@ -31,7 +31,7 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
 PARENT, PRISMATIC, LEADER = range(3)  # columns of `joint_ints` (n, 3)
 AXIS, ORIGIN, REST = 0, 3, 6  # columns of `joint_floats` (n, 15): axis, origin in the parent, rest rotation by rows
 MASS, COM, INERTIA, COMPENSATED = 0, 1, 4, 10  # columns of `bodies` (n + 1, 11); com and inertia in the link's frame
-DAMPING, ARMATURE, STIFFNESS, DRAG, LIMIT, PULL, MULTIPLIER = range(7)  # columns of `drives` (n, 7)
+DAMPING, ARMATURE, STIFFNESS, DRAG, LIMIT, PULL, MULTIPLIER, FEED, BOUND = range(9)  # columns of `drives` (n, 9)
 
 MAX_PASSES = 3
 """Solutions per step: each takes the drives that it finds beyond their limits as constant torques from then on."""
@@ -251,20 +251,22 @@ def dynamics(
 
 @compiled
 def drive_law(
-    dt: float, joint_ints: Array, joint_floats: Array, bodies: Array, drives: Array, wrench: Array, gravity: Array,
-    root: Array, motion: Array, first: int, memory: Array, out: Array,
+    dt: float, implicit: bool, joint_ints: Array, joint_floats: Array, bodies: Array, drives: Array, wrench: Array,
+    gravity: Array, root: Array, motion: Array, first: int, memory: Array, out: Array,
 ) -> bool:  # fmt: skip
     """One step of the drives of an articulation.
 
-    The law is u = kp (q* - q) + kd (qd* - qd) + ff, clipped, its damping taken at the end of the step: the torque is
-    clip(u - dt kd qdd) with (M + A + dt (Kd + D)) qdd = u - D qd - c + known + outer. D is the joints' own damping, A
-    their armature, M, c and known are those of `dynamics`. `outer` is what else acted in the last step (contacts,
-    limits, dry friction): the momentum M dv/dt + c that the applied forces do not explain. Joints that follow another
-    are coupled in the equation, and the forces of the coupling drop out of it.
+    The law is u = kp (q* - q) + kd (qd* - qd) + ff, clipped, its damping taken at the end of the step if `implicit`,
+    else at the beginning, as if kd were 0 in what follows. The torque is clip(u - dt kd qdd) with
+    (M + A + dt (Kd + D)) qdd = u - D qd - c + known + outer. D is the joints' own damping, A their armature, M, c and
+    known are those of `dynamics`. `outer` is what else acted in the last step (contacts, limits, dry friction): the
+    momentum M dv/dt + c that the applied forces do not explain. Joints that follow another are coupled in the equation,
+    and the forces of the coupling drop out of it.
 
     Args:
-        drives: (n, 7): damping, armature, the stiffness and damping of the drive in its mode, its limit, the part of u
-            that does not depend on the state, and the multiplier of a joint that follows another (`LEADER` >= 0).
+        drives: (n, 9): damping, armature, the stiffness and damping of the drive in its mode, its limit,
+            kp q* + kd qd*, the multiplier of a joint that follows another (`LEADER` >= 0), ff, and what bounds
+            kp (q* - q) + kd qd*.
         memory: of the last step: 1 if it holds one, velocity, c - applied, M. Brought up to date.
         out: (2 n + 6): torques for the joints, efforts of the drives, force and moment on a free root's origin.
 
@@ -301,8 +303,12 @@ def drive_law(
             free += 1
     pull, drag = np.empty(n), np.empty(n)
     for i in range(n):
-        pull[i] = drives[i, PULL] - drives[i, STIFFNESS] * motion[0, i] - drives[i, DRAG] * motion[1, i]
+        asked = drives[i, PULL] - drives[i, STIFFNESS] * motion[0, i]
+        asked = min(max(asked, -drives[i, BOUND]), drives[i, BOUND])
+        pull[i] = asked + drives[i, FEED] - drives[i, DRAG] * motion[1, i]
         drag[i] = drives[i, DRAG]
+        if not implicit:
+            pull[i], drag[i] = min(max(pull[i], -drives[i, LIMIT]), drives[i, LIMIT]), 0.0
     gained, reduced, right = np.empty(size), np.empty((free, free)), np.empty(free)
     for _ in range(MAX_PASSES):
         for r in range(free):

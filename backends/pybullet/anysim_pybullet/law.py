@@ -9,30 +9,48 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.engine.actuation import speed_bound
 from anysim.engine.commands import MODES, Control
-from anysim.world.model import ControlMode, World
+from anysim.world.model import Actuation, ControlMode, World
 from anysim_pybullet import kernels as K
+from anysim_pybullet.client import Env
+from anysim_pybullet.lift import Lift, Lifter
+from anysim_pybullet.motors import Motors, feed
 from anysim_pybullet.tree import Frames, Tree
 
 _POSITION, _EFFORT = MODES.index(ControlMode.POSITION), MODES.index(ControlMode.EFFORT)
 
 
+_ONLY_COUPLED = np.array([0, 0, 0, 0, 1, 0, 1, 0, 1], dtype=float)
+"""Takes everything away from the drive of a joint that a motor moves, but limits and its multiplier."""
+
+
 class Laws:
     """Arrays of the drive law, env by env: per joint, per body, and what the last step left."""
 
-    def __init__(self, world: World, frames: Frames, trees: list[Tree], num_envs: int) -> None:
+    def __init__(self, world: World, frames: Frames, trees: list[Tree], envs: list[Env]) -> None:
+        num_envs = len(envs)
         n, bodies, joints, actuators = num_envs, world.bodies, world.joints, world.actuators
-        self._world, self._trees = world, trees
+        self._world, self._trees, self._envs = world, trees, envs
+        self.implicit = world.physics.actuation is not Actuation.EXPLICIT_PD
+        self._speeds = np.full(len(actuators), np.inf)
+        if world.physics.velocity_limits:
+            self._speeds = np.array([joints[a.joint].velocity_limit for a in actuators])
+        native = world.physics.actuation is Actuation.NATIVE and len(actuators) > 0
+        self.motors = Motors(world, trees, n) if native else None
+        self.lift = Lift(n, len(joints))
         self._driven = np.array([a.joint for a in actuators], dtype=int)
         self.kp = np.tile(np.array([a.kp for a in actuators], dtype=float), (n, 1))
         self.kd = np.tile(np.array([a.kd for a in actuators], dtype=float), (n, 1))
         self.limit = np.tile(np.array([a.effort_limit for a in actuators], dtype=float), (n, 1))
-        self.drives = np.zeros((n, len(joints), 7))
+        self.drives = np.zeros((n, len(joints), 9))
         self.drives[:, :, K.DAMPING] = [j.damping for j in joints]
         self.drives[:, :, K.ARMATURE] = [j.armature for j in joints]
-        self.drives[:, :, K.LIMIT] = np.inf
+        self.drives[:, :, [K.LIMIT, K.BOUND]] = np.inf
         for tree in trees:
             self.drives[:, tree.joints, K.MULTIPLIER] = tree.multiplier
+        self.acting = self.drives
+        """What the law uses: `drives`, or a copy in which the joints that motors move have none."""
         self.bodies = np.zeros((n, len(bodies), 11))
         for i, body in enumerate(bodies):
             row = self.bodies[:, i]
@@ -58,19 +76,60 @@ class Laws:
         law = np.zeros(len(self._world.joints), dtype=bool)
         law[self._driven] = True
         law |= np.any(self.drives[:, :, [K.DAMPING, K.ARMATURE]] != 0, axis=(0, 2))
+        loose: Array = np.ones(len(law), dtype=bool)
+        if self.motors is not None:
+            loose = np.logical_not(np.all(self.motors.running, axis=0))
         lifted: Array = np.any(self.bodies[:, :, K.COMPENSATED] != 0, axis=0)
-        self.needs = [bool(law[t.joints].any() or lifted[t.bodies].any()) for t in self._trees]
+        self.needs = [
+            bool((law & loose)[t.joints].any() or (lifted[t.bodies].any() and (t.free or loose[t.joints].any())))
+            for t in self._trees
+        ]
+        self._lifters: dict[int, Lifter] = {}
+        self.lifts = [
+            bool(lifted[t.bodies].any() and len(t.joints)) and not needed
+            for t, needed in zip(self._trees, self.needs, strict=True)
+        ]
 
     def apply(self, control: Control) -> None:
         """Take over commands: what the modes leave of the gains, and the part of the law that has no state in it."""
+        if self.motors is not None:
+            self._apply_natively(control, self.motors)
+            return
         stiffness, drag = self.kp * (control.mode == _POSITION), self.kd * (control.mode != _EFFORT)
         at = self.drives[:, self._driven]
         at[:, :, K.STIFFNESS], at[:, :, K.DRAG], at[:, :, K.LIMIT] = stiffness, drag, self.limit
-        at[:, :, K.PULL] = stiffness * control.position + drag * control.velocity + control.effort
+        at[:, :, K.PULL] = stiffness * control.position + drag * control.velocity
+        at[:, :, K.FEED], at[:, :, K.BOUND] = control.effort, speed_bound(drag, self._speeds)
         self.drives[:, self._driven] = at
+
+    def _apply_natively(self, control: Control, motors: Motors) -> None:
+        """Targets for the motors, and for the law what the drives in effort mode do."""
+        before = motors.running.copy()
+        motors.apply(control, self.kp, self.kd, self.limit, *self.damping_and_armature(), self._envs)
+        self.acting = self.drives.copy()
+        self.acting[:, self._driven, K.FEED], self.acting[:, self._driven, K.LIMIT] = feed(control), self.limit
+        self.acting[motors.running] *= _ONLY_COUPLED
+        if not np.array_equal(before, motors.running):
+            self.forget(np.arange(len(self._envs)))
+            self.refresh()
+
+    def damping_and_armature(self) -> tuple[Array, Array]:
+        """Those of the joints (N, J), views."""
+        return self.drives[:, :, K.DAMPING], self.drives[:, :, K.ARMATURE]
+
+    def lifter(self, env: Env, index: int) -> Lifter | None:
+        """What is left to do in an env where Bullet's motors do everything else; None where the law is needed."""
+        if self.motors is None or self.wrench is not None or any(self.needs):
+            return None
+        lifter = self._lifters.get(index)
+        if lifter is None or lifter.client != env.id:
+            lifter = Lifter(env, index, self, [t for t in self._trees if self.lifts[t.number]])
+            self._lifters[index] = lifter
+        return lifter
 
     def forget(self, ids: Array | int, trees: Array | None = None) -> None:
         """The velocities of these envs (of these trees) were written: the last step explains nothing now."""
+        self.lift.forget(ids)
         for number in range(len(self._trees)) if trees is None else trees.tolist():
             if self._starts[number + 1] > self._starts[number]:
                 self.memory[ids, self._starts[number]] = 0.0
@@ -96,6 +155,8 @@ class Pusher:
     def __init__(self, env: Any, index: int, laws: Laws, p: Any, dt: float) -> None:
         self._p, self._env, self._laws, self._index, self._dt = p, env, laws, index, dt
         self._work = [self._task(tree) for tree in env.plan.trees if self._needed(tree)]
+        lifted = [t for t in env.plan.trees if laws.lifts[t.number] and not self._needed(t)]
+        self._lifter = Lifter(env, index, laws, lifted)
 
     def _needed(self, tree: Tree) -> bool:
         wrench = self._laws.wrench
@@ -109,21 +170,21 @@ class Pusher:
         buffer.wrench[...] = 0.0 if laws.wrench is None else laws.wrench[index, tree.bodies]
         buffer.root[:7], buffer.root[7:] = laws.roots[index, tree.bodies[0]], 0.0
         return (
-            tree, self._env.root_ids[tree.number], [self._env.joint_link[j] for j in tree.joints.tolist()], buffer,
-            laws.bodies[index, tree.bodies], laws.drives[index, tree.joints], laws.remembered(index, tree.number),
+            tree, self._env.root_ids[tree.number], self._env.tree_links[tree.number], buffer,
+            laws.bodies[index, tree.bodies], laws.acting[index, tree.joints], laws.remembered(index, tree.number),
         )  # fmt: skip
 
     def run(self, steps: int) -> bool:
         """Advance; False where the state was found not finite, and the env stood still from then on."""
         p, client = self._p, self._env.id
         if not self._work:
-            for _ in range(steps):
-                p.stepSimulation(physicsClientId=client)
-            return True
+            return self._lifter.run(p, steps)
         for _ in range(steps):
             for task in self._work:
                 if not self._push(p, client, *task):
                     return False
+            if not self._lifter.push(p):
+                return False
             p.stepSimulation(physicsClientId=client)
         for tree, _, _, buffer, *_ in self._work:
             n = len(tree.joints)
@@ -146,7 +207,7 @@ class Pusher:
         buffer.motion[0] = [s[0] for s in states]
         buffer.motion[1] = [s[1] for s in states]
         good = K.drive_law(
-            self._dt, tree.joint_ints, tree.joint_floats, bodies, drives, buffer.wrench,
+            self._dt, self._laws.implicit, tree.joint_ints, tree.joint_floats, bodies, drives, buffer.wrench,
             self._laws.gravity[self._index], buffer.root, buffer.motion, tree.first, memory, buffer.out,
         )  # fmt: skip
         if not good:

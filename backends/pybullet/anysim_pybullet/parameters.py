@@ -11,6 +11,7 @@ from anysim_pybullet.bullet import bullet
 from anysim_pybullet.client import Env
 from anysim_pybullet.declared import PARAMETERS
 from anysim_pybullet.law import Laws
+from anysim_pybullet.motors import refuse_dry_friction
 
 _JOINT = {"joint.damping": K.DAMPING, "joint.armature": K.ARMATURE}
 
@@ -37,6 +38,9 @@ class Parameters:
 
     def set(self, name: str, values: Array, ids: Array, indices: Array) -> None:
         """Write values (E, K, ...)."""
+        if name == "joint.friction" and self._laws.motors is not None:
+            for joint, friction in zip(indices.tolist(), values.max(axis=0).tolist(), strict=True):
+                refuse_dry_friction(self._world, joint, friction)
         if name == "body.inertia":
             self._check_axes(values, indices)
         at = np.ix_(ids, indices)

@@ -1,44 +1,82 @@
 """Bullet's own loop over the same envs, which the engine is measured against."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from weakref import finalize
 
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.engine.commands import Control
 from anysim.engine.state import SnapshotLevel
+from anysim.world.model import Actuation
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.envs import Envs
 
 
-def raw_loop(envs: Envs) -> Callable[[int], None]:
-    """A function of the number of physics steps: write torques, step private clients, copy the state out.
+def raw_loop(envs: Envs, control: Control) -> Callable[[int], None]:
+    """A function of the number of physics steps: set targets, step private clients, copy the state out into arrays.
 
-    The torques are those of the last step, written in every step as Bullet wants it; nothing is computed.
+    As one would write it for Bullet alone: its own motors, told once in a call; the torques that carry a gravity
+    compensated robot in every step, as Bullet wants them, but not worked out anew; positions and velocities of joints,
+    and poses and velocities of centres of mass, as Bullet gives them.
+
+    Raises:
+        EngineError: the world asks for what Bullet's motors cannot do.
     """
-    p, ids = bullet(), np.arange(len(envs.clients))
-    copy = Envs(envs.world, len(envs.clients), envs.plan.options)
+    p, ids, n = bullet(), np.arange(len(envs.clients)), len(envs.clients)
+    world = replace(envs.world, physics=replace(envs.world.physics, actuation=Actuation.NATIVE))
+    copy = Envs(world, n, envs.plan.options)
     state: Mapping[str, Array] = envs.snapshot(ids, SnapshotLevel.TRAJECTORY)
     copy.restore(ids, state, SnapshotLevel.TRAJECTORY)
-    robots = [t for t in envs.plan.trees if len(t.joints)]
-    free = [t.number for t in envs.plan.trees if t.free]
-    torques = [[envs.laws.effort[i, t.joints].tolist() for t in robots] for i in ids]
+    laws = copy.laws
+    laws.apply(control)
+    orders: list[list[tuple[int, list[int], dict[str, list[float]]]]] = [[] for _ in ids]
+    number_of = {env.id: i for i, env in enumerate(copy.clients)}
+    if laws.motors is not None:
+        damping, armature = laws.damping_and_armature()
+        told = laws.motors.orders(control, laws.kp, laws.kd, laws.limit, damping, armature, copy.clients)
+        for client, uid, links, terms in told:
+            orders[number_of[client]].append((uid, links, terms))
+    copy.step(1, None)
+    trees = [t for t in envs.plan.trees if len(t.joints)]
+    lifted = [
+        [
+            (env.root_ids[t.number], env.tree_links[t.number], laws.lift.torque[i, t.joints].tolist())
+            for t in trees
+            if laws.lifts[t.number]
+        ]
+        for i, env in enumerate(copy.clients)
+    ]
+    free = [(t.number, int(t.bodies[0])) for t in envs.plan.trees if t.free]
+    joints, bodies = len(world.joints), len(world.bodies)
+    position, velocity = np.zeros((n, joints)), np.zeros((n, joints))
+    pose, twist = np.zeros((n, bodies, 7)), np.zeros((n, bodies, 6))
 
     def loop(steps: int) -> None:
-        for index, env in enumerate(copy.clients):
-            links = [[env.joint_link[j] for j in t.joints.tolist()] for t in robots]
+        for i, env in enumerate(copy.clients):
+            client = env.id
+            for uid, links, terms in orders[i]:
+                p.setJointMotorControlArray(uid, links, p.POSITION_CONTROL, **terms, physicsClientId=client)
             for _ in range(steps):
-                for t, where, torque in zip(robots, links, torques[index], strict=True):
-                    p.setJointMotorControlArray(
-                        env.root_ids[t.number], where, p.TORQUE_CONTROL, forces=torque, physicsClientId=env.id
-                    )
-                p.stepSimulation(physicsClientId=env.id)
-            for t, where in zip(robots, links, strict=True):
-                p.getJointStates(env.root_ids[t.number], where, physicsClientId=env.id)
-                p.getLinkStates(env.root_ids[t.number], where, computeLinkVelocity=1, physicsClientId=env.id)
-            for number in free:
-                p.getBasePositionAndOrientation(env.root_ids[number], physicsClientId=env.id)
-                p.getBaseVelocity(env.root_ids[number], physicsClientId=env.id)
+                for uid, links, torque in lifted[i]:
+                    p.setJointMotorControlArray(uid, links, p.TORQUE_CONTROL, forces=torque, physicsClientId=client)
+                p.stepSimulation(physicsClientId=client)
+            for t in trees:
+                uid, links = env.root_ids[t.number], env.tree_links[t.number]
+                states = p.getJointStates(uid, links, physicsClientId=client)
+                position[i, t.joints] = [s[0] for s in states]
+                velocity[i, t.joints] = [s[1] for s in states]
+                read = p.getLinkStates(
+                    uid, links, computeLinkVelocity=1, computeForwardKinematics=1, physicsClientId=client
+                )
+                pose[i, t.bodies[1:]] = [(*s[0], *s[1]) for s in read]
+                twist[i, t.bodies[1:]] = [(*s[6], *s[7]) for s in read]
+            for number, body in free:
+                uid = env.root_ids[number]
+                place, turn = p.getBasePositionAndOrientation(uid, physicsClientId=client)
+                linear, angular = p.getBaseVelocity(uid, physicsClientId=client)
+                pose[i, body], twist[i, body] = (*place, *turn), (*linear, *angular)
 
     finalize(loop, copy.close)
     return loop

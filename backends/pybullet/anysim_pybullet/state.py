@@ -19,6 +19,9 @@ from anysim_pybullet.law import Laws
 FRESH, LINKS, ALL = range(3)
 """How much of an env's mirror is out of date."""
 
+_UNUSED = (0.0,) * 7
+"""In place of a link's frame, which a root has not."""
+
 FAR, FAST = 1e6, 1e8
 """[m] and [m/s, rad/s] beyond which an env is given up: Bullet's collision detection has lost its bodies."""
 
@@ -34,12 +37,15 @@ class Mirror:
         self.contact = np.zeros((n, len(world.contact_sensors), 3))
         self.fault = np.zeros(n, dtype=bool)
         self._stale = np.full(n, ALL)
+        self._motor = np.zeros((n, joints))
         self._contact_stale = np.zeros(n, dtype=bool)
         trees = envs[0].plan.trees
-        self._is_root = np.array([b.kind != "link" for b in world.bodies], dtype=bool)
         self._free = [(t.number, int(t.bodies[0])) for t in trees if t.free]
-        self._linked = [(t.number, t.bodies[1:], t.joints) for t in trees if len(t.joints)]
-        self._rows = np.zeros((bodies, 20))
+        self._linked = [(t.number, t.joints) for t in trees if len(t.joints)]
+        self._links = np.concatenate([np.zeros(0, dtype=int), *(t.bodies[1:] for t in trees if len(t.joints))])
+        self._moving = np.concatenate([np.array([body for _, body in self._free], dtype=int), self._links])
+        self._is_root = np.arange(len(self._moving)) < len(self._free)
+        self._no_root = np.zeros(len(self._links), dtype=bool)
 
     def stepped(self, index: int, sound: bool) -> None:
         """This env was stepped; everything of it is new."""
@@ -55,11 +61,15 @@ class Mirror:
         """All of this env's arrays were written."""
         self._stale[index], self._contact_stale[index] = FRESH, False
 
+    def known_position(self, index: int) -> Array | None:
+        """The joint positions (J,) of an env, if they are those that Bullet has now."""
+        return self.position[index] if self._stale[index] != ALL else None
+
     def refresh(self, index: int) -> None:
         """Bring an env's motion up to date."""
         if self._stale[index] != FRESH:
             self._read(index, self._stale[index] == ALL)
-            self._stale[index] = FRESH
+            self._finish(np.array([index]))
 
     def settle(self, index: int) -> None:
         """Bring everything of an env up to date, also its contacts."""
@@ -70,51 +80,65 @@ class Mirror:
 
     def field(self, name: str) -> Array:
         """A fresh array of one of the neutral fields."""
-        if name == "joint_effort":
+        if name == "joint_effort" and self._laws.motors is None:
             return self._laws.effort.copy()
-        for index in range(len(self._envs)):
-            if name == "contact_force":
+        if name == "contact_force":
+            for index in range(len(self._envs)):
                 self.settle(index)
-            else:
-                self.refresh(index)
+        else:
+            self._refresh_all()
         arrays = {
             "body_pose": self.pose, "body_twist": self.twist, "joint_pos": self.position, "joint_vel": self.velocity,
-            "contact_force": self.contact, "fault": self.fault,
+            "contact_force": self.contact, "fault": self.fault, "joint_effort": self._laws.effort,
         }  # fmt: skip
         return arrays[name].copy()
 
+    def _refresh_all(self) -> None:
+        stale = np.flatnonzero(self._stale != FRESH)
+        if len(stale):
+            levels = self._stale[stale].tolist()
+            for index, level in zip(stale.tolist(), levels, strict=True):
+                self._read(index, level == ALL)
+            self._finish(stale)
+
+    def _finish(self, ids: Array) -> None:
+        """These envs were read."""
+        if self._laws.motors is not None:
+            stepped = ids[self._stale[ids] == ALL]
+            effort, motor = self._laws.effort[stepped], self._motor[stepped]
+            self._laws.effort[stepped] = np.where(self._laws.motors.running[stepped], motor, effort)
+        self._stale[ids] = FRESH
+        self._judge(ids)
+
     def _read(self, index: int, everything: bool) -> None:
-        p, env, rows = bullet(), self._envs[index], self._rows
+        p, env = bullet(), self._envs[index]
         client = env.id
+        rows: list[tuple[float, ...]] = []
         if everything:
-            for number, body in self._free:
+            for number, _ in self._free:
                 uid = env.root_ids[number]
                 place, turn = p.getBasePositionAndOrientation(uid, physicsClientId=client)
                 linear, angular = p.getBaseVelocity(uid, physicsClientId=client)
-                rows[body] = (*place, *turn, 0, 0, 0, 0, 0, 0, 0, *linear, *angular)
-        for number, bodies, joints in self._linked:
-            uid = env.root_ids[number]
+                rows.append((*place, *turn, *_UNUSED, *linear, *angular))
+        for number, joints in self._linked:
+            uid, links = env.root_ids[number], env.tree_links[number]
             if everything:
-                links = [env.joint_link[j] for j in joints.tolist()]
                 states: Any = p.getJointStates(uid, links, physicsClientId=client)
                 self.position[index, joints] = [s[0] for s in states]
                 self.velocity[index, joints] = [s[1] for s in states]
-            links = [env.body_at[b][1] for b in bodies.tolist()]
+                if self._laws.motors is not None:
+                    self._motor[index, joints] = [s[3] for s in states]
             read = p.getLinkStates(
                 uid, links, computeLinkVelocity=1, computeForwardKinematics=1, physicsClientId=client
             )
-            rows[bodies] = [(*s[0], *s[1], *s[4], *s[5], *s[6], *s[7]) for s in read]
-        pose, twist = np.zeros_like(self.pose[index]), np.zeros_like(self.twist[index])
-        frames(rows, env.local, self._is_root, pose, twist)
-        chosen = ~self._is_root
-        if everything:
-            chosen[[body for _, body in self._free]] = True
-        self.pose[index, chosen], self.twist[index, chosen] = pose[chosen], twist[chosen]
-        self._judge(index)
+            rows += [(*s[0], *s[1], *s[4], *s[5], *s[6], *s[7]) for s in read]
+        bodies, is_root = (self._moving, self._is_root) if everything else (self._links, self._no_root)
+        pose, twist = np.empty((len(bodies), 7)), np.empty((len(bodies), 6))
+        frames(np.array(rows, dtype=float).reshape(-1, 20), env.local[bodies], is_root, pose, twist)
+        self.pose[index, bodies], self.twist[index, bodies] = pose, twist
 
-    def _judge(self, index: int) -> None:
+    def _judge(self, ids: Array) -> None:
         """A comparison with what is not a number is false, so that it is a fault too."""
-        near = (np.abs(self.pose[index, :, :3]) < FAR).all()
-        slow = (np.abs(self.twist[index]) < FAST).all() and (np.abs(self.velocity[index]) < FAST).all()
-        if not (near and slow):
-            self.fault[index] = True
+        near = (np.abs(self.pose[ids, :, :3]) < FAR).all(axis=(1, 2))
+        slow = (np.abs(self.twist[ids]) < FAST).all(axis=(1, 2)) & (np.abs(self.velocity[ids]) < FAST).all(axis=1)
+        self.fault[ids] |= ~(near & slow)

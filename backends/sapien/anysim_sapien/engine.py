@@ -1,6 +1,6 @@
 """SAPIEN as a SimEngine: one scene per env, stepped one after the other on the CPU."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -18,10 +18,11 @@ from anysim_sapien import declared
 from anysim_sapien.audit import geom_volumes, joint_limits
 from anysim_sapien.carry import Carried, shared
 from anysim_sapien.contacts import contact_points
-from anysim_sapien.drives import Drives
 from anysim_sapien.motion import Motion, motion_of, motions_of, put_motion, put_twist, twists_of
+from anysim_sapien.native import drives_of
 from anysim_sapien.options import SapienOptions
 from anysim_sapien.parameters import Parameters
+from anysim_sapien.raw import raw_loop
 from anysim_sapien.rays import cast
 from anysim_sapien.recipe import Recipe
 from anysim_sapien.scene import EnvScene
@@ -70,7 +71,7 @@ class SapienEngine(SimEngine):
         self._recipe = Recipe(world, self.options)
         self._layout = self._recipe.layout
         self._scenes: list[EnvScene] = []
-        self._drives = Drives(world, num_envs)
+        self._drives = drives_of(world, num_envs)
         self._parameters = Parameters(world, self._layout, self._drives, self._scenes, self._rebuild_env, num_envs)
         for env in range(num_envs):
             self._scenes.append(EnvScene(self._recipe, self._parameters.values(env)))
@@ -113,8 +114,12 @@ class SapienEngine(SimEngine):
     # ------------------------------------------------------------------ stepping
 
     def _step(self, n_steps: int, ids: Array | None) -> None:
-        for env in range(self.num_envs) if ids is None else ids:
-            self._step_env(int(env), n_steps)
+        stepped = range(self.num_envs) if ids is None else [int(env) for env in ids]
+        for env in stepped:
+            self._step_env(env, n_steps)
+        if self.world.joints and len(stepped):
+            scenes = self._scenes if ids is None else [self._scenes[env] for env in stepped]
+            self._drives.note(slice(None) if ids is None else ids, scenes)
 
     def _step_env(self, env: int, n_steps: int) -> None:
         pushes = None if self._wrench is None else wrenches(self._wrench[env], self._layout.fixed)
@@ -162,7 +167,7 @@ class SapienEngine(SimEngine):
                     # the origin keeps its velocity; PhysX would keep that of the centre of mass
                     rows = np.zeros((len(bodies), 6))
                     if moved.any():
-                        rows[moved] = twists_of(scene, bodies[moved].tolist(), turn[moved])
+                        rows[moved] = twists_of([scene], bodies[moved].tolist(), turn[None, moved])[0]
                 for body, place in zip(bodies, pose[row], strict=True):
                     scene.place_body(int(body), place)
                 turn = scene.poses()[bodies, 3:]
@@ -232,6 +237,14 @@ class SapienEngine(SimEngine):
                 "joint.limits": joint_limits(self._scenes[0]),
                 "geom.volume": geom_volumes(self.world, self._scenes[0]),
             }
+
+    def raw_loop(self) -> Callable[[int], None]:
+        """SAPIEN's own loop, stepped without this engine."""
+        with self._lock:
+            self._require_world()
+            values = [self._parameters.values(env) for env in range(self.num_envs)]
+            motions = [motion_of(scene, self._layout) for scene in self._scenes]
+            return raw_loop(self.world, self.options, values, motions, self._drives, self.control)
 
     # ------------------------------------------------------------------ sensing
 

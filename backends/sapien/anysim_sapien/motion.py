@@ -48,23 +48,23 @@ def put_motion(scene: EnvScene, layout: Layout, motion: Motion) -> None:
     scene.place_joints(motion.joint_pos, motion.joint_vel)
 
 
-def twists_of(scene: EnvScene, bodies: Sequence[int], turn: Array) -> Array:
-    """Velocities of free roots' frame origins and their rates (K, 6), world axes; `turn` (K, 4) is their orientation.
+def twists_of(scenes: Sequence[EnvScene], bodies: Sequence[int], turn: Array) -> Array:
+    """Velocities of free roots' frame origins and their rates (N, K, 6), world axes; `turn` (N, K, 4) is how they lie.
 
     PhysX gives the velocity of the centre of mass; the origin's differs by the rate x the arm.
     """
-    components = [scene.bodies[body] for body in bodies]
-    linear = np.array([component.linear_velocity for component in components], dtype=float)
-    rate = np.array([component.angular_velocity for component in components], dtype=float)
-    return np.concatenate([linear - P.cross(rate, _arms(components, turn)), rate], axis=1)
+    components = [[scene.bodies[body] for body in bodies] for scene in scenes]
+    linear = np.array([[part.linear_velocity for part in row] for row in components], dtype=float)
+    rate = np.array([[part.angular_velocity for part in row] for row in components], dtype=float)
+    return np.concatenate([linear - P.cross(rate, _arms(components, turn)), rate], axis=-1)
 
 
-def _arms(components: Sequence[Any], turn: Array) -> Array:
-    """From the frames' origins to the centres of mass (K, 3), in world axes."""
-    return P.rotate(turn, np.array([component.cmass_local_pose.p for component in components], dtype=float))
+def _arms(components: Sequence[Sequence[Any]], turn: Array) -> Array:
+    """From the frames' origins to the centres of mass (N, K, 3), in world axes."""
+    return P.rotate(turn, np.array([[part.cmass_local_pose.p for part in row] for row in components], dtype=float))
 
 
 def put_twist(scene: EnvScene, body: int, twist: Array, turn: Array) -> None:
     """Write a root's twist (6,), as `twists_of` returns it, at its orientation (4,)."""
-    arm = _arms([scene.bodies[body]], turn[None])[0]
+    arm = _arms([[scene.bodies[body]]], turn[None, None])[0, 0]
     scene.push_body(body, twist[:3] + P.cross(twist[3:], arm), twist[3:])

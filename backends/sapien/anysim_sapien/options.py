@@ -10,7 +10,10 @@ class SapienOptions(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    position_iterations: int = Field(default=15, ge=1, le=255, description="iterations of the constraint solver")
+    position_iterations: int = Field(
+        default=30, ge=1, le=255,
+        description="iterations of the constraint solver; with 15 a blocked drive is up to 6 % weaker than it says",
+    )  # fmt: skip
     velocity_iterations: int = Field(default=1, ge=0, le=255, description="further iterations on velocities alone")
     contact_offset: float = Field(
         default=0.005, gt=0, description="distance at which contacts are prepared [m]; forces act from touch on"

@@ -5,6 +5,7 @@ and for parameters that PhysX reads once. Nothing here knows of rendering, so no
 """
 
 import threading
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -272,10 +273,13 @@ class EnvScene:
         """PhysX' contacts of the last step, by the numbers of their shapes: its own order is that of addresses."""
         return sorted(self.system.get_contacts(), key=lambda c: [self._number[shape] for shape in c.shapes])
 
+    def packed_poses(self) -> Array:
+        """(B, 7) float32 of the bodies' frames, in PhysX' order of columns."""
+        return np.frombuffer(self.scene.pack_poses(), dtype=np.float32).reshape(-1, 7)[self._rows]
+
     def poses(self) -> Array:
         """Poses (B, 7) of the bodies' frames, xyzw, float64."""
-        rows = np.frombuffer(self.scene.pack_poses(), dtype=np.float32).reshape(-1, 7)
-        return rows[self._rows[:, None], _FROM_PACKED].astype(float)
+        return self.packed_poses()[:, _FROM_PACKED].astype(float)
 
     def joint_positions(self) -> Array:
         """(J,) float64."""
@@ -290,6 +294,29 @@ class EnvScene:
         for tree in self.trees:
             values[tree.joints] = getattr(tree.handle, name)()
         return values
+
+
+def poses_of(scenes: Sequence[EnvScene]) -> Array:
+    """Poses (N, B, 7) of all envs, xyzw, float64."""
+    return np.array([scene.packed_poses() for scene in scenes])[..., _FROM_PACKED].astype(float)
+
+
+def positions_of(scenes: Sequence[EnvScene]) -> Array:
+    """Joint positions (N, J) of all envs, float64."""
+    values = np.zeros((len(scenes), len(scenes[0].joints)))
+    for row, scene in zip(values, scenes, strict=True):
+        for tree in scene.trees:
+            row[tree.joints] = tree.handle.get_qpos()
+    return values
+
+
+def velocities_of(scenes: Sequence[EnvScene]) -> Array:
+    """Joint velocities (N, J) of all envs, float64."""
+    values = np.zeros((len(scenes), len(scenes[0].joints)))
+    for row, scene in zip(values, scenes, strict=True):
+        for tree in scene.trees:
+            row[tree.joints] = tree.handle.get_qvel()
+    return values
 
 
 def _system(recipe: Recipe, gravity: Array) -> Any:

@@ -10,7 +10,7 @@ from anysim.world.model import BodyKind, World
 from anysim_sapien.contacts import sensor_forces
 from anysim_sapien.drives import Drives
 from anysim_sapien.motion import twists_of
-from anysim_sapien.scene import EnvScene
+from anysim_sapien.scene import EnvScene, poses_of, positions_of, velocities_of
 from anysim_sapien.velocities import LinkVelocities
 
 
@@ -78,31 +78,34 @@ class StateReader:
         return self._scenes[env].poses()
 
     def body_pose(self) -> Array:
-        poses = np.stack([self._poses(env) for env in range(len(self._scenes))])
+        poses = poses_of(self._scenes)
         if self._held_motion.any():
             poses[self._held_motion] = self._motion[self._held_motion, :, :7]
         return poses
 
     def _twists(self, env: int) -> Array:
-        scene, poses = self._scenes[env], self._poses(env)
-        twists = np.zeros((len(self._world.bodies), 6))
+        return self._twists_of(self._scenes[env : env + 1])[0]
+
+    def _twists_of(self, scenes: Sequence[EnvScene]) -> Array:
+        """(N, B, 6), all envs in one go."""
+        poses, twists = poses_of(scenes), np.zeros((len(scenes), len(self._world.bodies), 6))
         if self._free:
-            twists[self._free] = twists_of(scene, self._free, poses[self._free, 3:])
-        if scene.trees:
-            self._velocities.fill(twists, poses, scene.joint_velocities())
+            twists[:, self._free] = twists_of(scenes, self._free, poses[:, self._free, 3:])
+        if scenes[0].trees:
+            self._velocities.fill(twists, poses, velocities_of(scenes))
         return twists
 
     def body_twist(self) -> Array:
-        twists = np.stack([self._twists(env) for env in range(len(self._scenes))])
+        twists = self._twists_of(self._scenes)
         if self._held_motion.any():
             twists[self._held_motion] = self._motion[self._held_motion, :, 7:]
         return twists
 
     def joint_pos(self) -> Array:
-        return np.stack([scene.joint_positions() for scene in self._scenes])
+        return positions_of(self._scenes)
 
     def joint_vel(self) -> Array:
-        return np.stack([scene.joint_velocities() for scene in self._scenes])
+        return velocities_of(self._scenes)
 
     def joint_effort(self) -> Array:
         return self._drives.effort.copy()

@@ -10,6 +10,7 @@ from anysim.engine.commands import Control
 from anysim.world.model import World
 from anysim_sapien.drives import Drives
 from anysim_sapien.journal import Op, entries
+from anysim_sapien.native import drives_of
 from anysim_sapien.recipe import Recipe, Values
 from anysim_sapien.scene import EnvScene
 
@@ -22,12 +23,14 @@ def advance(scene: EnvScene, drives: Drives, row: int, pushes: Array | None, n_s
     system, driven, journal = scene.system, bool(scene.joints), scene.journal
     if driven:
         drives.record(row, journal)
+        drives.begin(row, scene)
+    by_law = driven and drives.each_substep
     pushed: list[tuple[Any, Array, Array]] = []
     if pushes is not None and len(pushes):
         journal.record(Op.WRENCH, pushes.tobytes())
         pushed = [(scene.bodies[int(push[0])], push[1:4], push[4:]) for push in pushes]
     for _ in range(n_steps):
-        if driven:
+        if by_law:
             drives.substep(row, scene)
         for component, force, torque in pushed:
             component.add_force_torque(force, torque)
@@ -35,8 +38,6 @@ def advance(scene: EnvScene, drives: Drives, row: int, pushes: Array | None, n_s
     journal.stepped(n_steps)
     if pushed:
         journal.flush()
-    if driven:
-        drives.note(row, scene)
 
 
 def replay(scene: EnvScene, world: World, rows: Array) -> Drives:
@@ -44,7 +45,7 @@ def replay(scene: EnvScene, world: World, rows: Array) -> Drives:
 
     Returns the drives of one env that moved it.
     """
-    drives = Drives(world, 1)
+    drives = drives_of(world, 1)
     pushes: Array | None = None
     for op, values in entries(rows):
         match op:

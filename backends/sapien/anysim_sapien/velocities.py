@@ -27,19 +27,19 @@ class LinkVelocities:
         self._moved_by = moved_by[self._links]
 
     def fill(self, twists: Array, poses: Array, joint_vel: Array) -> None:
-        """Write the rows of the links into twists (B, 6), whose root rows are there; poses (B, 7), joint_vel (J,).
+        """Write the rows of the links into twists (..., B, 6), whose root rows are there.
 
-        A rigid motion is its angular rate and the velocity of whatever passes the world's origin; both add along a
-        chain of joints.
+        Poses are (..., B, 7), joint_vel (..., J). A rigid motion is its angular rate and the velocity of whatever
+        passes the world's origin; both add along a chain of joints.
         """
-        turn = poses[self._body, 3:]
-        axis = P.rotate(turn, self._axis) * joint_vel[:, None]
-        anchor = poses[self._body, :3] + P.rotate(turn, self._anchor)
+        turn = poses[..., self._body, 3:]
+        axis = P.rotate(turn, np.broadcast_to(self._axis, (*turn.shape[:-1], 3))) * joint_vel[..., None]
+        anchor = poses[..., self._body, :3] + P.rotate(turn, np.broadcast_to(self._anchor, (*turn.shape[:-1], 3)))
         rate = axis * self._turns
-        motion = np.concatenate([P.cross(anchor, rate) + axis * (1.0 - self._turns), rate], axis=1)
+        motion = np.concatenate([P.cross(anchor, rate) + axis * (1.0 - self._turns), rate], axis=-1)
         total = self._moved_by @ motion
-        root = twists[self._root]
-        total[:, :3] += root[:, :3] - P.cross(root[:, 3:], poses[self._root, :3])
-        total[:, 3:] += root[:, 3:]
-        twists[self._links, :3] = total[:, :3] + P.cross(total[:, 3:], poses[self._links, :3])
-        twists[self._links, 3:] = total[:, 3:]
+        root = twists[..., self._root, :]
+        total[..., :3] += root[..., :3] - P.cross(root[..., 3:], poses[..., self._root, :3])
+        total[..., 3:] += root[..., 3:]
+        twists[..., self._links, :3] = total[..., :3] + P.cross(total[..., 3:], poses[..., self._links, :3])
+        twists[..., self._links, 3:] = total[..., 3:]

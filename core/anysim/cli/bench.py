@@ -16,43 +16,49 @@ def _group() -> None:
 
 @app.command("step")
 def step(
-    engine: Annotated[str | None, typer.Option("--engine", "-e", help="An installed engine with a raw loop.")] = None,
+    engine: Annotated[
+        str, typer.Option("--engine", "-e", help="Engines, separated by commas; `all` are those with a raw loop.")
+    ] = "all",
     num_envs: Annotated[
         str, typer.Option("--num-envs", "-n", help="Numbers of envs, separated by commas.")
-    ] = "1,16,64,256",
-    task: Annotated[str, typer.Option(help="The task of the second half.")] = "pick_cube",
+    ] = "1,16,64",
+    task: Annotated[str, typer.Option(help="The task of the last rows; an empty name leaves them out.")] = "pick_cube",
     rounds: Annotated[int, typer.Option(min=1, help="Interleaved rounds; the best of each side counts.")] = 7,
     json: AsJson = False,
 ) -> None:
     """Step through SimEngine and through a whole task, each against the engine's own loop doing the same.
 
     First a Panda with five boxes: commands written and joint positions, velocities, body poses and twists read every
-    control step. Then the task, with observations, rewards and status.
+    control step, with the engine's own drives (`native`) and with the drive law (`implicit_pd`); the raw loop has the
+    engine's own. Then the task, with observations, rewards and status.
     """
-    from anysim.benchmark import engine_cost, env_cost
+    from anysim.benchmark import engine_cost, engines_with_raw_loop, env_cost
     from anysim.cli.output import print_json, print_table
-    from anysim.engine.factory import default_engine
     from anysim.errors import EngineError
+    from anysim.world.model import Actuation
 
     try:
         sizes = [int(n) for n in num_envs.split(",")]
     except ValueError:
         raise EngineError(f"--num-envs takes whole numbers separated by commas, got '{num_envs}'") from None
-    name = engine or default_engine()
+    names = engines_with_raw_loop() if engine == "all" else [name.strip() for name in engine.split(",")]
     costs = []
-    for n in sizes:
-        typer.echo(f"measuring {n} envs…", err=True)
-        costs += [engine_cost(name, n, rounds), env_cost(name, n, task, rounds)]
-    costs.sort(key=lambda c: c.what != "engine")
+    for name in names:
+        for n in sizes:
+            typer.echo(f"measuring {n} envs on {name}…", err=True)
+            costs += [engine_cost(name, n, rounds, mode) for mode in (Actuation.NATIVE, Actuation.IMPLICIT_PD)]
+            costs += [env_cost(name, n, task, rounds)] if task else []
     if json:
         print_json([c._asdict() for c in costs])
         return
     print_table(
-        f"Physics steps per second on {name}, all envs together",
-        ("loop", "envs", "anysim", "raw", "ratio (wall)", "ratio (cpu)"),
+        "Physics steps per second, all envs together",
+        ("engine", "loop", "drives", "envs", "anysim", "raw", "ratio (wall)", "ratio (cpu)"),
         [
             (
+                c.engine,
                 c.what if c.what == "engine" else task,
+                c.actuation,
                 c.num_envs,
                 f"{c.ours:,.0f}",
                 f"{c.raw:,.0f}",

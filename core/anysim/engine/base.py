@@ -14,6 +14,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine import checks, saving
+from anysim.engine.actuation import check_drives
 from anysim.engine.allowance import Allowance
 from anysim.engine.cameras import CameraRig
 from anysim.engine.capability import Capabilities, Capability, Need, check
@@ -115,6 +116,7 @@ class SimEngine(Primitives):
             if num_envs < 1:
                 raise EngineError(f"num_envs must be at least 1, got {num_envs}")
             self.approximations: list[Need] = check(self.name, self.capabilities, needs_of(world), f"'{world.name}'")
+            check_drives(world)
             self.num_envs = num_envs
             self._install(world)
             try:

@@ -3,7 +3,7 @@
 from math import isfinite
 
 from anysim.engine.capability import Capability, Need
-from anysim.world.model import BodyKind, ControlMode, HeightFieldShape, MeshShape, Plane, World
+from anysim.world.model import Actuation, BodyKind, ControlMode, HeightFieldShape, MeshShape, Plane, World
 
 
 def needs_of(world: World) -> list[Need]:
@@ -39,6 +39,16 @@ def needs_of(world: World) -> list[Need]:
         need(capability, f"drive '{actuator.name}' is {actuator.mode} controlled")
         if isfinite(actuator.effort_limit):
             need(Capability.EFFORT_LIMITS, f"drive '{actuator.name}' is limited")
+    needed_by_mode = {
+        Actuation.EXPLICIT_PD: Capability.ACTUATION_EXPLICIT,
+        Actuation.NATIVE: Capability.ACTUATION_NATIVE,
+    }
+    if world.actuators and world.physics.actuation in needed_by_mode:
+        need(needed_by_mode[world.physics.actuation], f"physics.actuation is {world.physics.actuation}")
+    if world.physics.velocity_limits:
+        for actuator in world.actuators:
+            if isfinite(world.joints[actuator.joint].velocity_limit):
+                need(Capability.VELOCITY_LIMITS, f"drive '{actuator.name}' heeds its joint's velocity limit")
     for geom in world.geoms:
         what = f"geom '{geom.name}'"
         if not geom.collides:

@@ -39,11 +39,13 @@ class NullEngine(SimEngine):
             C.CONTROL_POSITION: "the joint moves to its target at its velocity limit, whatever the gains",
             C.CONTROL_VELOCITY: "the joint has its target velocity at once, whatever the gains",
             C.CONTROL_EFFORT: _IGNORED,
+            C.VELOCITY_LIMITS: "position drives alone heed them, and always",
             C.CONTACT_SENSORS: "read zero: kinematic engine",
             **dict.fromkeys(
                 (
                     C.CONTACTS, C.TERRAIN_PLANE, C.TERRAIN_HEIGHTFIELD, C.SHAPE_MESH, C.JOINT_FRICTION, C.ARMATURE,
-                    C.EFFORT_LIMITS, C.GRAVITY_COMPENSATION, C.RESTITUTION, C.TORSIONAL_FRICTION,
+                    C.EFFORT_LIMITS, C.ACTUATION_EXPLICIT, C.ACTUATION_NATIVE, C.GRAVITY_COMPENSATION, C.RESTITUTION,
+                    C.TORSIONAL_FRICTION,
                 ),
                 _IGNORED,
             ),

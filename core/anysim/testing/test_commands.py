@@ -1,5 +1,7 @@
 """Drives and wrenches: they persist or they do not, and they exert what they say."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from anysim.engine.capability import Capability as C
 from anysim.testing import tolerances, worlds
 from anysim.testing.compare import assert_close, assert_ratio, assert_same, read, tape
 from anysim.testing.fixtures import needs
-from anysim.world.model import ControlMode
+from anysim.world.model import Actuation, ControlMode
 
 
 def test_position_drive_reaches_its_target(build):
@@ -179,6 +181,79 @@ def test_modes_switch(build):
     engine.set_control(position=0.0, velocity=0.0)
     engine.step(2500)
     assert_close(engine.get_state().joint_pos, 0.0, tolerances.AT_REST, "both back in position mode")
+
+
+@needs(C.CONTROL_POSITION, C.CONTROL_VELOCITY, C.CONTROL_EFFORT, C.DYNAMICS)
+def test_modes_mix_in_one_batch(build):
+    """Each drive of each env has its own mode: position, velocity and effort side by side, feed-forward in all."""
+    engine = build(worlds.sliders(3), 2)
+    for drive, mode in enumerate(("position", "velocity", "effort")):
+        engine.set_control_mode(mode, env_ids=[0], actuators=[drive])
+        engine.set_control_mode(mode, env_ids=[1], actuators=[2 - drive])
+    engine.set_control(position=0.1, velocity=0.0, effort=4.0)
+    engine.step(1000)
+    state = engine.get_state()
+    for env, order in ((0, [0, 1, 2]), (1, [2, 1, 0])):
+        place, speed = state.joint_pos[env, order], state.joint_vel[env, order]
+        assert_close(place[0], 0.1 + 4.0 / 200.0, tolerances.AT_REST, f"env {env}: position, with feed-forward")
+        assert_close(speed[1], 4.0 / 40.0, tolerances.AT_REST, f"env {env}: velocity, with feed-forward")
+        assert_ratio(speed[2], 4.0 / 2.0 * 2.0, tolerances.MOTION, f"env {env}: effort, speed after 2 s")
+
+
+@needs(C.DYNAMICS)
+def test_the_explicit_law_is_of_the_state_before_the_step(build):
+    """`actuation: explicit_pd`: m v' = m v + dt (kp (q* - q) - kd v), clipped, step by step."""
+    world = worlds.actuated(worlds.slider(ControlMode.POSITION, 100.0, 20.0, 9.0), Actuation.EXPLICIT_PD)
+    engine = build(world)
+    engine.set_control(position=0.2)
+    q = v = 0.0
+    for _ in range(300):
+        engine.step()
+        v += 0.002 / 2.0 * float(np.clip(100.0 * (0.2 - q) - 20.0 * v, -9.0, 9.0))
+        q += 0.002 * v
+        assert_close(engine.get_state().joint_pos[0, 0], q, tolerances.READ_BACK, "position under the explicit law")
+
+
+@needs(C.DYNAMICS)
+def test_native_drives_do_what_their_modes_say(build):
+    """`actuation: native`: each mode reaches what it is told, with feed-forward and within its effort limit."""
+    world = worlds.actuated(worlds.sliders(3, limit=30.0), Actuation.NATIVE)
+    engine = build(world)
+    for drive, mode in enumerate(("position", "velocity", "effort")):
+        engine.set_control_mode(mode, actuators=[drive])
+    engine.set_control(position=0.1, velocity=0.0, effort=4.0)
+    engine.step(1000)
+    place, speed = engine.get_state().joint_pos[0], engine.get_state().joint_vel[0]
+    assert_close(place[0], 0.1 + 4.0 / 200.0, tolerances.AT_REST, "position, with feed-forward")
+    assert_close(speed[1], 4.0 / 40.0, tolerances.AT_REST, "velocity, with feed-forward")
+    assert_ratio(speed[2], 4.0 / 2.0 * 2.0, tolerances.MOTION, "effort, speed after 2 s")
+    engine.set_control(effort=100.0)
+    before = float(engine.get_state().joint_vel[0, 2])
+    engine.step(100)
+    assert_ratio(engine.get_state().joint_vel[0, 2] - before, 30.0 / 2.0 * 0.2, tolerances.BLOCKED, "clipped to 30 N")
+
+
+@needs(C.VELOCITY_LIMITS, C.DYNAMICS)
+@pytest.mark.parametrize("enforced", [True, False], ids=["enforced", "ignored"])
+def test_drives_keep_the_velocity_limit(build, enforced):
+    """Where it is enforced, a position drive goes to a far target at the limit, and a velocity drive no faster."""
+    world = worlds.sliders(2, velocity_limit=0.3)
+    world = replace(world, physics=replace(world.physics, velocity_limits=enforced))
+    engine = build(world)
+    engine.set_control_mode("velocity", actuators=[1])
+    engine.set_control(position=2.0, velocity=[[0.0, 0.8]])
+    fastest = np.zeros(2)
+    for _ in range(100):
+        engine.step(5)
+        fastest = np.maximum(fastest, engine.get_state().joint_vel[0])
+    assert_close(fastest[1], 0.3 if enforced else 0.8, tolerances.AT_REST, "the velocity drive")
+    if enforced:
+        assert_close(engine.get_state().joint_vel[0, 0], 0.3, tolerances.AT_REST, "the position drive on its way")
+        assert fastest[0] < 0.3 + tolerances.AT_REST
+    else:
+        assert fastest[0] > 1.0
+    engine.step(4000)
+    assert_close(engine.get_state().joint_pos[0, 0], 2.0, tolerances.AT_REST, "the position drive at its target")
 
 
 # ---------------------------------------------------------------------- wrenches

@@ -1,5 +1,6 @@
 """The worlds of the contract suite: small enough to know the answers by hand."""
 
+from dataclasses import replace
 from math import cos, inf, pi, sin
 from typing import Any
 
@@ -11,6 +12,7 @@ from anysim.engine.needs import needs_of
 from anysim.math import pose as P
 from anysim.testing.sketch import ORIGIN, Sketch, inertial
 from anysim.world.model import (
+    Actuation,
     Box,
     Camera,
     ContactSensor,
@@ -286,6 +288,22 @@ def slider(
     if drive:
         s.drive(link, mode, kp, kd, limit)
     return s.world()
+
+
+def sliders(count: int, limit: float = inf, **joint: Any) -> World:
+    """Several carriages of 2 kg on one rail base, each with a position drive (kp 200, kd 40); no gravity."""
+    s = Sketch("sliders", gravity=WEIGHTLESS)
+    base = s.robot("rail")
+    for number in range(count):
+        part = inertial(Box((0.1, 0.1, 0.1)), 2.0)
+        link = s.link(f"carriage{number}", base, PRISMATIC, X, part, position=(0.0, 1.0 * number, 0.0), **joint)
+        s.drive(link, ControlMode.POSITION, 200.0, 40.0, limit)
+    return s.world()
+
+
+def actuated(world: World, actuation: Actuation) -> World:
+    """The same world with another actuation."""
+    return replace(world, physics=replace(world.physics, actuation=actuation))
 
 
 def gripper() -> World:

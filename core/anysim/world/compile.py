@@ -15,7 +15,7 @@ from anysim.world.compile_robot import add_robot
 from anysim.world.compile_sensors import compile_lights, with_sensors
 from anysim.world.imported import ImportNote
 from anysim.world.issues import Issues
-from anysim.world.model import Physics, World
+from anysim.world.model import Actuation, Physics, World
 from anysim.world.placement import check_layout, place_nominally
 from anysim_schemas.engine import PhysicsSpec
 from anysim_schemas.run import RunSpec, WorldSpec
@@ -79,4 +79,7 @@ def _base(base: Base, name: str) -> Path | None:
 
 def neutral_physics(spec: PhysicsSpec) -> Physics:
     """The physics part of a World."""
-    return Physics(spec.dt, spec.control_dt, spec.gravity, spec.friction_cone, spec.impratio)
+    return Physics(
+        spec.dt, spec.control_dt, spec.gravity, spec.friction_cone, spec.impratio, Actuation(spec.actuation),
+        spec.velocity_limits == "enforce",
+    )  # fmt: skip

@@ -82,6 +82,14 @@ class ControlMode(StrEnum):
     EFFORT = "effort"  # u = ff
 
 
+class Actuation(StrEnum):
+    """Who computes the drive law, and how it takes its damping."""
+
+    IMPLICIT_PD = "implicit_pd"  # the law, its damping at the end of the step; the same on every engine
+    EXPLICIT_PD = "explicit_pd"  # the law of the state at the beginning of the step; the same on every engine
+    NATIVE = "native"  # the engine's own drives
+
+
 class Inertial(NamedTuple):
     """Mass [kg], centre of mass [m] in the body frame, and the inertia about it in body axes.
 
@@ -272,13 +280,18 @@ class Robot:
 
 @dataclass(frozen=True, slots=True)
 class Physics:
-    """Time steps [s], gravity [m/s^2], and what an engine may choose about friction."""
+    """Time steps [s], gravity [m/s^2], what an engine may choose about friction, and how drives act.
+
+    With `velocity_limits` a drive asks for no more than its joint's velocity limit; see `docs/conventions.md`.
+    """
 
     dt: float = 0.002
     control_dt: float = 0.02
     gravity: Vec3 = (0.0, 0.0, -9.81)
     friction_cone: str = "elliptic"
     impratio: float = 1.0
+    actuation: Actuation = Actuation.IMPLICIT_PD
+    velocity_limits: bool = False
 
     @property
     def substeps(self) -> int:

@@ -1,0 +1,101 @@
+"""Bullet's own drives, for `actuation: native`: a motor is a constraint on the joint's velocity with a bounded force.
+
+A motor reaches v + g_p (q* - q) / dt + g_v (qd* - v) at the end of a step, whatever else acts on the joint, as long as
+its force suffices. With g_p = dt^2 kp / D, g_v = dt (kd + d) / D and D = I + A + dt (kd + d) a single joint moves
+as the drive law says; I is the joint's own entry in the mass matrix at the initial pose, A its armature, d its damping.
+So a motor knows nothing of coupling and load, and one that is blocked pushes with up to its effort limit.
+Feed-forward moves the target. Drives in effort mode have no motor and stay with the law, see `law`.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.engine.commands import MODES, Control
+from anysim.errors import EngineError
+from anysim.world.jacobians import mass_matrix
+from anysim.world.model import ControlMode, World
+from anysim_pybullet.bullet import bullet
+from anysim_pybullet.client import Env
+from anysim_pybullet.tree import Tree
+
+_POSITION, _EFFORT = MODES.index(ControlMode.POSITION), MODES.index(ControlMode.EFFORT)
+
+ENDLESS = 1e30
+"""Stands for no effort limit: Bullet multiplies it by the time step."""
+
+
+class Motors:
+    """The motors of all envs."""
+
+    def __init__(self, world: World, trees: list[Tree], num_envs: int) -> None:
+        self._dt = world.physics.dt
+        self._driven = np.array([a.joint for a in world.actuators], dtype=int)
+        for actuator in world.actuators:
+            refuse_dry_friction(world, actuator.joint, world.joints[actuator.joint].friction)
+        if len(set(self._driven.tolist())) < len(self._driven):
+            raise EngineError(
+                f"a joint of '{world.name}' has two drives; with physics.actuation: native pybullet has one motor per "
+                f"joint; use physics.actuation: implicit_pd"
+            )
+        armature = np.array([joint.armature for joint in world.joints])
+        diagonal = np.diag(mass_matrix(world, world.initial_body_pose))[: len(armature)]
+        self._inertia = (diagonal - armature)[self._driven]
+        self.running = np.zeros((num_envs, len(world.joints)), dtype=bool)
+        """Which joints (N, J) a motor moves."""
+        self._rows: list[tuple[int, Array, list[int]]] = []  # per tree with drives: number, actuators, joints
+        for tree in trees:
+            chosen = [a for a, joint in enumerate(self._driven.tolist()) if joint in tree.joints]
+            if chosen:
+                self._rows.append((tree.number, np.array(chosen), self._driven[chosen].tolist()))
+
+    def apply(
+        self, control: Control, kp: Array, kd: Array, limit: Array, damping: Array, armature: Array, envs: list[Env]
+    ) -> None:
+        """Give Bullet the targets and gains of all envs; gains and limits are (N, A), the others (N, J)."""
+        p = bullet()
+        for client, uid, links, terms in self.orders(control, kp, kd, limit, damping, armature, envs):
+            p.setJointMotorControlArray(uid, links, p.POSITION_CONTROL, **terms, physicsClientId=client)
+
+    def orders(
+        self, control: Control, kp: Array, kd: Array, limit: Array, damping: Array, armature: Array, envs: list[Env]
+    ) -> Iterator[tuple[int, int, list[int], dict[str, list[float]]]]:
+        """As `apply`, but what Bullet is to be told: client, body, links, targets and gains, for each articulation."""
+        dt = self._dt
+        motor = control.mode != _EFFORT
+        stiffness, drag = kp * (control.mode == _POSITION), kd * motor
+        motor &= (stiffness > 0) | (drag > 0)
+        whole = drag + damping[:, self._driven]
+        inertia = self._inertia + armature[:, self._driven] + dt * whole
+        position, push = control.position.copy(), drag * control.velocity
+        shifted = stiffness > 0
+        np.add(position, np.divide(control.effort, stiffness, where=shifted, out=np.zeros_like(push)), out=position)
+        push += np.where(shifted, 0.0, control.effort)
+        velocity = np.divide(push, whole, where=whole > 0, out=np.zeros_like(push))
+        gains, brakes = dt * dt * stiffness / inertia, dt * whole / inertia
+        force = np.where(motor, np.minimum(limit, ENDLESS), 0.0)
+        self.running[:, self._driven] = motor
+        told = {
+            "targetPositions": position, "targetVelocities": velocity, "forces": force, "positionGains": gains,
+            "velocityGains": brakes,
+        }  # fmt: skip
+        for number, chosen, joints in self._rows:
+            lists = [values[:, chosen].tolist() for values in told.values()]
+            for env, *rows in zip(envs, *lists, strict=True):
+                links = [env.joint_link[j] for j in joints]
+                yield env.id, env.root_ids[number], links, dict(zip(told, rows, strict=True))
+
+
+def refuse_dry_friction(world: World, joint: int, friction: float) -> None:
+    """Raise where a driven joint is to have dry friction: Bullet makes both of the same motor."""
+    if friction > 0 and any(a.joint == joint for a in world.actuators):
+        raise EngineError(
+            f"joint '{world.joints[joint].name}' has dry friction and a drive; with physics.actuation: native pybullet "
+            f"has one motor for both; use physics.actuation: implicit_pd, or take the friction away"
+        )
+
+
+def feed(control: Control) -> Array:
+    """What is left of the commands for the law: the effort of drives in effort mode (N, A)."""
+    return np.where(control.mode == _EFFORT, control.effort, 0.0)
