@@ -298,7 +298,7 @@ class EnvScene:
 
 def poses_of(scenes: Sequence[EnvScene]) -> Array:
     """Poses (N, B, 7) of all envs, xyzw, float64."""
-    return np.array([scene.packed_poses() for scene in scenes])[..., _FROM_PACKED].astype(float)
+    return np.array([scene.packed_poses() for scene in scenes])[..., _FROM_PACKED].astype(float, order="C")
 
 
 def positions_of(scenes: Sequence[EnvScene]) -> Array:
