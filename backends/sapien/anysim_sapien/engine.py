@@ -17,6 +17,7 @@ from anysim_sapien.audit import geom_volumes, joint_limits
 from anysim_sapien.carry import Carried, shared
 from anysim_sapien.contacts import contact_points
 from anysim_sapien.drives import Drives
+from anysim_sapien.momentum import Momentum
 from anysim_sapien.motion import Motion, motion_of, put_motion, put_twist, twists_of
 from anysim_sapien.options import SapienOptions
 from anysim_sapien.parameters import Parameters
@@ -26,7 +27,7 @@ from anysim_sapien.scene import EnvScene
 from anysim_sapien.shapes import to_pose
 from anysim_sapien.state import StateReader
 
-_BUILT = ("_recipe", "_layout", "_drives", "_parameters", "_reader", "_fields", "_wrench", "_scenes")
+_BUILT = ("_recipe", "_layout", "_drives", "_parameters", "_momentum", "_reader", "_fields", "_wrench", "_scenes")
 """What `_build` makes and `_free` lets go of."""
 
 
@@ -64,7 +65,8 @@ class SapienEngine(SimEngine):
         self._parameters = Parameters(world, self._layout, self._drives, self._scenes, self._rebuild_env, num_envs)
         for env in range(num_envs):
             self._scenes.append(EnvScene(self._recipe, self._parameters.values(env)))
-        self._reader = StateReader(world, self._scenes, self._drives)
+        self._momentum = Momentum(self._recipe, num_envs)
+        self._reader = StateReader(world, self._scenes, self._drives, self._momentum)
         self._fields = self._reader.fields
         self._wrench: Array | None = None
         self._painter: Any = None
@@ -87,6 +89,7 @@ class SapienEngine(SimEngine):
         """A new scene for an env, in the initial state: a used one would remember contacts."""
         self._scenes[env] = EnvScene(self._recipe, self._parameters.values(env))
         self._drives.forget(env)
+        self._momentum.forget(env)
 
     def _rebuild_env(self, env: int) -> None:
         """A new scene for an env, in its present state."""
@@ -106,14 +109,17 @@ class SapienEngine(SimEngine):
         scene, system = self._scenes[env], self._scenes[env].system
         driven = bool(scene.joints)
         pushes = self._pushes(env, scene)
-        for _ in range(n_steps):
+        for number in range(n_steps):
             if driven:
                 self._drives.substep(env, scene)
+            if number == n_steps - 1:
+                self._momentum.before(scene)
             for component, force, torque in pushes:
                 component.add_force_torque(force, torque)
             system.step()
         if driven:
             self._drives.note(env, scene)
+        self._momentum.after(env, scene, None if self._wrench is None else self._wrench[env])
         self._reader.stepped(env)
 
     def _pushes(self, env: int, scene: EnvScene) -> list[tuple[Any, Array, Array]]:
@@ -229,7 +235,7 @@ class SapienEngine(SimEngine):
         return cast(self._scenes, self._layout, origins, directions, ids)
 
     def _contacts(self, ids: Array) -> ContactPoints:
-        return contact_points(self.world, self._scenes, ids)
+        return contact_points(self.world, self._scenes, self._momentum, ids)
 
     def _render(self, view: CameraView, ids: Array, channels: tuple[str, ...]) -> dict[str, Array]:
         from anysim_sapien.render import Painter

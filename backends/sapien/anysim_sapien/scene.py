@@ -47,7 +47,8 @@ class EnvScene:
 
     def __init__(self, recipe: Recipe, values: Values) -> None:
         world = recipe.world
-        self._recipe, self._values = recipe, values
+        self._recipe, self.values = recipe, values
+        """Of the env's parameters, kept up to date."""
         self.system = _system(recipe, values.gravity)
         self.scene: Any = sapien.Scene([self.system])
         self.bodies: list[Any] = [None] * len(world.bodies)
@@ -91,7 +92,7 @@ class EnvScene:
         else:
             self.bodies[body], self.entities[body] = component, entity
             if not isinstance(component, physx.PhysxRigidStaticComponent):
-                self.set_inertial(body, self._values.mass[body], self._values.com[body], self._values.inertia[body])
+                self.set_inertial(body, self.values.mass[body], self.values.com[body], self.values.inertia[body])
                 self._free_of_defaults(component, recipe.world.bodies[body].gravity_compensation)
         self.scene.add_entity(entity)
 
@@ -133,7 +134,7 @@ class EnvScene:
             joint.set_limit(np.array([[spec.lower, spec.upper]], dtype=np.float32))
             joint.set_friction(0.0)
             joint.set_max_velocity(FAST)
-            joint.set_armature(np.array([self._values.armature[index]], dtype=np.float32))
+            joint.set_armature(np.array([self.values.armature[index]], dtype=np.float32))
             joint.set_drive_properties(0.0, spec.damping, UNBOUNDED, "force")
             joint.set_drive_velocity_target(0.0)
             joint.set_name(str(index))
