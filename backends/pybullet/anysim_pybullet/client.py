@@ -208,7 +208,7 @@ class Env:
             for second, (uid_b, link_b) in shapes[:k]:
                 low, high = sorted((world.geoms[first].body, world.geoms[second].body))
                 kin = low != WORLD and (world.bodies[high].parent == low and world.bodies[high].kind == "link")
-                if low != WORLD and (low == high or kin or (low, high) in world.excluded_pairs):
+                if low == high or kin or (low, high) in world.excluded_pairs:
                     p.setCollisionFilterPair(uid_a, uid_b, link_a, link_b, 0, physicsClientId=self.id)
 
     def _couple(self, p: Any) -> None:

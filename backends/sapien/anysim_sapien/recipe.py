@@ -8,7 +8,7 @@ from anysim.conventions import WORLD, Array
 from anysim.errors import EngineError
 from anysim.math import pose as P
 from anysim.world.model import BodyKind, HeightFieldShape, Joint, Plane, World
-from anysim_sapien.exclusions import groups_of
+from anysim_sapien.exclusions import apart_of
 from anysim_sapien.inertia import Principal, principal
 from anysim_sapien.layout import Layout
 from anysim_sapien.options import SapienOptions
@@ -33,7 +33,7 @@ class Recipe:
 
     def __init__(self, world: World, options: SapienOptions) -> None:
         self.world, self.options, self.layout = world, options, Layout.of(world)
-        self.groups = groups_of(world)
+        self.apart = apart_of(world)
         self.surfaces = [geom.surface for geom in world.geoms]
         self.solid = np.array([i for i, geom in enumerate(world.geoms) if geom.collides], dtype=int)
         self.geoms_on: dict[int, list[int]] = {}
@@ -70,7 +70,9 @@ class Recipe:
                 self._copies.clear()
             solid = self.solid
             surfaces = [self.surfaces[i] for i in solid]
-            made = copies_of(surfaces, friction[solid], self.layout.geom_fixed[solid], self._meet)
+            labels = [self.apart.labels.get(self.world.geoms[i].body, 0) for i in solid]
+            still, between = self.layout.geom_fixed[solid], self.apart.between
+            made = copies_of(surfaces, friction[solid], still, self._meet, labels, between)
             self._copies[key] = dict(zip(solid.tolist(), made, strict=True))
         return self._copies[key]
 

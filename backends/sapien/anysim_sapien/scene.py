@@ -79,7 +79,11 @@ class EnvScene:
         for index in recipe.geoms_on.get(body, ()):
             for copy in self.copies[index]:
                 shape = make_shape(
-                    recipe.world, recipe.world.geoms[index], copy, recipe.groups.get(body, Group()), recipe.options
+                    recipe.world,
+                    recipe.world.geoms[index],
+                    copy,
+                    recipe.apart.groups.get(body, Group()),
+                    recipe.options,
                 )
                 component.attach(shape)
                 self.shapes[index].append(shape)

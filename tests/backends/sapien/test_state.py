@@ -6,8 +6,6 @@ import pytest
 from anysim.errors import CapabilityError
 from anysim.testing import worlds
 from anysim.testing.compare import play, read, spread, tape
-from anysim.testing.sketch import Sketch
-from anysim.world.model import Box, ContactSensor, Surface
 
 
 def test_packed_poses_are_the_entities_poses(make):
@@ -68,18 +66,3 @@ def test_exact_snapshots_are_not_claimed(make):
     engine = make(worlds.scene())
     with pytest.raises(CapabilityError, match="snapshot: trajectory"):
         engine.snapshot()
-
-
-def test_contact_forces_are_normal_forces(make):
-    """What the capability declares: friction of a sliding block is not in its contact force."""
-    s = Sketch("slide")
-    s.ground()
-    box = s.free("box", Box((0.2, 0.2, 0.05)), (0.0, 0.0, 0.05), surface=Surface(friction=0.5))
-    s.sensors.append(ContactSensor("box", (box,)))
-    engine = make(s.world())
-    engine.step(50)
-    engine.set_body_state(twist=[2.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    engine.step(20)
-    force = engine.get_state().contact_force[0, 0]
-    assert force[2] == pytest.approx(9.81, rel=0.02)
-    assert abs(force[0]) < 0.01

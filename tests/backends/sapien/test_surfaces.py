@@ -6,7 +6,7 @@ import pytest
 from anysim.errors import EngineError
 from anysim.testing.sketch import Sketch, inertial
 from anysim.world.model import Body, BodyKind, Box, JointType, Sphere, Surface, World
-from anysim_sapien.exclusions import Group, groups_of
+from anysim_sapien.exclusions import Group, apart_of
 from anysim_sapien.surfaces import copies_of
 
 
@@ -97,7 +97,7 @@ def test_exclusions_are_what_they_say(seed):
     rng = np.random.default_rng(seed)
     count, chained = 7, bool(seed % 2)
     pairs = {(i, k) for k in range(count) for i in range(k) if rng.random() < 0.35}
-    groups = groups_of(_world(count, pairs, chained))
+    groups = apart_of(_world(count, pairs, chained)).groups
     for k in range(count):
         for i in range(k):
             a, b = groups.get(i, Group()), groups.get(k, Group())
@@ -109,7 +109,7 @@ def test_exclusions_are_what_they_say(seed):
 def test_a_robot_without_self_collision_needs_one_set():
     """All pairs but neighbours are excluded: with the neighbours, which never collide, that is one set."""
     pairs = {(i, k) for k in range(12) for i in range(k) if k > i + 1}
-    assert {group.bits for group in groups_of(_world(12, pairs, chained=True)).values()} == {1}
+    assert {group.bits for group in apart_of(_world(12, pairs, chained=True)).groups.values()} == {1}
 
 
 def test_parents_and_children_never_collide(make):
