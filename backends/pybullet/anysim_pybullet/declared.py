@@ -12,9 +12,9 @@ REMEDY = "pip install 'pybullet>=3.2.7'"
 
 _APPROXIMATE = {
     Capability.CONTACTS: (
-        "friction multiplies in Bullet: a pair is as the rule says where things touch the ground, the fixed or a robot "
-        "and 3 or fewer coefficients are about (within 0.005 with 4); between two free objects it can be too high by "
-        "0.45 (0.2 and 0.2 on a ground of 0.8). Surfaces are rigid: softness is not simulated"
+        "friction multiplies in Bullet: within 0.02 of the pair rule as built, by several shapes a geom where it takes "
+        "them; where coefficients are changed later it can be off by 0.45 (0.2 and 0.2 on a ground of 0.8, built with "
+        "0.8 throughout). Surfaces are rigid: softness is not simulated"
     ),
     Capability.RESTITUTION: "within 0.05 of the coefficient at 1, 2 and 4.2 ms; an impact sinks up to one step's way",
     Capability.TORSIONAL_FRICTION: "exact on a surface of equal friction; else off as the friction of the pair is",
