@@ -1,6 +1,6 @@
 """SAPIEN as a SimEngine: one scene per env, stepped one after the other on the CPU."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -17,6 +17,7 @@ from anysim_sapien.audit import geom_volumes, joint_limits
 from anysim_sapien.carry import Carried, shared
 from anysim_sapien.contacts import contact_points
 from anysim_sapien.drives import Drives
+from anysim_sapien.meeting import refusals
 from anysim_sapien.momentum import Momentum
 from anysim_sapien.motion import Motion, motion_of, put_motion, put_twist, twists_of
 from anysim_sapien.options import SapienOptions
@@ -48,6 +49,11 @@ class SapienEngine(SimEngine):
     def options_model(cls) -> type[SapienOptions]:
         """The engine's options."""
         return SapienOptions
+
+    @classmethod
+    def refusals(cls, world: World) -> Sequence[str]:
+        """Pairs of surfaces and exclusions that PhysX' filters cannot tell apart."""
+        return refusals(world)
 
     @property
     def version(self) -> str:

@@ -82,7 +82,7 @@ class EnvScene:
                     recipe.world,
                     recipe.world.geoms[index],
                     copy,
-                    recipe.apart.groups.get(body, Group()),
+                    recipe.groups.get(body, Group()),
                     recipe.options,
                 )
                 component.attach(shape)

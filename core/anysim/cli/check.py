@@ -55,7 +55,8 @@ def check_one(name: str, engine: str | None, all_engines: bool, overrides: list[
     faults: list[str] = []
     for one in engines:
         try:
-            check_capabilities(one, registry.load("engines", one).capabilities, needs_of(world), name)
+            kind = registry.load("engines", one)
+            check_capabilities(one, kind.capabilities, needs_of(world), name, kind.refusals(world))
         except AnysimError as error:
             faults.append(f"{name}: {error}")
     return faults
