@@ -35,6 +35,9 @@ class RobotSpec(Spec):
     )
     home_noise: NonNegativeValue = Field(default=0.0, description="standard deviation of the arm's home position [rad]")
     actions: dict[str, ActionSpec] = Field(default_factory=dict, description="channel: controller")
+    self_collision: Flag | None = Field(
+        default=None, description="whether its links collide with each other; as the catalogue says where not given"
+    )
 
 
 class GainSpec(Spec):

@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from anysim_schemas.base import Integer, Name, Spec
 from anysim_schemas.cameras import CameraSpec
+from anysim_schemas.collisions import CollisionsSpec
 from anysim_schemas.engine import EngineSpec, PhysicsSpec
 from anysim_schemas.errors import KeyFault
 from anysim_schemas.layout import PlacementSpec
@@ -26,6 +27,7 @@ class WorldSpec(Spec):
     cameras: dict[Name, CameraSpec] = Field(default_factory=dict, description="cameras by name")
     lights: dict[Name, LightSpec] = Field(default_factory=dict, description="lights by name")
     contact_sensors: dict[Name, ContactSensorSpec] = Field(default_factory=dict, description="contact sensors by name")
+    collisions: CollisionsSpec = Field(default=CollisionsSpec(), description="what passes through what")
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> Self:

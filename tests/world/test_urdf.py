@@ -143,6 +143,16 @@ def test_impossible_inertias_are_repaired_and_reported(urdf: Load, inertial: Tex
     assert "link 'a' (arm.urdf:3): has an inertia that no body can have" in notes(model, "repaired")
 
 
+def test_inertia_without_mass_is_dropped(urdf: Load, inertial: Text) -> None:
+    """Some engines keep the inertia of a link that has no mass and some drop it: it is settled at the import."""
+    nothing = '<inertial><mass value="0"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    parts = link("base", inertial(1)) + link("hand", inertial(2)) + joint("j", "base", "hand")
+    plain = urdf(parts)
+    model = urdf(parts + link("grasp", nothing) + joint("f", "hand", "grasp", "fixed"))
+    assert model.bodies[1].inertial == plain.bodies[1].inertial
+    assert "has inertia and no mass; the inertia is dropped" in notes(model, "repaired")
+
+
 def test_links_without_mass(urdf: Load, inertial: Text) -> None:
     ball = '<visual><geometry><sphere radius="0.3"/></geometry></visual>'
     limit = '<limit lower="0.3" upper="1" effort="1" velocity="1"/><axis xyz="1 0 0"/>'

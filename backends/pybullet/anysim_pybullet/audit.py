@@ -38,7 +38,8 @@ def inertials(env: Env) -> dict[str, Array]:
 def geom_volumes(env: Env) -> Array:
     """(G,) [m^3] of colliding geoms; 0 for others, for planes and for height fields."""
     volumes = np.zeros(len(env.plan.world.geoms))
-    for index, (uid, link) in env.shape_at.items():
+    for number, (uid, link) in env.shape_at.items():
+        index = int(env.plan.rules.geoms[number])
         if isinstance(env.plan.world.geoms[index].shape, Plane | HeightFieldShape):
             continue
         for shape in bullet().getCollisionShapeData(uid, link, physicsClientId=env.id):

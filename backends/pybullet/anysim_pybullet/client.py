@@ -14,7 +14,7 @@ from anysim.world.model import Geom, HeightField, HeightFieldShape, Plane, World
 from anysim_pybullet.bullet import bullet, connect, disconnect
 from anysim_pybullet.options import PybulletOptions
 from anysim_pybullet.surfaces import PairRules
-from anysim_pybullet.tree import Frames, Tree, frames_of, shapes_of, trees_of
+from anysim_pybullet.tree import Frames, Tree, frames_of, trees_of
 from anysim_pybullet.urdf import body_link, joint_name, shape_link, tree_urdf, world_geom_urdf, write_meshes
 
 STATIC_GROUP, MOVING_GROUP = 2, 1
@@ -42,13 +42,13 @@ class Plan:
             meshes = write_meshes(world, self.folder)
             self.urdf: list[str] = []
             for tree in self.trees:
-                self.urdf.append(self._write(f"t{tree.number}", tree_urdf(world, self.frames, tree, meshes)))
+                shapes = self.rules.shapes_on(tree.bodies)
+                self.urdf.append(self._write(f"t{tree.number}", tree_urdf(world, self.frames, tree, shapes, meshes)))
             self.ground: list[tuple[int, Geom, str]] = []
-            for i, geom in enumerate(world.geoms):
-                if geom.collides and geom.body == WORLD:
-                    whole = isinstance(geom.shape, Plane | HeightFieldShape)
-                    file = "" if whole else self._write(f"w{i}", world_geom_urdf(geom, meshes))
-                    self.ground.append((i, geom, file))
+            for number, geom in self.rules.shapes_on(np.array([WORLD]))[WORLD]:
+                whole = isinstance(geom.shape, Plane | HeightFieldShape)
+                file = "" if whole else self._write(f"w{number}", world_geom_urdf(geom, meshes))
+                self.ground.append((number, geom, file))
         except BaseException:
             self.close()
             raise
@@ -67,7 +67,7 @@ class Plan:
 class Env:
     """A client with one copy of the World. `root_ids[t]` is the Bullet body of tree t.
 
-    `body_at`, `joint_link`, `shape_at` say where the World's bodies, joints and colliding geoms are.
+    `body_at`, `joint_link`, `shape_at` say where the World's bodies, joints and the shapes of `PairRules` are.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -95,8 +95,8 @@ class Env:
         with quiet() as words:
             try:
                 self._settings(p)
-                for index, geom, file in plan.ground:
-                    self._add_ground(p, index, geom, file)
+                for number, geom, file in plan.ground:
+                    self._add_ground(p, number, geom, file)
                 for tree in plan.trees:
                     self._add_tree(p, tree)
                 self._filter(p)
@@ -129,7 +129,7 @@ class Env:
         )  # fmt: skip
         p.setGravity(*physics.gravity, physicsClientId=self.id)
 
-    def _add_ground(self, p: Any, index: int, geom: Geom, file: str) -> None:
+    def _add_ground(self, p: Any, number: int, geom: Geom, file: str) -> None:
         place, turn = np.array(geom.position, dtype=float), geom.quaternion
         if isinstance(geom.shape, Plane):
             shape = p.createCollisionShape(p.GEOM_PLANE, planeNormal=[0, 0, 1], physicsClientId=self.id)
@@ -140,14 +140,14 @@ class Env:
         else:
             flags = p.URDF_IGNORE_VISUAL_SHAPES | p.URDF_USE_IMPLICIT_CYLINDER
             uid = p.loadURDF(file, useFixedBase=1, flags=flags, physicsClientId=self.id)
-            self._know(index, uid, -1)
+            self._know(number, uid, -1)
             return
         uid = p.createMultiBody(0, shape, -1, place.tolist(), turn, physicsClientId=self.id)
-        self._know(index, uid, -1)
+        self._know(number, uid, -1)
 
-    def _know(self, index: int, uid: int, link: int) -> None:
-        self.shape_at[index] = (uid, link)
-        self.body_of.setdefault(uid, {})[link] = self.plan.world.geoms[index].body
+    def _know(self, number: int, uid: int, link: int) -> None:
+        self.shape_at[number] = (uid, link)
+        self.body_of.setdefault(uid, {})[link] = self.plan.world.geoms[self.plan.rules.geoms[number]].body
 
     def _height_field(self, p: Any, field: HeightField) -> tuple[int, float]:
         heights = np.asarray(field.heights, dtype=float)
@@ -178,9 +178,9 @@ class Env:
             link = links[body_link(body)]
             self.body_at[body] = (uid, link)
             self.body_of.setdefault(uid, {})[link] = body
-        for body, shapes in shapes_of(world, tree.bodies).items():
-            for k, (index, _) in enumerate(shapes):
-                self._know(index, uid, links[shape_link(index) if k else body_link(body)])
+        for body, shapes in self.plan.rules.shapes_on(tree.bodies).items():
+            for k, (number, _) in enumerate(shapes):
+                self._know(number, uid, links[shape_link(number) if k else body_link(body)])
         for link in (-1, *links.values()):
             p.changeDynamics(
                 uid, link, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0, maxJointVelocity=SPEED_LIMIT,
@@ -201,18 +201,15 @@ class Env:
 
     def _filter(self, p: Any) -> None:
         """Switch off the pairs of shapes that never collide; the rest of the World collides."""
-        world, shapes = self.plan.world, list(self.shape_at.items())
-        for index, (uid, link) in shapes:
-            body = world.geoms[index].body
+        world, rules = self.plan.world, self.plan.rules
+        for number, (uid, link) in self.shape_at.items():
+            body = world.geoms[rules.geoms[number]].body
             still = body == WORLD or world.bodies[body].kind == "static"
             group, mask = (STATIC_GROUP, MOVING_GROUP) if still else (MOVING_GROUP, MOVING_GROUP | STATIC_GROUP)
             p.setCollisionFilterGroupMask(uid, link, group, mask, physicsClientId=self.id)
-        for k, (first, (uid_a, link_a)) in enumerate(shapes):
-            for second, (uid_b, link_b) in shapes[:k]:
-                low, high = sorted((world.geoms[first].body, world.geoms[second].body))
-                kin = low != WORLD and (world.bodies[high].parent == low and world.bodies[high].kind == "link")
-                if low != WORLD and (low == high or kin or (low, high) in world.excluded_pairs):
-                    p.setCollisionFilterPair(uid_a, uid_b, link_a, link_b, 0, physicsClientId=self.id)
+        for first, second in zip(*np.nonzero(np.triu(rules.weight == 0.0, 1)), strict=True):
+            (uid_a, link_a), (uid_b, link_b) = self.shape_at[int(first)], self.shape_at[int(second)]
+            p.setCollisionFilterPair(uid_a, uid_b, link_a, link_b, 0, physicsClientId=self.id)
 
     def _couple(self, p: Any) -> None:
         world = self.plan.world
@@ -249,15 +246,15 @@ class Env:
     # ------------------------------------------------------------------ surfaces
 
     def set_surfaces(self, friction: Array) -> None:
-        """Give Bullet its numbers for the coefficients (K,) of the colliding geoms."""
+        """Give Bullet its numbers for the coefficients (K,) of the shapes' geoms."""
         p, rules = bullet(), self.plan.rules
         numbers = rules.numbers(friction)
-        for k, index in enumerate(rules.geoms.tolist()):
+        for number, index in enumerate(rules.geoms.tolist()):
             if self.plan.world.geoms[index].surface.restitution > 0:
                 # Bullet begins a contact before the touch and takes the gap off the speed after it: no bounce is left
-                p.changeDynamics(*self.shape_at[index], contactProcessingThreshold=0.0, physicsClientId=self.id)
+                p.changeDynamics(*self.shape_at[number], contactProcessingThreshold=0.0, physicsClientId=self.id)
             p.changeDynamics(
-                *self.shape_at[index], lateralFriction=float(numbers.friction[k]),
-                spinningFriction=float(numbers.spinning[k]), restitution=float(numbers.restitution[k]),
+                *self.shape_at[number], lateralFriction=float(numbers.friction[number]),
+                spinningFriction=float(numbers.spinning[number]), restitution=float(numbers.restitution[number]),
                 physicsClientId=self.id,
             )  # fmt: skip

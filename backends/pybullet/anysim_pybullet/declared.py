@@ -13,10 +13,9 @@ REMEDY = "pip install 'pybullet>=3.2.7'"
 
 _APPROXIMATE = {
     Capability.CONTACTS: (
-        "friction multiplies in Bullet: a pair is as the rule says where the coefficients about can be written as "
-        "products, such as one on all that is fixed; 0.2 and 0.6 on fixed plates and on objects give 0.32 for 0.2 and "
-        "0.43 to 0.71 for 0.6; between two free objects it can be too high by 0.45 (0.2 and 0.2 on a ground of 0.8). "
-        "Surfaces are rigid: softness is not simulated. A cylinder rolls 2 % too fast down 15 degrees"
+        "friction multiplies in Bullet: within 0.02 of the pair rule as built, by several shapes a geom where it takes "
+        "them; where coefficients are changed later it can be off by 0.45 (0.2 and 0.2 on a ground of 0.8, built with "
+        "0.8 throughout). Surfaces are rigid: softness is not simulated. A cylinder rolls 2 % too fast down 15 degrees"
     ),
     Capability.RESTITUTION: "within 0.05 of the coefficient at 1, 2 and 4.2 ms; an impact sinks up to one step's way",
     Capability.TORSIONAL_FRICTION: "exact on a surface of equal friction; else off as the friction of the pair is",

@@ -1,8 +1,10 @@
 """The pair rules of the conventions, in an engine that multiplies.
 
 A pair's friction is the larger of the two coefficients, or that of the surface of higher priority; Bullet multiplies
-the numbers of the two shapes. So each shape gets a number such that the products come out as the rule says: exactly
-wherever the rule can be written as products, else as near as least squares come, pairs that matter more first.
+the numbers of the two shapes. So each shape gets a number such that the products come out as the rule says. Where no
+such numbers exist (0.2 and 0.2 on a ground of 0.8), a geom becomes one shape for each value that its pairs can have;
+shapes meet only in the value of their pair, and each has its root. Coefficients that are changed later may ask for
+values that no shape is there for: then the products come as near as least squares bring them.
 """
 
 import math
@@ -11,17 +13,20 @@ from typing import NamedTuple
 import numpy as np
 
 from anysim.conventions import WORLD, Array
-from anysim.world.model import BodyKind, World
+from anysim.world.model import BodyKind, Geom, World
 from anysim_pybullet.kernels import compiled
 from anysim_pybullet.tree import Tree
 
 _SWEEPS = 100
+EXACT = 0.02
+"""By how much a coefficient may be off before geoms get several shapes, which cost time (a third, for a Panda)."""
+
 _APART, _LOOSE, _WITHIN = 1.0, 0.01, 0.001
 """Weights of pairs: of things of different kinds, of two free objects, of links of one robot."""
 
 
 class Surfaces(NamedTuple):
-    """What Bullet gets for each colliding geom (K,)."""
+    """What Bullet gets for each shape (K,)."""
 
     friction: Array
     spinning: Array
@@ -29,20 +34,54 @@ class Surfaces(NamedTuple):
 
 
 class PairRules:
-    """The pairs of colliding geoms of a World; gives Bullet's numbers for any coefficients."""
+    """The pairs of shapes of a World; gives Bullet's numbers for any coefficients.
+
+    Attributes:
+        geoms: (K,) the World's geom of each shape, in order; more than once where a geom has several shapes.
+        weight: (K, K) how much a pair counts; 0 where two shapes never meet.
+    """
 
     def __init__(self, world: World, trees: list[Tree], contact_erp: float) -> None:
-        self.geoms = np.array([i for i, g in enumerate(world.geoms) if g.collides], dtype=int)
-        chosen = [world.geoms[i] for i in self.geoms]
-        self.priority = np.array([g.surface.priority for g in chosen], dtype=int)
-        self._spin = np.array([g.surface.torsional_friction if g.surface.torsional else 0.0 for g in chosen])
-        bounce = np.array([g.surface.restitution for g in chosen], dtype=float)
+        self._world, self._erp = world, contact_erp
+        solid = np.array([i for i, g in enumerate(world.geoms) if g.collides], dtype=int)
         tree_of = {WORLD: -1} | {int(b): t.number for t in trees for b in t.bodies}
-        self.weight = self._weights(world, [g.body for g in chosen], tree_of, trees)
+        self._take(solid, self._weights(world, [world.geoms[i].body for i in solid], tree_of, trees))
+        nominal = np.array([world.geoms[i].surface.friction for i in solid], dtype=float)
+        if self._gap(nominal) > EXACT:
+            self._split(nominal)
+
+    def _take(self, geoms: Array, weight: Array) -> None:
+        surfaces = [self._world.geoms[i].surface for i in geoms]
+        self.geoms, self.weight = geoms, weight
+        self.priority = np.array([s.priority for s in surfaces], dtype=int)
+        self._spin = np.array([s.torsional_friction if s.torsional else 0.0 for s in surfaces])
+        bounce = np.array([s.restitution for s in surfaces], dtype=float)
         # What an impact sinks, up to a step's way, is pushed out with `contact_erp` of its speed, which adds to the
         # bounce: half of that on average.
-        wanted = np.maximum(np.maximum.outer(bounce, bounce) - 0.5 * contact_erp, 0.0)
-        self._bounce = factors(wanted, self.weight, _SWEEPS) if bounce.any() else np.zeros_like(bounce)
+        self._wanted_bounce = np.maximum(np.maximum.outer(bounce, bounce) - 0.5 * self._erp, 0.0)
+        some = bool(bounce.any())
+        self._bounce = factors(self._wanted_bounce, weight, _SWEEPS) if some else np.zeros_like(bounce)
+
+    def _gap(self, friction: Array) -> float:
+        """The largest difference between a coefficient of a pair and the rule's."""
+        meet, values = self.weight > 0, self.numbers(friction).friction
+        slide = np.abs(np.multiply.outer(values, values) - self.pair_friction(friction))
+        bounce = np.abs(np.multiply.outer(self._bounce, self._bounce) - self._wanted_bounce)
+        return float(max(slide[meet].max(initial=0.0), bounce[meet].max(initial=0.0)))
+
+    def _split(self, friction: Array) -> None:
+        """Give each geom a shape for each pair of values, of friction and of restitution, that it can meet with."""
+        wanted = [self.pair_friction(friction), self._wanted_bounce]
+        shapes: list[tuple[int, tuple[float, ...]]] = []
+        for i in range(len(self.geoms)):
+            values = {tuple(float(w[i, k]) for w in wanted) for k in np.flatnonzero(self.weight[i])}
+            shapes += [(i, value) for value in sorted(values)] or [(i, ())]
+        weight = np.zeros((len(shapes), len(shapes)))
+        for row, (i, value) in enumerate(shapes):
+            for column, (k, other) in enumerate(shapes):
+                if value == other and self.weight[i, k] > 0 and value == tuple(float(w[i, k]) for w in wanted):
+                    weight[row, column] = self.weight[i, k]
+        self._take(self.geoms[[i for i, _ in shapes]], weight)
 
     def _weights(self, world: World, bodies: list[int], tree_of: dict[int, int], trees: list[Tree]) -> Array:
         tree = np.array([tree_of[b] for b in bodies], dtype=int)
@@ -52,7 +91,11 @@ class PairRules:
         weight[tree[:, None] == tree] = _WITHIN
         weight[still[:, None] & still] = 0.0
         body = np.array(bodies, dtype=int)
+        parent = np.array([world.bodies[b].parent if b != WORLD else WORLD for b in bodies], dtype=int)
+        link = np.array([b != WORLD and world.bodies[b].kind is BodyKind.LINK for b in bodies], dtype=bool)
         weight[body[:, None] == body] = 0.0
+        child = link[:, None] & (parent[:, None] == body)
+        weight[child | child.T] = 0.0
         for low, high in world.excluded_pairs:
             weight[np.ix_(body == low, body == high)] = weight[np.ix_(body == high, body == low)] = 0.0
         return weight
@@ -65,7 +108,7 @@ class PairRules:
         )
 
     def numbers(self, friction: Array) -> Surfaces:
-        """What Bullet gets, for coefficients (K,)."""
+        """What Bullet gets, for coefficients (K,) of the shapes' geoms."""
         if not len(friction):
             return Surfaces(friction, friction, friction)
         wanted = self.pair_friction(friction)
@@ -85,12 +128,14 @@ class PairRules:
                     spinning[i] = max(0.0, float(weight @ (wanted[i] - spinning * values[i])) / below)
         return spinning
 
-    def error(self, friction: Array) -> float:
-        """The largest difference between a pair's friction and the rule, over pairs of different trees."""
-        values = self.numbers(friction).friction
-        apart = self.weight > _WITHIN
-        gap = np.abs(np.multiply.outer(values, values) - self.pair_friction(friction))
-        return float(gap[apart].max(initial=0.0))
+    def shapes_on(self, bodies: Array) -> dict[int, list[tuple[int, Geom]]]:
+        """The shapes of each body: their numbers and geoms."""
+        wanted: dict[int, list[tuple[int, Geom]]] = {int(b): [] for b in bodies}
+        for number, index in enumerate(self.geoms.tolist()):
+            geom = self._world.geoms[index]
+            if geom.body in wanted:
+                wanted[geom.body].append((number, geom))
+        return wanted
 
 
 @compiled

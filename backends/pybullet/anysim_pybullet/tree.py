@@ -11,7 +11,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.world import inertia
-from anysim.world.model import BodyKind, Geom, Inertial, JointType, World
+from anysim.world.model import BodyKind, Inertial, JointType, World
 
 Inertia6 = tuple[float, float, float, float, float, float]
 
@@ -116,12 +116,3 @@ def link_pose(world: World, frames: Frames, body: int) -> Array:
     quaternion = np.array(b.quaternion)
     place = np.array(b.position) + P.rotate(quaternion, frames.anchor[body]) - frames.anchor[b.parent]
     return np.concatenate([place, quaternion])
-
-
-def shapes_of(world: World, bodies: Array) -> dict[int, list[tuple[int, Geom]]]:
-    """The colliding geoms of each body, with their World indices."""
-    wanted = {int(b): [] for b in bodies}
-    for i, geom in enumerate(world.geoms):
-        if geom.collides and geom.body in wanted:
-            wanted[geom.body].append((i, geom))
-    return wanted

@@ -5,6 +5,7 @@ further shape of a body is on a massless link of its own, rigidly joined: a stat
 one link does not continue exactly in Bullet. Lines are short, because its reader has a buffer of fixed length.
 """
 
+from collections.abc import Mapping, Sequence
 from math import atan2, hypot, isfinite
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from anysim.conventions import Array
 from anysim.errors import EngineError
 from anysim.math import pose as P
 from anysim.world.model import Box, Capsule, Cylinder, Geom, JointType, Mesh, MeshShape, Sphere, World
-from anysim_pybullet.tree import Frames, Tree, link_pose, shapes_of
+from anysim_pybullet.tree import Frames, Tree, link_pose
 
 UNLIMITED = 1e10
 """Stands for infinity where Bullet wants a number: the open side of a limit."""
@@ -27,9 +28,9 @@ def body_link(body: int) -> str:
     return f"b{body}"
 
 
-def shape_link(geom: int) -> str:
+def shape_link(shape: int) -> str:
     """The name of the link that carries a further shape of a body."""
-    return f"g{geom}"
+    return f"g{shape}"
 
 
 def joint_name(joint: int) -> str:
@@ -55,10 +56,11 @@ def obj_text(mesh: Mesh) -> str:
     return "\n".join(lines) + "\n"
 
 
-def tree_urdf(world: World, frames: Frames, tree: Tree, meshes: dict[str, Path]) -> str:
-    """The URDF of a tree."""
+def tree_urdf(
+    world: World, frames: Frames, tree: Tree, shapes: Mapping[int, Sequence[tuple[int, Geom]]], meshes: dict[str, Path]
+) -> str:
+    """The URDF of a tree, with these numbered shapes on its bodies."""
     lines = [f'<robot name="t{tree.number}">']
-    shapes = shapes_of(world, tree.bodies)
     for body in tree.bodies.tolist():
         weightless = world.bodies[body].inertial.mass <= 0
         lines += [

@@ -1,57 +1,134 @@
-"""Contacts as PhysX reports them after a substep: points with the impulse along their normal.
+"""Contacts of a substep: PhysX' points with the force along their normal, and the friction that goes with them.
 
-PhysX 5.3 does not report friction, so forces here are normal forces.
+PhysX 5.3 reports no friction. It follows from momentum: each touching body's net contact force is known (`Momentum`),
+and what its normal forces leave of it is the friction of its pairs. Where a body touches one thing more than there are
+such equations (a box on two tables), they say no more than the sum; it is shared among the pairs as the most likely
+one, with each pair's friction spread up to its coefficient times its normal force.
 """
 
-from collections.abc import Iterator
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
-from anysim.conventions import Array
+from anysim.conventions import WORLD, Array
 from anysim.engine.state import ContactPoints
 from anysim.world.model import World
+from anysim_sapien.momentum import Balance, Momentum
 from anysim_sapien.scene import EnvScene
 
+_NOISE = 1e-3
+"""Relative, of a momentum equation: single precision, and the terms of a link's that are first-order in the step."""
 
-def _touching(scene: EnvScene) -> Iterator[tuple[int, int, Any]]:
-    """Bodies and the contact of each pair of shapes that PhysX looked at."""
+
+class Pair(NamedTuple):
+    """Two shapes that touch: forces are on the first body [N]."""
+
+    first: int
+    second: int
+    normals: Array
+    """(P, 3) unit, from the second to the first."""
+    pressure: Array
+    """(P,) [N] along the normals."""
+    position: Array
+    """(P, 3) [m]."""
+    separation: Array
+    """(P,) [m]."""
+    friction: Array
+    """(3,) [N]."""
+
+    @property
+    def force(self) -> Array:
+        """(3,) [N] on the first body."""
+        return self.pressure @ self.normals + self.friction
+
+    def shared(self) -> Array:
+        """(P, 3) [N] on the first body, friction shared as the pressure is."""
+        total = self.pressure.sum()
+        share = self.pressure / total if total > 0 else self.pressure
+        return self.pressure[:, None] * self.normals + share[:, None] * self.friction
+
+
+def pairs_of(world: World, scene: EnvScene, momentum: Momentum, env: int) -> list[Pair]:
+    """What touched or pressed in the last substep of an env, with friction."""
+    found: list[Pair] = []
+    spread: list[Array] = []
     for contact in scene.contacts():
-        first, second = contact.bodies
-        yield scene.body_of[first], scene.body_of[second], contact
+        points = contact.points
+        impulse = np.array([p.impulse for p in points], dtype=float).reshape(-1, 3)
+        separation = np.array([p.separation for p in points], dtype=float)
+        if not (impulse.any() or (separation <= 0).any()):
+            continue
+        normals = np.array([p.normal for p in points], dtype=float).reshape(-1, 3)
+        pressure = np.einsum("pi,pi->p", impulse, normals) / world.physics.dt
+        first, second = (scene.body_of[body] for body in contact.bodies)
+        position = np.array([p.position for p in points], dtype=float).reshape(-1, 3)
+        found.append(Pair(first, second, normals, pressure, position, separation, np.zeros(3)))
+        # shapes of a pair have one coefficient, see surfaces.py
+        coefficient = float(contact.shapes[0].physical_material.static_friction)
+        across = np.eye(3) * pressure.sum() - np.einsum("p,pi,pj->ij", pressure, normals, normals)
+        spread.append(coefficient**2 * pressure.sum() * across)
+    friction = _friction(found, spread, momentum.balance(env))
+    return [pair._replace(friction=f) for pair, f in zip(found, friction, strict=True)]
 
 
-def sensor_forces(world: World, scene: EnvScene) -> Array:
-    """(S, 3) [N]: the net normal force of the last substep on each contact sensor's bodies."""
+def _friction(pairs: list[Pair], spread: list[Array], balance: Balance) -> Array:
+    """(C, 3) [N] on the first bodies: the likeliest with which the momentum of the bodies comes out.
+
+    Args:
+        pairs: with their normal forces.
+        spread: (3, 3) of each, the covariance of a friction that may be anything its pair could exert.
+        balance: net contact forces, and by how much they may be off.
+    """
+    touched = {body for pair in pairs if pair.pressure.any() for body in (pair.first, pair.second)}
+    rows = {
+        body: i for i, body in enumerate(sorted(b for b in touched if b != WORLD and np.isfinite(balance.doubt[b])))
+    }
+    if not rows:
+        return np.zeros((len(pairs), 3))
+    left = balance.force[list(rows)]
+    enters = np.zeros((len(rows), len(pairs)))
+    for column, pair in enumerate(pairs):
+        for body, sign in ((pair.first, 1.0), (pair.second, -1.0)):
+            if body in rows:
+                enters[rows[body], column] += sign
+                left[rows[body]] -= sign * (pair.pressure @ pair.normals)
+    free = np.array(spread)
+    matrix = np.einsum("ac,cij,bc->aibj", enters, free, enters).reshape(3 * len(rows), -1)
+    diagonal = np.einsum("ac,cii->a", np.abs(enters), free).repeat(3)
+    matrix[np.diag_indices(len(matrix))] += _NOISE**2 * diagonal + (balance.doubt[list(rows)] ** 2).repeat(3) + 1e-18
+    weight = np.linalg.solve(matrix, left.ravel()).reshape(-1, 3)
+    return np.einsum("cij,ac,aj->ci", free, enters, weight)
+
+
+def sensor_forces(world: World, scene: EnvScene, momentum: Momentum, env: int) -> Array:
+    """(S, 3) [N]: the net contact force of the last substep on each contact sensor's bodies."""
     sensors = world.contact_sensors
     total = np.zeros((len(sensors), 3))
     if not sensors:
         return total
-    for first, second, contact in _touching(scene):
-        impulse = sum((np.asarray(point.impulse, dtype=float) for point in contact.points), np.zeros(3))
-        if not impulse.any():
+    for pair in pairs_of(world, scene, momentum, env):
+        if not pair.pressure.any():
             continue
-        # the impulse is the one on the first body
+        force = pair.force
         for row, sensor in zip(total, sensors, strict=True):
-            for body, other, force in ((first, second, impulse), (second, first, -impulse)):
+            for body, other, on in ((pair.first, pair.second, force), (pair.second, pair.first, -force)):
                 if body in sensor.bodies and (sensor.against is None or other in sensor.against):
-                    row += force
-    return total / world.physics.dt
+                    row += on
+    return total
 
 
-def contact_points(world: World, scenes: Any, ids: Array) -> ContactPoints:
+def contact_points(world: World, scenes: list[EnvScene], momentum: Momentum, ids: Array) -> ContactPoints:
     """All points that touch or exert force."""
-    rows: list[tuple[Any, ...]] = []
-    for env in ids:
-        for first, second, contact in _touching(scenes[env]):
-            for point in contact.points:
-                impulse = np.asarray(point.impulse, dtype=float)
-                if point.separation <= 0 or impulse.any():
-                    # PhysX' normal points from the second body to the first
-                    normal, force = -np.asarray(point.normal, dtype=float), -impulse / world.physics.dt
-                    place = np.asarray(point.position, dtype=float)
-                    rows.append((int(env), first, second, place, normal, force, -float(point.separation)))
-    if not rows:
+    parts: list[tuple[Array, ...]] = []
+    for env in ids.tolist():
+        for pair in pairs_of(world, scenes[env], momentum, env):
+            counts = (pair.separation <= 0) | (pair.pressure != 0)
+            size = int(counts.sum())
+            parts.append((
+                np.full(size, env), np.full(size, pair.first), np.full(size, pair.second), pair.position[counts],
+                -pair.normals[counts], -pair.shared()[counts], -pair.separation[counts],
+            ))  # fmt: skip
+    if not parts:
         whole, empty = np.zeros(0, dtype=int), np.zeros((0, 3))
         return ContactPoints(whole, whole, whole, empty, empty, empty, np.zeros(0))
-    return ContactPoints(*(np.array(column) for column in zip(*rows, strict=True)))
+    return ContactPoints(*(np.concatenate(column) for column in zip(*parts, strict=True)))

@@ -27,8 +27,11 @@ _APPROXIMATE = {
         "faces resist through their several points, within 4 % of MuJoCo; where one point touches nothing resists: a "
         "ball spins on"
     ),
-    Capability.CONTACT_SENSORS: "normal forces alone: PhysX 5.3 does not report friction, up to mu times as much",
-    Capability.CONTACT_POINTS: "normal forces alone: PhysX 5.3 does not report friction, up to mu times as much",
+    Capability.CONTACT_SENSORS: (
+        "friction follows from momentum: within 0.2 % of the net force on a body; on a link above a joint with dry "
+        "friction off by up to twice that; how several fixed things share the friction of one body is a guess"
+    ),
+    Capability.CONTACT_POINTS: "the friction of a pair, as sensors have it, is shared as the normal forces are",
 }
 _ABSENT = (Capability.LIVE_EDIT_NATIVE,)
 CAPABILITIES = Capabilities.of(

@@ -1,6 +1,6 @@
 """SAPIEN as a SimEngine: one scene per env, stepped one after the other on the CPU."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -18,6 +18,8 @@ from anysim_sapien import declared
 from anysim_sapien.audit import geom_volumes, joint_limits
 from anysim_sapien.carry import Carried, shared
 from anysim_sapien.contacts import contact_points
+from anysim_sapien.meeting import refusals
+from anysim_sapien.momentum import Momentum
 from anysim_sapien.motion import Motion, motion_of, motions_of, put_motion, put_twist, twists_of
 from anysim_sapien.native import drives_of
 from anysim_sapien.options import SapienOptions
@@ -29,7 +31,7 @@ from anysim_sapien.scene import EnvScene
 from anysim_sapien.state import StateReader
 from anysim_sapien.stepping import advance, pasts_of, relive, wrenches
 
-_BUILT = ("_recipe", "_layout", "_drives", "_parameters", "_reader", "_fields", "_wrench", "_scenes")
+_BUILT = ("_recipe", "_layout", "_drives", "_parameters", "_momentum", "_reader", "_fields", "_wrench", "_scenes")
 """What `_build` makes and `_free` lets go of."""
 
 
@@ -59,6 +61,11 @@ class SapienEngine(SimEngine):
 
         return findings()
 
+    @classmethod
+    def refusals(cls, world: World) -> Sequence[str]:
+        """Pairs of surfaces and exclusions that PhysX' filters cannot tell apart."""
+        return refusals(world)
+
     @property
     def version(self) -> str:
         """SAPIEN's version, with the options that shape trajectories where they are not the defaults."""
@@ -75,7 +82,8 @@ class SapienEngine(SimEngine):
         self._parameters = Parameters(world, self._layout, self._drives, self._scenes, self._rebuild_env, num_envs)
         for env in range(num_envs):
             self._scenes.append(EnvScene(self._recipe, self._parameters.values(env)))
-        self._reader = StateReader(world, self._scenes, self._drives)
+        self._momentum = Momentum(self._recipe, num_envs)
+        self._reader = StateReader(world, self._scenes, self._drives, self._momentum)
         self._fields = self._reader.fields
         self._wrench: Array | None = None
         self._painter: Any = None
@@ -98,6 +106,7 @@ class SapienEngine(SimEngine):
         """A new scene for an env, in the initial state: a used one would remember contacts."""
         self._scenes[env] = EnvScene(self._recipe, self._parameters.values(env))
         self._drives.forget(env)
+        self._momentum.forget(env)
 
     def _rebuild_env(self, env: int) -> None:
         """A new scene for an env, in its present state."""
@@ -128,7 +137,7 @@ class SapienEngine(SimEngine):
             if room <= 0:
                 self._place(env, motion_of(self._scenes[env], self._layout))
                 continue
-            advance(self._scenes[env], self._drives, env, pushes, min(n_steps, room))
+            advance(self._scenes[env], self._drives, self._momentum, env, pushes, min(n_steps, room))
             n_steps -= min(n_steps, room)
         self._reader.stepped(env)
 
@@ -206,8 +215,9 @@ class SapienEngine(SimEngine):
     def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:
         for row, env in enumerate(ids.tolist()):
             if level is SnapshotLevel.TRAJECTORY:
-                self._scenes[env], drives = relive(self._recipe, data, row)
+                self._scenes[env], drives, momentum = relive(self._recipe, data, row)
                 self._drives.adopt(env, drives.given(0))
+                self._momentum.adopt(env, momentum.noted(0))
             else:
                 self._place(env, Motion(*(data[name][row] for name in Motion._fields)))
             self._reader.put_rows(env, data, row)
@@ -259,7 +269,7 @@ class SapienEngine(SimEngine):
         return cast(self._scenes, self._layout, origins, directions, ids)
 
     def _contacts(self, ids: Array) -> ContactPoints:
-        return contact_points(self.world, self._scenes, ids)
+        return contact_points(self.world, self._scenes, self._momentum, ids)
 
     def _render(self, view: CameraView, ids: Array, channels: tuple[str, ...]) -> dict[str, Array]:
         from anysim_sapien.render import Painter

@@ -1,12 +1,13 @@
 """Pairs of bodies that never collide, as PhysX filter words.
 
 Two shapes are kept apart where their groups have the same number and a bit in common. Bodies that hang together by
-exclusions get one number; within it each bit stands for a set of bodies of which no two collide.
+exclusions get one number; within it each bit stands for a set of bodies of which no two collide. -1 is the world.
 """
 
 from collections.abc import Iterable
 from typing import NamedTuple
 
+from anysim.conventions import WORLD
 from anysim.errors import EngineError
 from anysim.world.model import World
 
@@ -20,28 +21,71 @@ class Group(NamedTuple):
     number: int = 0
 
 
-def groups_of(world: World) -> dict[int, Group]:
-    """The groups of the bodies that take part in an exclusion.
+class Apart(NamedTuple):
+    """How the excluded pairs are kept apart.
+
+    Attributes:
+        groups: filter words of the bodies that need some.
+        labels: bodies that `surfaces` keeps apart, where filter words do not suffice; equal labels are treated alike.
+        between: pairs of labels (both ways) whose bodies never collide.
+    """
+
+    groups: dict[int, Group]
+    labels: dict[int, int]
+    between: frozenset[tuple[int, int]]
+
+
+def apart_of(world: World) -> Apart:
+    """How PhysX is told of the World's exclusions.
+
+    Bodies that many others pass through need many sets, a tool with 20 links against two parts 40 of them. There the
+    pairs across entities are left to the collision groups that surfaces have: these take a bit for each kind of body.
 
     Raises:
-        EngineError: the exclusions of one robot need more sets than there are bits.
+        EngineError: the exclusions within one entity need more sets than there are bits.
     """
     wanted = {frozenset(pair) for pair in world.excluded_pairs}
-    # a parent and its child never collide anyhow: such a pair may be covered or not
-    harmless = {frozenset((i, b.parent)) for i, b in enumerate(world.bodies) if b.parent >= 0}
+    entity = {WORLD: WORLD} | dict(enumerate(world.body_entity))
+    across: set[frozenset[int]] = set()
+    for members in _components(wanted):
+        edges = {pair for pair in wanted if pair <= members}
+        if len(_sets(world, edges, members)) > BITS:
+            across |= {pair for pair in edges if len({entity[body] for body in pair}) > 1}
+    labels, between = _labels(across)
+    return Apart(groups_of(world, wanted - across), labels, between)
+
+
+def groups_of(world: World, wanted: set[frozenset[int]]) -> dict[int, Group]:
+    """The groups of the bodies that take part in an exclusion."""
     groups: dict[int, Group] = {}
     for number, members in enumerate(_components(wanted), start=1):
-        edges = {pair for pair in wanted if pair <= members}
-        sets = _cover(edges, edges | {pair for pair in harmless if pair <= members})
+        sets = _sets(world, {pair for pair in wanted if pair <= members}, members)
         if len(sets) > BITS or number >= NUMBERS:
-            names = ", ".join(world.bodies[i].name for i in sorted(members)[:4])
+            names = ", ".join(world.bodies[i].name for i in sorted(members) if i != WORLD)
             raise EngineError(
-                f"PhysX cannot keep apart the excluded pairs around {names}: they form {len(sets)} sets and there are "
-                f"{BITS} bits; exclude all pairs of this robot, or fewer"
+                f"PhysX cannot keep apart the excluded pairs around {names[:80]}: they form {len(sets)} sets and there "
+                f"are {BITS} bits; exclude all pairs of this robot, or fewer"
             )
         for body in members:
             groups[body] = Group(sum(1 << i for i, part in enumerate(sets) if body in part), number)
     return groups
+
+
+def _labels(pairs: set[frozenset[int]]) -> tuple[dict[int, int], frozenset[tuple[int, int]]]:
+    """Bodies with the same partners get the same label; two labels collide all or not at all."""
+    partners: dict[int, set[int]] = {}
+    for first, second in (sorted(pair) for pair in pairs):
+        partners.setdefault(first, set()).add(second)
+        partners.setdefault(second, set()).add(first)
+    numbers: dict[frozenset[int], int] = {}
+    labels = {body: numbers.setdefault(frozenset(partners[body]), len(numbers) + 1) for body in sorted(partners)}
+    return labels, frozenset((labels[a], labels[b]) for pair in pairs for a in pair for b in pair if a != b)
+
+
+def _sets(world: World, edges: set[frozenset[int]], members: frozenset[int]) -> list[frozenset[int]]:
+    # a parent and its child never collide anyhow: such a pair may be covered or not
+    harmless = {frozenset((i, world.bodies[i].parent)) for i in members if i != WORLD and world.bodies[i].parent >= 0}
+    return _cover(edges, edges | {pair for pair in harmless if pair <= members})
 
 
 def _components(pairs: Iterable[frozenset[int]]) -> list[frozenset[int]]:

@@ -8,12 +8,12 @@ from anysim.conventions import WORLD, Array
 from anysim.errors import EngineError
 from anysim.math import pose as P
 from anysim.world.model import BodyKind, HeightFieldShape, Joint, Plane, World
-from anysim_sapien.exclusions import groups_of
 from anysim_sapien.inertia import Principal, principal
 from anysim_sapien.layout import Layout
+from anysim_sapien.meeting import Meeting
 from anysim_sapien.options import SapienOptions
 from anysim_sapien.shapes import to_pose
-from anysim_sapien.surfaces import Copy, copies_of
+from anysim_sapien.surfaces import Copy
 
 
 class Values(NamedTuple):
@@ -33,34 +33,17 @@ class Recipe:
 
     def __init__(self, world: World, options: SapienOptions) -> None:
         self.world, self.options, self.layout = world, options, Layout.of(world)
-        self.groups = groups_of(world)
-        self.surfaces = [geom.surface for geom in world.geoms]
-        self.solid = np.array([i for i, geom in enumerate(world.geoms) if geom.collides], dtype=int)
+        self._meeting = Meeting(world, self.layout)
+        self.groups = self._meeting.apart.groups
         self.geoms_on: dict[int, list[int]] = {}
-        for i in self.solid.tolist():
+        for i in self._meeting.solid.tolist():
             self.geoms_on.setdefault(world.geoms[i].body, []).append(i)
         self.root_pose = [to_pose(np.array([*b.position, *b.quaternion])) for b in world.bodies]
         self.frames = [_joint_frames(world, joint) for joint in world.joints]
         self.initial = np.array([joint.initial for joint in world.joints])
         self._principal: dict[tuple[str, bytes], Principal] = {}
         self._copies: dict[bytes, dict[int, list[Copy]]] = {}
-        self._meet = self._may_meet()
         _check(world)
-
-    def _may_meet(self) -> Array:
-        """(C, C) bool: which of the geoms that collide can ever touch."""
-        world, fixed = self.world, self.layout.geom_fixed
-        bodies = [world.geoms[i].body for i in self.solid]
-        parents = [world.bodies[b].parent if b != WORLD else WORLD for b in bodies]
-        excluded = {pair for low, high in world.excluded_pairs for pair in ((low, high), (high, low))}
-        meet = np.zeros((len(bodies), len(bodies)), dtype=bool)
-        for i, first in enumerate(bodies):
-            for k, second in enumerate(bodies):
-                kin = first == second or (second != WORLD and parents[i] == second)
-                kin = kin or (first != WORLD and parents[k] == first)
-                both_fixed = fixed[self.solid[i]] and fixed[self.solid[k]]
-                meet[i, k] = not (kin or both_fixed or (first, second) in excluded)
-        return meet
 
     def copies(self, friction: Array) -> dict[int, list[Copy]]:
         """The shapes of each geom that collides, for the coefficients in force (G,)."""
@@ -68,10 +51,7 @@ class Recipe:
         if key not in self._copies:
             if len(self._copies) > 1000:
                 self._copies.clear()
-            solid = self.solid
-            surfaces = [self.surfaces[i] for i in solid]
-            made = copies_of(surfaces, friction[solid], self.layout.geom_fixed[solid], self._meet)
-            self._copies[key] = dict(zip(solid.tolist(), made, strict=True))
+            self._copies[key] = self._meeting.copies(friction)
         return self._copies[key]
 
     def principal(self, body: int, inertia: Array) -> Principal:

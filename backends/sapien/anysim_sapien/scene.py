@@ -54,6 +54,8 @@ class EnvScene:
         """The parameters that it was built with."""
         self.journal = Journal()
         """What was done to it since it was built."""
+        self.mass, self.rubbing = self.values.mass.copy(), self.values.joint_friction.copy()
+        """Masses (B,) [kg] and dry friction (J,) [N m] or [N] as they are now."""
         self.system = _system(recipe, values.gravity)
         self.scene: Any = sapien.Scene([self.system])
         self.bodies: list[Any] = [None] * len(world.bodies)
@@ -86,7 +88,11 @@ class EnvScene:
         for index in recipe.geoms_on.get(body, ()):
             for copy in self.copies[index]:
                 shape = make_shape(
-                    recipe.world, recipe.world.geoms[index], copy, recipe.groups.get(body, Group()), recipe.options
+                    recipe.world,
+                    recipe.world.geoms[index],
+                    copy,
+                    recipe.groups.get(body, Group()),
+                    recipe.options,
                 )
                 component.attach(shape)
                 self.shapes[index].append(shape)
@@ -198,6 +204,7 @@ class EnvScene:
             component.set_inertia([1e-3, 1e-3, 1e-3])
             component.set_cmass_local_pose(sapien.Pose())
             return
+        self.mass[body] = mass
         moments, frame = self._recipe.principal(body, inertia)
         component.set_mass(float(mass))
         component.set_inertia(moments.tolist())
@@ -208,6 +215,7 @@ class EnvScene:
         world = self._recipe.world
         spec = world.joints[index]
         self.journal.note(Op.DRY, index, friction)
+        self.rubbing[index] = friction
         drive = self.dry.get(index)
         if drive is None:
             if friction == 0.0:

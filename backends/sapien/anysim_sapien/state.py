@@ -9,6 +9,7 @@ from anysim.engine.state import FIELDS
 from anysim.world.model import BodyKind, World
 from anysim_sapien.contacts import sensor_forces
 from anysim_sapien.drives import Drives
+from anysim_sapien.momentum import Momentum
 from anysim_sapien.motion import twists_of
 from anysim_sapien.scene import EnvScene, poses_of, positions_of, velocities_of
 from anysim_sapien.velocities import LinkVelocities
@@ -24,9 +25,10 @@ class StateReader:
     putting joint positions back moves a link by a rounding error, so those that were read before are kept as well.
     """
 
-    def __init__(self, world: World, scenes: Sequence[EnvScene], drives: Drives) -> None:
+    def __init__(self, world: World, scenes: list[EnvScene], drives: Drives, momentum: Momentum) -> None:
         n, bodies = len(scenes), len(world.bodies)
         self._world, self._scenes, self._drives = world, scenes, drives
+        self._momentum = momentum
         self._free = [i for i, b in enumerate(world.bodies) if b.kind is BodyKind.FREE]
         self._velocities = LinkVelocities(world)
         self._held_contact = np.ones(n, dtype=bool)
@@ -49,7 +51,7 @@ class StateReader:
     def keep_contact(self, env: int) -> None:
         """The env's scene is about to be built anew: note its contact forces."""
         if not self._held_contact[env]:
-            self.hold_contact(env, sensor_forces(self._world, self._scenes[env]))
+            self.hold_contact(env, self._touch(env))
 
     def hold_contact(self, env: int, force: Array | float) -> None:
         """Make these the contact forces (S, 3) of the last substep."""
@@ -113,8 +115,11 @@ class StateReader:
     def contact_force(self) -> Array:
         force = self._contact.copy()
         for env in np.flatnonzero(~self._held_contact):
-            force[env] = sensor_forces(self._world, self._scenes[int(env)])
+            force[env] = self._touch(int(env))
         return force
+
+    def _touch(self, env: int) -> Array:
+        return sensor_forces(self._world, self._scenes[env], self._momentum, env)
 
     def fault(self) -> Array:
         return np.array([not self._finite(scene) for scene in self._scenes], dtype=bool)

@@ -7,16 +7,16 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.commands import Control
-from anysim.world.model import World
 from anysim_sapien.drives import Drives
 from anysim_sapien.journal import Op, entries
+from anysim_sapien.momentum import Momentum
 from anysim_sapien.native import drives_of
 from anysim_sapien.recipe import Recipe, Values
 from anysim_sapien.scene import EnvScene
 
 
-def advance(scene: EnvScene, drives: Drives, row: int, pushes: Array | None, n_steps: int) -> None:
-    """Step a scene under the commands in a row of the drives.
+def advance(scene: EnvScene, drives: Drives, momentum: Momentum, row: int, pushes: Array | None, n_steps: int) -> None:
+    """Step a scene under the commands in a row of the drives, and note its momentum in that row.
 
     `pushes` (K, 7) are bodies and the wrenches on them, in each of the steps.
     """
@@ -29,28 +29,31 @@ def advance(scene: EnvScene, drives: Drives, row: int, pushes: Array | None, n_s
     if pushes is not None and len(pushes):
         journal.record(Op.WRENCH, pushes.tobytes())
         pushed = [(scene.bodies[int(push[0])], push[1:4], push[4:]) for push in pushes]
-    for _ in range(n_steps):
+    for number in range(n_steps):
         if by_law:
             drives.substep(row, scene)
+        if number == n_steps - 1:
+            momentum.before(scene)
         for component, force, torque in pushed:
             component.add_force_torque(force, torque)
         system.step()
+    momentum.after(row, scene, pushes)
     journal.stepped(n_steps)
     if pushed:
         journal.flush()
 
 
-def replay(scene: EnvScene, world: World, rows: Array) -> Drives:
+def replay(scene: EnvScene, recipe: Recipe, rows: Array) -> tuple[Drives, Momentum]:
     """Do to a scene as built what a journal says; the scene's own says the same afterwards.
 
-    Returns the drives of one env that moved it.
+    Returns the drives of one env that moved it, and the momentum of its last substep.
     """
-    drives = drives_of(world, 1)
+    drives, momentum = drives_of(recipe.world, 1), Momentum(recipe, 1)
     pushes: Array | None = None
     for op, values in entries(rows):
         match op:
             case Op.STEP:
-                advance(scene, drives, 0, pushes, int(values[0]))
+                advance(scene, drives, momentum, 0, pushes, int(values[0]))
                 pushes = None
             case Op.WRENCH:
                 pushes = values.reshape(-1, 7)
@@ -73,7 +76,7 @@ def replay(scene: EnvScene, world: World, rows: Array) -> Drives:
                 scene.set_armature(int(values[0]), float(values[1]))
             case Op.BASE:
                 scene.journal.base()
-    return drives
+    return drives, momentum
 
 
 def pasts_of(scenes: Sequence[EnvScene]) -> dict[str, Array]:
@@ -87,10 +90,10 @@ def pasts_of(scenes: Sequence[EnvScene]) -> dict[str, Array]:
     return data | {"journal": rows, "length": length}
 
 
-def relive(recipe: Recipe, data: Mapping[str, Array], row: int) -> tuple[EnvScene, Drives]:
-    """The scene of a row that `pasts_of` made, in the same state to the bit, and the drives that moved it."""
+def relive(recipe: Recipe, data: Mapping[str, Array], row: int) -> tuple[EnvScene, Drives, Momentum]:
+    """The scene of a row that `pasts_of` made, in the same state to the bit, with its drives and its momentum."""
     scene = EnvScene(recipe, Values(*(data[f"base.{name}"][row] for name in Values._fields)))
-    return scene, replay(scene, recipe.world, data["journal"][row, : int(data["length"][row])])
+    return scene, *replay(scene, recipe, data["journal"][row, : int(data["length"][row])])
 
 
 def wrenches(rows: Array, fixed: Array) -> Array:

@@ -8,7 +8,7 @@ let shapes meet only in the value of their pair.
 Two shapes meet where the `kind` bits of one and the `meets` bits of the other have a bit in common.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -43,6 +43,7 @@ class _Class(NamedTuple):
     friction: float
     restitution: float
     priority: int
+    label: int
 
 
 @dataclass
@@ -66,7 +67,10 @@ def pair(a: _Class, b: _Class) -> Touch:
     return Touch(friction, max(a.restitution, b.restitution))
 
 
-def copies_of(surfaces: Sequence[Surface], frictions: Array, fixed: Array, may_meet: Array) -> list[list[Copy]]:
+def copies_of(
+    surfaces: Sequence[Surface], frictions: Array, fixed: Array, may_meet: Array, labels: Sequence[int] = (),
+    between: Collection[tuple[int, int]] = (),
+) -> list[list[Copy]]:  # fmt: skip
     """The shapes of each of G geoms.
 
     Args:
@@ -74,11 +78,16 @@ def copies_of(surfaces: Sequence[Surface], frictions: Array, fixed: Array, may_m
         frictions: (G,) those in force, which may differ from the surfaces' own.
         fixed: (G,) bool, geoms that nothing moves; two of them never meet.
         may_meet: (G, G) bool; a geom gets no shape for a value that none of its pairs can have.
+        labels: (G,) of the geoms' bodies, as in `exclusions.Apart`; none where it is empty.
+        between: pairs of labels, both ways, that never meet.
 
     Raises:
         EngineError: more different pairs than there are bits.
     """
-    keys = [_Class(float(f), s.restitution, s.priority) for s, f in zip(surfaces, frictions, strict=True)]
+    keys = [
+        _Class(float(f), s.restitution, s.priority, label)
+        for s, f, label in zip(surfaces, frictions, labels or [0] * len(surfaces), strict=True)
+    ]
     classes = sorted(set(keys))
     movable = {c for c, still in zip(keys, fixed, strict=True) if not still}
     still = {c for c, f in zip(keys, fixed, strict=True) if f}
@@ -92,12 +101,14 @@ def copies_of(surfaces: Sequence[Surface], frictions: Array, fixed: Array, may_m
             raise EngineError(
                 f"the {len(classes)} different surfaces of this world meet in more ways than the {BITS} collision "
                 f"groups of PhysX can keep apart; give more geoms the same friction, restitution and priority"
+                + (", or exclude fewer pairs" if between else "")
             )
         return 1 << number
 
     def meet(touch: Touch, first: _Class, seconds: Sequence[_Class]) -> None:
         """Movable geoms of `first` meet all of `seconds`, its fixed ones the movable of `seconds`."""
-        if first in movable:
+        seconds = [second for second in seconds if (first.label, second.label) not in between]
+        if first in movable and seconds:
             mark = bit()
             loose[first].add(touch, kind=mark)
             for second in seconds:

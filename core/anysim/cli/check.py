@@ -56,7 +56,8 @@ def check_one(name: str, engine: str | None, all_engines: bool, overrides: list[
     faults: list[str] = []
     for one in engines:
         try:
-            check_capabilities(one, engine_class(one).capabilities, needs_of(world), name)
+            kind = engine_class(one)
+            check_capabilities(one, kind.capabilities, needs_of(world), name, kind.refusals(world))
         except AnysimError as error:
             faults.append(f"{name}: {error}")
     return faults

@@ -87,6 +87,11 @@ class SimEngine(Primitives):
         del threads
         return dict(options)
 
+    @classmethod
+    def refusals(cls, world: World) -> Sequence[str]:
+        """Why this world in particular cannot be built, beyond capabilities: a reason each. Imports nothing heavy."""
+        return ()
+
     @property
     def version(self) -> str:
         """The version of the physics engine, as it stamps snapshots."""
@@ -115,7 +120,7 @@ class SimEngine(Primitives):
                 raise EngineError(f"this {self.name} engine has a world already; destroy() it or make another engine")
             if num_envs < 1:
                 raise EngineError(f"num_envs must be at least 1, got {num_envs}")
-            self.approximations: list[Need] = check(self.name, self.capabilities, needs_of(world), f"'{world.name}'")
+            self.approximations: list[Need] = self._check(world)
             check_drives(world)
             self.num_envs = num_envs
             self._install(world)
@@ -126,6 +131,9 @@ class SimEngine(Primitives):
                 raise
             self._reset_rows(self._all)
             return self
+
+    def _check(self, world: World) -> list[Need]:
+        return check(self.name, self.capabilities, needs_of(world), f"'{world.name}'", self.refusals(world))
 
     def _install(self, world: World) -> None:
         """Everything the base class keeps about a world."""
@@ -447,7 +455,7 @@ class SimEngine(Primitives):
         """Replace the world, carrying by name all that both worlds have. On failure the old world is untouched."""
         from anysim.engine.carry import carry_over
 
-        needs = check(self.name, self.capabilities, needs_of(world), f"'{world.name}'")
+        needs = self._check(world)
         carry_over(self, world)
         self.approximations = needs
 

@@ -79,11 +79,17 @@ class Need:
     why: str
 
 
-def check(engine: str, capabilities: Capabilities, needs: Sequence[Need], source: str = "this world") -> list[Need]:
-    """Raise one CapabilityError that lists every absent need; return the needs met only approximately."""
+def check(
+    engine: str, capabilities: Capabilities, needs: Sequence[Need], source: str = "this world",
+    refusals: Sequence[str] = (),
+) -> list[Need]:  # fmt: skip
+    """Raise one CapabilityError that lists every absent need; return the needs met only approximately.
+
+    `refusals` are the engine's own reasons against this world in particular, see `SimEngine.refusals`.
+    """
     absent = [need for need in needs if need.capability not in capabilities]
-    if absent:
-        reasons = "; ".join(f"{need.why} ({need.capability})" for need in absent)
+    if absent or refusals:
+        reasons = "; ".join([*(f"{need.why} ({need.capability})" for need in absent), *refusals])
         raise CapabilityError(
             f"{engine} cannot run {source}: {reasons}. "
             f"Choose another engine (`anysim list engines` shows what each can do) or change the lines named."

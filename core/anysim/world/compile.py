@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from anysim.world.builder import WorldBuilder
+from anysim.world.compile_collisions import with_exclusions
 from anysim.world.compile_object import add_object, add_terrain
 from anysim.world.compile_robot import add_robot
 from anysim.world.compile_sensors import compile_lights, with_sensors
@@ -68,6 +69,7 @@ def compile_with_report(
     if missing:  # what looks at a thing that could not be made would only repeat its error
         issues.raise_if_any()
     world = place_nominally(world, content.layout, order)
+    world = with_exclusions(world, content.collisions, issues.at("collisions"))
     world = with_sensors(world, content.cameras, content.contact_sensors, issues)
     issues.raise_if_any()
     return Compiled(world, notes)

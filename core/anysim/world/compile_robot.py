@@ -71,7 +71,8 @@ class _Assembly:
             for i, body in enumerate(self.model.bodies)
         )
         model = replace(self.model, joints=tuple(joints), bodies=bodies, geoms=self._geoms())
-        if not self.entry.self_collision:
+        collides = self.entry.self_collision if self.spec.self_collision is None else self.spec.self_collision
+        if not collides:
             pairs = combinations(range(len(bodies)), 2)
             apart = frozenset(p for p in pairs if bodies[p[1]].parent != p[0])
             model = replace(model, excluded_pairs=model.excluded_pairs | apart)

@@ -318,7 +318,10 @@ class World:
     meshes: tuple[Mesh, ...] = ()
     heightfields: tuple[HeightField, ...] = ()
     excluded_pairs: frozenset[tuple[int, int]] = frozenset()
-    """Pairs of bodies (low, high) that never collide. A parent and its child never do, and are not listed."""
+    """Pairs of bodies (low, high) that never collide; -1 stands for geoms fixed to the world.
+
+    A parent and its child never collide and are not listed.
+    """
 
     @cached_property
     def hash(self) -> str:

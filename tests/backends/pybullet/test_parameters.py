@@ -18,25 +18,39 @@ def _objects(*coefficients, ground=0.8):
     return s.world()
 
 
-def _products(engine):
+def _gaps(engine):
+    """What Bullet has less what the rule wants, for the pairs of shapes that meet."""
     rules = engine._envs.plan.rules
     friction = engine._envs.parameters.friction[0, rules.geoms]
     values = rules.numbers(friction).friction
-    return np.multiply.outer(values, values), rules.pair_friction(friction)
+    return (np.multiply.outer(values, values) - rules.pair_friction(friction))[rules.weight > 0]
 
 
 def test_equal_frictions_are_exact(build):
-    """One coefficient throughout: every pair has it."""
-    got, wanted = _products(build(_objects(0.8, 0.8, 0.8)))
-    off = ~np.eye(len(got), dtype=bool)
-    assert np.allclose(got[off], wanted[off], rtol=2e-4)
+    """One coefficient throughout: every pair has it, with a shape each."""
+    engine = build(_objects(0.8, 0.8, 0.8))
+    assert len(engine._envs.plan.rules.geoms) == 4
+    assert np.abs(_gaps(engine)).max() < 2e-4
 
 
-def test_friction_with_the_ground_comes_first(build):
-    """With four coefficients the pairs with the ground are right to 0.005; those of two objects pay for it."""
-    got, wanted = _products(build(_objects(0.2, 0.2, 0.5, 1.0)))
-    assert np.abs(got[0, 1:] - wanted[0, 1:]).max() < 0.006
-    assert (got[1:, 1:] - wanted[1:, 1:]).max() < 0.45
+def test_every_pair_has_one_meeting(build):
+    """Where products cannot give the rule geoms get more shapes: each pair of geoms meets once, at its own value."""
+    engine = build(_objects(0.2, 0.2, 0.5, 1.0))
+    rules = engine._envs.plan.rules
+    meetings = np.zeros((5, 5), dtype=int)
+    np.add.at(meetings, (rules.geoms[:, None], rules.geoms[None, :]), (rules.weight > 0).astype(int))
+    assert (meetings == 1 - np.eye(5, dtype=int)).all()
+    assert np.abs(_gaps(engine)).max() < 2e-4
+
+
+def test_changed_frictions_come_near(build):
+    """Shapes are made for the World's coefficients: after a change the ground is right and free pairs pay for it."""
+    engine = build(_objects(0.8, 0.8, 0.8, 0.8))
+    engine.set_parameters("geom.friction", [[0.8, 0.2, 0.2, 0.5, 1.0]])
+    rules = engine._envs.plan.rules
+    numbers = rules.numbers(engine._envs.parameters.friction[0, rules.geoms]).friction
+    assert numbers[0] * numbers[1:] == pytest.approx([0.8, 0.8, 0.8, 1.0], abs=0.006)
+    assert np.abs(_gaps(engine)).max() < 0.45
 
 
 def test_torsional_friction_slows_a_spin(build):

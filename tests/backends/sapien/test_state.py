@@ -7,10 +7,8 @@ from anysim.compare.kinematics import random_positions
 from anysim.math import pose as P
 from anysim.testing import worlds
 from anysim.testing.compare import play, read, spread, tape
-from anysim.testing.sketch import Sketch
 from anysim.world.compile import compile_world
 from anysim.world.kinematics import forward_kinematics
-from anysim.world.model import Box, ContactSensor, Surface
 from anysim_schemas.run import WorldSpec
 
 
@@ -80,18 +78,3 @@ def test_restoring_twice_is_the_same(make):
         engine.step(100)
         ends.append(read(engine)["body_pose"])
     assert np.array_equal(*ends)
-
-
-def test_contact_forces_are_normal_forces(make):
-    """What the capability declares: friction of a sliding block is not in its contact force."""
-    s = Sketch("slide")
-    s.ground()
-    box = s.free("box", Box((0.2, 0.2, 0.05)), (0.0, 0.0, 0.05), surface=Surface(friction=0.5))
-    s.sensors.append(ContactSensor("box", (box,)))
-    engine = make(s.world())
-    engine.step(50)
-    engine.set_body_state(twist=[2.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    engine.step(20)
-    force = engine.get_state().contact_force[0, 0]
-    assert force[2] == pytest.approx(9.81, rel=0.02)
-    assert abs(force[0]) < 0.01

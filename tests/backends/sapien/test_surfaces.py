@@ -1,12 +1,17 @@
 """The pair rule and the exclusions, as PhysX' filter sees the bits: every pair of geoms once, with the rule's value."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from anysim.errors import EngineError
+from anysim.errors import CapabilityError, EngineError
 from anysim.testing.sketch import Sketch, inertial
 from anysim.world.model import Body, BodyKind, Box, JointType, Sphere, Surface, World
-from anysim_sapien.exclusions import Group, groups_of
+from anysim_sapien.engine import SapienEngine
+from anysim_sapien.exclusions import Group, apart_of
+from anysim_sapien.layout import Layout
+from anysim_sapien.meeting import Meeting
 from anysim_sapien.surfaces import copies_of
 
 
@@ -97,7 +102,7 @@ def test_exclusions_are_what_they_say(seed):
     rng = np.random.default_rng(seed)
     count, chained = 7, bool(seed % 2)
     pairs = {(i, k) for k in range(count) for i in range(k) if rng.random() < 0.35}
-    groups = groups_of(_world(count, pairs, chained))
+    groups = apart_of(_world(count, pairs, chained)).groups
     for k in range(count):
         for i in range(k):
             a, b = groups.get(i, Group()), groups.get(k, Group())
@@ -109,7 +114,7 @@ def test_exclusions_are_what_they_say(seed):
 def test_a_robot_without_self_collision_needs_one_set():
     """All pairs but neighbours are excluded: with the neighbours, which never collide, that is one set."""
     pairs = {(i, k) for k in range(12) for i in range(k) if k > i + 1}
-    assert {group.bits for group in groups_of(_world(12, pairs, chained=True)).values()} == {1}
+    assert {group.bits for group in apart_of(_world(12, pairs, chained=True)).groups.values()} == {1}
 
 
 def test_parents_and_children_never_collide(make):
@@ -164,3 +169,43 @@ def test_bouncy_things_come_to_rest(make):
     assert np.abs(state.body_twist).max() < 0.01
     assert state.body_pose[0, 2, 2] == pytest.approx(0.25, abs=2e-3)
     assert np.abs(state.body_pose[0, :, :2]).max() < 2e-3
+
+
+def test_worlds_that_filters_cannot_tell_apart_are_refused_before_the_build():
+    """Too many surfaces: a CapabilityError by name, in `check` as well, and nothing was built."""
+    s = Sketch("colourful")
+    for i in range(40):
+        s.free(f"b{i}", Sphere(0.1), (float(i), 0.0, 0.1), surface=Surface(friction=0.01 * i))
+    world = s.world()
+    (reason,) = SapienEngine.refusals(world)
+    assert "the 40 different surfaces" in reason
+    engine = SapienEngine()
+    with pytest.raises(CapabilityError, match="sapien cannot run 'colourful': the 40 different surfaces"):
+        engine.create_world(world)
+    assert not hasattr(engine, "_scenes")
+    engine.destroy()
+
+
+@pytest.mark.parametrize(("tools", "parts"), [(6, 6), (20, 3)])
+def test_groups_with_more_pairs_than_bits(tools, parts):
+    """Each tool passes each part: filter words have 32 bits, so the surfaces' groups keep these apart."""
+    s = Sketch("groups")
+    s.ground()
+    hand = s.robot("hand")
+    for i in range(tools):
+        s.shape(s.link(f"tool{i}", hand, JointType.PRISMATIC, (1.0, 0.0, 0.0), inertial(Sphere(0.1), 1.0)), Sphere(0.1))
+    for i in range(parts):
+        s.free(f"part{i}", Sphere(0.1), (float(i), 0.0, 0.1), surface=Surface(friction=0.5 + 0.1 * (i % 2)))
+    world = s.world()
+    apart = {(a, b) for a in range(1, tools + 1) for b in range(tools + 1, tools + parts + 1)}
+    meeting = Meeting(replace(world, excluded_pairs=frozenset(apart)), Layout.of(world))
+    assert meeting.apart.between
+    copies = meeting.copies(np.array([geom.surface.friction for geom in world.geoms]))
+    groups = meeting.apart.groups
+    for k, second in enumerate(world.geoms):
+        for i, first in enumerate(world.geoms[:k]):
+            a, b = groups.get(first.body, Group()), groups.get(second.body, Group())
+            filtered = bool(a.bits & b.bits) and a.number == b.number
+            met = [] if filtered else meetings(copies[i], copies[k])
+            pair = (min(first.body, second.body), max(first.body, second.body))
+            assert met == ([] if pair in apart else [rule(first.surface, second.surface)])
