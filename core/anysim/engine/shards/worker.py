@@ -2,6 +2,8 @@
 
 import faulthandler
 import importlib
+import os
+import select
 import signal
 import socket
 import time
@@ -26,6 +28,11 @@ from anysim.world.model import World
 # ruff: noqa: SLF001  the worker drives the primitives of an engine, as the base class does in one process
 
 
+LINGER_S = 3e-4
+"""How long a worker waits awake for its next message [s]. One that sleeps is often woken on a core that is in use, and
+starts milliseconds late: two shards on two cores gained 1.5 to 1.6 times without this, 1.85 with it."""
+
+
 class News(NamedTuple):
     """What changed in the shared memory since the last message to this worker; `wrench` is None where it did not."""
 
@@ -47,6 +54,8 @@ class Host:
 
     def __init__(self, pipe: Connection) -> None:
         self._pipe = pipe
+        self._arrival = select.poll()
+        self._arrival.register(pipe.fileno(), select.POLLIN)
         self._engine: SimEngine | None = None
         self._memory: SharedArrays | None = None
         self._rows = slice(0)
@@ -56,6 +65,7 @@ class Host:
         """Answer messages: `("done", result)`, or `("error", type, message)`."""
         while True:
             try:
+                self._linger()
                 name, news, *arguments = self._pipe.recv()
             except (EOFError, OSError):
                 break
@@ -74,6 +84,12 @@ class Host:
             except OSError:
                 break
         self.free()
+
+    def _linger(self) -> None:
+        """Stay awake for the next message, leaving the core to whoever wants it."""
+        until = time.perf_counter() + LINGER_S
+        while not self._arrival.poll(0) and time.perf_counter() < until:
+            os.sched_yield()
 
     def _placed(self, message: str) -> str:
         """An error that names an env by its number here says so."""
