@@ -23,10 +23,13 @@ _APPROXIMATE = {
     ),
     Capability.EFFORT_LIMITS: (
         "clipped at the speed of the step's beginning: exact when blocked; a stiff drive that is clipped in motion "
-        "swings about its limit (kp 4500, kd 450 on 0.05 kg m^2 at 2 ms: 0.034 rad off the solution, 0.5 ms: 0.01)"
+        "swings about its limit (kp 4500, kd 450 on 0.05 kg m^2 at 2 ms: 0.034 rad off the solution)"
     ),
     Capability.MIMIC_JOINTS: "a stiff soft constraint: 0.3 mm at 20 N on a gripper's finger of 15 g",
-    Capability.JOINT_LIMITS: "a stiff soft constraint: 0.5 mrad beyond, pressed with 87 N m on 0.1 kg m^2",
+    Capability.JOINT_LIMITS: (
+        "a stiff soft constraint: 0.5 mrad beyond, pressed with 87 N m on 0.1 kg m^2; where the dt kd of a drive is "
+        "above the inertia it moves, its force on a limit swings (kd 300 on 0.115 kg at 2 ms: 3 to 25 N about 20 N)"
+    ),
     Capability.RESTITUTION: (
         "an underdamped contact: within 0.07 of the coefficient, within 0.04 from 0.5 on; it sinks 6 mm "
         "per m/s at 2 ms; 0 gives 0.13"

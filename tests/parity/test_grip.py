@@ -20,7 +20,7 @@ SPEC = {
 CREEP = 2e-4
 """[m/s] of a held cube of 2 N in a grip of 2 x 40 N: 0.04 mm/s on MuJoCo, 0.11 on PyBullet, none on SAPIEN."""
 SLIP = 4e-3
-"""[m] after 3 s of shaking with up to 8 m/s^2: 2.7 mm on MuJoCo and PyBullet, none on SAPIEN."""
+"""[m] of shaking with up to 8 m/s^2: 2.7 mm after 6 s on MuJoCo and PyBullet, none on SAPIEN."""
 WIDTH = 2e-4
 """[m] of a finger's place at a cube of 40 mm: 0.007 mm of sink on MuJoCo, 0.1 mm before the cube on PyBullet."""
 
