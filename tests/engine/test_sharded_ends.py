@@ -10,7 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from tests.engine.shards_help import PROC, alive, gone, segments
+from anysim.engine.null import NullEngine
+from anysim.engine.sharded import sharded
+from anysim.engine.shards.spares import keeping_workers
+from anysim.testing import worlds
+from anysim.testing.compare import assert_same, read
+from tests.engine.shards_help import PROC, alive, children, gone, segments
 
 pytestmark = pytest.mark.skipif(not PROC.exists(), reason="no /proc here: processes cannot be seen from outside")
 
@@ -188,3 +193,26 @@ def test_the_module_of_the_worker_is_light():
         "assert not loaded & {'mujoco', 'pybullet', 'sapien', 'scipy', 'trimesh', 'numba', 'typer'}, loaded"
     )
     subprocess.run([sys.executable, "-c", code], cwd=Path.home(), check=True)
+
+
+def test_workers_are_kept_for_the_next_engine_where_that_is_asked_for():
+    """The same processes serve engines of one kind one after the other, and end with the block."""
+    before, world, kind = children(), worlds.scene(), sharded(NullEngine, 2)
+    with NullEngine() as alone:
+        wanted = read(alone.create_world(world, 2))
+    with keeping_workers():
+        seen = []
+        for _ in range(2):
+            with kind() as engine:
+                assert_same(read(engine.create_world(world, 2)), wanted, "the start")
+                engine.step(5)
+                seen.append(engine.workers)
+        with kind() as engine:
+            engine.create_world(world, 2)
+            os.kill(engine.workers[0], signal.SIGKILL)
+        with kind() as engine:
+            seen.append(engine.create_world(world, 2).workers)
+        assert seen[0] == seen[1]
+        assert not set(seen[0]) & set(seen[2]), "a crew with a lost worker is not kept"
+        assert children() - before == set(seen[2])
+    assert children() == before

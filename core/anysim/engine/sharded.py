@@ -23,6 +23,7 @@ from anysim.engine.shards.blocks import Blocks, joined, joined_by_name, joined_c
 from anysim.engine.shards.crew import START_S, Crew, importable_path
 from anysim.engine.shards.memory import SharedArrays, state_layout
 from anysim.engine.shards.process import WorkerLost
+from anysim.engine.shards.spares import dismiss, hire
 from anysim.engine.shards.worker import News
 from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
 from anysim.errors import EngineError
@@ -87,7 +88,7 @@ class ShardedEngine(SimEngine):
             count = min(self.shards, num_envs)
             threads = max(1, usable_cores() // count)
             options = self.inner.share_of_threads(self._given, threads)
-            crew = Crew(importable_path(self.inner), options, count, threads, self.timeout_s)
+            crew = hire(importable_path(self.inner), options, count, threads, self.timeout_s)
             self._crew = crew
             self._finalizer = weakref.finalize(self, Crew.close, crew)
             self._blocks = Blocks(num_envs, count)
@@ -112,7 +113,7 @@ class ShardedEngine(SimEngine):
             self._memory = None
         if workers_too and self._crew is not None:
             self._finalizer.detach()
-            self._crew.close()
+            dismiss(self._crew)
             self._crew = None
 
     def _free(self) -> None:

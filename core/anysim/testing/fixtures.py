@@ -9,6 +9,7 @@ import pytest
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capability
 from anysim.engine.needs import needs_of
+from anysim.engine.shards.spares import keeping_workers
 from anysim.errors import EngineError
 from anysim.testing import plugin
 from anysim.world.model import World
@@ -26,6 +27,13 @@ class Build(Protocol):
 def engine_class(pytestconfig: pytest.Config) -> type[SimEngine]:
     """The class under test."""
     return plugin.engine_class(pytestconfig)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _workers() -> Iterator[None]:
+    """An engine in worker processes is made for each test; its workers serve one after the other."""
+    with keeping_workers():
+        yield
 
 
 @pytest.fixture

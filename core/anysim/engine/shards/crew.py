@@ -48,6 +48,8 @@ class Crew:
         if sys.platform == "win32":
             raise EngineError("worker processes need a POSIX system; use shards: 1 on Windows")
         self._path, self._options, self._threads, self._timeout = path, dict(options), threads, timeout_s
+        self.kind = self.kind_of(path, options, count, threads, timeout_s)
+        """Engines of one kind can have the same workers, one after the other."""
         self._owner = os.getpid()
         self._workers: list[Worker | None] = [None] * count
         # files that an engine keeps go with it even if its worker is killed
@@ -59,6 +61,19 @@ class Crew:
         except BaseException:
             self.close()
             raise
+
+    @staticmethod
+    def kind_of(path: str, options: Mapping[str, Any], count: int, threads: int, timeout_s: float) -> str:
+        """What two crews have in common that can stand in for each other."""
+        return repr((path, sorted(options.items()), count, threads, timeout_s))
+
+    def rest(self) -> bool:
+        """Have all workers free their worlds; False where one is lost or does not."""
+        if os.getpid() != self._owner:
+            return False
+        messages = {k: ("free", None) for k in range(len(self._workers))}
+        answers, _, _ = self.ask(messages, None)
+        return len(answers) == len(self._workers)
 
     @property
     def pids(self) -> tuple[int, ...]:
