@@ -49,7 +49,10 @@ def test_three_engines_see_the_same(make) -> None:
     assert DEPTH <= 5e-3
     assert OVERLAP <= 0.05
     depths = [g for g in layer.gaps if g.subject.endswith("depth, median")]
-    outlines = [g for g in layer.gaps if "outline of" in g.subject]
+    # an outline of a few pixels is off by 5 % with one of them: those have no tolerance, and most are not such
+    seen = [g for g in layer.gaps if "outline of" in g.subject]
+    outlines = [g for g in seen if g.tolerance is not None]
+    assert len(outlines) > 0.7 * len(seen)
     assert len(depths) == 2 * 2 * 3  # states, cameras, pairs
     assert len(outlines) > len(depths)
     for gap in (*depths, *outlines):
