@@ -87,7 +87,7 @@ class Momentum:
         self._noted[env] = _Noted(
             self._velocity, self._velocities(scene), self._poses,
             tuple(np.array(tree.handle.link_incoming_joint_forces) for tree in scene.trees), self._order,
-            scene.mass.copy(), scene.rubbing.copy(), scene.values.gravity, pushes,
+            scene.mass.copy(), scene.rubbing.copy(), scene.gravity, pushes,
         )  # fmt: skip
 
     def balance(self, env: int) -> Balance:

@@ -54,8 +54,11 @@ class EnvScene:
         """The parameters that it was built with."""
         self.journal = Journal()
         """What was done to it since it was built."""
-        self.mass, self.rubbing = self.values.mass.copy(), self.values.joint_friction.copy()
+        # as PhysX has them: what a snapshot says of them is what was read from PhysX
+        self.mass, self.rubbing = np.zeros(len(world.bodies)), np.zeros(len(world.joints))
         """Masses (B,) [kg] and dry friction (J,) [N m] or [N] as they are now."""
+        self.gravity = _single(self.values.gravity)
+        """[m/s^2], as PhysX has it."""
         self.system = _system(recipe, values.gravity)
         self.scene: Any = sapien.Scene([self.system])
         self.bodies: list[Any] = [None] * len(world.bodies)
@@ -204,9 +207,9 @@ class EnvScene:
             component.set_inertia([1e-3, 1e-3, 1e-3])
             component.set_cmass_local_pose(sapien.Pose())
             return
-        self.mass[body] = mass
         moments, frame = self._recipe.principal(body, inertia)
         component.set_mass(float(mass))
+        self.mass[body] = component.mass  # PhysX keeps its inverse, in single precision
         component.set_inertia(moments.tolist())
         component.set_cmass_local_pose(sapien.Pose(com, wxyz_from_xyzw(frame)))
 
@@ -215,11 +218,10 @@ class EnvScene:
         world = self._recipe.world
         spec = world.joints[index]
         self.journal.note(Op.DRY, index, friction)
-        self.rubbing[index] = friction
         drive = self.dry.get(index)
         if drive is None:
             if friction == 0.0:
-                return
+                return  # no drive, no friction
             drive = physx.PhysxDriveComponent(self.bodies[spec.body])
             drive.set_parent(self.bodies[world.bodies[spec.body].parent])
             in_parent, in_child = self._recipe.frames[index]
@@ -229,6 +231,7 @@ class EnvScene:
             self.dry[index] = drive
         # PhysX bounds the impulse of these drives, not the force
         bound = friction * world.physics.dt
+        self.rubbing[index] = float(np.float32(bound)) / world.physics.dt
         if spec.type is JointType.PRISMATIC:
             drive.set_drive_property_x(0.0, STICKING, bound, "force")
         else:
@@ -325,6 +328,11 @@ def velocities_of(scenes: Sequence[EnvScene]) -> Array:
         for tree in scene.trees:
             row[tree.joints] = tree.handle.get_qvel()
     return values
+
+
+def _single(values: Array) -> Array:
+    """Rounded to single precision, in double."""
+    return values.astype(np.float32).astype(float)
 
 
 def _system(recipe: Recipe, gravity: Array) -> Any:
