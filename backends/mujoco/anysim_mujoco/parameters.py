@@ -109,22 +109,19 @@ class Parameters:
 
     def rows(self, ids: Array) -> dict[str, Array]:
         """Principal axes as MuJoCo has them: full tensors would not come back with the same bits."""
-        if "body_inertia" not in self._expanded:
-            return {}
         bodies = self._layout.bodies
         return {name: self._rows(name)[ids][:, bodies] for name in ("body_inertia", "body_iquat")}
 
     def restore_rows(self, ids: Array, data: Any, bodies: Array | None = None) -> None:
-        """Write what `rows` returned (for these World bodies), or the built values if that was nothing."""
-        if "body_inertia" in data:
-            which = self._layout.bodies if bodies is None else self._layout.bodies[bodies]
-            self._write_inertia(np.ix_(ids, which), data["body_inertia"], data["body_iquat"])
-        elif "body_inertia" in self._expanded:
-            for name in ("body_inertia", "body_iquat"):
-                self._rows(name)[ids] = getattr(self._batch.model, name)
-        else:
-            return
-        self._mark(ids)
+        """Write what `rows` returned (for these World bodies); envs go on sharing the model where it says the same."""
+        at = np.ix_(ids, self._layout.bodies if bodies is None else self._layout.bodies[bodies])
+        moments, frames = data["body_inertia"], data["body_iquat"]
+        same = np.array_equal(self._rows("body_inertia")[at], moments) and np.array_equal(
+            self._rows("body_iquat")[at], frames
+        )
+        if not same:
+            self._write_inertia(at, moments, frames)
+            self._mark(ids)
 
     def settle(self) -> None:
         """Bring the constants that MuJoCo derives up to date where parameters changed.
