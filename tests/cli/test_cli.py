@@ -15,7 +15,7 @@ FAST = ["-o", "record.cameras=[]"]
 
 def anysim(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "anysim.cli", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, cwd=cwd, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=900, cwd=cwd, check=False)
 
 
 def manifests(out: Path) -> dict[str, dict[str, object]]:

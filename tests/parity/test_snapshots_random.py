@@ -88,6 +88,6 @@ def _elsewhere(name, taken, folder: Path) -> dict[int, list[str]]:
     file = folder / "snapshots.npz"
     scenes.store(taken, file)
     command = [sys.executable, scenes.__file__, name, str(file), str(AFTER)]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=900, check=False)
     assert done.returncode == 0, done.stderr[-4000:]
     return {int(number): digests for number, digests in json.loads(done.stdout.splitlines()[-1]).items()}
