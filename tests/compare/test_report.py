@@ -10,10 +10,11 @@ import pytest
 from lxml import etree
 
 from anysim.compare.html import page
+from anysim.compare.judge import nearest
 from anysim.compare.report import Comparison, as_data
 from anysim.compare.result import Gap, Layer, Measure, Picture, Plot, Series
 from anysim.compare.statistics import wilson
-from anysim.compare.verdict import ANALYTIC, disagreements, findings, nearest, nearest_counts
+from anysim.compare.verdict import ANALYTIC, disagreements, findings, nearest_counts
 from anysim.compare.write import write
 from anysim.errors import AnysimError
 

@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Sequence
 from html import escape
 
+from anysim.compare.judge import nearest
 from anysim.compare.result import Gap, Layer, Measure
-from anysim.compare.verdict import nearest
 
 
 def number(value: float) -> str:

@@ -10,10 +10,15 @@ def errors(measure: Measure) -> dict[str, float]:
     return {engine: abs(value - measure.reference) for engine, value in measure.values.items()}
 
 
-def nearest(measure: Measure) -> str | None:
-    """The engine nearest to the analytic answer, the first of equals; None where there is no answer or no value."""
+def nearest(measure: Measure) -> tuple[str, ...]:
+    """The engines nearest to the analytic answer: one, or several that are as near; none without an answer."""
     off = errors(measure)
-    return min(off, key=lambda engine: off[engine]) if off else None
+    if len(off) < 2:
+        return ()
+    best = min(off.values())
+    # what is far below the tolerance is near enough: telling 1e-14 from 1e-8 would say nothing of physics
+    room = max(1.05 * best, 0.0 if measure.tolerance is None else measure.tolerance / 10)
+    return tuple(engine for engine, error in off.items() if error <= room)
 
 
 def largest_gap(measure: Measure) -> float | None:

@@ -3,8 +3,9 @@
 from math import isfinite
 from typing import Any, NamedTuple
 
+from anysim.compare.judge import nearest
 from anysim.compare.result import Layer, Measure, Plot, Series
-from anysim.compare.verdict import disagreements, findings, nearest
+from anysim.compare.verdict import disagreements, findings
 
 FORMAT = "anysim-compare-1"
 

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
+from anysim.compare.judge import errors, nearest
 from anysim.compare.result import Layer, Measure
 
 ANALYTIC = "the analytic answer"
@@ -53,8 +54,7 @@ def _of_measure(layer: str, m: Measure, has_gaps: bool) -> Iterator[Finding]:
     if m.tolerance is None:
         return
     if m.reference is not None:
-        for engine, value in m.values.items():
-            gap = abs(value - m.reference)
+        for engine, gap in errors(m).items():
             agree = gap <= m.tolerance
             yield Finding(layer, m.subject, m.unit, engine, ANALYTIC, gap, m.tolerance, agree, m.explanation)
         if has_gaps:
@@ -67,17 +67,6 @@ def _of_measure(layer: str, m: Measure, has_gaps: bool) -> Iterator[Finding]:
             (low_a, high_a), (low_b, high_b) = m.intervals[a], m.intervals[b]
             agree = low_a <= high_b and low_b <= high_a
         yield Finding(layer, m.subject, m.unit, a, b, gap, allowed, agree, m.explanation)
-
-
-def nearest(measure: Measure) -> tuple[str, ...]:
-    """The engines nearest to the analytic answer: one, or several that are as near; none without an answer."""
-    if measure.reference is None or len(measure.values) < 2:
-        return ()
-    errors = {engine: abs(value - measure.reference) for engine, value in measure.values.items()}
-    best = min(errors.values())
-    # what is far below the tolerance is near enough: telling 1e-14 from 1e-8 would say nothing of physics
-    room = max(1.05 * best, 0.0 if measure.tolerance is None else measure.tolerance / 10)
-    return tuple(engine for engine, error in errors.items() if error <= room)
 
 
 def nearest_counts(layer: Layer, engines: Sequence[str]) -> dict[str, int]:
