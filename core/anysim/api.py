@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from anysim import registry
-from anysim.engine.factory import ENGINE_VARIABLE, create_simulation
+from anysim.engine.factory import ENGINE_VARIABLE, create_simulation, engine_class
 from anysim.errors import AssetError, SpecError, SpecIssue, TaskError
 from anysim.plugin_options import resolve_options
 from anysim_schemas.load import Loaded, LoadedRun, load_run
@@ -161,7 +161,7 @@ def simulation(spec: "RunSpec") -> "SimEngine":
     from anysim.engine.shards.blocks import shard_count
 
     chosen = spec.engine
-    shards = shard_count(chosen.shards, registry.load("engines", chosen.name), spec.num_envs)
+    shards = shard_count(chosen.shards, engine_class(chosen.name), spec.num_envs)
     return create_simulation(chosen.name, shards=shards, shard_timeout=chosen.shard_timeout, **chosen.options)
 
 

@@ -81,8 +81,9 @@ def _engines(text: str | None, default: str) -> list[str]:
         return [default]
     if text == "all":
         from anysim import registry
+        from anysim.engine.factory import availability
 
-        return [name for name in registry.names("engines") if registry.load("engines", name).availability().available]
+        return [name for name in registry.names("engines") if availability(name).available]
     return [part.strip() for part in text.split(",") if part.strip()]
 
 
