@@ -7,13 +7,16 @@ from pydantic import Field, model_validator
 from anysim_schemas.base import Integer, Name, Spec
 from anysim_schemas.cameras import CameraSpec
 from anysim_schemas.collisions import CollisionsSpec
+from anysim_schemas.contact_sensors import ContactSensorSpec
 from anysim_schemas.engine import EngineSpec, PhysicsSpec
 from anysim_schemas.errors import KeyFault
 from anysim_schemas.layout import PlacementSpec
-from anysim_schemas.objects import ContactSensorSpec, LightSpec, ObjectSpec, TerrainSpec
+from anysim_schemas.lights import LightSpec
+from anysim_schemas.objects import ObjectSpec
 from anysim_schemas.record import RecordSpec
 from anysim_schemas.robots import RobotSpec
 from anysim_schemas.task import TaskSpec
+from anysim_schemas.terrain import TerrainSpec
 
 
 class WorldSpec(Spec):

@@ -23,6 +23,7 @@ from anysim.engine.diagnosis import Finding
 from anysim.engine.index import Index
 from anysim.engine.needs import needs_of
 from anysim.engine.parameters import PARAMETERS, count
+from anysim.engine.presence import Lifecycle, Presence, blocks
 from anysim.engine.primitives import Primitives
 from anysim.engine.state import (
     Availability,
@@ -49,6 +50,8 @@ class SimEngine(Primitives):
     capabilities: ClassVar[Capabilities]
     parameters: ClassVar[frozenset[str]] = frozenset()
     """The names of `anysim.engine.parameters` that the engine can change per env."""
+    lifecycle: ClassVar[Lifecycle] = Lifecycle.P3
+    """What it can do with an entity after the build; all but P3 goes with Capability.VARYING_ENTITIES."""
     parallel: ClassVar[bool] = False
     """Whether it steps its envs on several cores by itself, so that more processes (`shards: auto`) gain nothing."""
     audit_allowances: ClassVar[Mapping[str, Allowance]] = {}
@@ -126,6 +129,8 @@ class SimEngine(Primitives):
             self._install(world)
             try:
                 self._build(world, num_envs)
+                if self._presence.varies:
+                    self._populate(self._all)
             except BaseException:
                 self._world = None
                 raise
@@ -144,6 +149,7 @@ class SimEngine(Primitives):
         self._state: State | None = None
         self._commands = CommandBuffer(world, self.num_envs)
         self._rig = CameraRig(world, self.num_envs)
+        self._presence = Presence(world, self.num_envs)
         self._changed: dict[str, None] = {}
 
     def destroy(self) -> None:
@@ -163,11 +169,44 @@ class SimEngine(Primitives):
 
     # ------------------------------------------------------------------ stepping
 
-    def reset(self, env_ids: EnvIds = None) -> None:
-        """Put envs into the World's initial state; commands return to holding it. Parameters stay as they are."""
+    def reset(self, env_ids: EnvIds = None, present: Any = None) -> None:
+        """Put envs into the World's initial state; commands return to holding it. Parameters stay as they are.
+
+        Args:
+            env_ids: which envs.
+            present: (E, entities) bool, what is there from now on; None leaves it as it is. What is in no slot of the
+                World is always there, and of each slot at most one entity.
+
+        Raises:
+            CapabilityError: what is there was to change, and the engine cannot change it.
+            EngineError: rows that no env can have; nothing was changed.
+        """
         with self._lock:
             self._require_world()
-            self._reset_rows(self._ids(env_ids))
+            ids = self._ids(env_ids)
+            if present is not None:
+                self._admit(ids, self._presence.checked(present, ids))
+            self._reset_rows(ids)
+
+    def _admit(self, ids: Array, present: Array) -> Array:
+        """Change who is there; returns the envs where that is another than before, which then need a reset."""
+        changed = self._presence.changed(ids, present)
+        if len(changed):
+            self._require(Capability.VARYING_ENTITIES)
+            self._retire_state()
+            self._presence.write(ids, present)
+            self._populate(changed)
+        return changed
+
+    @property
+    def presence(self) -> Array:
+        """(N, entities) bool: which of the World's entities are there. Bodies of the others read as the world's frame.
+
+        What is written to them has no effect but for parameters, which wait for them.
+        """
+        with self._lock:
+            self._require_world()
+            return self._presence.entities.copy()
 
     def _reset_rows(self, ids: Array) -> None:
         self._retire_state()
@@ -210,7 +249,10 @@ class SimEngine(Primitives):
 
     def _read_locked(self, name: str) -> Array:
         with self._lock:
-            return self._read(name)
+            array = self._read(name)
+            if self._presence.varies:
+                self._presence.blank(name, array)
+            return array
 
     def _retire_state(self) -> None:
         if self._state is not None:
@@ -229,7 +271,10 @@ class SimEngine(Primitives):
             pos = None if position is None else checks.rows("position", position, (len(ids), len(which)))
             vel = None if velocity is None else checks.rows("velocity", velocity, (len(ids), len(which)))
             self._retire_state()
-            self._write_joints(ids, *checks.with_followers(self.world, which, pos, vel))
+            which, pos, vel = checks.with_followers(self.world, which, pos, vel)
+            for rows, columns in blocks(self._presence.joints[np.ix_(ids, which)]):
+                at = np.ix_(rows, columns)
+                self._write_joints(ids[rows], which[columns], *(v if v is None else v[at] for v in (pos, vel)))
 
     def set_body_state(
         self, pose: Any = None, twist: Any = None, env_ids: EnvIds = None, bodies: Indices = None
@@ -247,7 +292,9 @@ class SimEngine(Primitives):
             twists = None if twist is None else checks.rows("twist", twist, (len(ids), len(which), 6))
             checks.roots_only(self.world, which, with_twist=twists is not None)
             self._retire_state()
-            self._write_bodies(ids, which, poses, twists)
+            for rows, columns in blocks(self._presence.bodies[np.ix_(ids, which)]):
+                at = np.ix_(rows, columns)
+                self._write_bodies(ids[rows], which[columns], *(v if v is None else v[at] for v in (poses, twists)))
 
     def set_control(
         self, position: Any = None, velocity: Any = None, effort: Any = None, env_ids: EnvIds = None,
@@ -284,7 +331,9 @@ class SimEngine(Primitives):
             self._require_world()
             self._require(Capability.WRENCHES)
             ids, which = self._ids(env_ids), self._which(bodies, len(self.world.bodies), "body")
-            self._commands.add_wrench(checks.rows("wrench", wrench, (len(ids), len(which), 6)), ids, which)
+            forces = checks.rows("wrench", wrench, (len(ids), len(which), 6))
+            there = self._presence.bodies[np.ix_(ids, which)]
+            self._commands.add_wrench(np.where(there[..., None], forces, 0.0), ids, which)
 
     # ------------------------------------------------------------------ parameters
 

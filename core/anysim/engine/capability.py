@@ -40,6 +40,7 @@ class Capability(StrEnum):
     RENDER_SEGMENTATION = "render: segmentation"
     SNAPSHOT_STATE = "snapshot: state"
     SNAPSHOT_TRAJECTORY = "snapshot: trajectory"
+    VARYING_ENTITIES = "entities that vary by env"
     PARAMETERS_PER_ENV = "parameters per env"
     LIVE_EDIT_NATIVE = "live add and remove without a rebuild"
     DYNAMICS = "dynamics"  # bodies fall; the null engine moves nothing by itself

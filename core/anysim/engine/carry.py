@@ -26,7 +26,7 @@ def carry_over(engine: "SimEngine", world: World) -> None:
     """Replace the engine's world. If the new one cannot be built the old one is built again, with its state."""
     old = engine.world
     all_envs = np.arange(engine.num_envs)
-    state = engine.get_state()
+    state, present = engine.get_state(), engine.presence
     body_pose, body_twist = state.body_pose, state.body_twist
     joint_pos, joint_vel = state.joint_pos, state.joint_vel
     ticks, control, rig = engine._ticks, engine._commands.control, engine._rig  # noqa: SLF001
@@ -37,7 +37,13 @@ def carry_over(engine: "SimEngine", world: World) -> None:
         engine._retire_state()  # noqa: SLF001
         engine._free()  # noqa: SLF001
         engine._install(target)  # noqa: SLF001
+        before, after = _shared(old, target, "entities")
+        rows = engine._presence.entities.copy()  # noqa: SLF001
+        rows[:, after] = present[:, before]
+        engine._presence.write(all_envs, rows)  # noqa: SLF001
         engine._build(target, engine.num_envs)  # noqa: SLF001
+        if engine._presence.varies:  # noqa: SLF001
+            engine._populate(all_envs)  # noqa: SLF001
         engine._reset_rows(all_envs)  # noqa: SLF001
         for name, values in changed.items():
             before, after = _shared(old, target, PARAMETERS[name].target)

@@ -64,6 +64,8 @@ def needs_of(world: World) -> list[Need]:
             need(Capability.RESTITUTION, f"{what} bounces")
         if geom.surface.torsional:
             need(Capability.TORSIONAL_FRICTION, f"{what} has torsional friction")
+    for slot in world.slots:
+        need(Capability.VARYING_ENTITIES, f"'{slot.name}' is not the same in every env")
     for sensor in world.contact_sensors:
         need(Capability.CONTACT_SENSORS, f"contact sensor '{sensor.name}'")
     for camera in world.cameras:

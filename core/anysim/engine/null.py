@@ -19,6 +19,7 @@ from anysim.engine.capability import Capabilities
 from anysim.engine.capability import Capability as C
 from anysim.engine.commands import MODES, Control
 from anysim.engine.parameters import PARAMETERS
+from anysim.engine.presence import Lifecycle
 from anysim.engine.state import Availability, SnapshotLevel
 from anysim.math import pose as P
 from anysim.world.kinematics import forward_kinematics
@@ -34,7 +35,8 @@ class NullEngine(SimEngine):
     name = "null"
     capabilities = Capabilities.of(
         C.RIGID_BODIES, C.ARTICULATIONS, C.MIMIC_JOINTS, C.JOINT_LIMITS,
-        C.SNAPSHOT_STATE, C.SNAPSHOT_TRAJECTORY, C.PARAMETERS_PER_ENV,
+        C.SNAPSHOT_STATE, C.SNAPSHOT_TRAJECTORY, C.VARYING_ENTITIES,
+        C.PARAMETERS_PER_ENV,
         approximate={
             C.CONTROL_POSITION: "the joint moves to its target at its velocity limit, whatever the gains",
             C.CONTROL_VELOCITY: "the joint has its target velocity at once, whatever the gains",
@@ -51,6 +53,7 @@ class NullEngine(SimEngine):
             ),
         },
     )  # fmt: skip
+    lifecycle: ClassVar[Lifecycle] = Lifecycle.P2
     parameters: ClassVar[frozenset[str]] = frozenset(PARAMETERS)
 
     @classmethod
@@ -83,6 +86,9 @@ class NullEngine(SimEngine):
         self._twists[ids] = 0.0
         self._position[ids] = [j.initial for j in self.world.joints]
         self._velocity[ids] = 0.0
+
+    def _populate(self, ids: Array) -> None:
+        """Nothing touches or sees anything here, so nobody has to leave: what is absent moves unseen."""
 
     # ------------------------------------------------------------------ stepping
 

@@ -34,6 +34,13 @@ class Primitives(ABC):
     def _reset(self, ids: Array) -> None:
         """Write the World's initial state, with nothing left over (warm starts, accumulated forces)."""
 
+    def _populate(self, ids: Array) -> None:
+        """Have in these envs the entities that `self._presence` says, and no others; `_reset` of them follows.
+
+        What is absent is as if it were not in the World: nothing touches it, sees it or hits it with a ray.
+        """
+        raise self._absent(Capability.VARYING_ENTITIES)
+
     @abstractmethod
     def _step(self, n_steps: int, ids: Array | None) -> None:
         """Advance all envs, or those in `ids`, by n physics steps. Must not disturb the others."""

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 def take(engine: "SimEngine", ids: Array, level: SnapshotLevel) -> Snapshot:
     """Copy the rows of envs; see `SimEngine.snapshot`."""
     data: dict[str, Array] = {"ticks": engine._ticks[ids], "cameras": engine._rig.poses[ids]}
+    if engine._presence.varies:
+        data["present"] = engine._presence.entities[ids]
     data |= {f"commands.{name}": rows for name, rows in engine._commands.rows(ids).items()}
     data |= {f"parameter.{name}": engine._get_parameter(name)[ids] for name in engine._changed}
     data |= {f"engine.{name}": rows for name, rows in engine._snapshot(ids, level).items()}
@@ -27,12 +29,14 @@ def take(engine: "SimEngine", ids: Array, level: SnapshotLevel) -> Snapshot:
 
 
 def put_back(engine: "SimEngine", ids: Array, snapshot: Snapshot) -> None:
-    """Write checked rows: parameters first, since an engine's state may depend on them.
+    """Write checked rows: who is there and parameters first, since an engine's state depends on them.
 
     A parameter that was changed since, but not when the snapshot was taken, gets its built value back.
     """
     data = snapshot.data
     engine._retire_state()
+    if "present" in data:
+        engine._reset(engine._admit(ids, data["present"]))
     for name in PARAMETERS:
         rows = data.get(f"parameter.{name}")
         if rows is None and name in engine._changed:

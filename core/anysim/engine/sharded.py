@@ -177,6 +177,7 @@ class ShardedEngine(SimEngine):
         try:
             self._crew.replace(k, self.world, self._blocks, self._memory)
             for name, arguments in (
+                ("populate", (rows - first, self._presence.entities[rows])),
                 ("reset", (rows - first,)),
                 ("set_parameters", ({name: values[rows] for name, values in self._values.items()},)),
             ):
@@ -209,6 +210,10 @@ class ShardedEngine(SimEngine):
     def _reset(self, ids: Array) -> None:
         self._write("reset", {p.worker: (p.ids,) for p in self._blocks.split(ids)})
         self._lost[ids] = False
+
+    def _populate(self, ids: Array) -> None:
+        rows = self._presence.entities[ids]
+        self._write("populate", {p.worker: (p.ids, rows[p.rows]) for p in self._blocks.split(ids)})
 
     def _step(self, n_steps: int, ids: Array | None) -> None:
         # what was read after the last step will be read after this one: it comes with the answer
@@ -346,5 +351,6 @@ def sharded(engine_class: type[SimEngine], shards: int, timeout_s: float = TIMEO
         "__doc__": f"{engine_class.__name__} in worker processes.", "__module__": __name__, "inner": engine_class,
         "shards": shards, "timeout_s": timeout_s, "name": engine_class.name,
         "capabilities": engine_class.capabilities, "parameters": engine_class.parameters,
+        "lifecycle": engine_class.lifecycle,
     }  # fmt: skip
     return type(f"Sharded{engine_class.__name__}", (ShardedEngine,), body)

@@ -1,10 +1,11 @@
 """The lifecycle that every manager has.
 
-    configure(spec, streams)  ->  build(world)  ->  bind(engine)  ->  reset(env_ids)
+    configure(spec, streams, board)  ->  build(world)  ->  bind(engine)  ->  reset(env_ids)
                               ->  before_step(...) / after_step()  ->  snapshot(env_ids) / restore(env_ids, data)
 
-A manager owns its slice of the state and nothing else; managers never call each other. `RESET_ORDER` is the one place
-that says who comes before whom.
+A manager owns its slice of the state and nothing else; managers never call each other. What one of them decides and
+others need stands on the `Board`, on which each thing has one writer. `RESET_ORDER` is the one place that says who
+comes before whom.
 """
 
 from abc import ABC
@@ -13,12 +14,14 @@ from typing import ClassVar, Self
 
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
+from anysim.managers.board import Board
 from anysim.managers.streams import Streams
 from anysim.world.model import World
 from anysim_schemas.run import RunSpec
 
-RESET_ORDER = ("layout", "scene", "terrain", "robot", "camera", "capture", "task")
-"""Poses first, then what things are, then who moves and who looks, and the task last, on the settled scene."""
+RESET_ORDER = ("terrain", "population", "layout", "scene", "robot", "camera", "capture", "task")
+"""The ground first, then who is there, where it is and what it is like, then who moves and who looks, and the task
+last, on the settled scene."""
 
 
 class Manager(ABC):
@@ -27,12 +30,14 @@ class Manager(ABC):
     name: ClassVar[str]
     spec: RunSpec
     streams: Streams
+    board: Board
     engine: SimEngine
 
-    def configure(self, spec: RunSpec, streams: Streams) -> Self:
-        """Take the spec; check what can be checked without a world."""
+    def configure(self, spec: RunSpec, streams: Streams, board: Board | None = None) -> Self:
+        """Take the spec; check what can be checked without a world. Managers of one env share streams and board."""
         self.spec = spec
         self.streams = streams
+        self.board = Board(streams.num_envs) if board is None else board
         return self
 
     def build(self, world: World) -> None:

@@ -1,6 +1,7 @@
 """The managers that every env has."""
 
 from anysim.managers.base import Manager
+from anysim.managers.board import Board
 from anysim.managers.camera import CameraManager
 from anysim.managers.layout import LayoutManager
 from anysim.managers.robot import RobotManager
@@ -12,9 +13,9 @@ from anysim_schemas.run import RunSpec
 
 def standard_managers(spec: RunSpec, world: World, num_envs: int) -> list[Manager]:
     """Configured and built, sharing one set of streams."""
-    streams = Streams(num_envs)
+    streams, board = Streams(num_envs), Board(num_envs)
     managers: list[Manager] = [LayoutManager(), SceneManager(), RobotManager(), CameraManager()]
     for manager in managers:
-        manager.configure(spec, streams)
+        manager.configure(spec, streams, board)
         manager.build(world)
     return managers

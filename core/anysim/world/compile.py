@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 from anysim.world.builder import WorldBuilder
 from anysim.world.compile_collisions import with_exclusions
-from anysim.world.compile_object import add_object, add_terrain
+from anysim.world.compile_object import add_object
 from anysim.world.compile_robot import add_robot
 from anysim.world.compile_sensors import compile_lights, with_sensors
+from anysim.world.compile_terrain import add_terrain
 from anysim.world.imported import ImportNote
 from anysim.world.issues import Issues
 from anysim.world.model import Actuation, Physics, World

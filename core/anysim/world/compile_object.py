@@ -4,9 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
-from anysim.conventions import GROUND, IDENTITY_QUATERNION, WORLD
+from anysim.conventions import IDENTITY_QUATERNION
 from anysim.errors import AssetError, PluginError
 from anysim.world import inertia
 from anysim.world.assets import locate
@@ -25,11 +23,8 @@ from anysim.world.model import (
     Cylinder,
     EntityKind,
     Geom,
-    HeightField,
-    HeightFieldShape,
     Mesh,
     MeshShape,
-    Plane,
     Quat,
     Shape,
     Sphere,
@@ -38,7 +33,7 @@ from anysim.world.model import (
 )  # fmt: skip
 from anysim.world.nominal import nominal
 from anysim.world.presets import surface
-from anysim_schemas.objects import ContactSpec, ObjectSpec, SourceSpec, TerrainSpec
+from anysim_schemas.objects import ContactSpec, ObjectSpec, SourceSpec
 from anysim_schemas.values import Choice, Range
 
 DEFAULT_DENSITY = 1000.0  # [kg/m^3], water
@@ -167,16 +162,3 @@ def _color(spec: ObjectSpec, issues: Issues) -> Rgb:
     except ValueError as error:
         issues.add("color", str(error))
         return DEFAULT_COLOR
-
-
-def add_terrain(builder: WorldBuilder, spec: TerrainSpec) -> None:
-    """The ground as a geom of the world."""
-    touch = Surface(friction=spec.friction, restitution=spec.restitution)
-    color = (*spec.color, 1.0)
-    if spec.kind == "plane":
-        builder.geoms.append(Geom(GROUND, WORLD, Plane(), color=color, surface=touch))
-    elif spec.heights is not None:
-        heights = np.array(spec.heights, dtype=np.float64)
-        heights.setflags(write=False)
-        builder.add_heightfields([HeightField(GROUND, heights, spec.size)])
-        builder.geoms.append(Geom(GROUND, WORLD, HeightFieldShape(GROUND), color=color, surface=touch))

@@ -13,7 +13,8 @@ from anysim.world.lookup import find_bodies, find_frame
 from anysim.world.model import Camera, ContactSensor, Light, World
 from anysim.world.rounding import split
 from anysim_schemas.cameras import CameraSpec
-from anysim_schemas.objects import ContactSensorSpec, LightSpec
+from anysim_schemas.contact_sensors import ContactSensorSpec
+from anysim_schemas.lights import LightSpec
 
 DEFAULT_LIGHTS = (
     Light("key", direction=(-0.4, 0.3, -0.87), intensity=0.7),  # from the front right, as a lamp beside the viewer

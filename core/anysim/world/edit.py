@@ -16,7 +16,7 @@ from anysim.world.compile_object import add_object
 from anysim.world.compile_robot import add_robot, placement
 from anysim.world.compile_sensors import compile_camera
 from anysim.world.issues import Issues
-from anysim.world.model import Channel, MeshShape, Quat, Robot, Vec3, World
+from anysim.world.model import Channel, MeshShape, Quat, Robot, Slot, Vec3, World
 from anysim.world.rounding import split
 from anysim_schemas.base import Spec
 from anysim_schemas.cameras import CameraSpec
@@ -129,6 +129,7 @@ def without_entity(world: World, name: str) -> World:
         excluded_pairs=frozenset(
             (bodies[a], bodies[b]) for a, b in world.excluded_pairs if a in bodies and b in bodies
         ),
+        slots=_slots(world, names.index(name)),
     )  # fmt: skip
 
 
@@ -137,6 +138,12 @@ def _numbers(count: int, gone: Iterable[int]) -> dict[int, int]:
     dropped = set(gone)
     kept = [i for i in range(count) if i not in dropped]
     return {WORLD: WORLD, **{old: new for new, old in enumerate(kept)}}
+
+
+def _slots(world: World, gone: int) -> tuple[Slot, ...]:
+    """The slots without an entity; one that has no other goes with it."""
+    left = [replace(slot, entities=tuple(e - (e > gone) for e in slot.entities if e != gone)) for slot in world.slots]
+    return tuple(slot for slot in left if slot.entities)
 
 
 def _sensors(world: World, bodies: Mapping[int, int]) -> tuple[Any, ...]:

@@ -255,6 +255,20 @@ class Entity:
 
 
 @dataclass(frozen=True, slots=True)
+class Slot:
+    """A logical object, the same in every episode and on every engine: the `instance`-th of a `category`.
+
+    `entities` are the indices of the entities that it can be, each with its own asset; in an env at most one of
+    them is present at a time. Most slots have one, of the same name.
+    """
+
+    name: str
+    category: str
+    instance: int
+    entities: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Channel:
     """Joints of a robot that are commanded together: indices into the world's joints and actuators.
 
@@ -322,6 +336,8 @@ class World:
 
     A parent and its child never collide and are not listed.
     """
+    slots: tuple[Slot, ...] = ()
+    """Logical objects that may differ between envs. An entity that is in none of them is there in every env."""
 
     @cached_property
     def hash(self) -> str:
@@ -345,6 +361,15 @@ class World:
         for index, entity in enumerate(self.entities):
             table[entity.body_start : entity.body_stop] = [index] * (entity.body_stop - entity.body_start)
         return tuple(table)
+
+    @cached_property
+    def initial_presence(self) -> Array:
+        """(E,) bool, read-only: what is there in an env before anything was drawn, of each slot the first entity."""
+        present = np.ones(len(self.entities), dtype=bool)
+        for slot in self.slots:
+            present[list(slot.entities[1:])] = False
+        present.setflags(write=False)
+        return present
 
     @cached_property
     def initial_body_pose(self) -> Array:

@@ -167,6 +167,13 @@ class Host:
 
     # ------------------------------------------------------------------ running
 
+    def populate(self, ids: Array, present: Array) -> None:
+        engine = self._here
+        if engine._presence.varies:
+            engine._retire_state()
+            engine._presence.write(ids, present)
+            engine._populate(ids)
+
     def reset(self, ids: Array) -> None:
         self._here._retire_state()
         self._here._reset(ids)

@@ -1,0 +1,96 @@
+"""Who is there: which of a World's entities are present in each env, and how an engine makes them come and go.
+
+A World lists everything that may ever be in an env; a slot of it says what is one and the same logical object with
+another asset. Arrays stay dense over all entities, whatever an env has. It changes at a reset alone.
+"""
+
+from collections.abc import Iterator
+from enum import StrEnum
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.errors import EngineError
+from anysim.world.model import World
+
+
+class Lifecycle(StrEnum):
+    """What an engine can do with an entity after the build (MagicSim report, section 4.5)."""
+
+    P1 = "import and delete"
+    P2 = "import only"  # what leaves is retired: hidden, disabled, moved aside, and taken up again
+    P3 = "neither"  # everything stays and is reset in place
+
+
+class Presence:
+    """The entities of all envs: `entities` (N, E), and `bodies` (N, B) and `joints` (N, J) that follow from them."""
+
+    def __init__(self, world: World, num_envs: int) -> None:
+        self._world = world
+        self.varies = bool(world.slots)
+        """Whether anything may be absent at all."""
+        body_entity = np.array(world.body_entity, dtype=int)
+        joint_body = np.array([joint.body for joint in world.joints], dtype=int)
+        self._body_entity, self._joint_entity = body_entity, body_entity[joint_body]
+        self._initial_joints = np.array([joint.initial for joint in world.joints], dtype=float)
+        self.entities = np.repeat(world.initial_presence[None], num_envs, axis=0)
+        self._derive()
+
+    def _derive(self) -> None:
+        self.bodies = self.entities[:, self._body_entity]
+        self.joints = self.entities[:, self._joint_entity]
+
+    def checked(self, present: object, ids: Array) -> Array:
+        """The wanted rows (E, entities), if every env has what is fixed and no slot has two entities.
+
+        Raises:
+            EngineError: another shape or type, or rows that no env can have.
+        """
+        rows, world = np.asarray(present), self._world
+        shape = (len(ids), len(world.entities))
+        if rows.dtype != bool or rows.shape != shape:
+            raise EngineError(f"present must be a bool array of shape {shape}, got {rows.dtype} {rows.shape}")
+        varying = {entity for slot in world.slots for entity in slot.entities}
+        for index, entity in enumerate(world.entities):
+            if index not in varying and not rows[:, index].all():
+                raise EngineError(f"'{entity.name}' is in no slot of the world, so it is present in every env")
+        for slot in world.slots:
+            if (rows[:, slot.entities].sum(axis=1) > 1).any():
+                row = int(np.argmax(rows[:, slot.entities].sum(axis=1) > 1))
+                both = [world.entities[e].name for e in slot.entities if rows[row, e]]
+                raise EngineError(f"env {ids[row]}: '{slot.name}' can be one of {' and '.join(both)}, not several")
+        return rows
+
+    def write(self, ids: Array, rows: Array) -> None:
+        """Take over rows (E, entities)."""
+        self.entities[ids] = rows
+        self._derive()
+
+    def changed(self, ids: Array, rows: Array) -> Array:
+        """The envs of `ids` whose rows differ from those in force."""
+        return ids[(self.entities[ids] != rows).any(axis=1)]
+
+    def blank(self, name: str, array: Array) -> None:
+        """Give what is absent its values in a field of the state.
+
+        They are the same on every engine: the pose of the world's own frame, no velocity, the initial joint position.
+        """
+        if name == "body_pose":
+            array[~self.bodies] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+        elif name == "body_twist":
+            array[~self.bodies] = 0.0
+        elif name == "joint_pos":
+            array[...] = np.where(self.joints, array, self._initial_joints)
+        elif name in ("joint_vel", "joint_effort"):
+            array[~self.joints] = 0.0
+
+
+def blocks(present: Array) -> Iterator[tuple[Array, Array]]:
+    """A mask (E, K) as blocks (rows, columns) of what is present, rows of one pattern together."""
+    if present.all():
+        yield np.arange(len(present)), np.arange(present.shape[1])
+        return
+    patterns, which = np.unique(present, axis=0, return_inverse=True)
+    for number, pattern in enumerate(patterns):
+        if pattern.any():
+            yield np.flatnonzero(which.reshape(-1) == number), np.flatnonzero(pattern)
