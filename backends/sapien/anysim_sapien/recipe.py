@@ -1,6 +1,7 @@
 """What all envs of a world are built from: everything about the World that is worked out once."""
 
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -28,40 +29,59 @@ class Values(NamedTuple):
     gravity: Array
 
 
-class Recipe:
-    """What all envs of a world are built from."""
+class Recipes:
+    """What all envs of a world are built from: one recipe for each set of entities that are there."""
 
     def __init__(self, world: World, options: SapienOptions) -> None:
-        self.world, self.options, self.layout = world, options, Layout.of(world)
-        self._meeting = Meeting(world, self.layout)
-        self.groups = self._meeting.apart.groups
-        self.geoms_on: dict[int, list[int]] = {}
-        for i in self._meeting.solid.tolist():
-            self.geoms_on.setdefault(world.geoms[i].body, []).append(i)
+        self.world, self.options = world, options
+        self.layout = Layout.of(world)
+        """That of everything that may be there."""
         self.root_pose = [to_pose(np.array([*b.position, *b.quaternion])) for b in world.bodies]
         self.frames = [_joint_frames(world, joint) for joint in world.joints]
         self.initial = np.array([joint.initial for joint in world.joints])
         self._principal: dict[tuple[str, bytes], Principal] = {}
-        self._copies: dict[bytes, dict[int, list[Copy]]] = {}
+        self._made: dict[bytes, Recipe] = {}
         _check(world)
 
-    def copies(self, friction: Array) -> dict[int, list[Copy]]:
-        """The shapes of each geom that collides, for the coefficients in force (G,)."""
-        key = friction.tobytes()
-        if key not in self._copies:
-            if len(self._copies) > 1000:
-                self._copies.clear()
-            self._copies[key] = self._meeting.copies(friction)
-        return self._copies[key]
+    def of(self, present: Array) -> "Recipe":
+        """The recipe for the entities (E,) that are there."""
+        return remembered(self._made, present.tobytes(), 64, lambda: Recipe(self, present))
 
     def principal(self, body: int, inertia: Array) -> Principal:
         """The principal moments of a body, computed once."""
         key = (self.world.bodies[body].name, inertia.tobytes())
-        if key not in self._principal:
-            if len(self._principal) > 10000:
-                self._principal.clear()
-            self._principal[key] = principal(key[0], inertia)
-        return self._principal[key]
+        return remembered(self._principal, key, 10000, lambda: principal(key[0], inertia))
+
+
+class Recipe:
+    """What an env is built from, with some of the World's entities: indices are the World's."""
+
+    def __init__(self, common: Recipes, present: Array) -> None:
+        self.world, self.options, self.common = common.world, common.options, common
+        self.layout = Layout.of(common.world, present[np.array(common.world.body_entity, dtype=int)])
+        self._meeting = Meeting(self.world, self.layout)
+        self.groups = self._meeting.apart.groups
+        self.geoms_on: dict[int, list[int]] = {}
+        for i in self._meeting.solid.tolist():
+            self.geoms_on.setdefault(self.world.geoms[i].body, []).append(i)
+        self._copies: dict[bytes, dict[int, list[Copy]]] = {}
+
+    def copies(self, friction: Array) -> dict[int, list[Copy]]:
+        """The shapes of each geom that collides, for the coefficients in force (G,)."""
+        return remembered(self._copies, friction.tobytes(), 64, lambda: self._meeting.copies(friction))
+
+
+K = TypeVar("K")
+V = TypeVar("V")
+
+
+def remembered(found: dict[K, V], key: K, most: int, make: Callable[[], V]) -> V:
+    """The value of a key, made if it is not there; the one that was not asked for the longest makes room."""
+    value = found.pop(key) if key in found else make()
+    found[key] = value
+    if len(found) > most:
+        del found[next(iter(found))]
+    return value
 
 
 def tendon_chain(world: World, follower: int) -> tuple[list[int], list[float]]:
