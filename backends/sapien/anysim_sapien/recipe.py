@@ -1,7 +1,7 @@
 """What all envs of a world are built from: everything about the World that is worked out once."""
 
-from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,18 +39,23 @@ class Recipes:
         self.root_pose = [to_pose(np.array([*b.position, *b.quaternion])) for b in world.bodies]
         self.frames = [_joint_frames(world, joint) for joint in world.joints]
         self.initial = np.array([joint.initial for joint in world.joints])
-        self._principal: dict[tuple[str, bytes], Principal] = {}
-        self._made: dict[bytes, Recipe] = {}
+        self._principal = lru_cache(maxsize=10000)(self._make_principal)
+        self._made = lru_cache(maxsize=64)(self._make)
         _check(world)
 
     def of(self, present: Array) -> "Recipe":
         """The recipe for the entities (E,) that are there."""
-        return remembered(self._made, present.tobytes(), 64, lambda: Recipe(self, present))
+        return self._made(present.tobytes())
+
+    def _make(self, present: bytes) -> "Recipe":
+        return Recipe(self, np.frombuffer(present, dtype=bool))
 
     def principal(self, body: int, inertia: Array) -> Principal:
         """The principal moments of a body, computed once."""
-        key = (self.world.bodies[body].name, inertia.tobytes())
-        return remembered(self._principal, key, 10000, lambda: principal(key[0], inertia))
+        return self._principal(body, np.asarray(inertia, dtype=float).tobytes())
+
+    def _make_principal(self, body: int, inertia: bytes) -> Principal:
+        return principal(self.world.bodies[body].name, np.frombuffer(inertia))
 
 
 class Recipe:
@@ -64,24 +69,14 @@ class Recipe:
         self.geoms_on: dict[int, list[int]] = {}
         for i in self._meeting.solid.tolist():
             self.geoms_on.setdefault(self.world.geoms[i].body, []).append(i)
-        self._copies: dict[bytes, dict[int, list[Copy]]] = {}
+        self._copies = lru_cache(maxsize=64)(self._make_copies)
 
     def copies(self, friction: Array) -> dict[int, list[Copy]]:
         """The shapes of each geom that collides, for the coefficients in force (G,)."""
-        return remembered(self._copies, friction.tobytes(), 64, lambda: self._meeting.copies(friction))
+        return self._copies(friction.tobytes())
 
-
-K = TypeVar("K")
-V = TypeVar("V")
-
-
-def remembered(found: dict[K, V], key: K, most: int, make: Callable[[], V]) -> V:
-    """The value of a key, made if it is not there; the one that was not asked for the longest makes room."""
-    value = found.pop(key) if key in found else make()
-    found[key] = value
-    if len(found) > most:
-        del found[next(iter(found))]
-    return value
+    def _make_copies(self, friction: bytes) -> dict[int, list[Copy]]:
+        return self._meeting.copies(np.frombuffer(friction))
 
 
 def tendon_chain(world: World, follower: int) -> tuple[list[int], list[float]]:
