@@ -13,6 +13,7 @@ from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Capabilities
 from anysim.engine.commands import Control
 from anysim.engine.diagnosis import Finding, Health
+from anysim.engine.presence import Lifecycle
 from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
 from anysim.math import pose as P
 from anysim.world.model import World
@@ -25,6 +26,7 @@ from anysim_mujoco.options import MujocoOptions
 from anysim_mujoco.parameters import Parameters
 from anysim_mujoco.query import Queries
 from anysim_mujoco.raw import raw_loop
+from anysim_mujoco.retired import Retired
 from anysim_mujoco.state import StateReader
 
 _VELOCITY_STAGE = mujoco.mjtStage.mjSTAGE_VEL.value
@@ -33,7 +35,7 @@ _VELOCITY_STAGE = mujoco.mjtStage.mjSTAGE_VEL.value
 
 _BUILT = (
     "_model", "_layout", "_batch", "_rows", "_initial", "_qpos", "_qvel", "_mocap_pos", "_mocap_quat", "_wrenches",
-    "_drives", "_parameters", "_reader", "_fields", "_queries",
+    "_drives", "_parameters", "_reader", "_fields", "_queries", "_retired",
 )  # fmt: skip
 """What `_build` makes and `_free` lets go of."""
 
@@ -44,6 +46,7 @@ class MujocoEngine(SimEngine):
     name: ClassVar[str] = "mujoco"
     capabilities: ClassVar[Capabilities] = declared.CAPABILITIES
     parameters: ClassVar[frozenset[str]] = Parameters.NAMES
+    lifecycle: ClassVar[Lifecycle] = Lifecycle.P2
     parallel: ClassVar[bool] = True  # a Batch steps its envs in C threads, without Python's lock
     options: MujocoOptions
 
@@ -95,6 +98,9 @@ class MujocoEngine(SimEngine):
         self._reader = StateReader(self._batch, layout)
         self._fields = self._reader.fields
         self._queries = Queries(self._batch, layout, self._parameters)
+        self._retired: Retired | None = None
+        if self._presence.varies:
+            self._retired = Retired(self._batch, world, layout, self._parameters)
         self._painter: Any = None
 
     def _free(self) -> None:
@@ -106,8 +112,14 @@ class MujocoEngine(SimEngine):
 
     def _reset(self, ids: Array) -> None:
         self._rows[ids] = self._initial
+        if self._retired is not None:
+            self._retired.uncouple(ids)
         self._reader.clear_faults(ids)
         self._reader.hold(ids, 0.0, 0.0)
+
+    def _populate(self, ids: Array) -> None:
+        if self._retired is not None:
+            self._retired.populate(ids, self._presence.entities[ids])
 
     # ------------------------------------------------------------------ stepping
 
@@ -120,6 +132,8 @@ class MujocoEngine(SimEngine):
                 self._advance(rows, 1)
         else:
             self._advance(rows, n_steps)
+        if self._retired is not None:
+            self._retired.rest()
         self._reader.stepped(ids)
 
     def _advance(self, rows: Array | None, n_steps: int) -> None:

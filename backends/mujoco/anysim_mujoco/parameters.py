@@ -1,5 +1,6 @@
 """Physical and visual parameters per env, as per-env fields of the batch's model."""
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -122,6 +123,12 @@ class Parameters:
         if not same:
             self._write_inertia(at, moments, frames)
             self._mark(ids)
+
+    def place(self, ids: Array, fields: Mapping[str, Array]) -> None:
+        """Write rows of fields of the model that are no parameters, and from which MuJoCo derives constants."""
+        for name, values in fields.items():
+            self._expand(name)[ids] = values
+        self._mark(ids)
 
     def settle(self) -> None:
         """Bring the constants that MuJoCo derives up to date where parameters changed.

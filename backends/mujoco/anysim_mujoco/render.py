@@ -46,6 +46,8 @@ class Painter:
 
     def _draw(self, view: CameraView, ids: Array, channels: tuple[str, ...]) -> dict[str, Array]:
         self._fit(view.width, view.height)
+        # another engine's painter may have drawn in between, into buffers of its own
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
         size = (len(ids), view.height, view.width)
         shapes: dict[str, tuple[tuple[int, ...], Any]] = {
             "rgb": ((*size, 3), np.uint8), "depth": (size, np.float32), "segmentation": (size, np.int32)

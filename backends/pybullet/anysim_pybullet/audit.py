@@ -13,9 +13,10 @@ from anysim_pybullet.urdf import UNLIMITED
 
 
 def joint_limits(env: Env) -> Array:
-    """(J, 2) [rad, m] as Bullet enforces them, infinite where it does not."""
-    limits = np.empty((len(env.joint_link), 2))
-    for j, link in enumerate(env.joint_link):
+    """(J, 2) [rad, m] as Bullet enforces them, infinite where it does not, not a number for what is not there."""
+    limits = np.full((len(env.joint_link), 2), np.nan)
+    for j in env.cast.joints.tolist():
+        link = env.joint_link[j]
         uid = env.body_at[env.plan.world.joints[j].body][0]
         lower, upper = bullet().getJointInfo(uid, link, physicsClientId=env.id)[8:10]
         limits[j] = (lower, upper) if lower <= upper else (-np.inf, np.inf)
@@ -23,10 +24,11 @@ def joint_limits(env: Env) -> Array:
 
 
 def inertials(env: Env) -> dict[str, Array]:
-    """Masses (B,), centres of mass (B, 3) in the bodies' frames, and inertias (B, 6) in their axes."""
+    """Masses (B,), centres of mass (B, 3) in the bodies' frames, and inertias (B, 6) in their axes; 0 of the absent."""
     count = len(env.body_at)
     mass, com, inertia = np.zeros(count), np.zeros((count, 3)), np.zeros((count, 6))
-    for i, (uid, link) in enumerate(env.body_at):
+    for i in np.flatnonzero(env.cast.bodies).tolist():
+        uid, link = env.body_at[i]
         info = bullet().getDynamicsInfo(uid, link, physicsClientId=env.id)
         axes = P.to_matrix(np.array(info[4]))
         tensor = axes @ np.diag(info[2]) @ axes.T

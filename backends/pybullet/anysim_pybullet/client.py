@@ -1,6 +1,7 @@
 """One env: a Bullet client of its own, built from the plan that all envs share."""
 
 import tempfile
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from anysim.math import pose as P
 from anysim.quiet import quiet
 from anysim.world.model import Geom, HeightField, HeightFieldShape, Plane, World
 from anysim_pybullet.bullet import bullet, connect, disconnect
+from anysim_pybullet.cast import Cast
 from anysim_pybullet.options import PybulletOptions
 from anysim_pybullet.surfaces import PairRules
 from anysim_pybullet.tree import Frames, Tree, frames_of, trees_of
@@ -36,6 +38,7 @@ class Plan:
         self.frames: Frames = frames_of(world)
         self.trees: list[Tree] = trees_of(world, self.frames)
         self.rules = PairRules(world, self.trees, options.contact_erp)
+        self._casts = lru_cache(maxsize=64)(self._make_cast)
         self._folder = tempfile.TemporaryDirectory(prefix="anysim-pybullet-")
         self.folder = Path(self._folder.name)
         try:
@@ -58,6 +61,13 @@ class Plan:
         """Remove the files."""
         self._folder.cleanup()
 
+    def cast(self, present: Array) -> Cast:
+        """What an env has where these entities (E,) are there."""
+        return self._casts(present.tobytes())
+
+    def _make_cast(self, present: bytes) -> Cast:
+        return Cast.of(self.world, self.trees, self.rules.geoms, np.frombuffer(present, dtype=bool))
+
     def _write(self, name: str, text: str) -> str:
         path = self.folder / f"{name}.urdf"
         path.write_text(text, encoding="ascii")
@@ -65,13 +75,14 @@ class Plan:
 
 
 class Env:
-    """A client with one copy of the World. `root_ids[t]` is the Bullet body of tree t.
+    """A client with one copy of the World, or of what is there of it. `root_ids[t]` is the Bullet body of tree t.
 
-    `body_at`, `joint_link`, `shape_at` say where the World's bodies, joints and the shapes of `PairRules` are.
+    `body_at`, `joint_link`, `shape_at` say where the World's bodies, joints and the shapes of `PairRules` are; what is
+    not there is at -1.
     """
 
-    def __init__(self, plan: Plan) -> None:
-        self.plan = plan
+    def __init__(self, plan: Plan, cast: Cast) -> None:
+        self.plan, self.cast = plan, cast
         self.id = connect()
         try:
             self._build()
@@ -83,6 +94,11 @@ class Env:
         """Free the client."""
         disconnect(self.id)
 
+    def rebuild(self, cast: Cast) -> None:
+        """Build what is there now, in the same client: half the work of a new one, and with the same bits after it."""
+        self.cast = cast
+        self._build()
+
     # ------------------------------------------------------------------ building
 
     def _build(self) -> None:
@@ -91,13 +107,13 @@ class Env:
         self.joint_link: list[int] = [-1] * len(world.joints)
         self.shape_at: dict[int, tuple[int, int]] = {}
         self.body_of: dict[int, dict[int, int]] = {}  # World body by Bullet body and link, -1 for the world
-        self.root_ids: list[int] = []
+        self.root_ids: list[int] = [-1] * len(plan.trees)
         with quiet() as words:
             try:
                 self._settings(p)
                 for number, geom, file in plan.ground:
                     self._add_ground(p, number, geom, file)
-                for tree in plan.trees:
+                for tree in self.cast.trees:
                     self._add_tree(p, tree)
                 self._filter(p)
                 self._couple(p)
@@ -111,8 +127,8 @@ class Env:
             raise EngineError(f"Bullet cannot build the world '{world.name}': {failure}; {words.tail}") from failure
         self.tree_links = [[self.joint_link[j] for j in tree.joints.tolist()] for tree in plan.trees]
         self.local = np.concatenate([plan.frames.inertial, plan.frames.anchor], axis=1)
-        for tree, uid in zip(plan.trees, self.root_ids, strict=True):
-            info = p.getDynamicsInfo(uid, -1, physicsClientId=self.id)
+        for tree in self.cast.trees:
+            info = p.getDynamicsInfo(self.root_ids[tree.number], -1, physicsClientId=self.id)
             self.local[tree.bodies[0], :7] = [*info[3], *info[4]]
 
     def _settings(self, p: Any) -> None:
@@ -168,7 +184,7 @@ class Env:
         uid = p.loadURDF(
             self.plan.urdf[tree.number], useFixedBase=0 if tree.free else 1, flags=flags, physicsClientId=client
         )
-        self.root_ids.append(uid)
+        self.root_ids[tree.number] = uid
         links: dict[str, int] = {body_link(int(tree.bodies[0])): -1}
         joints: dict[str, int] = {}
         for i in range(p.getNumJoints(uid, physicsClientId=client)):
@@ -207,13 +223,15 @@ class Env:
             still = body == WORLD or world.bodies[body].kind == "static"
             group, mask = (STATIC_GROUP, MOVING_GROUP) if still else (MOVING_GROUP, MOVING_GROUP | STATIC_GROUP)
             p.setCollisionFilterGroupMask(uid, link, group, mask, physicsClientId=self.id)
-        for first, second in zip(*np.nonzero(np.triu(rules.weight == 0.0, 1)), strict=True):
-            (uid_a, link_a), (uid_b, link_b) = self.shape_at[int(first)], self.shape_at[int(second)]
+        shapes = self.cast.shapes
+        for first, second in zip(*np.nonzero(np.triu(rules.weight[np.ix_(shapes, shapes)] == 0.0, 1)), strict=True):
+            (uid_a, link_a), (uid_b, link_b) = self.shape_at[int(shapes[first])], self.shape_at[int(shapes[second])]
             p.setCollisionFilterPair(uid_a, uid_b, link_a, link_b, 0, physicsClientId=self.id)
 
     def _couple(self, p: Any) -> None:
         world = self.plan.world
-        for index, joint in enumerate(world.joints):
+        for index in self.cast.joints.tolist():
+            joint = world.joints[index]
             if joint.mimic is None:
                 continue
             uid = self.body_at[joint.body][0]
@@ -236,9 +254,9 @@ class Env:
             False where links of one robot touch each other: those cannot be parted, and the client must be replaced.
         """
         p = bullet()
-        for tree, uid in zip(self.plan.trees, self.root_ids, strict=True):
+        for tree in self.cast.trees:
             if tree.free or len(tree.joints):
-                away = [APART * (tree.number + 1), 0.0, 10 * APART]
+                uid, away = self.root_ids[tree.number], [APART * (tree.number + 1), 0.0, 10 * APART]
                 p.resetBasePositionAndOrientation(uid, away, [0.0, 0.0, 0.0, 1.0], physicsClientId=self.id)
         p.performCollisionDetection(physicsClientId=self.id)
         return not p.getContactPoints(physicsClientId=self.id)
@@ -248,13 +266,13 @@ class Env:
     def set_surfaces(self, friction: Array) -> None:
         """Give Bullet its numbers for the coefficients (K,) of the shapes' geoms."""
         p, rules = bullet(), self.plan.rules
-        numbers = rules.numbers(friction)
-        for number, index in enumerate(rules.geoms.tolist()):
-            if self.plan.world.geoms[index].surface.restitution > 0:
+        numbers = rules.numbers(friction, self.cast.shapes)
+        for row, number in enumerate(self.cast.shapes.tolist()):
+            if self.plan.world.geoms[rules.geoms[number]].surface.restitution > 0:
                 # Bullet begins a contact before the touch and takes the gap off the speed after it: no bounce is left
                 p.changeDynamics(*self.shape_at[number], contactProcessingThreshold=0.0, physicsClientId=self.id)
             p.changeDynamics(
-                *self.shape_at[number], lateralFriction=float(numbers.friction[number]),
-                spinningFriction=float(numbers.spinning[number]), restitution=float(numbers.restitution[number]),
+                *self.shape_at[number], lateralFriction=float(numbers.friction[row]),
+                spinningFriction=float(numbers.spinning[row]), restitution=float(numbers.restitution[row]),
                 physicsClientId=self.id,
             )  # fmt: skip

@@ -10,6 +10,7 @@ from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Capabilities
 from anysim.engine.commands import Control
 from anysim.engine.diagnosis import Finding, Health
+from anysim.engine.presence import Lifecycle
 from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
 from anysim.world.model import World
 from anysim_pybullet import declared
@@ -25,6 +26,7 @@ class PybulletEngine(SimEngine):
     name: ClassVar[str] = "pybullet"
     capabilities: ClassVar[Capabilities] = declared.CAPABILITIES
     parameters: ClassVar[frozenset[str]] = declared.PARAMETERS
+    lifecycle: ClassVar[Lifecycle] = Lifecycle.P1
     audit_allowances: ClassVar[Mapping[str, Allowance]] = declared.AUDIT_ALLOWANCES
     options: PybulletOptions
 
@@ -57,13 +59,16 @@ class PybulletEngine(SimEngine):
         from anysim_pybullet.envs import Envs
 
         self._painter: Painter | None = None
-        self._envs: Envs = Envs(world, num_envs, self.options)
+        self._envs: Envs = Envs(world, self._presence.entities, self.options)
 
     def _free(self) -> None:
         if self._painter is not None:
             self._painter.close()
         self._envs.close()
         del self._envs, self._painter
+
+    def _populate(self, ids: Array) -> None:
+        self._envs.populate(ids, self._presence.entities[ids])
 
     def _reset(self, ids: Array) -> None:
         self._envs.reset(ids)
@@ -155,4 +160,5 @@ class PybulletEngine(SimEngine):
             self._painter = Painter(self.world, self.options.shadows)
         for index in ids.tolist():
             self._envs.mirror.refresh(index)
-        return self._painter.draw(view, self._envs.mirror.pose, self._envs.parameters.color, ids, channels)
+        there = self._presence.bodies
+        return self._painter.draw(view, self._envs.mirror.pose, self._envs.parameters.color, there, ids, channels)

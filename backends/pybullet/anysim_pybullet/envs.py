@@ -12,6 +12,7 @@ from anysim.math import pose as P
 from anysim.quiet import quiet
 from anysim.world.model import BodyKind, World
 from anysim_pybullet.bullet import bullet
+from anysim_pybullet.cast import Cast
 from anysim_pybullet.client import Env, Plan
 from anysim_pybullet.law import Laws, Pusher
 from anysim_pybullet.options import PybulletOptions
@@ -24,21 +25,24 @@ _MIRRORED = ("pose", "twist", "position", "velocity", "contact", "fault")
 class Envs:
     """The clients, and all that is kept beside them."""
 
-    def __init__(self, world: World, num_envs: int, options: PybulletOptions) -> None:
+    def __init__(self, world: World, present: Array, options: PybulletOptions) -> None:
+        """With the entities (N, E) that are there in each env."""
+        num_envs = len(present)
         self.world = world
         self.plan = Plan(world, options)
         self.clients: list[Env] = []
         try:
-            for _ in range(num_envs):
-                self.clients.append(Env(self.plan))
+            for row in present:
+                self.clients.append(Env(self.plan, self.plan.cast(row)))
             self.laws = Laws(world, self.plan.frames, self.plan.trees, self.clients)
             self.parameters = Parameters(world, self.clients, self.laws)
             self.mirror = Mirror(world, self.clients, self.laws)
             self._tree_of = np.zeros(len(world.bodies), dtype=int)
             for tree in self.plan.trees:
                 self._tree_of[tree.bodies] = tree.number
-            self._static = [i for i, b in enumerate(world.bodies) if b.kind is BodyKind.STATIC]
+            self._static = np.array([i for i, b in enumerate(world.bodies) if b.kind is BodyKind.STATIC], dtype=int)
             self._begin: list[int] = [0] * num_envs
+            self._initial: list[dict[str, Array]] = [{} for _ in range(num_envs)]
             for index in range(num_envs):
                 self._settle(index)
         except BaseException:
@@ -54,30 +58,54 @@ class Envs:
     # ------------------------------------------------------------------ the initial state
 
     def _settle(self, index: int) -> None:
-        """Bring a new client into the World's initial state, and have Bullet remember it."""
+        """Bring a client that was just built into the World's initial state, and have Bullet remember it."""
         world, mirror, env = self.world, self.mirror, self.clients[index]
         env.set_surfaces(self.parameters.friction[index, self.plan.rules.geoms])
         mirror.pose[index], mirror.twist[index] = world.initial_body_pose, 0.0
         mirror.position[index], mirror.velocity[index] = [j.initial for j in world.joints], 0.0
-        self._set_joints(index, np.arange(len(world.joints)))
-        for body, part in enumerate(world.bodies):
-            if part.kind is not BodyKind.LINK:
-                self._set_root(index, body, with_pose=True)
+        self._set_joints(index, env.cast.joints)
+        for tree in env.cast.trees:
+            self._set_root(index, int(tree.bodies[0]), with_pose=True)
         mirror.hold(index)
         mirror.wrote(index)
         mirror.refresh(index)
         self.laws.roots[index] = mirror.pose[index]
         self._begin[index] = bullet().saveState(physicsClientId=env.id)
-        if index == 0:
-            self._initial = {name: getattr(mirror, name)[0].copy() for name in _MIRRORED}
+        self._initial[index] = {name: getattr(mirror, name)[index].copy() for name in _MIRRORED}
+
+    def populate(self, ids: Array, present: Array) -> None:
+        """Have these envs hold the entities (E, entities) that are there, and no others, in their initial state."""
+        for index, row in zip(ids.tolist(), present, strict=True):
+            before, cast = self.clients[index].cast, self.plan.cast(row)
+            if cast is not before:
+                self.mirror.refresh(index)
+                try:
+                    self._renew(index, cast)
+                except BaseException:
+                    self.mirror.fault[index] = True
+                    self._renew(index, before)
+                    raise
+
+    def _renew(self, index: int, cast: Cast) -> None:
+        """Build an env anew; one that was given up in a new client, since what is not finite stays in the old one."""
+        if self.mirror.fault[index]:
+            self.clients[index].close()
+            self.clients[index] = Env(self.plan, cast)
+        else:
+            bullet().removeState(self._begin[index], physicsClientId=self.clients[index].id)
+            self.clients[index].rebuild(cast)
+        self.mirror.fault[index] = False
+        self._settle(index)
+        self.parameters.renew(index)
 
     def reset(self, ids: Array) -> None:
         """Back to the initial state, with nothing left over."""
         for index in ids.tolist():
-            self._clear(index, self._initial["pose"])
+            initial = self._initial[index]
+            self._clear(index, initial["pose"])
             bullet().restoreState(self._begin[index], physicsClientId=self.clients[index].id)
             for name in _MIRRORED:
-                getattr(self.mirror, name)[index] = self._initial[name]
+                getattr(self.mirror, name)[index] = initial[name]
             self.mirror.hold(index)
             self.laws.effort[index] = 0.0
             self.laws.forget(index)
@@ -88,13 +116,11 @@ class Envs:
         An env that was given up gets a new client: what is not finite stays in Bullet's collision detection.
         """
         self.mirror.refresh(index)
-        if self.mirror.fault[index] or not self.clients[index].part():
-            self.clients[index].close()
-            self.clients[index] = Env(self.plan)
-            self.mirror.fault[index] = False
-            self._settle(index)
-            self.parameters.renew(index)
-        for body in self._static:
+        env = self.clients[index]
+        if self.mirror.fault[index] or not env.part():
+            self.mirror.fault[index] = True
+            self._renew(index, env.cast)
+        for body in self._static[env.cast.bodies[self._static]].tolist():
             self.mirror.pose[index, body] = pose[body]
             self._set_root(index, body, with_pose=True)
 
@@ -189,8 +215,8 @@ class Envs:
             for name in _MIRRORED:
                 getattr(self.mirror, name)[index] = data[name][row]
             if not exact:
-                self._set_joints(index, np.arange(len(self.world.joints)))
-                for tree in self.plan.trees:
+                self._set_joints(index, self.clients[index].cast.joints)
+                for tree in self.clients[index].cast.trees:
                     if tree.free:
                         self._set_root(index, int(tree.bodies[0]), with_pose=True)
             self.mirror.hold(index)

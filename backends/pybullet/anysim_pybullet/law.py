@@ -122,8 +122,8 @@ class Laws:
         if self.motors is None or self.wrench is not None or any(self.needs):
             return None
         lifter = self._lifters.get(index)
-        if lifter is None or lifter.client != env.id:
-            lifter = Lifter(env, index, self, [t for t in self._trees if self.lifts[t.number]])
+        if lifter is None or lifter.client != env.id or lifter.cast is not env.cast:
+            lifter = Lifter(env, index, self, [t for t in env.cast.trees if self.lifts[t.number]])
             self._lifters[index] = lifter
         return lifter
 
@@ -154,8 +154,8 @@ class Pusher:
 
     def __init__(self, env: Any, index: int, laws: Laws, p: Any, dt: float) -> None:
         self._p, self._env, self._laws, self._index, self._dt = p, env, laws, index, dt
-        self._work = [self._task(tree) for tree in env.plan.trees if self._needed(tree)]
-        lifted = [t for t in env.plan.trees if laws.lifts[t.number] and not self._needed(t)]
+        self._work = [self._task(tree) for tree in env.cast.trees if self._needed(tree)]
+        lifted = [t for t in env.cast.trees if laws.lifts[t.number] and not self._needed(t)]
         self._lifter = Lifter(env, index, laws, lifted)
 
     def _needed(self, tree: Tree) -> bool:

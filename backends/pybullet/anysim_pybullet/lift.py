@@ -37,7 +37,7 @@ class Lifter:
     """Applies the torques to some articulations of one env."""
 
     def __init__(self, env: "Env", index: int, laws: "Laws", trees: list[Tree]) -> None:
-        self.client = env.id
+        self.client, self.cast = env.id, env.cast
         self._index, self._laws, self._lift = index, laws, laws.lift
         self._trees = [(tree, env.root_ids[tree.number], env.tree_links[tree.number]) for tree in trees]
 

@@ -83,6 +83,8 @@ class Motors:
         for number, chosen, joints in self._rows:
             lists = [values[:, chosen].tolist() for values in told.values()]
             for env, *rows in zip(envs, *lists, strict=True):
+                if env.root_ids[number] < 0:
+                    continue
                 links = [env.joint_link[j] for j in joints]
                 yield env.id, env.root_ids[number], links, dict(zip(told, rows, strict=True))
 

@@ -58,18 +58,18 @@ class Parameters:
             self._push(index, name, indices)
 
     def _push(self, index: int, name: str, indices: Array) -> None:
-        """Give Bullet what it simulates itself."""
+        """Give Bullet what it simulates itself, of what is there; the rest waits here."""
         p, env = bullet(), self._envs[index]
         if name == "world.gravity":
             p.setGravity(*self._laws.gravity[index].tolist(), physicsClientId=env.id)
         elif name == "geom.friction":
             env.set_surfaces(self.friction[index, env.plan.rules.geoms])
         elif name == "joint.friction":
-            for joint in indices.tolist():
+            for joint in np.intersect1d(indices, env.cast.joints).tolist():
                 env.set_dry_friction(joint, float(self.dry[index, joint]))
         elif name in ("body.mass", "body.inertia"):
             for body in indices.tolist():
-                if self._world.bodies[body].kind != "static":
+                if env.cast.bodies[body] and self._world.bodies[body].kind != "static":
                     # a mass without moments would be given those of the shapes
                     p.changeDynamics(
                         *env.body_at[body], mass=float(self._laws.bodies[index, body, K.MASS]),
@@ -77,7 +77,7 @@ class Parameters:
                     )  # fmt: skip
 
     def renew(self, index: int) -> None:
-        """Give the new client of an env what was changed in the one before."""
+        """Give an env that was built anew what was changed in it before."""
         for name in self._touched[index]:
             self._push(index, name, np.arange(self._all(name).shape[1]))
 

@@ -26,7 +26,7 @@ def raw_loop(envs: Envs, control: Control) -> Callable[[int], None]:
     """
     p, ids, n = bullet(), np.arange(len(envs.clients)), len(envs.clients)
     world = replace(envs.world, physics=replace(envs.world.physics, actuation=Actuation.NATIVE))
-    copy = Envs(world, n, envs.plan.options)
+    copy = Envs(world, np.array([env.cast.present for env in envs.clients]), envs.plan.options)
     state: Mapping[str, Array] = envs.snapshot(ids, SnapshotLevel.TRAJECTORY)
     copy.restore(ids, state, SnapshotLevel.TRAJECTORY)
     laws = copy.laws
@@ -39,16 +39,15 @@ def raw_loop(envs: Envs, control: Control) -> Callable[[int], None]:
         for client, uid, links, terms in told:
             orders[number_of[client]].append((uid, links, terms))
     copy.step(1, None)
-    trees = [t for t in envs.plan.trees if len(t.joints)]
     lifted = [
         [
             (env.root_ids[t.number], env.tree_links[t.number], laws.lift.torque[i, t.joints].tolist())
-            for t in trees
+            for t in env.cast.trees
             if laws.lifts[t.number]
         ]
         for i, env in enumerate(copy.clients)
     ]
-    free = [(t.number, int(t.bodies[0])) for t in envs.plan.trees if t.free]
+    linked = [[t for t in env.cast.trees if len(t.joints)] for env in copy.clients]
     joints, bodies = len(world.joints), len(world.bodies)
     position, velocity = np.zeros((n, joints)), np.zeros((n, joints))
     pose, twist = np.zeros((n, bodies, 7)), np.zeros((n, bodies, 6))
@@ -62,7 +61,7 @@ def raw_loop(envs: Envs, control: Control) -> Callable[[int], None]:
                 for uid, links, torque in lifted[i]:
                     p.setJointMotorControlArray(uid, links, p.TORQUE_CONTROL, forces=torque, physicsClientId=client)
                 p.stepSimulation(physicsClientId=client)
-            for t in trees:
+            for t in linked[i]:
                 uid, links = env.root_ids[t.number], env.tree_links[t.number]
                 states = p.getJointStates(uid, links, physicsClientId=client)
                 position[i, t.joints] = [s[0] for s in states]
@@ -72,7 +71,7 @@ def raw_loop(envs: Envs, control: Control) -> Callable[[int], None]:
                 )
                 pose[i, t.bodies[1:]] = [(*s[0], *s[1]) for s in read]
                 twist[i, t.bodies[1:]] = [(*s[6], *s[7]) for s in read]
-            for number, body in free:
+            for number, body in env.cast.free:
                 uid = env.root_ids[number]
                 place, turn = p.getBasePositionAndOrientation(uid, physicsClientId=client)
                 linear, angular = p.getBaseVelocity(uid, physicsClientId=client)

@@ -70,16 +70,16 @@ class Painter:
         disconnect(self._client)
 
     def draw(
-        self, view: CameraView, poses: Array, colors: Array, ids: Array, channels: tuple[str, ...]
+        self, view: CameraView, poses: Array, colors: Array, there: Array, ids: Array, channels: tuple[str, ...]
     ) -> dict[str, Array]:
-        """See `SimEngine.render`. `poses` (N, B, 7) and `colors` (N, G, 4) are those of all envs."""
+        """See `SimEngine.render`. `poses` (N, B, 7), `colors` (N, G, 4) and who is there (N, B) are of all envs."""
         size = (len(ids), view.height, view.width)
         shapes: dict[str, tuple[tuple[int, ...], Any]] = {
             "rgb": ((*size, 3), np.uint8), "depth": (size, np.float32), "segmentation": (size, np.int32)
         }  # fmt: skip
         images = {name: np.empty(*shapes[name]) for name in channels}
         for row, index in enumerate(ids.tolist()):
-            self._arrange(poses[index], colors[index, self._geoms])
+            self._arrange(poses[index], colors[index, self._geoms], there[index])
             rgba, raw, owner = self._shoot(view, view.pose[row])
             near, far = view.near, view.far
             depth = far * near / (far - (far - near) * raw.astype(np.float64))
@@ -92,8 +92,10 @@ class Painter:
                 images["segmentation"][row] = self._entity[np.where(nothing, -1, owner)]
         return images
 
-    def _arrange(self, poses: Array, colors: Array) -> None:
+    def _arrange(self, poses: Array, colors: Array, there: Array) -> None:
         p, client = bullet(), self._client
+        # TinyRenderer draws nothing of what is wholly transparent
+        colors = np.where(np.append(there, True)[self._body, None], colors, 0.0)
         frame = np.concatenate([poses, [[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]]])[self._body]
         placed = P.compose(frame, self._local) if len(frame) else frame
         for uid, place in zip(self._uids, placed.tolist(), strict=True):

@@ -39,13 +39,6 @@ class Mirror:
         self._stale = np.full(n, ALL)
         self._motor = np.zeros((n, joints))
         self._contact_stale = np.zeros(n, dtype=bool)
-        trees = envs[0].plan.trees
-        self._free = [(t.number, int(t.bodies[0])) for t in trees if t.free]
-        self._linked = [(t.number, t.joints) for t in trees if len(t.joints)]
-        self._links = np.concatenate([np.zeros(0, dtype=int), *(t.bodies[1:] for t in trees if len(t.joints))])
-        self._moving = np.concatenate([np.array([body for _, body in self._free], dtype=int), self._links])
-        self._is_root = np.arange(len(self._moving)) < len(self._free)
-        self._no_root = np.zeros(len(self._links), dtype=bool)
 
     def stepped(self, index: int, sound: bool) -> None:
         """This env was stepped; everything of it is new."""
@@ -112,15 +105,15 @@ class Mirror:
 
     def _read(self, index: int, everything: bool) -> None:
         p, env = bullet(), self._envs[index]
-        client = env.id
+        client, cast = env.id, env.cast
         rows: list[tuple[float, ...]] = []
         if everything:
-            for number, _ in self._free:
+            for number, _ in cast.free:
                 uid = env.root_ids[number]
                 place, turn = p.getBasePositionAndOrientation(uid, physicsClientId=client)
                 linear, angular = p.getBaseVelocity(uid, physicsClientId=client)
                 rows.append((*place, *turn, *_UNUSED, *linear, *angular))
-        for number, joints in self._linked:
+        for number, joints in cast.linked:
             uid, links = env.root_ids[number], env.tree_links[number]
             if everything:
                 states: Any = p.getJointStates(uid, links, physicsClientId=client)
@@ -132,7 +125,7 @@ class Mirror:
                 uid, links, computeLinkVelocity=1, computeForwardKinematics=1, physicsClientId=client
             )
             rows += [(*s[0], *s[1], *s[4], *s[5], *s[6], *s[7]) for s in read]
-        bodies, is_root = (self._moving, self._is_root) if everything else (self._links, self._no_root)
+        bodies, is_root = (cast.moving, cast.is_root) if everything else (cast.links, cast.is_root[len(cast.free) :])
         pose, twist = np.empty((len(bodies), 7)), np.empty((len(bodies), 6))
         frames(np.array(rows, dtype=float).reshape(-1, 20), env.local[bodies], is_root, pose, twist)
         self.pose[index, bodies], self.twist[index, bodies] = pose, twist

@@ -8,6 +8,7 @@ values that no shape is there for: then the products come as near as least squar
 """
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -59,14 +60,15 @@ class PairRules:
         # What an impact sinks, up to a step's way, is pushed out with `contact_erp` of its speed, which adds to the
         # bounce: half of that on average.
         self._wanted_bounce = np.maximum(np.maximum.outer(bounce, bounce) - 0.5 * self._erp, 0.0)
-        some = bool(bounce.any())
-        self._bounce = factors(self._wanted_bounce, weight, _SWEEPS) if some else np.zeros_like(bounce)
+        self._bounces = bool(bounce.any())
+        self._numbers = lru_cache(maxsize=64)(self._make_numbers)
 
     def _gap(self, friction: Array) -> float:
         """The largest difference between a coefficient of a pair and the rule's."""
-        meet, values = self.weight > 0, self.numbers(friction).friction
+        meet, numbers = self.weight > 0, self.numbers(friction)
+        values, bounces = numbers.friction, numbers.restitution
         slide = np.abs(np.multiply.outer(values, values) - self.pair_friction(friction))
-        bounce = np.abs(np.multiply.outer(self._bounce, self._bounce) - self._wanted_bounce)
+        bounce = np.abs(np.multiply.outer(bounces, bounces) - self._wanted_bounce)
         return float(max(slide[meet].max(initial=0.0), bounce[meet].max(initial=0.0)))
 
     def _split(self, friction: Array) -> None:
@@ -96,6 +98,11 @@ class PairRules:
         weight[body[:, None] == body] = 0.0
         child = link[:, None] & (parent[:, None] == body)
         weight[child | child.T] = 0.0
+        which = {entity: number for number, slot in enumerate(world.slots) for entity in slot.entities}
+        entity = np.array([world.body_entity[b] if b != WORLD else -1 for b in bodies], dtype=int)
+        slot = np.array([which.get(e, -1) for e in entity.tolist()], dtype=int)
+        # at most one entity of a slot is there at a time
+        weight[(slot[:, None] == slot) & (slot >= 0) & (entity[:, None] != entity)] = 0.0
         for low, high in world.excluded_pairs:
             weight[np.ix_(body == low, body == high)] = weight[np.ix_(body == high, body == low)] = 0.0
         return weight
@@ -107,22 +114,32 @@ class PairRules:
             above > 0, friction[:, None], np.where(above < 0, friction, np.maximum.outer(friction, friction))
         )
 
-    def numbers(self, friction: Array) -> Surfaces:
-        """What Bullet gets, for coefficients (K,) of the shapes' geoms."""
-        if not len(friction):
-            return Surfaces(friction, friction, friction)
-        wanted = self.pair_friction(friction)
-        values = factors(wanted, self.weight, _SWEEPS)
-        return Surfaces(values, self._spinning(values), self._bounce)
+    def numbers(self, friction: Array, shapes: Array | None = None) -> Surfaces:
+        """What Bullet gets, for coefficients (K,) of all shapes' geoms, for those shapes that are there (None: all)."""
+        chosen = np.arange(len(friction)) if shapes is None else shapes
+        return self._numbers(friction.tobytes(), chosen.tobytes())
 
-    def _spinning(self, values: Array) -> Array:
+    def _make_numbers(self, frictions: bytes, chosen: bytes) -> Surfaces:
+        friction, shapes = np.frombuffer(frictions), np.frombuffer(chosen, dtype=np.int64)
+        if not len(shapes):
+            return Surfaces(*([np.zeros(0)] * 3))
+        pairs = np.ix_(shapes, shapes)
+        wanted, weight = self.pair_friction(friction)[pairs], np.ascontiguousarray(self.weight[pairs])
+        values = factors(np.ascontiguousarray(wanted), weight, _SWEEPS)
+        bounce = np.zeros(len(shapes))
+        if self._bounces:
+            bounce = factors(np.ascontiguousarray(self._wanted_bounce[pairs]), weight, _SWEEPS)
+        return Surfaces(values, self._spinning(values, weight, self._spin[shapes]), bounce)
+
+    @staticmethod
+    def _spinning(values: Array, weights: Array, spin: Array) -> Array:
         """Bullet's torsional coefficient of a pair is s1 f2 + s2 f1; that of the rule is the larger of the two."""
-        turning = np.flatnonzero(self._spin)
-        wanted = np.maximum.outer(self._spin, self._spin)
+        turning = np.flatnonzero(spin)
+        wanted = np.maximum.outer(spin, spin)
         spinning = np.zeros_like(values)
         for _ in range(_SWEEPS if len(turning) else 0):
             for i in turning:
-                weight = self.weight[i] * values
+                weight = weights[i] * values
                 below = float(weight @ values)
                 if below > 1e-9:
                     spinning[i] = max(0.0, float(weight @ (wanted[i] - spinning * values[i])) / below)

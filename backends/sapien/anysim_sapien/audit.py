@@ -11,9 +11,11 @@ from anysim_sapien.scene import EnvScene
 
 
 def joint_limits(scene: EnvScene) -> Array:
-    """(J, 2) [rad, m], infinite where there is none."""
-    limits = np.array([np.asarray(joint.limit, dtype=float).reshape(2) for joint in scene.joints])
-    return limits.reshape(-1, 2)
+    """(J, 2) [rad, m], infinite where there is none, not a number for joints that are not there."""
+    limits = np.full((len(scene.joints), 2), np.nan)
+    for index in np.flatnonzero(scene.layout.joint_there):
+        limits[index] = np.asarray(scene.joints[index].limit, dtype=float).reshape(2)
+    return limits
 
 
 def geom_volumes(world: World, scene: EnvScene) -> Array:

@@ -159,6 +159,7 @@ class Drives:
 
     def _tell(self, scene: EnvScene, changed: Array, terms: Array) -> None:
         damping, limit, target = terms.tolist()
+        changed = changed & scene.layout.joint_there
         for j in np.flatnonzero(changed[0] | changed[1]).tolist():
             scene.joints[j].set_drive_properties(0.0, damping[j], limit[j], "force")
         for j in np.flatnonzero(changed[2]).tolist():

@@ -12,6 +12,7 @@ from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Capabilities
 from anysim.engine.commands import Control
 from anysim.engine.diagnosis import Finding
+from anysim.engine.presence import Lifecycle
 from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
 from anysim.world.model import World
 from anysim_sapien import declared
@@ -26,12 +27,12 @@ from anysim_sapien.options import SapienOptions
 from anysim_sapien.parameters import Parameters
 from anysim_sapien.raw import raw_loop
 from anysim_sapien.rays import cast
-from anysim_sapien.recipe import Recipe
+from anysim_sapien.recipe import Recipe, Recipes
 from anysim_sapien.scene import EnvScene
 from anysim_sapien.state import StateReader
 from anysim_sapien.stepping import advance, pasts_of, relive, wrenches
 
-_BUILT = ("_recipe", "_layout", "_drives", "_parameters", "_momentum", "_reader", "_fields", "_wrench", "_scenes")
+_BUILT = ("_recipes", "_layout", "_drives", "_parameters", "_momentum", "_reader", "_fields", "_wrench", "_scenes")
 """What `_build` makes and `_free` lets go of."""
 
 
@@ -41,6 +42,7 @@ class SapienEngine(SimEngine):
     name: ClassVar[str] = "sapien"
     capabilities: ClassVar[Capabilities] = declared.CAPABILITIES
     parameters: ClassVar[frozenset[str]] = Parameters.NAMES
+    lifecycle: ClassVar[Lifecycle] = Lifecycle.P1
     audit_allowances: ClassVar[Mapping[str, Allowance]] = declared.AUDIT_ALLOWANCES
     options: SapienOptions
 
@@ -75,14 +77,14 @@ class SapienEngine(SimEngine):
     # ------------------------------------------------------------------ lifecycle
 
     def _build(self, world: World, num_envs: int) -> None:
-        self._recipe = Recipe(world, self.options)
-        self._layout = self._recipe.layout
+        self._recipes = Recipes(world, self.options)
+        self._layout = self._recipes.layout
         self._scenes: list[EnvScene] = []
         self._drives = drives_of(world, num_envs)
         self._parameters = Parameters(world, self._layout, self._drives, self._scenes, self._rebuild_env, num_envs)
         for env in range(num_envs):
-            self._scenes.append(EnvScene(self._recipe, self._parameters.values(env)))
-        self._momentum = Momentum(self._recipe, num_envs)
+            self._scenes.append(EnvScene(self._recipe(env), self._parameters.values(env)))
+        self._momentum = Momentum(self._recipes, num_envs)
         self._reader = StateReader(world, self._scenes, self._drives, self._momentum)
         self._fields = self._reader.fields
         self._wrench: Array | None = None
@@ -95,6 +97,14 @@ class SapienEngine(SimEngine):
         for name in _BUILT:
             vars(self).pop(name, None)
 
+    def _recipe(self, env: int) -> Recipe:
+        return self._recipes.of(self._presence.entities[env])
+
+    def _populate(self, ids: Array) -> None:
+        """Nothing yet: a reset builds the scene of an env anew, with what is there. Here it fails where that cannot."""
+        for env in ids:
+            self._recipe(int(env)).copies(self._parameters.values(int(env)).geom_friction)
+
     def _reset(self, ids: Array) -> None:
         for env in ids:
             self._renew(int(env))
@@ -104,20 +114,20 @@ class SapienEngine(SimEngine):
 
     def _renew(self, env: int) -> None:
         """A new scene for an env, in the initial state: a used one would remember contacts."""
-        self._scenes[env] = EnvScene(self._recipe, self._parameters.values(env))
+        self._scenes[env] = EnvScene(self._recipe(env), self._parameters.values(env))
         self._drives.forget(env)
         self._momentum.forget(env)
 
     def _rebuild_env(self, env: int) -> None:
         """A new scene for an env, in its present state."""
         self._reader.keep_contact(env)
-        self._place(env, motion_of(self._scenes[env], self._layout))
+        self._place(env, motion_of(self._scenes[env]))
         self._reader.written(env)
 
     def _place(self, env: int, motion: Motion) -> None:
         """A new scene for an env, in a given state."""
         self._renew(env)
-        put_motion(self._scenes[env], self._layout, motion)
+        put_motion(self._scenes[env], motion)
         self._scenes[env].journal.base()
 
     # ------------------------------------------------------------------ stepping
@@ -135,7 +145,7 @@ class SapienEngine(SimEngine):
         while n_steps:
             room = self.options.rebase_steps - self._scenes[env].journal.steps
             if room <= 0:
-                self._place(env, motion_of(self._scenes[env], self._layout))
+                self._place(env, motion_of(self._scenes[env]))
                 continue
             advance(self._scenes[env], self._drives, self._momentum, env, pushes, min(n_steps, room))
             n_steps -= min(n_steps, room)
@@ -209,13 +219,13 @@ class SapienEngine(SimEngine):
 
     def _snapshot(self, ids: Array, level: SnapshotLevel) -> dict[str, Array]:
         scenes = [self._scenes[env] for env in ids]
-        data = pasts_of(scenes) if level is SnapshotLevel.TRAJECTORY else motions_of(scenes, self._layout)
+        data = pasts_of(scenes) if level is SnapshotLevel.TRAJECTORY else motions_of(scenes)
         return data | {"effort": self._drives.effort[ids]} | self._reader.rows(ids)
 
     def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:
         for row, env in enumerate(ids.tolist()):
             if level is SnapshotLevel.TRAJECTORY:
-                self._scenes[env], drives, momentum = relive(self._recipe, data, row)
+                self._scenes[env], drives, momentum = relive(self._recipe(env), data, row)
                 self._drives.adopt(env, drives.given(0))
                 self._momentum.adopt(env, momentum.noted(0))
             else:
@@ -253,8 +263,8 @@ class SapienEngine(SimEngine):
         with self._lock:
             self._require_world()
             values = [self._parameters.values(env) for env in range(self.num_envs)]
-            motions = [motion_of(scene, self._layout) for scene in self._scenes]
-            return raw_loop(self.world, self.options, values, motions, self._drives, self.control)
+            motions = [motion_of(scene) for scene in self._scenes]
+            return raw_loop(self.world, self.options, self.presence, values, motions, self._drives, self.control)
 
     # ------------------------------------------------------------------ sensing
 
@@ -276,5 +286,5 @@ class SapienEngine(SimEngine):
 
         if self._painter is None:
             self._painter = Painter(self.world, self._layout, self.options)
-        state = self.get_state()
-        return self._painter.draw(view, state.body_pose[ids], self._parameters.get("geom.color")[ids], channels)
+        poses, colors = self.get_state().body_pose[ids], self._parameters.get("geom.color")[ids]
+        return self._painter.draw(view, poses, colors, self._presence.bodies[ids], channels)

@@ -7,7 +7,9 @@ exclusions get one number; within it each bit stands for a set of bodies of whic
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from anysim.conventions import WORLD
+import numpy as np
+
+from anysim.conventions import WORLD, Array
 from anysim.errors import EngineError
 from anysim.world.model import World
 
@@ -35,8 +37,8 @@ class Apart(NamedTuple):
     between: frozenset[tuple[int, int]]
 
 
-def apart_of(world: World) -> Apart:
-    """How PhysX is told of the World's exclusions.
+def apart_of(world: World, there: Array | None = None) -> Apart:
+    """How PhysX is told of the World's exclusions, or of those between bodies (B,) that are there.
 
     Bodies that many others pass through need many sets, a tool with 20 links against two parts 40 of them. There the
     pairs across entities are left to the collision groups that surfaces have: these take a bit for each kind of body.
@@ -44,7 +46,8 @@ def apart_of(world: World) -> Apart:
     Raises:
         EngineError: the exclusions within one entity need more sets than there are bits.
     """
-    wanted = {frozenset(pair) for pair in world.excluded_pairs}
+    here = np.ones(len(world.bodies), dtype=bool) if there is None else there
+    wanted = {frozenset(pair) for pair in world.excluded_pairs if all(b == WORLD or here[b] for b in pair)}
     entity = {WORLD: WORLD} | dict(enumerate(world.body_entity))
     across: set[frozenset[int]] = set()
     for members in _components(wanted):

@@ -10,7 +10,7 @@ from anysim.world.model import BodyKind, World
 
 @dataclass(frozen=True)
 class Layout:
-    """Indices into the World's lists.
+    """Indices into the World's lists, of what is there.
 
     A body with links below it is the root of an articulation; other free and static bodies are actors of their own.
     """
@@ -21,10 +21,14 @@ class Layout:
     """Bodies that are no part of an articulation."""
     tree_of: Array
     """(B,) articulation of each body, -1 for actors."""
+    there: Array
+    """(B,) bool: bodies that are there."""
+    joint_there: Array
+    """(J,) bool: joints that are there."""
     fixed: Array
-    """(B,) bool: bodies that nothing moves."""
+    """(B,) bool: bodies that are there and that nothing moves."""
     free: Array
-    """(B,) bool."""
+    """(B,) bool: free bodies that are there."""
     geom_fixed: Array
     """(G,) bool: geoms of the world and of static bodies."""
     geom_entity: Array
@@ -33,13 +37,15 @@ class Layout:
     """(B + 1,) segmentation id; the last is the world's."""
 
     @classmethod
-    def of(cls, world: World) -> "Layout":
-        """Sort the World's bodies."""
+    def of(cls, world: World, there: Array | None = None) -> "Layout":
+        """Sort the World's bodies, or those of them (B,) that are there."""
+        if there is None:
+            there = np.ones(len(world.bodies), dtype=bool)
         root = list(range(len(world.bodies)))
         for i, body in enumerate(world.bodies):
             if body.kind is BodyKind.LINK:
                 root[i] = root[body.parent]
-        trees = {r: tuple(i for i, other in enumerate(root) if other == r) for r in dict.fromkeys(root)}
+        trees = {r: tuple(i for i, other in enumerate(root) if other == r) for r in dict.fromkeys(root) if there[r]}
         articulated = [members for members in trees.values() if len(members) > 1]
         tree_of = np.full(len(world.bodies), -1)
         for number, members in enumerate(articulated):
@@ -50,8 +56,10 @@ class Layout:
             trees=tuple(articulated),
             actors=tuple(r for r, members in trees.items() if len(members) == 1),
             tree_of=tree_of,
-            fixed=fixed,
-            free=np.array([b.kind is BodyKind.FREE for b in world.bodies], dtype=bool),
+            there=there,
+            joint_there=there[np.array([joint.body for joint in world.joints], dtype=int)],
+            fixed=fixed & there,
+            free=np.array([b.kind is BodyKind.FREE for b in world.bodies], dtype=bool) & there,
             geom_fixed=np.array([g.body == WORLD or fixed[g.body] for g in world.geoms], dtype=bool),
             geom_entity=entity[[g.body for g in world.geoms]] if world.geoms else np.zeros(0, dtype=int),
             body_entity=entity,

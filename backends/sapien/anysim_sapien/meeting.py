@@ -1,5 +1,8 @@
 """Which geoms of a World can meet, and the PhysX shapes that make them meet by the rules. Knows no SAPIEN."""
 
+from itertools import product
+from math import prod
+
 import numpy as np
 
 from anysim.conventions import WORLD, Array
@@ -9,18 +12,22 @@ from anysim_sapien.exclusions import Apart, apart_of
 from anysim_sapien.layout import Layout
 from anysim_sapien.surfaces import Copy, copies_of
 
+MOST = 64
+"""Ways to fill the slots of a World that are tried before it is refused."""
+
 
 class Meeting:
-    """Pairs of the geoms that collide.
+    """Pairs of the geoms that collide and are there.
 
     Attributes:
         apart: how excluded pairs are kept apart.
-        solid: (C,) the World's geoms that collide.
+        solid: (C,) the World's geoms that collide and are there.
     """
 
     def __init__(self, world: World, layout: Layout) -> None:
-        self.apart: Apart = apart_of(world)
-        self.solid = np.array([i for i, geom in enumerate(world.geoms) if geom.collides], dtype=int)
+        self.apart: Apart = apart_of(world, layout.there)
+        here = [*layout.there.tolist(), True]  # the last one is the world's own
+        self.solid = np.array([i for i, geom in enumerate(world.geoms) if geom.collides and here[geom.body]], dtype=int)
         self._surfaces = [world.geoms[i].surface for i in self.solid]
         self._labels = [self.apart.labels.get(world.geoms[i].body, 0) for i in self.solid]
         self._fixed = layout.geom_fixed[self.solid]
@@ -28,17 +35,15 @@ class Meeting:
 
     def _may_meet(self, world: World) -> Array:
         """(C, C) bool: which of the geoms that collide can ever touch."""
-        bodies = [world.geoms[i].body for i in self.solid]
-        parents = [world.bodies[b].parent if b != WORLD else WORLD for b in bodies]
-        excluded = {pair for low, high in world.excluded_pairs for pair in ((low, high), (high, low))}
-        meet = np.zeros((len(bodies), len(bodies)), dtype=bool)
-        for i, first in enumerate(bodies):
-            for k, second in enumerate(bodies):
-                kin = first == second or (second != WORLD and parents[i] == second)
-                kin = kin or (first != WORLD and parents[k] == first)
-                both_fixed = self._fixed[i] and self._fixed[k]
-                meet[i, k] = not (kin or both_fixed or (first, second) in excluded)
-        return meet
+        bodies = np.array([world.geoms[i].body for i in self.solid], dtype=int)
+        parents = np.array([world.bodies[b].parent if b != WORLD else WORLD for b in bodies], dtype=int)
+        child = (parents[:, None] == bodies) & (bodies != WORLD)
+        apart = (bodies[:, None] == bodies) | child | child.T | (self._fixed[:, None] & self._fixed)
+        size = len(world.bodies) + 1
+        excluded = np.zeros((size, size), dtype=bool)
+        for low, high in world.excluded_pairs:
+            excluded[low, high] = excluded[high, low] = True  # the world is the last row, by its index of -1
+        return ~(apart | excluded[np.ix_(bodies, bodies)])
 
     def copies(self, friction: Array) -> dict[int, list[Copy]]:
         """The shapes of each geom that collides, for the coefficients in force (G,).
@@ -54,8 +59,27 @@ class Meeting:
 
 def refusals(world: World) -> list[str]:
     """Why PhysX' filters cannot tell this World's pairs apart, if so."""
+    friction = np.array([geom.surface.friction for geom in world.geoms], dtype=float)
+    together = _trouble(world, friction, np.ones(len(world.entities), dtype=bool))
+    if not together or not world.slots:
+        return together
+    # what can be there at once may do where all of it together does not
+    fullest = prod(len(slot.entities) for slot in world.slots)
+    if fullest > MOST:
+        return [f"its {fullest} combinations of entities are too many to try one by one, and together {together[0]}"]
+    fixed = np.array(world.initial_presence)
+    fixed[[entity for slot in world.slots for entity in slot.entities]] = False
+    for chosen in product(*(slot.entities for slot in world.slots)):
+        present = fixed.copy()
+        present[list(chosen)] = True
+        if trouble := _trouble(world, friction, present):
+            return trouble
+    return []
+
+
+def _trouble(world: World, friction: Array, present: Array) -> list[str]:
     try:
-        Meeting(world, Layout.of(world)).copies(np.array([geom.surface.friction for geom in world.geoms], dtype=float))
+        Meeting(world, Layout.of(world, present[list(world.body_entity)])).copies(friction)
     except EngineError as error:
         return [str(error)]
     return []

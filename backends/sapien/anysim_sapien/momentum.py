@@ -12,7 +12,7 @@ import numpy as np
 from anysim.conventions import Array, xyzw_from_wxyz
 from anysim.math import pose as P
 from anysim.world.model import BodyKind, JointType, World
-from anysim_sapien.recipe import Recipe
+from anysim_sapien.recipe import Recipes
 from anysim_sapien.scene import EnvScene
 
 _DOUBT = {JointType.PRISMATIC: 2.0, JointType.REVOLUTE: 10.0}
@@ -48,8 +48,8 @@ class _Noted(NamedTuple):
 class Momentum:
     """The balances of the last substep, per env."""
 
-    def __init__(self, recipe: Recipe, num_envs: int) -> None:
-        world = recipe.world
+    def __init__(self, recipes: Recipes, num_envs: int) -> None:
+        world = recipes.world
         self._world = world
         self._moving = np.array([i for i, b in enumerate(world.bodies) if b.kind is not BodyKind.STATIC], dtype=int)
         self._weighs = np.array([not b.gravity_compensation for b in world.bodies], dtype=float)
@@ -57,9 +57,8 @@ class Momentum:
         self._links = np.array([i for i, b in enumerate(world.bodies) if b.kind is BodyKind.LINK], dtype=int)
         self._turn = np.zeros((len(world.bodies), 4))
         for index, joint in enumerate(world.joints):
-            self._turn[joint.body] = xyzw_from_wxyz(np.asarray(recipe.frames[index][1].q, dtype=float))
+            self._turn[joint.body] = xyzw_from_wxyz(np.asarray(recipes.frames[index][1].q, dtype=float))
         self._doubts = _doubts(world)
-        self._order: list[Array] | None = None
         self._noted: list[_Noted | None] = [None] * num_envs
         self._balance: list[Balance | None] = [None] * num_envs
 
@@ -81,12 +80,10 @@ class Momentum:
 
     def after(self, env: int, scene: EnvScene, pushes: Array | None) -> None:
         """Right after the last substep, with `pushes` (K, 7): bodies and the wrenches that were on them."""
-        if self._order is None:
-            self._order = [np.array([scene.body_of[link] for link in tree.handle.links]) for tree in scene.trees]
         self._balance[env] = None
         self._noted[env] = _Noted(
             self._velocity, self._velocities(scene), self._poses,
-            tuple(np.array(tree.handle.link_incoming_joint_forces) for tree in scene.trees), self._order,
+            tuple(np.array(tree.handle.link_incoming_joint_forces) for tree in scene.trees), scene.link_order(),
             scene.mass.copy(), scene.rubbing.copy(), scene.gravity, pushes,
         )  # fmt: skip
 

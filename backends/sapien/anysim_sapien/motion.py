@@ -7,7 +7,6 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.math import pose as P
-from anysim_sapien.layout import Layout
 from anysim_sapien.scene import EnvScene
 
 
@@ -23,8 +22,9 @@ class Motion(NamedTuple):
     joint_vel: Array
 
 
-def motion_of(scene: EnvScene, layout: Layout) -> Motion:
-    """Copy it out."""
+def motion_of(scene: EnvScene) -> Motion:
+    """Copy it out; what is not there is 0."""
+    layout = scene.layout
     roots = (layout.free | layout.fixed)[:, None]
     velocity = np.zeros((len(scene.bodies), 6))
     for body in np.flatnonzero(layout.free):
@@ -33,14 +33,15 @@ def motion_of(scene: EnvScene, layout: Layout) -> Motion:
     return Motion(np.where(roots, scene.poses(), 0.0), velocity, scene.joint_positions(), scene.joint_velocities())
 
 
-def motions_of(scenes: Sequence[EnvScene], layout: Layout) -> dict[str, Array]:
+def motions_of(scenes: Sequence[EnvScene]) -> dict[str, Array]:
     """Those of several scenes (E, ...), by the names of `Motion`."""
-    parts = [motion_of(scene, layout) for scene in scenes]
+    parts = [motion_of(scene) for scene in scenes]
     return {name: np.array([getattr(part, name) for part in parts]) for name in Motion._fields}
 
 
-def put_motion(scene: EnvScene, layout: Layout, motion: Motion) -> None:
-    """Write what `motion_of` returned."""
+def put_motion(scene: EnvScene, motion: Motion) -> None:
+    """Write what `motion_of` returned of a scene with the same things in it."""
+    layout = scene.layout
     for body in np.flatnonzero(layout.free | layout.fixed):
         scene.place_body(int(body), motion.pose[body])
         if layout.free[body]:

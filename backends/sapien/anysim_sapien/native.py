@@ -67,7 +67,7 @@ class NativeDrives(Drives):
     def begin(self, env: int, scene: EnvScene) -> None:
         """Tell PhysX what changed."""
         wanted, told = self._wanted[env], self._known[env]
-        changed = wanted != told
+        changed = (wanted != told) & scene.layout.joint_there[:, None]
         if not changed.any():
             return
         joints, rows = scene.joints, wanted.tolist()

@@ -79,9 +79,12 @@ class Parameters:
         return values
 
     def _read(self, name: str, row: Array, scene: EnvScene) -> None:
-        """Overwrite the wanted values by PhysX' own where it has the thing; it has no mass of what is fixed."""
+        """Overwrite the wanted values by PhysX' own where it has the thing.
+
+        It has no mass of what is fixed, and nothing of what is not there.
+        """
         if name in _BODIES:
-            for body in np.flatnonzero(~self._layout.fixed):
+            for body in np.flatnonzero(scene.layout.there & ~self._layout.fixed):
                 component = scene.bodies[body]
                 frame = component.cmass_local_pose
                 if name == "body.mass":
@@ -91,9 +94,11 @@ class Parameters:
                 else:
                     row[body] = full(component.inertia, xyzw_from_wxyz(np.asarray(frame.q, dtype=float)))
         elif name == "joint.armature":
-            row[:] = [joint.armature[0] for joint in scene.joints]
+            for index in np.flatnonzero(scene.layout.joint_there):
+                row[index] = scene.joints[index].armature[0]
         elif name == "joint.friction":
-            row[:] = [scene.dry_friction(index) for index in range(len(row))]
+            for index in np.flatnonzero(scene.layout.joint_there):
+                row[index] = scene.dry_friction(int(index))
         elif name == "geom.friction":
             for index, shapes in enumerate(scene.shapes):
                 row[index] = _own_friction(row[index], scene.copies.get(index, ()), shapes)
@@ -129,13 +134,13 @@ class Parameters:
         scene, wanted = self._scenes[env], self._wanted
         if name in _BODIES:
             for body in indices:
-                if not self._layout.fixed[body]:
+                if scene.layout.there[body] and not self._layout.fixed[body]:
                     scene.set_inertial(int(body), *(wanted[part][env, body] for part in _BODIES))
         elif name == "joint.armature":
-            for index in indices:
+            for index in np.asarray(indices)[scene.layout.joint_there[indices]]:
                 scene.set_armature(int(index), float(wanted[name][env, index]))
         elif name == "joint.friction":
-            for index in indices:
+            for index in np.asarray(indices)[scene.layout.joint_there[indices]]:
                 scene.set_dry(int(index), float(wanted[name][env, index]))
         elif name in _REBUILD:
             self._rebuild(env)

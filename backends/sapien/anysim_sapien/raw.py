@@ -5,39 +5,44 @@ from dataclasses import replace
 
 import numpy as np
 
+from anysim.conventions import Array
 from anysim.engine.commands import Control
 from anysim.world.model import Actuation, World
 from anysim_sapien.drives import Drives
 from anysim_sapien.motion import Motion, put_motion
 from anysim_sapien.native import NativeDrives
 from anysim_sapien.options import SapienOptions
-from anysim_sapien.recipe import Recipe, Values
+from anysim_sapien.recipe import Recipes, Values
 from anysim_sapien.scene import EnvScene
 
 
 def raw_loop(
-    world: World, options: SapienOptions, values: list[Values], motions: list[Motion], drives: Drives, control: Control
-) -> Callable[[int], None]:
+    world: World, options: SapienOptions, present: Array, values: list[Values], motions: list[Motion], drives: Drives,
+    control: Control,
+) -> Callable[[int], None]:  # fmt: skip
     """A function of the number of physics steps: set targets, step private scenes, copy the state out into arrays.
 
     As one would write it for SAPIEN alone: PhysX' own drives, whose gains were set before; all targets are set in each
     call, and joint positions and velocities, poses and velocities of bodies copied as SAPIEN gives them.
     """
     native = replace(world, physics=replace(world.physics, actuation=Actuation.NATIVE))
-    recipe = Recipe(native, options)
-    scenes = [EnvScene(recipe, row) for row in values]
+    recipes = Recipes(native, options)
+    scenes = [EnvScene(recipes.of(there), row) for there, row in zip(present, values, strict=True)]
     own = NativeDrives(native, len(scenes))
     own.kp[...], own.kd[...], own.limit[...], own.passive[...] = drives.kp, drives.kd, drives.limit, drives.passive
     own.apply(control)
     for env, (scene, motion) in enumerate(zip(scenes, motions, strict=True)):
-        put_motion(scene, recipe.layout, motion)
+        put_motion(scene, motion)
         own.begin(env, scene)
     driven = [a.joint for a in world.actuators]
-    targets = [[(scene.joints[j], *own.target(env, j)) for j in driven] for env, scene in enumerate(scenes)]
-    moving = [i for i in range(len(world.bodies)) if not recipe.layout.fixed[i]]
+    targets = [
+        [(scene.joints[j], *own.target(env, j)) for j in driven if scene.layout.joint_there[j]]
+        for env, scene in enumerate(scenes)
+    ]
+    moving = [i for i in range(len(world.bodies)) if not recipes.layout.fixed[i]]
     position = np.zeros((len(scenes), len(world.joints)))
-    velocity, count = np.zeros_like(position), len(scenes[0].scene.entities) if scenes else 0
-    pose, twist = np.zeros((len(scenes), count, 7)), np.zeros((len(scenes), len(world.bodies), 6))
+    velocity, twist = np.zeros_like(position), np.zeros((len(scenes), len(world.bodies), 6))
+    poses = [np.zeros((len(scene.scene.entities), 7)) for scene in scenes]
 
     def loop(steps: int) -> None:
         for env, scene in enumerate(scenes):
@@ -50,7 +55,7 @@ def raw_loop(
             for tree in scene.trees:
                 position[env, tree.joints] = tree.handle.get_qpos()
                 velocity[env, tree.joints] = tree.handle.get_qvel()
-            pose[env] = np.frombuffer(scene.scene.pack_poses(), dtype=np.float32).reshape(-1, 7)
+            poses[env][...] = np.frombuffer(scene.scene.pack_poses(), dtype=np.float32).reshape(-1, 7)
             twist[env, moving] = [(*scene.bodies[b].linear_velocity, *scene.bodies[b].angular_velocity) for b in moving]
 
     return loop

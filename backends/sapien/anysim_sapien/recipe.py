@@ -1,5 +1,6 @@
 """What all envs of a world are built from: everything about the World that is worked out once."""
 
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,40 +29,54 @@ class Values(NamedTuple):
     gravity: Array
 
 
-class Recipe:
-    """What all envs of a world are built from."""
+class Recipes:
+    """What all envs of a world are built from: one recipe for each set of entities that are there."""
 
     def __init__(self, world: World, options: SapienOptions) -> None:
-        self.world, self.options, self.layout = world, options, Layout.of(world)
-        self._meeting = Meeting(world, self.layout)
-        self.groups = self._meeting.apart.groups
-        self.geoms_on: dict[int, list[int]] = {}
-        for i in self._meeting.solid.tolist():
-            self.geoms_on.setdefault(world.geoms[i].body, []).append(i)
+        self.world, self.options = world, options
+        self.layout = Layout.of(world)
+        """That of everything that may be there."""
         self.root_pose = [to_pose(np.array([*b.position, *b.quaternion])) for b in world.bodies]
         self.frames = [_joint_frames(world, joint) for joint in world.joints]
         self.initial = np.array([joint.initial for joint in world.joints])
-        self._principal: dict[tuple[str, bytes], Principal] = {}
-        self._copies: dict[bytes, dict[int, list[Copy]]] = {}
+        self._principal = lru_cache(maxsize=10000)(self._make_principal)
+        self._made = lru_cache(maxsize=64)(self._make)
         _check(world)
 
-    def copies(self, friction: Array) -> dict[int, list[Copy]]:
-        """The shapes of each geom that collides, for the coefficients in force (G,)."""
-        key = friction.tobytes()
-        if key not in self._copies:
-            if len(self._copies) > 1000:
-                self._copies.clear()
-            self._copies[key] = self._meeting.copies(friction)
-        return self._copies[key]
+    def of(self, present: Array) -> "Recipe":
+        """The recipe for the entities (E,) that are there."""
+        return self._made(present.tobytes())
+
+    def _make(self, present: bytes) -> "Recipe":
+        return Recipe(self, np.frombuffer(present, dtype=bool))
 
     def principal(self, body: int, inertia: Array) -> Principal:
         """The principal moments of a body, computed once."""
-        key = (self.world.bodies[body].name, inertia.tobytes())
-        if key not in self._principal:
-            if len(self._principal) > 10000:
-                self._principal.clear()
-            self._principal[key] = principal(key[0], inertia)
-        return self._principal[key]
+        return self._principal(body, np.asarray(inertia, dtype=float).tobytes())
+
+    def _make_principal(self, body: int, inertia: bytes) -> Principal:
+        return principal(self.world.bodies[body].name, np.frombuffer(inertia))
+
+
+class Recipe:
+    """What an env is built from, with some of the World's entities: indices are the World's."""
+
+    def __init__(self, common: Recipes, present: Array) -> None:
+        self.world, self.options, self.common = common.world, common.options, common
+        self.layout = Layout.of(common.world, present[np.array(common.world.body_entity, dtype=int)])
+        self._meeting = Meeting(self.world, self.layout)
+        self.groups = self._meeting.apart.groups
+        self.geoms_on: dict[int, list[int]] = {}
+        for i in self._meeting.solid.tolist():
+            self.geoms_on.setdefault(self.world.geoms[i].body, []).append(i)
+        self._copies = lru_cache(maxsize=64)(self._make_copies)
+
+    def copies(self, friction: Array) -> dict[int, list[Copy]]:
+        """The shapes of each geom that collides, for the coefficients in force (G,)."""
+        return self._copies(friction.tobytes())
+
+    def _make_copies(self, friction: bytes) -> dict[int, list[Copy]]:
+        return self._meeting.copies(np.frombuffer(friction))
 
 
 def tendon_chain(world: World, follower: int) -> tuple[list[int], list[float]]:

@@ -53,6 +53,7 @@ class Painter:
             self._cameras: dict[tuple[int, int], Any] = {}
             self._bodies: dict[int, Any] = {}
             self._materials: dict[int, Any] = {}
+            self._shapes: dict[int, Any] = {}
             self._names = {0: 0}
             self._light(world)
             for index, geom in enumerate(world.geoms):
@@ -65,6 +66,7 @@ class Painter:
             self._cameras.clear()
             self._bodies.clear()
             self._materials.clear()
+            self._shapes.clear()
             self._scene = None
 
     def _light(self, world: World) -> None:
@@ -90,11 +92,13 @@ class Painter:
         entity.add_component(component)
         self._scene.add_entity(entity)
         self._materials[index] = material
-        self._bodies[index] = (geom.body, entity)
+        self._bodies[index], self._shapes[index] = (geom.body, entity), component
         self._names[int(entity.per_scene_id)] = entity_id
 
-    def draw(self, view: CameraView, poses: Array, colors: Array, channels: tuple[str, ...]) -> dict[str, Array]:
-        """See `SimEngine.render`. Poses (E, B, 7) of the bodies and colours (E, G, 4) of the geoms."""
+    def draw(
+        self, view: CameraView, poses: Array, colors: Array, there: Array, channels: tuple[str, ...]
+    ) -> dict[str, Array]:
+        """See `SimEngine.render`. Poses (E, B, 7) and presence (E, B) of the bodies, colours (E, G, 4) of the geoms."""
         size = (len(poses), view.height, view.width)
         images: dict[str, Array] = {}
         for name in channels:
@@ -103,7 +107,7 @@ class Painter:
         with drawing:
             camera, mount = self._camera(view)
             for row in range(len(poses)):
-                self._compose(poses[row], colors[row])
+                self._compose(poses[row], colors[row], there[row])
                 eye = np.concatenate([view.pose[row, :3], P.multiply(view.pose[row, 3:], FROM_OPTICAL)])
                 mount.set_pose(to_pose(eye))
                 self._scene.update_render()
@@ -126,9 +130,10 @@ class Painter:
         camera.set_far(view.far)
         return camera, mount
 
-    def _compose(self, poses: Array, colors: Array) -> None:
+    def _compose(self, poses: Array, colors: Array, there: Array) -> None:
         for index, (body, entity) in self._bodies.items():
             if body != WORLD:
+                self._shapes[index].visibility = float(there[body])
                 entity.set_pose(to_pose(poses[body]))
             self._materials[index].set_base_color(colors[index].tolist())
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from anysim.conventions import WORLD, Array, wxyz_from_xyzw
 from anysim.world.model import BodyKind, JointType
+from anysim_sapien.absent import NOBODY, NOWHERE
 from anysim_sapien.exclusions import Group
 from anysim_sapien.journal import Journal, Op
 from anysim_sapien.library import physx, sapien
@@ -61,7 +62,8 @@ class EnvScene:
         """[m/s^2], as PhysX has it."""
         self.system = _system(recipe, values.gravity)
         self.scene: Any = sapien.Scene([self.system])
-        self.bodies: list[Any] = [None] * len(world.bodies)
+        self.layout = recipe.layout
+        self.bodies: list[Any] = [NOBODY] * len(world.bodies)
         self.entities: list[Any] = [None] * len(world.bodies)
         self.shapes: list[list[Any]] = [[] for _ in world.geoms]
         self.dry: dict[int, Any] = {}
@@ -74,12 +76,14 @@ class EnvScene:
         for body in recipe.layout.actors:
             self._actor(body)
         self.trees = [self._tree(members) for members in recipe.layout.trees]
+        self._order: list[Array] | None = None
         self.joints = self._joints()
-        for index in np.flatnonzero(values.joint_friction > 0):
+        for index in np.flatnonzero((values.joint_friction > 0) & self.layout.joint_there):
             self.set_dry(int(index), float(values.joint_friction[index]))
-        self.place_joints(recipe.initial, np.zeros(len(world.joints)))
+        self.place_joints(recipe.common.initial, np.zeros(len(world.joints)))
         order = {entity: row for row, entity in enumerate(self.scene.entities)}
-        self._rows = np.array([order[entity] for entity in self.entities], dtype=int)
+        self._rows = np.array([order[entity] for entity in self.entities if entity is not None], dtype=int)
+        self._whole = bool(recipe.layout.there.all())
         self._number = {shape: i for i, shape in enumerate(s for shapes in self.shapes for s in shapes)}
         self.journal.clear()
 
@@ -115,13 +119,13 @@ class EnvScene:
     def _actor(self, body: int) -> None:
         recipe, options = self._recipe, self._recipe.options
         if recipe.world.bodies[body].kind is BodyKind.STATIC:
-            self._enter(body, physx.PhysxRigidStaticComponent(), recipe.root_pose[body])
+            self._enter(body, physx.PhysxRigidStaticComponent(), recipe.common.root_pose[body])
             return
         component = physx.PhysxRigidDynamicComponent()
         component.set_sleep_threshold(0.0)
         component.set_solver_position_iterations(options.position_iterations)
         component.set_solver_velocity_iterations(options.velocity_iterations)
-        self._enter(body, component, recipe.root_pose[body])
+        self._enter(body, component, recipe.common.root_pose[body])
 
     def _free_of_defaults(self, component: Any, weightless: bool) -> None:
         component.set_linear_damping(0.0)
@@ -156,7 +160,7 @@ class EnvScene:
         handle.set_solver_position_iterations(recipe.options.position_iterations)
         handle.set_solver_velocity_iterations(recipe.options.velocity_iterations)
         for body in members:
-            self._enter(body, made[body], recipe.root_pose[members[0]])
+            self._enter(body, made[body], recipe.common.root_pose[members[0]])
         for body in members[1:]:
             self._join(body)
         # PhysX sorts the degrees of freedom in its own way: only names tell
@@ -170,7 +174,7 @@ class EnvScene:
         PhysX keeps the frames of joints relative to the centres of mass, and shifts them, rounding, whenever one moves:
         with each shape and with the inertial. Said last, links are where they should be three times as closely.
         """
-        in_parent, in_child = self._recipe.frames[self._recipe.world.body_joint[body]]
+        in_parent, in_child = self._recipe.common.frames[self._recipe.world.body_joint[body]]
         self.bodies[body].joint.set_pose_in_parent(in_parent)
         self.bodies[body].joint.set_pose_in_child(in_child)
 
@@ -207,7 +211,7 @@ class EnvScene:
             component.set_inertia([1e-3, 1e-3, 1e-3])
             component.set_cmass_local_pose(sapien.Pose())
             return
-        moments, frame = self._recipe.principal(body, inertia)
+        moments, frame = self._recipe.common.principal(body, inertia)
         component.set_mass(float(mass))
         self.mass[body] = component.mass  # PhysX keeps its inverse, in single precision
         component.set_inertia(moments.tolist())
@@ -224,7 +228,7 @@ class EnvScene:
                 return  # no drive, no friction
             drive = physx.PhysxDriveComponent(self.bodies[spec.body])
             drive.set_parent(self.bodies[world.bodies[spec.body].parent])
-            in_parent, in_child = self._recipe.frames[index]
+            in_parent, in_child = self._recipe.common.frames[index]
             drive.set_pose_in_parent(in_parent)
             drive.set_pose_in_child(in_child)
             self.entities[spec.body].add_component(drive)
@@ -280,13 +284,24 @@ class EnvScene:
             if velocity is not None:
                 tree.handle.set_qvel(velocity[tree.joints].astype(np.float32))
 
+    def link_order(self) -> list[Array]:
+        """Per articulation the World's bodies in PhysX' order of its links."""
+        if self._order is None:
+            self._order = [np.array([self.body_of[link] for link in tree.handle.links]) for tree in self.trees]
+        return self._order
+
     def contacts(self) -> list[Any]:
         """PhysX' contacts of the last step, by the numbers of their shapes: its own order is that of addresses."""
         return sorted(self.system.get_contacts(), key=lambda c: [self._number[shape] for shape in c.shapes])
 
     def packed_poses(self) -> Array:
         """(B, 7) float32 of the bodies' frames, in PhysX' order of columns."""
-        return np.frombuffer(self.scene.pack_poses(), dtype=np.float32).reshape(-1, 7)[self._rows]
+        packed = np.frombuffer(self.scene.pack_poses(), dtype=np.float32).reshape(-1, 7)[self._rows]
+        if self._whole:
+            return packed
+        rows = np.tile(NOWHERE, (len(self.bodies), 1))
+        rows[self.layout.there] = packed
+        return rows
 
     def poses(self) -> Array:
         """Poses (B, 7) of the bodies' frames, xyzw, float64."""

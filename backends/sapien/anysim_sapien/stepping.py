@@ -48,7 +48,7 @@ def replay(scene: EnvScene, recipe: Recipe, rows: Array) -> tuple[Drives, Moment
 
     Returns the drives of one env that moved it, and the momentum of its last substep.
     """
-    drives, momentum = drives_of(recipe.world, 1), Momentum(recipe, 1)
+    drives, momentum = drives_of(recipe.world, 1), Momentum(recipe.common, 1)
     pushes: Array | None = None
     for op, values in entries(rows):
         match op:

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine import checks, saving
+from anysim.engine import checks, saving, writing
 from anysim.engine.actuation import check_drives
 from anysim.engine.allowance import Allowance
 from anysim.engine.cameras import CameraRig
@@ -22,8 +22,7 @@ from anysim.engine.commands import CommandBuffer, Control
 from anysim.engine.diagnosis import Finding
 from anysim.engine.index import Index
 from anysim.engine.needs import needs_of
-from anysim.engine.parameters import PARAMETERS, count
-from anysim.engine.presence import Lifecycle, Presence, blocks
+from anysim.engine.presence import Lifecycle, Presence
 from anysim.engine.primitives import Primitives
 from anysim.engine.state import (
     Availability,
@@ -34,7 +33,7 @@ from anysim.engine.state import (
     State,
 )  # fmt: skip
 from anysim.errors import CapabilityError, EngineError, listing
-from anysim.world.model import BodyKind, ControlMode, World
+from anysim.world.model import ControlMode, World
 
 EnvIds = Sequence[int] | Array | None
 """Which envs: None for all, else unique indices."""
@@ -194,8 +193,13 @@ class SimEngine(Primitives):
         if len(changed):
             self._require(Capability.VARYING_ENTITIES)
             self._retire_state()
+            before = self._presence.entities[ids]
             self._presence.write(ids, present)
-            self._populate(changed)
+            try:
+                self._populate(changed)
+            except BaseException:
+                self._presence.write(ids, before)
+                raise
         return changed
 
     @property
@@ -267,14 +271,7 @@ class SimEngine(Primitives):
         """Write joint positions and velocities (E, K); mimic joints follow their leaders. Commands stay."""
         with self._lock:
             self._require_world()
-            ids, which = self._ids(env_ids), self._which(joints, len(self.world.joints), "joint")
-            pos = None if position is None else checks.rows("position", position, (len(ids), len(which)))
-            vel = None if velocity is None else checks.rows("velocity", velocity, (len(ids), len(which)))
-            self._retire_state()
-            which, pos, vel = checks.with_followers(self.world, which, pos, vel)
-            for rows, columns in blocks(self._presence.joints[np.ix_(ids, which)]):
-                at = np.ix_(rows, columns)
-                self._write_joints(ids[rows], which[columns], *(v if v is None else v[at] for v in (pos, vel)))
+            writing.write_joints(self, position, velocity, self._ids(env_ids), joints)
 
     def set_body_state(
         self, pose: Any = None, twist: Any = None, env_ids: EnvIds = None, bodies: Indices = None
@@ -285,16 +282,7 @@ class SimEngine(Primitives):
         """
         with self._lock:
             self._require_world()
-            ids = self._ids(env_ids)
-            free = [i for i, b in enumerate(self.world.bodies) if b.kind is BodyKind.FREE]
-            which = np.array(free, dtype=int) if bodies is None else self._which(bodies, len(self.world.bodies), "body")
-            poses = None if pose is None else checks.poses("pose", pose, (len(ids), len(which), 7))
-            twists = None if twist is None else checks.rows("twist", twist, (len(ids), len(which), 6))
-            checks.roots_only(self.world, which, with_twist=twists is not None)
-            self._retire_state()
-            for rows, columns in blocks(self._presence.bodies[np.ix_(ids, which)]):
-                at = np.ix_(rows, columns)
-                self._write_bodies(ids[rows], which[columns], *(v if v is None else v[at] for v in (poses, twists)))
+            writing.write_bodies(self, pose, twist, self._ids(env_ids), bodies)
 
     def set_control(
         self, position: Any = None, velocity: Any = None, effort: Any = None, env_ids: EnvIds = None,
@@ -330,19 +318,15 @@ class SimEngine(Primitives):
         with self._lock:
             self._require_world()
             self._require(Capability.WRENCHES)
-            ids, which = self._ids(env_ids), self._which(bodies, len(self.world.bodies), "body")
-            forces = checks.rows("wrench", wrench, (len(ids), len(which), 6))
-            there = self._presence.bodies[np.ix_(ids, which)]
-            self._commands.add_wrench(np.where(there[..., None], forces, 0.0), ids, which)
+            writing.push(self, wrench, bodies, self._ids(env_ids))
 
     # ------------------------------------------------------------------ parameters
 
     def get_parameters(self, name: str, env_ids: EnvIds = None, indices: Indices = None) -> Array:
         """Values (E, K, ...) of a neutral parameter such as `body.mass`, as the engine has them."""
         with self._lock:
-            parameter, ids, which = self._parameter(name, env_ids, indices)
-            del parameter
-            return self._get_parameter(name)[np.ix_(ids, which)].copy()
+            self._require_world()
+            return writing.read_parameter(self, name, env_ids, indices)
 
     def set_parameters(self, name: str, values: Any, env_ids: EnvIds = None, indices: Indices = None) -> None:
         """Change a neutral parameter per env, values (E, K, ...); what the engine took is read back and compared.
@@ -352,30 +336,8 @@ class SimEngine(Primitives):
             EngineError: a wrong shape, a value out of bounds, or the engine kept another value.
         """
         with self._lock:
-            parameter, ids, which = self._parameter(name, env_ids, indices)
-            rows = checks.rows(name, values, (len(ids), len(which), *parameter.shape))
-            if parameter.minimum is not None and rows.size and rows.min() < parameter.minimum:
-                raise EngineError(
-                    f"{name} [{parameter.unit}] must be at least {parameter.minimum:g}, got {rows.min():g}"
-                )
-            self._retire_state()
-            self._set_parameter(name, rows, ids, which)
-            self._changed[name] = None
-            kept = self._get_parameter(name)[np.ix_(ids, which)]
-            checks.kept(self.name, name, rows, kept)
-            if name in ("actuator.kp", "actuator.kd"):
-                self._commands.control_changed = True
-
-    def _parameter(self, name: str, env_ids: EnvIds, indices: Indices) -> tuple[Any, Array, Array]:
-        self._require_world()
-        parameter = PARAMETERS.get(name)
-        if parameter is None:
-            raise EngineError(f"there is no parameter '{name}' (parameters: {listing(PARAMETERS, 20)})")
-        if name not in self.parameters:
-            raise CapabilityError(
-                f"{self.name} cannot change '{name}' (it can: {listing(sorted(self.parameters), 20)})"
-            )
-        return parameter, self._ids(env_ids), self._which(indices, count(parameter, self.world), parameter.target)
+            self._require_world()
+            writing.write_parameter(self, name, values, env_ids, indices)
 
     # ------------------------------------------------------------------ snapshots
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.parameters import PARAMETERS, count
+from anysim.engine.writing import put_bodies, put_joints
 from anysim.world.model import BodyKind, World
 
 if TYPE_CHECKING:
@@ -56,10 +57,10 @@ def carry_over(engine: "SimEngine", world: World) -> None:
             chosen = np.array([k is kind for k in kinds], dtype=bool)
             if chosen.any():
                 twist = body_twist[:, before[chosen]] if kind is BodyKind.FREE else None
-                engine._write_bodies(all_envs, after[chosen], body_pose[:, before[chosen]], twist)  # noqa: SLF001
+                put_bodies(engine, all_envs, after[chosen], body_pose[:, before[chosen]], twist)
         before, after = _shared(old, target, "joints")
         if len(after):
-            engine._write_joints(all_envs, after, joint_pos[:, before], joint_vel[:, before])  # noqa: SLF001
+            put_joints(engine, all_envs, after, joint_pos[:, before], joint_vel[:, before])
         before, after = _shared(old, target, "actuators")
         for theirs, ours in zip(control, engine._commands.control, strict=True):  # noqa: SLF001
             ours[:, after] = theirs[:, before]

@@ -136,6 +136,17 @@ def test_pictures_have_their_shapes(build):
     assert small["depth"].shape == (1, 10, 20)
 
 
+@needs(C.RENDER_RGB, C.RENDER_SEGMENTATION)
+def test_two_engines_draw_in_turn(build):
+    """What one engine draws does not depend on another one that draws in between."""
+    engine, other = build(worlds.wall()), build(worlds.scene(cameras=True))
+    channels = ("rgb", "segmentation")
+    wanted = engine.render("fixed", channels=channels)
+    for _ in range(2):
+        other.render("front", channels=channels)
+        assert_same(engine.render("fixed", channels=channels), wanted, "after another engine drew")
+
+
 def test_depth_of_a_wall(build):
     """Depth is along the optical axis: a wall across the view has one depth, 2 m, from corner to corner."""
     depth = build(worlds.wall()).render("fixed", channels=("depth",))["depth"][0]

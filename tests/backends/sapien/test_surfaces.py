@@ -7,6 +7,7 @@ import pytest
 
 from anysim.errors import CapabilityError, EngineError
 from anysim.testing.sketch import Sketch, inertial
+from anysim.testing.varying import having, with_slots
 from anysim.world.model import Body, BodyKind, Box, JointType, Sphere, Surface, World
 from anysim_sapien.engine import SapienEngine
 from anysim_sapien.exclusions import Group, apart_of
@@ -184,6 +185,43 @@ def test_worlds_that_filters_cannot_tell_apart_are_refused_before_the_build():
         engine.create_world(world)
     assert not hasattr(engine, "_scenes")
     engine.destroy()
+
+
+def test_what_is_never_there_at_once_may_have_any_surfaces():
+    """Forty surfaces do not fit at once, one of forty does; nor do too many ways to choose, which are not tried."""
+    s = Sketch("colourful")
+    for i in range(40):
+        s.free(f"b{i}", Sphere(0.1), (float(i), 0.0, 0.1), surface=Surface(friction=0.01 * i))
+    names = tuple(f"b{i}" for i in range(40))
+    one = with_slots(s.world(), {"one": names})
+    assert not SapienEngine.refusals(one)
+    with SapienEngine().create_world(one) as engine:
+        engine.reset(present=having(one, "b39"))
+        engine.step()
+        assert engine.get_parameters("geom.friction")[0, 39] == pytest.approx(0.39)
+    (reason,) = SapienEngine.refusals(with_slots(s.world(), {"first": names[:20], "second": names[20:]}))
+    assert "its 400 combinations of entities are too many to try one by one" in reason
+    (reason,) = SapienEngine.refusals(with_slots(s.world(), {name: (name,) for name in names}))
+    assert "the 40 different surfaces" in reason
+
+
+def test_a_reset_that_cannot_be_built_leaves_all_as_it_was():
+    """Coefficients of what is absent may ask for too much when it comes: the reset says so, and nothing changes."""
+    s = Sketch("colourful")
+    for i in range(40):
+        s.free(f"b{i}", Sphere(0.1), (float(i), 0.0, 0.1))
+    world = with_slots(s.world(), {f"b{i}": (f"b{i}",) for i in range(1, 40)})
+    with SapienEngine().create_world(world, 2) as engine:
+        engine.reset(present=having(world).repeat(2, axis=0))
+        engine.set_parameters("geom.friction", 0.01 * np.arange(1, 41), [1])
+        engine.step(3)
+        before = engine.get_state().body_pose
+        with pytest.raises(EngineError, match="the 40 different surfaces"):
+            engine.reset(present=np.ones((2, 40), dtype=bool))
+        assert (engine.presence == having(world)).all()
+        engine.step()
+        assert np.isfinite(engine.get_state().body_pose).all()
+        assert before[0, 0, 2] > 0.05
 
 
 @pytest.mark.parametrize(("tools", "parts"), [(6, 6), (20, 3)])

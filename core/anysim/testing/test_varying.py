@@ -1,0 +1,475 @@
+"""Entities that come and go at resets: what is absent is as if it were not there, and leaves nothing behind."""
+
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
+import numpy as np
+import pytest
+
+from anysim.conventions import WORLD
+from anysim.engine.capability import Capability as C
+from anysim.engine.presence import Lifecycle
+from anysim.errors import EngineError
+from anysim.testing import plugin, tolerances
+from anysim.testing.compare import MOTION, assert_close, assert_same, play, read, tape
+from anysim.testing.fixtures import needs, skip_without_parameter
+from anysim.testing.sketch import Sketch
+from anysim.testing.varying import EYE, having, random_presence, reduced, shared_bodies, varied, with_slots
+from anysim.world.edit import without_entity
+from anysim.world.model import Box, Sphere
+
+varies = needs(C.VARYING_ENTITIES)
+IDENTITY = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+FULL = ("mug~1", "chest~0", "post", "lid")
+BARE = ()
+
+
+def _engine(build, engine_class, num_envs=2, cameras=False):
+    return build(varied(engine_class.capabilities, cameras), num_envs)
+
+
+def _other(engine):
+    """Rows of another presence than `FULL` and none."""
+    return having(engine.world, "mug~2", "chest~1", "lid")
+
+
+def test_the_lifecycle_is_declared(engine_class):
+    """An engine that lets entities vary says how they come and go; one that does not is P3."""
+    assert isinstance(engine_class.lifecycle, Lifecycle)
+    assert (engine_class.lifecycle is not Lifecycle.P3) == (C.VARYING_ENTITIES in engine_class.capabilities)
+
+
+@varies
+def test_a_world_begins_with_the_first_of_each_slot(build, engine_class):
+    """After the build every env has the first entity of each slot, and reads like a reset engine."""
+    engine = _engine(build, engine_class)
+    assert np.array_equal(engine.presence, np.repeat(engine.world.initial_presence[None], 2, axis=0))
+    before = read(engine)
+    engine.reset()
+    assert_same(read(engine), before, "after a reset")
+
+
+@varies
+def test_what_is_absent_reads_as_the_world_frame(build, engine_class):
+    """An absent body has the world's pose and no velocity, whatever is written to it; an absent joint its initial."""
+    engine = _engine(build, engine_class)
+    world = engine.world
+    engine.reset([1], present=having(world))
+    absent = ~np.array([having(world)[0, e] for e in world.body_entity])
+    free = [i for i, b in enumerate(world.bodies) if b.kind == "free"]
+    away = np.tile([3.0, 3.0, 3.0, 0.0, 0.0, 0.0, 1.0], (2, len(free), 1))
+    away[:, :, 0] += np.arange(len(free))
+    engine.set_body_state(away, np.ones((2, len(free), 6)), bodies=free)
+    if world.joints:
+        engine.set_joint_state([j.initial + 0.01 for j in world.joints], [0.1] * len(world.joints))
+    if C.WRENCHES in engine.capabilities:
+        engine.apply_wrench(np.ones((2, len(free), 6)), free)
+    for moment in ("after writes", "after steps"):
+        state = engine.get_state()
+        assert (state.body_pose[1, absent] == IDENTITY).all(), moment
+        assert not state.body_twist[1, absent].any(), moment
+        gone = [i for i, j in enumerate(world.joints) if absent[j.body]]
+        assert state.joint_pos[1, gone].tolist() == [world.joints[i].initial for i in gone], moment
+        assert not state.joint_vel[1, gone].any()
+        assert not state.fault.any()
+        engine.step(20)
+    there = [i for i, b in enumerate(world.bodies) if b.kind == "free" and not absent[i]]
+    assert_close(engine.get_state().body_pose[1, there, 1], 3.0, 2.0, "what is there went where it was put")
+
+
+@varies
+def test_what_comes_back_is_in_its_initial_state(build, engine_class):
+    """What is taken in again stands where the World puts it, as after the build, whatever happened before."""
+    engine, fresh = _engine(build, engine_class), _engine(build, engine_class)
+    wanted = read(fresh)
+    play(engine, tape(engine.world, [0, 1], 10))
+    engine.reset([0], present=having(engine.world))
+    engine.step(5)
+    engine.reset(present=np.repeat(engine.world.initial_presence[None], 2, axis=0))
+    assert_same(read(engine), wanted, "after all came back")
+
+
+@varies
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        (("mug~0", "mug~2"), "env 1: 'mug' can be one of mug~0 and mug~2, not several"),
+        ("no table", "'table' is in no slot"),
+        ("short", "present must be a bool array of shape"),
+        ("numbers", "present must be a bool array of shape"),
+    ],
+    ids=["two-of-a-slot", "without-the-table", "short", "numbers"],
+)
+def test_rows_that_no_env_can_have_are_refused(build, engine_class, row, message):
+    """Two of one slot, or without what is always there, or of another shape: an error, and nothing changes."""
+    engine = _engine(build, engine_class)
+    play(engine, tape(engine.world, [0, 1], 3))
+    before, present = read(engine), engine.presence
+    rows = having(engine.world) if isinstance(row, str) else having(engine.world, *row)
+    if row == "no table":
+        rows[0, [e.name for e in engine.world.entities].index("table")] = False
+    rows = rows[:, :-1] if row == "short" else rows.astype(int) if row == "numbers" else rows
+    with pytest.raises(EngineError, match=message):
+        engine.reset([1], present=rows)
+    assert_same(read(engine), before, "after the refusal")
+    assert np.array_equal(engine.presence, present)
+
+
+# ---------------------------------------------------------------------- nothing meets it
+
+
+@needs(C.VARYING_ENTITIES, C.DYNAMICS, C.CONTACTS)
+def test_what_is_there_moves_as_if_the_rest_were_not_in_the_world(build, engine_class):
+    """With the rest absent, and in a world without the rest: the same motion, contacts included."""
+    whole = varied(engine_class.capabilities)
+    for names in (BARE, FULL, ("mug~2", "chest~1"), ("mug~0",)):
+        less = reduced(whole, *names)
+        engine, alone = build(whole), build(less)
+        engine.reset(present=having(whole, *names))
+        ours, theirs = shared_bodies(whole, less)
+        if whole.actuators:
+            play(engine, tape(whole, [0], 60), 5)
+            play(alone, tape(less, [0], 60), 5)
+        got, wanted = engine.get_state().body_pose[:, ours], alone.get_state().body_pose[:, theirs]
+        assert_close(got, wanted, tolerances.ABSENT, f"poses with {names or 'nothing of the slots'} there")
+        assert_close(
+            engine.get_state().contact_force[:, 0], alone.get_state().contact_force[:, 0], tolerances.ABSENT_FORCE,
+            "the force on the box",
+        )  # fmt: skip
+
+
+@needs(C.VARYING_ENTITIES, C.DYNAMICS, C.CONTACTS, C.CONTACT_POINTS)
+def test_nothing_touches_what_is_absent(build, engine_class):
+    """What lay on an entity that is absent now falls, and no contact names what is not there."""
+    engine = _engine(build, engine_class)
+    world = engine.world
+    engine.reset([1], present=having(world, "lid"))
+    on_table = engine.index.body("box")
+    under = [*(i for i, b in enumerate(world.bodies) if b.name.startswith(("mug", "chest", "post")))]
+    engine.step(200)
+    contacts = engine.contacts()
+    named = {0: set(), 1: set()}
+    for env, a, b in zip(contacts.env.tolist(), contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True):
+        named[env] |= {a, b}
+    assert not named[1] & set(under)
+    assert {on_table, engine.index.body("lid"), engine.index.body("table")} <= named[1]
+    assert engine.index.body("mug~0") in named[0]
+    sensors = [s.name for s in world.contact_sensors]
+    force = engine.get_state().contact_force
+    assert force[0, sensors.index("mug"), 2] > 1.0
+    assert not force[1, sensors.index("mug")].any()
+    # where the lid's box was nothing is: a body dropped into the place of what is absent falls through it
+    mug = engine.index.body("mug~0")
+    engine.reset([1], present=having(world, "mug~0"))
+    inside = [0.0, 0.6, 0.35, 0.0, 0.0, 0.0, 1.0]
+    engine.set_body_state(pose=[[inside]], env_ids=[1], bodies=[mug])
+    engine.step(250)
+    assert_close(engine.get_state().body_pose[1, mug, 2], 0.05, 0.01, "a ball where a cabinet could be")
+
+
+@needs(C.VARYING_ENTITIES, C.DYNAMICS, C.CONTACTS, C.ARTICULATIONS)
+def test_what_is_there_carries_and_blocks(build, engine_class):
+    """Brought in at a reset, a fixed crate carries and a cabinet's frame blocks, as if they had always been there."""
+    engine = _engine(build, engine_class, 3)
+    world = engine.world
+    mug = engine.index.body("mug~0")
+    rows = np.concatenate([having(world, "mug~0", *more) for more in (("chest~1",), ("chest~0",), ())])
+    engine.reset(present=rows)
+    above = [0.0, 0.6, 0.36, 0.0, 0.0, 0.0, 1.0]
+    engine.set_body_state(pose=np.tile(above, (3, 1, 1)), bodies=[mug])
+    engine.step(300)
+    height = engine.get_state().body_pose[:, mug, 2]
+    assert_close(height[0], 0.35, 0.01, "a ball on the crate")
+    assert_close(height[1], 0.29, 0.02, "a ball on the drawer of the cabinet")
+    assert_close(height[2], 0.05, 0.01, "a ball on the ground")
+
+
+@needs(C.VARYING_ENTITIES, C.RAYCAST)
+def test_no_ray_hits_what_is_absent(build, engine_class):
+    """A ray goes through where an absent entity would be, also where all absent ones were built."""
+    engine = _engine(build, engine_class)
+    world = engine.world
+    engine.reset([0], present=having(world, *FULL))
+    engine.reset([1], present=having(world))
+    down, start = [0.0, 0.0, -1.0], np.array([[-0.1, 0.0, 3.0], [-0.25, 0.15, 3.0], [0.0, 0.75, 3.0], [0.2, 0.1, 3.0]])
+    hits = engine.raycast([start] * 2, [[down] * len(start)] * 2)
+    ids = {e.name: i + 1 for i, e in enumerate(world.entities)}
+    assert hits.entity[0].tolist() == [ids["mug~1"], ids["post"], ids["chest~0"], ids["lid"]]
+    floor = 0 if engine.world.geoms[0].body == WORLD else -1
+    assert hits.entity[1].tolist() == [ids["table"], ids["table"], floor, ids["box"]]
+    # and all around: nothing is parked where something could look
+    rng = np.random.default_rng(0)
+    around = rng.standard_normal((500, 3))
+    away = engine.raycast([np.tile([0.0, 0.0, 5.0], (500, 1))], [around], env_ids=[1])
+    gone = {i + 1 for i in np.flatnonzero(~engine.presence[1])}
+    assert not gone & set(away.entity.ravel().tolist())
+
+
+@needs(C.VARYING_ENTITIES, C.RENDER_RGB, C.RENDER_SEGMENTATION, C.RENDER_DEPTH)
+def test_no_picture_shows_what_is_absent(build, engine_class):
+    """An image of an env shows what is there, and is that of a world without the rest."""
+    engine = _engine(build, engine_class, 3, cameras=True)
+    world = engine.world
+    rows = np.concatenate([having(world, *FULL), having(world), having(world, "mug~0", "chest~1")])
+    engine.reset(present=rows)
+    channels = ("rgb", "depth", "segmentation")
+    images = engine.render("front", channels=channels)
+    for env, row in enumerate(rows):
+        seen = set(np.unique(images["segmentation"][env]).tolist()) - {0}
+        assert seen == {int(i) + 1 for i in np.flatnonzero(row)}, f"what env {env} shows"
+    less = reduced(world)
+    alone = build(less)
+    picture = alone.render("front", channels=channels)
+    assert (images["rgb"][1] == picture["rgb"][0]).mean() > 0.999
+    assert_close(
+        np.nan_to_num(images["depth"][1], posinf=0.0), np.nan_to_num(picture["depth"][0], posinf=0.0), 1e-3, "depth"
+    )
+    # the camera may look into any direction
+    for target in ((0.0, -10.0, 0.9), (0.0, -2.2, 10.0), (10.0, -2.2, 0.0), (-10.0, -2.2, 0.0), (0.0, 0.0, -10.0)):
+        _look(engine, target)
+        seen = set(np.unique(engine.render("front", env_ids=[1], channels=("segmentation",))["segmentation"]).tolist())
+        assert seen <= {0, *(int(i) + 1 for i in np.flatnonzero(rows[1]))}, target
+
+
+def _look(engine, target):
+    from anysim.math import pose as P
+
+    eye = np.array(EYE)
+    engine.set_camera_pose("front", np.concatenate([eye, P.look_at(eye, np.array(target))])[None], env_ids=[1])
+
+
+# ---------------------------------------------------------------------- nothing of it is left
+
+
+@varies
+def test_other_envs_do_not_notice(build, engine_class):
+    """A reset that changes who is there touches its own rows alone, bit for bit, then and later."""
+    engine, calm = _engine(build, engine_class, 3), _engine(build, engine_class, 3)
+    targets = tape(engine.world, range(3), 20)
+    for e in (engine, calm):
+        e.reset([2], present=_other(e))
+        play(e, targets[:8])
+    before = read(engine, [0, 2])
+    engine.reset([1], present=having(engine.world, *FULL))
+    assert_same(read(engine, [0, 2]), before, "the others at the reset")
+    for e in (engine, calm):
+        play(e, targets[8:])
+    assert_same(read(engine, [0, 2]), read(calm, [0, 2]), "the others, 24 steps later")
+
+
+@varies
+def test_the_past_leaves_nothing_over(build, engine_class):
+    """A, then B, then A again: the run is that of a new engine with A, bit for bit."""
+    engine, fresh = _engine(build, engine_class), _engine(build, engine_class)
+    world, rng = engine.world, np.random.default_rng(5)
+    for _ in range(4):
+        engine.reset(present=random_presence(world, rng, 2))
+        play(engine, tape(world, [3, 4], 5), 5)
+    last = np.concatenate([having(world, *FULL), having(world, "mug~2", "chest~0")])
+    for e in (engine, fresh):
+        e.reset(present=last)
+    assert_same(read(engine), read(fresh), "after the reset")
+    for e in (engine, fresh):
+        play(e, tape(world, [0, 1], 30), 5)
+    assert_same(read(engine), read(fresh), "150 steps later")
+
+
+@varies
+def test_an_env_depends_on_its_own_presence_alone(build, engine_class):
+    """Env i has the same trajectory, bit for bit, whatever `num_envs` is and whatever is in the others."""
+    few, many = _engine(build, engine_class, 1), _engine(build, engine_class, 4)
+    world = few.world
+    few.reset(present=having(world, *FULL))
+    many.reset(present=np.concatenate([having(world, *FULL), random_presence(world, np.random.default_rng(2), 3)]))
+    for e in (few, many):
+        play(e, tape(world, range(e.num_envs), 40), 4)
+    assert_same(read(many, [0]), read(few), "env 0 among 4 against alone")
+
+
+@varies
+def test_a_reset_without_presence_keeps_it(build, engine_class):
+    """A reset that says nothing of who is there brings the same entities back to their initial state."""
+    engine = _engine(build, engine_class)
+    engine.reset([1], present=_other(engine))
+    wanted, present = read(engine), engine.presence
+    play(engine, tape(engine.world, [0, 1], 10))
+    engine.reset()
+    assert_same(read(engine), wanted, "after the second reset")
+    assert np.array_equal(engine.presence, present)
+
+
+@varies
+def test_many_presences_in_a_row(build, engine_class):
+    """Forty random presences, some steps in each: the states are finite, and the last run is that of a new engine."""
+    engine, fresh = _engine(build, engine_class, 3), _engine(build, engine_class, 3)
+    world, rng = engine.world, np.random.default_rng(7)
+    for turn in range(40):
+        ids = np.flatnonzero(rng.random(3) < 0.6)
+        rows = random_presence(world, rng, len(ids))
+        engine.reset(ids, present=rows)
+        assert np.array_equal(engine.presence[ids], rows)
+        engine.step(int(rng.integers(1, 8)))
+        assert not engine.get_state().fault.any(), turn
+    rows = random_presence(world, rng, 3)
+    for e in (engine, fresh):
+        e.reset(present=rows)
+        play(e, tape(world, range(3), 10), 3)
+    assert_same(read(engine), read(fresh), "the last run")
+
+
+# ---------------------------------------------------------------------- snapshots
+
+
+def _snapshot_run(engine):
+    """A run with a presence of its own, its snapshot, and what follows."""
+    world = engine.world
+    engine.reset(present=np.concatenate([having(world, *FULL), having(world, "mug~2", "chest~1")]))
+    play(engine, tape(world, [0, 1], 15), 4)
+    snapshot = engine.snapshot()
+    play(engine, tape(world, [0, 1], 15, seed=3), 4)
+    return snapshot, read(engine)
+
+
+@needs(C.VARYING_ENTITIES, C.SNAPSHOT_TRAJECTORY)
+def test_snapshots_bring_back_who_was_there(build, engine_class):
+    """A snapshot restored where others are there now, in place and in a new engine, goes on bit for bit."""
+    engine = _engine(build, engine_class)
+    snapshot, wanted = _snapshot_run(engine)
+    engine.reset(present=having(engine.world).repeat(2, axis=0))
+    engine.step(7)
+    for e in (engine, _engine(build, engine_class)):
+        e.restore(snapshot)
+        assert np.array_equal(e.presence, snapshot.data["present"])
+        play(e, tape(e.world, [0, 1], 15, seed=3), 4)
+        assert_same(read(e), wanted, "from the snapshot")
+
+
+@needs(C.VARYING_ENTITIES, C.SNAPSHOT_TRAJECTORY)
+def test_rows_of_a_snapshot_go_into_envs_of_another_presence(build, engine_class):
+    """A row goes into another env, which then has the entities of the first; the rest is untouched."""
+    engine = _engine(build, engine_class, 3)
+    world = engine.world
+    engine.reset([0], present=having(world, *FULL))
+    play(engine, tape(world, range(3), 10))
+    snapshot, untouched = engine.snapshot([0]), read(engine, [0, 1])
+    engine.restore(snapshot, [2])
+    assert_same(read(engine, [0, 1]), untouched, "the others")
+    play(engine, tape(world, [4, 5, 4], 20))
+    state = read(engine)
+    assert_same({k: v[2] for k, v in state.items()}, {k: v[0] for k, v in state.items()}, "env 2 as a twin of env 0")
+
+
+@needs(C.VARYING_ENTITIES, C.SNAPSHOT_STATE)
+def test_states_bring_back_who_was_there(build, engine_class):
+    """A snapshot of the level STATE brings back who was there, and where."""
+    engine = _engine(build, engine_class)
+    engine.reset([1], present=_other(engine))
+    play(engine, tape(engine.world, [0, 1], 10))
+    before, present, snapshot = read(engine, fields=MOTION), engine.presence, engine.snapshot(level="state")
+    engine.reset(present=having(engine.world).repeat(2, axis=0))
+    engine.restore(snapshot)
+    assert np.array_equal(engine.presence, present)
+    for name, value in read(engine, fields=MOTION).items():
+        assert_close(value, before[name], tolerances.READ_BACK, name)
+
+
+@needs(C.VARYING_ENTITIES, C.SNAPSHOT_TRAJECTORY)
+def test_a_snapshot_goes_on_in_another_process(new_engine, engine_class, pytestconfig):
+    """A snapshot taken in another process brings its entities along, and its run, bit for bit."""
+    arguments = (pytestconfig.getoption("engine"), plugin.engine_options(pytestconfig))
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        there = pool.submit(snapshot_elsewhere, *arguments)
+        engine = new_engine().create_world(varied(engine_class.capabilities), 2)
+        engine.reset(present=having(engine.world, "mug~0").repeat(2, axis=0))
+        snapshot, wanted = there.result(timeout=300)
+        engine.restore(snapshot)
+        play(engine, tape(engine.world, [0, 1], 15, seed=3), 4)
+        assert_same(read(engine), wanted, "after a snapshot of another process")
+
+
+def snapshot_elsewhere(name, options):
+    """What the other process does."""
+    with plugin.load_engine(name)(**options) as engine:
+        engine.create_world(varied(engine.capabilities), 2)
+        snapshot, wanted = _snapshot_run(engine)
+        return snapshot, wanted
+
+
+# ---------------------------------------------------------------------- parameters and live editing
+
+
+@varies
+@pytest.mark.parametrize("name", ["body.mass", "geom.friction", "geom.color", "joint.damping"])
+def test_parameters_of_what_is_absent_wait_for_it(build, engine_class, name):
+    """What is written while an entity is absent is read back then, and acts when it comes, like one written there."""
+    skip_without_parameter(engine_class, name)
+    late, early = _engine(build, engine_class), _engine(build, engine_class)
+    world = late.world
+    if name.startswith("joint") and not world.joints:
+        pytest.skip("this engine's world has no joints")
+    values = late.get_parameters(name) * 0.5 + (0.2 if name != "geom.color" else 0.0)
+    fixed = [i for i, b in enumerate(world.bodies) if b.kind == "static"]
+    if name == "body.mass":
+        values[:, fixed] = late.get_parameters(name)[:, fixed]
+    late.reset(present=having(world).repeat(2, axis=0))
+    late.set_parameters(name, values)
+    assert_close(late.get_parameters(name), values, tolerances.READ_BACK, "read back while absent")
+    rows = having(world, *FULL).repeat(2, axis=0)
+    late.reset(present=rows)
+    assert_close(late.get_parameters(name), values, tolerances.READ_BACK, "read back when there")
+    early.reset(present=rows)
+    early.set_parameters(name, values)
+    early.reset()
+    for e in (late, early):
+        play(e, tape(world, [0, 1], 20), 4)
+    assert_same(read(late), read(early), f"with {name} of what was absent")
+
+
+@varies
+def test_live_editing_keeps_who_is_there(build, engine_class):
+    """An object is added and removed; who is there stays, and the run goes on."""
+    engine, calm = _engine(build, engine_class), _engine(build, engine_class)
+    for e in (engine, calm):
+        e.reset([1], present=_other(e))
+        play(e, tape(e.world, [0, 1], 10))
+    present, before = engine.presence, read(engine, fields=MOTION)
+    engine.add_object("crate", {"box": [0.2, 0.2, 0.2]}, mass=1.0, position=(3.0, 3.0, 0.5))
+    assert np.array_equal(engine.presence[:, :-1], present)
+    assert engine.presence[:, -1].all()
+    bodies = len(calm.world.bodies)
+    for name, value in read(engine, fields=MOTION[:2]).items():
+        if name != "time":
+            assert_close(value[:, :bodies], before[name], tolerances.READ_BACK, name)
+    engine.step(5)
+    engine.remove_object("crate")
+    assert np.array_equal(engine.presence, present)
+    calm.step(5)
+    wanted, got = calm.get_state().body_pose, engine.get_state().body_pose
+    assert_close(got, wanted, 100 * tolerances.READ_BACK, "poses after the crate came and went")
+
+
+@varies
+def test_a_world_of_nothing_but_what_may_be_absent(build):
+    """All of a world may be absent: then nothing is there, nothing moves, and what comes is as built."""
+    s = Sketch("ghosts")
+    s.free("ball", Sphere(0.1), (0.0, 0.0, 1.0), collides=False)
+    s.fixed("block", Box((0.1, 0.1, 0.1)), (1.0, 0.0, 0.5), collides=False)
+    world = with_slots(s.world(), {"ball": ("ball",), "block": ("block",)})
+    engine = build(world, 2)
+    wanted = read(engine)
+    engine.reset(present=np.zeros((2, 2), dtype=bool))
+    engine.step(5)
+    assert (engine.get_state().body_pose == IDENTITY).all()
+    assert not engine.get_state().fault.any()
+    engine.reset(present=np.ones((2, 2), dtype=bool))
+    assert_same(read(engine), wanted, "when all came back")
+
+
+@varies
+def test_what_may_be_absent_can_be_removed(build, engine_class):
+    """Removing an entity of a slot leaves the others of it, in a new engine as after live editing."""
+    world = without_entity(varied(engine_class.capabilities), "mug~1")
+    engine = build(world)
+    engine.reset(present=having(world, "mug~2"))
+    engine.step(3)
+    assert not engine.get_state().fault.any()
