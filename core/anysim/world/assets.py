@@ -7,6 +7,7 @@
 | `robot_descriptions:panda_description` | what that module names | its package folder |
 | `file:meshes/cup.stl`, `meshes/cup.stl` | relative to the YAML file | the YAML file's folder |
 | `file:/data/arm/urdf/arm.urdf` | absolute | the asset's folder (see `_folder_root`) |
+| `procedural:cabinet` | none: `anysim.world.importers` has it built | |
 """
 
 import difflib
@@ -50,7 +51,7 @@ def locate(uri: str, *, base: Path | None = None) -> AssetFile:
     if scheme != "file":
         raise AssetError(
             f"asset '{uri}': there is no scheme '{scheme}'{suggest(scheme, SCHEMES)} "
-            f"(schemes: {', '.join(f'{s}:' for s in SCHEMES)} or a path relative to the YAML file)"
+            f"(schemes: {', '.join(f'{s}:' for s in SCHEMES)}, procedural: or a path relative to the YAML file)"
         )
     path = Path(rest)
     if path.is_absolute():
