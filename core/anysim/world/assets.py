@@ -51,7 +51,7 @@ def locate(uri: str, *, base: Path | None = None) -> AssetFile:
     if scheme != "file":
         raise AssetError(
             f"asset '{uri}': there is no scheme '{scheme}'{suggest(scheme, SCHEMES)} "
-            f"(schemes: {', '.join(f'{s}:' for s in SCHEMES)}, procedural: or a path relative to the YAML file)"
+            f"(schemes: {', '.join(f'{s}:' for s in SCHEMES)} or a path relative to the YAML file)"
         )
     path = Path(rest)
     if path.is_absolute():

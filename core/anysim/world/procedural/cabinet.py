@@ -20,7 +20,10 @@ class Front(Spec):
 
     front: Literal["drawer", "door", "double_door", "open", "panel"] = Field(description="what closes it, if anything")
     height: Positive = Field(default=1.0, description="share of the column's height")
-    hinge: Literal["left", "right"] = Field(default="left", description="side of a door's hinge, seen from the front")
+    hinge: Literal["auto", "left", "right"] = Field(
+        default="auto",
+        description="side of a door's hinge, seen from the front; auto: the outer side, or away from drawers beside it",
+    )
 
     @classmethod
     def from_text(cls, text: str) -> dict[str, Any]:
@@ -37,7 +40,7 @@ class _Cell(NamedTuple):
 
 
 _DRAWER = Front(front="drawer")
-_COLUMNS = ((_DRAWER, _DRAWER, _DRAWER), (Front(front="door", hinge="right"),))
+_COLUMNS = ((_DRAWER, _DRAWER, _DRAWER), (Front(front="door"),))
 _HANDLE = Handle()
 
 
@@ -68,8 +71,8 @@ def cabinet(
     Links and joints are `drawer_1`, `drawer_2`, … and `door_1`, … column by column from left to right as seen from the
     front, each from top to bottom; both leaves of a double door count. Positive is open. Frames: `drawer_1.handle`,
     `drawer_1.inside` (the middle of its floor), and `shelf_1`, … (the middle of the floor of each other compartment).
-    A part of its own cannot jam it: a drawer or door never collides with the carcass that it is joined to, only its
-    limits hold it, and two of them keep a gap.
+    A drawer or door never collides with the carcass that it is joined to: only its limits hold it, so it cannot jam.
+    Two of them do collide, and keep a gap; as in a kitchen, the handle of an open door reaches over what is beside it.
 
     Args:
         size: depth, width and height [m], handles not included.
@@ -210,8 +213,20 @@ def _cells(
                     f"wide, {inner[3] - inner[2]:.3g} m high",
                     "columns",
                 )
-            cells.append(_Cell(rows[row], outer, inner))
+            front = rows[row]
+            if front.hinge == "auto":
+                front = front.model_copy(update={"hinge": _outer_side(columns, column)})
+            cells.append(_Cell(front, outer, inner))
     return cells
+
+
+def _outer_side(columns: tuple[tuple[Front, ...], ...], column: int) -> str:
+    """Where a door of a column is hinged best: its open handle then reaches over no drawer, where that can be."""
+    if column == 0:
+        return "left"
+    if column == len(columns) - 1 or any(front.front == "drawer" for front in columns[column - 1]):
+        return "right"
+    return "left"
 
 
 def _divided(start: float, stop: float, shares: Any) -> list[float]:
