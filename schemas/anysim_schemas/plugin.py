@@ -4,11 +4,12 @@ The spec only marks the slot. Who loads a file passes a resolver that turns `(ki
 plugin declares; the loader then validates the slot with it and reports its errors with the rest, by file and line.
 
 There are two kinds of slots:
-- a `dict[str, Any]` field annotated with `PluginSlot`: `engine.options`, `record.options`, `actions.*.params`;
+- a `dict[str, Any]` field annotated with `PluginSlot`: `engine.options`, `record.options`, `actions.*.params`,
+  `source.params` of a procedural object;
 - a spec with the class attribute `plugin_kind`, whose parameters stand beside its own fields: terms and skills. The
   name of the plugin is in the field `term`, or in the one that `plugin_name_field` names.
 
-The kinds are engine, writer, controller, observation, reward, predicate, command, event and skill.
+The kinds are engine, writer, controller, asset, observation, reward, predicate, command, event and skill.
 """
 
 from collections.abc import Callable

@@ -41,14 +41,19 @@ from anysim_schemas.run import WorldSpec
 PANDA_EVERY = 10
 """Every how manyeth scene has the catalogue's Panda instead of a random arm."""
 
+FURNITURE_EVERY = 10
+"""Every how manyeth scene has a cabinet and a box with a lid, counted from the sixth."""
+
 ENVS = 2
 
 Rng = np.random.Generator
 
 
 def scene(number: int) -> World:
-    """Objects dropped in a heap around a robot, on the ground."""
+    """Objects dropped in a heap around a robot, on the ground; or onto furniture."""
     rng = np.random.default_rng([number, 0])
+    if number % FURNITURE_EVERY == FURNITURE_EVERY // 2:
+        return _furniture(rng)
     return _panda_scene(rng) if number % PANDA_EVERY == 0 else _sketch(number, rng)
 
 
@@ -146,6 +151,28 @@ def _panda_scene(rng: Rng) -> World:
     }
     spec = {"robots": {"panda": {"robot": "franka_panda"}}, "objects": objects, "layout": layout}
     return compile_world(WorldSpec.model_validate(spec))
+
+
+def _furniture(rng: Rng) -> World:
+    """A cabinet, fixed or not, with drawers and doors ajar, a box with a lid on it, and things that fall into both."""
+    fronts = ["drawer", "drawer", "door", "double_door", "open"]
+    columns = [
+        [str(rng.choice(fronts)) for _ in range(int(rng.integers(1, 4)))] for _ in range(int(rng.integers(1, 4)))
+    ]
+    columns[0][0] = "drawer"
+    ajar = {"*": {"opened": float(rng.uniform(0.1, 0.6)), "friction": float(rng.choice([0.0, 0.5, 2.0]))}}
+    cabinet = {"procedural": "cabinet", "params": {"size": [0.4, 0.4 * len(columns), 0.5], "columns": columns}}
+    objects: dict[str, Any] = {
+        "cabinet": {"source": cabinet, "fixed": bool(rng.random() < 0.5), "joints": ajar},
+        "chest": {"source": "procedural:hinge_box", "joints": {"lid": {"opened": float(rng.uniform(0.3, 0.9))}}},
+    }
+    layout: dict[str, Any] = {"cabinet": {"position": [0, 0, 0]}, "chest": {"on": "cabinet", "x": 0, "y": 0}}
+    sources = [{"box": [0.05, 0.05, 0.05]}, {"sphere": 0.03}, {"capsule": [0.02, 0.05]}]
+    for i in range(3):
+        objects[f"thing{i}"] = {"source": sources[int(rng.integers(3))], "mass": float(rng.uniform(0.05, 0.3))}
+        place = np.array([0.0 if i else 0.25, 0.0]) + 0.05 * rng.standard_normal(2)
+        layout[f"thing{i}"] = {"position": [*place.tolist(), 0.75 + 0.1 * i]}
+    return compile_world(WorldSpec.model_validate({"objects": objects, "layout": layout}))
 
 
 # ---------------------------------------------------------------------- what is done

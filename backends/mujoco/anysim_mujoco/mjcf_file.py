@@ -1,5 +1,6 @@
 """An MJCF file as a compiled MuJoCo model, after looking where its references lead."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +19,10 @@ def compiled(path: Path, root: Path) -> Any:
         AssetError: a missing file, a reference that leaves `root`, or what MuJoCo says against the file.
     """
     path, root = path.resolve(), root.resolve()
-    _check_includes(path, path, root, ())
+    included: dict[str, bytes] = {}
+    _check_includes(path, path, root, (), included)
     try:
-        spec = mujoco.MjSpec.from_file(str(path))
+        spec = _parsed(path, included)
         _check_assets(spec, path, root)
         for texture in list(spec.textures):
             spec.delete(texture)
@@ -34,8 +36,17 @@ def compiled(path: Path, root: Path) -> Any:
         raise AssetError(f"{path}: MuJoCo cannot read it: {' '.join(str(error).split())}") from error
 
 
-def _check_includes(path: Path, main: Path, root: Path, above: tuple[Path, ...]) -> None:
-    """Follow <include> elements, which MuJoCo resolves against the folder of the main file."""
+def _parsed(path: Path, included: Mapping[str, bytes]) -> Any:
+    """MuJoCo tells formats by the ending and knows no .mjcf: a file that is not called .xml is read as a text."""
+    if path.suffix.lower() == ".xml":
+        return mujoco.MjSpec.from_file(str(path))
+    spec = mujoco.MjSpec.from_string(path.read_text(encoding="utf-8"), include=dict(included))
+    spec.modelfiledir = str(path.parent)
+    return spec
+
+
+def _check_includes(path: Path, main: Path, root: Path, above: tuple[Path, ...], included: dict[str, bytes]) -> None:
+    """Follow <include> elements, which MuJoCo resolves against the folder of the main file; keeps what they hold."""
     import lxml.etree as etree
 
     parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
@@ -48,7 +59,8 @@ def _check_includes(path: Path, main: Path, root: Path, above: tuple[Path, ...])
         found = resolve_reference(element.get("file") or "", file=main, root=root, asked_by=asked_by)
         if found in (path, *above):
             raise AssetError(f"{asked_by} includes itself through '{found.name}'")
-        _check_includes(found, main, root, (path, *above))
+        included[element.get("file") or ""] = found.read_bytes()
+        _check_includes(found, main, root, (path, *above), included)
 
 
 def _check_assets(spec: Any, path: Path, root: Path) -> None:

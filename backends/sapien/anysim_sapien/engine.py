@@ -220,9 +220,10 @@ class SapienEngine(SimEngine):
     def _snapshot(self, ids: Array, level: SnapshotLevel) -> dict[str, Array]:
         scenes = [self._scenes[env] for env in ids]
         data = pasts_of(scenes) if level is SnapshotLevel.TRAJECTORY else motions_of(scenes)
-        return data | {"effort": self._drives.effort[ids]} | self._reader.rows(ids)
+        return data | {"effort": self._drives.effort[ids]} | self._reader.rows(ids) | self._parameters.rows(ids)
 
     def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:
+        self._parameters.put_rows(ids, data)
         for row, env in enumerate(ids.tolist()):
             if level is SnapshotLevel.TRAJECTORY:
                 self._scenes[env], drives, momentum = relive(self._recipe(env), data, row)

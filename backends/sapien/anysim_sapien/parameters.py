@@ -1,6 +1,6 @@
 """Physical and visual parameters per env. They are read back from PhysX' own objects."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -64,6 +64,19 @@ class Parameters:
     def default(self, name: str) -> Array:
         """Values (K, ...) as built."""
         return self._defaults[name].copy()
+
+    def rows(self, ids: Array) -> dict[str, Array]:
+        """What scenes are built with, as it was asked for: what is read from PhysX is rounded, and not asked for again.
+
+        A scene that is built anew later, as its steps run out, has to be built from the same bits.
+        """
+        return {f"wanted.{name}": values[ids] for name, values in self._wanted.items() if name != "geom.color"}
+
+    def put_rows(self, ids: Array, data: Mapping[str, Array]) -> None:
+        """Write what `rows` made; the scenes themselves come from elsewhere."""
+        for name, values in self._wanted.items():
+            if name != "geom.color":
+                values[ids] = data[f"wanted.{name}"]
 
     # ------------------------------------------------------------------ reading
 

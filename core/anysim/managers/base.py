@@ -19,9 +19,9 @@ from anysim.managers.streams import Streams
 from anysim.world.model import World
 from anysim_schemas.run import RunSpec
 
-RESET_ORDER = ("terrain", "population", "layout", "scene", "robot", "camera", "capture", "task")
-"""The ground first, then who is there, where it is and what it is like, then who moves and who looks, and the task
-last, on the settled scene."""
+RESET_ORDER = ("terrain", "population", "layout", "scene", "joints", "robot", "camera", "capture", "task")
+"""The ground first, then who is there, where it is, what it is like and how its joints stand, then who moves and who
+looks, and the task last, on the settled scene."""
 
 
 class Manager(ABC):

@@ -3,6 +3,7 @@
 from anysim.managers.base import Manager
 from anysim.managers.board import Board
 from anysim.managers.camera import CameraManager
+from anysim.managers.joints import JointManager
 from anysim.managers.layout import LayoutManager
 from anysim.managers.robot import RobotManager
 from anysim.managers.scene import SceneManager
@@ -14,7 +15,7 @@ from anysim_schemas.run import RunSpec
 def standard_managers(spec: RunSpec, world: World, num_envs: int) -> list[Manager]:
     """Configured and built, sharing one set of streams."""
     streams, board = Streams(num_envs), Board(num_envs)
-    managers: list[Manager] = [LayoutManager(), SceneManager(), RobotManager(), CameraManager()]
+    managers: list[Manager] = [LayoutManager(), SceneManager(), JointManager(), RobotManager(), CameraManager()]
     for manager in managers:
         manager.configure(spec, streams, board)
         manager.build(world)

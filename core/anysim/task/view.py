@@ -156,9 +156,21 @@ class ObjectView:
 
     def __init__(self, scene: SceneView, name: str) -> None:
         entity = scene.index.entity(name)
-        self.name, self.entity = name, entity
+        self.scene, self.name, self.entity = scene, name, entity
         self.root = scene.frame(name)
         self.movable = scene.engine.world.bodies[entity.root].kind is BodyKind.FREE
+        self.joints = slice(entity.joint_start, entity.joint_stop)
+        """Its joints among the world's; none where it is rigid."""
+
+    @property
+    def joint_pos(self) -> Array:
+        """(n, J) [rad, m] of its joints."""
+        return self.scene.state.joint_pos[self.scene.rows, self.joints]
+
+    @property
+    def joint_vel(self) -> Array:
+        """(n, J) [rad/s, m/s] of its joints."""
+        return self.scene.state.joint_vel[self.scene.rows, self.joints]
 
 
 class RobotView:

@@ -7,6 +7,7 @@
 | `robot_descriptions:panda_description` | what that module names | its package folder |
 | `file:meshes/cup.stl`, `meshes/cup.stl` | relative to the YAML file | the YAML file's folder |
 | `file:/data/arm/urdf/arm.urdf` | absolute | the asset's folder (see `_folder_root`) |
+| `procedural:cabinet` | none: `anysim.world.importers` has it built | |
 """
 
 import difflib

@@ -5,11 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from anysim.conventions import IDENTITY_QUATERNION
-from anysim.errors import AssetError, PluginError
+from anysim.errors import AssetError, PluginError, SpecError
 from anysim.world import inertia
 from anysim.world.assets import locate
 from anysim.world.builder import WorldBuilder
 from anysim.world.colors import Rgb, rgb
+from anysim.world.compile_joints import with_joints
 from anysim.world.imported import ImportedModel, ImportNote
 from anysim.world.importers import import_asset
 from anysim.world.issues import Issues
@@ -33,7 +34,8 @@ from anysim.world.model import (
 )  # fmt: skip
 from anysim.world.nominal import nominal
 from anysim.world.presets import surface
-from anysim_schemas.objects import ContactSpec, ObjectSpec, SourceSpec
+from anysim.world.procedural.build import build
+from anysim_schemas.objects import PROCEDURAL, ContactSpec, ObjectSpec, SourceSpec
 from anysim_schemas.values import Choice, Range
 
 DEFAULT_DENSITY = 1000.0  # [kg/m^3], water
@@ -51,13 +53,23 @@ def add_object(
     except (AssetError, PluginError) as error:
         issues.asset("source", AssetError(str(error)))
         return []
+    except SpecError as error:
+        for issue in error.issues:
+            issues.add(f"source.{issue.path}", issue.message)
+        return []
     if model is None:
         return []
+    model = with_joints(model, spec.joints, issues.at("joints"))
     builder.add(
         name, EntityKind.OBJECT, model, root=BodyKind.STATIC if spec.fixed else BodyKind.FREE, position=position,
-        quaternion=quaternion, label=spec.label or name, source=spec.source.mesh or spec.source.asset or "",
+        quaternion=quaternion, label=spec.label or name, source=source_name(spec.source),
     )  # fmt: skip
     return list(model.report)
+
+
+def source_name(source: SourceSpec) -> str:
+    """The URI that a source stands for; empty for a primitive."""
+    return f"{PROCEDURAL}{source.procedural}" if source.procedural else source.mesh or source.asset or ""
 
 
 def _model(name: str, spec: ObjectSpec, issues: Issues, base: Path | None) -> ImportedModel | None:
@@ -65,7 +77,11 @@ def _model(name: str, spec: ObjectSpec, issues: Issues, base: Path | None) -> Im
     friction = DEFAULT_FRICTION if spec.friction is None else float(nominal(spec.friction))
     touch = surface(spec.contact or ContactSpec(), friction, spec.restitution or 0.0)
     if spec.source.asset is not None:
-        return _asset(spec, spec.source.asset, touch, color, issues, base)
+        model = import_asset(spec.source.asset, base=base, scale=spec.source.scale)
+        return _asset(spec, model, touch, color, issues)
+    if spec.source.procedural is not None:
+        model = build(spec.source.procedural, spec.source.params, scale=spec.source.scale)
+        return _asset(spec, model, touch, color, issues)
     meshes: dict[str, Mesh] = {}
     if spec.source.mesh is None:
         solid = _primitive(spec.source)
@@ -117,13 +133,11 @@ def _mesh_geoms(
     return geoms, MeshShape(hull.name)
 
 
-def _asset(
-    spec: ObjectSpec, uri: str, touch: Surface, color: Rgb, issues: Issues, base: Path | None
-) -> ImportedModel | None:  # fmt: skip
-    """A URDF or MJCF file. What the spec gives explicitly wins over the file; its mass is that of the whole object."""
-    model = import_asset(uri, base=base, scale=spec.source.scale)
+def _asset(spec: ObjectSpec, model: ImportedModel, touch: Surface, color: Rgb, issues: Issues) -> ImportedModel | None:
+    """What a file or a builder makes. What the spec gives explicitly wins; its mass is that of the whole object."""
     if spec.density is not None:
-        issues.add("density", "an asset file has its own masses; give `mass` to scale them, or leave it out")
+        what = "a procedural asset" if spec.source.procedural else "an asset file"
+        issues.add("density", f"{what} has its own masses; give `mass` to scale them, or leave it out")
     geoms: list[Geom] = []
     for geom in model.geoms:
         if not (spec.friction is None and spec.contact is None and spec.restitution is None):

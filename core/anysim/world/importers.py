@@ -6,7 +6,9 @@ from anysim import registry
 from anysim.errors import AssetError
 from anysim.world.assets import AssetFile, locate
 from anysim.world.imported import ImportedModel, Importer
+from anysim.world.procedural.build import from_uri
 from anysim.world.urdf import import_urdf
+from anysim_schemas.objects import PROCEDURAL
 
 _FORMATS = {".urdf": "urdf", ".xml": "mjcf", ".mjcf": "mjcf"}
 
@@ -14,10 +16,14 @@ _FORMATS = {".urdf": "urdf", ".xml": "mjcf", ".mjcf": "mjcf"}
 def import_asset(uri: str, *, base: Path | None = None, scale: float = 1.0) -> ImportedModel:
     """The model behind a URI. `.urdf` is read here; `.xml` and `.mjcf` by the installed importer named `mjcf`.
 
+    `procedural:NAME` is built by the installed builder, with its default parameters.
+
     Raises:
         AssetError: see `anysim.world.assets.locate` and the importers.
         PluginError: no importer for the format is installed.
     """
+    if uri.startswith(PROCEDURAL):
+        return from_uri(uri, scale=scale)
     file = locate(uri, base=base)
     return _importer(file, uri)(file.path, root=file.root, scale=scale)
 

@@ -296,6 +296,27 @@ def test_what_is_refused_and_how(load, tmp_path, change, words):
         load(ARM.replace(change[0], change[1], 1))
 
 
+def test_a_file_may_be_called_mjcf_and_have_parts(tmp_path):
+    """MuJoCo itself reads .xml alone; meshes and parts lie where they would for it."""
+    vertices = "0 0 0 1 0 0 0 1 0 0 0 1".split()
+    faces = ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))
+    (tmp_path / "shapes").mkdir()
+    lines = [f"v {' '.join(vertices[3 * i : 3 * i + 3])}" for i in range(4)]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces]
+    (tmp_path / "shapes" / "corner.obj").write_text("\n".join(lines), encoding="utf-8")
+    (tmp_path / "mesh.xml").write_text(
+        '<mujoco><asset><mesh name="corner" file="shapes/corner.obj"/></asset></mujoco>', encoding="utf-8"
+    )
+    text = """<mujoco model="m"><include file="mesh.xml"/><worldbody><body name="b"><freejoint/>
+        <geom type="mesh" mesh="corner"/></body></worldbody></mujoco>"""
+    models = []
+    for ending in ("mjcf", "xml"):
+        (tmp_path / f"model.{ending}").write_text(text, encoding="utf-8")
+        models.append(import_mjcf(tmp_path / f"model.{ending}", root=tmp_path))
+    assert models[0].bodies == models[1].bodies
+    assert [mesh.hash for mesh in models[0].meshes] == [mesh.hash for mesh in models[1].meshes]
+
+
 def test_it_is_the_installed_importer(load, tmp_path):
     """A path that ends in .xml comes here, through the entry point."""
     from anysim.world.importers import import_asset

@@ -4,9 +4,13 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.math import pose as P
-from anysim.task.view import Frame, RobotView, SceneView
+from anysim.task.joints import RangedJointView
+from anysim.task.view import Frame, ObjectView, RobotView, SceneView
 
-__all__ = ["frame_pose", "frame_twist", "goal_position", "joint_pos", "joint_vel", "last_action", "offset"]
+__all__ = [
+    "frame_pose", "frame_twist", "goal_position", "joint_opening", "joint_pos", "joint_vel", "last_action",
+    "object_joint_pos", "object_joint_vel", "offset",
+]  # fmt: skip
 
 
 def joint_pos(scene: SceneView, *, robot: RobotView) -> Array:
@@ -17,6 +21,21 @@ def joint_pos(scene: SceneView, *, robot: RobotView) -> Array:
 def joint_vel(scene: SceneView, *, robot: RobotView) -> Array:
     """Joint velocities of a robot [rad/s, m/s]."""
     return robot.joint_vel
+
+
+def object_joint_pos(scene: SceneView, *, object: ObjectView) -> Array:
+    """Joint positions of an articulated object [rad, m]."""
+    return object.joint_pos
+
+
+def object_joint_vel(scene: SceneView, *, object: ObjectView) -> Array:
+    """Joint velocities of an articulated object [rad/s, m/s]."""
+    return object.joint_vel
+
+
+def joint_opening(scene: SceneView, *, joint: RangedJointView) -> Array:
+    """How far a joint is open: 0 at the limit that is nearer to zero, 1 at the other."""
+    return joint.opening[:, None]
 
 
 def frame_pose(scene: SceneView, *, frame: Frame) -> Array:

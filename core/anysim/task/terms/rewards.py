@@ -7,9 +7,10 @@ from pydantic import Field
 
 from anysim.conventions import Array
 from anysim.math import pose as P
+from anysim.task.joints import RangedJointView
 from anysim.task.view import Frame, SceneView
 
-__all__ = ["action_rate", "distance", "tanh_distance"]
+__all__ = ["action_rate", "distance", "joint_progress", "tanh_distance"]
 
 
 def distance(scene: SceneView, *, a: Frame, b: Frame) -> Array:
@@ -23,6 +24,14 @@ def tanh_distance(
 ) -> Array:  # fmt: skip
     """1 - tanh(distance / scale): 1 when the frames coincide, 0 far away."""
     return 1.0 - np.tanh(P.norm(b.position - a.position) / scale)
+
+
+def joint_progress(
+    scene: SceneView, *, joint: RangedJointView,
+    target: Annotated[float, Field(ge=0, le=1, description="share of the range; 0 is closed")] = 1.0,
+) -> Array:  # fmt: skip
+    """1 - |opening - target|: 1 where the joint is open as far as wanted, 0 where it is the whole range away."""
+    return 1.0 - np.abs(joint.opening - target)
 
 
 def action_rate(scene: SceneView) -> Array:

@@ -1,0 +1,99 @@
+"""Links made of solids: what a builder adds up to a model, with masses and inertias that follow from the solids."""
+
+from collections.abc import Sequence
+from math import inf
+
+import numpy as np
+
+from anysim.conventions import IDENTITY_QUATERNION
+from anysim.math import pose as P
+from anysim.world import inertia
+from anysim.world.colors import rgb
+from anysim.world.imported import ImportedModel
+from anysim.world.model import (
+    ORIGIN,
+    Body,
+    BodyKind,
+    Box,
+    Geom,
+    Inertial,
+    Joint,
+    JointType,
+    Quat,
+    Shape,
+    Site,
+    Vec3,
+)  # fmt: skip
+from anysim.world.rounding import split, tidy
+
+Colour = str | Sequence[float]
+
+
+class Assembly:
+    """A tree of links in the making. The root is link 0, named `base`; every other link has a joint of its own name."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self._bodies: list[Body] = [Body("base", BodyKind.FREE)]
+        self._joints: list[Joint] = []
+        self._geoms: list[Geom] = []
+        self._sites: list[Site] = []
+        self._masses: list[list[Inertial]] = [[]]
+
+    def link(
+        self, name: str, position: Vec3, type: JointType, axis: Vec3, *, lower: float = -inf, upper: float = inf,
+        friction: float = 0.0, damping: float = 0.0,
+    ) -> int:  # fmt: skip
+        """A link on the root, its frame at `position` and parallel to the root's where the joint is at zero."""
+        self._bodies.append(Body(name, BodyKind.LINK, 0, tidy(np.array(position))))
+        self._masses.append([])
+        body = len(self._bodies) - 1
+        start = min(max(0.0, lower), upper)
+        self._joints.append(
+            Joint(name, body, type, axis, lower=lower, upper=upper, friction=friction, damping=damping, initial=start)
+        )
+        return body
+
+    def solid(
+        self, body: int, name: str, shape: Shape, position: Vec3, density: float, color: Colour,
+        quaternion: Quat = IDENTITY_QUATERNION, *, filled: Shape | None = None,
+    ) -> None:  # fmt: skip
+        """A homogeneous solid [kg/m^3] on a link, which has the mass of `filled` where that is given.
+
+        Solids of one link should not overlap but where `filled` says which part of one counts.
+        """
+        place, turn = split(np.array([*position, *quaternion]))
+        owner = self._bodies[body].name
+        self._geoms.append(Geom(f"{owner}.{name}", body, shape, place, turn, color=(*rgb(color), 1.0)))
+        heavy = filled or shape
+        own = inertia.of_shape(heavy, density * inertia.volume(heavy, {}), {})
+        self._masses[body].append(inertia.moved(own, np.array([*place, *turn])))
+
+    def board(
+        self, body: int, name: str, low: Vec3, high: Vec3, density: float, color: Colour, origin: Vec3 = ORIGIN
+    ) -> None:
+        """A box between two corners, given in axes parallel to the link's from a point `origin` of the same axes."""
+        corners = np.array([low, high]) - np.array(origin)
+        half, middle = 0.5 * (corners[1] - corners[0]), 0.5 * (corners[0] + corners[1])
+        self.solid(body, name, Box(tidy(half)), tidy(middle), density, color)
+
+    def site(self, body: int, name: str, position: Vec3, quaternion: Quat = IDENTITY_QUATERNION) -> None:
+        """A named frame on a link."""
+        self._sites.append(Site(name, body, *split(np.array([*position, *quaternion]))))
+
+    def model(self) -> ImportedModel:
+        """What has been put together."""
+        bodies = tuple(
+            Body(b.name, b.kind, b.parent, b.position, b.quaternion, inertia.moving(inertia.composed(parts)))
+            for b, parts in zip(self._bodies, self._masses, strict=True)
+        )
+        return ImportedModel(
+            self.name, bodies, tuple(self._joints), tuple(self._geoms), tuple(bodies[g.body].name for g in self._geoms),
+            tuple(self._sites), links={body.name: i for i, body in enumerate(bodies)},
+        )  # fmt: skip
+
+
+def turned(axis: Vec3, angle: float) -> Quat:
+    """The quaternion of a turn by `angle` [rad] about `axis`."""
+    x, y, z, w = P.from_axis_angle(np.array(axis), np.array(angle)).tolist()
+    return (x, y, z, w)
