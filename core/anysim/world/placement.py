@@ -111,6 +111,13 @@ def roots_of(world: World, entity: Entity) -> range:
     return range(entity.body_start, entity.body_stop if entity.family == INSTANCER else entity.body_start + 1)
 
 
+def root_offsets(world: World, entity: Entity) -> Array:
+    """Poses (K, 7) of the root bodies of an entity in the frame of the first of them, as they are nominally."""
+    roots = [world.bodies[b] for b in roots_of(world, entity)]
+    poses = np.array([[*body.position, *body.quaternion] for body in roots])
+    return P.compose(np.broadcast_to(P.inverse(poses[0]), poses.shape), poses)
+
+
 def place_nominally(world: World, layout: Mapping[str, PlacementSpec], order: Sequence[str]) -> World:
     """The World with its objects where the layout, by logical object, has them nominally.
 
@@ -145,10 +152,8 @@ def _in_a_row(world: World, slot: Slot, entity: Entity) -> PlacementSpec:
 
 def _move(world: World, bodies: list[Body], entity: Entity, pose: Array) -> None:
     """Put the root of an entity to a pose (7,), and with it the other roots that it has."""
-    root = world.bodies[entity.root]
-    change = P.compose(pose, P.inverse(P.pose(root.position, root.quaternion)))
-    for i in roots_of(world, entity):
-        body = world.bodies[i]
-        moved = pose if i == entity.root else P.compose(change, P.pose(body.position, body.quaternion))
-        position, quaternion = split(moved)
-        bodies[i] = replace(body, position=position, quaternion=quaternion)
+    placed = P.compose(np.broadcast_to(pose, (len(roots_of(world, entity)), 7)), root_offsets(world, entity))
+    placed[0] = pose
+    for i, one in zip(roots_of(world, entity), placed, strict=True):
+        position, quaternion = split(one)
+        bodies[i] = replace(world.bodies[i], position=position, quaternion=quaternion)
