@@ -7,6 +7,7 @@ from typing import Any
 from anysim import registry
 from anysim.errors import AnysimError, PluginError, SpecError, SpecIssue, listing, suggest
 from anysim.signatures import options_model, parameters, reference_kind
+from anysim.task.logical import CategoryView
 from anysim.task.view import Frame, ObjectView, RobotView, SceneView
 from anysim_schemas.task import TermSpec
 
@@ -66,9 +67,11 @@ def bind(kind: str, spec: TermSpec, scene: SceneView, path: str) -> Callable[...
     return lambda *arguments: function(scene, *arguments, **keywords)
 
 
-def resolve(kind: str, name: str | None, scene: SceneView) -> Frame | RobotView | ObjectView:
+def resolve(kind: str, name: str | None, scene: SceneView) -> Frame | RobotView | ObjectView | CategoryView:
     """The handle that a reference in a YAML file stands for."""
     if kind == "robot":
         return scene.robot(scene.index.robot(name).name)
     assert name is not None
+    if kind == "category":
+        return scene.category(name)
     return ObjectView(scene, name) if kind == "object" else scene.frame(name)

@@ -6,9 +6,9 @@ from pydantic import Field
 
 from anysim.conventions import Array
 from anysim.math import pose as P
-from anysim.task.view import Frame, RobotView, SceneView
+from anysim.task.view import Frame, ObjectView, RobotView, SceneView
 
-__all__ = ["at_rest", "below", "further_than", "near"]
+__all__ = ["at_rest", "below", "further_than", "near", "present"]
 
 
 def near(
@@ -38,3 +38,8 @@ def at_rest(
 def below(scene: SceneView, *, frame: Frame, height: float) -> Array:
     """The frame's origin is lower than `height` [m] in the world."""
     return frame.position[:, 2] < height
+
+
+def present(scene: SceneView, *, object: ObjectView) -> Array:
+    """The object is there in this episode."""
+    return object.present
