@@ -85,7 +85,7 @@ class Follower:
             return
         there = self.scene.presence[:, self._entities]  # (N, K, variants)
         which, k = there.argmax(axis=2), np.arange(len(self._entities))
-        self._present = there.any(axis=2)
+        self._present = np.any(there, axis=2)
         self._body = np.where(self._present, self._bodies[k, which], ABSENT)
         self._entity = np.where(self._present, self._entities[k, which], ABSENT)
         self._local = self._locals[k, which]
