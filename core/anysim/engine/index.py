@@ -123,6 +123,8 @@ class Index:
             return FrameIndex(name, WORLD, (0.0, 0.0, 0.0), IDENTITY_QUATERNION)
         if name in self._bodies or name in self._entities:
             return FrameIndex(name, self.body(name), (0.0, 0.0, 0.0), IDENTITY_QUATERNION)
+        if members(self.world, owner) and owner not in self._entities:
+            self._entity(owner)  # it stands for several: the error says which
         tools = [f"{r.name}.{t}" for r in self._robots.values() for t in r.tools]
         known = list(dict.fromkeys([*self._entities, *tools, *self._bodies, *self._sites]))
         raise NameLookupError(
