@@ -15,6 +15,7 @@ from anysim.engine.factory import ENGINE_VARIABLE, create_simulation, engine_cla
 from anysim.errors import AssetError, SpecError, SpecIssue, TaskError
 from anysim.plugin_options import resolve_options
 from anysim_schemas.load import Loaded, LoadedRun, load_run
+from anysim_schemas.object_source import Source, SourceChoice, SourceFolder
 
 if TYPE_CHECKING:
     from anysim.engine.base import SimEngine
@@ -89,13 +90,23 @@ def _asset_folders(loaded: LoadedRun) -> dict[str, Path]:
     files = {path.resolve(): path.parent for path in loaded.files}
     folders: dict[str, Path] = {}
     for name, thing in loaded.spec.world.objects.items():
-        kind = "mesh" if thing.source.mesh is not None else "asset"
-        place = Path(place_of(loaded, f"world.objects.{name}.source.{kind}").rsplit(":", 2)[0]).resolve()
+        place = Path(
+            place_of(loaded, f"world.objects.{name}.source.{_written(thing.source)}").rsplit(":", 2)[0]
+        ).resolve()
         if place in files:
             folders[name] = files[place]
         elif loaded.files:
             folders[name] = loaded.files[-1].parent
     return folders
+
+
+def _written(source: "Source") -> str:
+    """The key of a source that says where its files are."""
+    if isinstance(source, SourceFolder):
+        return "folder"
+    if isinstance(source, SourceChoice):
+        return "choice"
+    return "mesh" if source.mesh is not None else "asset"
 
 
 def located(error: SpecError | AssetError, loaded: LoadedRun) -> SpecError | AssetError:

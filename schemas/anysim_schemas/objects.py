@@ -1,71 +1,17 @@
 """Objects: what exists. Where it goes is in layout, how it behaves is in its physical fields."""
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, Strict, model_validator
 
-from anysim_schemas.base import Flag, Integer, Number, Positive, Spec
+from anysim_schemas.base import Flag, Integer, NonNegative, Number, Spec
 from anysim_schemas.errors import KeyFault
 from anysim_schemas.joints import ObjectJointSpec
-from anysim_schemas.plugin import PluginSlot
+from anysim_schemas.object_source import Count, Source, most
+from anysim_schemas.object_source import SourceSpec as SourceSpec
 from anysim_schemas.values import ColorValue, NonNegativeValue, PositiveValue
 
-SHAPES = ("box", "sphere", "cylinder", "capsule", "mesh", "asset", "procedural")
-PROCEDURAL = "procedural:"
-"""What the URI of a procedural asset begins with."""
-MESH_ENDINGS = (".stl", ".obj", ".dae", ".glb", ".ply")
-
-
-class SourceSpec(Spec):
-    """The shape of an object: exactly one of a primitive, a mesh file, an asset file or a procedural asset.
-
-    Sizes are full sizes. A bare string is the URI of an asset, or of a mesh where it ends like one.
-    """
-
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
-        *((shape,) for shape in SHAPES[:-1]), ("procedural", "params"),
-    )  # fmt: skip
-
-    box: tuple[Positive, Positive, Positive] | None = Field(default=None, description="edge lengths x, y, z [m]")
-    sphere: Positive | None = Field(default=None, description="radius [m]")
-    cylinder: tuple[Positive, Positive] | None = Field(default=None, description="radius, height along z [m]")
-    capsule: tuple[Positive, Positive] | None = Field(
-        default=None, description="radius, length of the straight part along z [m]"
-    )
-    mesh: str | None = Field(default=None, description="URI of a mesh file; collides as its convex hull")
-    asset: str | None = Field(default=None, description="URI of a URDF or MJCF file")
-    procedural: str | None = Field(
-        default=None, description="a builder of articulated assets, as in `anysim list assets`"
-    )
-    params: Annotated[dict[str, Any], PluginSlot("asset", "procedural")] = Field(
-        default_factory=dict, description="parameters owned by the builder"
-    )
-    scale: Positive = Field(default=1.0, description="scale of a mesh, an asset or a procedural asset")
-
-    @classmethod
-    def from_text(cls, text: str) -> dict[str, Any]:
-        """The URI of a mesh or an asset; `procedural:NAME` is a builder with its defaults."""
-        if text.startswith(PROCEDURAL):
-            return {"procedural": text.removeprefix(PROCEDURAL)}
-        return {"mesh" if text.lower().endswith(MESH_ENDINGS) else "asset": text}
-
-    @classmethod
-    def text_means(cls) -> str:
-        """What a bare string means, for editors."""
-        return (
-            "{asset: URI}, or {mesh: URI} where it ends in "
-            + ", ".join(MESH_ENDINGS)
-            + "; procedural:NAME is a builder"
-        )
-
-    @model_validator(mode="after")
-    def _exactly_one(self) -> "SourceSpec":
-        given = [shape for shape in SHAPES if getattr(self, shape) is not None]
-        if len(given) != 1:
-            raise ValueError(f"expected exactly one of {', '.join(SHAPES)}; got {' and '.join(given) or 'none'}")
-        if self.params and self.procedural is None:
-            raise KeyFault("`params` are for the builder that `procedural` names", "params")
-        return self
+Columns = Annotated[int, Strict(), Field(gt=0)]
 
 
 class ContactSpec(Spec):
@@ -89,7 +35,25 @@ class ObjectSpec(Spec):
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("mass",), ("density",))
 
-    source: SourceSpec = Field(description="its shape: a primitive, a mesh or an asset")
+    source: Source = Field(description="its shape: a primitive, a mesh or an asset; or several to draw from")
+    scale: PositiveValue = Field(
+        default=1.0, description="multiplies all its lengths; a range is drawn from as many sizes as `sizes` says"
+    )
+    sizes: Annotated[int, Strict(), Field(ge=2, le=64)] = Field(
+        default=5, description="in how many sizes a drawn range of `scale` is made: geometry is fixed at build"
+    )
+    count: Count | None = Field(
+        default=None, description="how many there are: cube_0, cube_1, …; one, of the bare name, where not given"
+    )
+    family: Literal["rigid", "articulation", "rigid_instancer"] | None = Field(
+        default=None, description="what it must be; as its source has it where not given. An instancer is many as one"
+    )
+    grid: tuple[Columns, Columns] | None = Field(
+        default=None, description="with rigid_instancer: columns along x and y of one layer; about a cube otherwise"
+    )
+    gap: NonNegative | None = Field(
+        default=None, description="with rigid_instancer: free space between neighbours [m]; a tenth of their size"
+    )
     fixed: Flag = Field(default=False, description="welded to the world; may still be placed anew at each reset")
     mass: PositiveValue | None = Field(default=None, description="mass [kg]; exclusive with density")
     density: PositiveValue | None = Field(
@@ -117,4 +81,18 @@ class ObjectSpec(Spec):
     def _one_of_mass_and_density(self) -> "ObjectSpec":
         if self.mass is not None and self.density is not None:
             raise ValueError("give either mass or density, not both")
+        return self
+
+    @model_validator(mode="after")
+    def _a_number_of_them(self) -> "ObjectSpec":
+        if self.count is not None and most(self.count) < 1:
+            raise KeyFault("a count that is always 0 is no object; leave the object out, or set it to null", "count")
+        if self.family == "rigid_instancer":
+            if not isinstance(self.count, int):
+                raise KeyFault("a rigid_instancer needs a `count` that is one number: it is made once, as a whole",
+                               "count" if self.count is not None else "family")  # fmt: skip
+            return self
+        for key in ("grid", "gap"):
+            if getattr(self, key) is not None:
+                raise KeyFault(f"`{key}` is for `family: rigid_instancer`; others are placed by the layout", key)
         return self

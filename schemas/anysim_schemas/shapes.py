@@ -125,8 +125,8 @@ def expanded(shapes: Shapes, text: str) -> dict[str, Any] | None:
 
 def alternatives(shapes: Shapes) -> tuple[tuple[str, ...], ...]:
     """The groups of keys that exclude each other at this place."""
-    specs = [shape.spec for shape in shapes]
-    return next((spec.alternatives for spec in specs if spec is not None and spec.alternatives), ())
+    specs = [shape.spec for shape in shapes if shape.spec is not None]
+    return tuple(dict.fromkeys(group for spec in specs for group in spec.alternatives))
 
 
 _NAMES: tuple[tuple[type, str], ...] = (

@@ -22,6 +22,7 @@ from anysim.engine.index import Index
 from anysim.engine.state import State
 from anysim.errors import AnysimError, EngineError, listing
 from anysim.math import pose as P
+from anysim.world.edit import nominal_population
 from anysim.world.kinematics import forward_kinematics
 from anysim.world.model import BodyKind, World
 
@@ -79,6 +80,7 @@ def camera_layer(
     Raises:
         NameLookupError: there is no such camera.
     """
+    world = nominal_population(world)
     index = Index(world)
     names = list(cameras) if cameras is not None else [c.name for c in world.cameras] or ["default"]
     poses = [rest(world), *([bent(world)] if moved else [])]

@@ -8,8 +8,11 @@ from anysim.world.model import Actuator, Body, BodyKind, ControlMode, Joint, Phy
 
 
 def unseen(world: World) -> World:
-    """Without cameras and contact sensors: an engine that cannot draw can still move."""
-    return replace(world, cameras=(), contact_sensors=())
+    """Without cameras and contact sensors: an engine that cannot draw can still move.
+
+    All that may ever be there is there at once: nothing of it needs an engine in which things come and go.
+    """
+    return replace(world, cameras=(), contact_sensors=(), slots=())
 
 
 def mechanisms(world: World) -> World:

@@ -6,6 +6,7 @@ from typing import NamedTuple, TypeVar
 from anysim.conventions import GROUND, IDENTITY_QUATERNION, WORLD
 from anysim.errors import NameLookupError, listing, suggest
 from anysim.world.model import Entity, EntityKind, Quat, Robot, Vec3, World
+from anysim.world.slots import members
 
 T = TypeVar("T")
 
@@ -67,11 +68,29 @@ class Index:
         return self._find("contact sensor", self._sensors, name)
 
     def entity(self, name: str) -> Entity:
-        return self.world.entities[self._find("entity", self._entities, name)]
+        """An entity by name; what can be several things is none, but each of these is (`mug~1`)."""
+        return self.world.entities[self._entity(name)]
+
+    def _entity(self, name: str) -> int:
+        slots = () if name in self._entities else members(self.world, name)
+        if slots:
+            every = [self.world.entities[e].name for slot in slots for e in sorted(slot.entities)]
+            raise NameLookupError(
+                f"'{name}' stands for {len(every)} entities of the world '{self.world.name}'; name one of them: "
+                f"{listing(every)}"
+            )
+        return self._find("entity", self._entities, name)
 
     def segmentation_id(self, name: str) -> int:
         """The id of an entity in segmentation images; 0 is the ground and the background."""
-        return 0 if name == GROUND else self._find("entity", self._entities, name) + 1
+        return 0 if name == GROUND else self._entity(name) + 1
+
+    def segmentation_ids(self, name: str) -> tuple[int, ...]:
+        """The ids of all that a name stands for in segmentation images: an entity, what a slot can be, a category."""
+        slots = members(self.world, name)
+        if not slots:
+            return (self.segmentation_id(name),)
+        return tuple(sorted(entity + 1 for slot in slots for entity in slot.entities))
 
     def robot(self, name: str | None = None) -> Robot:
         """A robot by name; None means the only one there is."""
@@ -104,6 +123,8 @@ class Index:
             return FrameIndex(name, WORLD, (0.0, 0.0, 0.0), IDENTITY_QUATERNION)
         if name in self._bodies or name in self._entities:
             return FrameIndex(name, self.body(name), (0.0, 0.0, 0.0), IDENTITY_QUATERNION)
+        if members(self.world, owner) and owner not in self._entities:
+            self._entity(owner)  # it stands for several: the error says which
         tools = [f"{r.name}.{t}" for r in self._robots.values() for t in r.tools]
         known = list(dict.fromkeys([*self._entities, *tools, *self._bodies, *self._sites]))
         raise NameLookupError(

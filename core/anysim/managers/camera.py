@@ -6,6 +6,8 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.managers.base import Manager
 from anysim.math import pose as P
+from anysim.world.model import Slot
+from anysim.world.slots import ABSENT, active_entity, single
 
 
 class CameraManager(Manager):
@@ -16,13 +18,24 @@ class CameraManager(Manager):
     def bind(self, engine: SimEngine) -> None:
         super().bind(engine)
         self._aimed = [
-            (camera.name, np.array(camera.position), engine.index.frame(camera.look_at).body)
+            (camera.name, np.array(camera.position), single(engine.world, camera.look_at))
             for camera in engine.world.cameras
             if camera.look_at is not None
         ]
 
     def reset(self, env_ids: Array) -> None:
-        for name, eye, body in self._aimed:
-            target = self.engine.get_state().body_pose[env_ids, body, :3]
+        for name, eye, slot in self._aimed:
+            target = self._target(slot, env_ids)
             eyes = np.broadcast_to(eye, target.shape)
             self.engine.set_camera_pose(name, np.concatenate([eyes, P.look_at(eyes, target)], axis=1), env_ids)
+
+    def _target(self, slot: Slot, env_ids: Array) -> Array:
+        """Where the object is (E, 3); where it is absent, the place that it has nominally."""
+        world, poses = self.engine.world, self.engine.get_state().body_pose
+        if len(slot.entities) == 1 and not world.slots:
+            return poses[env_ids, world.entities[slot.entities[0]].root, :3]
+        there = active_entity(slot, self.engine.presence[env_ids])
+        entities = np.where(there == ABSENT, slot.entities[0], there)
+        bodies = np.array([entity.root for entity in world.entities])[entities]
+        nominal = world.initial_body_pose[bodies, :3]
+        return np.where((there == ABSENT)[:, None], nominal, poses[env_ids, bodies, :3])

@@ -5,6 +5,7 @@ from anysim.managers.board import Board
 from anysim.managers.camera import CameraManager
 from anysim.managers.joints import JointManager
 from anysim.managers.layout import LayoutManager
+from anysim.managers.population import PopulationManager
 from anysim.managers.robot import RobotManager
 from anysim.managers.scene import SceneManager
 from anysim.managers.streams import Streams
@@ -15,7 +16,9 @@ from anysim_schemas.run import RunSpec
 def standard_managers(spec: RunSpec, world: World, num_envs: int) -> list[Manager]:
     """Configured and built, sharing one set of streams."""
     streams, board = Streams(num_envs), Board(num_envs)
-    managers: list[Manager] = [LayoutManager(), SceneManager(), JointManager(), RobotManager(), CameraManager()]
+    managers: list[Manager] = [
+        PopulationManager(), LayoutManager(), SceneManager(), JointManager(), RobotManager(), CameraManager(),
+    ]  # fmt: skip
     for manager in managers:
         manager.configure(spec, streams, board)
         manager.build(world)

@@ -70,6 +70,11 @@ class Pick(Skill):
         if len(ids) == 0:
             return
         self.env.scene.look(ids)
+        self.outcome[ids[~self._object.present]] = OUTCOMES.index(Outcome.ADVERSE_STATE)
+        ids = ids[self._object.present]
+        if len(ids) == 0:
+            return
+        self.env.scene.look(ids)
         self._command[ids] = self._tool.pose
         self._joints[ids] = self.env.scene.state.joint_pos[np.ix_(ids, self._chain.joints)]
         self._choose_grasp(ids)

@@ -118,6 +118,7 @@ class TaskEnv:
         self.scene.elapsed[ids] = 0
         self.scene.last_action[ids] = 0.0
         self._code[ids], self._fault[ids], self._success[ids] = RUNNING, False, False
+        self.scene.meet()
         self.scene.look(ids)
         self.mdp.reset(ids)
         rows = self.mdp.observe()
@@ -274,6 +275,7 @@ class TaskEnv:
         self._code[ids], self._fault[ids] = task["code"], task["fault"]
         self._success[ids] = task["success"]
         self.streams.restore(ids, dict(snapshot.streams))
+        self.scene.meet()
         self.scene.look(ids)
         rows = self.mdp.observe()
         self._store(rows, ids)

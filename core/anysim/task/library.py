@@ -8,6 +8,7 @@ from anysim import registry
 from anysim.errors import AnysimError, PluginError, SpecError, SpecIssue, listing, suggest
 from anysim.signatures import options_model, parameters, reference_kind
 from anysim.task.joints import JointView, RangedJointView
+from anysim.task.logical import CategoryView
 from anysim.task.view import Frame, ObjectView, RobotView, SceneView
 from anysim_schemas.task import TermSpec
 
@@ -67,11 +68,13 @@ def bind(kind: str, spec: TermSpec, scene: SceneView, path: str) -> Callable[...
     return lambda *arguments: function(scene, *arguments, **keywords)
 
 
-def resolve(kind: str, name: str | None, scene: SceneView) -> Frame | RobotView | ObjectView | JointView:
+def resolve(kind: str, name: str | None, scene: SceneView) -> Frame | RobotView | ObjectView | JointView | CategoryView:
     """The handle that a reference in a YAML file stands for."""
     if kind == "robot":
         return scene.robot(scene.index.robot(name).name)
     assert name is not None
     if kind in ("joint", "ranged joint"):
         return (JointView if kind == "joint" else RangedJointView)(scene, name)
+    if kind == "category":
+        return scene.category(name)
     return ObjectView(scene, name) if kind == "object" else scene.frame(name)

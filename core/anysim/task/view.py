@@ -5,6 +5,7 @@ env is built. A handle returns arrays for `scene.rows` only: all envs in a step,
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from typing import ClassVar
 
 import numpy as np
@@ -13,9 +14,11 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.index import FrameIndex
 from anysim.engine.state import State
-from anysim.errors import NameLookupError, listing, suggest
+from anysim.errors import NameLookupError, TaskError, listing, suggest
 from anysim.math import pose as P
-from anysim.world.model import BodyKind
+from anysim.task.logical import CategoryView, Column, Follower, columns_of, varies
+from anysim.world.model import BodyKind, Entity
+from anysim.world.slots import members, single
 
 
 class SceneView:
@@ -34,6 +37,16 @@ class SceneView:
         self._frames: dict[str, Frame] = {}
         self._robots: dict[str, RobotView] = {}
         self.moment = 0
+        self.population = 0
+        """Changes whenever who is there may have changed."""
+        self.presence = engine.presence
+        """(N, entities) bool: which of the World's entities are there; as of the last `meet`."""
+
+    def meet(self) -> None:
+        """Who is there may have changed: look again."""
+        if self.engine.world.slots:
+            self.presence = self.engine.presence
+            self.population += 1
 
     def look(self, rows: Array | None) -> None:
         """Start a new moment: all envs (None), or these."""
@@ -65,10 +78,23 @@ class SceneView:
 
     def _world_frame(self, name: str) -> "Frame":
         try:
-            return BodyFrame(self, self.index.frame(name))
+            return self._frame_of(name)
         except NameLookupError as error:
             goals = f" Goals: {listing(self.goals)}{suggest(name, list(self.goals))}." if self.goals else ""
             raise NameLookupError(f"{error}.{goals}") from None
+
+    def _frame_of(self, name: str) -> "Frame":
+        world, (owner, dot, part) = self.engine.world, name.partition(".")
+        if not members(world, owner):
+            return BodyFrame(self, self.index.frame(name))
+        slot = single(world, owner)
+        if varies(world, slot):
+            return SlotFrame(self, name, columns_of(world, name)[0])
+        return BodyFrame(self, self.index.frame(f"{slot.name}{dot}{part}"))
+
+    def category(self, name: str) -> CategoryView:
+        """The handle of all instances of a category."""
+        return CategoryView(self, name)
 
     def robot(self, name: str) -> "RobotView":
         """The handle of a robot."""
@@ -108,6 +134,11 @@ class Frame(ABC):
     def twist(self) -> Array:
         """(n, 6): velocity of the frame's origin [m/s] and rate [rad/s], world axes."""
         return np.zeros((len(self.pose), 6))
+
+    @property
+    def present(self) -> Array:
+        """(n,) bool: whether what it belongs to is there; what is absent has the world's own frame."""
+        return np.ones(len(self.scene.env_ids), dtype=bool)
 
     @abstractmethod
     def _compute(self) -> Array:
@@ -149,28 +180,83 @@ class BodyFrame(Frame):
         return np.concatenate([body[:, :3] + P.cross(body[:, 3:], arm), body[:, 3:]], axis=-1)
 
 
+class SlotFrame(Frame):
+    """A frame of an object that is not the same in every env: it follows what is there."""
+
+    def __init__(self, scene: SceneView, name: str, column: Column) -> None:
+        super().__init__(scene, name)
+        self._follower = Follower(scene, [column])
+
+    def _compute(self) -> Array:
+        return self._follower.poses[:, 0]
+
+    @property
+    def twist(self) -> Array:
+        return self._follower.twists[:, 0]
+
+    @property
+    def present(self) -> Array:
+        return self._follower.present[:, 0]
+
+
 class ObjectView:
-    """An object of the world. In YAML: its name."""
+    """An object of the world, whatever it is in each env. In YAML: its name."""
 
     reference_kind: ClassVar[str] = "object"
 
     def __init__(self, scene: SceneView, name: str) -> None:
-        entity = scene.index.entity(name)
-        self.scene, self.name, self.entity = scene, name, entity
+        world = scene.engine.world
+        self.scene, self.name = scene, name
+        self.slot = single(world, name)
+        self.entities: tuple[Entity, ...] = tuple(world.entities[e] for e in self.slot.entities)
+        """All that it can be."""
         self.root = scene.frame(name)
-        self.movable = scene.engine.world.bodies[entity.root].kind is BodyKind.FREE
-        self.joints = slice(entity.joint_start, entity.joint_stop)
-        """Its joints among the world's; none where it is rigid."""
+        self.movable = all(world.bodies[entity.root].kind is BodyKind.FREE for entity in self.entities)
+        self._nominal = world.initial_body_pose[[entity.root for entity in self.entities]]
+
+    @property
+    def entity(self) -> Entity:
+        """The entity that it is in every env; TaskError where it can be several."""
+        first, *others = self.entities
+        if others:
+            raise TaskError(
+                f"'{self.name}' can be {listing([e.name for e in self.entities])}; "
+                f"`by_entity` says which it is in each env"
+            )
+        return first
+
+    @property
+    def present(self) -> Array:
+        """(n,) bool: whether it is there."""
+        return self.root.present
+
+    @property
+    def nominal_pose(self) -> Array:
+        """(n, 7) where the World has it before anything is drawn, as what it is in each env."""
+        choice = np.array(self.slot.entities)
+        there = self.scene.presence[self.scene.env_ids[:, None], choice]
+        return self._nominal[there.argmax(axis=1)]
+
+    def by_entity(self, env_ids: Array) -> Iterator[tuple[Entity, Array]]:
+        """What it is in these envs: each entity with those of the envs in which it is there."""
+        for index, entity in zip(self.slot.entities, self.entities, strict=True):
+            own = env_ids[self.scene.presence[env_ids, index]]
+            if len(own):
+                yield entity, own
 
     @property
     def joint_pos(self) -> Array:
         """(n, J) [rad, m] of its joints."""
-        return self.scene.state.joint_pos[self.scene.rows, self.joints]
+        return self.scene.state.joint_pos[self.scene.rows, self._joints]
 
     @property
     def joint_vel(self) -> Array:
         """(n, J) [rad/s, m/s] of its joints."""
-        return self.scene.state.joint_vel[self.scene.rows, self.joints]
+        return self.scene.state.joint_vel[self.scene.rows, self._joints]
+
+    @property
+    def _joints(self) -> slice:
+        return slice(self.entity.joint_start, self.entity.joint_stop)
 
 
 class RobotView:

@@ -61,6 +61,42 @@ def locate(uri: str, *, base: Path | None = None) -> AssetFile:
     return _inside(base, rest, uri)
 
 
+def locate_folder(uri: str, *, base: Path | None = None) -> AssetFile:
+    """The folder a URI stands for: as `locate`, but for `robot_descriptions`, which names files.
+
+    Raises:
+        AssetError: an unknown scheme, a package that is not installed, a path that leaves its root, no such folder.
+    """
+    scheme, colon, rest = uri.partition(":")
+    if not colon:
+        scheme, rest = "file", uri
+    if scheme == EXAMPLE_ROBOT_DATA:
+        return _folder_inside(example_robot_data(), rest, uri)
+    if scheme == "package":
+        package, _, path = rest.partition("/")
+        return _folder_inside(_package_folders(package, uri)[-1], path, uri)
+    if scheme != "file":
+        known = ", ".join(f"{s}:" for s in SCHEMES if s != "robot_descriptions")
+        raise AssetError(f"folder '{uri}': there are no folders of '{scheme}:' (schemes: {known} or a relative path)")
+    path = Path(rest)
+    if path.is_absolute():
+        return _folder_inside(path, str(path), uri)
+    if base is None:
+        raise AssetError(f"folder '{uri}': a relative path needs the YAML file it is relative to; give an absolute one")
+    return _folder_inside(base, rest, uri)
+
+
+def _folder_inside(root: Path, rest: str, uri: str) -> AssetFile:
+    root = root.resolve()
+    resolved = (root / rest).resolve()
+    if not resolved.is_relative_to(root):
+        raise AssetError(f"folder '{uri}' leaves its root {root}: it would be {resolved}")
+    if not resolved.is_dir():
+        near = _nearest(root / rest, root)
+        raise AssetError(f"folder '{uri}' does not exist: no folder {root / rest}{near}")
+    return AssetFile(resolved, root)
+
+
 def resolve_reference(reference: str, *, file: Path, root: Path, asked_by: str) -> Path:
     """The file that a mesh reference in the URDF or MJCF `file` stands for.
 
@@ -141,7 +177,17 @@ def _inside(root: Path, rest: str, uri: str) -> AssetFile:
 
 def _from_package(rest: str, uri: str) -> AssetFile:
     package, _, path = rest.partition("/")
-    if not package.isidentifier() or not path:
+    if not path:
+        raise AssetError(f"asset '{uri}': expected package:<python package>/<path>")
+    folders = _package_folders(package, uri)
+    for folder in folders[:-1]:
+        if (folder / path).is_file():
+            return _inside(folder, path, uri)
+    return _inside(folders[-1], path, uri)
+
+
+def _package_folders(package: str, uri: str) -> list[Path]:
+    if not package.isidentifier():
         raise AssetError(f"asset '{uri}': expected package:<python package>/<path>")
     spec = importlib.util.find_spec(package)  # a top-level name: nothing is imported
     folders = [Path(p) for p in (spec.submodule_search_locations or [])] if spec is not None else []
@@ -149,10 +195,7 @@ def _from_package(rest: str, uri: str) -> AssetFile:
         raise AssetError(
             f"asset '{uri}': no Python package '{package}' is installed; install the one that has the file"
         )
-    for folder in folders[:-1]:
-        if (folder / path).is_file():
-            return _inside(folder, path, uri)
-    return _inside(folders[-1], path, uri)
+    return folders
 
 
 def _from_robot_descriptions(name: str, uri: str) -> AssetFile:

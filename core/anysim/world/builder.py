@@ -52,6 +52,7 @@ class WorldBuilder:
     def add(
         self, name: str, kind: EntityKind, model: ImportedModel, *, root: BodyKind, position: Vec3 = ORIGIN,
         quaternion: Quat = IDENTITY_QUATERNION, label: str = "", source: str = "", license: str = "",
+        category: str = "", instance: int = 0, family: str = "",
     ) -> Entity:  # fmt: skip
         """Add a model as an entity, its root floating or static at the given pose. Returns the entity."""
         body, joint = len(self.bodies), len(self.joints)
@@ -78,7 +79,8 @@ class WorldBuilder:
         self.excluded |= {(low + body, high + body) for low, high in model.excluded_pairs}
         entity = Entity(
             name, kind, body, len(self.bodies), joint, len(self.joints), label=label or name, source=source,
-            license=license,
+            license=license, category=category or name, instance=instance,
+            family=family or ("articulation" if model.joints else "rigid"),
         )  # fmt: skip
         self.entities.append(entity)
         return entity

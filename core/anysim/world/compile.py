@@ -11,14 +11,15 @@ from typing import NamedTuple
 
 from anysim.world.builder import WorldBuilder
 from anysim.world.compile_collisions import with_exclusions
-from anysim.world.compile_object import add_object
+from anysim.world.compile_population import add_population, check_names
 from anysim.world.compile_robot import add_robot
 from anysim.world.compile_sensors import compile_lights, with_sensors
 from anysim.world.compile_terrain import add_terrain
 from anysim.world.imported import ImportNote
 from anysim.world.issues import Issues
-from anysim.world.model import Actuation, Physics, World
+from anysim.world.model import Actuation, Physics, Slot, World
 from anysim.world.placement import check_layout, place_nominally
+from anysim.world.slots import by_object
 from anysim_schemas.engine import PhysicsSpec
 from anysim_schemas.run import RunSpec, WorldSpec
 
@@ -62,14 +63,19 @@ def compile_with_report(
     notes: dict[str, tuple[ImportNote, ...]] = {}
     for name, robot in content.robots.items():
         notes[name] = tuple(add_robot(builder, name, robot, issues.at("robots", name)))
+    check_names(content.objects, content.robots, issues.at("objects"))
+    slots: list[Slot] = []
     for name, thing in content.objects.items():
-        notes[name] = tuple(add_object(builder, name, thing, issues.at("objects", name), base=_base(base, name)))
-    order = check_layout(content.layout, list(content.objects), list(content.robots), issues.at("layout"))
-    world = replace(builder.build(), lights=compile_lights(content.lights, issues.at("lights")))
-    missing = {*content.robots, *content.objects} - {entity.name for entity in world.entities}
+        found, varying = add_population(builder, name, thing, issues.at("objects", name), base=_base(base, name))
+        notes[name] = tuple(found)
+        slots += varying
+    order = check_layout(content.layout, content.objects, list(content.robots), issues.at("layout"))
+    world = replace(builder.build(), slots=tuple(slots), lights=compile_lights(content.lights, issues.at("lights")))
+    missing = {*content.robots, *content.objects} - {entity.category for entity in world.entities}
     if missing:  # what looks at a thing that could not be made would only repeat its error
         issues.raise_if_any()
-    world = place_nominally(world, content.layout, order)
+    places = {name: entry for name, (_, entry) in by_object(content.layout, content.objects).items()}
+    world = place_nominally(world, places, order)
     world = with_exclusions(world, content.collisions, issues.at("collisions"))
     world = with_sensors(world, content.cameras, content.contact_sensors, issues)
     issues.raise_if_any()

@@ -9,6 +9,7 @@ from anysim.errors import NameLookupError, listing, suggest
 from anysim.world.issues import Issues
 from anysim.world.lookup import find_bodies
 from anysim.world.model import BodyKind, World
+from anysim.world.slots import members
 from anysim_schemas.collisions import CollisionsSpec
 
 Members = Mapping[str, tuple[int, ...]]
@@ -21,7 +22,7 @@ def with_exclusions(world: World, spec: CollisionsSpec, issues: Issues) -> World
     pairs: set[tuple[int, int]] = set()
     for i, pair in enumerate(spec.exclude):
         first, second = (_members(world, name, groups, issues.at("exclude", i, k)) for k, name in enumerate(pair))
-        alone = pair[0] == pair[1] and pair[0] not in groups
+        alone = pair[0] == pair[1] and pair[0] not in groups and len(first) == 1
         for (name, bodies), (other, others) in product(first.items(), second.items()):
             if name != other or alone:
                 pairs |= {(min(a, b), max(a, b)) for a, b in product(bodies, others) if _could_meet(world, a, b)}
@@ -29,7 +30,7 @@ def with_exclusions(world: World, spec: CollisionsSpec, issues: Issues) -> World
 
 
 def _group(world: World, name: str, members: tuple[str, ...], issues: Issues) -> Members:
-    taken = [GROUND, *(entity.name for entity in world.entities)]
+    taken = [GROUND, *dict.fromkeys([*world.categories, *world.logical_objects])]
     if name in taken:
         issues.add("", f"the name '{name}' is taken (entities: {listing(taken)}); give the group another one")
     found: dict[str, tuple[int, ...]] = {}
@@ -42,10 +43,13 @@ def _members(world: World, name: str, groups: Mapping[str, Members], issues: Iss
     if name in groups:
         return groups[name]
     try:
+        slots = members(world, name)
+        if len(slots) > 1:  # a category: each of its instances is a thing of its own
+            return {slot.name: find_bodies(world, slot.name) for slot in slots}
         return {name: find_bodies(world, name)}
     except NameLookupError as error:
         owner = name.partition(".")[0]
-        names = [*(entity.name for entity in world.entities), GROUND]
+        names = [*dict.fromkeys([*world.logical_objects, *world.categories]), GROUND]
         if owner in names:
             issues.add("", str(error))
         else:

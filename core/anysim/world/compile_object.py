@@ -5,12 +5,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from anysim.conventions import IDENTITY_QUATERNION
-from anysim.errors import AssetError, PluginError, SpecError
+from anysim.errors import AssetError, PluginError, SpecError, listing
 from anysim.world import inertia
 from anysim.world.assets import locate
 from anysim.world.builder import WorldBuilder
 from anysim.world.colors import Rgb, rgb
 from anysim.world.compile_joints import with_joints
+from anysim.world.forms import INSTANCER, Origin, source_text
 from anysim.world.imported import ImportedModel, ImportNote
 from anysim.world.importers import import_asset
 from anysim.world.issues import Issues
@@ -22,6 +23,7 @@ from anysim.world.model import (
     Box,
     Capsule,
     Cylinder,
+    Entity,
     EntityKind,
     Geom,
     Mesh,
@@ -35,8 +37,9 @@ from anysim.world.model import (
 from anysim.world.nominal import nominal
 from anysim.world.presets import surface
 from anysim.world.procedural.build import build
-from anysim_schemas.objects import PROCEDURAL, ContactSpec, ObjectSpec, SourceSpec
-from anysim_schemas.values import Choice, Range
+from anysim_schemas.object_source import PROCEDURAL, SourceSpec
+from anysim_schemas.objects import ContactSpec, ObjectSpec
+from anysim_schemas.values import Choice, Drawn, Range
 
 DEFAULT_DENSITY = 1000.0  # [kg/m^3], water
 DEFAULT_FRICTION = 0.8
@@ -47,24 +50,27 @@ def add_object(
     builder: WorldBuilder, name: str, spec: ObjectSpec, issues: Issues, *, base: Path | None, position: Vec3 = ORIGIN,
     quaternion: Quat = IDENTITY_QUATERNION,
 ) -> list[ImportNote]:  # fmt: skip
-    """Add an object; what is wrong goes to `issues`, whose path is that of the object. Returns an import's notes."""
-    try:
-        model = _model(name, spec, issues, base)
-    except (AssetError, PluginError) as error:
-        issues.asset("source", AssetError(str(error)))
+    """Add an object of one source; what is wrong goes to `issues`, at the path of the object. Returns import notes."""
+    if not isinstance(spec.source, SourceSpec) or isinstance(spec.scale, Drawn) or spec.count is not None:
+        issues.add("", "an object that is added to a world has one source, one scale and no count; add each by its own")
         return []
-    except SpecError as error:
-        for issue in error.issues:
-            issues.add(f"source.{issue.path}", issue.message)
-        return []
+    model = object_model(name, spec, Origin(spec.source, "source"), spec.scale, issues, base)
     if model is None:
         return []
-    model = with_joints(model, spec.joints, issues.at("joints"))
-    builder.add(
-        name, EntityKind.OBJECT, model, root=BodyKind.STATIC if spec.fixed else BodyKind.FREE, position=position,
-        quaternion=quaternion, label=spec.label or name, source=source_name(spec.source),
-    )  # fmt: skip
+    place_model(builder, name, spec, spec.source, model, position=position, quaternion=quaternion)
     return list(model.report)
+
+
+def place_model(
+    builder: WorldBuilder, name: str, spec: ObjectSpec, source: SourceSpec, model: ImportedModel, *, category: str = "",
+    instance: int = 0, family: str = "", position: Vec3 = ORIGIN, quaternion: Quat = IDENTITY_QUATERNION,
+) -> Entity:  # fmt: skip
+    """Put what `object_model` made into a World, as an entity."""
+    return builder.add(
+        name, EntityKind.OBJECT, model, root=BodyKind.STATIC if spec.fixed else BodyKind.FREE, position=position,
+        quaternion=quaternion, label=spec.label or category or name, source=source_name(source),
+        category=category, instance=instance, family=family,
+    )  # fmt: skip
 
 
 def source_name(source: SourceSpec) -> str:
@@ -72,24 +78,60 @@ def source_name(source: SourceSpec) -> str:
     return f"{PROCEDURAL}{source.procedural}" if source.procedural else source.mesh or source.asset or ""
 
 
-def _model(name: str, spec: ObjectSpec, issues: Issues, base: Path | None) -> ImportedModel | None:
+def object_model(
+    name: str, spec: ObjectSpec, origin: Origin, size: float, issues: Issues, base: Path | None
+) -> ImportedModel | None:
+    """An object as one of its sources makes it, `size` times as large; None where that fails, which `issues` says."""
+    source = origin.source.model_copy(update={"scale": origin.source.scale * size})
+    try:
+        model = _model(name, spec, source, issues, origin.key, base)
+    except (AssetError, PluginError) as error:
+        issues.asset(origin.key, AssetError(str(error)))
+        return None
+    except SpecError as error:
+        for issue in error.issues:
+            issues.add(f"{origin.key}.{issue.path}", issue.message)
+        return None
+    if model is not None:
+        model = with_joints(model, spec.joints, issues.at("joints"))
+    if model is not None and not _of_family(spec, source, model, issues):
+        return None
+    return model
+
+
+def _of_family(spec: ObjectSpec, source: SourceSpec, model: ImportedModel, issues: Issues) -> bool:
+    """Whether a model is what the spec says that it must be."""
+    what, moving = f"'{source_text(source)}'", len(model.joints)
+    if spec.family == "articulation" and not moving:
+        issues.add("family", f"{what} has no joints, so it is no articulation; leave `family` out, or say `rigid`")
+    elif spec.family in ("rigid", INSTANCER) and moving:
+        joints = listing([joint.name for joint in model.joints], 4)
+        issues.add("family", f"{what} has {moving} joints ({joints}), so it is an articulation, not `{spec.family}`")
+    else:
+        return True
+    return False
+
+
+def _model(
+    name: str, spec: ObjectSpec, source: SourceSpec, issues: Issues, key: str, base: Path | None
+) -> ImportedModel | None:
     color = _color(spec, issues)
     friction = DEFAULT_FRICTION if spec.friction is None else float(nominal(spec.friction))
     touch = surface(spec.contact or ContactSpec(), friction, spec.restitution or 0.0)
-    if spec.source.asset is not None:
-        model = import_asset(spec.source.asset, base=base, scale=spec.source.scale)
-        return _asset(spec, model, touch, color, issues)
-    if spec.source.procedural is not None:
-        model = build(spec.source.procedural, spec.source.params, scale=spec.source.scale)
-        return _asset(spec, model, touch, color, issues)
+    if source.asset is not None:
+        model = import_asset(source.asset, base=base, scale=source.scale)
+        return _asset(spec, source, model, touch, color, issues, key)
+    if source.procedural is not None:
+        model = build(source.procedural, source.params, scale=source.scale)
+        return _asset(spec, source, model, touch, color, issues, key)
     meshes: dict[str, Mesh] = {}
-    if spec.source.mesh is None:
-        solid = _primitive(spec.source)
+    if source.mesh is None:
+        solid = _primitive(source)
         geoms = [Geom("shape", 0, solid, color=(*color, 1.0), surface=touch, collides=spec.collides)]
     else:
-        geoms, solid = _mesh_geoms(spec, spec.source.mesh, touch, color, meshes, base)
+        geoms, solid = _mesh_geoms(spec, source, touch, color, meshes, base)
     if inertia.volume(solid, meshes) <= 0:
-        issues.add("source", "the mesh encloses no volume, so it cannot have a mass")
+        issues.add(key, "the mesh encloses no volume, so it cannot have a mass")
         return None
     body = Body("", BodyKind.FREE, inertial=_inertial(spec, solid, meshes))
     links = {"": 0}
@@ -99,15 +141,16 @@ def _model(name: str, spec: ObjectSpec, issues: Issues, base: Path | None) -> Im
 
 
 def _primitive(source: SourceSpec) -> Shape:
+    size = source.scale
     if source.box is not None:
         x, y, z = source.box
-        return Box((x / 2, y / 2, z / 2))
+        return Box((size * x / 2, size * y / 2, size * z / 2))
     if source.sphere is not None:
-        return Sphere(source.sphere)
+        return Sphere(size * source.sphere)
     if source.cylinder is not None:
-        return Cylinder(source.cylinder[0], source.cylinder[1] / 2)
+        return Cylinder(size * source.cylinder[0], size * source.cylinder[1] / 2)
     assert source.capsule is not None  # the spec has exactly one of them
-    return Capsule(source.capsule[0], source.capsule[1] / 2)
+    return Capsule(size * source.capsule[0], size * source.capsule[1] / 2)
 
 
 def _inertial(spec: ObjectSpec, solid: Shape, meshes: Mapping[str, Mesh]) -> inertia.Inertial:
@@ -117,11 +160,11 @@ def _inertial(spec: ObjectSpec, solid: Shape, meshes: Mapping[str, Mesh]) -> ine
 
 
 def _mesh_geoms(
-    spec: ObjectSpec, uri: str, touch: Surface, color: Rgb, meshes: dict[str, Mesh], base: Path | None
+    spec: ObjectSpec, source: SourceSpec, touch: Surface, color: Rgb, meshes: dict[str, Mesh], base: Path | None
 ) -> tuple[list[Geom], Shape]:  # fmt: skip
     """The hull to collide (also the solid that has the mass), and the coloured parts to look at; z up."""
-    path = locate(uri, base=base).path
-    scale = (spec.source.scale, spec.source.scale, spec.source.scale)
+    path = locate(source.mesh or "", base=base).path
+    scale = (source.scale, source.scale, source.scale)
     hull = collision_mesh(path, scale, upright=True)
     hull = replace(hull, name=f"{hull.name}_hull")
     meshes[hull.name] = hull
@@ -133,10 +176,12 @@ def _mesh_geoms(
     return geoms, MeshShape(hull.name)
 
 
-def _asset(spec: ObjectSpec, model: ImportedModel, touch: Surface, color: Rgb, issues: Issues) -> ImportedModel | None:
+def _asset(
+    spec: ObjectSpec, source: SourceSpec, model: ImportedModel, touch: Surface, color: Rgb, issues: Issues, key: str
+) -> ImportedModel | None:  # fmt: skip
     """What a file or a builder makes. What the spec gives explicitly wins; its mass is that of the whole object."""
     if spec.density is not None:
-        what = "a procedural asset" if spec.source.procedural else "an asset file"
+        what = "a procedural asset" if source.procedural else "an asset file"
         issues.add("density", f"{what} has its own masses; give `mass` to scale them, or leave it out")
     geoms: list[Geom] = []
     for geom in model.geoms:
@@ -148,9 +193,7 @@ def _asset(spec: ObjectSpec, model: ImportedModel, touch: Surface, color: Rgb, i
     bodies = model.bodies
     total = sum(body.inertial.mass for body in bodies)
     if not spec.fixed and bodies[0].inertial.mass <= 0:
-        issues.add(
-            "source", f"the root link '{bodies[0].name}' of a free object has no mass; add one, or set `fixed: true`"
-        )
+        issues.add(key, f"the root link '{bodies[0].name}' of a free object has no mass; add one, or set `fixed: true`")
         return None
     if spec.mass is not None and total > 0:
         factor = float(nominal(spec.mass)) / total

@@ -12,6 +12,7 @@ from anysim.world.issues import Issues
 from anysim.world.lookup import find_bodies, find_frame
 from anysim.world.model import Camera, ContactSensor, Light, World
 from anysim.world.rounding import split
+from anysim.world.slots import members
 from anysim_schemas.cameras import CameraSpec
 from anysim_schemas.contact_sensors import ContactSensorSpec
 from anysim_schemas.lights import LightSpec
@@ -63,10 +64,14 @@ def compile_camera(world: World, name: str, spec: CameraSpec, issues: Issues) ->
 def _target(world: World, spec: CameraSpec, issues: Issues) -> np.ndarray | None:
     if not isinstance(spec.look_at, str):
         return np.array(spec.look_at, dtype=float)
-    for entity in world.entities:
-        if entity.name == spec.look_at:
-            return world.initial_body_pose[entity.root, :3]
-    names = [entity.name for entity in world.entities]
+    slots = members(world, spec.look_at)
+    if len(slots) == 1:  # where several things can be it, the one that is there is looked at from reset on
+        return world.initial_body_pose[world.entities[slots[0].entities[0]].root, :3]
+    if slots:
+        which = listing([slot.name for slot in slots])
+        issues.add("look_at", f"there are {len(slots)} of '{spec.look_at}'; look at one of them: {which}")
+        return None
+    names = list(world.logical_objects)
     known = f"{suggest(spec.look_at, names)} (objects: {listing(names)})"
     issues.add("look_at", f"there is no object '{spec.look_at}' to look at{known}")
     return None

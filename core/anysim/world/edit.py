@@ -18,6 +18,7 @@ from anysim.world.compile_sensors import compile_camera
 from anysim.world.issues import Issues
 from anysim.world.model import Channel, MeshShape, Quat, Robot, Slot, Vec3, World
 from anysim.world.rounding import split
+from anysim.world.slots import members
 from anysim_schemas.base import Spec
 from anysim_schemas.cameras import CameraSpec
 from anysim_schemas.objects import ObjectSpec
@@ -76,7 +77,7 @@ def with_camera(world: World, name: str, spec: Mapping[str, Any]) -> World:
 
 
 def without_entity(world: World, name: str) -> World:
-    """Without an entity, and without what hangs on it.
+    """Without an entity, or all that a logical object or a category can be, and without what hangs on it.
 
     With it go its sites and drives, cameras that ride on it, contact sensors on it, and those that feel nothing but it.
     A camera that looks at it stays where it is.
@@ -86,7 +87,12 @@ def without_entity(world: World, name: str) -> World:
     """
     names = [entity.name for entity in world.entities]
     if name not in names:
-        raise NameLookupError(f"there is no entity '{name}'{suggest(name, names)} (entities: {listing(names)})")
+        every = [world.entities[e].name for slot in members(world, name) for e in slot.entities]
+        if not every:
+            raise NameLookupError(f"there is no entity '{name}'{suggest(name, names)} (entities: {listing(names)})")
+        for one in every:
+            world = without_entity(world, one)
+        return world
     gone = world.entities[names.index(name)]
     bodies = _numbers(len(world.bodies), range(gone.body_start, gone.body_stop))
     joints = _numbers(len(world.joints), range(gone.joint_start, gone.joint_stop))
@@ -94,6 +100,7 @@ def without_entity(world: World, name: str) -> World:
     drives = _numbers(len(world.actuators), [i for i, a in enumerate(world.actuators) if a.joint not in joints])
     geoms = tuple(replace(g, body=bodies[g.body]) for g in world.geoms if g.body in bodies)
     shown = {g.shape.mesh for g in geoms if isinstance(g.shape, MeshShape)}
+    left = {e.name for e in world.entities if e.name != name} | {slot.name for slot in _slots(world, names.index(name))}
     shift_bodies = gone.body_stop - gone.body_start
     shift_joints = gone.joint_stop - gone.joint_start
     return replace(
@@ -108,7 +115,7 @@ def without_entity(world: World, name: str) -> World:
         sites=tuple(replace(s, body=bodies[s.body]) for s in world.sites if s.body in bodies),
         actuators=tuple(replace(a, joint=joints[a.joint]) for a in world.actuators if a.joint in joints),
         cameras=tuple(
-            replace(c, body=bodies[c.body], look_at=None if c.look_at == name else c.look_at)
+            replace(c, body=bodies[c.body], look_at=c.look_at if c.look_at in left else None)
             for c in world.cameras
             if c.body in bodies
         ),
@@ -131,6 +138,17 @@ def without_entity(world: World, name: str) -> World:
         ),
         slots=_slots(world, names.index(name)),
     )  # fmt: skip
+
+
+def nominal_population(world: World) -> World:
+    """With who is there before anything is drawn, and nobody else: the same in every env, so any engine can run it."""
+    gone = [e.name for e, there in zip(world.entities, world.initial_presence, strict=True) if not there]
+    standing = {slot.name: world.entities[slot.entities[0]].name for slot in world.slots if slot.initially}
+    cameras = tuple(replace(c, look_at=standing.get(c.look_at or "", c.look_at)) for c in world.cameras)
+    world = replace(world, cameras=cameras)
+    for name in gone:
+        world = without_entity(world, name)
+    return replace(world, slots=())
 
 
 def _numbers(count: int, gone: Iterable[int]) -> dict[int, int]:
@@ -165,7 +183,7 @@ def _robot(robot: Robot, joints: Mapping[int, int], sites: Mapping[int, int], dr
 
 
 def _free_name(world: World, name: str, path: str) -> None:
-    taken = [GROUND, *(entity.name for entity in world.entities)]
+    taken = [GROUND, *dict.fromkeys([*world.logical_objects, *world.categories, *(e.name for e in world.entities)])]
     if name in taken:
         raise SpecError([SpecIssue("", path, f"the name '{name}' is taken (entities: {listing(taken)})")])
     if not (name.isascii() and name[:1].isalpha() and name.replace("_", "").isalnum()):

@@ -75,7 +75,12 @@ class EntityShape:
         self._meshes = {mesh.name: mesh for mesh in world.meshes}
         start, stop = entity.body_start, entity.body_stop
         poses = {start: np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])}
+        root = world.bodies[start]
         for i in range(start + 1, stop):
+            if world.bodies[i].parent == WORLD:  # an instancer has many roots; they are one thing where they start
+                place = P.pose(world.bodies[i].position, world.bodies[i].quaternion)
+                poses[i] = P.compose(P.inverse(P.pose(root.position, root.quaternion)), place)
+                continue
             body, joint = world.bodies[i], world.body_joint[i]
             rest = P.compose(poses[body.parent], P.pose(body.position, body.quaternion))
             poses[i] = P.compose(rest, joint_pose(world, joint, np.array(world.joints[joint].initial)))

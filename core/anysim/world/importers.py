@@ -8,7 +8,7 @@ from anysim.world.assets import AssetFile, locate
 from anysim.world.imported import ImportedModel, Importer
 from anysim.world.procedural.build import from_uri
 from anysim.world.urdf import import_urdf
-from anysim_schemas.objects import PROCEDURAL
+from anysim_schemas.object_source import PROCEDURAL
 
 _FORMATS = {".urdf": "urdf", ".xml": "mjcf", ".mjcf": "mjcf"}
 

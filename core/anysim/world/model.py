@@ -233,9 +233,11 @@ class EntityKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Entity:
-    """A logical object: a contiguous slice of bodies and joints. Bodies [body_start, body_stop), joints alike.
+    """A contiguous slice of bodies and joints, made from one source. Bodies [body_start, body_stop), joints alike.
 
-    Its segmentation id is its position in `World.entities` plus one (0 is background and ground).
+    Its segmentation id is its position in `World.entities` plus one (0 is background and ground). It stands for the
+    `instance`-th of a `category`, which is the name that it was declared by. A `rigid_instancer` has as many root
+    bodies as instances, all others have one, the first.
     """
 
     name: str
@@ -247,6 +249,9 @@ class Entity:
     label: str = ""
     source: str = ""
     license: str = ""
+    category: str = ""
+    instance: int = 0
+    family: str = "rigid"
 
     @property
     def root(self) -> int:
@@ -259,13 +264,15 @@ class Slot:
     """A logical object, the same in every episode and on every engine: the `instance`-th of a `category`.
 
     `entities` are the indices of the entities that it can be, each with its own asset; in an env at most one of
-    them is present at a time. Most slots have one, of the same name.
+    them is present at a time, nominally the first, or none where `initially` is not set. Most slots have one, of the
+    same name.
     """
 
     name: str
     category: str
     instance: int
     entities: tuple[int, ...]
+    initially: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -363,11 +370,25 @@ class World:
         return tuple(table)
 
     @cached_property
+    def logical_objects(self) -> Mapping[str, Slot]:
+        """Every logical object by name, robots too; what is the same in every env is a slot of one entity."""
+        from anysim.world.slots import logical_objects
+
+        return logical_objects(self)
+
+    @cached_property
+    def categories(self) -> Mapping[str, tuple[Slot, ...]]:
+        """The instances of each category of objects, in order."""
+        from anysim.world.slots import categories
+
+        return categories(self)
+
+    @cached_property
     def initial_presence(self) -> Array:
-        """(E,) bool, read-only: what is there in an env before anything was drawn, of each slot the first entity."""
+        """(E,) bool, read-only: what is there in an env before anything was drawn, the nominal population."""
         present = np.ones(len(self.entities), dtype=bool)
         for slot in self.slots:
-            present[list(slot.entities[1:])] = False
+            present[list(slot.entities[slot.initially :])] = False
         present.setflags(write=False)
         return present
 

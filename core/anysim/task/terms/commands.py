@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.task.view import Frame, SceneView
+from anysim.task.view import Frame, ObjectView, SceneView
 from anysim.world.geometry import EntityShape
 from anysim_schemas.values import FloatValue, Vec3Value
 
@@ -27,12 +27,25 @@ def goal_at(scene: SceneView, draw: Draw, *, position: Vec3Value) -> Array:
     return _upright(draw("position", position))
 
 
+def _top(scene: SceneView, surface: Frame) -> Array:
+    """Heights (n,) [m] of the highest point of an object as it is in each env at hand."""
+    thing = ObjectView(scene, surface.name)
+    top = surface.pose[:, 2].copy()
+    for entity, ids in thing.by_entity(scene.env_ids):
+        rows = np.isin(scene.env_ids, ids)
+        top[rows] = EntityShape(scene.engine.world, entity.name).top_height(surface.pose[rows])
+    return top
+
+
 def goal_above(
     scene: SceneView, draw: Draw, *, surface: Frame, height: FloatValue, x: FloatValue = 0.0, y: FloatValue = 0.0
 ) -> Array:
-    """A point `height` [m] above the top of an object, at x, y [m] from its centre in the object's axes."""
+    """A point `height` [m] above the top of an object, at x, y [m] from its centre in the object's axes.
+
+    Where the object is not there, it counts as a point at the world's origin.
+    """
     base = surface.position
-    top = EntityShape(scene.engine.world, surface.name).top_height(surface.pose)
+    top = _top(scene, surface)
     dx, dy = draw("x", x), draw("y", y)
     yaw = 2.0 * np.arctan2(surface.quaternion[:, 2], surface.quaternion[:, 3])
     cosine, sine = np.cos(yaw), np.sin(yaw)

@@ -20,13 +20,16 @@ def push(scene: SceneView, draw: Draw, *, object: ObjectView, force: Vec3Value, 
     due = scene.env_ids[(scene.elapsed[scene.rows] % max(1, int(every))) == 0]
     if len(due) == 0:
         return
-    force_rows = draw("force", force)[np.isin(scene.env_ids, due)]
-    wrench = np.concatenate([force_rows, np.zeros((len(due), 3))], axis=1)
-    scene.engine.apply_wrench(wrench[:, None], [object.entity.root], due)
+    wrench = np.zeros((scene.engine.num_envs, 6))
+    wrench[scene.env_ids, :3] = draw("force", force)
+    for entity, ids in object.by_entity(due):
+        scene.engine.apply_wrench(wrench[ids, None], [entity.root], ids)
 
 
 def set_friction(scene: SceneView, draw: Draw, *, object: ObjectView, friction: NonNegativeValue) -> None:
     """Give all surfaces of an object one friction coefficient."""
-    geoms = scene.index.geoms_of(object.entity)
-    rows = draw("friction", friction)
-    scene.engine.set_parameters("geom.friction", np.repeat(rows[:, None], len(geoms), axis=1), scene.env_ids, geoms)
+    values = np.zeros(scene.engine.num_envs)
+    values[scene.env_ids] = draw("friction", friction)
+    for entity, ids in object.by_entity(scene.env_ids):
+        geoms = scene.index.geoms_of(entity)
+        scene.engine.set_parameters("geom.friction", np.repeat(values[ids, None], len(geoms), axis=1), ids, geoms)

@@ -5,11 +5,13 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.joints import RangedJointView
+from anysim.task.logical import CategoryView
 from anysim.task.view import Frame, ObjectView, RobotView, SceneView
 
 __all__ = [
-    "frame_pose", "frame_twist", "goal_position", "joint_opening", "joint_pos", "joint_vel", "last_action",
-    "object_joint_pos", "object_joint_vel", "offset",
+    "category_offset", "category_pose", "category_present", "category_twist", "frame_pose", "frame_twist",
+    "goal_position", "joint_opening", "joint_pos", "joint_vel", "last_action", "object_joint_pos", "object_joint_vel",
+    "offset", "present",
 ]  # fmt: skip
 
 
@@ -40,8 +42,11 @@ def joint_opening(scene: SceneView, *, joint: RangedJointView) -> Array:
 
 def frame_pose(scene: SceneView, *, frame: Frame) -> Array:
     """Pose of a frame in the world [m, xyzw]; the quaternion's scalar part is never negative."""
-    pose = frame.pose
-    return np.concatenate([pose[:, :3], np.where(pose[:, 6:] < 0, -pose[:, 3:], pose[:, 3:])], axis=1)
+    return _unsigned(frame.pose)
+
+
+def _unsigned(pose: Array) -> Array:
+    return np.concatenate([pose[..., :3], np.where(pose[..., 6:] < 0, -pose[..., 3:], pose[..., 3:])], axis=-1)
 
 
 def frame_twist(scene: SceneView, *, frame: Frame) -> Array:
@@ -57,6 +62,34 @@ def goal_position(scene: SceneView, *, goal: Frame) -> Array:
 def offset(scene: SceneView, *, a: Frame, b: Frame) -> Array:
     """From a to b, in the axes of a [m]."""
     return P.rotate_inverse(a.quaternion, b.position - a.position)
+
+
+def present(scene: SceneView, *, object: ObjectView) -> Array:
+    """1 where an object is there, 0 where it is not."""
+    return object.present[:, None].astype(float)
+
+
+def category_present(scene: SceneView, *, category: CategoryView) -> Array:
+    """For each instance of a category 1 where it is there, 0 where it is not: the mask of the terms below."""
+    return category.present.astype(float)
+
+
+def category_pose(scene: SceneView, *, category: CategoryView) -> Array:
+    """Poses of all instances of a category, one after the other [m, xyzw]; absent ones have the world's own frame."""
+    return _unsigned(category.poses).reshape(len(category.poses), -1)
+
+
+def category_twist(scene: SceneView, *, category: CategoryView) -> Array:
+    """Velocities of all instances of a category, one after the other [m/s, rad/s]; zero for absent ones."""
+    twists = category.twists
+    return twists.reshape(len(twists), -1)
+
+
+def category_offset(scene: SceneView, *, frame: Frame, category: CategoryView) -> Array:
+    """From a frame to each instance of a category, in the frame's axes [m]; zero for absent ones."""
+    apart = category.positions - frame.position[:, None]
+    turn = np.broadcast_to(frame.quaternion[:, None], (*apart.shape[:2], 4))
+    return np.where(category.present[..., None], P.rotate_inverse(turn, apart), 0.0).reshape(len(apart), -1)
 
 
 def last_action(scene: SceneView) -> Array:

@@ -8,9 +8,12 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.joints import JointView, RangedJointView
-from anysim.task.view import Frame, RobotView, SceneView
+from anysim.task.view import Frame, ObjectView, RobotView, SceneView
 
-__all__ = ["at_rest", "below", "closed", "further_than", "joint_above", "joint_below", "joint_still", "near", "opened"]
+__all__ = [
+    "at_rest", "below", "closed", "further_than", "joint_above", "joint_below", "joint_still", "near", "opened",
+    "present",
+]  # fmt: skip
 
 
 def near(
@@ -74,3 +77,8 @@ def joint_still(
 ) -> Array:  # fmt: skip
     """A joint moves no faster than `speed`."""
     return np.abs(joint.velocity) <= speed
+
+
+def present(scene: SceneView, *, object: ObjectView) -> Array:
+    """The object is there in this episode."""
+    return object.present

@@ -11,7 +11,7 @@ from anysim.signatures import options_model, parameters
 from anysim.world.imported import ImportedModel
 from anysim.world.procedural.scaling import scaled
 from anysim_schemas.errors import KeyFault
-from anysim_schemas.objects import PROCEDURAL
+from anysim_schemas.object_source import PROCEDURAL
 
 
 def build(name: str, params: Mapping[str, Any], *, scale: float = 1.0) -> ImportedModel:

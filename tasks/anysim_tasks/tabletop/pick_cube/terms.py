@@ -19,7 +19,7 @@ def lifted_toward(
     The share of the goal's height that is reached multiplies it, so that pushing along the table earns nothing.
     """
     position = object.root.position
-    rest = scene.engine.world.initial_body_pose[object.entity.root, 2]
+    rest = object.nominal_pose[:, 2]
     share = np.clip((position[:, 2] - rest) / np.maximum(goal.position[:, 2] - rest, 1e-6), 0.0, 1.0)
     return share * (1.0 - np.tanh(norm(goal.position - position) / scale))
 
