@@ -7,6 +7,7 @@ from anysim.managers.layout import LayoutManager
 from anysim.managers.robot import RobotManager
 from anysim.managers.scene import SceneManager
 from anysim.managers.streams import Streams
+from anysim.managers.terrain import TerrainManager
 from anysim.world.model import World
 from anysim_schemas.run import RunSpec
 
@@ -14,7 +15,7 @@ from anysim_schemas.run import RunSpec
 def standard_managers(spec: RunSpec, world: World, num_envs: int) -> list[Manager]:
     """Configured and built, sharing one set of streams."""
     streams, board = Streams(num_envs), Board(num_envs)
-    managers: list[Manager] = [LayoutManager(), SceneManager(), RobotManager(), CameraManager()]
+    managers: list[Manager] = [TerrainManager(), LayoutManager(), SceneManager(), RobotManager(), CameraManager()]
     for manager in managers:
         manager.configure(spec, streams, board)
         manager.build(world)

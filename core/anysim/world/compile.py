@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+from anysim.conventions import GROUND
 from anysim.world.builder import WorldBuilder
 from anysim.world.compile_collisions import with_exclusions
 from anysim.world.compile_object import add_object
@@ -31,7 +32,7 @@ class Compiled(NamedTuple):
 
 
 Base = Path | Mapping[str, Path] | None
-"""What relative asset paths are relative to: one folder, or one for each object by name (the files that wrote them)."""
+"""What relative asset paths are relative to: one folder, or one for each object by name and for the ground."""
 
 
 def compile_world(spec: RunSpec | WorldSpec, *, physics: PhysicsSpec | None = None, base: Base = None) -> World:
@@ -58,7 +59,7 @@ def compile_with_report(
     else:
         issues, content, steps = Issues(), spec, physics or PhysicsSpec()
     builder = WorldBuilder(World(name=content.name, physics=neutral_physics(steps)))
-    add_terrain(builder, content.terrain)
+    add_terrain(builder, content.terrain, issues.at("terrain"), _base(base, GROUND))
     notes: dict[str, tuple[ImportNote, ...]] = {}
     for name, robot in content.robots.items():
         notes[name] = tuple(add_robot(builder, name, robot, issues.at("robots", name)))

@@ -5,8 +5,11 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.view import Frame, RobotView, SceneView
+from anysim_schemas.base import Number, Positive
 
-__all__ = ["frame_pose", "frame_twist", "goal_position", "joint_pos", "joint_vel", "last_action", "offset"]
+__all__ = [
+    "frame_pose", "frame_twist", "goal_position", "height_scan", "joint_pos", "joint_vel", "last_action", "offset",
+]  # fmt: skip
 
 
 def joint_pos(scene: SceneView, *, robot: RobotView) -> Array:
@@ -38,6 +41,29 @@ def goal_position(scene: SceneView, *, goal: Frame) -> Array:
 def offset(scene: SceneView, *, a: Frame, b: Frame) -> Array:
     """From a to b, in the axes of a [m]."""
     return P.rotate_inverse(a.quaternion, b.position - a.position)
+
+
+def height_scan(
+    scene: SceneView, *, frame: Frame, length: Positive = 1.6, width: Positive = 1.0, spacing: Positive = 0.1,
+    offset: Number = 0.0, limit: Positive = 1.0,
+) -> Array:  # fmt: skip
+    """How far the ground lies below a frame [m], on a grid around it that turns with its yaw.
+
+    From the world's own geometry, so the same on every engine. The grid is `length` along the frame's heading times
+    `width` across, points `spacing` apart: first along, then across, both from the lowest. `offset` is taken off, what
+    is left is clipped to [-limit, limit]; where there is no ground it is `limit`.
+    """
+    along, across = (np.arange(round(extent / spacing) + 1) * spacing - extent / 2 for extent in (length, width))
+    x, y = (values.ravel() for values in np.meshgrid(along, across))
+    turn = frame.quaternion
+    yaw = np.arctan2(
+        2.0 * (turn[:, 3] * turn[:, 2] + turn[:, 0] * turn[:, 1]), 1.0 - 2.0 * (turn[:, 1] ** 2 + turn[:, 2] ** 2)
+    )[:, None]
+    cosine, sine = np.cos(yaw), np.sin(yaw)
+    at = frame.position
+    points = np.stack([at[:, :1] + cosine * x - sine * y, at[:, 1:2] + sine * x + cosine * y], axis=-1)
+    below = at[:, 2:] - scene.engine.world.ground.heights_at(points) - offset
+    return np.clip(np.nan_to_num(below, nan=limit), -limit, limit)
 
 
 def last_action(scene: SceneView) -> Array:
