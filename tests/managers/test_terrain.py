@@ -169,3 +169,35 @@ def test_a_colour_moves_no_tile() -> None:
         more.reset(seed=2)
         assert (terrain(plain).level == terrain(more).level).all()
         assert (plain.scene.origin == more.scene.origin).all()
+
+
+def test_the_look_of_a_room_is_drawn_and_its_form_is_not() -> None:
+    spec = {
+        "engine": "null",
+        "world": {
+            "room": {
+                "furniture": {"table": 1, "chair": 2},
+                "wall_color": {"choice": ["white", "beige"]},
+                "floor_color": {"range": [[0.3, 0.2, 0.1], [0.6, 0.5, 0.4]]},
+                "furniture_color": {"choice": ["brown", "gray", "navy"]},
+            },
+        },
+        "task": {"observations": {"policy": ["last_action"]}},
+    }
+    with anysim.make(spec, num_envs=16) as env:
+        env.reset(seed=0)
+        engine = env.engine
+        names = [g.name for g in engine.world.geoms]
+
+        def colors(geom: str) -> set[tuple[float, ...]]:
+            rows = engine.get_parameters("geom.color", indices=[names.index(geom)])[:, 0]
+            return {tuple(row) for row in np.round(rows, 6).tolist()}
+
+        assert len(colors("room.wall0_0")) == 2
+        assert colors("room.wall0_0") == colors("room.lintel0_0")
+        assert len(colors("room.floor")) == 16
+        assert len(colors("table.main0")) == 3
+        drawn = env.streams.draws
+        assert any(d["terrain/chair_0/color"] != d["terrain/chair_1/color"] for d in drawn)
+        poses = engine.get_state().body_pose
+        assert (poses == poses[:1]).all()

@@ -11,7 +11,7 @@ from anysim.managers.values import draw
 from anysim.math import pose as P
 from anysim.world.geometry import EntityShape, ground_top
 from anysim.world.model import BodyKind, World
-from anysim.world.placement import placement_order
+from anysim.world.placement import initial_root, placement_order
 from anysim_schemas.layout import PlacementSpec
 
 ATTEMPTS = 100
@@ -74,7 +74,8 @@ class LayoutManager(Manager):
             low, high = shape.bounds(np.concatenate([[x, y, 0.0], turn]))
             top = ground_top(self._world, low[:2], high[:2])
         else:
-            top = self._shapes[entry.on].top_height(placed[entry.on])
+            support = placed.get(entry.on)  # what has no place of its own, as furniture, stays where it is
+            top = self._shapes[entry.on].top_height(initial_root(self._world, entry.on) if support is None else support)
         return shape.resting_on(top, np.asarray(x), np.asarray(y), turn)
 
     def _draw(self, env: int, name: str, entry: PlacementSpec, field: str, attempt: int) -> Any:

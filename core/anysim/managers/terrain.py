@@ -1,4 +1,4 @@
-"""TerrainManager: on which piece of ground an env stands, and what the ground looks like in this episode.
+"""TerrainManager: on which piece of ground an env stands, and what ground and room look like in this episode.
 
 With `choose: curriculum` each env keeps its level over episodes. Whoever judges progress calls `promote` or `demote`;
 that takes effect at the env's next reset. An env that has mastered the last level gets one of all levels, by its
@@ -6,7 +6,7 @@ streams, so that it does not forget the easy ones.
 """
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,15 +16,49 @@ from anysim.errors import TaskError
 from anysim.managers.base import Manager
 from anysim.managers.values import draw, is_random
 from anysim.world.colors import rgb
+from anysim.world.compile_room import MAIN, ROOM, furniture_names
 from anysim.world.model import World
+from anysim_schemas.run import WorldSpec
 from anysim_schemas.values import Choice
 
 NEVER = -1
 """The level of an env that was not reset yet."""
 
 
+class Look(NamedTuple):
+    """Geoms that have one colour, which is drawn in each episode."""
+
+    color: Any
+    stream: str
+    source: str
+    geoms: Array
+
+
+def _looks(spec: WorldSpec, world: World) -> list[Look]:
+    """What of the ground and of the room looks different in each episode."""
+    owner = {b: e.name for e in world.entities for b in range(e.body_start, e.body_stop)}
+    parts: list[tuple[Any, str, str, list[int]]] = [
+        (spec.terrain.color, "terrain/color", "world.terrain.color",
+         [i for i, g in enumerate(world.geoms) if g.body == WORLD and g.name == GROUND and g.visible])
+    ]  # fmt: skip
+    if spec.room is not None:
+        shell = {i: g.name.partition(".")[2] for i, g in enumerate(world.geoms) if owner.get(g.body) == ROOM}
+        walls = [i for i, name in shell.items() if name.startswith(("wall", "lintel", "sill"))]
+        floor = [i for i, name in shell.items() if name == "floor"]
+        parts.append((spec.room.floor_color, "terrain/room/floor_color", "world.room.floor_color", floor))
+        parts.append((spec.room.wall_color, "terrain/room/wall_color", "world.room.wall_color", walls))
+        for name in furniture_names(spec.room):
+            main = [
+                i for i, g in enumerate(world.geoms)
+                if owner.get(g.body) == name and g.name.partition(".")[2].startswith(MAIN)
+            ]  # fmt: skip
+            stream = f"terrain/{name}/color"
+            parts.append((spec.room.furniture_color, stream, "world.room.furniture_color", main))
+    return [Look(c, s, p, np.array(g)) for c, s, p, g in parts if is_random(c) and g]
+
+
 class TerrainManager(Manager):
-    """Chooses tiles and writes `board.origin`; draws the ground's colour. Geometry is part of the World and stays."""
+    """Chooses tiles and writes `board.origin`; draws colours of ground and room. Geometry is part of the World."""
 
     name = "terrain"
 
@@ -42,9 +76,7 @@ class TerrainManager(Manager):
         self.column = np.zeros(n, dtype=int)
         """(N,) the column of each env's tile."""
         self._change = np.zeros(n, dtype=int)
-        self._geoms = np.array([
-            i for i, g in enumerate(world.geoms) if g.body == WORLD and g.name == GROUND
-        ], dtype=int)  # fmt: skip
+        self._looks = _looks(self.spec.world, world)
 
     def bind(self, engine: SimEngine) -> None:
         super().bind(engine)
@@ -79,13 +111,10 @@ class TerrainManager(Manager):
             for env in env_ids:
                 self._choose(int(env))
             self.board.origin[env_ids] = self._origins[self.level[env_ids], self.column[env_ids]]
-        if is_random(self._spec.color) and len(self._geoms):
-            path = "world.terrain.color"
-            drawn = [draw(self._spec.color, "terrain/color", self.streams, int(e), source=path) for e in env_ids]
+        for look in self._looks:
+            drawn = [draw(look.color, look.stream, self.streams, int(e), source=look.source) for e in env_ids]
             rows = np.array([[[*rgb(color), 1.0]] for color in drawn])
-            self.engine.set_parameters(
-                "geom.color", np.repeat(rows, len(self._geoms), axis=1), env_ids, self._geoms
-            )  # fmt: skip
+            self.engine.set_parameters("geom.color", np.repeat(rows, len(look.geoms), axis=1), env_ids, look.geoms)
 
     def _choose(self, env: int) -> None:
         path = "world.terrain.tiles"

@@ -14,6 +14,7 @@ from anysim.world.builder import WorldBuilder
 from anysim.world.compile_collisions import with_exclusions
 from anysim.world.compile_object import add_object
 from anysim.world.compile_robot import add_robot
+from anysim.world.compile_room import add_room, furniture_names
 from anysim.world.compile_sensors import compile_lights, with_sensors
 from anysim.world.compile_terrain import add_terrain
 from anysim.world.imported import ImportNote
@@ -60,12 +61,14 @@ def compile_with_report(
         issues, content, steps = Issues(), spec, physics or PhysicsSpec()
     builder = WorldBuilder(World(name=content.name, physics=neutral_physics(steps)))
     add_terrain(builder, content.terrain, issues.at("terrain"), _base(base, GROUND))
+    add_room(builder, content, issues)
     notes: dict[str, tuple[ImportNote, ...]] = {}
     for name, robot in content.robots.items():
         notes[name] = tuple(add_robot(builder, name, robot, issues.at("robots", name)))
     for name, thing in content.objects.items():
         notes[name] = tuple(add_object(builder, name, thing, issues.at("objects", name), base=_base(base, name)))
-    order = check_layout(content.layout, list(content.objects), list(content.robots), issues.at("layout"))
+    fixtures = [] if content.room is None else furniture_names(content.room)
+    order = check_layout(content.layout, list(content.objects), list(content.robots), issues.at("layout"), fixtures)
     world = replace(builder.build(), lights=compile_lights(content.lights, issues.at("lights")))
     missing = {*content.robots, *content.objects} - {entity.name for entity in world.entities}
     if missing:  # what looks at a thing that could not be made would only repeat its error

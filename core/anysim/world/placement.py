@@ -43,10 +43,14 @@ def placement_order(layout: Mapping[str, PlacementSpec]) -> tuple[list[str], lis
 
 
 def check_layout(
-    layout: Mapping[str, PlacementSpec], objects: Sequence[str], robots: Sequence[str], issues: Issues
-) -> list[str]:
-    """The entries that can be placed, in order; what is wrong goes to `issues`, whose path is that of the layout."""
-    supports = [*objects, *robots, GROUND]
+    layout: Mapping[str, PlacementSpec], objects: Sequence[str], robots: Sequence[str], issues: Issues,
+    fixtures: Sequence[str] = (),
+) -> list[str]:  # fmt: skip
+    """The entries that can be placed, in order; what is wrong goes to `issues`, whose path is that of the layout.
+
+    `fixtures` have their place and can carry others: the furniture of a room.
+    """
+    supports = [*objects, *robots, *fixtures, GROUND]
     for name, spec in layout.items():
         if name in robots:
             issues.add(name, f"'{name}' is a robot; its place is in world.robots.{name} (position, yaw)")
