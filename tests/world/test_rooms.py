@@ -69,17 +69,18 @@ def check(made: Furnished, spec: RoomSpec) -> None:
         assert flat.distance(points, np.stack([wall.start, wall.at(wall.length)])).min() >= 0.25
 
 
-def test_two_hundred_rooms_keep_the_rules(capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("count", [16, pytest.param(200, marks=pytest.mark.slow)])
+def test_random_rooms_keep_the_rules(count: int, capsys: pytest.CaptureFixture[str]) -> None:
     """Nothing overlaps, doors are clear, free points are free; also says what a room costs."""
     times: list[float] = []
-    for seed in range(200):
+    for seed in range(count):
         fields = random_spec(seed)
         start = perf_counter()
         made = room(**fields)
         times.append(perf_counter() - start)
         check(made, RoomSpec.model_validate(fields))
     with capsys.disabled():
-        print(f"\n200 rooms: {1e3 * np.mean(times):.0f} ms each, the longest {1e3 * max(times):.0f} ms")
+        print(f"\n{count} rooms: {1e3 * np.mean(times):.0f} ms each, the longest {1e3 * max(times):.0f} ms")
 
 
 def test_equal_specs_are_equal_rooms_and_seeds_differ() -> None:
