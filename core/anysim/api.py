@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from anysim import registry
+from anysim.conventions import GROUND
 from anysim.engine.factory import ENGINE_VARIABLE, create_simulation, engine_class
 from anysim.errors import AssetError, SpecError, SpecIssue, TaskError
 from anysim.plugin_options import resolve_options
@@ -86,13 +87,14 @@ def compile_world(
 
 
 def _asset_folders(loaded: LoadedRun) -> dict[str, Path]:
-    """For each object the folder of the file that says where its asset is; an override is relative to the last file."""
+    """The folder of the file that says where an object's or the ground's asset is; overrides: of the last file."""
     files = {path.resolve(): path.parent for path in loaded.files}
     folders: dict[str, Path] = {}
+    keys = {GROUND: "world.terrain.file"}
     for name, thing in loaded.spec.world.objects.items():
-        place = Path(
-            place_of(loaded, f"world.objects.{name}.source.{_written(thing.source)}").rsplit(":", 2)[0]
-        ).resolve()
+        keys[name] = f"world.objects.{name}.source.{_written(thing.source)}"
+    for name, key in keys.items():
+        place = Path(place_of(loaded, key).rsplit(":", 2)[0]).resolve()
         if place in files:
             folders[name] = files[place]
         elif loaded.files:

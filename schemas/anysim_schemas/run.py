@@ -15,6 +15,7 @@ from anysim_schemas.lights import LightSpec
 from anysim_schemas.objects import ObjectSpec
 from anysim_schemas.record import RecordSpec
 from anysim_schemas.robots import RobotSpec
+from anysim_schemas.rooms import RoomSpec
 from anysim_schemas.task import TaskSpec
 from anysim_schemas.terrain import TerrainSpec
 
@@ -24,6 +25,7 @@ class WorldSpec(Spec):
 
     name: Name = Field(default="world", description="the name of the world")
     terrain: TerrainSpec = Field(default=TerrainSpec(), description="the ground")
+    room: RoomSpec | None = Field(default=None, description="walls around the scene, and furniture")
     robots: dict[Name, RobotSpec] = Field(default_factory=dict, description="robots by name")
     objects: dict[Name, ObjectSpec] = Field(default_factory=dict, description="objects by name")
     layout: dict[Name, PlacementSpec] = Field(default_factory=dict, description="where each object goes at reset")

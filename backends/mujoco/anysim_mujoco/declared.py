@@ -35,7 +35,10 @@ _APPROXIMATE = {
         "per m/s at 2 ms; 0 gives 0.13"
     ),
 }
-_ABSENT = (Capability.LIVE_EDIT_NATIVE,)
+_ABSENT = (
+    Capability.LIVE_EDIT_NATIVE,
+    Capability.TERRAIN_TRIMESH,  # MuJoCo collides the convex hull of a mesh
+)
 CAPABILITIES = Capabilities.of(
     *(c for c in Capability if c not in _APPROXIMATE and c not in _ABSENT), approximate=_APPROXIMATE
 )

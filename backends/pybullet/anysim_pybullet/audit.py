@@ -6,7 +6,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.math import pose as P
-from anysim.world.model import HeightFieldShape, Plane
+from anysim.world.shapes import is_ground
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.client import Env
 from anysim_pybullet.urdf import UNLIMITED
@@ -42,7 +42,7 @@ def geom_volumes(env: Env) -> Array:
     volumes = np.zeros(len(env.plan.world.geoms))
     for number, (uid, link) in env.shape_at.items():
         index = int(env.plan.rules.geoms[number])
-        if isinstance(env.plan.world.geoms[index].shape, Plane | HeightFieldShape):
+        if is_ground(env.plan.world.geoms[index].shape):
             continue
         for shape in bullet().getCollisionShapeData(uid, link, physicsClientId=env.id):
             volumes[index] = _volume(shape[2], shape[3], env, uid, link)

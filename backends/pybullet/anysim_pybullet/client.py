@@ -2,6 +2,7 @@
 
 import tempfile
 from functools import lru_cache
+from math import sqrt
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from anysim.conventions import WORLD, Array
 from anysim.errors import EngineError
 from anysim.math import pose as P
 from anysim.quiet import quiet
-from anysim.world.model import Geom, HeightField, HeightFieldShape, Plane, World
+from anysim.world.model import Geom, HeightField, HeightFieldShape, MeshShape, Plane, World
 from anysim_pybullet.bullet import bullet, connect, disconnect
 from anysim_pybullet.cast import Cast
 from anysim_pybullet.options import PybulletOptions
@@ -22,6 +23,9 @@ from anysim_pybullet.urdf import body_link, joint_name, shape_link, tree_urdf, w
 STATIC_GROUP, MOVING_GROUP = 2, 1
 MIMIC_FORCE = 1e6
 """[N, N m] that keeps a joint with its leader: more than anything here exerts."""
+
+QUARTER = np.array([0.0, 0.0, sqrt(0.5), sqrt(0.5)])
+"""A quarter turn about z."""
 
 APART = 500.0
 """[m] between trees that are moved apart, larger than any of them."""
@@ -49,8 +53,13 @@ class Plan:
                 self.urdf.append(self._write(f"t{tree.number}", tree_urdf(world, self.frames, tree, shapes, meshes)))
             self.ground: list[tuple[int, Geom, str]] = []
             for number, geom in self.rules.shapes_on(np.array([WORLD]))[WORLD]:
-                whole = isinstance(geom.shape, Plane | HeightFieldShape)
-                file = "" if whole else self._write(f"w{number}", world_geom_urdf(geom, meshes))
+                match geom.shape:
+                    case Plane() | HeightFieldShape():
+                        file = ""
+                    case MeshShape(name, concave=True):
+                        file = str(meshes[name])
+                    case _:
+                        file = self._write(f"w{number}", world_geom_urdf(geom, meshes))
                 self.ground.append((number, geom, file))
         except BaseException:
             self.close()
@@ -151,8 +160,14 @@ class Env:
             shape = p.createCollisionShape(p.GEOM_PLANE, planeNormal=[0, 0, 1], physicsClientId=self.id)
         elif isinstance(geom.shape, HeightFieldShape):
             shape, middle = self._height_field(p, self.plan.fields[geom.shape.heightfield])
-            # Bullet puts the middle of the range of heights at the frame
             place = place + P.rotate(np.array(turn), np.array([0.0, 0.0, middle]))
+            turn = P.multiply(np.array(turn), QUARTER).tolist()
+        elif isinstance(geom.shape, MeshShape) and geom.shape.concave:
+            # from the file: arrays pass through shared memory, which is too small for large ground
+            flags = p.GEOM_FORCE_CONCAVE_TRIMESH
+            shape = p.createCollisionShape(p.GEOM_MESH, fileName=file, flags=flags, physicsClientId=self.id)
+            if shape < 0:
+                raise EngineError(f"Bullet cannot make a triangle mesh of geom '{geom.name}'")
         else:
             flags = p.URDF_IGNORE_VISUAL_SHAPES | p.URDF_USE_IMPLICIT_CYLINDER
             uid = p.loadURDF(file, useFixedBase=1, flags=flags, physicsClientId=self.id)
@@ -166,11 +181,15 @@ class Env:
         self.body_of.setdefault(uid, {})[link] = self.plan.world.geoms[self.plan.rules.geoms[number]].body
 
     def _height_field(self, p: Any, field: HeightField) -> tuple[int, float]:
+        """The shape, in a frame that is a `QUARTER` turned: Bullet cuts cells along the other diagonal than the World.
+
+        Also the middle of the range of heights, which Bullet puts at the shape's frame.
+        """
         heights = np.asarray(field.heights, dtype=float)
         rows, cols = heights.shape
         shape = p.createCollisionShape(
-            p.GEOM_HEIGHTFIELD, meshScale=[field.size[0] / (cols - 1), field.size[1] / (rows - 1), 1.0],
-            heightfieldData=heights.ravel().tolist(), numHeightfieldRows=cols, numHeightfieldColumns=rows,
+            p.GEOM_HEIGHTFIELD, meshScale=[field.size[1] / (rows - 1), field.size[0] / (cols - 1), 1.0],
+            heightfieldData=heights.T[::-1].ravel().tolist(), numHeightfieldRows=rows, numHeightfieldColumns=cols,
             physicsClientId=self.id,
         )  # fmt: skip
         return shape, 0.5 * float(heights.min() + heights.max())

@@ -36,7 +36,7 @@ def _volume(kind: Any, shape: Any) -> float:
         case Capsule():
             radius = float(shape.radius)
             return 2 * pi * radius**2 * float(shape.half_length) + 4 / 3 * pi * radius**3
-        case MeshShape():
+        case MeshShape(concave=False):
             corners = np.asarray(shape.vertices, dtype=float)[np.asarray(shape.triangles)]
             return abs(float(np.linalg.det(corners).sum() / 6))
         case _:

@@ -8,7 +8,8 @@ import numpy as np
 from anysim.conventions import WORLD, Array
 from anysim.errors import EngineError
 from anysim.math import pose as P
-from anysim.world.model import BodyKind, HeightFieldShape, Joint, Plane, World
+from anysim.world.model import BodyKind, Joint, World
+from anysim.world.shapes import is_ground
 from anysim_sapien.inertia import Principal, principal
 from anysim_sapien.layout import Layout
 from anysim_sapien.meeting import Meeting
@@ -126,7 +127,7 @@ def _check(world: World) -> None:
             tendon_chain(world, index)
     for geom in world.geoms:
         loose = geom.body != WORLD and world.bodies[geom.body].kind is not BodyKind.STATIC
-        if loose and geom.collides and isinstance(geom.shape, HeightFieldShape | Plane):
+        if loose and geom.collides and is_ground(geom.shape):
             raise EngineError(
                 f"geom '{geom.name}' is a {type(geom.shape).__name__} on a body that moves; PhysX collides these with "
                 f"fixed bodies alone"

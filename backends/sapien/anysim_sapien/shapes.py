@@ -82,8 +82,12 @@ def _shape(world: World, geom: Geom, material: Any) -> Any:
             return physx.PhysxCollisionShapeCapsule(radius, half_length, material)
         case Cylinder(radius, half_length):
             return physx.PhysxCollisionShapeCylinder(radius, half_length, material)
-        case MeshShape(name):
+        case MeshShape(name, concave):
             mesh = next(mesh for mesh in world.meshes if mesh.name == name)
+            if concave:
+                triangles = np.asarray(mesh.faces, dtype=np.uint32)
+                vertices = np.asarray(mesh.vertices, dtype=np.float32)
+                return physx.PhysxCollisionShapeTriangleMesh(vertices, triangles, UNIT_SCALE, material)
             return physx.PhysxCollisionShapeConvexMesh(
                 np.asarray(mesh.vertices, dtype=np.float32), UNIT_SCALE, material
             )

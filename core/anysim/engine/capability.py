@@ -16,6 +16,7 @@ class Capability(StrEnum):
     CONTACTS = "contacts"
     TERRAIN_PLANE = "terrain: plane"
     TERRAIN_HEIGHTFIELD = "terrain: heightfield"
+    TERRAIN_TRIMESH = "terrain: triangle mesh (concave)"
     SHAPE_MESH = "shape: mesh (convex)"
     MIMIC_JOINTS = "mimic joints"
     JOINT_FRICTION = "joint friction"

@@ -58,6 +58,11 @@ def needs_of(world: World) -> list[Need]:
             need(Capability.TERRAIN_PLANE, f"{what} is a plane")
         elif isinstance(geom.shape, HeightFieldShape):
             need(Capability.TERRAIN_HEIGHTFIELD, f"{what} is a height field")
+        elif isinstance(geom.shape, MeshShape) and geom.shape.concave:
+            need(
+                Capability.TERRAIN_TRIMESH,
+                f"{what} is a triangle mesh; `kind: heightfield` with the same `file` is its heights seen from above",
+            )
         elif isinstance(geom.shape, MeshShape):
             need(Capability.SHAPE_MESH, f"{what} is a mesh")
         if geom.surface.restitution > 0:

@@ -45,9 +45,9 @@ class NullEngine(SimEngine):
             C.CONTACT_SENSORS: "read zero: kinematic engine",
             **dict.fromkeys(
                 (
-                    C.CONTACTS, C.TERRAIN_PLANE, C.TERRAIN_HEIGHTFIELD, C.SHAPE_MESH, C.JOINT_FRICTION, C.ARMATURE,
-                    C.EFFORT_LIMITS, C.ACTUATION_EXPLICIT, C.ACTUATION_NATIVE, C.GRAVITY_COMPENSATION, C.RESTITUTION,
-                    C.TORSIONAL_FRICTION,
+                    C.CONTACTS, C.TERRAIN_PLANE, C.TERRAIN_HEIGHTFIELD, C.TERRAIN_TRIMESH, C.SHAPE_MESH,
+                    C.JOINT_FRICTION, C.ARMATURE, C.EFFORT_LIMITS, C.ACTUATION_EXPLICIT, C.ACTUATION_NATIVE,
+                    C.GRAVITY_COMPENSATION, C.RESTITUTION, C.TORSIONAL_FRICTION,
                 ),
                 _IGNORED,
             ),

@@ -1,8 +1,11 @@
-"""CameraManager: view points are state of the world; those that look at an object are aimed when it has been placed."""
+"""CameraManager: view points are state of the world; those that look at an object are aimed when it has been placed.
+
+A camera that is fixed to the world belongs to its env's scene: it moves with the env's piece of ground.
+"""
 
 import numpy as np
 
-from anysim.conventions import Array
+from anysim.conventions import WORLD, Array
 from anysim.engine.base import SimEngine
 from anysim.managers.base import Manager
 from anysim.math import pose as P
@@ -22,11 +25,21 @@ class CameraManager(Manager):
             for camera in engine.world.cameras
             if camera.look_at is not None
         ]
+        self._fixed = [
+            (camera.name, np.array([*camera.position, *camera.quaternion]))
+            for camera in engine.world.cameras
+            if camera.body == WORLD and camera.look_at is None and engine.world.tiles
+        ]
 
     def reset(self, env_ids: Array) -> None:
+        origin = self.board.origin[env_ids]
+        for name, pose in self._fixed:
+            moved = np.tile(pose, (len(env_ids), 1))
+            moved[:, :3] += origin
+            self.engine.set_camera_pose(name, moved, env_ids)
         for name, eye, slot in self._aimed:
             target = self._target(slot, env_ids)
-            eyes = np.broadcast_to(eye, target.shape)
+            eyes = eye + origin
             self.engine.set_camera_pose(name, np.concatenate([eyes, P.look_at(eyes, target)], axis=1), env_ids)
 
     def _target(self, slot: Slot, env_ids: Array) -> Array:

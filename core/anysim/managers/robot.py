@@ -14,7 +14,7 @@ from anysim.managers.base import Manager
 from anysim.managers.streams import Origin
 from anysim.managers.values import draw_rows
 from anysim.signatures import options_model
-from anysim.world.model import World
+from anysim.world.model import BodyKind, World
 
 
 class ActionSlice(NamedTuple):
@@ -76,6 +76,8 @@ class RobotManager(Manager):
         for robot in self._world.robots:
             spec = self.spec.world.robots[robot.name]
             entity = self.engine.index.entity(robot.name)
+            if self._world.tiles:
+                self._stand(entity.root, env_ids)
             joints = np.arange(entity.joint_start, entity.joint_stop)
             home = np.array([self._world.joints[j].initial for j in joints])
             position = np.tile(home, (len(env_ids), 1))
@@ -97,6 +99,14 @@ class RobotManager(Manager):
         for s in self.slices:
             s.controller.reset(env_ids, self._targets[np.ix_(env_ids, s.controller.channel.actuators)])
         self.engine.set_control(position=self._targets[env_ids], env_ids=env_ids)
+
+    def _stand(self, root: int, env_ids: Array) -> None:
+        """Put a base on the env's piece of ground, where the spec has it relative to that."""
+        body = self._world.bodies[root]
+        poses = np.tile(np.array([*body.position, *body.quaternion]), (len(env_ids), 1, 1))
+        poses[:, 0, :3] += self.board.origin[env_ids]
+        twist = np.zeros((len(env_ids), 1, 6)) if body.kind is BodyKind.FREE else None
+        self.engine.set_body_state(poses, twist, env_ids, [root])
 
     def _add_noise(
         self, position: Array, column: int, joint: int, robot: str, deviation: Array, env_ids: Array

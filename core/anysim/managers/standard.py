@@ -9,6 +9,7 @@ from anysim.managers.population import PopulationManager
 from anysim.managers.robot import RobotManager
 from anysim.managers.scene import SceneManager
 from anysim.managers.streams import Streams
+from anysim.managers.terrain import TerrainManager
 from anysim.world.model import World
 from anysim_schemas.run import RunSpec
 
@@ -17,7 +18,8 @@ def standard_managers(spec: RunSpec, world: World, num_envs: int) -> list[Manage
     """Configured and built, sharing one set of streams."""
     streams, board = Streams(num_envs), Board(num_envs)
     managers: list[Manager] = [
-        PopulationManager(), LayoutManager(), SceneManager(), JointManager(), RobotManager(), CameraManager(),
+        TerrainManager(), PopulationManager(), LayoutManager(), SceneManager(), JointManager(), RobotManager(),
+        CameraManager(),
     ]  # fmt: skip
     for manager in managers:
         manager.configure(spec, streams, board)

@@ -12,6 +12,7 @@ from anysim.errors import SnapshotError, TaskError
 from anysim.managers.base import RESET_ORDER, Manager
 from anysim.managers.robot import RobotManager
 from anysim.managers.streams import Streams
+from anysim.managers.terrain import TerrainManager
 from anysim.task.contract import (
     FAILED,
     RUNNING,
@@ -46,6 +47,9 @@ class TaskEnv:
         self.managers = sorted(managers, key=lambda m: order[m.name])
         for manager in self.managers:
             manager.bind(engine)
+        if self.managers:
+            self.scene.origin = self.managers[0].board.origin
+            self.scene.terrain = next((m for m in self.managers if isinstance(m, TerrainManager)), None)
         self.robots = next((m for m in self.managers if isinstance(m, RobotManager)), None)
         self.action_dim = 0 if self.robots is None else self.robots.action_dim
         self.mdp = Mdp(spec.task, self.scene, self.streams)

@@ -15,6 +15,7 @@ from anysim.engine.base import SimEngine
 from anysim.engine.index import FrameIndex
 from anysim.engine.state import State
 from anysim.errors import NameLookupError, TaskError, listing, suggest
+from anysim.managers.terrain import TerrainManager
 from anysim.math import pose as P
 from anysim.task.logical import CategoryView, Column, Follower, columns_of, varies
 from anysim.world.model import BodyKind, Entity
@@ -31,6 +32,10 @@ class SceneView:
         """Goal poses (N, 7) by command name."""
         self.last_action = np.zeros((engine.num_envs, 0))
         """The last action (N, A), clipped."""
+        self.origin = np.zeros((engine.num_envs, 3))
+        """Where each env's scene stands on the ground (N, 3) [m]."""
+        self.terrain: TerrainManager | None = None
+        """Who stands on which tile, and at which level; None in an env without managers."""
         self.elapsed = np.zeros(engine.num_envs, dtype=np.int64)
         """Control steps since each env's reset (N,)."""
         self._rows: Array | slice = slice(None)

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from anysim.world import inertia
-from anysim.world.model import Body, BodyKind, Entity, HeightFieldShape, Plane, World
+from anysim.world.model import Body, BodyKind, Entity, World
+from anysim.world.shapes import is_ground
 
 
 class AuditRow(NamedTuple):
@@ -51,7 +52,7 @@ def world_rows(world: World) -> list[AuditRow]:
         rows.append(AuditRow(actuator.name, "effort limit", (actuator.effort_limit,)))
     meshes = {mesh.name: mesh for mesh in world.meshes}
     for geom in world.geoms:
-        if geom.collides and not isinstance(geom.shape, Plane | HeightFieldShape):
+        if geom.collides and not is_ground(geom.shape):
             rows.append(AuditRow(geom.name, "volume", (inertia.volume(geom.shape, meshes),)))
             rows.append(AuditRow(geom.name, "friction", (geom.surface.friction,)))
     return rows

@@ -39,6 +39,7 @@ class WorldBuilder:
         self._meshes = {mesh.name: mesh for mesh in world.meshes}
         self._heightfields = {field.name: field for field in world.heightfields}
         self.excluded = set(world.excluded_pairs)
+        self.tiles = world.tiles
 
     def build(self) -> World:
         """The World as it is now."""
@@ -47,6 +48,7 @@ class WorldBuilder:
             sites=tuple(self.sites), actuators=tuple(self.actuators), entities=tuple(self.entities),
             robots=tuple(self.robots), meshes=tuple(self._meshes.values()),
             heightfields=tuple(self._heightfields.values()), excluded_pairs=frozenset(self.excluded),
+            tiles=self.tiles,
         )  # fmt: skip
 
     def add(
@@ -70,7 +72,7 @@ class WorldBuilder:
         for part in model.geoms:
             shape: Any = part.shape
             if isinstance(shape, MeshShape):
-                shape = MeshShape(own[shape.mesh])
+                shape = replace(shape, mesh=own[shape.mesh])
             elif isinstance(shape, HeightFieldShape):
                 shape = HeightFieldShape(full(shape.heightfield))
             self.geoms.append(replace(part, name=full(part.name), body=shift(part.body), shape=shape))

@@ -1,8 +1,12 @@
 """Colour names, with the values of CSS."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from anysim.errors import listing, suggest
+from anysim.world.issues import Issues
+from anysim.world.nominal import nominal
+from anysim_schemas.values import Choice, Range
 
 Rgb = tuple[float, float, float]
 
@@ -32,3 +36,18 @@ def rgb(color: str | Sequence[float]) -> Rgb:
         return COLORS[color]
     red, green, blue = color
     return (float(red), float(green), float(blue))
+
+
+def nominal_rgb(color: Any, otherwise: Rgb, issues: Issues, path: str = "color") -> Rgb:
+    """The nominal colour of a value, `otherwise` where it names none; all that may be drawn are checked."""
+    try:
+        if isinstance(color, Choice):
+            first, *_ = [rgb(one) for one in color.choice]
+            return first
+        if isinstance(color, Range):
+            low, high = (rgb(bound) for bound in color.range)
+            return (0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]))
+        return otherwise if color is None else rgb(nominal(color))
+    except ValueError as error:
+        issues.add(path, str(error))
+        return otherwise

@@ -9,10 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+from anysim.conventions import GROUND
 from anysim.world.builder import WorldBuilder
 from anysim.world.compile_collisions import with_exclusions
 from anysim.world.compile_population import add_population, check_names
 from anysim.world.compile_robot import add_robot
+from anysim.world.compile_room import add_room, furniture_names
 from anysim.world.compile_sensors import compile_lights, with_sensors
 from anysim.world.compile_terrain import add_terrain
 from anysim.world.imported import ImportNote
@@ -32,7 +34,7 @@ class Compiled(NamedTuple):
 
 
 Base = Path | Mapping[str, Path] | None
-"""What relative asset paths are relative to: one folder, or one for each object by name (the files that wrote them)."""
+"""What relative asset paths are relative to: one folder, or one for each object by name and for the ground."""
 
 
 def compile_world(spec: RunSpec | WorldSpec, *, physics: PhysicsSpec | None = None, base: Base = None) -> World:
@@ -59,7 +61,8 @@ def compile_with_report(
     else:
         issues, content, steps = Issues(), spec, physics or PhysicsSpec()
     builder = WorldBuilder(World(name=content.name, physics=neutral_physics(steps)))
-    add_terrain(builder, content.terrain)
+    add_terrain(builder, content.terrain, issues.at("terrain"), _base(base, GROUND))
+    add_room(builder, content, issues)
     notes: dict[str, tuple[ImportNote, ...]] = {}
     for name, robot in content.robots.items():
         notes[name] = tuple(add_robot(builder, name, robot, issues.at("robots", name)))
@@ -69,7 +72,8 @@ def compile_with_report(
         found, varying = add_population(builder, name, thing, issues.at("objects", name), base=_base(base, name))
         notes[name] = tuple(found)
         slots += varying
-    order = check_layout(content.layout, content.objects, list(content.robots), issues.at("layout"))
+    fixtures = [] if content.room is None else furniture_names(content.room)
+    order = check_layout(content.layout, content.objects, list(content.robots), issues.at("layout"), fixtures)
     world = replace(builder.build(), slots=tuple(slots), lights=compile_lights(content.lights, issues.at("lights")))
     missing = {*content.robots, *content.objects} - {entity.category for entity in world.entities}
     if missing:  # what looks at a thing that could not be made would only repeat its error

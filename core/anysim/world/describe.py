@@ -3,7 +3,7 @@
 from math import degrees, inf
 from typing import NamedTuple
 
-from anysim.world.model import JointType, Shape, World
+from anysim.world.model import JointType, MeshShape, Shape, World
 
 
 class EntityRow(NamedTuple):
@@ -85,4 +85,6 @@ def shape_name(shape: Shape) -> str:
     """`box`, `mesh`, `height field` and so on."""
     names = {"MeshShape": "mesh", "HeightFieldShape": "height field"}
     kind = type(shape).__name__
+    if isinstance(shape, MeshShape) and shape.concave:
+        return "triangle mesh"
     return names.get(kind, kind.lower())

@@ -13,20 +13,8 @@ from anysim.conventions import WORLD, Array
 from anysim.errors import NameLookupError, listing, suggest
 from anysim.math import pose as P
 from anysim.world.kinematics import joint_pose
-from anysim.world.model import (
-    Box,
-    Capsule,
-    Cylinder,
-    Geom,
-    HeightField,
-    HeightFieldShape,
-    Mesh,
-    MeshShape,
-    Plane,
-    Shape,
-    Sphere,
-    World,
-)  # fmt: skip
+from anysim.world.model import Box, Capsule, Cylinder, Geom, Mesh, MeshShape, Shape, Sphere, World
+from anysim.world.shapes import is_ground
 
 
 def shape_bounds(shape: Shape, pose: Array, meshes: Mapping[str, Mesh]) -> tuple[Array, Array]:
@@ -84,7 +72,7 @@ class EntityShape:
             body, joint = world.bodies[i], world.body_joint[i]
             rest = P.compose(poses[body.parent], P.pose(body.position, body.quaternion))
             poses[i] = P.compose(rest, joint_pose(world, joint, np.array(world.joints[joint].initial)))
-        own = [g for g in world.geoms if start <= g.body < stop and not isinstance(g.shape, Plane | HeightFieldShape)]
+        own = [g for g in world.geoms if start <= g.body < stop and not is_ground(g.shape)]
         chosen: list[Geom] = [g for g in own if g.collides] or own
         self.shapes = tuple(
             PlacedShape(g.shape, P.compose(poses[g.body], P.pose(g.position, g.quaternion))) for g in chosen
@@ -120,36 +108,7 @@ class EntityShape:
 
 def ground_top(world: World, low: Array, high: Array) -> Array:
     """The greatest height (...) [m] of the ground under rectangles from `low` to `high` (..., 2); 0 without ground."""
-    height = np.full(np.shape(low)[:-1], -np.inf)
-    fields = {field.name: field for field in world.heightfields}
-    for geom in world.geoms:
-        if geom.body != WORLD:
-            continue
-        if isinstance(geom.shape, Plane):
-            height = np.maximum(height, geom.position[2])
-        elif isinstance(geom.shape, HeightFieldShape):
-            field, shift = fields[geom.shape.heightfield], np.array(geom.position)
-            flat_low, flat_high = (np.reshape(v - shift[:2], (-1, 2)) for v in (low, high))
-            tops = [_field_top(field, a, b) for a, b in zip(flat_low, flat_high, strict=True)]
-            height = np.maximum(height, np.reshape(tops, height.shape) + shift[2])
-    return np.where(np.isfinite(height), height, 0.0)
-
-
-def _field_top(field: HeightField, low: Array, high: Array) -> float:
-    """The greatest height of the bilinear surface over a rectangle.
-
-    It is at a corner of the rectangle, or of one of the pieces that the grid cuts it into.
-    """
-    rows, cols = field.heights.shape
-    steps = np.array([field.size[0] / (cols - 1), field.size[1] / (rows - 1)])
-    a, b = (np.clip((v + np.array(field.size) / 2) / steps, 0, (cols - 1, rows - 1)) for v in (low, high))
-    u, v = (np.array([a[k], *range(int(np.ceil(a[k])), int(b[k]) + 1), b[k]]) for k in (0, 1))
-    j, i = np.minimum(u.astype(int), cols - 2), np.minimum(v.astype(int), rows - 2)
-    t, s = u - j, (v - i)[:, None]
-    h = field.heights
-    near = (1 - t) * h[i][:, j] + t * h[i][:, j + 1]
-    far = (1 - t) * h[i + 1][:, j] + t * h[i + 1][:, j + 1]
-    return float(((1 - s) * near + s * far).max())
+    return np.nan_to_num(world.ground.top(low, high), nan=0.0)
 
 
 def _at_origin(quaternion: Array) -> Array:

@@ -50,6 +50,21 @@ def collision_mesh(path: Path, scale: Vec3 = _ONE, *, upright: bool = False) -> 
     return _mesh(path.stem, key, cache.load_or_make("meshes", key, make))
 
 
+def whole_mesh(path: Path, scale: Vec3 = _ONE, *, upright: bool = False) -> Mesh:
+    """All triangles of a mesh file, with equal vertices joined. See `visual_parts` for the arguments."""
+    key = _key(path, "whole", scale, upright)
+
+    def make() -> dict[str, Array]:
+        pieces = _load(path, scale, upright)
+        starts = np.cumsum([0, *(len(piece.vertices) for piece in pieces[:-1])])
+        faces = np.concatenate([piece.faces + start for piece, start in zip(pieces, starts, strict=True)])
+        vertices = np.concatenate([piece.vertices for piece in pieces])
+        joined = _decimate(vertices, faces, len(faces))
+        return {"vertices": joined[0], "faces": joined[1]}
+
+    return _mesh(path.stem, key, cache.load_or_make("meshes", key, make))
+
+
 def hull_of(name: str, vertices: Array, source: str) -> Mesh:
     """The convex hull of vertices (V, 3) that some parser has read; `source` is a digest of where they come from."""
     key = cache.digest(_VERSION, "hull of", source, str(HULL_VERTICES))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 from math import inf
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -54,6 +54,9 @@ from anysim.world.shapes import (
 from anysim.world.shapes import (
     Vec3 as Vec3,
 )
+
+if TYPE_CHECKING:
+    from anysim.world.terrain.ground import Ground
 
 Quat = tuple[float, float, float, float]
 ORIGIN: Vec3 = (0.0, 0.0, 0.0)
@@ -276,6 +279,20 @@ class Slot:
 
 
 @dataclass(frozen=True, slots=True)
+class Tile:
+    """A piece of tiled ground: its level of difficulty (`row`), its kind (`column`), and where a scene stands on it.
+
+    `origin` [m] is on the tile's platform, relative to that of the first tile, which is the world's origin.
+    """
+
+    row: int
+    column: int
+    kind: str
+    difficulty: float
+    origin: Vec3
+
+
+@dataclass(frozen=True, slots=True)
 class Channel:
     """Joints of a robot that are commanded together: indices into the world's joints and actuators.
 
@@ -345,6 +362,8 @@ class World:
     """
     slots: tuple[Slot, ...] = ()
     """Logical objects that may differ between envs. An entity that is in none of them is there in every env."""
+    tiles: tuple[Tile, ...] = ()
+    """Pieces of tiled ground, row by row; an env's scene stands on one of them. Empty where there is one ground."""
 
     @cached_property
     def hash(self) -> str:
@@ -352,6 +371,13 @@ class World:
         from anysim.world.digest import world_hash
 
         return world_hash(self)
+
+    @cached_property
+    def ground(self) -> "Ground":
+        """Heights of the ground, from the neutral geometry."""
+        from anysim.world.terrain.ground import Ground
+
+        return Ground(self)
 
     @cached_property
     def body_joint(self) -> tuple[int, ...]:

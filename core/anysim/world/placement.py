@@ -46,12 +46,16 @@ def placement_order(layout: Mapping[str, PlacementSpec]) -> tuple[list[str], lis
 
 
 def check_layout(
-    layout: Mapping[str, PlacementSpec], objects: Mapping[str, ObjectSpec], robots: Sequence[str], issues: Issues
-) -> list[str]:
-    """The logical objects that can be placed, in order; what is wrong goes to `issues`, at the path of the layout."""
+    layout: Mapping[str, PlacementSpec], objects: Mapping[str, ObjectSpec], robots: Sequence[str], issues: Issues,
+    fixtures: Sequence[str] = (),
+) -> list[str]:  # fmt: skip
+    """The logical objects that can be placed, in order; what is wrong goes to `issues`, at the path of the layout.
+
+    `fixtures` have their place and can carry others: the furniture of a room.
+    """
     logical = [one for name, spec in objects.items() for one in instances(name, spec)]
     known = list(dict.fromkeys([*objects, *logical]))
-    supports = [*logical, *robots, GROUND]
+    supports = [*logical, *robots, *fixtures, GROUND]
     for name, spec in layout.items():
         if name in robots:
             issues.add(name, f"'{name}' is a robot; its place is in world.robots.{name} (position, yaw)")

@@ -46,9 +46,13 @@ class Cylinder:
 
 @dataclass(frozen=True, slots=True)
 class MeshShape:
-    """A mesh of the world by name; as a collision shape it is its convex hull."""
+    """A mesh of the world by name; as a collision shape it is its convex hull.
+
+    A `concave` one collides triangle by triangle, and is ground: fixed to the world.
+    """
 
     mesh: str
+    concave: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +63,11 @@ class HeightFieldShape:
 
 
 Shape = Plane | Box | Sphere | Capsule | Cylinder | MeshShape | HeightFieldShape
+
+
+def is_ground(shape: Shape) -> bool:
+    """Whether a shape is a surface without a volume: it has no bounds or mass, and only what is fixed can have it."""
+    return isinstance(shape, Plane | HeightFieldShape) or (isinstance(shape, MeshShape) and shape.concave)
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,8 +23,8 @@ def _upright(position: Array) -> Array:
 
 
 def goal_at(scene: SceneView, draw: Draw, *, position: Vec3Value) -> Array:
-    """A point in the world [m]."""
-    return _upright(draw("position", position))
+    """A point in the world [m]; on tiled ground relative to the env's tile."""
+    return _upright(draw("position", position) + scene.origin[scene.rows])
 
 
 def _top(scene: SceneView, surface: Frame) -> Array:

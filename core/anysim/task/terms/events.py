@@ -6,13 +6,27 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.task.view import ObjectView, SceneView
+from anysim.errors import TaskError
+from anysim.math.pose import norm
+from anysim.task.view import Frame, ObjectView, SceneView
 from anysim_schemas.base import NonNegative
 from anysim_schemas.values import NonNegativeValue, Vec3Value
 
-__all__ = ["push", "set_friction"]
+__all__ = ["climb_levels", "push", "set_friction"]
 
 Draw = Callable[[str, Any], Array]
+
+
+def climb_levels(scene: SceneView, draw: Draw, *, frame: Frame, promote: NonNegative, demote: NonNegative) -> None:
+    """The terrain's curriculum, for `when: step`: by how far a frame is from its tile's origin when an episode ends.
+
+    At the next reset an env gets harder ground where that was more than `promote` [m], easier where it was less than
+    `demote`.
+    """
+    if scene.terrain is None:
+        raise TaskError("climb_levels needs the managers of an env")
+    away = norm((frame.position - scene.origin[scene.rows])[:, :2])
+    scene.terrain.promote(scene.env_ids, (away > promote).astype(int) - (away < demote))
 
 
 def push(scene: SceneView, draw: Draw, *, object: ObjectView, force: Vec3Value, every: NonNegative = 50) -> None:

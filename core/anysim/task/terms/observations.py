@@ -7,11 +7,12 @@ from anysim.math import pose as P
 from anysim.task.joints import RangedJointView
 from anysim.task.logical import CategoryView
 from anysim.task.view import Frame, ObjectView, RobotView, SceneView
+from anysim_schemas.base import Number, Positive
 
 __all__ = [
     "category_offset", "category_pose", "category_present", "category_twist", "frame_pose", "frame_twist",
-    "goal_position", "joint_opening", "joint_pos", "joint_vel", "last_action", "object_joint_pos", "object_joint_vel",
-    "offset", "present",
+    "goal_position", "height_scan", "joint_opening", "joint_pos", "joint_vel", "last_action", "object_joint_pos",
+    "object_joint_vel", "offset", "present",
 ]  # fmt: skip
 
 
@@ -90,6 +91,29 @@ def category_offset(scene: SceneView, *, frame: Frame, category: CategoryView) -
     apart = category.positions - frame.position[:, None]
     turn = np.broadcast_to(frame.quaternion[:, None], (*apart.shape[:2], 4))
     return np.where(category.present[..., None], P.rotate_inverse(turn, apart), 0.0).reshape(len(apart), -1)
+
+
+def height_scan(
+    scene: SceneView, *, frame: Frame, length: Positive = 1.6, width: Positive = 1.0, spacing: Positive = 0.1,
+    offset: Number = 0.0, limit: Positive = 1.0,
+) -> Array:  # fmt: skip
+    """How far the ground lies below a frame [m], on a grid around it that turns with its yaw.
+
+    From the world's own geometry, so the same on every engine. The grid is `length` along the frame's heading times
+    `width` across, points `spacing` apart: first along, then across, both from the lowest. `offset` is taken off, what
+    is left is clipped to [-limit, limit]; where there is no ground it is `limit`.
+    """
+    along, across = (np.arange(round(extent / spacing) + 1) * spacing - extent / 2 for extent in (length, width))
+    x, y = (values.ravel() for values in np.meshgrid(along, across))
+    turn = frame.quaternion
+    yaw = np.arctan2(
+        2.0 * (turn[:, 3] * turn[:, 2] + turn[:, 0] * turn[:, 1]), 1.0 - 2.0 * (turn[:, 1] ** 2 + turn[:, 2] ** 2)
+    )[:, None]
+    cosine, sine = np.cos(yaw), np.sin(yaw)
+    at = frame.position
+    points = np.stack([at[:, :1] + cosine * x - sine * y, at[:, 1:2] + sine * x + cosine * y], axis=-1)
+    below = at[:, 2:] - scene.engine.world.ground.heights_at(points) - offset
+    return np.clip(np.nan_to_num(below, nan=limit), -limit, limit)
 
 
 def last_action(scene: SceneView) -> Array:

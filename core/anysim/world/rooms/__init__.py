@@ -1,0 +1,1 @@
+"""Procedural rooms: plans with walls and openings, furniture from primitives, and where there is free space."""
