@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.math import pose as P
 from anysim.world.compile import compile_world
+from anysim.world.jacobians import frame_jacobians
 from anysim.world.model import Inertial, Joint, World
 from anysim_schemas.engine import PhysicsSpec
 from anysim_schemas.run import WorldSpec
@@ -118,3 +120,47 @@ def random_positions(world: World, rng: np.random.Generator, rows: int) -> Array
     low = np.array([max(joint.lower, -7.0) for joint in world.joints])
     high = np.array([min(joint.upper, 7.0) for joint in world.joints])
     return rng.uniform(low, high, (rows, len(world.joints)))
+
+
+# ---------------------------------------------------------------------- a hand that opens a drawer
+
+BY_HAND: dict[str, Any] = {
+    "robots": {"panda": {"robot": "franka_panda"}},
+    "objects": {
+        "tray": {
+            "source": {
+                "procedural": "cabinet",
+                "params": {"size": [0.2, 0.3, 0.15], "columns": [["drawer"]], "base": 0.0, "handle": {"length": 0.1}},
+            },
+            "fixed": True,
+        }
+    },
+    "layout": {"tray": {"position": [0.0, 0.0, 0.0]}},
+}
+"""A drawer under a Panda's hand: it is turned so that its front looks up, and its bar lies between the fingers."""
+
+IN_HAND = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+"""The axes of a handle in those of a tool that holds it: x against the approach, z along what the fingers close on."""
+
+
+def by_hand(**joint: Any) -> World:
+    """`BY_HAND` with the drawer's joint as given."""
+    tray = {**BY_HAND["objects"]["tray"], "joints": {"drawer_1": joint}}
+    spec = WorldSpec.model_validate({**BY_HAND, "objects": {"tray": tray}})
+    return compile_world(spec, physics=PhysicsSpec(dt=DT, control_dt=10 * DT))
+
+
+def under_the_hand(world: World, hand: Array) -> Array:
+    """Where the tray's root (7,) must be for its handle to lie in a hand at this pose (7,)."""
+    site = next(site for site in world.sites if site.name == "tray.drawer_1.handle")
+    link = world.bodies[site.body]
+    handle = P.compose(P.pose(link.position, link.quaternion), P.pose(site.position, site.quaternion))
+    wanted = P.compose(hand, P.pose((0.0, 0.0, 0.0), tuple(P.from_matrix(IN_HAND).tolist())))
+    return P.compose(wanted, P.inverse(handle))
+
+
+def lifted(world: World, poses: Array, body: int, point: Array, joints: list[int], rise: float) -> Array:
+    """Changes (K,) of an arm's joints that raise a point of a body [m] and do not turn it."""
+    jacobian = frame_jacobians(world, poses)[body]
+    jacobian[:3] += np.cross(jacobian[3:], (point - poses[body, :3]), axis=0)
+    return np.linalg.pinv(jacobian[:, joints]) @ np.array([0.0, 0.0, rise, 0.0, 0.0, 0.0])

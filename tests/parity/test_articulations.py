@@ -17,11 +17,14 @@ from tests.parity.articulated import (
     CABINET,
     DT,
     about_axis,
+    by_hand,
     compiled,
     falling,
+    lifted,
     pushed,
     random_positions,
     trolley,
+    under_the_hand,
 )  # fmt: skip
 
 
@@ -210,6 +213,47 @@ def test_a_thing_in_a_drawer_comes_out_with_it(name: str) -> None:
         push(engine, {"cabinet.drawer_1": 10.0}, 500)
         block = engine.get_state().body_pose[0, engine.index.body("block")]
         assert abs(block[2] - before[2]) <= 1e-3, "the stop at the end throws it against the front, not out"
+
+
+@pytest.mark.parametrize("friction", [2.0, 10.0])
+def test_a_hand_opens_a_drawer_by_its_handle(name: str, friction: float) -> None:
+    """A Panda grips the bar and rises by 6 cm; the bar stays in the hand, and the drawer comes along."""
+    world = by_hand(friction=friction)
+    robot = world.robots[0]
+    arm, gripper, tool = robot.channels["arm"], robot.channels["eef"], world.sites[robot.tools["tool"]]
+    assert gripper.closed is not None
+    local = P.pose(tool.position, tool.quaternion)
+    targets = np.array([world.joints[a.joint].initial for a in world.actuators])
+    with started(name, world) as engine:
+        drawer = engine.index.joint("tray.drawer_1")
+        handle = engine.index.frame("tray.drawer_1.handle")
+
+        def place(body: int, offset: np.ndarray) -> np.ndarray:
+            return P.compose(engine.get_state().body_pose[0, body], offset)
+
+        def held() -> np.ndarray:
+            """The handle's place in the hand (3,)."""
+            bar = place(handle.body, P.pose(handle.position, handle.quaternion))
+            return P.compose(P.inverse(place(tool.body, local)), bar)[:3]
+
+        root = engine.index.body("tray")
+        engine.set_body_state(pose=under_the_hand(world, place(tool.body, local))[None, None], bodies=[root])
+        assert np.abs(held()).max() <= 1e-5
+        targets[list(gripper.actuators)] = gripper.closed
+        engine.set_control(position=targets[None])
+        engine.step(250)
+        start, height = held(), place(tool.body, local)[2]
+        for _ in range(60):
+            poses = engine.get_state().body_pose[0]
+            change = lifted(world, poses, tool.body, place(tool.body, local)[:3], list(arm.joints), 1e-3)
+            targets[list(arm.actuators)] += change
+            engine.set_control(position=targets[None])
+            engine.step(10)
+        engine.step(250)
+        rise = place(tool.body, local)[2] - height
+        assert 0.05 < rise < 0.07
+        assert abs(engine.get_state().joint_pos[0, drawer] - rise) <= 1.5e-3
+        assert np.abs(held() - start).max() <= 1.5e-3
 
 
 def test_a_box_that_is_not_fixed_stands_and_its_lid_stays_shut(name: str) -> None:
