@@ -1,5 +1,7 @@
 """SceneManager: what each object is in this episode: mass, friction, colour."""
 
+from collections.abc import Iterable, Mapping
+
 import numpy as np
 
 from anysim.conventions import Array
@@ -10,6 +12,12 @@ from anysim.world.colors import rgb
 from anysim.world.model import BodyKind, World
 from anysim.world.nominal import nominal
 from anysim_schemas.objects import ObjectSpec
+
+_PARAMETERS: Mapping[str, tuple[str, ...]] = {
+    "mass": ("body.mass", "body.inertia"), "density": ("body.mass", "body.inertia"),
+    "friction": ("geom.friction",), "color": ("geom.color",),
+}  # fmt: skip
+"""What is written where a field is drawn."""
 
 
 class SceneManager(Manager):
@@ -25,6 +33,12 @@ class SceneManager(Manager):
             if any(is_random(v) for v in (obj.mass, obj.density, obj.friction, obj.color))
         }
         self._random: dict[str, ObjectSpec] = random
+
+    def parameters(self) -> Iterable[tuple[str, str]]:
+        for name, obj in self._random.items():
+            for field, names in _PARAMETERS.items():
+                if is_random(getattr(obj, field)):
+                    yield from ((parameter, f"world.objects.{name}.{field}") for parameter in names)
 
     def bind(self, engine: SimEngine) -> None:
         super().bind(engine)
