@@ -152,7 +152,7 @@ class PybulletEngine(SimEngine):
         from anysim_pybullet.render import Painter
 
         if self._painter is None:
-            self._painter = Painter(self.world, self.options.shadows)
+            self._painter = Painter(self.world, self._envs.parameters.looks)
         for index in ids.tolist():
             self._envs.mirror.refresh(index)
         return self._painter.draw(view, self._envs.mirror.pose, self._envs.parameters.color, ids, channels)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.engine.looks import Looks
 from anysim.engine.state import SnapshotLevel
 from anysim.errors import EngineError
 from anysim.math import pose as P
@@ -14,7 +15,7 @@ from anysim.world.model import BodyKind, World
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.client import Env, Plan
 from anysim_pybullet.law import Laws, Pusher
-from anysim_pybullet.options import PybulletOptions
+from anysim_pybullet.options import PybulletOptions, own_scenery
 from anysim_pybullet.parameters import Parameters
 from anysim_pybullet.state import Mirror
 
@@ -32,7 +33,7 @@ class Envs:
             for _ in range(num_envs):
                 self.clients.append(Env(self.plan))
             self.laws = Laws(world, self.plan.frames, self.plan.trees, self.clients)
-            self.parameters = Parameters(world, self.clients, self.laws)
+            self.parameters = Parameters(world, self.clients, self.laws, Looks(world, num_envs, own_scenery(options)))
             self.mirror = Mirror(world, self.clients, self.laws)
             self._tree_of = np.zeros(len(world.bodies), dtype=int)
             for tree in self.plan.trees:

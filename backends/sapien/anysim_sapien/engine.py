@@ -12,7 +12,9 @@ from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Capabilities
 from anysim.engine.commands import Control
 from anysim.engine.diagnosis import Finding
+from anysim.engine.looks import Looks
 from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
+from anysim.errors import EngineError
 from anysim.world.model import World
 from anysim_sapien import declared
 from anysim_sapien.audit import geom_volumes, joint_limits
@@ -22,8 +24,8 @@ from anysim_sapien.meeting import refusals
 from anysim_sapien.momentum import Momentum
 from anysim_sapien.motion import Motion, motion_of, motions_of, put_motion, put_twist, twists_of
 from anysim_sapien.native import drives_of
-from anysim_sapien.options import SapienOptions
-from anysim_sapien.parameters import Parameters
+from anysim_sapien.options import OWN_SCENERY, SapienOptions
+from anysim_sapien.parameters import LIT, LOOKS, Parameters
 from anysim_sapien.raw import raw_loop
 from anysim_sapien.rays import cast
 from anysim_sapien.recipe import Recipe
@@ -31,7 +33,9 @@ from anysim_sapien.scene import EnvScene
 from anysim_sapien.state import StateReader
 from anysim_sapien.stepping import advance, pasts_of, relive, wrenches
 
-_BUILT = ("_recipe", "_layout", "_drives", "_parameters", "_momentum", "_reader", "_fields", "_wrench", "_scenes")
+_BUILT = (
+    "_recipe", "_layout", "_drives", "_looks", "_parameters", "_momentum", "_reader", "_fields", "_wrench", "_scenes",
+)  # fmt: skip
 """What `_build` makes and `_free` lets go of."""
 
 
@@ -79,7 +83,10 @@ class SapienEngine(SimEngine):
         self._layout = self._recipe.layout
         self._scenes: list[EnvScene] = []
         self._drives = drives_of(world, num_envs)
-        self._parameters = Parameters(world, self._layout, self._drives, self._scenes, self._rebuild_env, num_envs)
+        self._looks = Looks(world, num_envs, OWN_SCENERY)
+        self._parameters = Parameters(
+            world, self._layout, self._drives, self._scenes, self._rebuild_env, num_envs, self._looks
+        )
         for env in range(num_envs):
             self._scenes.append(EnvScene(self._recipe, self._parameters.values(env)))
         self._momentum = Momentum(self._recipe, num_envs)
@@ -200,7 +207,13 @@ class SapienEngine(SimEngine):
         return self._parameters.get(name)
 
     def _set_parameter(self, name: str, values: Array, ids: Array, indices: Array) -> None:
+        if self.options.shader == "trivial" and name in LIT:
+            raise EngineError(
+                f"sapien's shader 'trivial' draws no light: {name} is not seen; choose options.shader: lit"
+            )
         self._parameters.set(name, values, ids, indices)
+        if name in LOOKS:
+            return
         for env in ids:
             self._bound(int(env))
 
@@ -275,6 +288,6 @@ class SapienEngine(SimEngine):
         from anysim_sapien.render import Painter
 
         if self._painter is None:
-            self._painter = Painter(self.world, self._layout, self.options)
+            self._painter = Painter(self.world, self._layout, self._looks, self.options)
         state = self.get_state()
-        return self._painter.draw(view, state.body_pose[ids], self._parameters.get("geom.color")[ids], channels)
+        return self._painter.draw(view, ids, state.body_pose[ids], self._parameters.get("geom.color")[ids], channels)

@@ -19,9 +19,11 @@ from anysim.managers.streams import Streams
 from anysim.world.model import World
 from anysim_schemas.run import RunSpec
 
-RESET_ORDER = ("terrain", "population", "layout", "scene", "robot", "camera", "capture", "task")
-"""The ground first, then who is there, where it is and what it is like, then who moves and who looks, and the task
-last, on the settled scene."""
+RESET_ORDER = (
+    "terrain", "population", "layout", "scene", "physics", "robot", "light", "camera", "capture", "task",
+)  # fmt: skip
+"""The ground first, then who is there, where it is and what it is like, what pulls at it, then who moves, what shines
+and who looks, and the task last, on the settled scene."""
 
 
 class Manager(ABC):

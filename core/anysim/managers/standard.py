@@ -3,7 +3,10 @@
 from anysim.managers.base import Manager
 from anysim.managers.board import Board
 from anysim.managers.camera import CameraManager
+from anysim.managers.capture import CaptureManager
 from anysim.managers.layout import LayoutManager
+from anysim.managers.light import LightManager
+from anysim.managers.physics import PhysicsManager
 from anysim.managers.robot import RobotManager
 from anysim.managers.scene import SceneManager
 from anysim.managers.streams import Streams
@@ -14,7 +17,15 @@ from anysim_schemas.run import RunSpec
 def standard_managers(spec: RunSpec, world: World, num_envs: int) -> list[Manager]:
     """Configured and built, sharing one set of streams."""
     streams, board = Streams(num_envs), Board(num_envs)
-    managers: list[Manager] = [LayoutManager(), SceneManager(), RobotManager(), CameraManager()]
+    managers: list[Manager] = [
+        LayoutManager(),
+        SceneManager(),
+        PhysicsManager(),
+        RobotManager(),
+        LightManager(),
+        CameraManager(),
+        CaptureManager(),
+    ]
     for manager in managers:
         manager.configure(spec, streams, board)
         manager.build(world)

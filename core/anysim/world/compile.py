@@ -11,13 +11,16 @@ from typing import NamedTuple
 
 from anysim.world.builder import WorldBuilder
 from anysim.world.compile_collisions import with_exclusions
+from anysim.world.compile_dynamics import with_dynamics
+from anysim.world.compile_lights import compile_lights, compile_scenery
 from anysim.world.compile_object import add_object
 from anysim.world.compile_robot import add_robot
-from anysim.world.compile_sensors import compile_lights, with_sensors
+from anysim.world.compile_sensors import with_sensors
 from anysim.world.compile_terrain import add_terrain
 from anysim.world.imported import ImportNote
 from anysim.world.issues import Issues
 from anysim.world.model import Actuation, Physics, World
+from anysim.world.nominal import nominal
 from anysim.world.placement import check_layout, place_nominally
 from anysim_schemas.engine import PhysicsSpec
 from anysim_schemas.run import RunSpec, WorldSpec
@@ -65,10 +68,13 @@ def compile_with_report(
     for name, thing in content.objects.items():
         notes[name] = tuple(add_object(builder, name, thing, issues.at("objects", name), base=_base(base, name)))
     order = check_layout(content.layout, list(content.objects), list(content.robots), issues.at("layout"))
-    world = replace(builder.build(), lights=compile_lights(content.lights, issues.at("lights")))
+    lights = compile_lights(content.lights, issues.at("lights"))
+    scenery = compile_scenery(content.scenery, issues.at("scenery"))
+    world = replace(builder.build(), lights=lights, scenery=scenery)
     missing = {*content.robots, *content.objects} - {entity.name for entity in world.entities}
     if missing:  # what looks at a thing that could not be made would only repeat its error
         issues.raise_if_any()
+    world = with_dynamics(world, content.robots, issues.at("robots"))
     world = place_nominally(world, content.layout, order)
     world = with_exclusions(world, content.collisions, issues.at("collisions"))
     world = with_sensors(world, content.cameras, content.contact_sensors, issues)
@@ -83,6 +89,6 @@ def _base(base: Base, name: str) -> Path | None:
 def neutral_physics(spec: PhysicsSpec) -> Physics:
     """The physics part of a World."""
     return Physics(
-        spec.dt, spec.control_dt, spec.gravity, spec.friction_cone, spec.impratio, Actuation(spec.actuation),
+        spec.dt, spec.control_dt, nominal(spec.gravity), spec.friction_cone, spec.impratio, Actuation(spec.actuation),
         spec.velocity_limits == "enforce",
     )  # fmt: skip

@@ -109,7 +109,7 @@ def test_the_doctor_names_the_driver_and_how_to_choose_it(monkeypatch, tmp_path)
 
 
 def test_a_driver_in_software_gets_the_cheap_shader(make):
-    """SwiftShader does not call itself a CPU; the shader with lights takes half a minute to its first image there."""
+    """SwiftShader does not call itself a CPU; SAPIEN's own shader takes half a minute to its first image there."""
     engine = make(worlds.scene(cameras=True))
     try:
         where = engine.renderer_name().rpartition(", ")[2]
@@ -119,7 +119,9 @@ def test_a_driver_in_software_gets_the_cheap_shader(make):
     computes = any(word in device.name.lower() for word in ("swiftshader", "llvmpipe"))
     assert device.is_cpu == computes
     assert where == ("in software" if computes else "on the GPU")
-    assert Painter(engine.world, engine._layout, engine.options)._shader == ("trivial" if computes else "default")
+    assert Painter(engine.world, engine._layout, engine._looks, engine.options)._shader == (
+        "lit" if computes else "default"
+    )
 
 
 def test_drawing_leaves_the_environment_alone(make):
