@@ -71,6 +71,8 @@ def needs_of(world: World) -> list[Need]:
     shows = [camera.name for camera in world.cameras if "rgb" in camera.channels]
     if shows and (len(world.lights) > 1 or any(light.position is not None for light in world.lights)):
         need(Capability.RENDER_LIGHTS, f"camera '{shows[0]}' shows {len(world.lights)} lights")
+    if shows and world.scenery.shadows:
+        need(Capability.RENDER_SHADOWS, f"camera '{shows[0]}' shows shadows")
     for camera in world.cameras:
         for channel in camera.channels:
             need(Capability(f"render: {channel}"), f"camera '{camera.name}' gives {channel}")
