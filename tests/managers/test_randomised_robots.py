@@ -295,3 +295,52 @@ def test_constants_stay_in_the_world_and_nothing_is_drawn() -> None:
         moon.reset(seed=0)
         plain.reset(seed=0)
         assert moon.streams.draws == plain.streams.draws
+
+
+class Tape:
+    """A policy that plays the same random actions in every env."""
+
+    name = "tape"
+
+    def __init__(self, env: TaskEnv) -> None:
+        self.env = env
+
+    def begin(self, env_ids: np.ndarray) -> None:
+        del env_ids
+
+    def act(self, env_ids: np.ndarray) -> np.ndarray:
+        steps = self.env.scene.elapsed
+        return np.stack([np.random.default_rng(int(k)).uniform(-1, 1, self.env.action_dim) for k in steps])
+
+    def gave_up(self, env_ids: np.ndarray) -> np.ndarray:
+        return np.zeros(len(env_ids), dtype=bool)
+
+    def describe(self, env: int) -> dict[str, Any]:
+        del env
+        return {}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_record_says_what_was_drawn_and_is_replayed_to_the_bit(engine: str, tmp_path: Any) -> None:
+    """Noise and delays of the actions come again from the episode's seed: the record has the actions as given."""
+    pytest.importorskip("anysim_mcap")
+    from anysim.record.collector import Collector
+    from anysim.record.manifest import read_manifest
+    from anysim.record.replay import replay
+
+    with arm(2, *TERMS, "task.horizon=6", "record.keep=all", engine=engine) as env:
+        results = list(Collector(env, Tape(env), tmp_path, episodes=2, seed=1).run())
+    for result in results:
+        assert result.path is not None
+        manifest = read_manifest(result.path)
+        assert {"robot/panda/arm/delay", "robot/panda/kp_scale", "light/key/intensity"} <= manifest.drawn.keys()
+        assert replay(result.path).identical
+
+
+def test_every_axis_names_parameters_that_exist() -> None:
+    from anysim.engine.parameters import PARAMETERS
+    from anysim.managers.axes import AXES, can
+
+    assert {name for axis in AXES for name in axis.parameters} <= PARAMETERS.keys()
+    payload = next(axis for axis in AXES if "body.com" in axis.parameters)
+    assert [can(engine_class(name), payload) for name in ("mujoco", "pybullet")] == ["yes", "-"]
