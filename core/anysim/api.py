@@ -144,24 +144,44 @@ def dry_run(loaded: LoadedRun, world: "World") -> None:
         raise located(error, loaded) from None
 
 
+def check_engine(loaded: LoadedRun, world: "World", engine: "type[SimEngine]", source: str) -> None:
+    """Whether an engine can run a world and change what the spec draws anew in each episode; nothing is built.
+
+    Raises:
+        SpecError: with file, line and column.
+        CapabilityError: lists every need that the engine does not meet.
+    """
+    from anysim.managers.changes import check_run
+    from anysim.managers.standard import standard_managers
+
+    try:
+        managers = standard_managers(loaded.spec, world, 1)
+    except SpecError as error:
+        raise located(error, loaded) from None
+    check_run(engine, world, managers, source, lambda path: place_of(loaded, path))
+
+
 def blind_env(loaded: LoadedRun, world: "World", name: str) -> "TaskEnv":
     """One env on the kinematic engine, which draws no images and can run any world."""
     from anysim.engine.null import NullEngine
 
     blind = replace(world, cameras=tuple(replace(camera, channels=()) for camera in world.cameras))
     try:
-        return _env(loaded.spec, blind, NullEngine(), 1, name)
+        return _env(loaded, blind, NullEngine(), 1, name)
     except SpecError as error:
         raise located(error, loaded) from None
 
 
-def _env(spec: "RunSpec", world: "World", simulation: "SimEngine", num_envs: int, name: str) -> "TaskEnv":
+def _env(loaded: LoadedRun, world: "World", simulation: "SimEngine", num_envs: int, name: str) -> "TaskEnv":
     """An env on a fresh engine; the engine is destroyed if anything fails."""
+    from anysim.managers.changes import check_run
     from anysim.managers.standard import standard_managers
     from anysim.task.env import TaskEnv
 
     try:
+        spec = loaded.spec
         managers = standard_managers(spec, world, num_envs)
+        check_run(simulation, world, managers, f"'{world.name}'", lambda path: place_of(loaded, path))
         simulation.create_world(world, num_envs)
         return TaskEnv(spec, simulation, managers, name)
     except BaseException:
@@ -209,7 +229,7 @@ def make(
     world = compile_world(loaded, base=base)
     name = str(source) if isinstance(source, str) and "/" not in str(source) else world.name
     try:
-        env = _env(spec, world, simulation(spec), spec.num_envs, name)
+        env = _env(loaded, world, simulation(spec), spec.num_envs, name)
     except SpecError as error:
         raise located(error, loaded) from None
     if seed is not None:

@@ -74,6 +74,9 @@ Number = Annotated[float, Strict()]
 Integer = Annotated[int, Strict()]
 Flag = Annotated[bool, Strict()]
 
+Whole = Annotated[int, Strict(), Field(ge=0)]
+Degrees = Annotated[float, Strict(), Field(gt=1, lt=170)]
+"""A field of view."""
 Positive = Annotated[float, Strict(), Field(gt=0)]
 NonNegative = Annotated[float, Strict(), Field(ge=0)]
 Fraction = Annotated[float, Strict(), Field(ge=0, le=1)]

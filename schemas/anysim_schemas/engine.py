@@ -4,9 +4,10 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from anysim_schemas.base import Positive, Spec, Vec3
+from anysim_schemas.base import Positive, Spec
 from anysim_schemas.errors import KeyFault
 from anysim_schemas.plugin import PluginSlot
+from anysim_schemas.values import Vec3Value
 
 MAX_SUBSTEPS = 1_000_000
 
@@ -43,7 +44,7 @@ class PhysicsSpec(Spec):
 
     dt: Positive = Field(default=0.002, description="physics time step [s]")
     control_dt: Positive = Field(default=0.02, description="time between two actions [s]")
-    gravity: Vec3 = Field(default=(0.0, 0.0, -9.81), description="gravity [m/s^2], world axes, z up")
+    gravity: Vec3Value = Field(default=(0.0, 0.0, -9.81), description="gravity [m/s^2], world axes, z up")
     friction_cone: Literal["elliptic", "pyramidal"] = Field(
         default="elliptic", description="shape of the friction cone where the engine offers a choice"
     )

@@ -2,12 +2,13 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from anysim_schemas.base import Flag, Name, NonNegative, Number, Positive, Spec, Vec3
+from anysim_schemas.dynamics import RobotDynamicsSpec
 from anysim_schemas.objects import ContactSpec
 from anysim_schemas.plugin import PluginSlot
-from anysim_schemas.values import NonNegativeValue
+from anysim_schemas.values import FloatValue, NonNegativeValue, Vec3Value, WholeValue, unshared
 
 
 class ActionSpec(Spec):
@@ -17,6 +18,18 @@ class ActionSpec(Spec):
     params: Annotated[dict[str, Any], PluginSlot("controller", "controller")] = Field(
         default_factory=dict, description="parameters owned by the controller"
     )
+    noise: FloatValue | None = Field(
+        default=None,
+        description="drawn anew at each control step and added to each component of the action, within its bounds",
+    )
+    delay: WholeValue = Field(
+        default=0, description="control steps from an action to its effect; until the first one the robot holds still"
+    )
+
+    @field_validator("noise")
+    @classmethod
+    def _alone(cls, noise: Any) -> Any:
+        return unshared(noise)
 
     @classmethod
     def from_text(cls, text: str) -> dict[str, Any]:
@@ -28,13 +41,19 @@ class RobotSpec(Spec):
     """A robot in the world."""
 
     robot: str = Field(description="a robot of the catalogue, as in `anysim list robots`")
-    position: Vec3 = Field(default=(0.0, 0.0, 0.0), description="place of the base [m], world frame")
-    yaw: Number = Field(default=0.0, description="angle of the base about the world z axis [rad]")
-    home: dict[str, Number] = Field(
+    position: Vec3Value = Field(default=(0.0, 0.0, 0.0), description="place of the base [m], world frame")
+    yaw: FloatValue = Field(default=0.0, description="angle of the base about the world z axis [rad]")
+    home: dict[str, FloatValue] = Field(
         default_factory=dict, description="joint positions that differ from the catalogue's home"
+    )
+    home_velocity: dict[str, FloatValue] = Field(
+        default_factory=dict, description="joint velocities at the reset [rad/s] or [m/s]; 0 where not given"
     )
     home_noise: NonNegativeValue = Field(default=0.0, description="standard deviation of the arm's home position [rad]")
     actions: dict[str, ActionSpec] = Field(default_factory=dict, description="channel: controller")
+    dynamics: RobotDynamicsSpec = Field(
+        default=RobotDynamicsSpec(), description="how its drives, joints and masses differ from the catalogue's"
+    )
     self_collision: Flag | None = Field(
         default=None, description="whether its links collide with each other; as the catalogue says where not given"
     )

@@ -11,7 +11,7 @@ from anysim_schemas.contact_sensors import ContactSensorSpec
 from anysim_schemas.engine import EngineSpec, PhysicsSpec
 from anysim_schemas.errors import KeyFault
 from anysim_schemas.layout import PlacementSpec
-from anysim_schemas.lights import LightSpec
+from anysim_schemas.lights import LightSpec, ScenerySpec
 from anysim_schemas.objects import ObjectSpec
 from anysim_schemas.record import RecordSpec
 from anysim_schemas.robots import RobotSpec
@@ -31,6 +31,7 @@ class WorldSpec(Spec):
     layout: dict[Name, PlacementSpec] = Field(default_factory=dict, description="where each object goes at reset")
     cameras: dict[Name, CameraSpec] = Field(default_factory=dict, description="cameras by name")
     lights: dict[Name, LightSpec] = Field(default_factory=dict, description="lights by name")
+    scenery: ScenerySpec = Field(default=ScenerySpec(), description="background, ambient light and shadows")
     contact_sensors: dict[Name, ContactSensorSpec] = Field(default_factory=dict, description="contact sensors by name")
     collisions: CollisionsSpec = Field(default=CollisionsSpec(), description="what passes through what")
 

@@ -4,8 +4,9 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import ConfigDict, Field, field_validator
 
-from anysim_schemas.base import Integer, Name, NamedByKey, Number, Spec
+from anysim_schemas.base import Integer, Name, NamedByKey, Number, Positive, Spec
 from anysim_schemas.errors import KeyFault
+from anysim_schemas.values import FloatValue, WholeValue, unshared
 
 
 class TermSpec(Spec):
@@ -31,9 +32,24 @@ class TermSpec(Spec):
 
 
 class ObservationTermSpec(TermSpec):
-    """A term that is observed: it yields a row of numbers for each environment."""
+    """A term that is observed: it yields a row of numbers for each environment, the truth unless told otherwise."""
 
     plugin_kind: ClassVar[str] = "observation"
+
+    noise: FloatValue | None = Field(
+        default=None, description="drawn anew at each control step and added to each number of the term"
+    )
+    bias: FloatValue | None = Field(
+        default=None, description="drawn once an episode for each number of the term, and added to it"
+    )
+    delay: WholeValue = Field(
+        default=0, description="control steps by which the term is late; the first observation stands in until then"
+    )
+
+    @field_validator("noise", "bias")
+    @classmethod
+    def _alone(cls, noise: Any) -> Any:
+        return unshared(noise)
 
 
 class RewardTermSpec(TermSpec):
@@ -79,6 +95,15 @@ class ExpertSpec(Spec):
         return dict(self.model_extra or {})
 
 
+class ImageSpec(Spec):
+    """How the images of a camera are observed."""
+
+    fps: Positive | None = Field(
+        default=None,
+        description="images per second, the latest one holds meanwhile; each control step if not given",
+    )
+
+
 ByTerm = NamedByKey("term")
 
 
@@ -92,6 +117,9 @@ class TaskSpec(Spec):
     )
     observations: dict[Name, tuple[ObservationTermSpec, ...]] = Field(
         description="groups of terms; `policy` is required, `privileged` may hold simulator-only truth"
+    )
+    images: dict[Name, ImageSpec] = Field(
+        default_factory=dict, description="cameras whose colour images are observed, as `images/CAMERA`"
     )
     rewards: Annotated[dict[Name, RewardTermSpec], ByTerm] = Field(
         default_factory=dict, description="terms whose weighted sum is the reward"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, TypeVar, ca
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from anysim_schemas.base import Color, Fraction, Name, NonNegative, Number, Positive, Spec, Vec3
+from anysim_schemas.base import Color, Degrees, Flag, Fraction, Name, NonNegative, Number, Positive, Spec, Vec3, Whole
 from anysim_schemas.errors import KeyFault
 
 T = TypeVar("T")
@@ -34,8 +34,10 @@ def _check_order(low: object, high: object, what: str) -> None:
             raise ValueError(f"the lower {what} {lower:g} is above the upper {what} {upper:g}")
 
 
-_LABELS = ((Number, "number"), (Positive, "positive"), (NonNegative, "non_negative"), (Fraction, "fraction"),
-           (Vec3, "vector"), (Color, "color"))  # fmt: skip
+_LABELS: tuple[tuple[Any, str], ...] = (
+    (Number, "number"), (Positive, "positive"), (NonNegative, "non_negative"), (Fraction, "fraction"),
+    (Vec3, "vector"), (Color, "color"), (Whole, "whole"), (Flag, "flag"), (Degrees, "degrees"),
+)  # fmt: skip
 
 
 class Variant(Spec):
@@ -78,7 +80,7 @@ class Drawn(Variant, Generic[T]):
 
 
 class Range(Drawn[T], Generic[T]):
-    """Uniform between two bounds, component by component."""
+    """Uniform between two bounds, component by component; whole numbers include both bounds."""
 
     range: tuple[T, T] = Field(description="lower and upper bound")
 
@@ -179,3 +181,20 @@ NonNegativeValue = Value[NonNegative]
 FractionValue = Value[Fraction]
 Vec3Value = Value[Vec3]
 ColorValue = Value[Color]
+WholeValue = Value[Whole]
+
+if TYPE_CHECKING:
+    FlagValue = bool | Choice[bool]
+else:
+    FlagValue = Annotated[
+        Annotated[Flag, Tag(TAG_PREFIX + "constant")] | Annotated[Choice[Flag], Tag(TAG_PREFIX + "choice")],
+        Discriminator(_kind),
+    ]
+    """True, false, or a choice of both: there is nothing between them."""
+
+
+def unshared(noise: Any) -> Any:
+    """Refuse to share the draws of a value that is drawn anew at each step, or for several numbers at once."""
+    if isinstance(noise, Drawn) and cast("Drawn[float]", noise).shared is not None:
+        raise KeyFault("noise is drawn for itself, number by number; leave `shared` out", "shared")
+    return cast("Any", noise)

@@ -22,7 +22,7 @@ class Sideways(MujocoEngine):
     """Looks through the corners of its pixels."""
 
     def _render(self, view, ids, channels):
-        half = np.array([0.5, 0.5]) / (view.height / 2 / np.tan(np.radians(view.fov) / 2))
+        half = np.array([0.5, 0.5]) / (view.height / 2 / np.tan(np.radians(view.fov[0]) / 2))
         pose = view.pose.copy()
         turn = P.from_axis_angle(np.array([0.0, 1.0, 0.0]), -half[0])
         pose[:, 3:] = P.multiply(pose[:, 3:], np.broadcast_to(turn, pose[:, 3:].shape))
@@ -116,7 +116,7 @@ def test_an_engine_that_cannot_draw_is_named(drawn: None) -> None:
 
 def view_from(eye: tuple[float, float, float], target: tuple[float, float, float], size: tuple[int, int]) -> CameraView:
     pose = np.array([[*eye, *P.look_at(np.array(eye), np.array(target))]])
-    return CameraView("eye", pose, 60.0, *size, 0.01, 20.0)
+    return CameraView("eye", pose, np.array([60.0]), *size, 0.01, 20.0)
 
 
 def test_rays_know_the_answer() -> None:

@@ -5,9 +5,10 @@ from anysim.conventions import xyzw_from_wxyz
 from anysim.engine.commands import Control
 from anysim.engine.state import State
 from anysim.errors import RecordError
+from anysim.managers.capture import interval
 from anysim.record.episode import Episode
 from anysim.record.frame import state_digest, state_rows
-from anysim.record.header import CameraInfo, EpisodeHeader, Header, camera_info, image_interval, state_layout
+from anysim.record.header import CameraInfo, EpisodeHeader, Header, camera_info, state_layout
 from anysim.world.model import Actuator, Body, BodyKind, Camera, ControlMode, Joint, JointType, World
 
 
@@ -137,4 +138,4 @@ def test_cameras_of_a_world(world):
     ("dt", "fps", "every"), [(0.02, 25.0, 2), (0.02, 50.0, 1), (0.02, 100.0, 1), (0.05, 25.0, 1), (1 / 60, 20.0, 3)]
 )
 def test_image_interval(dt, fps, every):
-    assert image_interval(dt, fps) == every
+    assert interval(dt, fps) == every

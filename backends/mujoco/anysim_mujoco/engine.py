@@ -13,6 +13,7 @@ from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Capabilities
 from anysim.engine.commands import Control
 from anysim.engine.diagnosis import Finding, Health
+from anysim.engine.looks import Looks
 from anysim.engine.presence import Lifecycle
 from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
 from anysim.math import pose as P
@@ -22,6 +23,7 @@ from anysim_mujoco.audit import geom_volumes, joint_limits
 from anysim_mujoco.build import build, initial_row, silence
 from anysim_mujoco.carry import carried_rows, take_rows
 from anysim_mujoco.drives import Drives
+from anysim_mujoco.geoms import own_scenery
 from anysim_mujoco.options import MujocoOptions
 from anysim_mujoco.parameters import Parameters
 from anysim_mujoco.query import Queries
@@ -35,7 +37,7 @@ _VELOCITY_STAGE = mujoco.mjtStage.mjSTAGE_VEL.value
 
 _BUILT = (
     "_model", "_layout", "_batch", "_rows", "_initial", "_qpos", "_qvel", "_mocap_pos", "_mocap_quat", "_wrenches",
-    "_drives", "_parameters", "_reader", "_fields", "_queries", "_retired",
+    "_drives", "_looks", "_parameters", "_reader", "_fields", "_queries", "_retired",
 )  # fmt: skip
 """What `_build` makes and `_free` lets go of."""
 
@@ -94,7 +96,8 @@ class MujocoEngine(SimEngine):
         self._mocap_pos, self._mocap_quat = self._batch.bind("mocap_pos"), self._batch.bind("mocap_quat")
         self._wrenches = self._batch.bind("xfrc_applied")
         self._drives = Drives(self._batch, world, layout)
-        self._parameters = Parameters(self._batch, world, layout, self._drives)
+        self._looks = Looks(world, num_envs, own_scenery(self.options))
+        self._parameters = Parameters(self._batch, world, layout, self._drives, self._looks)
         self._reader = StateReader(self._batch, layout)
         self._fields = self._reader.fields
         self._queries = Queries(self._batch, layout, self._parameters)
@@ -264,5 +267,5 @@ class MujocoEngine(SimEngine):
 
         self._parameters.settle()
         if self._painter is None:
-            self._painter = Painter(self._model, self._layout, self._queries, self.options)
+            self._painter = Painter(self._model, self._layout, self._queries, self._looks, self.options)
         return self._painter.draw(view, ids, channels)

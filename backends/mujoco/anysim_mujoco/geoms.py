@@ -16,6 +16,7 @@ from anysim.world.model import (
     Light,
     MeshShape,
     Plane,
+    Scenery,
     Sphere,
     World,
 )  # fmt: skip
@@ -34,11 +35,30 @@ _GROUND = "ground"
 _NEUTRAL_RGBA = (0.5, 0.5, 0.5, 1.0)
 
 
+SKY = ((0.62, 0.74, 0.87), (0.93, 0.95, 0.97))
+"""Above and below, where the world has no background of its own."""
+
+AMBIENT, SHINE = 0.28, 0.2
+"""Of what there is without any light, and the share of a light that surfaces mirror."""
+
+
+def own_scenery(options: MujocoOptions) -> Scenery:
+    """What is drawn where the World says nothing; the background is the middle of the sky."""
+    red, green, blue = (0.5 * (a + b) for a, b in zip(*SKY, strict=True))
+    return Scenery((red, green, blue), (AMBIENT, AMBIENT, AMBIENT), options.shadows)
+
+
+def shadow_place(world: World, direction: Array) -> Array:
+    """Where the shadow map of a light that shines from far away is drawn from: off the middle of the bodies."""
+    middle = world.initial_body_pose[:, :3].mean(axis=0) if world.bodies else np.zeros(3)
+    return middle - 4.0 * direction / np.linalg.norm(direction)
+
+
 def add_look(spec: Any, world: World, options: MujocoOptions) -> None:
     """Sky, ground material, light: what a picture needs beside the geoms."""
     spec.add_texture(
         name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
-        rgb1=(0.62, 0.74, 0.87), rgb2=(0.93, 0.95, 0.97), width=256, height=1536,
+        rgb1=SKY[0], rgb2=SKY[1], width=256, height=1536,
     )  # fmt: skip
     spec.add_texture(
         name=_GROUND, type=mujoco.mjtTexture.mjTEXTURE_2D, builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
@@ -51,23 +71,22 @@ def add_look(spec: Any, world: World, options: MujocoOptions) -> None:
     ground.textures = textures
     head = spec.visual.headlight
     # the viewer's own lamp only fills in where the world brings its lights
-    head.ambient, head.diffuse, head.specular = [0.28] * 3, [0.08 if world.lights else 0.25] * 3, [0.1] * 3
+    head.ambient, head.diffuse, head.specular = [AMBIENT] * 3, [0.08 if world.lights else 0.25] * 3, [0.1] * 3
     quality = spec.visual.quality
-    quality.shadowsize = 1024 if options.shadows else 0
+    quality.shadowsize = 1024
     quality.offsamples = options.antialiasing
     for light in world.lights or (Light("default", (-0.35, 0.25, -1.0), intensity=0.45),):
-        _add_light(spec, light, world, options.shadows)
+        _add_light(spec, light, world)
 
 
-def _add_light(spec: Any, light: Light, world: World, shadows: bool) -> None:
+def _add_light(spec: Any, light: Light, world: World) -> None:
     """A light without a position is directional. Its shadow map still has a place: off the middle of the bodies."""
     direction = np.asarray(light.direction, dtype=float)
-    middle = world.initial_body_pose[:, :3].mean(axis=0) if world.bodies else np.zeros(3)
-    away = middle - 4.0 * direction / np.linalg.norm(direction)
+    away = shadow_place(world, direction)
     element = spec.worldbody.add_light(
         dir=direction, pos=away if light.position is None else light.position,
         type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, diffuse=[light.intensity * c for c in light.color],
-        specular=[0.2 * light.intensity] * 3, castshadow=shadows,
+        specular=[SHINE * light.intensity] * 3, castshadow=True,  # the painter says in which envs
     )  # fmt: skip
     if light.position is not None:
         element.type = mujoco.mjtLightType.mjLIGHT_SPOT

@@ -7,6 +7,7 @@ import numpy as np
 from mujoco.batch import SimulationError
 
 from anysim.conventions import Array
+from anysim.engine.looks import LIGHTS, SURROUNDINGS, Looks
 from anysim.errors import EngineError
 from anysim.world.model import World
 from anysim_mujoco.drives import Drives
@@ -29,10 +30,12 @@ class Parameters:
     NAMES = frozenset({
         "body.mass", "body.com", "body.inertia", "geom.friction", "geom.color", "joint.damping", "joint.friction",
         "joint.armature", "actuator.kp", "actuator.kd", "actuator.effort_limit", "world.gravity",
+        *LIGHTS, *SURROUNDINGS,
     })  # fmt: skip
 
-    def __init__(self, batch: Any, world: World, layout: Layout, drives: Drives) -> None:
+    def __init__(self, batch: Any, world: World, layout: Layout, drives: Drives, looks: Looks) -> None:
         self._batch, self._world, self._layout, self._drives = batch, world, layout, drives
+        self._looks = looks
         self._expanded: set[str] = set()
         self._stale = np.zeros(batch.nsim, dtype=bool)
         self._any_stale = False
@@ -49,6 +52,8 @@ class Parameters:
 
     def get(self, name: str) -> Array:
         """All values (N, K, ...)."""
+        if name in self._looks:
+            return self._looks.get(name)
         if name in ("actuator.kp", "actuator.kd"):
             return getattr(self._drives, name.removeprefix("actuator.")).copy()
         if name == "world.gravity":
@@ -61,6 +66,8 @@ class Parameters:
 
     def default(self, name: str) -> Array:
         """Values (K, ...) as built."""
+        if name in self._looks:
+            return self._looks.default(name)
         world, model = self._world, self._batch.model
         if name in ("actuator.kp", "actuator.kd"):
             return np.array([getattr(a, name.removeprefix("actuator.")) for a in world.actuators], dtype=float)
@@ -74,6 +81,9 @@ class Parameters:
 
     def set(self, name: str, values: Array, ids: Array, indices: Array) -> None:
         """Write values (E, K, ...)."""
+        if name in self._looks:
+            self._looks.set(name, values, ids, indices)
+            return
         at = np.ix_(ids, indices)
         if name in ("actuator.kp", "actuator.kd"):
             getattr(self._drives, name.removeprefix("actuator."))[at] = values

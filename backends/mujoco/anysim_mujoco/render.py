@@ -8,23 +8,26 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.cameras import CameraView
+from anysim.engine.looks import Look, Looks
 from anysim.math import pose as P
-from anysim_mujoco.geoms import DRAWN_GROUPS
+from anysim_mujoco.geoms import DRAWN_GROUPS, SHINE, shadow_place
 from anysim_mujoco.gl import gl_thread
 from anysim_mujoco.layout import Layout
 from anysim_mujoco.options import MujocoOptions
 from anysim_mujoco.query import Queries
 
+_SHADOW = int(mujoco.mjtRndFlag.mjRND_SHADOW)
 _SEGMENT, _ID_COLOR = int(mujoco.mjtRndFlag.mjRND_SEGMENT), int(mujoco.mjtRndFlag.mjRND_IDCOLOR)
 
 
 class Painter:
     """Draws the envs of one engine. Its methods may be called from any thread."""
 
-    def __init__(self, model: Any, layout: Layout, queries: Queries, options: MujocoOptions) -> None:
+    def __init__(self, model: Any, layout: Layout, queries: Queries, looks: Looks, options: MujocoOptions) -> None:
         self._thread = gl_thread()
         self._thread.open(options.gl)
-        self._layout, self._queries = layout, queries
+        self._layout, self._queries, self._looks = layout, queries, looks
+        self._model, self._sky = model, Sky(model)
         self._scene = mujoco.MjvScene(model, maxgeom=model.ngeom + 16)
         self._options = mujoco.MjvOption()
         self._options.geomgroup[:] = 0
@@ -57,7 +60,7 @@ class Painter:
         rect = mujoco.MjrRect(0, 0, view.width, view.height)
         colors = np.empty((view.height, view.width, 3), dtype=np.uint8)
         for row, index in enumerate(ids):
-            self._compose(int(index), view, view.pose[row, :3], axes[row])
+            self._compose(int(index), view, row, axes[row])
             if "rgb" in images:
                 mujoco.mjr_render(rect, self._scene, self._context)
                 mujoco.mjr_readPixels(colors, None, rect, self._context)
@@ -73,20 +76,33 @@ class Painter:
             mujoco.mjr_resizeOffscreen(*grown, self._context)
             self._size = grown
 
-    def _compose(self, index: int, view: CameraView, eye: Array, axes: Array) -> None:
-        """Put the geoms of an env and the camera into the scene."""
+    def _compose(self, index: int, view: CameraView, row: int, axes: Array) -> None:
+        """Put the geoms and lights of an env and the camera into the scene."""
         model, data = self._queries.env(index)
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_camlight(model, data)
         everything = mujoco.mjtCatBit.mjCAT_ALL.value
         mujoco.mjv_updateScene(model, data, self._options, None, self._free_camera, everything, self._scene)
-        top = view.near * tan(radians(view.fov) / 2)
+        self._shine(self._looks.of(index))
+        eye, top = view.pose[row, :3], view.near * tan(radians(view.fov[row]) / 2)
         for camera in self._scene.camera:
             camera.pos, camera.forward, camera.up = eye, axes[:, 2], -axes[:, 1]
             camera.frustum_center = 0.0
             camera.frustum_bottom, camera.frustum_top = -top, top
             camera.frustum_near, camera.frustum_far = view.near, view.far
+
+    def _shine(self, look: Look) -> None:
+        """Give the scene the lights and the sky of an env. Its first light is the viewer's own lamp."""
+        lamp, *lights = list(self._scene.lights)[: self._scene.nlight]
+        lamp.ambient = look.ambient
+        for k, light in enumerate(lights[: len(look.direction)]):
+            direction, emission = look.direction[k], look.emission[k]
+            light.dir, light.diffuse, light.specular = direction, emission, [SHINE * float(emission.max())] * 3
+            light.pos = look.position[k] if self._looks.local[k] else shadow_place(self._looks.world, direction)
+        self._scene.flags[_SHADOW] = look.shadows
+        if self._sky.wear(None if look.sky else look.background):
+            mujoco.mjr_uploadTexture(self._model, self._context, self._sky.texture)
 
     def _measure(self, view: CameraView, rect: Any, colors: Array, images: dict[str, Array], row: int) -> None:
         """Depth and segmentation, from one pass in which a geom's colour is its number in the scene plus one."""
@@ -105,6 +121,27 @@ class Painter:
                     entities[geom.segid + 1] = self._layout.geom_entity[geom.objid]
             code = colors[::-1].astype(np.int32)
             images["segmentation"][row] = entities[code[..., 0] + 256 * code[..., 1] + 65536 * code[..., 2]]
+
+
+class Sky:
+    """The texture behind everything: MuJoCo's gradient, or one colour."""
+
+    def __init__(self, model: Any) -> None:
+        self.texture = next(t for t in range(model.ntex) if model.tex_type[t] == mujoco.mjtTexture.mjTEXTURE_SKYBOX)
+        first = int(model.tex_adr[self.texture])
+        size = int(model.tex_height[self.texture] * model.tex_width[self.texture] * model.tex_nchannel[self.texture])
+        self._pixels = model.tex_data[first : first + size].reshape(-1, model.tex_nchannel[self.texture])
+        self._gradient, self._worn = self._pixels.copy(), b""
+
+    def wear(self, color: Array | None) -> bool:
+        """Take a colour (3,), or None for the gradient; whether that is another than before."""
+        levels = None if color is None else np.rint(np.clip(color, 0.0, 1.0) * 255).astype(np.uint8)
+        wanted = b"" if levels is None else levels.tobytes()
+        if wanted == self._worn:
+            return False
+        self._worn = wanted
+        self._pixels[:] = self._gradient if levels is None else levels
+        return True
 
 
 def _make_context(model: Any) -> Any:

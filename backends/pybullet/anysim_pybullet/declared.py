@@ -5,6 +5,7 @@ from importlib import metadata
 
 from anysim.engine.allowance import Allowance
 from anysim.engine.capability import Capabilities, Capability
+from anysim.engine.looks import LIGHTS
 from anysim.engine.state import Availability
 from anysim.engine.versions import judge
 
@@ -34,6 +35,11 @@ _APPROXIMATE = {
         "it pushes with anything up to its effort limit, whatever its error, and its fingers with three quarters of "
         "their command; compensated gravity is worked out in every tenth step; no dry friction on driven joints"
     ),
+    Capability.RENDER_SHADOWS: "faint and with gaps: the light sees the scene as coarsely as the camera",
+    Capability.RENDER_LIGHTS: (
+        "the first light shines, the others light all sides alike with a quarter of their strength; one with a place "
+        "shines as if from far away, towards the middle of the bodies"
+    ),
     Capability.CONTROL_VELOCITY: "computed in each step, as position control is",
 }
 _ABSENT = (Capability.LIVE_EDIT_NATIVE,)
@@ -44,6 +50,7 @@ CAPABILITIES = Capabilities.of(
 PARAMETERS = frozenset({
     "body.mass", "body.inertia", "geom.friction", "geom.color", "joint.damping", "joint.friction", "joint.armature",
     "actuator.kp", "actuator.kd", "actuator.effort_limit", "world.gravity",
+    *LIGHTS, "world.ambient", "world.background",
 })  # fmt: skip
 """What can be changed per env. Bullet fixes the centre of mass at the build."""
 

@@ -157,7 +157,7 @@ class PybulletEngine(SimEngine):
         from anysim_pybullet.render import Painter
 
         if self._painter is None:
-            self._painter = Painter(self.world, self.options.shadows)
+            self._painter = Painter(self.world, self._envs.parameters.looks)
         for index in ids.tolist():
             self._envs.mirror.refresh(index)
         there = self._presence.bodies

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.engine.looks import Looks
 from anysim.engine.state import SnapshotLevel
 from anysim.errors import EngineError
 from anysim.math import pose as P
@@ -15,7 +16,7 @@ from anysim_pybullet.bullet import bullet
 from anysim_pybullet.cast import Cast
 from anysim_pybullet.client import Env, Plan
 from anysim_pybullet.law import Laws, Pusher
-from anysim_pybullet.options import PybulletOptions
+from anysim_pybullet.options import PybulletOptions, own_scenery
 from anysim_pybullet.parameters import Parameters
 from anysim_pybullet.state import Mirror
 
@@ -35,7 +36,7 @@ class Envs:
             for row in present:
                 self.clients.append(Env(self.plan, self.plan.cast(row)))
             self.laws = Laws(world, self.plan.frames, self.plan.trees, self.clients)
-            self.parameters = Parameters(world, self.clients, self.laws)
+            self.parameters = Parameters(world, self.clients, self.laws, Looks(world, num_envs, own_scenery(options)))
             self.mirror = Mirror(world, self.clients, self.laws)
             self._tree_of = np.zeros(len(world.bodies), dtype=int)
             for tree in self.plan.trees:

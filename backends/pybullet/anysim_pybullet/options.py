@@ -2,6 +2,12 @@
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from anysim.world.model import Scenery
+
+BACKGROUND = (221 / 255, 230 / 255, 240 / 255)
+AMBIENT = 0.35
+"""What is drawn where the World says nothing."""
+
 
 class PybulletOptions(BaseModel):
     """Options of the engine `pybullet`, as in `engine: {name: pybullet, options: {iterations: 100}}`."""
@@ -23,3 +29,8 @@ class PybulletOptions(BaseModel):
             if getattr(self, name) != getattr(defaults, name)
         ]
         return ",".join(changed)
+
+
+def own_scenery(options: PybulletOptions) -> Scenery:
+    """What is drawn where the World says nothing."""
+    return Scenery(BACKGROUND, (AMBIENT, AMBIENT, AMBIENT), options.shadows)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.engine.looks import Looks
 from anysim.errors import EngineError
 from anysim.world.inertia import tensor
 from anysim.world.model import Inertial, World
@@ -19,25 +20,29 @@ _JOINT = {"joint.damping": K.DAMPING, "joint.armature": K.ARMATURE}
 class Parameters:
     """Reads and writes neutral parameters. The centre of mass and the axes of inertia are fixed by the build."""
 
-    def __init__(self, world: World, envs: list[Env], laws: Laws) -> None:
+    def __init__(self, world: World, envs: list[Env], laws: Laws, looks: Looks) -> None:
         self._world, self._envs, self._laws = world, envs, laws
         n = len(envs)
         self.friction = np.tile(np.array([g.surface.friction for g in world.geoms], dtype=float), (n, 1))
         self.color = np.tile(np.array([g.color for g in world.geoms], dtype=float).reshape(-1, 4), (n, 1, 1))
         self.dry = np.tile(np.array([j.friction for j in world.joints], dtype=float), (n, 1))
-        self._defaults = {name: self._all(name)[0].copy() for name in PARAMETERS}
+        self.looks = looks
+        self._defaults = {name: self._all(name)[0].copy() for name in PARAMETERS if name not in looks}
         self._touched: list[dict[str, None]] = [{} for _ in envs]
 
     def get(self, name: str) -> Array:
         """All values (N, K, ...)."""
-        return self._all(name).copy()
+        return self.looks.get(name) if name in self.looks else self._all(name).copy()
 
     def default(self, name: str) -> Array:
         """Values (K, ...) as built."""
-        return self._defaults[name].copy()
+        return self.looks.default(name) if name in self.looks else self._defaults[name].copy()
 
     def set(self, name: str, values: Array, ids: Array, indices: Array) -> None:
         """Write values (E, K, ...)."""
+        if name in self.looks:
+            self.looks.set(name, values, ids, indices)
+            return
         if name == "joint.friction" and self._laws.motors is not None:
             for joint, friction in zip(indices.tolist(), values.max(axis=0).tolist(), strict=True):
                 refuse_dry_friction(self._world, joint, friction)

@@ -11,6 +11,7 @@ import numpy as np
 
 from anysim.conventions import WORLD, Array
 from anysim.engine.cameras import CameraView
+from anysim.engine.looks import Look, Looks
 from anysim.errors import EngineError
 from anysim.math import pose as P
 from anysim.quiet import quiet
@@ -35,14 +36,19 @@ GROUND_TILES = 16
 ROUND = 16
 """Half the corners around a round shape, and the rings of a ball from pole to pole: within 0.5 % of its outline."""
 
-BACKGROUND = (221, 230, 240)
+SUN = (-0.35, 0.25, -1.0)
+"""Where the light of a world without lights shines to."""
+
+SPREAD = 0.25
+"""Light that comes from one side meets the sides of a ball with this share of its strength, on average."""
 
 
 class Painter:
     """Draws the envs of one engine."""
 
-    def __init__(self, world: World, shadows: bool) -> None:
-        self._world, self._shadows = world, shadows
+    def __init__(self, world: World, looks: Looks) -> None:
+        self._world, self._looks = world, looks
+        self._middle = world.initial_body_pose[:, :3].mean(axis=0) if world.bodies else np.zeros(3)
         self._geoms = [i for i, g in enumerate(world.geoms) if g.visible]
         self._meshes = {m.name: m for m in world.meshes}
         self._fields = {f.name: f for f in world.heightfields}
@@ -80,12 +86,14 @@ class Painter:
         images = {name: np.empty(*shapes[name]) for name in channels}
         for row, index in enumerate(ids.tolist()):
             self._arrange(poses[index], colors[index, self._geoms], there[index])
-            rgba, raw, owner = self._shoot(view, view.pose[row])
+            look = self._looks.of(index)
+            rgba, raw, owner = self._shoot(view, row, look)
             near, far = view.near, view.far
             depth = far * near / (far - (far - near) * raw.astype(np.float64))
             nothing = (owner < 0) | (raw >= 1.0)
             if "rgb" in images:
-                images["rgb"][row] = np.where(nothing[..., None], np.array(BACKGROUND, dtype=np.uint8), rgba[..., :3])
+                sky = np.rint(np.clip(look.background, 0.0, 1.0) * 255).astype(np.uint8)
+                images["rgb"][row] = np.where(nothing[..., None], sky, rgba)
             if "depth" in images:
                 images["depth"][row] = np.where(nothing, np.inf, depth)
             if "segmentation" in images:
@@ -104,28 +112,45 @@ class Painter:
             p.changeVisualShape(self._uids[k], -1, rgbaColor=colors[k].tolist(), physicsClientId=client)
         self._colors = colors.copy()
 
-    def _shoot(self, view: CameraView, eye: Array) -> tuple[Array, Array, Array]:
+    def _shoot(self, view: CameraView, row: int, look: Look) -> tuple[Array, Array, Array]:
+        eye = view.pose[row]
         p, axes = bullet(), P.to_matrix(eye[3:])
         turned = np.eye(4)
         turned[0, :3], turned[1, :3], turned[2, :3] = axes[:, 0], -axes[:, 1], -axes[:, 2]
         turned[:3, 3] = -turned[:3, :3] @ eye[:3]
-        top = view.near * tan(radians(view.fov) / 2)
+        top = view.near * tan(radians(view.fov[row]) / 2)
         right = top * view.width / view.height
         # TinyRenderer looks through the lower left corner of a pixel: shifted by half a pixel, that is its middle
         aside, up = right / view.width, top / view.height
         lens = p.computeProjectionMatrix(aside - right, aside + right, up - top, up + top, view.near, view.far)
+        towards, emission, brightness, tint = self._light(look)
         _, _, rgba, raw, owner = p.getCameraImage(
-            view.width, view.height, turned.T.ravel().tolist(), lens, shadow=int(self._shadows),
-            lightDirection=self._light(), lightAmbientCoeff=0.55, lightDiffuseCoeff=0.45, lightSpecularCoeff=0.05,
+            view.width, view.height, turned.T.ravel().tolist(), lens, shadow=int(look.shadows),
+            lightDirection=towards.tolist(), lightColor=(emission / tint).tolist(),
+            lightAmbientCoeff=brightness, lightDiffuseCoeff=1.0, lightSpecularCoeff=0.05,
             renderer=p.ER_TINY_RENDERER, physicsClientId=self._client,
         )  # fmt: skip
         size = (view.height, view.width)
-        return np.reshape(rgba, (*size, 4)), np.reshape(raw, size), np.reshape(owner, size)
+        color = np.reshape(rgba, (*size, 4))[..., :3]
+        if (tint < 1.0).any():
+            color = np.rint(color * tint).astype(np.uint8)
+        return color, np.reshape(raw, size), np.reshape(owner, size)
 
-    def _light(self) -> list[float]:
-        """Towards the light, as the renderer wants it."""
-        light = self._world.lights[0].direction if self._world.lights else (-0.35, 0.25, -1.0)
-        return [-float(x) for x in light]
+    def _light(self, look: Look) -> tuple[Array, Array, float, Array]:
+        """Towards the one light that there is, its emission (3,), the ambient light, and its tint (3,).
+
+        The renderer has one light and grey ambient light. The first of a world's lights shines; the others are light
+        from everywhere. Tinted ambient light is that of its brightest colour, the whole picture tinted after it.
+        """
+        towards, emission = -np.array(SUN), np.full(3, 0.45)
+        if len(look.direction):
+            local = self._looks.local[0]
+            towards = look.position[0] - self._middle if local else -look.direction[0]
+            emission = look.emission[0]
+        ambient = look.ambient + SPREAD * look.emission[1:].sum(axis=0)
+        brightness = float(ambient.max())
+        tint = np.maximum(ambient / brightness, 0.02) if brightness > 0 else np.ones(3)
+        return towards, emission, brightness, tint
 
     # ------------------------------------------------------------------ shapes
 

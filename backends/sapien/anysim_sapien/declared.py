@@ -34,7 +34,7 @@ _APPROXIMATE = {
     ),
     Capability.CONTACT_POINTS: "the friction of a pair, as sensors have it, is shared as the normal forces are",
 }
-_ABSENT = (Capability.LIVE_EDIT_NATIVE,)
+_ABSENT = (Capability.LIVE_EDIT_NATIVE, Capability.RENDER_SHADOWS)
 CAPABILITIES = Capabilities.of(
     *(c for c in Capability if c not in _APPROXIMATE and c not in _ABSENT), approximate=_APPROXIMATE
 )

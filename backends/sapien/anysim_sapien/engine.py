@@ -12,8 +12,10 @@ from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Capabilities
 from anysim.engine.commands import Control
 from anysim.engine.diagnosis import Finding
+from anysim.engine.looks import Looks
 from anysim.engine.presence import Lifecycle
 from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
+from anysim.errors import EngineError
 from anysim.world.model import World
 from anysim_sapien import declared
 from anysim_sapien.audit import geom_volumes, joint_limits
@@ -23,8 +25,8 @@ from anysim_sapien.meeting import refusals
 from anysim_sapien.momentum import Momentum
 from anysim_sapien.motion import Motion, motion_of, motions_of, put_motion, put_twist, twists_of
 from anysim_sapien.native import drives_of
-from anysim_sapien.options import SapienOptions
-from anysim_sapien.parameters import Parameters
+from anysim_sapien.options import OWN_SCENERY, SapienOptions
+from anysim_sapien.parameters import LIT, LOOKS, Parameters
 from anysim_sapien.raw import raw_loop
 from anysim_sapien.rays import cast
 from anysim_sapien.recipe import Recipe, Recipes
@@ -32,7 +34,9 @@ from anysim_sapien.scene import EnvScene
 from anysim_sapien.state import StateReader
 from anysim_sapien.stepping import advance, pasts_of, relive, wrenches
 
-_BUILT = ("_recipes", "_layout", "_drives", "_parameters", "_momentum", "_reader", "_fields", "_wrench", "_scenes")
+_BUILT = (
+    "_recipes", "_layout", "_drives", "_looks", "_parameters", "_momentum", "_reader", "_fields", "_wrench", "_scenes",
+)  # fmt: skip
 """What `_build` makes and `_free` lets go of."""
 
 
@@ -81,7 +85,10 @@ class SapienEngine(SimEngine):
         self._layout = self._recipes.layout
         self._scenes: list[EnvScene] = []
         self._drives = drives_of(world, num_envs)
-        self._parameters = Parameters(world, self._layout, self._drives, self._scenes, self._rebuild_env, num_envs)
+        self._looks = Looks(world, num_envs, OWN_SCENERY)
+        self._parameters = Parameters(
+            world, self._layout, self._drives, self._scenes, self._rebuild_env, num_envs, self._looks
+        )
         for env in range(num_envs):
             self._scenes.append(EnvScene(self._recipe(env), self._parameters.values(env)))
         self._momentum = Momentum(self._recipes, num_envs)
@@ -210,7 +217,13 @@ class SapienEngine(SimEngine):
         return self._parameters.get(name)
 
     def _set_parameter(self, name: str, values: Array, ids: Array, indices: Array) -> None:
+        if self.options.shader == "trivial" and name in LIT:
+            raise EngineError(
+                f"sapien's shader 'trivial' draws no light: {name} is not seen; choose options.shader: lit"
+            )
         self._parameters.set(name, values, ids, indices)
+        if name in LOOKS:
+            return
         for env in ids:
             self._bound(int(env))
 
@@ -286,6 +299,6 @@ class SapienEngine(SimEngine):
         from anysim_sapien.render import Painter
 
         if self._painter is None:
-            self._painter = Painter(self.world, self._layout, self.options)
+            self._painter = Painter(self.world, self._layout, self._looks, self.options)
         poses, colors = self.get_state().body_pose[ids], self._parameters.get("geom.color")[ids]
-        return self._painter.draw(view, poses, colors, self._presence.bodies[ids], channels)
+        return self._painter.draw(view, ids, poses, colors, self._presence.bodies[ids], channels)

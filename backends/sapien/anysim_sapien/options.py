@@ -4,6 +4,11 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from anysim.world.model import Scenery
+
+OWN_SCENERY = Scenery((0.867, 0.902, 0.941), (0.35, 0.35, 0.35), False)
+"""What is drawn where the World says nothing."""
+
 
 class SapienOptions(BaseModel):
     """Options of the engine `sapien`, as in `engine: {name: sapien, options: {position_iterations: 30}}`."""
@@ -35,10 +40,11 @@ class SapienOptions(BaseModel):
         description="Vulkan driver that draws: auto (what the environment says, a system driver, else Chromium's "
         "software driver), none, or the path of a driver's JSON file",
     )
-    shader: Literal["auto", "trivial", "lit", "default"] = Field(
+    shader: Literal["auto", "lit", "trivial", "default"] = Field(
         default="auto",
-        description="trivial: flat colours; lit: lights without shadows, fast in software; default: SAPIEN's own, half "
-        "a minute to the first image without a graphics card; auto: lit in software, else default",
+        description="lit: lights without shadows, fast in software; trivial: flat colours, whatever the lights; "
+        "default: SAPIEN's own materials, half a minute to the first image without a graphics card; "
+        "auto: lit in software, else default",
     )
 
     def trajectory_stamp(self) -> str:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array, xyzw_from_wxyz
+from anysim.engine.looks import LIGHTS, SURROUNDINGS, Looks
 from anysim.world.model import World
 from anysim_sapien.drives import Drives
 from anysim_sapien.inertia import full, principal
@@ -22,16 +23,24 @@ _REBUILD = ("geom.friction", "world.gravity")
 """PhysX reads gravity once, and a change of friction regroups the shapes: the scene is built anew."""
 
 
+LOOKS = frozenset({*LIGHTS, *SURROUNDINGS} - {"world.shadows"})
+"""What is drawn; there are no shadows."""
+
+LIT = LOOKS - {"world.background"}
+"""What needs a shader with lights."""
+
+
 class Parameters:
     """The values in force (N, K, ...), and how they get into the scenes."""
 
-    NAMES = frozenset({*_DRIVES, *_BODIES, *_REBUILD, "joint.friction", "joint.armature", "geom.color"})
+    NAMES = frozenset({*_DRIVES, *_BODIES, *_REBUILD, "joint.friction", "joint.armature", "geom.color"}) | LOOKS
 
     def __init__(
         self, world: World, layout: Layout, drives: Drives, scenes: list[EnvScene], rebuild: Callable[[int], None],
-        num_envs: int,
+        num_envs: int, looks: Looks,
     ) -> None:  # fmt: skip
         self._world, self._layout, self._drives, self._scenes, self._rebuild = world, layout, drives, scenes, rebuild
+        self._looks = looks
         bodies, joints = world.bodies, world.joints
         self._defaults = {
             "body.mass": np.array([b.inertial.mass for b in bodies], dtype=float),
@@ -63,7 +72,7 @@ class Parameters:
 
     def default(self, name: str) -> Array:
         """Values (K, ...) as built."""
-        return self._defaults[name].copy()
+        return self._looks.default(name) if name in LOOKS else self._defaults[name].copy()
 
     def rows(self, ids: Array) -> dict[str, Array]:
         """What scenes are built with, as it was asked for: what is read from PhysX is rounded, and not asked for again.
@@ -82,6 +91,8 @@ class Parameters:
 
     def get(self, name: str) -> Array:
         """All values (N, K, ...)."""
+        if name in LOOKS:
+            return self._looks.get(name)
         if name in _DRIVES:
             return getattr(self._drives, _DRIVES[name]).copy()
         values = self._wanted[name].copy()
@@ -122,6 +133,9 @@ class Parameters:
 
     def set(self, name: str, values: Array, ids: Array, indices: Array) -> None:
         """Write values (E, K, ...)."""
+        if name in LOOKS:
+            self._looks.set(name, values, ids, indices)
+            return
         at = np.ix_(ids, indices)
         if name in _DRIVES:
             getattr(self._drives, _DRIVES[name])[at] = values

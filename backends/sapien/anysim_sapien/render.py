@@ -10,6 +10,7 @@ import numpy as np
 
 from anysim.conventions import WORLD, Array
 from anysim.engine.cameras import CameraView
+from anysim.engine.looks import Look, Looks
 from anysim.math import pose as P
 from anysim.world.model import (
     Box,
@@ -35,15 +36,13 @@ THIN = 1e-3
 """[m]: half the thickness of a drawn plane."""
 
 SUN = (0.3, -0.5, -1.0)
-
-BACKGROUND = (0.80, 0.87, 0.94)
-"""Colour of what is beyond everything."""
+"""Where the light of a world without lights shines to."""
 
 
 class Painter:
     """Draws the envs of one engine. Its methods may be called from any thread."""
 
-    def __init__(self, world: World, layout: Layout, options: SapienOptions) -> None:
+    def __init__(self, world: World, layout: Layout, looks: Looks, options: SapienOptions) -> None:
         with drawing:
             device = open_device(options.vulkan_icd)
             self._shader = options.shader
@@ -55,7 +54,10 @@ class Painter:
             self._materials: dict[int, Any] = {}
             self._shapes: dict[int, Any] = {}
             self._names = {0: 0}
-            self._light(world)
+            self._looks = looks
+            self._lights = [self._add_light(local) for local in looks.local.tolist()]
+            if not self._lights:
+                self._shine(self._add_light(False), np.array(SUN), np.zeros(3), np.full(3, 0.6), False)
             for index, geom in enumerate(world.geoms):
                 if geom.visible:
                     self._add(world, index, geom, int(layout.geom_entity[index]))
@@ -65,22 +67,26 @@ class Painter:
         with drawing:
             self._cameras.clear()
             self._bodies.clear()
+            self._lights.clear()
             self._materials.clear()
             self._shapes.clear()
             self._scene = None
 
-    def _light(self, world: World) -> None:
-        render = sapien.render
-        self._scene.render_system.set_ambient_light([0.4, 0.4, 0.4])
-        directions = [light.direction for light in world.lights if light.position is None] or [SUN]
-        for direction in directions:
-            entity, light = sapien.Entity(), render.RenderDirectionalLightComponent()
-            light.set_color([0.8, 0.8, 0.8])
-            along = np.asarray(direction, dtype=float)
-            turn = P.multiply(P.look_at(np.zeros(3), along), FROM_OPTICAL)
-            entity.add_component(light)
-            entity.set_pose(to_pose(np.concatenate([np.zeros(3), turn])))
-            self._scene.add_entity(entity)
+    def _add_light(self, local: bool) -> tuple[Any, Any]:
+        """A light of the scene: its entity and its component."""
+        entity = sapien.Entity()
+        light = sapien.render.RenderPointLightComponent() if local else sapien.render.RenderDirectionalLightComponent()
+        entity.add_component(light)
+        self._scene.add_entity(entity)
+        return entity, light
+
+    def _shine(self, made: tuple[Any, Any], direction: Array, position: Array, emission: Array, local: bool) -> None:
+        entity, light = made
+        light.set_color(emission.tolist())
+        turn = np.array([0.0, 0.0, 0.0, 1.0])
+        if not local:
+            turn = P.multiply(P.look_at(np.zeros(3), direction), FROM_OPTICAL)
+        entity.set_pose(to_pose(np.concatenate([position if local else np.zeros(3), turn])))
 
     def _add(self, world: World, index: int, geom: Geom, entity_id: int) -> None:
         material = sapien.render.RenderMaterial(base_color=list(geom.color))
@@ -96,7 +102,7 @@ class Painter:
         self._names[int(entity.per_scene_id)] = entity_id
 
     def draw(
-        self, view: CameraView, poses: Array, colors: Array, there: Array, channels: tuple[str, ...]
+        self, view: CameraView, ids: Array, poses: Array, colors: Array, there: Array, channels: tuple[str, ...]
     ) -> dict[str, Array]:
         """See `SimEngine.render`. Poses (E, B, 7) and presence (E, B) of the bodies, colours (E, G, 4) of the geoms."""
         size = (len(poses), view.height, view.width)
@@ -106,13 +112,15 @@ class Painter:
             images[name] = np.empty(shape, dtype=kind)
         with drawing:
             camera, mount = self._camera(view)
-            for row in range(len(poses)):
-                self._compose(poses[row], colors[row], there[row])
+            for row, index in enumerate(ids.tolist()):
+                look = self._looks.of(index)
+                self._compose(poses[row], colors[row], there[row], look)
+                camera.set_fovy(radians(view.fov[row]), compute_x=True)
                 eye = np.concatenate([view.pose[row, :3], P.multiply(view.pose[row, 3:], FROM_OPTICAL)])
                 mount.set_pose(to_pose(eye))
                 self._scene.update_render()
                 camera.take_picture()
-                self._read(camera, images, row)
+                self._read(camera, images, row, look)
         return images
 
     def _camera(self, view: CameraView) -> tuple[Any, Any]:
@@ -125,25 +133,25 @@ class Painter:
             self._scene.add_entity(mount)
             self._cameras[size] = (camera, mount)
         camera, mount = self._cameras[size]
-        camera.set_fovy(radians(view.fov), compute_x=True)
         camera.set_near(view.near)
         camera.set_far(view.far)
         return camera, mount
 
-    def _compose(self, poses: Array, colors: Array, there: Array) -> None:
+    def _compose(self, poses: Array, colors: Array, there: Array, look: Look) -> None:
+        self._scene.render_system.set_ambient_light(look.ambient.tolist())
+        for k, (light, local) in enumerate(zip(self._lights, self._looks.local.tolist(), strict=True)):
+            self._shine(light, look.direction[k], look.position[k], look.emission[k], local)
         for index, (body, entity) in self._bodies.items():
             if body != WORLD:
                 self._shapes[index].visibility = float(there[body])
                 entity.set_pose(to_pose(poses[body]))
             self._materials[index].set_base_color(colors[index].tolist())
 
-    def _read(self, camera: Any, images: dict[str, Array], row: int) -> None:
+    def _read(self, camera: Any, images: dict[str, Array], row: int, look: Look) -> None:
         seen = camera.get_picture("Segmentation")[..., 1]
         if "rgb" in images:
-            color = np.clip(camera.get_picture("Color")[..., :3], 0.0, 1.0)
-            if self._shader != "default":  # which has a background of its own
-                color[seen == 0] = BACKGROUND
-            images["rgb"][row] = np.rint(color * 255)
+            color = np.where(seen[..., None] > 0, camera.get_picture("Color")[..., :3], look.background)
+            images["rgb"][row] = np.rint(np.clip(color, 0.0, 1.0) * 255)
         if "depth" in images:
             depth = -camera.get_picture("Position")[..., 2]
             images["depth"][row] = np.where(seen > 0, depth, np.inf)
@@ -156,7 +164,7 @@ class Painter:
 def _shader_folder(name: str) -> Any:
     from importlib.resources import files
 
-    return files("anysim_sapien") / "shader" / name if name == "lit" else files("sapien") / "vulkan_shader" / name
+    return files("anysim_sapien") / "shaders" / name if name == "lit" else files("sapien") / "vulkan_shader" / name
 
 
 def _local(geom: Geom) -> Array:

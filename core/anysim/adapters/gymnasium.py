@@ -15,10 +15,12 @@ from anysim.task.env import TaskEnv
 
 
 def observation_space(env: TaskEnv) -> gym.spaces.Dict:
-    """A Dict with a float32 Box for each observation group."""
-    return gym.spaces.Dict(
-        {group: gym.spaces.Box(-np.inf, np.inf, (size,), np.float32) for group, size in env.observation_sizes.items()}
-    )
+    """A Dict with a float32 Box for each observation group, and a uint8 one for each observed image."""
+    spaces: dict[str, gym.Space[Any]] = {
+        group: gym.spaces.Box(-np.inf, np.inf, (size,), np.float32) for group, size in env.observation_sizes.items()
+    }
+    spaces |= {name: gym.spaces.Box(0, 255, shape, np.uint8) for name, shape in env.image_shapes.items()}
+    return gym.spaces.Dict(spaces)
 
 
 def action_space(env: TaskEnv) -> gym.spaces.Box:

@@ -37,10 +37,8 @@ def check(
 def check_one(name: str, engine: str | None, all_engines: bool, overrides: list[str]) -> list[str]:
     """Every fault of one file, a sentence each; empty if it can be run."""
     from anysim import registry
-    from anysim.api import compile_world, dry_run, load
-    from anysim.engine.capability import check as check_capabilities
+    from anysim.api import check_engine, compile_world, dry_run, load
     from anysim.engine.factory import engine_class
-    from anysim.engine.needs import needs_of
     from anysim.errors import AnysimError, AssetError, SpecError
 
     try:
@@ -56,8 +54,9 @@ def check_one(name: str, engine: str | None, all_engines: bool, overrides: list[
     faults: list[str] = []
     for one in engines:
         try:
-            kind = engine_class(one)
-            check_capabilities(one, kind.capabilities, needs_of(world), name, kind.refusals(world))
+            check_engine(loaded, world, engine_class(one), name)
+        except SpecError as error:
+            return [str(issue) for issue in error.issues]
         except AnysimError as error:
             faults.append(f"{name}: {error}")
     return faults

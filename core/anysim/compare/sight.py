@@ -5,6 +5,7 @@ A pixel's ray goes through its centre: the pixel in column u and row v of a W x 
 cylinders and capsules are met exactly; meshes and height fields triangle by triangle. There is no anti-aliasing.
 """
 
+from dataclasses import replace
 from math import radians, tan
 from typing import NamedTuple
 
@@ -51,13 +52,14 @@ def rays(fov: float, width: int, height: int) -> Array:
 def project(points: Array, view: CameraView, row: int = 0) -> Array:
     """Where points (..., 3) [m] of the world fall: (..., 2) [pixels], column and row; 0.5 is a pixel's centre."""
     local = P.rotate_inverse(view.pose[row, 3:], points - view.pose[row, :3])
-    f = focal_length(view.fov, view.height)
+    f = focal_length(float(view.fov[row]), view.height)
     return local[..., :2] / local[..., 2:] * f + np.array([view.width, view.height]) / 2
 
 
 def sight(world: World, poses: Array, view: CameraView, row: int = 0) -> Sight:
     """What the camera sees, bodies at poses (B, 7)."""
-    directions = rays(view.fov, view.width, view.height)
+    view = replace(view, pose=view.pose[[row]], fov=view.fov[[row]])
+    directions = rays(float(view.fov[0]), view.width, view.height)
     depth = np.full((view.height, view.width), np.inf)
     owner = np.zeros((view.height, view.width), dtype=np.int32)
     entity = {WORLD: 0} | {body: e + 1 for body, e in enumerate(world.body_entity)}
@@ -66,7 +68,7 @@ def sight(world: World, poses: Array, view: CameraView, row: int = 0) -> Sight:
             continue
         local = P.pose(geom.position, geom.quaternion)
         place = local if geom.body == WORLD else P.compose(poses[geom.body], local)
-        seen = P.compose(P.inverse(view.pose[row]), place)  # the geom's frame in the optical one
+        seen = P.compose(P.inverse(view.pose[0]), place)  # the geom's frame in the optical one
         found = _depth(world, geom, seen, directions, view)
         nearer = (found < depth) & (found >= view.near) & (found <= view.far)
         depth[nearer] = found[nearer]
@@ -144,7 +146,7 @@ def _discs(origin: Array, along: Array, radius: float, half_length: float) -> Ar
 def _triangles(corners: Array, directions: Array, view: CameraView) -> Array:
     """The nearest of triangles (T, 3, 3) in the optical frame. Counterclockwise is their front; backs are not seen."""
     depth = np.full(directions.shape[:2], np.inf)
-    f, size = focal_length(view.fov, view.height), np.array([view.width, view.height])
+    f, size = focal_length(float(view.fov[0]), view.height), np.array([view.width, view.height])
     ahead = np.all(corners[..., 2] > view.near, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         flat = np.asarray(corners[..., :2] / corners[..., 2:] * f + size / 2 - 0.5)

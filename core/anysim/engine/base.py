@@ -397,6 +397,30 @@ class SimEngine(Primitives):
             ids = self._ids(env_ids)
             self._rig.poses[ids, self.index.camera(camera_name)] = checks.poses("pose", pose, (len(ids), 7))
 
+    def camera_mounts(self, camera_name: str, env_ids: EnvIds = None) -> Array:
+        """Poses (E, 7) of a camera's optical frame in the frame of its body, or of the world where it has none."""
+        with self._lock:
+            self._require_world()
+            return self._rig.poses[self._ids(env_ids), self.index.camera(camera_name)]
+
+    def camera_fov(self, camera_name: str, env_ids: EnvIds = None) -> Array:
+        """Vertical fields of view (E,) [degrees] of a camera."""
+        with self._lock:
+            self._require_world()
+            return self._rig.fov[self._ids(env_ids), self.index.camera(camera_name)]
+
+    def set_camera_fov(self, camera_name: str, fov: Any, env_ids: EnvIds = None) -> None:
+        """Change a camera's vertical field of view per env: (E,) [degrees], between 1 and 170."""
+        with self._lock:
+            self._require_world()
+            ids = self._ids(env_ids)
+            rows = checks.rows("fov", fov, (len(ids),))
+            if rows.size and not (rows.min() > 1 and rows.max() < 170):
+                raise EngineError(
+                    f"a field of view lies between 1 and 170 degrees, got {rows.min():g} to {rows.max():g}"
+                )
+            self._rig.fov[ids, self.index.camera(camera_name)] = rows
+
     def raycast(self, origins: Any, directions: Any, env_ids: EnvIds = None) -> RayHits:
         """First hits of rays (E, R, 3) [m], world frame, with collision geometry. Directions need not be unit."""
         with self._lock:

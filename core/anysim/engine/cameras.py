@@ -14,11 +14,11 @@ from anysim.world.model import Camera, World
 
 @dataclass(frozen=True)
 class CameraView:
-    """What an engine needs to draw: world poses (E, 7) of the optical frame, lens and size."""
+    """What an engine needs to draw: world poses (E, 7) of the optical frame, vertical fields of view (E,), size."""
 
     name: str
     pose: Array
-    fov: float
+    fov: Array
     width: int
     height: int
     near: float
@@ -26,17 +26,24 @@ class CameraView:
 
 
 class CameraRig:
-    """The cameras of a world in all envs: `poses` (N, C, 7) relative to their bodies, may be changed per env."""
+    """The cameras of a world in all envs, each its own: poses relative to their bodies, and vertical fields of view.
+
+    Attributes:
+        poses: (N, C, 7).
+        fov: (N, C) [degrees].
+    """
 
     def __init__(self, world: World, num_envs: int) -> None:
         self._world = world
         mounts = [[*c.position, *c.quaternion] for c in world.cameras]
         self.poses = np.tile(np.array(mounts, dtype=float).reshape(1, -1, 7), (num_envs, 1, 1))
+        self.fov = np.tile(np.array([c.fov for c in world.cameras], dtype=float), (num_envs, 1))
 
     def extended(self, world: World) -> "CameraRig":
-        """The rig of a world with more cameras (after the present ones), keeping the poses of these."""
+        """The rig of a world with more cameras (after the present ones), keeping what these have."""
         rig = CameraRig(world, len(self.poses))
         rig.poses[:, : self.poses.shape[1]] = self.poses
+        rig.fov[:, : self.fov.shape[1]] = self.fov
         return rig
 
     def view(
@@ -47,15 +54,16 @@ class CameraRig:
         if name == "default" and name not in names:
             camera = self._overview()
             local = np.tile([*camera.position, *camera.quaternion], (len(ids), 1))
+            fov = np.full(len(ids), camera.fov)
         else:
             number = index.camera(name)
             camera = self._world.cameras[number]
-            local = self.poses[ids, number]
+            local, fov = self.poses[ids, number], self.fov[ids, number]
         pose = local if camera.body < 0 else P.compose(state.body_pose[ids, camera.body], local)
         size = (width or camera.width, height or camera.height)
         if min(size) < 1 or max(size) > 8192:
             raise EngineError(f"an image of {size[0]} x {size[1]} pixels cannot be drawn; 1 to 8192 expected")
-        return CameraView(name, pose, camera.fov, *size, camera.near, camera.far)
+        return CameraView(name, pose, fov, *size, camera.near, camera.far)
 
     def _overview(self) -> Camera:
         """Looks at the middle of all bodies' initial places, from far enough to see them."""

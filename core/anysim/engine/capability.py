@@ -39,6 +39,8 @@ class Capability(StrEnum):
     RENDER_RGB = "render: rgb"
     RENDER_DEPTH = "render: depth"
     RENDER_SEGMENTATION = "render: segmentation"
+    RENDER_SHADOWS = "render: shadows"
+    RENDER_LIGHTS = "render: several lights, or one with a place"
     SNAPSHOT_STATE = "snapshot: state"
     SNAPSHOT_TRAJECTORY = "snapshot: trajectory"
     VARYING_ENTITIES = "entities that vary by env"

@@ -66,6 +66,7 @@ def carry_over(engine: "SimEngine", world: World) -> None:
             ours[:, after] = theirs[:, before]
         before, after = _shared(old, target, "cameras")
         engine._rig.poses[:, after] = rig.poses[:, before]  # noqa: SLF001
+        engine._rig.fov[:, after] = rig.fov[:, before]  # noqa: SLF001
         engine._ticks[:] = ticks  # noqa: SLF001
         engine._take_rows(solver, old)  # noqa: SLF001
 

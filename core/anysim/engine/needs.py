@@ -73,6 +73,11 @@ def needs_of(world: World) -> list[Need]:
         need(Capability.VARYING_ENTITIES, f"'{slot.name}' is not the same in every env")
     for sensor in world.contact_sensors:
         need(Capability.CONTACT_SENSORS, f"contact sensor '{sensor.name}'")
+    shows = [camera.name for camera in world.cameras if "rgb" in camera.channels]
+    if shows and (len(world.lights) > 1 or any(light.position is not None for light in world.lights)):
+        need(Capability.RENDER_LIGHTS, f"camera '{shows[0]}' shows {len(world.lights)} lights")
+    if shows and world.scenery.shadows:
+        need(Capability.RENDER_SHADOWS, f"camera '{shows[0]}' shows shadows")
     for camera in world.cameras:
         for channel in camera.channels:
             need(Capability(f"render: {channel}"), f"camera '{camera.name}' gives {channel}")

@@ -18,12 +18,16 @@ from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capabilities
 from anysim.engine.capability import Capability as C
 from anysim.engine.commands import MODES, Control
+from anysim.engine.looks import LIGHTS, SURROUNDINGS, Looks
 from anysim.engine.parameters import PARAMETERS
 from anysim.engine.presence import Lifecycle
 from anysim.engine.state import Availability, SnapshotLevel
 from anysim.math import pose as P
 from anysim.world.kinematics import forward_kinematics
-from anysim.world.model import BodyKind, ControlMode, JointType, World
+from anysim.world.model import BodyKind, ControlMode, JointType, Scenery, World
+
+_UNSEEN = Scenery(background=(0.0, 0.0, 0.0), ambient=(0.0, 0.0, 0.0), shadows=False)
+"""What nobody draws here."""
 
 _IGNORED = "ignored: kinematic engine"
 _POSITION, _VELOCITY = MODES.index(ControlMode.POSITION), MODES.index(ControlMode.VELOCITY)
@@ -212,6 +216,8 @@ class NullEngine(SimEngine):
 
 def _nominal(world: World, name: str) -> Array:
     """The values (K, ...) of a parameter that the World gives."""
+    if name in LIGHTS or name in SURROUNDINGS:
+        return Looks(world, 1, _UNSEEN).default(name)
     table = {
         "body.mass": [b.inertial.mass for b in world.bodies],
         "body.com": [b.inertial.com for b in world.bodies],

@@ -29,6 +29,14 @@ _ALL = (
     Parameter("actuator.kd", "actuators", (), "N m s/rad or N s/m", 0.0),
     Parameter("actuator.effort_limit", "actuators", (), "N m or N", 0.0),
     Parameter("world.gravity", "world", (3,), "m/s^2"),
+    # lights and surroundings: see anysim.engine.looks
+    Parameter("light.direction", "lights", (3,), "where it shines to, world axes"),
+    Parameter("light.position", "lights", (3,), "m, of point lights"),
+    Parameter("light.color", "lights", (3,), "red green blue", 0.0),
+    Parameter("light.intensity", "lights", (), "1 lights a white surface fully", 0.0),
+    Parameter("world.ambient", "world", (3,), "red green blue of the light from everywhere", 0.0),
+    Parameter("world.background", "world", (3,), "red green blue where nothing is", 0.0),
+    Parameter("world.shadows", "world", (), "1 where things cast shadows, else 0", 0.0),
 )
 PARAMETERS: Mapping[str, Parameter] = {p.name: p for p in _ALL}
 """Every parameter the contract knows; an engine declares which of them it can change."""

@@ -18,7 +18,11 @@ if TYPE_CHECKING:
 
 def take(engine: "SimEngine", ids: Array, level: SnapshotLevel) -> Snapshot:
     """Copy the rows of envs; see `SimEngine.snapshot`."""
-    data: dict[str, Array] = {"ticks": engine._ticks[ids], "cameras": engine._rig.poses[ids]}
+    data: dict[str, Array] = {
+        "ticks": engine._ticks[ids],
+        "cameras": engine._rig.poses[ids],
+        "fov": engine._rig.fov[ids],
+    }
     if engine._presence.varies:
         data["present"] = engine._presence.entities[ids]
     data |= {f"commands.{name}": rows for name, rows in engine._commands.rows(ids).items()}
@@ -45,7 +49,7 @@ def put_back(engine: "SimEngine", ids: Array, snapshot: Snapshot) -> None:
             engine._set_parameter(name, rows, ids, np.arange(int(rows.shape[1])))
             engine._changed[name] = None
     engine._commands.restore(ids, _under("commands.", data))
-    engine._rig.poses[ids] = data["cameras"]
+    engine._rig.poses[ids], engine._rig.fov[ids] = data["cameras"], data["fov"]
     engine._restore(ids, _under("engine.", data), snapshot.level)
     engine._ticks[ids] = data["ticks"]
 

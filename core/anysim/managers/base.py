@@ -1,6 +1,6 @@
 """The lifecycle that every manager has.
 
-    configure(spec, streams, board)  ->  build(world)  ->  bind(engine)  ->  reset(env_ids)
+    configure(spec, streams, board)  ->  build(world)  ->  parameters()  ->  bind(engine)  ->  reset(env_ids)
                               ->  before_step(...) / after_step()  ->  snapshot(env_ids) / restore(env_ids, data)
 
 A manager owns its slice of the state and nothing else; managers never call each other. What one of them decides and
@@ -9,7 +9,7 @@ comes before whom.
 """
 
 from abc import ABC
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import ClassVar, Self
 
 from anysim.conventions import Array
@@ -19,9 +19,11 @@ from anysim.managers.streams import Streams
 from anysim.world.model import World
 from anysim_schemas.run import RunSpec
 
-RESET_ORDER = ("terrain", "population", "layout", "scene", "joints", "robot", "camera", "capture", "task")
-"""The ground first, then who is there, where it is, what it is like and how its joints stand, then who moves and who
-looks, and the task last, on the settled scene."""
+RESET_ORDER = (
+    "terrain", "population", "layout", "scene", "joints", "physics", "robot", "light", "camera", "capture", "task",
+)  # fmt: skip
+"""The ground first, then who is there, where it is, what it is like, how its joints stand and what pulls at it, then
+who moves, what shines and who looks, and the task last, on the settled scene."""
 
 
 class Manager(ABC):
@@ -42,6 +44,14 @@ class Manager(ABC):
 
     def build(self, world: World) -> None:
         """Prepare for a compiled World; names become indices here."""
+
+    def parameters(self) -> Iterable[tuple[str, str]]:
+        """What this run will change per env: (parameter, dotted path of the spec that asks for it).
+
+        Names are those of `anysim.engine.parameters`. Asked after `build`; an engine that cannot change one of them is
+        refused before it builds anything.
+        """
+        return ()
 
     def bind(self, engine: SimEngine) -> None:
         """The engine is live: allocate buffers."""

@@ -1,5 +1,7 @@
 """SceneManager: what each object is in this episode: mass, friction, colour."""
 
+from collections.abc import Iterable, Mapping
+
 import numpy as np
 
 from anysim.conventions import Array
@@ -12,6 +14,12 @@ from anysim.world.model import BodyKind, Entity, World
 from anysim.world.nominal import nominal
 from anysim.world.slots import ABSENT, active_entity
 from anysim_schemas.objects import ObjectSpec
+
+_PARAMETERS: Mapping[str, tuple[str, ...]] = {
+    "mass": ("body.mass", "body.inertia"), "density": ("body.mass", "body.inertia"),
+    "friction": ("geom.friction",), "color": ("geom.color",),
+}  # fmt: skip
+"""What is written where a field is drawn."""
 
 
 class SceneManager(Manager):
@@ -31,6 +39,12 @@ class SceneManager(Manager):
             for name, slot in world.logical_objects.items()
             if slot.category in random
         }
+
+    def parameters(self) -> Iterable[tuple[str, str]]:
+        for name, obj in self._random.items():
+            for field, names in _PARAMETERS.items():
+                if is_random(getattr(obj, field)):
+                    yield from ((parameter, f"world.objects.{name}.{field}") for parameter in names)
 
     def bind(self, engine: SimEngine) -> None:
         super().bind(engine)

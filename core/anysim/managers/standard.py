@@ -3,8 +3,11 @@
 from anysim.managers.base import Manager
 from anysim.managers.board import Board
 from anysim.managers.camera import CameraManager
+from anysim.managers.capture import CaptureManager
 from anysim.managers.joints import JointManager
 from anysim.managers.layout import LayoutManager
+from anysim.managers.light import LightManager
+from anysim.managers.physics import PhysicsManager
 from anysim.managers.population import PopulationManager
 from anysim.managers.robot import RobotManager
 from anysim.managers.scene import SceneManager
@@ -18,8 +21,8 @@ def standard_managers(spec: RunSpec, world: World, num_envs: int) -> list[Manage
     """Configured and built, sharing one set of streams."""
     streams, board = Streams(num_envs), Board(num_envs)
     managers: list[Manager] = [
-        TerrainManager(), PopulationManager(), LayoutManager(), SceneManager(), JointManager(), RobotManager(),
-        CameraManager(),
+        TerrainManager(), PopulationManager(), LayoutManager(), SceneManager(), JointManager(), PhysicsManager(),
+        RobotManager(), LightManager(), CameraManager(), CaptureManager(),
     ]  # fmt: skip
     for manager in managers:
         manager.configure(spec, streams, board)

@@ -36,6 +36,9 @@ def draw_one(value: Any, quantiles: Quantiles) -> Any:
         index = int(np.searchsorted(edges, float(quantiles(())), side="right"))
         return value.choice[min(index, len(value.choice) - 1)]
     if isinstance(value, Range):
+        if isinstance(value.range[0], int):  # a whole number, both bounds included
+            first, last = value.range
+            return min(first + int(float(quantiles(())) * (last + 1 - first)), last)
         low, high = (np.asarray(bound, dtype=float) for bound in value.range)
         return _plain(low + (high - low) * quantiles(low.shape))
     if isinstance(value, LogUniform):

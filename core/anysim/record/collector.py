@@ -13,7 +13,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.record.frame import Frame, state_rows
-from anysim.record.header import EpisodeHeader, RunHeader, camera_info, image_interval, state_layout
+from anysim.record.header import EpisodeHeader, RunHeader, camera_info, state_layout
 from anysim.record.provenance import package_versions
 from anysim.record.recorder import Recorder
 from anysim.record.writer import writer_factory
@@ -86,8 +86,9 @@ class Collector:
         """Run `episodes` in all, shared out as evenly as can be: env i runs one of every N."""
         self.env, self.policy, self.seed = env, policy, seed
         record = env.spec.record
+        assert env.capture is not None  # every env that `anysim.make` makes has one
         self.recorder = Recorder(out, writer_factory(record.writer, record.options), run_header(env, seed))
-        self._every = image_interval(env.engine.world.physics.control_dt, record.fps)
+        self._capture = env.capture
         self._share = np.array([len(range(i, episodes, env.num_envs)) for i in range(env.num_envs)])
         self._episode = np.full(env.num_envs, -1)
         self._total = np.zeros(env.num_envs)
@@ -140,8 +141,8 @@ class Collector:
         for name in env.spec.record.cameras:
             number = env.engine.index.camera(name)
             camera = env.engine.world.cameras[number]
-            pose = env.engine.camera_poses(name, [i])[0] if camera.look_at else None
-            cameras[name] = camera_info(env.engine.world, camera, self._every, pose)
+            pose, fov = env.engine.camera_mounts(name, [i])[0], float(env.engine.camera_fov(name, [i])[0])
+            cameras[name] = camera_info(env.engine.world, camera, self._capture.every, pose, fov)
         return EpisodeHeader(
             env=i, episode=int(self._episode[i]), episode_seed=int(env.streams.episode_seed[i]),
             drawn=env.streams.draws[i], instruction=env.spec.task.description, cameras=cameras,
@@ -198,11 +199,11 @@ class Collector:
             ))  # fmt: skip
 
     def _images(self, ids: Array) -> dict[int, dict[str, Array]]:
-        due = ids[self.env.scene.elapsed[ids] % self._every == 0]
+        due = self._capture.due(ids)
         images: dict[int, dict[str, Array]] = {int(i): {} for i in due}
         if len(due):
             for camera in self.env.spec.record.cameras:
-                pictures = self.env.engine.render(camera, env_ids=due)["rgb"]
+                pictures = self._capture.image(camera, due)
                 for row, i in enumerate(map(int, due)):
                     images[i][camera] = pictures[row]
         return images

@@ -123,10 +123,12 @@ def state_layout(
     )
 
 
-def camera_info(world: World, camera: Camera, every: int, pose: Array | None = None) -> CameraInfo:
+def camera_info(
+    world: World, camera: Camera, every: int, pose: Array | None = None, fov: float | None = None
+) -> CameraInfo:
     """A camera of a World as a recorder wants it.
 
-    `pose` (7,) overrides the one in the World: a camera that looks at something is aimed anew at each reset.
+    `pose` (7,) and `fov` [degrees] override those in the World: they may be other ones in each episode.
     """
     values = [*camera.position, *camera.quaternion] if pose is None else [float(x) for x in pose]
     return CameraInfo.model_validate(
@@ -134,13 +136,8 @@ def camera_info(world: World, camera: Camera, every: int, pose: Array | None = N
             "width": camera.width,
             "height": camera.height,
             "every": every,
-            "fov": camera.fov,
+            "fov": camera.fov if fov is None else fov,
             "parent": "world" if camera.body < 0 else world.bodies[camera.body].name,
             "pose": tuple(values),
         }
     )
-
-
-def image_interval(control_dt: float, fps: float) -> int:
-    """Every how many control steps an image is taken so that the video has about `fps` frames per second [Hz]."""
-    return max(1, round(1.0 / (control_dt * fps)))

@@ -25,7 +25,9 @@ STATUS_NAMES = np.array([str(s) for s in Status])
 RUNNING, SUCCESS, FAILED, TRUNCATED = range(4)
 
 Obs = dict[str, Array]
-"""Observation groups: `policy` always; `privileged` and others as the task declares; (N, D) float32."""
+"""Observation groups: `policy` always; `privileged` and others as the task declares; (N, D) float32.
+
+Images that the task observes are `images/CAMERA`; (N, H, W, 3) uint8."""
 
 
 class StepResult(NamedTuple):

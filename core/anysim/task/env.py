@@ -10,6 +10,7 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.errors import SnapshotError, TaskError
 from anysim.managers.base import RESET_ORDER, Manager
+from anysim.managers.capture import CaptureManager
 from anysim.managers.robot import RobotManager
 from anysim.managers.streams import Streams
 from anysim.managers.terrain import TerrainManager
@@ -51,6 +52,7 @@ class TaskEnv:
             self.scene.origin = self.managers[0].board.origin
             self.scene.terrain = next((m for m in self.managers if isinstance(m, TerrainManager)), None)
         self.robots = next((m for m in self.managers if isinstance(m, RobotManager)), None)
+        self.capture = next((m for m in self.managers if isinstance(m, CaptureManager)), None)
         self.action_dim = 0 if self.robots is None else self.robots.action_dim
         self.mdp = Mdp(spec.task, self.scene, self.streams)
         self.scene.last_action = np.zeros((self.num_envs, self.action_dim))
@@ -65,6 +67,8 @@ class TaskEnv:
         self.scene.look(None)
         self.observation_sizes = {group: rows.shape[1] for group, rows in self.mdp.observe().items()}
         """Components of each observation group."""
+        self.image_shapes = {} if self.capture is None else self.capture.image_shapes
+        """The shape of each observed image, by `images/CAMERA`."""
         self._hooks.after_build(env=self)
 
     # ------------------------------------------------------------------ facts
@@ -125,7 +129,7 @@ class TaskEnv:
         self.scene.meet()
         self.scene.look(ids)
         self.mdp.reset(ids)
-        rows = self.mdp.observe()
+        rows = self._observe(ids)
         self._store(rows, ids)
         self._hooks.before_episode(env=self, env_ids=ids)
         return {g: r.copy() for g, r in rows.items()}, {k: v[ids] for k, v in self._info().items()}
@@ -143,6 +147,13 @@ class TaskEnv:
             raise TaskError(f"mask must be a bool array of shape ({self.num_envs},), got {mask.dtype} {mask.shape}")
         return np.flatnonzero(mask)
 
+    def _observe(self, ids: Array | None) -> Obs:
+        """All groups and images of all envs, or of those in `ids`."""
+        rows = self.mdp.observe()
+        if self.image_shapes and self.capture is not None:
+            rows |= self.capture.observe(np.arange(self.num_envs) if ids is None else ids)
+        return rows
+
     def _store(self, rows: Obs, ids: Array | None) -> None:
         """Keep the latest observation: a fresh array for a full batch, rows written into the present one otherwise."""
         if ids is None or len(ids) == self.num_envs:
@@ -151,7 +162,7 @@ class TaskEnv:
         for group, values in rows.items():
             kept = self._obs.get(group)
             # copied before it is written to: earlier results may still hold the array
-            fresh = np.zeros((self.num_envs, values.shape[1]), np.float32) if kept is None else kept.copy()
+            fresh = np.zeros((self.num_envs, *values.shape[1:]), values.dtype) if kept is None else kept.copy()
             fresh[ids] = values
             self._obs[group] = fresh
 
@@ -190,7 +201,7 @@ class TaskEnv:
         self._evaluate(rows)
         reward = self._reward(ids)
         self.mdp.interval_events()
-        observed = self.mdp.observe()
+        observed = self._observe(ids)
         self._store(observed, ids)
         result = StepResult(self._full(observed, ids), reward, STATUS_NAMES[self._code], self._info())
         self._announce(result, ids)
@@ -281,7 +292,7 @@ class TaskEnv:
         self.streams.restore(ids, dict(snapshot.streams))
         self.scene.meet()
         self.scene.look(ids)
-        rows = self.mdp.observe()
+        rows = self._observe(ids)
         self._store(rows, ids)
         return {g: r.copy() for g, r in rows.items()}
 

@@ -12,6 +12,7 @@ from anysim.managers.streams import Streams
 from anysim.managers.values import draw_rows
 from anysim.task.contract import Obs
 from anysim.task.library import bind
+from anysim.task.sensing import Sensed
 from anysim.task.view import SceneView
 from anysim_schemas.task import TaskSpec
 
@@ -46,14 +47,26 @@ class Mdp:
         self._success = terms("predicate", spec.success, "success")
         self._failure = terms("predicate", spec.failure, "failure")
         self._events = terms("event", spec.events, "events")
-        self._groups = {
-            group: list(
-                terms("observation", {str(i): t for i, t in enumerate(entries)}, f"observations.{group}").values()
-            )
-            for group, entries in spec.observations.items()
-        }
+        self._groups: dict[str, list[Term]] = {}
+        for group, entries in spec.observations.items():
+            bound = terms("observation", {str(i): t for i, t in enumerate(entries)}, f"observations.{group}")
+            self._groups[group] = [self._sensed(group, int(i), term) for i, term in bound.items()]
         if issues:
             raise SpecError(issues)
+
+    def _sensed(self, group: str, place: int, term: Term) -> Term:
+        """The term with what its spec says of noise, bias and delay; the term itself where that is nothing."""
+        entries = self.spec.observations[group]
+        spec = entries[place]
+        if not Sensed.alters(spec):
+            return term
+        before = sum(entry.term == spec.term for entry in entries[:place])  # terms of one name are told apart by order
+        name = f"task/observations.{group}/{spec.term}{f'~{before}' if before else ''}"
+        return Sensed(term, spec, name, f"task.observations.{group}.{place}", self.scene, self.streams)
+
+    @property
+    def _altered(self) -> list[Sensed]:
+        return [term for terms in self._groups.values() for term in terms if isinstance(term, Sensed)]
 
     def reset(self, env_ids: Array) -> None:
         """Reset events, then new goals; the scene must be looking at these rows."""
@@ -62,6 +75,8 @@ class Mdp:
         for name, term in self._commands.items():
             self.scene.goals[name][env_ids] = term(partial(self._draw, f"command/{name}", 0))
         self.scene.moment += 1  # goals have moved
+        for term in self._altered:
+            term.reset(env_ids)
 
     def interval_events(self) -> None:
         """Events of the kind `when: step`, for the rows at hand."""
@@ -119,10 +134,15 @@ class Mdp:
 
     def snapshot(self, env_ids: Array) -> dict[str, Array]:
         """Copies of the goals and counters."""
-        return {"held": self.held[env_ids]} | {f"goal.{name}": g[env_ids] for name, g in self.scene.goals.items()}
+        data = {"held": self.held[env_ids]} | {f"goal.{name}": g[env_ids] for name, g in self.scene.goals.items()}
+        for term in self._altered:
+            data |= term.snapshot(env_ids)
+        return data
 
     def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
         """Write what `snapshot` returned."""
         self.held[env_ids] = data["held"]
         for name, goal in self.scene.goals.items():
             goal[env_ids] = data[f"goal.{name}"]
+        for term in self._altered:
+            term.restore(env_ids, data)

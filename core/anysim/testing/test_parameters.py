@@ -20,8 +20,17 @@ def _nominal(world, name):
     """The values (K, ...) that the World gives."""
     target, field = name.split(".")
     if target == "world":
-        return np.array([world.physics.gravity])
-    things = {"body": world.bodies, "geom": world.geoms, "joint": world.joints, "actuator": world.actuators}[target]
+        owner = world.physics if field == "gravity" else world.scenery
+        return np.array([getattr(owner, field)], dtype=float)
+    if name == "light.position":
+        return np.array([light.position or (0.0, 0.0, 0.0) for light in world.lights])
+    things = {
+        "light": world.lights,
+        "body": world.bodies,
+        "geom": world.geoms,
+        "joint": world.joints,
+        "actuator": world.actuators,
+    }[target]
     inner = {"body": "inertial", "geom": "surface" if field == "friction" else ""}.get(target, "")
     return np.array([getattr(getattr(t, inner) if inner else t, field) for t in things], dtype=float)
 
@@ -34,6 +43,8 @@ def _changed(name, values):
 
 def _movable(world, name):
     """The indices whose value an engine must be able to change: not those of bodies that cannot move."""
+    if name == "light.position":
+        return [i for i, light in enumerate(world.lights) if light.position is not None]
     if not name.startswith("body."):
         return list(range(count(PARAMETERS[name], world)))
     return [i for i, b in enumerate(world.bodies) if b.kind != "static"]
@@ -43,7 +54,7 @@ def _movable(world, name):
 def test_parameters_begin_as_the_world_says(build, engine_class, name):
     """Right after the build every parameter has the World's value in every env."""
     skip_without_parameter(engine_class, name)
-    world = worlds.scene()
+    world = worlds.lit()
     engine = build(world, 2)
     which = _movable(world, name)
     wanted = _nominal(world, name)[which]
@@ -57,7 +68,7 @@ def test_parameters_begin_as_the_world_says(build, engine_class, name):
 def test_parameters_are_per_env(build, engine_class, name):
     """A value written for one env and index is read back there, and nowhere else."""
     skip_without_parameter(engine_class, name)
-    world = worlds.scene()
+    world = worlds.lit()
     engine = build(world, 3)
     before = engine.get_parameters(name)
     index = _movable(world, name)[-1]
@@ -76,7 +87,7 @@ def test_parameters_are_per_env(build, engine_class, name):
 def test_parameters_survive_a_reset(build, engine_class, name):
     """`reset` leaves parameters as they are."""
     skip_without_parameter(engine_class, name)
-    world = worlds.scene()
+    world = worlds.lit()
     engine = build(world, 2)
     index = _movable(world, name)[0]
     engine.set_parameters(name, _changed(name, engine.get_parameters(name, [1], [index])), [1], [index])
@@ -90,7 +101,7 @@ def test_parameters_survive_a_reset(build, engine_class, name):
 def test_one_envs_parameters_leave_the_others(build, engine_class, name):
     """Envs whose parameters were not touched run on, bit for bit."""
     skip_without_parameter(engine_class, name)
-    world = worlds.scene()
+    world = worlds.lit()
     engine, clean = build(world, 2), build(world, 2)
     which = _movable(world, name)
     engine.set_parameters(name, _changed(name, engine.get_parameters(name, [1], which)), [1], which)

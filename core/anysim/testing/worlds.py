@@ -22,10 +22,12 @@ from anysim.world.model import (
     HeightFieldShape,
     Inertial,
     JointType,
+    Light,
     Mesh,
     MeshShape,
     Mimic,
     Quat,
+    Scenery,
     Shape,
     Site,
     Sphere,
@@ -69,6 +71,15 @@ def scene(cameras: bool = False, sensor: bool = False) -> World:
         channels = ("rgb", "depth", "segmentation")
         s.cameras.append(Camera("front", WORLD, eye, _looking(eye, middle), 50.0, 64, 48, channels))
     return s.world()
+
+
+def lit(cameras: bool = False) -> World:
+    """The scene with a light from far away and one from a place, and surroundings of its own."""
+    lights = (
+        Light("sun", (0.0, 0.6, -0.8), None, (1.0, 0.9, 0.8), 0.6),
+        Light("lamp", (0.0, 0.0, -1.0), (0.0, 0.5, 2.0), (0.5, 0.6, 1.0), 0.3),
+    )
+    return replace(scene(cameras), lights=lights, scenery=Scenery((0.2, 0.3, 0.5), (0.3, 0.3, 0.4), False))
 
 
 def _arm(s: Sketch, position: Vec3 = ORIGIN) -> None:

@@ -12,14 +12,17 @@ from typing import NamedTuple
 from anysim.conventions import GROUND
 from anysim.world.builder import WorldBuilder
 from anysim.world.compile_collisions import with_exclusions
+from anysim.world.compile_dynamics import with_dynamics
+from anysim.world.compile_lights import compile_lights, compile_scenery
 from anysim.world.compile_population import add_population, check_names
 from anysim.world.compile_robot import add_robot
 from anysim.world.compile_room import add_room, furniture_names
-from anysim.world.compile_sensors import compile_lights, with_sensors
+from anysim.world.compile_sensors import with_sensors
 from anysim.world.compile_terrain import add_terrain
 from anysim.world.imported import ImportNote
 from anysim.world.issues import Issues
 from anysim.world.model import Actuation, Physics, Slot, World
+from anysim.world.nominal import nominal
 from anysim.world.placement import check_layout, place_nominally
 from anysim.world.slots import by_object
 from anysim_schemas.engine import PhysicsSpec
@@ -74,10 +77,13 @@ def compile_with_report(
         slots += varying
     fixtures = [] if content.room is None else furniture_names(content.room)
     order = check_layout(content.layout, content.objects, list(content.robots), issues.at("layout"), fixtures)
-    world = replace(builder.build(), slots=tuple(slots), lights=compile_lights(content.lights, issues.at("lights")))
+    lights = compile_lights(content.lights, issues.at("lights"))
+    scenery = compile_scenery(content.scenery, issues.at("scenery"))
+    world = replace(builder.build(), slots=tuple(slots), lights=lights, scenery=scenery)
     missing = {*content.robots, *content.objects} - {entity.category for entity in world.entities}
     if missing:  # what looks at a thing that could not be made would only repeat its error
         issues.raise_if_any()
+    world = with_dynamics(world, content.robots, issues.at("robots"))
     places = {name: entry for name, (_, entry) in by_object(content.layout, content.objects).items()}
     world = place_nominally(world, places, order)
     world = with_exclusions(world, content.collisions, issues.at("collisions"))
@@ -93,6 +99,6 @@ def _base(base: Base, name: str) -> Path | None:
 def neutral_physics(spec: PhysicsSpec) -> Physics:
     """The physics part of a World."""
     return Physics(
-        spec.dt, spec.control_dt, spec.gravity, spec.friction_cone, spec.impratio, Actuation(spec.actuation),
+        spec.dt, spec.control_dt, nominal(spec.gravity), spec.friction_cone, spec.impratio, Actuation(spec.actuation),
         spec.velocity_limits == "enforce",
     )  # fmt: skip

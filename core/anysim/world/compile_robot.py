@@ -28,6 +28,7 @@ from anysim.world.model import (
     Site,
     Vec3,
 )  # fmt: skip
+from anysim.world.nominal import extremes, nominal
 from anysim.world.presets import GRIPPER_LIMIT_SOFTNESS, surface
 from anysim.world.rounding import split
 from anysim_schemas.robots import RobotModelSpec, RobotSpec
@@ -76,7 +77,7 @@ class _Assembly:
             pairs = combinations(range(len(bodies)), 2)
             apart = frozenset(p for p in pairs if bodies[p[1]].parent != p[0])
             model = replace(model, excluded_pairs=model.excluded_pairs | apart)
-        position, quaternion = placement(self.spec.position, (0.0, 0.0, self.spec.yaw))
+        position, quaternion = placement(nominal(self.spec.position), (0.0, 0.0, nominal(self.spec.yaw)))
         entity = builder.add(
             self.name, EntityKind.ROBOT, model, root=BodyKind.FREE if floating else BodyKind.STATIC, position=position,
             quaternion=quaternion, source=self.entry.source, license=self.entry.license,
@@ -100,15 +101,21 @@ class _Assembly:
             for name, value in home.items():
                 for index in self._known((name,), issues):
                     joint = joints[index]
-                    if not joint.lower - 1e-9 <= value <= joint.upper + 1e-9:
-                        issues.add(
-                            name, f"{value:g} is outside of the joint's limits [{joint.lower:g}, {joint.upper:g}]"
-                        )
+                    low, high = extremes(value)
+                    if not (joint.lower - 1e-9 <= low and high <= joint.upper + 1e-9):
+                        far = low if low < joint.lower - 1e-9 else high
+                        issues.add(name, f"{far:g} is outside of the joint's limits [{joint.lower:g}, {joint.upper:g}]")
                     elif joint.mimic is not None:
                         leader = joints[joint.mimic.joint].name
                         issues.add(name, f"'{name}' follows '{leader}'; give the home of that one")
                     else:
-                        joints[index] = replace(joint, initial=value)
+                        joints[index] = replace(joint, initial=float(nominal(value)))
+        issues = self.issues.at("home_velocity")
+        for name in self.spec.home_velocity:
+            for index in self._known((name,), issues):
+                mimic = joints[index].mimic
+                if mimic is not None:
+                    issues.add(name, f"'{name}' follows '{joints[mimic.joint].name}'; give the velocity of that one")
         for i, joint in enumerate(joints):
             if joint.mimic is not None:
                 leader = joints[joint.mimic.joint]

@@ -1,4 +1,4 @@
-"""Cameras, contact sensors and lights of a spec, looked up in the World they belong to."""
+"""Cameras and contact sensors of a spec, looked up in the World they belong to."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -10,17 +10,12 @@ from anysim.errors import NameLookupError, listing, suggest
 from anysim.math import pose as P
 from anysim.world.issues import Issues
 from anysim.world.lookup import find_bodies, find_frame
-from anysim.world.model import Camera, ContactSensor, Light, World
+from anysim.world.model import Camera, ContactSensor, World
+from anysim.world.nominal import nominal
 from anysim.world.rounding import split
 from anysim.world.slots import members
 from anysim_schemas.cameras import CameraSpec
 from anysim_schemas.contact_sensors import ContactSensorSpec
-from anysim_schemas.lights import LightSpec
-
-DEFAULT_LIGHTS = (
-    Light("key", direction=(-0.4, 0.3, -0.87), intensity=0.7),  # from the front right, as a lamp beside the viewer
-    Light("fill", direction=(0.5, -0.6, -0.62), intensity=0.35),  # weaker, from the other side: no side is black
-)
 
 
 def compile_camera(world: World, name: str, spec: CameraSpec, issues: Issues) -> Camera | None:
@@ -31,7 +26,7 @@ def compile_camera(world: World, name: str, spec: CameraSpec, issues: Issues) ->
         except NameLookupError as error:
             issues.add("mount", str(error))
             return None
-        local = P.pose(spec.position, P.from_roll_pitch_yaw(np.array(spec.roll_pitch_yaw)))
+        local = P.pose(nominal(spec.position), P.from_roll_pitch_yaw(np.array(nominal(spec.roll_pitch_yaw))))
         body, looks_at = frame.body, None
         pose = P.compose(P.pose(frame.position, frame.quaternion), local)
     else:
@@ -40,7 +35,7 @@ def compile_camera(world: World, name: str, spec: CameraSpec, issues: Issues) ->
         target = _target(world, spec, issues)
         if target is None:
             return None
-        eye = np.array(spec.from_)
+        eye, target = np.array(nominal(spec.from_)), target + np.array(nominal(spec.look_at_offset))
         if np.linalg.norm(target - eye) < 1e-6:
             issues.add("look_at", "is where the camera is; move one of them")
             return None
@@ -51,7 +46,7 @@ def compile_camera(world: World, name: str, spec: CameraSpec, issues: Issues) ->
         body,
         position,
         quaternion,
-        spec.fov,
+        float(nominal(spec.fov)),
         spec.size[0],
         spec.size[1],
         spec.channels,
@@ -92,19 +87,6 @@ def compile_contact_sensor(world: World, name: str, spec: ContactSensorSpec, iss
         issues.add("body", "the ground has no contact sensor; sense the other body `against` it")
         return None
     return ContactSensor(name, found["body"], found.get("against"))
-
-
-def compile_lights(specs: Mapping[str, LightSpec], issues: Issues) -> tuple[Light, ...]:
-    """The lights, or a key and a fill light where none is given."""
-    lights: list[Light] = []
-    for name, spec in specs.items():
-        length = float(np.linalg.norm(spec.direction))
-        if length < 1e-9:
-            issues.add(f"{name}.direction", "a light needs a direction that is not zero")
-            continue
-        x, y, z = (component / length for component in spec.direction)
-        lights.append(Light(name, (x, y, z), spec.position, spec.color, spec.intensity))
-    return tuple(lights) if specs else DEFAULT_LIGHTS
 
 
 def with_sensors(

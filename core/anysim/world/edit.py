@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from anysim.conventions import GROUND, WORLD
 from anysim.errors import NameLookupError, SpecError, SpecIssue, listing, suggest
 from anysim.world.builder import WorldBuilder
+from anysim.world.compile_dynamics import with_dynamics
 from anysim.world.compile_object import add_object
 from anysim.world.compile_robot import add_robot, placement
 from anysim.world.compile_sensors import compile_camera
@@ -55,9 +56,12 @@ def with_robot(world: World, name: str, robot: str, placement: Mapping[str, Any]
     path = f"robots.{name}"
     _free_name(world, name, path)
     builder, issues = WorldBuilder(world), Issues(path)
-    add_robot(builder, name, _parse(RobotSpec, {"robot": robot, **placement}, path), issues)
+    parsed = _parse(RobotSpec, {"robot": robot, **placement}, path)
+    add_robot(builder, name, parsed, issues)
     issues.raise_if_any()
-    return builder.build()
+    made = with_dynamics(builder.build(), {name: parsed}, (about := Issues("robots")))
+    about.raise_if_any()
+    return made
 
 
 def with_camera(world: World, name: str, spec: Mapping[str, Any]) -> World:

@@ -6,10 +6,11 @@ body; their frames survive as sites. All joints here have one degree of freedom;
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 from math import inf
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -216,6 +217,15 @@ class Light:
 
 
 @dataclass(frozen=True, slots=True)
+class Scenery:
+    """What is around the things: colours in [0, 1], red green blue. None leaves it to the engine."""
+
+    background: Vec3 | None = None
+    ambient: Vec3 | None = None
+    shadows: bool | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class ContactSensor:
     """Net contact force [N] on the bodies, world axes; `against` restricts it to contacts with those bodies.
 
@@ -337,6 +347,10 @@ class Physics:
         return round(self.control_dt / self.dt)
 
 
+HASHED_IF_GIVEN = MappingProxyType({"hashed": "if given"})
+"""Marks a field that came later: worlds that leave it alone keep their hash."""
+
+
 @dataclass(frozen=True)
 class World:
     """Everything an engine needs to build, and nothing about any engine."""
@@ -364,6 +378,7 @@ class World:
     """Logical objects that may differ between envs. An entity that is in none of them is there in every env."""
     tiles: tuple[Tile, ...] = ()
     """Pieces of tiled ground, row by row; an env's scene stands on one of them. Empty where there is one ground."""
+    scenery: Scenery = field(default=Scenery(), metadata=HASHED_IF_GIVEN)
 
     @cached_property
     def hash(self) -> str:

@@ -17,6 +17,8 @@ def nominal(value: Any) -> Any:
     if isinstance(value, Choice):
         return value.choice[0]
     if isinstance(value, Range):
+        if isinstance(value.range[0], int):
+            return sum(value.range) // 2
         return _combine(lambda low, high: 0.5 * (low + high), *value.range)
     if isinstance(value, LogUniform):
         return _combine(lambda low, high: sqrt(low * high), *value.log_uniform)
@@ -28,6 +30,27 @@ def nominal(value: Any) -> Any:
             mean = _combine(min, mean, value.normal.high)
         return mean
     return value
+
+
+def extremes(value: Any) -> tuple[float, float]:
+    """The smallest and the largest number that a scalar value can be; a normal's tails count up to its limits.
+
+    Where a normal has no limit, its mean counts: draws beyond what is allowed are clipped by who uses them.
+    """
+    if isinstance(value, Choice):
+        ends = [min(value.choice), max(value.choice)]
+    elif isinstance(value, Range):
+        ends = [*value.range]
+    elif isinstance(value, LogUniform):
+        ends = [*value.log_uniform]
+    elif isinstance(value, Normal):
+        p = value.normal
+        ends = [p.mean if p.low is None else p.low, p.mean if p.high is None else p.high]
+    else:
+        ends = [value]
+    if isinstance(value, Drawn) and value.otherwise is not None:
+        ends.append(value.otherwise)
+    return float(min(ends)), float(max(ends))
 
 
 def _combine(function: Any, a: Any, b: Any) -> Any:

@@ -122,7 +122,9 @@ def test_a_driver_in_software_gets_the_cheap_shader(make):
     computes = any(word in device.name.lower() for word in ("swiftshader", "llvmpipe"))
     assert device.is_cpu == computes
     assert where == ("in software" if computes else "on the GPU")
-    assert Painter(engine.world, engine._layout, engine.options)._shader == ("lit" if computes else "default")
+    assert Painter(engine.world, engine._layout, engine._looks, engine.options)._shader == (
+        "lit" if computes else "default"
+    )
 
 
 def test_faces_are_as_bright_as_light_falls_on_them():
