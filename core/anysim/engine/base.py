@@ -199,6 +199,7 @@ class SimEngine(Primitives):
                 self._populate(changed)
             except BaseException:
                 self._presence.write(ids, before)
+                self._populate(changed)  # of several envs or workers some may have gone on to the new one
                 raise
         return changed
 
