@@ -172,6 +172,11 @@ def test_errors_name_the_source_at_fault(world: Make, tmp_path: Path) -> None:
     assert text.startswith("objects.mug.source.choice.1: asset 'none.obj' does not exist")
 
 
+def test_a_fault_of_all_that_an_object_can_be_is_said_once(world: Make) -> None:
+    text = messages(world, objects={"mug": {"source": {"choice": [BALL, BRICK]}, "color": "gren"}})
+    assert len(text.splitlines()) == 1
+
+
 def test_sources_may_mix_families(world: Make, tmp_path: Path) -> None:
     (tmp_path / "chest.urdf").write_text(CHEST)
     made = world(tmp_path, objects={"thing": {"source": {"choice": [BALL, "chest.urdf"]}}})

@@ -37,8 +37,9 @@ class Presence:
         self._derive()
 
     def _derive(self) -> None:
-        self.bodies = self.entities[:, self._body_entity]
-        self.joints = self.entities[:, self._joint_entity]
+        # a body of no entity, whose index is -1, is always there
+        there = np.concatenate([self.entities, np.ones((len(self.entities), 1), dtype=bool)], axis=1)
+        self.bodies, self.joints = there[:, self._body_entity], there[:, self._joint_entity]
 
     def checked(self, present: object, ids: Array) -> Array:
         """The wanted rows (E, entities), if every env has what is fixed and no slot has two entities.

@@ -12,7 +12,7 @@ import numpy as np
 
 from anysim.errors import AssetError, listing
 from anysim.world.assets import locate_folder
-from anysim_schemas.object_source import PROCEDURAL, Count, SourceChoice, SourceFolder, SourceSpec, most
+from anysim_schemas.object_source import PROCEDURAL, SHAPES, Count, SourceChoice, SourceFolder, SourceSpec, most
 from anysim_schemas.objects import ObjectSpec
 from anysim_schemas.values import Choice, Drawn, LogUniform, Normal, Range
 
@@ -150,22 +150,31 @@ def source_text(source: SourceSpec) -> str:
     elif source.mesh is not None or source.asset is not None:
         text = source.mesh or source.asset or ""
     else:
-        kind, value = next((k, v) for k, v in source if k != "scale" and v is not None)
-        text = " ".join([kind, *(f"{x:g}" for x in (value if isinstance(value, tuple) else (value,)))])
+        kind, value = next((kind, value) for kind in SHAPES if (value := getattr(source, kind)) is not None)
+        parts = value if isinstance(value, tuple) else (value,)
+        text = " ".join([kind, *(f"{part:g}" if isinstance(part, float) else str(part) for part in parts)])
     return text if source.scale == 1.0 else f"{text}, scale {source.scale:g}"
 
 
 def drawn_sources(spec: ObjectSpec, texts: Sequence[str]) -> Options:
     """How the sources of an object are drawn, which are called `texts`, in the order of `sources`."""
-    source = spec.source
+    source, named = spec.source, _told_apart(texts)
+    if len(named) == 1:
+        return Options(named)
     if not isinstance(source, SourceChoice):
-        return options(texts, like=source)
-    listed = texts[: len(source.choice)]
-    first = 0 if source.otherwise is None else texts.index(source_text(source.otherwise))
-    if len(texts) == 1:
-        return Options((texts[0],))
+        return options(named, like=source)
+    first, listed = 0, len(source.choice)
+    if source.otherwise is not None:
+        first = source.choice.index(source.otherwise) if source.otherwise in source.choice else listed
     drawn = Choice[Any](
-        choice=tuple(listed), weights=source.weights, ratio=source.ratio, shared=source.shared,
-        otherwise=texts[first] if source.ratio < 1.0 else None,
+        choice=named[:listed], weights=source.weights, ratio=source.ratio, shared=source.shared,
+        otherwise=named[first] if source.ratio < 1.0 else None,
     )  # fmt: skip
-    return Options(tuple(texts), first, drawn)
+    return Options(named, first, drawn)
+
+
+def _told_apart(texts: Sequence[str]) -> tuple[str, ...]:
+    """The texts, those that come again with their number."""
+    return tuple(
+        text if text not in texts[:k] else f"{text} ({texts[: k + 1].count(text)})" for k, text in enumerate(texts)
+    )

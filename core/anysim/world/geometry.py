@@ -82,8 +82,22 @@ class EntityShape:
         """Lowest and highest corner (..., 3) [m] around the entity with its root at poses (..., 7)."""
         if not self.shapes:
             return root_pose[..., :3].copy(), root_pose[..., :3].copy()
-        boxes = [shape_bounds(s.shape, P.compose(root_pose, s.pose), self._meshes) for s in self.shapes]
-        return np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
+        lows: list[Array] = []
+        highs: list[Array] = []
+        for shape, poses in self._alike:
+            roots = np.broadcast_to(root_pose[..., None, :], (*root_pose.shape[:-1], *poses.shape))
+            low, high = shape_bounds(shape, P.compose(roots, np.broadcast_to(poses, roots.shape)), self._meshes)
+            lows.append(low.min(axis=-2))
+            highs.append(high.max(axis=-2))
+        return np.min(lows, axis=0), np.max(highs, axis=0)
+
+    @cached_property
+    def _alike(self) -> list[tuple[Shape, Array]]:
+        """Equal shapes together, with their poses (S, 7): an instancer has hundreds."""
+        places: dict[Shape, list[Array]] = {}
+        for placed in self.shapes:
+            places.setdefault(placed.shape, []).append(placed.pose)
+        return [(shape, np.stack(poses)) for shape, poses in places.items()]
 
     def lowest_point(self, quaternion: Array) -> Array:
         """Height (...) [m] of the lowest point above the root's origin, for root orientations (..., 4)."""

@@ -18,8 +18,9 @@ _AT_ORIGIN = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 def grid(count: int, cell: Array, columns: tuple[int, int] | None = None) -> Array:
     """Places (count, 3) [m] of equal cells (3,) around the first, which is in the middle of the lowest layer.
 
-    Layer by layer upward, each filled from its middle outward. Without `columns` (along x and y) the whole is as high
-    as it is wide, by number.
+    Layer by layer upward, each filled from its middle outward. Every other layer is a quarter of a cell aside, so that
+    balls do not stand on each other in columns. Without `columns` (along x and y) the whole is as high as it is wide,
+    by number.
     """
     side = max(1, round(count ** (1 / 3)))
     nx, ny = columns or (side, ceil(count / (side * side)))
@@ -27,8 +28,8 @@ def grid(count: int, cell: Array, columns: tuple[int, int] | None = None) -> Arr
     layer = np.stack([x - nx // 2, y - ny // 2], axis=1).astype(float)
     order = np.argsort((layer**2).sum(axis=1), kind="stable")
     number = np.arange(count)
-    places = np.concatenate([layer[order][number % len(layer)], (number // len(layer))[:, None]], axis=1)
-    return places * cell
+    height = (number // len(layer))[:, None]
+    return np.concatenate([layer[order][number % len(layer)] + 0.25 * (height % 2), height], axis=1) * cell
 
 
 def instanced(

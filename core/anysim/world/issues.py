@@ -27,11 +27,11 @@ class Issues:
 
     def add(self, path: str, message: str) -> None:
         """A fault at `path` below this view's path."""
-        self._spec.append(SpecIssue(self._where, self._join(path) if path else self._prefix, message))
+        _note(self._spec, SpecIssue(self._where, self._join(path) if path else self._prefix, message))
 
     def asset(self, path: str, error: AssetError) -> None:
         """An asset that `path` asks for and that cannot be had."""
-        self._assets.append(SpecIssue(self._where, self._join(path), str(error)))
+        _note(self._assets, SpecIssue(self._where, self._join(path), str(error)))
 
     def raise_if_any(self) -> None:
         """Raises SpecError with all faults; AssetError where nothing but assets are at fault."""
@@ -42,3 +42,9 @@ class Issues:
 
     def _join(self, *parts: str | int) -> str:
         return ".".join(str(part) for part in (self._prefix, *parts) if part != "")
+
+
+def _note(found: list[SpecIssue], issue: SpecIssue) -> None:
+    """Once: what can be several things is compiled several times, and has its faults in all of them."""
+    if issue not in found:
+        found.append(issue)

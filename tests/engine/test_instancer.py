@@ -1,0 +1,58 @@
+"""Hundreds of equal bodies from one declaration, on every engine."""
+
+import numpy as np
+import pytest
+
+from anysim import registry
+from anysim.engine.factory import create_simulation
+from anysim.world.compile import compile_world
+from anysim.world.model import World
+from anysim_schemas.run import WorldSpec
+
+RADIUS, MASS = 0.02, 0.01
+
+
+def heap(count: int) -> World:
+    """Balls that fall into a tray with low walls."""
+    walls = {
+        f"wall{i}": {"source": {"box": size}, "fixed": True}
+        for i, size in enumerate([[0.5, 0.02, 0.1]] * 2 + [[0.02, 0.5, 0.1]] * 2)
+    }
+    places = [(0, 0.25), (0, -0.25), (0.25, 0), (-0.25, 0)]
+    balls = {"source": {"sphere": RADIUS}, "family": "rigid_instancer", "count": count, "mass": MASS}
+    return compile_world(
+        WorldSpec.model_validate(
+            {
+                "objects": {"balls": balls, **walls},
+                "layout": {f"wall{i}": {"position": [*place, 0.05]} for i, place in enumerate(places)},
+            }
+        )
+    )
+
+
+@pytest.mark.parametrize("engine", registry.names("engines"))
+def test_two_hundred_bodies_are_built_fall_and_lie(engine: str) -> None:
+    if not registry.load("engines", engine).availability().available:
+        pytest.skip(f"{engine} cannot run here")
+    world = heap(200)
+    with create_simulation(engine) as simulation:
+        simulation.create_world(world)
+        start = simulation.get_state().body_pose[0, :200, :3].copy()
+        assert np.allclose(start, world.initial_body_pose[:200, :3], atol=1e-6)
+        if "body.mass" in simulation.parameters:
+            assert np.allclose(simulation.get_parameters("body.mass", indices=range(200)), MASS)
+        if engine == "null":  # nothing falls there
+            return
+        simulation.step(500)
+        place = simulation.get_state().body_pose[0, :200, :3]
+        # nobody has sunk into the ground by more than a tenth of the radius, nor left the tray of half a metre
+        assert place[:, 2].min() > 0.9 * RADIUS
+        assert np.abs(place[:, :2]).max() < 0.26
+        assert place[:, 2].mean() < start[:, 2].mean() - RADIUS
+        apart = np.linalg.norm(place[:, None] - place[None], axis=-1) + np.eye(200)
+        assert apart.min() > 1.8 * RADIUS
+        saved = simulation.snapshot()
+        simulation.reset()
+        assert np.allclose(simulation.get_state().body_pose[0, :200, :3], start, atol=1e-6)
+        simulation.restore(saved)
+        assert np.allclose(simulation.get_state().body_pose[0, :200, :3], place, atol=1e-6)
