@@ -8,6 +8,7 @@
 - A camera's frame is optical: x right, y down, z forward.
 - Friction of a pair: the larger of the two coefficients; where the surfaces differ in priority, the one of higher
   priority decides alone. Restitution of a pair: the larger of the two.
+- The cells of a height field are cut into two triangles from their corner of lowest x and y to that of highest x and y.
 - Bodies and joints are ordered depth first, children in source order.
 """
 

@@ -155,7 +155,6 @@ def _stepping_stones(grid: Lattice, p: Parameters, difficulty: float, rng: np.ra
     _resolved(gap, grid, 2, "gap")
     _room_around(grid, p["platform"], gap, f"a gap of {gap:g} m")
     pitch = stone + gap
-    # measured from the platform's edge, so that the first gap is a whole one
     row = np.floor((grid.y + grid.half[1]) / pitch).astype(int)
     shift = rng.uniform(0.0, pitch, size=int(row.max()) + 1)
     along = (grid.x + grid.half[0] + shift[row]) % pitch
