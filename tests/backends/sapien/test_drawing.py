@@ -13,7 +13,8 @@ from anysim.testing import worlds
 from anysim.world.compile import compile_world
 from anysim_sapien import diagnosis, vulkan
 from anysim_sapien.engine import SapienEngine
-from anysim_sapien.render import BACKGROUND, Painter
+from anysim_sapien.options import OWN_SCENERY
+from anysim_sapien.render import Painter
 from anysim_schemas.run import WorldSpec
 
 NOTHING = "/no/such/driver.json"
@@ -141,9 +142,9 @@ def test_faces_are_as_bright_as_light_falls_on_them():
         except EngineError as error:
             pytest.skip(f"no image can be drawn here: {error}")
     image, seen = images["rgb"][0], images["segmentation"][0]
-    assert (image[seen == 0] == np.rint(np.array(BACKGROUND) * 255)).all()
+    assert (image[seen == 0] == np.rint(np.array(OWN_SCENERY.background) * 255)).all()
     side, top = np.unique(image[seen == 1][:, 0])  # the side that the sun is behind is not in the picture
-    ambient = 0.4 * 0.5 * 255
+    ambient = OWN_SCENERY.ambient[0] * 0.5 * 255
     assert (top - ambient) / (side - ambient) == pytest.approx(0.8 / 0.6, rel=0.03)
 
 
