@@ -29,10 +29,12 @@ class CameraManager(Manager):
             for name, spec in cameras.items()
             if isinstance(spec.look_at, str) or any(is_random(getattr(spec, field)) for field in _POSE)
         }
+        self._still = {name: s for name, s in cameras.items() if s.mount is None and name not in self._aimed}
         self._zoomed = {name: spec for name, spec in cameras.items() if is_random(spec.fov)}
 
     def reset(self, env_ids: Array) -> None:
-        for name, spec in self._aimed.items():
+        moved = self._still if self.board.origin[env_ids].any() else {}  # they stand in their env's scene
+        for name, spec in (self._aimed | moved).items():
             pose = self._mounted(name, spec, env_ids) if spec.mount is not None else self._looking(name, spec, env_ids)
             self.engine.set_camera_pose(name, pose, env_ids)
         for name, spec in self._zoomed.items():
@@ -40,12 +42,13 @@ class CameraManager(Manager):
 
     def _looking(self, name: str, spec: CameraSpec, env_ids: Array) -> Array:
         """World poses (E, 7) of a camera that looks at a point or at an object."""
-        eyes = self._drawn(name, "from", spec.from_, env_ids)
+        origin = self.board.origin[env_ids]
+        eyes = self._drawn(name, "from", spec.from_, env_ids) + origin
         if isinstance(spec.look_at, str):
             body = self.engine.index.frame(spec.look_at).body
             target = self.engine.get_state().body_pose[env_ids, body, :3]
         else:
-            target = np.broadcast_to(np.array(spec.look_at, dtype=float), eyes.shape)
+            target = np.array(spec.look_at, dtype=float) + origin
         target = target + self._drawn(name, "look_at_offset", spec.look_at_offset, env_ids)
         return np.concatenate([eyes, P.look_at(eyes, target)], axis=1)
 
