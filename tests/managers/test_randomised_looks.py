@@ -265,3 +265,16 @@ def test_what_cannot_be_is_said_with_its_place(override: str, words: str) -> Non
     with pytest.raises(SpecError) as caught:
         compile_world(load(SCENE, overrides=[override]))
     assert words in str(caught.value)
+
+
+def test_a_camera_stands_in_the_scene_of_its_env() -> None:
+    """Where an env's scene stands elsewhere on the ground, its cameras do too."""
+    with studio("null", 2, "task.images={}", "world.cameras.top.channels=[]", "world.cameras.side.channels=[]",
+                scene={**SCENE, "task": {"observations": SCENE["task"]["observations"]}}) as env:  # fmt: skip
+        env.reset(seed=0)
+        before = env.engine.camera_poses("top")
+        env.managers[0].board.origin[1] = [3.0, 0.0, 0.5]
+        env.reset(seed=0)
+        after = env.engine.camera_poses("top")
+        assert np.allclose(after[:, :3] - before[:, :3], [[0.0, 0.0, 0.0], [3.0, 0.0, 0.5]])
+        assert np.allclose(after[:, 3:], before[:, 3:])

@@ -3,6 +3,7 @@
 from math import isfinite
 
 from anysim.engine.capability import Capability, Need
+from anysim.world.default_lights import DEFAULT_LIGHTS
 from anysim.world.model import Actuation, BodyKind, ControlMode, HeightFieldShape, MeshShape, Plane, World
 
 
@@ -74,7 +75,8 @@ def needs_of(world: World) -> list[Need]:
     for sensor in world.contact_sensors:
         need(Capability.CONTACT_SENSORS, f"contact sensor '{sensor.name}'")
     shows = [camera.name for camera in world.cameras if "rgb" in camera.channels]
-    if shows and (len(world.lights) > 1 or any(light.position is not None for light in world.lights)):
+    several = len(world.lights) > 1 or any(light.position is not None for light in world.lights)
+    if shows and several and world.lights != DEFAULT_LIGHTS:
         need(Capability.RENDER_LIGHTS, f"camera '{shows[0]}' shows {len(world.lights)} lights")
     if shows and world.scenery.shadows:
         need(Capability.RENDER_SHADOWS, f"camera '{shows[0]}' shows shadows")

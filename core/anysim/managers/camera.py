@@ -35,10 +35,12 @@ class CameraManager(Manager):
             or any(is_random(getattr(spec, field)) for field in _POSE)
             or (spec.mount is None and engine.world.tiles)
         }
+        self._still = {name: s for name, s in cameras.items() if s.mount is None and name not in self._aimed}
         self._zoomed = {name: spec for name, spec in cameras.items() if is_random(spec.fov)}
 
     def reset(self, env_ids: Array) -> None:
-        for name, spec in self._aimed.items():
+        moved = self._still if self.board.origin[env_ids].any() else {}  # they stand in their env's scene
+        for name, spec in (self._aimed | moved).items():
             pose = self._mounted(name, spec, env_ids) if spec.mount is not None else self._looking(name, spec, env_ids)
             self.engine.set_camera_pose(name, pose, env_ids)
         for name, spec in self._zoomed.items():

@@ -6,16 +6,12 @@ from typing import Any
 import numpy as np
 
 from anysim.world.colors import Rgb, rgb
+from anysim.world.default_lights import DEFAULT_LIGHTS
 from anysim.world.issues import Issues
 from anysim.world.model import Light, Scenery
 from anysim.world.nominal import nominal
 from anysim_schemas.lights import LightSpec, ScenerySpec
 from anysim_schemas.values import Choice, Drawn, LogUniform, Normal, Range
-
-DEFAULT_LIGHTS = (
-    Light("key", direction=(-0.4, 0.3, -0.87), intensity=0.7),  # from the front right, as a lamp beside the viewer
-    Light("fill", direction=(0.5, -0.6, -0.62), intensity=0.35),  # weaker, from the other side: no side is black
-)
 
 
 def compile_lights(specs: Mapping[str, LightSpec], issues: Issues) -> tuple[Light, ...]:
