@@ -77,6 +77,9 @@ Flag = Annotated[bool, Strict()]
 Positive = Annotated[float, Strict(), Field(gt=0)]
 NonNegative = Annotated[float, Strict(), Field(ge=0)]
 Fraction = Annotated[float, Strict(), Field(ge=0, le=1)]
+Bounce = Annotated[float, Strict(), Field(ge=0, lt=1)]
+"""A coefficient of restitution: what bounces with 1 never comes to rest."""
+
 Vec3 = tuple[Number, Number, Number]
 Color = Annotated[
     tuple[Fraction, Fraction, Fraction] | str,

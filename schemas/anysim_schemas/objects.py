@@ -5,7 +5,8 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from anysim_schemas.base import Flag, Integer, Number, Positive, Spec
-from anysim_schemas.values import ColorValue, NonNegativeValue, PositiveValue
+from anysim_schemas.matter import DampingSpec, MaterialValue, SolverSpec, TextureValue
+from anysim_schemas.values import BounceValue, ColorValue, NonNegativeValue, PositiveValue, Vec3Value
 
 SHAPES = ("box", "sphere", "cylinder", "capsule", "mesh", "asset")
 MESH_ENDINGS = (".stl", ".obj", ".dae", ".glb", ".ply")
@@ -61,6 +62,11 @@ class ContactSpec(Spec):
         default=None,
         description="the surface of higher priority decides friction and stiffness; the preset's where not given",
     )
+    offset: Positive | None = Field(
+        default=None,
+        description="distance [m] from which on contacts are prepared; forces act from touch on. The engine's own "
+        "where not given",
+    )
 
 
 class ObjectSpec(Spec):
@@ -74,17 +80,32 @@ class ObjectSpec(Spec):
     density: PositiveValue | None = Field(
         default=None, description="density [kg/m^3]; 1000 where neither it nor mass is given"
     )
+    com_offset: Vec3Value | None = Field(
+        default=None, description="shifts the centre of mass of its (root) body [m], body frame"
+    )
+    inertia_scale: PositiveValue | None = Field(
+        default=None, description="factor on the inertia that shape and mass give; 1 where not given"
+    )
     friction: NonNegativeValue | None = Field(
         default=None, description="sliding friction coefficient; 0.8, or an asset's own, where not given"
     )
-    restitution: Annotated[Number, Field(ge=0, lt=1)] | None = Field(
+    restitution: BounceValue | None = Field(
         default=None, description="ratio of speeds after and before a bounce; 0, or an asset's own, where not given"
     )
-    color: ColorValue | None = Field(
-        default=None, description="red, green, blue in [0, 1], or a colour name such as `red`; grey, or a file's own"
-    )
+    damping: DampingSpec | None = Field(default=None, description="how fast it comes to rest by itself; not at all")
     contact: ContactSpec | None = Field(
         default=None, description="how its surface gives; the default, or an asset's own"
+    )
+    solver: SolverSpec | None = Field(
+        default=None, description="settings of the contact solver for this object, where an engine has them"
+    )
+    color: ColorValue | None = Field(
+        default=None,
+        description="red, green, blue in [0, 1], or a colour name such as `red`; its material's, a file's own, or grey",
+    )
+    texture: TextureValue | None = Field(default=None, description="what is painted on it, tinted with `color`")
+    material: MaterialValue | None = Field(
+        default=None, description="how it answers light, and its colour where `color` and `texture` say nothing"
     )
     label: str | None = Field(default=None, description="semantic label; the object's name where not given")
     collides: Flag = Field(default=True, description="false for something that is only seen")

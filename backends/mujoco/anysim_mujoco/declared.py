@@ -34,8 +34,12 @@ _APPROXIMATE = {
         "an underdamped contact: within 0.07 of the coefficient, within 0.04 from 0.5 on; it sinks 6 mm "
         "per m/s at 2 ms; 0 gives 0.13"
     ),
+    Capability.CONTACT_OFFSET: "contacts are found from there on (MuJoCo's gap); it changes no motion",
+    Capability.MATERIALS: (
+        "one lamp's highlight: as strong as specular or metallic says, as small as it is smooth; nothing is mirrored"
+    ),
 }
-_ABSENT = (Capability.LIVE_EDIT_NATIVE,)
+_ABSENT = (Capability.LIVE_EDIT_NATIVE, Capability.SOLVER_SETTINGS)
 CAPABILITIES = Capabilities.of(
     *(c for c in Capability if c not in _APPROXIMATE and c not in _ABSENT), approximate=_APPROXIMATE
 )

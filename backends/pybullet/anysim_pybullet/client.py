@@ -14,7 +14,7 @@ from anysim.world.model import Geom, HeightField, HeightFieldShape, Plane, World
 from anysim_pybullet.bullet import bullet, connect, disconnect
 from anysim_pybullet.options import PybulletOptions
 from anysim_pybullet.surfaces import PairRules
-from anysim_pybullet.tree import Frames, Tree, frames_of, trees_of
+from anysim_pybullet.tree import Frames, Tree, frames_of, shifted, trees_of
 from anysim_pybullet.urdf import body_link, joint_name, shape_link, tree_urdf, world_geom_urdf, write_meshes
 
 STATIC_GROUP, MOVING_GROUP = 2, 1
@@ -23,6 +23,9 @@ MIMIC_FORCE = 1e6
 
 APART = 500.0
 """[m] between trees that are moved apart, larger than any of them."""
+
+UNBOUNDED = 1e30
+"""Bullet's own distance at which contacts begin; its margins bound it to 2 cm."""
 
 SPEED_LIMIT = 1e15
 """Bullet cuts joint and root velocities at 100 unless told otherwise."""
@@ -39,11 +42,9 @@ class Plan:
         self._folder = tempfile.TemporaryDirectory(prefix="anysim-pybullet-")
         self.folder = Path(self._folder.name)
         try:
-            meshes = write_meshes(world, self.folder)
-            self.urdf: list[str] = []
-            for tree in self.trees:
-                shapes = self.rules.shapes_on(tree.bodies)
-                self.urdf.append(self._write(f"t{tree.number}", tree_urdf(world, self.frames, tree, shapes, meshes)))
+            self._meshes = meshes = write_meshes(world, self.folder)
+            self._urdf = [self._tree_file(tree, self.frames, f"t{tree.number}") for tree in self.trees]
+            self._others = 0
             self.ground: list[tuple[int, Geom, str]] = []
             for number, geom in self.rules.shapes_on(np.array([WORLD]))[WORLD]:
                 whole = isinstance(geom.shape, Plane | HeightFieldShape)
@@ -58,6 +59,22 @@ class Plan:
         """Remove the files."""
         self._folder.cleanup()
 
+    def urdf_of(self, tree: Tree, frames: Frames) -> str:
+        """The file of a tree whose bodies have these frames: that of the build, or one of its own."""
+        if np.array_equal(frames.inertial[tree.bodies], self.frames.inertial[tree.bodies]):
+            return self._urdf[tree.number]
+        self._others += 1  # Bullet may keep a file that it has read under its name
+        return self._tree_file(tree, frames, f"t{tree.number}_{self._others}")
+
+    def forget(self, file: str) -> None:
+        """Remove a file that `urdf_of` made for one env."""
+        if file not in self._urdf:
+            Path(file).unlink()
+
+    def _tree_file(self, tree: Tree, frames: Frames, name: str) -> str:
+        shapes = self.rules.shapes_on(tree.bodies)
+        return self._write(name, tree_urdf(self.world, frames, tree, shapes, self._meshes))
+
     def _write(self, name: str, text: str) -> str:
         path = self.folder / f"{name}.urdf"
         path.write_text(text, encoding="ascii")
@@ -70,8 +87,10 @@ class Env:
     `body_at`, `joint_link`, `shape_at` say where the World's bodies, joints and the shapes of `PairRules` are.
     """
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: Plan, com: Array | None = None) -> None:
+        """`com` (B, 3) are the centres of mass in the bodies' frames, where they are not the World's."""
         self.plan = plan
+        self.frames = plan.frames if com is None else shifted(plan.frames, com)
         self.id = connect()
         try:
             self._build()
@@ -92,6 +111,7 @@ class Env:
         self.shape_at: dict[int, tuple[int, int]] = {}
         self.body_of: dict[int, dict[int, int]] = {}  # World body by Bullet body and link, -1 for the world
         self.root_ids: list[int] = []
+        self._begin: dict[int, float] = {}  # where contacts of a shape begin, where that is not Bullet's default
         with quiet() as words:
             try:
                 self._settings(p)
@@ -110,7 +130,7 @@ class Env:
         if failure is not None:
             raise EngineError(f"Bullet cannot build the world '{world.name}': {failure}; {words.tail}") from failure
         self.tree_links = [[self.joint_link[j] for j in tree.joints.tolist()] for tree in plan.trees]
-        self.local = np.concatenate([plan.frames.inertial, plan.frames.anchor], axis=1)
+        self.local = np.concatenate([self.frames.inertial, self.frames.anchor], axis=1)
         for tree, uid in zip(plan.trees, self.root_ids, strict=True):
             info = p.getDynamicsInfo(uid, -1, physicsClientId=self.id)
             self.local[tree.bodies[0], :7] = [*info[3], *info[4]]
@@ -165,9 +185,9 @@ class Env:
             p.URDF_USE_INERTIA_FROM_FILE | p.URDF_USE_SELF_COLLISION | p.URDF_IGNORE_VISUAL_SHAPES
             | p.URDF_USE_IMPLICIT_CYLINDER
         )  # fmt: skip
-        uid = p.loadURDF(
-            self.plan.urdf[tree.number], useFixedBase=0 if tree.free else 1, flags=flags, physicsClientId=client
-        )
+        file = self.plan.urdf_of(tree, self.frames)
+        uid = p.loadURDF(file, useFixedBase=0 if tree.free else 1, flags=flags, physicsClientId=client)
+        self.plan.forget(file)
         self.root_ids.append(uid)
         links: dict[str, int] = {body_link(int(tree.bodies[0])): -1}
         joints: dict[str, int] = {}
@@ -245,14 +265,17 @@ class Env:
 
     # ------------------------------------------------------------------ surfaces
 
-    def set_surfaces(self, friction: Array) -> None:
+    def set_surfaces(self, friction: Array, restitution: Array) -> None:
         """Give Bullet its numbers for the coefficients (K,) of the shapes' geoms."""
         p, rules = bullet(), self.plan.rules
-        numbers = rules.numbers(friction)
+        numbers = rules.numbers(friction, restitution)
         for number, index in enumerate(rules.geoms.tolist()):
-            if self.plan.world.geoms[index].surface.restitution > 0:
-                # Bullet begins a contact before the touch and takes the gap off the speed after it: no bounce is left
-                p.changeDynamics(*self.shape_at[number], contactProcessingThreshold=0.0, physicsClientId=self.id)
+            offset = self.plan.world.geoms[index].surface.contact_offset
+            # Bullet begins a contact before the touch and takes the gap off the speed after it: no bounce is left
+            begin = 0.0 if restitution[number] > 0 else UNBOUNDED if offset is None else offset
+            if begin != self._begin.get(number, UNBOUNDED):
+                self._begin[number] = begin
+                p.changeDynamics(*self.shape_at[number], contactProcessingThreshold=begin, physicsClientId=self.id)
             p.changeDynamics(
                 *self.shape_at[number], lateralFriction=float(numbers.friction[number]),
                 spinningFriction=float(numbers.spinning[number]), restitution=float(numbers.restitution[number]),

@@ -32,7 +32,7 @@ class Envs:
             for _ in range(num_envs):
                 self.clients.append(Env(self.plan))
             self.laws = Laws(world, self.plan.frames, self.plan.trees, self.clients)
-            self.parameters = Parameters(world, self.clients, self.laws)
+            self.parameters = Parameters(world, self.clients, self.laws, self._rebuild)
             self.mirror = Mirror(world, self.clients, self.laws)
             self._tree_of = np.zeros(len(world.bodies), dtype=int)
             for tree in self.plan.trees:
@@ -56,7 +56,7 @@ class Envs:
     def _settle(self, index: int) -> None:
         """Bring a new client into the World's initial state, and have Bullet remember it."""
         world, mirror, env = self.world, self.mirror, self.clients[index]
-        env.set_surfaces(self.parameters.friction[index, self.plan.rules.geoms])
+        self.parameters.push_surfaces(index)
         mirror.pose[index], mirror.twist[index] = world.initial_body_pose, 0.0
         mirror.position[index], mirror.velocity[index] = [j.initial for j in world.joints], 0.0
         self._set_joints(index, np.arange(len(world.joints)))
@@ -89,14 +89,37 @@ class Envs:
         """
         self.mirror.refresh(index)
         if self.mirror.fault[index] or not self.clients[index].part():
-            self.clients[index].close()
-            self.clients[index] = Env(self.plan)
-            self.mirror.fault[index] = False
-            self._settle(index)
-            self.parameters.renew(index)
+            self._replace(index)
         for body in self._static:
             self.mirror.pose[index, body] = pose[body]
             self._set_root(index, body, with_pose=True)
+
+    def _replace(self, index: int) -> None:
+        """A new client for an env, in the initial state and with the parameters in force."""
+        self.clients[index].close()
+        self.clients[index] = Env(self.plan, self.parameters.shifted_com(index))
+        self.mirror.fault[index] = False
+        self._settle(index)
+        self.parameters.renew(index)
+
+    def _rebuild(self, index: int) -> None:
+        """A new client for an env, in its present state: for what Bullet reads once. It has forgotten its contacts."""
+        self.mirror.settle(index)
+        kept = {name: getattr(self.mirror, name)[index].copy() for name in _MIRRORED}
+        effort = self.laws.effort[index].copy()
+        self._replace(index)
+        for name in _MIRRORED:
+            getattr(self.mirror, name)[index] = kept[name]
+        self._put_motion(index)
+        self.laws.effort[index] = effort
+        self.laws.forget(index)
+
+    def _put_motion(self, index: int) -> None:
+        """Give Bullet the joints and roots that the mirror has."""
+        self._set_joints(index, np.arange(len(self.world.joints)))
+        for tree in self.plan.trees:
+            self._set_root(index, int(tree.bodies[0]), with_pose=True)
+        self.mirror.hold(index)
 
     # ------------------------------------------------------------------ stepping
 

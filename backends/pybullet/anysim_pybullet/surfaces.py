@@ -46,32 +46,27 @@ class PairRules:
         solid = np.array([i for i, g in enumerate(world.geoms) if g.collides], dtype=int)
         tree_of = {WORLD: -1} | {int(b): t.number for t in trees for b in t.bodies}
         self._take(solid, self._weights(world, [world.geoms[i].body for i in solid], tree_of, trees))
-        nominal = np.array([world.geoms[i].surface.friction for i in solid], dtype=float)
-        if self._gap(nominal) > EXACT:
-            self._split(nominal)
+        friction = np.array([world.geoms[i].surface.friction for i in solid], dtype=float)
+        bounce = np.array([world.geoms[i].surface.restitution for i in solid], dtype=float)
+        if self._gap(friction, bounce) > EXACT:
+            self._split(friction, bounce)
 
     def _take(self, geoms: Array, weight: Array) -> None:
         surfaces = [self._world.geoms[i].surface for i in geoms]
         self.geoms, self.weight = geoms, weight
         self.priority = np.array([s.priority for s in surfaces], dtype=int)
         self._spin = np.array([s.torsional_friction if s.torsional else 0.0 for s in surfaces])
-        bounce = np.array([s.restitution for s in surfaces], dtype=float)
-        # What an impact sinks, up to a step's way, is pushed out with `contact_erp` of its speed, which adds to the
-        # bounce: half of that on average.
-        self._wanted_bounce = np.maximum(np.maximum.outer(bounce, bounce) - 0.5 * self._erp, 0.0)
-        some = bool(bounce.any())
-        self._bounce = factors(self._wanted_bounce, weight, _SWEEPS) if some else np.zeros_like(bounce)
 
-    def _gap(self, friction: Array) -> float:
+    def _gap(self, friction: Array, restitution: Array) -> float:
         """The largest difference between a coefficient of a pair and the rule's."""
-        meet, values = self.weight > 0, self.numbers(friction).friction
-        slide = np.abs(np.multiply.outer(values, values) - self.pair_friction(friction))
-        bounce = np.abs(np.multiply.outer(self._bounce, self._bounce) - self._wanted_bounce)
-        return float(max(slide[meet].max(initial=0.0), bounce[meet].max(initial=0.0)))
+        meet, found = self.weight > 0, self.numbers(friction, restitution)
+        slide = np.abs(np.multiply.outer(found.friction, found.friction) - self.pair_friction(friction))
+        bounce = np.multiply.outer(found.restitution, found.restitution) - self.pair_restitution(restitution)
+        return float(max(slide[meet].max(initial=0.0), np.abs(bounce)[meet].max(initial=0.0)))
 
-    def _split(self, friction: Array) -> None:
+    def _split(self, friction: Array, restitution: Array) -> None:
         """Give each geom a shape for each pair of values, of friction and of restitution, that it can meet with."""
-        wanted = [self.pair_friction(friction), self._wanted_bounce]
+        wanted = [self.pair_friction(friction), self.pair_restitution(restitution)]
         shapes: list[tuple[int, tuple[float, ...]]] = []
         for i in range(len(self.geoms)):
             values = {tuple(float(w[i, k]) for w in wanted) for k in np.flatnonzero(self.weight[i])}
@@ -107,13 +102,21 @@ class PairRules:
             above > 0, friction[:, None], np.where(above < 0, friction, np.maximum.outer(friction, friction))
         )
 
-    def numbers(self, friction: Array) -> Surfaces:
+    def pair_restitution(self, restitution: Array) -> Array:
+        """(K, K) the restitution that each pair should be given."""
+        # What an impact sinks, up to a step's way, is pushed out with `contact_erp` of its speed, which adds to the
+        # bounce: half of that on average.
+        return np.maximum(np.maximum.outer(restitution, restitution) - 0.5 * self._erp, 0.0)
+
+    def numbers(self, friction: Array, restitution: Array) -> Surfaces:
         """What Bullet gets, for coefficients (K,) of the shapes' geoms."""
         if not len(friction):
             return Surfaces(friction, friction, friction)
-        wanted = self.pair_friction(friction)
-        values = factors(wanted, self.weight, _SWEEPS)
-        return Surfaces(values, self._spinning(values), self._bounce)
+        values = factors(self.pair_friction(friction), self.weight, _SWEEPS)
+        bounce = np.zeros_like(restitution)
+        if restitution.any():
+            bounce = factors(self.pair_restitution(restitution), self.weight, _SWEEPS)
+        return Surfaces(values, self._spinning(values), bounce)
 
     def _spinning(self, values: Array) -> Array:
         """Bullet's torsional coefficient of a pair is s1 f2 + s2 f1; that of the rule is the larger of the two."""

@@ -31,6 +31,8 @@ from anysim_sapien.scene import EnvScene
 from anysim_sapien.state import StateReader
 from anysim_sapien.stepping import advance, pasts_of, relive, wrenches
 
+LOOKS = ("color", "texture", "material")
+
 _BUILT = ("_recipe", "_layout", "_drives", "_parameters", "_momentum", "_reader", "_fields", "_wrench", "_scenes")
 """What `_build` makes and `_free` lets go of."""
 
@@ -277,4 +279,5 @@ class SapienEngine(SimEngine):
         if self._painter is None:
             self._painter = Painter(self.world, self._layout, self.options)
         state = self.get_state()
-        return self._painter.draw(view, state.body_pose[ids], self._parameters.get("geom.color")[ids], channels)
+        color, texture, material = (self._parameters.get(f"geom.{name}")[ids] for name in LOOKS)
+        return self._painter.draw(view, state.body_pose[ids], (color, texture, material), channels)

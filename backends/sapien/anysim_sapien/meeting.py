@@ -1,5 +1,7 @@
 """Which geoms of a World can meet, and the PhysX shapes that make them meet by the rules. Knows no SAPIEN."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from anysim.conventions import WORLD, Array
@@ -40,14 +42,18 @@ class Meeting:
                 meet[i, k] = not (kin or both_fixed or (first, second) in excluded)
         return meet
 
-    def copies(self, friction: Array) -> dict[int, list[Copy]]:
-        """The shapes of each geom that collides, for the coefficients in force (G,).
+    def copies(self, friction: Array, restitution: Array | None = None) -> dict[int, list[Copy]]:
+        """The shapes of each geom that collides, for the coefficients in force (G,); restitutions as built for None.
 
         Raises:
             EngineError: more different pairs than PhysX has collision groups.
         """
+        surfaces = self._surfaces
+        if restitution is not None:
+            pairs = zip(surfaces, restitution[self.solid].tolist(), strict=True)
+            surfaces = [replace(surface, restitution=value) for surface, value in pairs]
         made = copies_of(
-            self._surfaces, friction[self.solid], self._fixed, self._meet, self._labels, self.apart.between
+            surfaces, friction[self.solid], self._fixed, self._meet, self._labels, self.apart.between
         )  # fmt: skip
         return dict(zip(self.solid.tolist(), made, strict=True))
 

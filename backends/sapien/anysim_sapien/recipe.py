@@ -22,7 +22,9 @@ class Values(NamedTuple):
     mass: Array
     com: Array
     inertia: Array
+    damping: Array
     geom_friction: Array
+    geom_restitution: Array
     joint_friction: Array
     armature: Array
     gravity: Array
@@ -45,13 +47,13 @@ class Recipe:
         self._copies: dict[bytes, dict[int, list[Copy]]] = {}
         _check(world)
 
-    def copies(self, friction: Array) -> dict[int, list[Copy]]:
+    def copies(self, friction: Array, restitution: Array) -> dict[int, list[Copy]]:
         """The shapes of each geom that collides, for the coefficients in force (G,)."""
-        key = friction.tobytes()
+        key = friction.tobytes() + restitution.tobytes()
         if key not in self._copies:
             if len(self._copies) > 1000:
                 self._copies.clear()
-            self._copies[key] = self._meeting.copies(friction)
+            self._copies[key] = self._meeting.copies(friction, restitution)
         return self._copies[key]
 
     def principal(self, body: int, inertia: Array) -> Principal:

@@ -11,6 +11,7 @@ import numpy as np
 from anysim.conventions import WORLD, Array
 from anysim.engine.cameras import CameraView
 from anysim.math import pose as P
+from anysim.world.looks import lying, wrapped
 from anysim.world.model import (
     Box,
     Capsule,
@@ -19,11 +20,14 @@ from anysim.world.model import (
     HeightFieldShape,
     MeshShape,
     Plane,
+    Shape,
     Sphere,
     World,
 )  # fmt: skip
+from anysim.world.tessellate import triangles
 from anysim_sapien.layout import Layout
 from anysim_sapien.library import sapien
+from anysim_sapien.looks import Looks
 from anysim_sapien.options import SapienOptions
 from anysim_sapien.shapes import X_TO_Z, relief, to_pose
 from anysim_sapien.vulkan import drawing, open_device
@@ -53,7 +57,10 @@ class Painter:
             self._cameras: dict[tuple[int, int], Any] = {}
             self._bodies: dict[int, Any] = {}
             self._materials: dict[int, Any] = {}
+            self._components: dict[int, Any] = {}
             self._names = {0: 0}
+            self._looks = Looks(world)
+            self._geoms = world.geoms
             self._light(world)
             for index, geom in enumerate(world.geoms):
                 if geom.visible:
@@ -65,6 +72,8 @@ class Painter:
             self._cameras.clear()
             self._bodies.clear()
             self._materials.clear()
+            self._components.clear()
+            self._looks.clear()
             self._scene = None
 
     def _light(self, world: World) -> None:
@@ -73,6 +82,7 @@ class Painter:
         directions = [light.direction for light in world.lights if light.position is None] or [SUN]
         for direction in directions:
             entity, light = sapien.Entity(), render.RenderDirectionalLightComponent()
+            light.disable_shadow()
             light.set_color([0.8, 0.8, 0.8])
             along = np.asarray(direction, dtype=float)
             turn = P.multiply(P.look_at(np.zeros(3), along), FROM_OPTICAL)
@@ -84,17 +94,20 @@ class Painter:
         material = sapien.render.RenderMaterial(base_color=list(geom.color))
         component = sapien.render.RenderBodyComponent()
         shape = _visual(world, geom, material)
-        shape.set_local_pose(to_pose(_local(geom)))
+        shape.set_local_pose(to_pose(_local(geom, own_axis=not world.textures)))
         component.attach(shape)
         entity = sapien.Entity()
         entity.add_component(component)
         self._scene.add_entity(entity)
         self._materials[index] = material
+        self._components[index] = component
         self._bodies[index] = (geom.body, entity)
         self._names[int(entity.per_scene_id)] = entity_id
 
-    def draw(self, view: CameraView, poses: Array, colors: Array, channels: tuple[str, ...]) -> dict[str, Array]:
-        """See `SimEngine.render`. Poses (E, B, 7) of the bodies and colours (E, G, 4) of the geoms."""
+    def draw(
+        self, view: CameraView, poses: Array, looks: tuple[Array, Array, Array], channels: tuple[str, ...]
+    ) -> dict[str, Array]:
+        """See `SimEngine.render`. Poses (E, B, 7) of the bodies; colours (E, G, 4), textures and materials of geoms."""
         size = (len(poses), view.height, view.width)
         images: dict[str, Array] = {}
         for name in channels:
@@ -103,7 +116,7 @@ class Painter:
         with drawing:
             camera, mount = self._camera(view)
             for row in range(len(poses)):
-                self._compose(poses[row], colors[row])
+                self._compose(poses[row], *(part[row] for part in looks))
                 eye = np.concatenate([view.pose[row, :3], P.multiply(view.pose[row, 3:], FROM_OPTICAL)])
                 mount.set_pose(to_pose(eye))
                 self._scene.update_render()
@@ -126,11 +139,14 @@ class Painter:
         camera.set_far(view.far)
         return camera, mount
 
-    def _compose(self, poses: Array, colors: Array) -> None:
+    def _compose(self, poses: Array, colors: Array, textures: Array, materials: Array) -> None:
         for index, (body, entity) in self._bodies.items():
             if body != WORLD:
                 entity.set_pose(to_pose(poses[body]))
-            self._materials[index].set_base_color(colors[index].tolist())
+            self._looks.give(
+                self._materials[index], self._components[index], colors[index], int(textures[index]),
+                int(materials[index]), flat=isinstance(self._geoms[index].shape, Plane | HeightFieldShape),
+            )  # fmt: skip
 
     def _read(self, camera: Any, images: dict[str, Array], row: int) -> None:
         seen = camera.get_picture("Segmentation")[..., 1]
@@ -154,18 +170,22 @@ def _shader_folder(name: str) -> Any:
     return files("anysim_sapien") / "shader" / name if name == "lit" else files("sapien") / "vulkan_shader" / name
 
 
-def _local(geom: Geom) -> Array:
-    """The pose of the visual shape in its body's frame."""
+def _local(geom: Geom, own_axis: bool) -> Array:
+    """The pose of the visual shape in its body's frame; `own_axis` where SAPIEN's shape lies along its x axis."""
     position, turn = np.asarray(geom.position, dtype=float), np.asarray(geom.quaternion, dtype=float)
     if isinstance(geom.shape, Plane):
         position = position - P.rotate(turn, np.array([0.0, 0.0, THIN]))
-    if isinstance(geom.shape, Capsule | Cylinder):
+    if own_axis and isinstance(geom.shape, Capsule | Cylinder):
         turn = P.multiply(turn, X_TO_Z)
     return np.concatenate([position, turn])
 
 
 def _visual(world: World, geom: Geom, material: Any) -> Any:
     render = sapien.render
+    made = triangles(geom.shape) if world.textures else None
+    if made is not None:
+        # where a texture may come, it lies on its shape as on every engine
+        return _triangles(*made, material, round_shape=geom.shape)
     match geom.shape:
         case Plane(size):
             return render.RenderShapeBox([size, size, THIN], material)
@@ -181,17 +201,28 @@ def _visual(world: World, geom: Geom, material: Any) -> Any:
             mesh = next(mesh for mesh in world.meshes if mesh.name == name)
             return _triangles(np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces), material)
         case HeightFieldShape(name):
-            vertices, triangles = relief(next(field for field in world.heightfields if field.name == name))
-            return _triangles(vertices.astype(float), triangles, material)
+            vertices, faces = relief(next(field for field in world.heightfields if field.name == name))
+            return _triangles(vertices.astype(float), faces, material, flat=True)
 
 
-def _triangles(vertices: Array, faces: Array, material: Any) -> Any:
-    """A mesh with flat faces: each triangle has its own corners and normal."""
+def _triangles(
+    vertices: Array, faces: Array, material: Any, flat: bool = False, round_shape: Shape | None = None
+) -> Any:
+    """A mesh with flat faces, but for those of a ball or capsule.
+
+    Each triangle has its own corners, normals, and places in a texture, which is wrapped around the mesh or lies flat.
+    """
     corners = vertices[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1, keepdims=True)
+    places = (lying(corners) if flat else wrapped(corners)) * [1.0, -1.0]  # SAPIEN's images begin below, and repeat
     normals = np.repeat(normals / np.where(length > 0, length, 1.0), 3, axis=0)
+    if isinstance(round_shape, Sphere | Capsule):
+        middle = np.zeros_like(corners)
+        if isinstance(round_shape, Capsule):
+            middle[..., 2] = np.clip(corners[..., 2], -round_shape.half_length, round_shape.half_length)
+        normals = ((corners - middle) / round_shape.radius).reshape(-1, 3)
     return sapien.render.RenderShapeTriangleMesh(
         corners.reshape(-1, 3).astype(np.float32), np.arange(len(normals), dtype=np.uint32).reshape(-1, 3),
-        normals.astype(np.float32), np.zeros((len(normals), 2), dtype=np.float32), material,
+        normals.astype(np.float32), places.reshape(-1, 2).astype(np.float32), material,
     )  # fmt: skip

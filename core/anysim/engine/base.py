@@ -22,7 +22,7 @@ from anysim.engine.commands import CommandBuffer, Control
 from anysim.engine.diagnosis import Finding
 from anysim.engine.index import Index
 from anysim.engine.needs import needs_of
-from anysim.engine.parameters import PARAMETERS, count
+from anysim.engine.parameters import PARAMETERS, check_values, count
 from anysim.engine.presence import Lifecycle, Presence, blocks
 from anysim.engine.primitives import Primitives
 from anysim.engine.state import (
@@ -354,10 +354,7 @@ class SimEngine(Primitives):
         with self._lock:
             parameter, ids, which = self._parameter(name, env_ids, indices)
             rows = checks.rows(name, values, (len(ids), len(which), *parameter.shape))
-            if parameter.minimum is not None and rows.size and rows.min() < parameter.minimum:
-                raise EngineError(
-                    f"{name} [{parameter.unit}] must be at least {parameter.minimum:g}, got {rows.min():g}"
-                )
+            check_values(parameter, self.world, rows, which)
             self._retire_state()
             self._set_parameter(name, rows, ids, which)
             self._changed[name] = None

@@ -10,6 +10,7 @@ from anysim.world import inertia
 from anysim.world.assets import locate
 from anysim.world.builder import WorldBuilder
 from anysim.world.colors import Rgb, rgb
+from anysim.world.compile_matter import with_matter
 from anysim.world.imported import ImportedModel, ImportNote
 from anysim.world.importers import import_asset
 from anysim.world.issues import Issues
@@ -53,17 +54,21 @@ def add_object(
         return []
     if model is None:
         return []
-    builder.add(
-        name, EntityKind.OBJECT, model, root=BodyKind.STATIC if spec.fixed else BodyKind.FREE, position=position,
-        quaternion=quaternion, label=spec.label or name, source=spec.source.mesh or spec.source.asset or "",
-    )  # fmt: skip
+    model = with_matter(model, spec, issues, base)
+    try:
+        builder.add(
+            name, EntityKind.OBJECT, model, root=BodyKind.STATIC if spec.fixed else BodyKind.FREE, position=position,
+            quaternion=quaternion, label=spec.label or name, source=spec.source.mesh or spec.source.asset or "",
+        )  # fmt: skip
+    except AssetError as error:
+        issues.asset("texture", error)
     return list(model.report)
 
 
 def _model(name: str, spec: ObjectSpec, issues: Issues, base: Path | None) -> ImportedModel | None:
     color = _color(spec, issues)
     friction = DEFAULT_FRICTION if spec.friction is None else float(nominal(spec.friction))
-    touch = surface(spec.contact or ContactSpec(), friction, spec.restitution or 0.0)
+    touch = surface(spec.contact or ContactSpec(), friction, float(nominal(spec.restitution or 0.0)))
     if spec.source.asset is not None:
         return _asset(spec, spec.source.asset, touch, color, issues, base)
     meshes: dict[str, Mesh] = {}

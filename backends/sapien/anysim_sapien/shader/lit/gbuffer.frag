@@ -1,5 +1,6 @@
 #version 450
-// Lambert's cosine law, in one pass and without shadows: cheap enough to be compiled and run without a graphics card.
+// Lambert's cosine law and Blinn's highlights, in one pass and without shadows: cheap enough to be compiled and run
+// without a graphics card. A material without specular and metallic has no highlights.
 
 layout(constant_id = 0) const int NUM_DIRECTIONAL_LIGHTS = 0;
 layout(constant_id = 1) const int NUM_POINT_LIGHTS = 0;
@@ -74,16 +75,26 @@ void main() {
   }
   vec3 facing = normalize(inNormal);
   facing = dot(facing, inPosition.xyz) > 0 ? -facing : facing;  // a surface is seen, and lit, from both sides
-  vec3 light = sceneBuffer.ambientLight.rgb;
+  vec3 toEye = normalize(-inPosition.xyz);
+  // the lobe that is as wide as that of a rough surface of microscopic mirrors
+  float width = max(materialBuffer.roughness, 0.15);
+  float sharpness = max(2.0 / pow(width, 4.0) - 2.0, 1.0);
+  vec3 light = sceneBuffer.ambientLight.rgb, shine = vec3(0);
   for (int i = 0; i < NUM_DIRECTIONAL_LIGHTS; ++i) {
     vec3 along = normalize(mat3(cameraBuffer.viewMatrix) * sceneBuffer.directionalLights[i].direction.xyz);
     light += max(0.0, dot(facing, -along)) * sceneBuffer.directionalLights[i].emission.rgb;
+    shine += pow(max(0.0, dot(facing, normalize(toEye - along))), sharpness)
+        * sceneBuffer.directionalLights[i].emission.rgb;
   }
   for (int i = 0; i < NUM_POINT_LIGHTS; ++i) {
     vec4 lamp = cameraBuffer.viewMatrix * vec4(sceneBuffer.pointLights[i].position.xyz, 1);
-    light += max(0.0, dot(facing, normalize(lamp.xyz - inPosition.xyz))) * sceneBuffer.pointLights[i].emission.rgb;
+    vec3 along = normalize(inPosition.xyz - lamp.xyz);
+    light += max(0.0, dot(facing, -along)) * sceneBuffer.pointLights[i].emission.rgb;
+    shine += pow(max(0.0, dot(facing, normalize(toEye - along))), sharpness) * sceneBuffer.pointLights[i].emission.rgb;
   }
-  outColor = vec4(materialBuffer.emission.rgb + albedo.rgb * light, albedo.a);
+  vec3 gloss = mix(vec3(materialBuffer.fresnel), albedo.rgb, materialBuffer.metallic) * (1.0 - materialBuffer.roughness);
+  vec3 matte = albedo.rgb * (1.0 - 0.5 * materialBuffer.metallic);
+  outColor = vec4(materialBuffer.emission.rgb + matte * light + gloss * shine, albedo.a);
   outPosition = inPosition;
   outSegmentation = inSegmentation;
 }
