@@ -80,6 +80,9 @@ Degrees = Annotated[float, Strict(), Field(gt=1, lt=170)]
 Positive = Annotated[float, Strict(), Field(gt=0)]
 NonNegative = Annotated[float, Strict(), Field(ge=0)]
 Fraction = Annotated[float, Strict(), Field(ge=0, le=1)]
+Bounce = Annotated[float, Strict(), Field(ge=0, lt=1)]
+"""A coefficient of restitution: what bounces with 1 never comes to rest."""
+
 Vec3 = tuple[Number, Number, Number]
 Color = Annotated[
     tuple[Fraction, Fraction, Fraction] | str,

@@ -4,12 +4,13 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, Strict, model_validator
 
-from anysim_schemas.base import Flag, Integer, NonNegative, Number, Spec
+from anysim_schemas.base import Flag, Integer, NonNegative, Number, Positive, Spec
 from anysim_schemas.errors import KeyFault
 from anysim_schemas.joints import ObjectJointSpec
+from anysim_schemas.matter import DampingSpec, MaterialValue, SolverSpec, TextureValue
 from anysim_schemas.object_source import Count, Source, most
 from anysim_schemas.object_source import SourceSpec as SourceSpec
-from anysim_schemas.values import ColorValue, NonNegativeValue, PositiveValue
+from anysim_schemas.values import BounceValue, ColorValue, NonNegativeValue, PositiveValue, Vec3Value
 
 Columns = Annotated[int, Strict(), Field(gt=0)]
 
@@ -27,6 +28,11 @@ class ContactSpec(Spec):
     priority: Integer | None = Field(
         default=None,
         description="the surface of higher priority decides friction and stiffness; the preset's where not given",
+    )
+    offset: Positive | None = Field(
+        default=None,
+        description="distance [m] from which on contacts are prepared; forces act from touch on. The engine's own "
+        "where not given",
     )
 
 
@@ -59,20 +65,35 @@ class ObjectSpec(Spec):
     density: PositiveValue | None = Field(
         default=None, description="density [kg/m^3]; 1000 where neither it nor mass is given"
     )
+    com_offset: Vec3Value | None = Field(
+        default=None, description="shifts the centre of mass of its (root) body [m], body frame"
+    )
+    inertia_scale: PositiveValue | None = Field(
+        default=None, description="factor on the inertia that shape and mass give; 1 where not given"
+    )
     friction: NonNegativeValue | None = Field(
         default=None, description="sliding friction coefficient; 0.8, or an asset's own, where not given"
     )
-    restitution: Annotated[Number, Field(ge=0, lt=1)] | None = Field(
+    restitution: BounceValue | None = Field(
         default=None, description="ratio of speeds after and before a bounce; 0, or an asset's own, where not given"
     )
-    color: ColorValue | None = Field(
-        default=None, description="red, green, blue in [0, 1], or a colour name such as `red`; grey, or a file's own"
-    )
+    damping: DampingSpec | None = Field(default=None, description="how fast it comes to rest by itself; not at all")
     contact: ContactSpec | None = Field(
         default=None, description="how its surface gives; the default, or an asset's own"
     )
     joints: dict[str, ObjectJointSpec] = Field(
         default_factory=dict, description="joints of an articulated object by name, `*` matches any part"
+    )
+    solver: SolverSpec | None = Field(
+        default=None, description="settings of the contact solver for this object, where an engine has them"
+    )
+    color: ColorValue | None = Field(
+        default=None,
+        description="red, green, blue in [0, 1], or a colour name such as `red`; its material's, a file's own, or grey",
+    )
+    texture: TextureValue | None = Field(default=None, description="what is painted on it, tinted with `color`")
+    material: MaterialValue | None = Field(
+        default=None, description="how it answers light, and its colour where `color` and `texture` say nothing"
     )
     label: str | None = Field(default=None, description="semantic label; the object's name where not given")
     collides: Flag = Field(default=True, description="false for something that is only seen")

@@ -9,7 +9,20 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, TypeVar, ca
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from anysim_schemas.base import Color, Degrees, Flag, Fraction, Name, NonNegative, Number, Positive, Spec, Vec3, Whole
+from anysim_schemas.base import (
+    Bounce,
+    Color,
+    Degrees,
+    Flag,
+    Fraction,
+    Name,
+    NonNegative,
+    Number,
+    Positive,
+    Spec,
+    Vec3,
+    Whole,
+)  # fmt: skip
 from anysim_schemas.errors import KeyFault
 
 T = TypeVar("T")
@@ -36,6 +49,7 @@ def _check_order(low: object, high: object, what: str) -> None:
 
 _LABELS: tuple[tuple[Any, str], ...] = (
     (Number, "number"), (Positive, "positive"), (NonNegative, "non_negative"), (Fraction, "fraction"),
+    (Bounce, "bounce"),
     (Vec3, "vector"), (Color, "color"), (Whole, "whole"), (Flag, "flag"), (Degrees, "degrees"),
 )  # fmt: skip
 
@@ -175,12 +189,27 @@ else:
             ]
 
 
+if TYPE_CHECKING:
+    ChoiceOf = T | Choice[T]
+else:
+
+    class ChoiceOf:
+        """`ChoiceOf[X]`: an X that has no order, or a choice among several."""
+
+        def __class_getitem__(cls, item: Any) -> Any:
+            return Annotated[
+                Annotated[item, Tag("as:constant")] | Annotated[Choice[item], Tag("as:choice")],
+                Discriminator(lambda value: "as:choice" if _kind(value) == "as:choice" else "as:constant"),
+            ]
+
+
 FloatValue = Value[Number]
 PositiveValue = Value[Positive]
 NonNegativeValue = Value[NonNegative]
 FractionValue = Value[Fraction]
 Vec3Value = Value[Vec3]
 ColorValue = Value[Color]
+BounceValue = Value[Bounce]
 WholeValue = Value[Whole]
 
 if TYPE_CHECKING:

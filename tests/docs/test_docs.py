@@ -72,6 +72,13 @@ def test_a_block_of_yaml_checks(where: str, code: str, tmp_path: Path) -> None:
     assert check_one(str(path), engine=None, all_engines=False, overrides=[]) == []
 
 
+@pytest.mark.parametrize("path", sorted((ROOT / "docs" / "examples").glob("*.yaml")), ids=lambda p: p.name)
+def test_an_example_of_a_world_checks(path: Path) -> None:
+    from anysim.cli.check import check_one
+
+    assert check_one(str(path), engine=None, all_engines=False, overrides=[]) == []
+
+
 def _words(text: str) -> str:
     """Lines without indentation and blank ones: `make format` sets those of a block as if it were a file."""
     return "".join(f"\n{line.strip()}" for line in text.splitlines() if line.strip()) + "\n"

@@ -17,6 +17,7 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capability
 from anysim.engine.factory import create_simulation
+from anysim.engine.parameters import PARAMETERS
 from anysim.engine.state import FIELDS, Snapshot, SnapshotLevel
 from anysim.math import pose as P
 from anysim.testing.sketch import Sketch, inertial
@@ -208,9 +209,10 @@ def treat(engine: SimEngine, number: int, part: int, length: int, rows: list[int
         if Capability.WRENCHES in engine.capabilities and rng.random() < 0.2:
             engine.apply_wrench(rng.standard_normal((len(rows), 1, 6)), [int(rng.choice(free))], rows)
         if engine.parameters and rng.random() < 0.15:
-            name = str(rng.choice(sorted(engine.parameters)))
+            name = str(rng.choice(sorted(n for n in engine.parameters if not PARAMETERS[n].index_of)))
             values = engine.get_parameters(name, rows)
-            engine.set_parameters(name, values * rng.uniform(0.8, 1.2, (len(rows), *[1] * (values.ndim - 1))), rows)
+            values = values * rng.uniform(0.8, 1.2, (len(rows), *[1] * (values.ndim - 1)))
+            engine.set_parameters(name, np.minimum(values, 0.99) if name == "geom.restitution" else values, rows)
         if rng.random() < 0.1:
             twist = engine.get_state().body_twist[rows][:, free] + 0.1 * rng.standard_normal(6)
             engine.set_body_state(twist=twist, env_ids=rows, bodies=free)

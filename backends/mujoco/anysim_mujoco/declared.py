@@ -34,9 +34,14 @@ _APPROXIMATE = {
         "an underdamped contact: within 0.07 of the coefficient, within 0.04 from 0.5 on; it sinks 6 mm "
         "per m/s at 2 ms; 0 gives 0.13"
     ),
+    Capability.CONTACT_OFFSET: "contacts are found from there on (MuJoCo's gap); it changes no motion",
+    Capability.MATERIALS: (
+        "one lamp's highlight: as strong as specular or metallic says, as small as it is smooth; nothing is mirrored"
+    ),
 }
 _ABSENT = (
     Capability.LIVE_EDIT_NATIVE,
+    Capability.SOLVER_SETTINGS,
     Capability.TERRAIN_TRIMESH,  # MuJoCo collides the convex hull of a mesh
 )
 CAPABILITIES = Capabilities.of(

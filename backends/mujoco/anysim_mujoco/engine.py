@@ -22,6 +22,7 @@ from anysim_mujoco import declared
 from anysim_mujoco.audit import geom_volumes, joint_limits
 from anysim_mujoco.build import build, initial_row, silence
 from anysim_mujoco.carry import carried_rows, take_rows
+from anysim_mujoco.dampers import Dampers
 from anysim_mujoco.drives import Drives
 from anysim_mujoco.geoms import own_scenery
 from anysim_mujoco.options import MujocoOptions
@@ -37,7 +38,7 @@ _VELOCITY_STAGE = mujoco.mjtStage.mjSTAGE_VEL.value
 
 _BUILT = (
     "_model", "_layout", "_batch", "_rows", "_initial", "_qpos", "_qvel", "_mocap_pos", "_mocap_quat", "_wrenches",
-    "_drives", "_looks", "_parameters", "_reader", "_fields", "_queries", "_retired",
+    "_drives", "_dampers", "_looks", "_parameters", "_reader", "_fields", "_queries", "_retired",
 )  # fmt: skip
 """What `_build` makes and `_free` lets go of."""
 
@@ -96,8 +97,9 @@ class MujocoEngine(SimEngine):
         self._mocap_pos, self._mocap_quat = self._batch.bind("mocap_pos"), self._batch.bind("mocap_quat")
         self._wrenches = self._batch.bind("xfrc_applied")
         self._drives = Drives(self._batch, world, layout)
+        self._dampers = Dampers(self._batch, world, layout)
         self._looks = Looks(world, num_envs, own_scenery(self.options))
-        self._parameters = Parameters(self._batch, world, layout, self._drives, self._looks)
+        self._parameters = Parameters(self._batch, world, layout, self._drives, self._dampers, self._looks)
         self._reader = StateReader(self._batch, layout)
         self._fields = self._reader.fields
         self._queries = Queries(self._batch, layout, self._parameters)
@@ -129,15 +131,24 @@ class MujocoEngine(SimEngine):
     def _step(self, n_steps: int, ids: Array | None) -> None:
         self._parameters.settle()
         rows = None if ids is None else np.sort(ids)
-        if self._drives.limited:
-            for _ in range(n_steps):
-                self._drives.limit()
-                self._advance(rows, 1)
+        if self._drives.limited or self._dampers.active:
+            self._step_one_by_one(n_steps, rows)
         else:
             self._advance(rows, n_steps)
         if self._retired is not None:
             self._retired.rest()
         self._reader.stepped(ids)
+
+    def _step_one_by_one(self, n_steps: int, rows: Array | None) -> None:
+        """What depends on the state of each substep and MuJoCo does not have."""
+        held, inertials = self._dampers.hold(), self._parameters.inertials()
+        for _ in range(n_steps):
+            if self._drives.limited:
+                self._drives.limit()
+            if self._dampers.active:
+                self._dampers.push(held, *inertials)
+            self._advance(rows, 1)
+        self._dampers.put(held)
 
     def _advance(self, rows: Array | None, n_steps: int) -> None:
         try:

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from anysim.conventions import Array, wxyz_from_xyzw
+from anysim.world.looks import NONE
 from anysim.world.model import (
     Box,
     Capsule,
@@ -21,6 +22,7 @@ from anysim.world.model import (
     World,
 )  # fmt: skip
 from anysim_mujoco.options import MujocoOptions
+from anysim_mujoco.skins import GROUND, NEUTRAL_RGBA, PLAIN, add_looks, look_name
 from anysim_mujoco.surfaces import contact_parameters
 
 VISIBLE, VISUAL_ONLY, COLLISION_ONLY, UNSEEN = range(4)
@@ -28,11 +30,6 @@ VISIBLE, VISUAL_ONLY, COLLISION_ONLY, UNSEEN = range(4)
 
 DRAWN_GROUPS = (VISIBLE, VISUAL_ONLY)
 COLLIDING_GROUPS = (VISIBLE, COLLISION_ONLY)
-
-_PLAIN = "plain"
-_GROUND = "ground"
-# a geom of exactly this colour takes its material's, which is therefore the same
-_NEUTRAL_RGBA = (0.5, 0.5, 0.5, 1.0)
 
 
 SKY = ((0.62, 0.74, 0.87), (0.93, 0.95, 0.97))
@@ -61,14 +58,15 @@ def add_look(spec: Any, world: World, options: MujocoOptions) -> None:
         rgb1=SKY[0], rgb2=SKY[1], width=256, height=1536,
     )  # fmt: skip
     spec.add_texture(
-        name=_GROUND, type=mujoco.mjtTexture.mjTEXTURE_2D, builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        name=GROUND, type=mujoco.mjtTexture.mjTEXTURE_2D, builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
         rgb1=(1.0, 1.0, 1.0), rgb2=(0.92, 0.93, 0.94), width=128, height=128,
     )  # fmt: skip
-    spec.add_material(name=_PLAIN, rgba=_NEUTRAL_RGBA, specular=0.25, shininess=0.4)
-    ground = spec.add_material(name=_GROUND, rgba=_NEUTRAL_RGBA, specular=0.05, texuniform=True, texrepeat=(1.0, 1.0))
+    spec.add_material(name=PLAIN, rgba=NEUTRAL_RGBA, specular=0.25, shininess=0.4)
+    ground = spec.add_material(name=GROUND, rgba=NEUTRAL_RGBA, specular=0.05, texuniform=True, texrepeat=(1.0, 1.0))
     textures = ground.textures
-    textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = _GROUND
+    textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = GROUND
     ground.textures = textures
+    add_looks(spec, world)
     head = spec.visual.headlight
     # the viewer's own lamp only fills in where the world brings its lights
     head.ambient, head.diffuse, head.specular = [AMBIENT] * 3, [0.08 if world.lights else 0.25] * 3, [0.1] * 3
@@ -124,13 +122,15 @@ def add_geom(spec: Any, owner: Any, geom: Geom, world: World) -> Any:
     """Add a geom to the MjSpec body `owner`."""
     surface = contact_parameters(geom.surface, world.physics.dt)
     kind, size, position = _shape(geom, world)
+    number = {t.name: i for i, t in enumerate(world.textures)}.get(geom.texture, NONE)
+    finish = {m.name: i for i, m in enumerate(world.materials)}.get(geom.material, NONE)
     groups = {(True, True): VISIBLE, (True, False): VISUAL_ONLY, (False, True): COLLISION_ONLY}
     element = owner.add_geom(
         name=geom.name, type=kind, size=size, pos=position, quat=wxyz_from_xyzw(np.asarray(geom.quaternion)),
-        rgba=geom.color, material=_GROUND if isinstance(geom.shape, Plane | HeightFieldShape) else _PLAIN,
+        rgba=geom.color, material=look_name(geom, number, finish),
         contype=int(geom.collides), conaffinity=int(geom.collides), condim=surface.condim, priority=surface.priority,
         friction=surface.friction, solref=surface.solref, solimp=surface.solimp, solmix=surface.solmix,
-        group=groups.get((geom.visible, geom.collides), UNSEEN), mass=0.0,
+        group=groups.get((geom.visible, geom.collides), UNSEEN), mass=0.0, gap=surface.gap,
     )  # fmt: skip
     if isinstance(geom.shape, MeshShape):
         element.meshname = geom.shape.mesh

@@ -1,6 +1,7 @@
 """Physical and visual parameters per env, as per-env fields of the batch's model."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -8,11 +9,18 @@ from mujoco.batch import SimulationError
 
 from anysim.conventions import Array
 from anysim.engine.looks import LIGHTS, SURROUNDINGS, Looks
+from anysim.engine.parameters import nominal
 from anysim.errors import EngineError
 from anysim.world.model import World
+from anysim_mujoco.dampers import Dampers
 from anysim_mujoco.drives import Drives
 from anysim_mujoco.inertia import check_physical, full, principal
 from anysim_mujoco.layout import Layout
+from anysim_mujoco.skins import Skins
+from anysim_mujoco.surfaces import contact_parameters, restitution_of
+
+_DAMPING = {"body.linear_damping": 0, "body.angular_damping": 1}
+_LOOKS = {"geom.texture": 0, "geom.material": 1}
 
 
 class _Field(NamedTuple):
@@ -28,14 +36,18 @@ class Parameters:
     """Reads and writes neutral parameters. Derived constants are brought up to date by `settle`, for touched envs."""
 
     NAMES = frozenset({
-        "body.mass", "body.com", "body.inertia", "geom.friction", "geom.color", "joint.damping", "joint.friction",
+        "body.mass", "body.com", "body.inertia", "body.linear_damping", "body.angular_damping", "geom.friction",
+        "geom.restitution", "geom.color", "geom.texture", "geom.material", "joint.damping", "joint.friction",
         "joint.armature", "actuator.kp", "actuator.kd", "actuator.effort_limit", "world.gravity",
         *LIGHTS, *SURROUNDINGS,
     })  # fmt: skip
 
-    def __init__(self, batch: Any, world: World, layout: Layout, drives: Drives, looks: Looks) -> None:
+    def __init__(
+        self, batch: Any, world: World, layout: Layout, drives: Drives, dampers: Dampers, looks: Looks
+    ) -> None:
         self._batch, self._world, self._layout, self._drives = batch, world, layout, drives
-        self._looks = looks
+        self._dampers, self._looks, self._skins = dampers, looks, Skins(world, batch.model)
+        self._bounce = np.tile(nominal("geom.restitution", world), (batch.nsim, 1))
         self._expanded: set[str] = set()
         self._stale = np.zeros(batch.nsim, dtype=bool)
         self._any_stale = False
@@ -61,6 +73,14 @@ class Parameters:
         if name == "body.inertia":
             bodies = self._layout.bodies
             return full(self._rows("body_inertia")[:, bodies], self._rows("body_iquat")[:, bodies])
+        if name in _DAMPING:
+            return self._dampers.rates[:, :, _DAMPING[name]].copy()
+        if name == "geom.restitution":
+            found = restitution_of(self._rows("geom_solmix")[:, self._layout.geoms])
+            # through a logarithm they come back with other last bits than they were written with
+            return np.where(np.abs(found - self._bounce) < 1e-9, self._bounce, found)
+        if name in _LOOKS:
+            return self._skins.pairs(self._rows("geom_matid")[:, self._layout.geoms])[_LOOKS[name]]
         field = self._fields[name]
         return np.array(_column(self._rows(field.name), field)[:, field.rows], dtype=float)
 
@@ -76,6 +96,8 @@ class Parameters:
         if name == "body.inertia":
             bodies = self._layout.bodies
             return full(model.body_inertia[bodies], model.body_iquat[bodies])
+        if name in (*_DAMPING, *_LOOKS, "geom.restitution"):
+            return nominal(name, world)
         field = self._fields[name]
         return np.array(_column(getattr(model, field.name), field)[field.rows], dtype=float)
 
@@ -93,6 +115,16 @@ class Parameters:
             self._mark(ids)
         elif name == "body.inertia":
             self._set_inertia(values, ids, indices)
+        elif name in _DAMPING:
+            self._dampers.rates[:, :, _DAMPING[name]][at] = values
+            self._dampers.refresh()
+        elif name == "geom.restitution":
+            self._set_restitution(values, ids, indices)
+        elif name in _LOOKS:
+            pair = [column[at] for column in self._skins.pairs(self._rows("geom_matid")[:, self._layout.geoms])]
+            pair[_LOOKS[name]] = values
+            geoms = self._layout.geoms[indices]
+            self._expand("geom_matid")[np.ix_(ids, geoms)] = self._skins.ids(indices, pair[0], pair[1])
         elif name == "actuator.effort_limit":
             limits = self._expand("actuator_forcerange")
             limits[at] = np.stack([-values, values], axis=-1)
@@ -101,6 +133,23 @@ class Parameters:
             _column(self._expand(field.name), field)[np.ix_(ids, field.rows[indices])] = values
             if field.derives:
                 self._mark(ids)
+
+    def _set_restitution(self, values: Array, ids: Array, indices: Array) -> None:
+        """How hard a contact is and how it counts in its pairs depend on what it gives back."""
+        surfaces, dt = [self._world.geoms[i].surface for i in indices], self._world.physics.dt
+        made = [
+            [contact_parameters(replace(s, restitution=float(e)), dt) for s, e in zip(surfaces, row, strict=True)]
+            for row in values
+        ]
+        self._bounce[np.ix_(ids, indices)] = values
+        at = np.ix_(ids, self._layout.geoms[indices])
+        self._expand("geom_solref")[at] = [[part.solref for part in row] for row in made]
+        self._expand("geom_solmix")[at] = [[part.solmix for part in row] for row in made]
+
+    def inertials(self) -> tuple[Array, Array, Array, Array]:
+        """Masses, centres, principal moments and axes (N, nbody, ...) as MuJoCo has them."""
+        mass, com, moments, axes = (self._rows(f"body_{name}") for name in ("mass", "ipos", "inertia", "iquat"))
+        return mass, com, moments, axes
 
     def _set_inertia(self, values: Array, ids: Array, indices: Array) -> None:
         split = [[principal(tensor) for tensor in row] for row in values]

@@ -5,9 +5,12 @@ decides the pair, and the bouncier of two outweighs the other, which is the pair
 """
 
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from math import atan2, exp, log, pi, sqrt
 
+import numpy as np
+
+from anysim.conventions import Array
 from anysim.world.model import Surface
 
 STIFF_IMPEDANCE = (0.99, 0.999, 0.001, 0.5, 2.0)
@@ -31,6 +34,8 @@ class ContactParameters:
     solref: tuple[float, float]
     solimp: tuple[float, float, float, float, float]
     solmix: float
+    gap: float
+    """[m] from which on contacts are found; forces act from touch on. A `margin` would lift things by it."""
 
 
 def contact_parameters(surface: Surface, dt: float) -> ContactParameters:
@@ -47,7 +52,13 @@ def contact_parameters(surface: Surface, dt: float) -> ContactParameters:
         solref=solref,
         solimp=(low, high, 0.001, 0.5, 2.0),
         solmix=solmix,
+        gap=surface.contact_offset or 0.0,
     )
+
+
+def restitution_of(solmix: Array) -> Array:
+    """The coefficients that surfaces with these weights were given; see `contact_parameters`."""
+    return np.where(solmix > 1e19, (np.log10(np.maximum(solmix, 1.0)) - 20.0) / 100.0, 0.0)
 
 
 def constraint_solref(softness: float, dt: float) -> tuple[float, float]:
@@ -69,7 +80,7 @@ def rebound(ratio: float) -> float:
     return exp(-ratio / s * span)
 
 
-@cache
+@lru_cache(maxsize=4096)
 def damping_ratio(restitution: float) -> float:
     """The damping ratio with which a contact gives back `restitution` of the approach speed."""
     low, high = 1e-4, 1e4

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anysim.conventions import WORLD, Array
+from anysim.engine.presence import bodies_there
 from anysim.world.model import World
 from anysim_pybullet.tree import Tree
 
@@ -27,7 +28,7 @@ class Cast:
     @classmethod
     def of(cls, world: World, trees: list[Tree], shape_geoms: Array, present: Array) -> "Cast":
         """Those of the entities (E,) that are present, of shapes that belong to these geoms (K,)."""
-        bodies = present[np.array(world.body_entity, dtype=int)]
+        bodies = bodies_there(world, present)
         there = [tree for tree in trees if bodies[tree.bodies[0]]]
         of_body = np.array([world.geoms[i].body for i in shape_geoms.tolist()], dtype=int)
         free = [(t.number, int(t.bodies[0])) for t in there if t.free]

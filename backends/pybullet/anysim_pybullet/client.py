@@ -17,7 +17,7 @@ from anysim_pybullet.bullet import bullet, connect, disconnect
 from anysim_pybullet.cast import Cast
 from anysim_pybullet.options import PybulletOptions
 from anysim_pybullet.surfaces import PairRules
-from anysim_pybullet.tree import Frames, Tree, frames_of, trees_of
+from anysim_pybullet.tree import Frames, Tree, frames_of, shifted, trees_of
 from anysim_pybullet.urdf import body_link, joint_name, shape_link, tree_urdf, world_geom_urdf, write_meshes
 
 STATIC_GROUP, MOVING_GROUP = 2, 1
@@ -29,6 +29,9 @@ QUARTER = np.array([0.0, 0.0, sqrt(0.5), sqrt(0.5)])
 
 APART = 500.0
 """[m] between trees that are moved apart, larger than any of them."""
+
+UNBOUNDED = 1e30
+"""Bullet's own distance at which contacts begin; its margins bound it to 2 cm."""
 
 SPEED_LIMIT = 1e15
 """Bullet cuts joint and root velocities at 100 unless told otherwise."""
@@ -46,11 +49,9 @@ class Plan:
         self._folder = tempfile.TemporaryDirectory(prefix="anysim-pybullet-")
         self.folder = Path(self._folder.name)
         try:
-            meshes = write_meshes(world, self.folder)
-            self.urdf: list[str] = []
-            for tree in self.trees:
-                shapes = self.rules.shapes_on(tree.bodies)
-                self.urdf.append(self._write(f"t{tree.number}", tree_urdf(world, self.frames, tree, shapes, meshes)))
+            self._meshes = meshes = write_meshes(world, self.folder)
+            self._urdf = [self._tree_file(tree, self.frames, f"t{tree.number}") for tree in self.trees]
+            self._others = 0
             self.ground: list[tuple[int, Geom, str]] = []
             for number, geom in self.rules.shapes_on(np.array([WORLD]))[WORLD]:
                 match geom.shape:
@@ -77,6 +78,22 @@ class Plan:
     def _make_cast(self, present: bytes) -> Cast:
         return Cast.of(self.world, self.trees, self.rules.geoms, np.frombuffer(present, dtype=bool))
 
+    def urdf_of(self, tree: Tree, frames: Frames) -> str:
+        """The file of a tree whose bodies have these frames: that of the build, or one of its own."""
+        if np.array_equal(frames.inertial[tree.bodies], self.frames.inertial[tree.bodies]):
+            return self._urdf[tree.number]
+        self._others += 1  # Bullet may keep a file that it has read under its name
+        return self._tree_file(tree, frames, f"t{tree.number}_{self._others}")
+
+    def forget(self, file: str) -> None:
+        """Remove a file that `urdf_of` made for one env."""
+        if file not in self._urdf:
+            Path(file).unlink()
+
+    def _tree_file(self, tree: Tree, frames: Frames, name: str) -> str:
+        shapes = self.rules.shapes_on(tree.bodies)
+        return self._write(name, tree_urdf(self.world, frames, tree, shapes, self._meshes))
+
     def _write(self, name: str, text: str) -> str:
         path = self.folder / f"{name}.urdf"
         path.write_text(text, encoding="ascii")
@@ -90,8 +107,10 @@ class Env:
     not there is at -1.
     """
 
-    def __init__(self, plan: Plan, cast: Cast) -> None:
-        self.plan, self.cast = plan, cast
+    def __init__(self, plan: Plan, cast: Cast, com: Array | None = None) -> None:
+        """`com` (B, 3) are the centres of mass in the bodies' frames, where they are not the World's."""
+        self.plan = plan
+        self._choose(cast, com)
         self.id = connect()
         try:
             self._build()
@@ -103,10 +122,13 @@ class Env:
         """Free the client."""
         disconnect(self.id)
 
-    def rebuild(self, cast: Cast) -> None:
+    def rebuild(self, cast: Cast, com: Array | None = None) -> None:
         """Build what is there now, in the same client: half the work of a new one, and with the same bits after it."""
-        self.cast = cast
+        self._choose(cast, com)
         self._build()
+
+    def _choose(self, cast: Cast, com: Array | None) -> None:
+        self.cast, self.frames = cast, self.plan.frames if com is None else shifted(self.plan.frames, com)
 
     # ------------------------------------------------------------------ building
 
@@ -117,6 +139,7 @@ class Env:
         self.shape_at: dict[int, tuple[int, int]] = {}
         self.body_of: dict[int, dict[int, int]] = {}  # World body by Bullet body and link, -1 for the world
         self.root_ids: list[int] = [-1] * len(plan.trees)
+        self._begin: dict[int, float] = {}  # where contacts of a shape begin, where that is not Bullet's default
         with quiet() as words:
             try:
                 self._settings(p)
@@ -135,7 +158,7 @@ class Env:
         if failure is not None:
             raise EngineError(f"Bullet cannot build the world '{world.name}': {failure}; {words.tail}") from failure
         self.tree_links = [[self.joint_link[j] for j in tree.joints.tolist()] for tree in plan.trees]
-        self.local = np.concatenate([plan.frames.inertial, plan.frames.anchor], axis=1)
+        self.local = np.concatenate([self.frames.inertial, self.frames.anchor], axis=1)
         for tree in self.cast.trees:
             info = p.getDynamicsInfo(self.root_ids[tree.number], -1, physicsClientId=self.id)
             self.local[tree.bodies[0], :7] = [*info[3], *info[4]]
@@ -200,9 +223,9 @@ class Env:
             p.URDF_USE_INERTIA_FROM_FILE | p.URDF_USE_SELF_COLLISION | p.URDF_IGNORE_VISUAL_SHAPES
             | p.URDF_USE_IMPLICIT_CYLINDER
         )  # fmt: skip
-        uid = p.loadURDF(
-            self.plan.urdf[tree.number], useFixedBase=0 if tree.free else 1, flags=flags, physicsClientId=client
-        )
+        file = self.plan.urdf_of(tree, self.frames)
+        uid = p.loadURDF(file, useFixedBase=0 if tree.free else 1, flags=flags, physicsClientId=client)
+        self.plan.forget(file)
         self.root_ids[tree.number] = uid
         links: dict[str, int] = {body_link(int(tree.bodies[0])): -1}
         joints: dict[str, int] = {}
@@ -282,14 +305,17 @@ class Env:
 
     # ------------------------------------------------------------------ surfaces
 
-    def set_surfaces(self, friction: Array) -> None:
+    def set_surfaces(self, friction: Array, restitution: Array) -> None:
         """Give Bullet its numbers for the coefficients (K,) of the shapes' geoms."""
         p, rules = bullet(), self.plan.rules
-        numbers = rules.numbers(friction, self.cast.shapes)
+        numbers = rules.numbers(friction, restitution, self.cast.shapes)
         for row, number in enumerate(self.cast.shapes.tolist()):
-            if self.plan.world.geoms[rules.geoms[number]].surface.restitution > 0:
-                # Bullet begins a contact before the touch and takes the gap off the speed after it: no bounce is left
-                p.changeDynamics(*self.shape_at[number], contactProcessingThreshold=0.0, physicsClientId=self.id)
+            offset = self.plan.world.geoms[rules.geoms[number]].surface.contact_offset
+            # Bullet begins a contact before the touch and takes the gap off the speed after it: no bounce is left
+            begin = 0.0 if restitution[number] > 0 else UNBOUNDED if offset is None else offset
+            if begin != self._begin.get(number, UNBOUNDED):
+                self._begin[number] = begin
+                p.changeDynamics(*self.shape_at[number], contactProcessingThreshold=begin, physicsClientId=self.id)
             p.changeDynamics(
                 *self.shape_at[number], lateralFriction=float(numbers.friction[row]),
                 spinningFriction=float(numbers.spinning[row]), restitution=float(numbers.restitution[row]),

@@ -18,7 +18,10 @@ _APPROXIMATE = {
         "them; where coefficients are changed later it can be off by 0.45 (0.2 and 0.2 on a ground of 0.8, built with "
         "0.8 throughout). Surfaces are rigid: softness is not simulated. A cylinder rolls 2 % too fast down 15 degrees"
     ),
-    Capability.RESTITUTION: "within 0.05 of the coefficient at 1, 2 and 4.2 ms; an impact sinks up to one step's way",
+    Capability.RESTITUTION: "within 0.05 of the coefficient at 1, 2 and 4.2 ms; an impact sinks up to one step's way; "
+    "where coefficients are changed later, as near as those of friction",
+    Capability.CONTACT_OFFSET: "at most 20 mm, and of two surfaces the smaller counts; none where a surface bounces",
+    Capability.MATERIALS: "their colour alone: TinyRenderer has neither gloss nor transparency, and nothing shines",
     Capability.TORSIONAL_FRICTION: "exact on a surface of equal friction; else off as the friction of the pair is",
     Capability.ARMATURE: (
         "a torque computed in each step: exact in free motion; an impact feels the inertia without it, and gets the "
@@ -42,17 +45,18 @@ _APPROXIMATE = {
     ),
     Capability.CONTROL_VELOCITY: "computed in each step, as position control is",
 }
-_ABSENT = (Capability.LIVE_EDIT_NATIVE,)
+_ABSENT = (Capability.LIVE_EDIT_NATIVE, Capability.SOLVER_SETTINGS)
 CAPABILITIES = Capabilities.of(
     *(c for c in Capability if c not in _APPROXIMATE and c not in _ABSENT), approximate=_APPROXIMATE
 )
 
 PARAMETERS = frozenset({
-    "body.mass", "body.inertia", "geom.friction", "geom.color", "joint.damping", "joint.friction", "joint.armature",
-    "actuator.kp", "actuator.kd", "actuator.effort_limit", "world.gravity",
+    "body.mass", "body.com", "body.inertia", "body.linear_damping", "body.angular_damping", "geom.friction",
+    "geom.restitution", "geom.color", "geom.texture", "geom.material", "joint.damping", "joint.friction",
+    "joint.armature", "actuator.kp", "actuator.kd", "actuator.effort_limit", "world.gravity",
     *LIGHTS, "world.ambient", "world.background",
 })  # fmt: skip
-"""What can be changed per env. Bullet fixes the centre of mass at the build."""
+"""What can be changed per env."""
 
 AUDIT_ALLOWANCES = {
     "volume": Allowance(0.001, "Bullet moves the corners of a hull by up to 1e-4 of its size: 0.05 % less volume")

@@ -102,7 +102,7 @@ class PybulletEngine(SimEngine):
 
     def _set_parameter(self, name: str, values: Array, ids: Array, indices: Array) -> None:
         self._envs.parameters.set(name, values, ids, indices)
-        if name.startswith(("actuator.", "joint.")):
+        if name.startswith(("actuator.", "joint.")) or name == "body.com":  # which gives the env a new client
             self._commands.control_changed = True
 
     def _default_parameter(self, name: str) -> Array:
@@ -160,5 +160,5 @@ class PybulletEngine(SimEngine):
             self._painter = Painter(self.world, self._envs.parameters.looks)
         for index in ids.tolist():
             self._envs.mirror.refresh(index)
-        there = self._presence.bodies
-        return self._painter.draw(view, self._envs.mirror.pose, self._envs.parameters.color, there, ids, channels)
+        there, looks = self._presence.bodies, self._envs.parameters
+        return self._painter.draw(view, self._envs.mirror.pose, looks.color, looks.texture, there, ids, channels)

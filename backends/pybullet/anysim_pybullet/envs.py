@@ -36,7 +36,8 @@ class Envs:
             for row in present:
                 self.clients.append(Env(self.plan, self.plan.cast(row)))
             self.laws = Laws(world, self.plan.frames, self.plan.trees, self.clients)
-            self.parameters = Parameters(world, self.clients, self.laws, Looks(world, num_envs, own_scenery(options)))
+            looks = Looks(world, num_envs, own_scenery(options))
+            self.parameters = Parameters(world, self.clients, self.laws, self._rebuild, looks)
             self.mirror = Mirror(world, self.clients, self.laws)
             self._tree_of = np.zeros(len(world.bodies), dtype=int)
             for tree in self.plan.trees:
@@ -61,7 +62,7 @@ class Envs:
     def _settle(self, index: int) -> None:
         """Bring a client that was just built into the World's initial state, and have Bullet remember it."""
         world, mirror, env = self.world, self.mirror, self.clients[index]
-        env.set_surfaces(self.parameters.friction[index, self.plan.rules.geoms])
+        self.parameters.push_surfaces(index)
         mirror.pose[index], mirror.twist[index] = world.initial_body_pose, 0.0
         mirror.position[index], mirror.velocity[index] = [j.initial for j in world.joints], 0.0
         self._set_joints(index, env.cast.joints)
@@ -91,10 +92,10 @@ class Envs:
         """Build an env anew; one that was given up in a new client, since what is not finite stays in the old one."""
         if self.mirror.fault[index]:
             self.clients[index].close()
-            self.clients[index] = Env(self.plan, cast)
+            self.clients[index] = Env(self.plan, cast, self.parameters.shifted_com(index))
         else:
             bullet().removeState(self._begin[index], physicsClientId=self.clients[index].id)
-            self.clients[index].rebuild(cast)
+            self.clients[index].rebuild(cast, self.parameters.shifted_com(index))
         self.mirror.fault[index] = False
         self._settle(index)
         self.parameters.renew(index)
@@ -124,6 +125,26 @@ class Envs:
         for body in self._static[env.cast.bodies[self._static]].tolist():
             self.mirror.pose[index, body] = pose[body]
             self._set_root(index, body, with_pose=True)
+
+    def _rebuild(self, index: int) -> None:
+        """Build an env anew, in its present state: for what Bullet reads once. It has forgotten its contacts."""
+        self.mirror.settle(index)
+        kept = {name: getattr(self.mirror, name)[index].copy() for name in _MIRRORED}
+        effort = self.laws.effort[index].copy()
+        self._renew(index, self.clients[index].cast)
+        for name in _MIRRORED:
+            getattr(self.mirror, name)[index] = kept[name]
+        self._put_motion(index)
+        self.laws.effort[index] = effort
+        self.laws.forget(index)
+
+    def _put_motion(self, index: int) -> None:
+        """Give Bullet the joints and roots that the mirror has."""
+        cast = self.clients[index].cast
+        self._set_joints(index, cast.joints)
+        for tree in cast.trees:
+            self._set_root(index, int(tree.bodies[0]), with_pose=True)
+        self.mirror.hold(index)
 
     # ------------------------------------------------------------------ stepping
 

@@ -4,13 +4,14 @@ See `anysim_pybullet.kernels.drive_law` for the law. An articulation without dri
 gravity or a wrench is left to Bullet alone.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.actuation import speed_bound
 from anysim.engine.commands import MODES, Control
+from anysim.engine.drag import drag, gain
 from anysim.world.model import Actuation, ControlMode, World
 from anysim_pybullet import kernels as K
 from anysim_pybullet.client import Env
@@ -58,6 +59,7 @@ class Laws:
             row[:, K.COM : K.COM + 3] = frames.inertial[i, :3]
             row[:, K.INERTIA : K.INERTIA + 6] = body.inertial.inertia
             row[:, K.COMPENSATED] = body.gravity_compensation
+        self.damping = np.tile(np.array([b.damping for b in bodies], dtype=float).reshape(-1, 2), (n, 1, 1))
         self.gravity = np.tile(np.array(world.physics.gravity), (n, 1))
         self.effort = np.zeros((n, len(joints)))
         self._starts = np.cumsum([0, *(self._length(t) for t in trees)])
@@ -79,9 +81,14 @@ class Laws:
         loose: Array = np.ones(len(law), dtype=bool)
         if self.motors is not None:
             loose = np.logical_not(np.all(self.motors.running, axis=0))
+        damped: Array = np.any(self.damping != 0, axis=(0, 2))
         lifted: Array = np.any(self.bodies[:, :, K.COMPENSATED] != 0, axis=0)
         self.needs = [
-            bool((law & loose)[t.joints].any() or (lifted[t.bodies].any() and (t.free or loose[t.joints].any())))
+            bool(
+                (law & loose)[t.joints].any()
+                or damped[t.bodies].any()
+                or (lifted[t.bodies].any() and (t.free or loose[t.joints].any()))
+            )
             for t in self._trees
         ]
         self._lifters: dict[int, Lifter] = {}
@@ -172,6 +179,7 @@ class Pusher:
         return (
             tree, self._env.root_ids[tree.number], self._env.tree_links[tree.number], buffer,
             laws.bodies[index, tree.bodies], laws.acting[index, tree.joints], laws.remembered(index, tree.number),
+            Brake.of(laws, self._p, self._env, index, tree, self._dt),
         )  # fmt: skip
 
     def run(self, steps: int) -> bool:
@@ -195,13 +203,17 @@ class Pusher:
 
     def _push(
         self, p: Any, client: int, tree: Tree, uid: int, links: list[int], buffer: _Gathered, bodies: Array,
-        drives: Array, memory: Array,
+        drives: Array, memory: Array, brake: "Brake | None",
     ) -> bool:  # fmt: skip
         place: Any = None
         if tree.free:
             place, turn = p.getBasePositionAndOrientation(uid, physicsClientId=client)
             if not links:
-                return self._push_body(p, client, uid, place, bodies[0], buffer.wrench[0])
+                wrench = buffer.wrench[0]
+                if brake is not None:
+                    velocity = p.getBaseVelocity(uid, physicsClientId=client)
+                    wrench = wrench + brake.wrench(np.array(turn), *map(np.array, velocity))
+                return self._push_body(p, client, uid, place, bodies[0], wrench)
             self._free_root(tree, place, turn, p.getBaseVelocity(uid, physicsClientId=client), buffer.root)
         states = p.getJointStates(uid, links, physicsClientId=client)
         buffer.motion[0] = [s[0] for s in states]
@@ -238,6 +250,27 @@ class Pusher:
         row[0, :3], row[0, 3:7], row[0, 14:17], row[0, 17:] = place, turn, velocity[0], velocity[1]
         K.frames(row, self._env.local[tree.bodies[:1]], _ROOT, pose, twist)
         root[:7], root[7:] = pose[0], twist[0]
+
+
+class Brake(NamedTuple):
+    """The damping of a free body. Bullet's own grows with the square of the speed."""
+
+    gains: Array
+    mass: Array
+    moments: Array
+
+    @staticmethod
+    def of(laws: Laws, p: Any, env: Any, index: int, tree: Tree, dt: float) -> "Brake | None":
+        """What slows the root of a tree down; None where nothing does."""
+        rates = laws.damping[index, tree.bodies[0]]
+        if not rates.any():
+            return None
+        info = p.getDynamicsInfo(env.root_ids[tree.number], -1, physicsClientId=env.id)
+        return Brake(gain(rates, dt), np.array(info[0]), np.array(info[2]))
+
+    def wrench(self, turn: Array, velocity: Array, rate: Array) -> Array:
+        """(6,) at the centre of mass; Bullet's frame of a body has its principal axes."""
+        return drag(self.gains, self.mass, self.moments, turn, velocity, rate)
 
 
 _ROOT = np.array([True])

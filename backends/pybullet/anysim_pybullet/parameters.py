@@ -1,9 +1,12 @@
 """Physical and visual parameters per env: Bullet's through changeDynamics, the others are the drive law's own."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.looks import Looks
+from anysim.engine.parameters import nominal
 from anysim.errors import EngineError
 from anysim.world.inertia import tensor
 from anysim.world.model import Inertial, World
@@ -18,12 +21,19 @@ _JOINT = {"joint.damping": K.DAMPING, "joint.armature": K.ARMATURE}
 
 
 class Parameters:
-    """Reads and writes neutral parameters. The centre of mass and the axes of inertia are fixed by the build."""
+    """Reads and writes neutral parameters. The axes of inertia are fixed by the build.
 
-    def __init__(self, world: World, envs: list[Env], laws: Laws, looks: Looks) -> None:
-        self._world, self._envs, self._laws = world, envs, laws
+    So are centres of mass, for Bullet: where one is moved the env gets a new client, in its present state.
+    """
+
+    def __init__(self, world: World, envs: list[Env], laws: Laws, rebuild: Callable[[int], None], looks: Looks) -> None:
+        self._world, self._envs, self._laws, self._rebuild = world, envs, laws, rebuild
         n = len(envs)
+        self.com = np.tile(nominal("body.com", world), (n, 1, 1))
         self.friction = np.tile(np.array([g.surface.friction for g in world.geoms], dtype=float), (n, 1))
+        self.restitution, self.texture, self.material = (
+            np.tile(nominal(f"geom.{name}", world), (n, 1)) for name in ("restitution", "texture", "material")
+        )
         self.color = np.tile(np.array([g.color for g in world.geoms], dtype=float).reshape(-1, 4), (n, 1, 1))
         self.dry = np.tile(np.array([j.friction for j in world.joints], dtype=float), (n, 1))
         self.looks = looks
@@ -56,8 +66,16 @@ class Parameters:
             self._laws.gravity[ids] = values[:, 0]
         elif name == "body.inertia":
             self._laws.bodies[:, :, K.INERTIA : K.INERTIA + 6][at] = values
+        elif name == "body.com":
+            if np.array_equal(self.com[at], values):
+                return
+            self.com[at] = values
+            anchor = self._envs[0].plan.frames.anchor
+            self._laws.bodies[ids, :, K.COM : K.COM + 3] = self.com[ids] - anchor
         else:
             self._array(name)[at] = values
+            if name in ("body.linear_damping", "body.angular_damping"):
+                self._laws.refresh()
         for index in ids.tolist():
             self._touched[index][name] = None
             self._push(index, name, indices)
@@ -67,8 +85,10 @@ class Parameters:
         p, env = bullet(), self._envs[index]
         if name == "world.gravity":
             p.setGravity(*self._laws.gravity[index].tolist(), physicsClientId=env.id)
-        elif name == "geom.friction":
-            env.set_surfaces(self.friction[index, env.plan.rules.geoms])
+        elif name in ("geom.friction", "geom.restitution"):
+            self.push_surfaces(index)
+        elif name == "body.com":
+            self._rebuild(index)
         elif name == "joint.friction":
             for joint in np.intersect1d(indices, env.cast.joints).tolist():
                 env.set_dry_friction(joint, float(self.dry[index, joint]))
@@ -81,15 +101,31 @@ class Parameters:
                         localInertiaDiagonal=self._moments(index, body), physicsClientId=env.id,
                     )  # fmt: skip
 
+    def shifted_com(self, index: int) -> Array | None:
+        """The centres of mass (B, 3) of an env, None where they are the World's."""
+        moved = not np.array_equal(self.com[index], self._defaults["body.com"])
+        return self.com[index] if moved else None
+
+    def push_surfaces(self, index: int) -> None:
+        """Give Bullet the coefficients of friction and restitution of an env."""
+        env = self._envs[index]
+        geoms = env.plan.rules.geoms
+        env.set_surfaces(self.friction[index, geoms], self.restitution[index, geoms])
+
     def renew(self, index: int) -> None:
         """Give an env that was built anew what was changed in it before."""
         for name in self._touched[index]:
+            if name == "body.com":  # the client was built with it
+                continue
             self._push(index, name, np.arange(self._all(name).shape[1]))
 
     def _array(self, name: str) -> Array:
         laws = self._laws
         return {
-            "body.mass": laws.bodies[:, :, K.MASS], "geom.friction": self.friction, "geom.color": self.color,
+            "body.mass": laws.bodies[:, :, K.MASS], "body.com": self.com, "geom.friction": self.friction,
+            "geom.color": self.color,
+            "geom.restitution": self.restitution, "geom.texture": self.texture, "geom.material": self.material,
+            "body.linear_damping": laws.damping[:, :, 0], "body.angular_damping": laws.damping[:, :, 1],
             "joint.friction": self.dry, "actuator.kp": laws.kp, "actuator.kd": laws.kd,
             "actuator.effort_limit": laws.limit,
         }[name]  # fmt: skip

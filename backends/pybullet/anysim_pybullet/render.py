@@ -4,7 +4,10 @@ That client holds each visible geom once, as a body that nothing moves; an env i
 bodies are and giving them its colours. Its bodies have no mass and no collision shapes, and it is never stepped.
 """
 
-from math import pi, radians, tan
+import struct
+import tempfile
+from math import radians, tan
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,19 +18,18 @@ from anysim.engine.looks import Look, Looks
 from anysim.errors import EngineError
 from anysim.math import pose as P
 from anysim.quiet import quiet
+from anysim.world.looks import NONE, lying, wrapped
 from anysim.world.model import (
     Box,
-    Capsule,
-    Cylinder,
     Geom,
     HeightField,
     HeightFieldShape,
     Mesh,
     MeshShape,
     Plane,
-    Sphere,
     World,
 )
+from anysim.world.tessellate import triangles
 from anysim_pybullet.bullet import bullet, connect, disconnect
 
 GROUND_TILES = 16
@@ -54,9 +56,11 @@ class Painter:
         self._fields = {f.name: f for f in world.heightfields}
         self._client = connect()
         self._uids: list[int] = []
+        self._painted: list[int] = []
         p, failure = bullet(), None
         with quiet() as words:
             try:
+                self._painted = self._load_textures(p)
                 self._uids = [self._add(p, world.geoms[i]) for i in self._geoms]
             except p.error as error:
                 failure = error
@@ -66,6 +70,7 @@ class Painter:
         self._local = np.array([[*world.geoms[i].position, *world.geoms[i].quaternion] for i in self._geoms])
         self._body = np.array([world.geoms[i].body for i in self._geoms], dtype=int)
         self._colors = np.full((len(self._geoms), 4), -1.0)
+        self._textures = np.full(len(self._geoms), NONE)
         entity = {WORLD: 0} | {b: e + 1 for b, e in enumerate(world.body_entity)}
         self._entity = np.zeros(max(self._uids, default=-1) + 2, dtype=np.int32)  # the last one for the background
         for uid, body in zip(self._uids, self._body.tolist(), strict=True):
@@ -76,16 +81,18 @@ class Painter:
         disconnect(self._client)
 
     def draw(
-        self, view: CameraView, poses: Array, colors: Array, there: Array, ids: Array, channels: tuple[str, ...]
-    ) -> dict[str, Array]:
-        """See `SimEngine.render`. `poses` (N, B, 7), `colors` (N, G, 4) and who is there (N, B) are of all envs."""
+        self, view: CameraView, poses: Array, colors: Array, textures: Array, there: Array, ids: Array,
+        channels: tuple[str, ...],
+    ) -> dict[str, Array]:  # fmt: skip
+        """See `SimEngine.render`: `poses` (N, B, 7), `colors` (N, G, 4), `textures` (N, G) and who is there (N, B)."""
         size = (len(ids), view.height, view.width)
         shapes: dict[str, tuple[tuple[int, ...], Any]] = {
             "rgb": ((*size, 3), np.uint8), "depth": (size, np.float32), "segmentation": (size, np.int32)
         }  # fmt: skip
         images = {name: np.empty(*shapes[name]) for name in channels}
         for row, index in enumerate(ids.tolist()):
-            self._arrange(poses[index], colors[index, self._geoms], there[index])
+            painted = textures[index, self._geoms].astype(int)
+            self._arrange(poses[index], colors[index, self._geoms], painted, there[index])
             look = self._looks.of(index)
             rgba, raw, owner = self._shoot(view, row, look)
             near, far = view.near, view.far
@@ -100,7 +107,7 @@ class Painter:
                 images["segmentation"][row] = self._entity[np.where(nothing, -1, owner)]
         return images
 
-    def _arrange(self, poses: Array, colors: Array, there: Array) -> None:
+    def _arrange(self, poses: Array, colors: Array, textures: Array, there: Array) -> None:
         p, client = bullet(), self._client
         # TinyRenderer draws nothing of what is wholly transparent
         colors = np.where(np.append(there, True)[self._body, None], colors, 0.0)
@@ -110,7 +117,10 @@ class Painter:
             p.resetBasePositionAndOrientation(uid, place[:3], place[3:], physicsClientId=client)
         for k in np.flatnonzero((colors != self._colors).any(axis=1)).tolist():
             p.changeVisualShape(self._uids[k], -1, rgbaColor=colors[k].tolist(), physicsClientId=client)
-        self._colors = colors.copy()
+        for k in np.flatnonzero(textures != self._textures).tolist():
+            image = NONE if textures[k] == NONE else self._painted[textures[k]]
+            p.changeVisualShape(self._uids[k], -1, textureUniqueId=image, physicsClientId=client)
+        self._colors, self._textures = colors.copy(), textures
 
     def _shoot(self, view: CameraView, row: int, look: Look) -> tuple[Array, Array, Array]:
         eye = view.pose[row]
@@ -154,14 +164,25 @@ class Painter:
 
     # ------------------------------------------------------------------ shapes
 
+    def _load_textures(self, p: Any) -> list[int]:
+        """Bullet's numbers of the World's textures, which it takes from files."""
+        numbers: list[int] = []
+        with tempfile.TemporaryDirectory(prefix="anysim-pybullet-") as folder:
+            for i, texture in enumerate(self._world.textures):
+                file = Path(folder) / f"texture{i}.tga"
+                file.write_bytes(tga(texture.tiled()))
+                numbers.append(p.loadTexture(str(file), physicsClientId=self._client))
+        return numbers
+
     def _add(self, p: Any, geom: Geom) -> int:
         client = self._client
         match geom.shape:
-            case Box(half):
+            case Box(half) if not self._painted:
                 shape = p.createVisualShape(p.GEOM_BOX, halfExtents=half, rgbaColor=geom.color, physicsClientId=client)
             case _:
                 vertices, faces = self._triangles(geom)
-                shape = self._add_mesh(p, vertices, faces, geom.color)
+                flat = isinstance(geom.shape, Plane | HeightFieldShape)
+                shape = self._add_mesh(p, vertices, faces, geom.color, flat)
         if shape < 0:
             raise p.error(f"createVisualShape failed for geom '{geom.name}'")
         return p.createMultiBody(0, -1, shape, physicsClientId=client)
@@ -174,31 +195,38 @@ class Painter:
             case HeightFieldShape(name):
                 field: HeightField = self._fields[name]
                 return grid(np.asarray(field.heights, dtype=float), field.size)
-            # Bullet's own round shapes are drawn so coarsely that they lose up to a tenth of their outline
-            case Sphere(r):
-                bend = np.linspace(-pi / 2, pi / 2, ROUND)
-                return turned(r * np.cos(bend), r * np.sin(bend))
-            case Capsule(r, h):
-                bend = np.linspace(0.0, pi / 2, ROUND // 2)
-                across, up = r * np.cos(bend), h + r * np.sin(bend)
-                return turned(np.concatenate([across[::-1], across]), np.concatenate([-up[::-1], up]))
-            case Cylinder(r, h):
-                return turned(np.array([0.0, r, r, 0.0]), np.array([-h, -h, h, h]))
             case Plane(half):
                 return grid(np.zeros((GROUND_TILES + 1, GROUND_TILES + 1)), (2 * half, 2 * half))
-            case _:
+            case shape:
+                # Bullet's own round shapes are drawn so coarsely that they lose up to a tenth of their outline
+                made = triangles(shape)
+                if made is not None:
+                    return made
                 raise EngineError(f"pybullet cannot draw a {type(geom.shape).__name__} (geom '{geom.name}')")
 
-    def _add_mesh(self, p: Any, vertices: Array, faces: Array, color: Any) -> int:
-        """A mesh of flat triangles, each with its own normal."""
+    def _add_mesh(self, p: Any, vertices: Array, faces: Array, color: Any, flat: bool) -> int:
+        """A mesh of flat triangles, each with its own normal and places in a texture."""
         corners = vertices[faces]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
         points = corners.reshape(-1, 3)
+        more: dict[str, Any] = {}
+        if self._painted:
+            # at 1 the renderer begins the image anew
+            places = lying(corners) if flat else 0.9999 * wrapped(corners)
+            more["uvs"] = places.reshape(-1, 2).tolist()
         return p.createVisualShape(
             p.GEOM_MESH, vertices=points.tolist(), indices=list(range(len(points))),
             normals=np.repeat(normal, 3, axis=0).tolist(), rgbaColor=color, physicsClientId=self._client,
+            **more,
         )  # fmt: skip
+
+
+def tga(pixels: Array) -> bytes:
+    """An image (H, W, 3) as the bytes of a TGA file, the simplest format that Bullet reads."""
+    height, width, _ = pixels.shape
+    head = struct.pack("<3B5x4H2B", 0, 0, 2, 0, 0, width, height, 24, 0x20)  # uncompressed, top row first
+    return head + np.ascontiguousarray(pixels[..., ::-1]).tobytes()
 
 
 def grid(heights: Array, size: tuple[float, float]) -> tuple[Array, Array]:
@@ -209,16 +237,4 @@ def grid(heights: Array, size: tuple[float, float]) -> tuple[Array, Array]:
     corner = (np.arange(rows - 1)[:, None] * cols + np.arange(cols - 1)).ravel()
     lower = np.stack([corner, corner + 1, corner + cols + 1], axis=1)
     upper = np.stack([corner, corner + cols + 1, corner + cols], axis=1)
-    return vertices, np.concatenate([lower, upper])
-
-
-def turned(across: Array, height: Array) -> tuple[Array, Array]:
-    """Vertices and triangles of the body that a profile (K,), from below to above, makes turning about z [m]."""
-    turn = np.arange(2 * ROUND) * (pi / ROUND)
-    x, y = np.multiply.outer(across, np.cos(turn)), np.multiply.outer(across, np.sin(turn))
-    vertices = np.stack([x, y, np.broadcast_to(height[:, None], x.shape)], axis=-1).reshape(-1, 3)
-    ring, place = np.meshgrid(np.arange(len(across) - 1), np.arange(2 * ROUND), indexing="ij")
-    a = (ring * 2 * ROUND + place).ravel()
-    b = (ring * 2 * ROUND + (place + 1) % (2 * ROUND)).ravel()
-    lower, upper = np.stack([a, b, b + 2 * ROUND], axis=1), np.stack([a, b + 2 * ROUND, a + 2 * ROUND], axis=1)
     return vertices, np.concatenate([lower, upper])

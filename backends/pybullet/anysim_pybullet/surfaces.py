@@ -47,33 +47,28 @@ class PairRules:
         solid = np.array([i for i, g in enumerate(world.geoms) if g.collides], dtype=int)
         tree_of = {WORLD: -1} | {int(b): t.number for t in trees for b in t.bodies}
         self._take(solid, self._weights(world, [world.geoms[i].body for i in solid], tree_of, trees))
-        nominal = np.array([world.geoms[i].surface.friction for i in solid], dtype=float)
-        if self._gap(nominal) > EXACT:
-            self._split(nominal)
+        friction = np.array([world.geoms[i].surface.friction for i in solid], dtype=float)
+        bounce = np.array([world.geoms[i].surface.restitution for i in solid], dtype=float)
+        if self._gap(friction, bounce) > EXACT:
+            self._split(friction, bounce)
 
     def _take(self, geoms: Array, weight: Array) -> None:
         surfaces = [self._world.geoms[i].surface for i in geoms]
         self.geoms, self.weight = geoms, weight
         self.priority = np.array([s.priority for s in surfaces], dtype=int)
         self._spin = np.array([s.torsional_friction if s.torsional else 0.0 for s in surfaces])
-        bounce = np.array([s.restitution for s in surfaces], dtype=float)
-        # What an impact sinks, up to a step's way, is pushed out with `contact_erp` of its speed, which adds to the
-        # bounce: half of that on average.
-        self._wanted_bounce = np.maximum(np.maximum.outer(bounce, bounce) - 0.5 * self._erp, 0.0)
-        self._bounces = bool(bounce.any())
         self._numbers = lru_cache(maxsize=64)(self._make_numbers)
 
-    def _gap(self, friction: Array) -> float:
+    def _gap(self, friction: Array, restitution: Array) -> float:
         """The largest difference between a coefficient of a pair and the rule's."""
-        meet, numbers = self.weight > 0, self.numbers(friction)
-        values, bounces = numbers.friction, numbers.restitution
-        slide = np.abs(np.multiply.outer(values, values) - self.pair_friction(friction))
-        bounce = np.abs(np.multiply.outer(bounces, bounces) - self._wanted_bounce)
-        return float(max(slide[meet].max(initial=0.0), bounce[meet].max(initial=0.0)))
+        meet, found = self.weight > 0, self.numbers(friction, restitution)
+        slide = np.abs(np.multiply.outer(found.friction, found.friction) - self.pair_friction(friction))
+        bounce = np.multiply.outer(found.restitution, found.restitution) - self.pair_restitution(restitution)
+        return float(max(slide[meet].max(initial=0.0), np.abs(bounce)[meet].max(initial=0.0)))
 
-    def _split(self, friction: Array) -> None:
+    def _split(self, friction: Array, restitution: Array) -> None:
         """Give each geom a shape for each pair of values, of friction and of restitution, that it can meet with."""
-        wanted = [self.pair_friction(friction), self._wanted_bounce]
+        wanted = [self.pair_friction(friction), self.pair_restitution(restitution)]
         shapes: list[tuple[int, tuple[float, ...]]] = []
         for i in range(len(self.geoms)):
             values = {tuple(float(w[i, k]) for w in wanted) for k in np.flatnonzero(self.weight[i])}
@@ -114,21 +109,29 @@ class PairRules:
             above > 0, friction[:, None], np.where(above < 0, friction, np.maximum.outer(friction, friction))
         )
 
-    def numbers(self, friction: Array, shapes: Array | None = None) -> Surfaces:
+    def pair_restitution(self, restitution: Array) -> Array:
+        """(K, K) the restitution that each pair should be given."""
+        # What an impact sinks, up to a step's way, is pushed out with `contact_erp` of its speed, which adds to the
+        # bounce: half of that on average.
+        return np.maximum(np.maximum.outer(restitution, restitution) - 0.5 * self._erp, 0.0)
+
+    def numbers(self, friction: Array, restitution: Array, shapes: Array | None = None) -> Surfaces:
         """What Bullet gets, for coefficients (K,) of all shapes' geoms, for those shapes that are there (None: all)."""
         chosen = np.arange(len(friction)) if shapes is None else shapes
-        return self._numbers(friction.tobytes(), chosen.tobytes())
+        return self._numbers(friction.tobytes(), restitution.tobytes(), chosen.tobytes())
 
-    def _make_numbers(self, frictions: bytes, chosen: bytes) -> Surfaces:
-        friction, shapes = np.frombuffer(frictions), np.frombuffer(chosen, dtype=np.int64)
+    def _make_numbers(self, frictions: bytes, restitutions: bytes, chosen: bytes) -> Surfaces:
+        friction, restitution = np.frombuffer(frictions), np.frombuffer(restitutions)
+        shapes = np.frombuffer(chosen, dtype=np.int64)
         if not len(shapes):
             return Surfaces(*([np.zeros(0)] * 3))
         pairs = np.ix_(shapes, shapes)
-        wanted, weight = self.pair_friction(friction)[pairs], np.ascontiguousarray(self.weight[pairs])
-        values = factors(np.ascontiguousarray(wanted), weight, _SWEEPS)
+        weight = np.ascontiguousarray(self.weight[pairs])
+        values = factors(np.ascontiguousarray(self.pair_friction(friction)[pairs]), weight, _SWEEPS)
         bounce = np.zeros(len(shapes))
-        if self._bounces:
-            bounce = factors(np.ascontiguousarray(self._wanted_bounce[pairs]), weight, _SWEEPS)
+        if restitution.any():
+            wanted = np.ascontiguousarray(self.pair_restitution(restitution)[pairs])
+            bounce = factors(wanted, weight, _SWEEPS)
         return Surfaces(values, self._spinning(values, weight, self._spin[shapes]), bounce)
 
     @staticmethod

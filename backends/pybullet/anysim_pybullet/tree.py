@@ -4,7 +4,7 @@ A link's frame here has the axes of its body and lies on its joint: at the ancho
 body's origin. That is where a URDF wants it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -55,6 +55,13 @@ def frames_of(world: World) -> Frames:
         moments[i], axes = principal(body.inertial)
         inertial[i] = [*(np.array(body.inertial.com) - anchor[i]), *axes]
     return Frames(anchor, moments, inertial)
+
+
+def shifted(frames: Frames, com: Array) -> Frames:
+    """The frames of bodies whose centres of mass are at `com` (B, 3), in the bodies' frames."""
+    inertial = frames.inertial.copy()
+    inertial[:, :3] = com - frames.anchor
+    return replace(frames, inertial=inertial)
 
 
 def principal(inertial: Inertial) -> tuple[Array, Array]:

@@ -32,6 +32,10 @@ _APPROXIMATE = {
         "friction off by more (0.37 N above a sliding joint of 0.2 N, 0.65 N above a turning one of 0.2 N m); how "
         "several fixed things share the friction of one body is a guess"
     ),
+    Capability.MATERIALS: (
+        "the shader `lit`, which `auto` takes without a graphics card, has highlights and mirrors nothing; `trivial` "
+        "shows colours and opacity alone, `default` is physically based"
+    ),
     Capability.CONTACT_POINTS: "the friction of a pair, as sensors have it, is shared as the normal forces are",
 }
 _ABSENT = (Capability.LIVE_EDIT_NATIVE, Capability.RENDER_SHADOWS)

@@ -34,6 +34,8 @@ from anysim_sapien.scene import EnvScene
 from anysim_sapien.state import StateReader
 from anysim_sapien.stepping import advance, pasts_of, relive, wrenches
 
+SKINS = ("color", "texture", "material")
+
 _BUILT = (
     "_recipes", "_layout", "_drives", "_looks", "_parameters", "_momentum", "_reader", "_fields", "_wrench", "_scenes",
 )  # fmt: skip
@@ -110,7 +112,8 @@ class SapienEngine(SimEngine):
     def _populate(self, ids: Array) -> None:
         """Nothing yet: a reset builds the scene of an env anew, with what is there. Here it fails where that cannot."""
         for env in ids:
-            self._recipe(int(env)).copies(self._parameters.values(int(env)).geom_friction)
+            values = self._parameters.values(int(env))
+            self._recipe(int(env)).copies(values.geom_friction, values.geom_restitution)
 
     def _reset(self, ids: Array) -> None:
         for env in ids:
@@ -300,5 +303,6 @@ class SapienEngine(SimEngine):
 
         if self._painter is None:
             self._painter = Painter(self.world, self._layout, self._looks, self.options)
-        poses, colors = self.get_state().body_pose[ids], self._parameters.get("geom.color")[ids]
-        return self._painter.draw(view, ids, poses, colors, self._presence.bodies[ids], channels)
+        poses, there = self.get_state().body_pose[ids], self._presence.bodies[ids]
+        skins = tuple(self._parameters.get(f"geom.{name}")[ids] for name in SKINS)
+        return self._painter.draw(view, ids, poses, skins, there, channels)

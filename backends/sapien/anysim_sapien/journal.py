@@ -44,9 +44,11 @@ class Op(IntEnum):
     """Joint and armature."""
     BASE = 10
     """Nothing: from here on steps and writes are counted."""
+    DAMPING = 11
+    """Body and its rates of damping, linear and angular."""
 
 
-_WRITES = frozenset({Op.JOINTS, Op.POSE, Op.VELOCITY, Op.INERTIAL, Op.DRY, Op.ARMATURE})
+_WRITES = frozenset({Op.JOINTS, Op.POSE, Op.VELOCITY, Op.INERTIAL, Op.DRY, Op.ARMATURE, Op.DAMPING})
 
 
 class Journal:

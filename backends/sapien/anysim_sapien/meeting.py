@@ -1,5 +1,6 @@
 """Which geoms of a World can meet, and the PhysX shapes that make them meet by the rules. Knows no SAPIEN."""
 
+from dataclasses import replace
 from itertools import product
 from math import prod
 
@@ -45,14 +46,18 @@ class Meeting:
             excluded[low, high] = excluded[high, low] = True  # the world is the last row, by its index of -1
         return ~(apart | excluded[np.ix_(bodies, bodies)])
 
-    def copies(self, friction: Array) -> dict[int, list[Copy]]:
-        """The shapes of each geom that collides, for the coefficients in force (G,).
+    def copies(self, friction: Array, restitution: Array | None = None) -> dict[int, list[Copy]]:
+        """The shapes of each geom that collides, for the coefficients in force (G,); restitutions as built for None.
 
         Raises:
             EngineError: more different pairs than PhysX has collision groups.
         """
+        surfaces = self._surfaces
+        if restitution is not None:
+            pairs = zip(surfaces, restitution[self.solid].tolist(), strict=True)
+            surfaces = [replace(surface, restitution=value) for surface, value in pairs]
         made = copies_of(
-            self._surfaces, friction[self.solid], self._fixed, self._meet, self._labels, self.apart.between
+            surfaces, friction[self.solid], self._fixed, self._meet, self._labels, self.apart.between
         )  # fmt: skip
         return dict(zip(self.solid.tolist(), made, strict=True))
 

@@ -41,6 +41,7 @@ class _Noted(NamedTuple):
     order: list[Array]
     mass: Array
     friction: Array
+    slowing: Array
     gravity: Array
     pushes: Array | None
 
@@ -84,7 +85,7 @@ class Momentum:
         self._noted[env] = _Noted(
             self._velocity, self._velocities(scene), self._poses,
             tuple(np.array(tree.handle.link_incoming_joint_forces) for tree in scene.trees), scene.link_order(),
-            scene.mass.copy(), scene.rubbing.copy(), scene.gravity, pushes,
+            scene.mass.copy(), scene.rubbing.copy(), scene.slowing[:, 0].copy(), scene.gravity, pushes,
         )  # fmt: skip
 
     def balance(self, env: int) -> Balance:
@@ -107,6 +108,8 @@ class Momentum:
         gained = noted.after.astype(float) - noted.before.astype(float)
         force[moving] = gained * (mass[:, None] / self._world.physics.dt)
         force[moving] -= np.outer(mass * self._weighs[moving], noted.gravity)
+        if noted.slowing.any():
+            force[moving] += self._dragged(noted)
         if noted.pushes is not None:
             force[noted.pushes[:, 0].astype(int)] -= noted.pushes[:, 1:4]
         if len(self._links):
@@ -115,6 +118,16 @@ class Momentum:
             np.add.at(force, self._parent[self._links], exerted[self._links])
         doubt[moving] = (noted.friction @ self._doubts)[moving]
         return Balance(force, doubt)
+
+    def _dragged(self, noted: _Noted) -> Array:
+        """(M, 3) [N] what damping takes: PhysX damps the speed that gravity and pushes have added to already."""
+        moving, dt = self._moving, self._world.physics.dt
+        pushed = np.zeros((len(self._parent), 3))
+        if noted.pushes is not None:
+            pushed[noted.pushes[:, 0].astype(int)] = noted.pushes[:, 1:4]
+        mass = noted.mass[moving, None]
+        gained = np.outer(self._weighs[moving], noted.gravity) + pushed[moving] / mass
+        return noted.slowing[moving, None] * mass * (noted.before.astype(float) + dt * gained)
 
     def _exerted(self, noted: _Noted) -> Array:
         """(B, 3) [N] what each link's joint exerts on it."""

@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array, xyzw_from_wxyz
+from anysim.engine.drag import gain
 from anysim.engine.looks import LIGHTS, SURROUNDINGS, Looks
+from anysim.engine.parameters import nominal
 from anysim.world.model import World
 from anysim_sapien.drives import Drives
 from anysim_sapien.inertia import full, principal
@@ -19,8 +21,11 @@ _DRIVES = {
     "joint.damping": "passive", "actuator.kp": "kp", "actuator.kd": "kd", "actuator.effort_limit": "limit",
 }  # fmt: skip
 _BODIES = ("body.mass", "body.com", "body.inertia")
-_REBUILD = ("geom.friction", "world.gravity")
-"""PhysX reads gravity once, and a change of friction regroups the shapes: the scene is built anew."""
+_DAMPING = ("body.linear_damping", "body.angular_damping")
+_SURFACES = ("geom.friction", "geom.restitution")
+_REBUILD = (*_SURFACES, "world.gravity")
+"""PhysX reads gravity once, and a change of coefficients regroups the shapes: the scene is built anew."""
+_SKINS = ("geom.color", "geom.texture", "geom.material")
 
 
 LOOKS = frozenset({*LIGHTS, *SURROUNDINGS} - {"world.shadows"})
@@ -33,7 +38,7 @@ LIT = LOOKS - {"world.background"}
 class Parameters:
     """The values in force (N, K, ...), and how they get into the scenes."""
 
-    NAMES = frozenset({*_DRIVES, *_BODIES, *_REBUILD, "joint.friction", "joint.armature", "geom.color"}) | LOOKS
+    NAMES = LOOKS | {*_DRIVES, *_BODIES, *_DAMPING, *_REBUILD, *_SKINS, "joint.friction", "joint.armature"}
 
     def __init__(
         self, world: World, layout: Layout, drives: Drives, scenes: list[EnvScene], rebuild: Callable[[int], None],
@@ -41,21 +46,7 @@ class Parameters:
     ) -> None:  # fmt: skip
         self._world, self._layout, self._drives, self._scenes, self._rebuild = world, layout, drives, scenes, rebuild
         self._looks = looks
-        bodies, joints = world.bodies, world.joints
-        self._defaults = {
-            "body.mass": np.array([b.inertial.mass for b in bodies], dtype=float),
-            "body.com": np.array([b.inertial.com for b in bodies], dtype=float).reshape(-1, 3),
-            "body.inertia": np.array([b.inertial.inertia for b in bodies], dtype=float).reshape(-1, 6),
-            "geom.friction": np.array([g.surface.friction for g in world.geoms], dtype=float),
-            "geom.color": np.array([g.color for g in world.geoms], dtype=float).reshape(-1, 4),
-            "joint.damping": np.array([j.damping for j in joints], dtype=float),
-            "joint.friction": np.array([j.friction for j in joints], dtype=float),
-            "joint.armature": np.array([j.armature for j in joints], dtype=float),
-            "actuator.kp": np.array([a.kp for a in world.actuators], dtype=float),
-            "actuator.kd": np.array([a.kd for a in world.actuators], dtype=float),
-            "actuator.effort_limit": np.array([a.effort_limit for a in world.actuators], dtype=float),
-            "world.gravity": np.array([world.physics.gravity], dtype=float),
-        }
+        self._defaults = {name: nominal(name, world) for name in sorted(self.NAMES - LOOKS)}
         self._wanted = {
             name: np.repeat(values[None], num_envs, axis=0)
             for name, values in self._defaults.items()
@@ -66,7 +57,8 @@ class Parameters:
         """What the scene of an env is built with."""
         w = self._wanted
         return Values(
-            w["body.mass"][env], w["body.com"][env], w["body.inertia"][env], w["geom.friction"][env],
+            w["body.mass"][env], w["body.com"][env], w["body.inertia"][env],
+            np.stack([w[name][env] for name in _DAMPING], axis=-1), w["geom.friction"][env], w["geom.restitution"][env],
             w["joint.friction"][env], w["joint.armature"][env], w["world.gravity"][env, 0],
         )  # fmt: skip
 
@@ -96,7 +88,7 @@ class Parameters:
         if name in _DRIVES:
             return getattr(self._drives, _DRIVES[name]).copy()
         values = self._wanted[name].copy()
-        if name == "geom.color":
+        if name in _SKINS:
             return values
         for row, scene in zip(values, self._scenes, strict=True):
             self._read(name, row, scene)
@@ -123,11 +115,22 @@ class Parameters:
         elif name == "joint.friction":
             for index in np.flatnonzero(scene.layout.joint_there):
                 row[index] = scene.dry_friction(int(index))
-        elif name == "geom.friction":
+        elif name in _DAMPING:
+            self._read_damping(_DAMPING.index(name), row, scene)
+        elif name in _SURFACES:
             for index, shapes in enumerate(scene.shapes):
-                row[index] = _own_friction(row[index], scene.copies.get(index, ()), shapes)
+                row[index] = _own(_SURFACES.index(name), row[index], scene.copies.get(index, ()), shapes)
         else:
             row[0] = scene.system.config.gravity
+
+    def _read_damping(self, which: int, row: Array, scene: EnvScene) -> None:
+        """A rate is the wanted one where PhysX has the single-precision share that it makes."""
+        dt = self._world.physics.dt
+        for body in np.flatnonzero(self._world.loose):
+            component = scene.bodies[body]
+            found = (component.linear_damping, component.angular_damping)[which]
+            if abs(found - gain(row[body], dt)) > 1e-6 * max(1.0, found):
+                row[body] = -np.log1p(-found * dt) / dt
 
     # ------------------------------------------------------------------ writing
 
@@ -169,17 +172,23 @@ class Parameters:
         elif name == "joint.friction":
             for index in np.asarray(indices)[scene.layout.joint_there[indices]]:
                 scene.set_dry(int(index), float(wanted[name][env, index]))
+        elif name in _DAMPING:
+            rates = np.stack([wanted[part][env] for part in _DAMPING], axis=-1)
+            for body in indices:
+                if scene.layout.there[body] and self._world.loose[body]:
+                    scene.set_damping(int(body), rates[body])
         elif name in _REBUILD:
             self._rebuild(env)
 
 
-def _own_friction(wanted: float, copies: Sequence[Copy], shapes: Sequence[Any]) -> float:
+def _own(which: int, wanted: float, copies: Sequence[Copy], shapes: Sequence[Any]) -> float:
     """The wanted value where all shapes of a geom have the coefficients that its pairs need, else what one has instead.
 
     A geom has a shape for each value that its pairs can have, and its own need not be among them.
     """
     for copy, shape in zip(copies, shapes, strict=True):
-        found = float(shape.physical_material.static_friction)
-        if abs(found - copy.touch.friction) > 1e-6 * max(1.0, found):
+        material = shape.physical_material
+        found = float((material.static_friction, material.restitution)[which])
+        if abs(found - copy.touch[which]) > 1e-6 * max(1.0, found):
             return found
     return wanted

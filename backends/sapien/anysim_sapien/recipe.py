@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anysim.conventions import WORLD, Array
+from anysim.engine.presence import bodies_there
 from anysim.errors import EngineError
 from anysim.math import pose as P
 from anysim.world.model import BodyKind, Joint, World
@@ -24,7 +25,9 @@ class Values(NamedTuple):
     mass: Array
     com: Array
     inertia: Array
+    damping: Array
     geom_friction: Array
+    geom_restitution: Array
     joint_friction: Array
     armature: Array
     gravity: Array
@@ -64,7 +67,7 @@ class Recipe:
 
     def __init__(self, common: Recipes, present: Array) -> None:
         self.world, self.options, self.common = common.world, common.options, common
-        self.layout = Layout.of(common.world, present[np.array(common.world.body_entity, dtype=int)])
+        self.layout = Layout.of(common.world, bodies_there(common.world, present))
         self._meeting = Meeting(self.world, self.layout)
         self.groups = self._meeting.apart.groups
         self.geoms_on: dict[int, list[int]] = {}
@@ -72,12 +75,12 @@ class Recipe:
             self.geoms_on.setdefault(self.world.geoms[i].body, []).append(i)
         self._copies = lru_cache(maxsize=64)(self._make_copies)
 
-    def copies(self, friction: Array) -> dict[int, list[Copy]]:
+    def copies(self, friction: Array, restitution: Array) -> dict[int, list[Copy]]:
         """The shapes of each geom that collides, for the coefficients in force (G,)."""
-        return self._copies(friction.tobytes())
+        return self._copies(friction.tobytes(), restitution.tobytes())
 
-    def _make_copies(self, friction: bytes) -> dict[int, list[Copy]]:
-        return self._meeting.copies(np.frombuffer(friction))
+    def _make_copies(self, friction: bytes, restitution: bytes) -> dict[int, list[Copy]]:
+        return self._meeting.copies(np.frombuffer(friction), np.frombuffer(restitution))
 
 
 def tendon_chain(world: World, follower: int) -> tuple[list[int], list[float]]:

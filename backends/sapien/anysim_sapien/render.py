@@ -12,6 +12,7 @@ from anysim.conventions import WORLD, Array
 from anysim.engine.cameras import CameraView
 from anysim.engine.looks import Look, Looks
 from anysim.math import pose as P
+from anysim.world.looks import lying, wrapped
 from anysim.world.model import (
     Box,
     Capsule,
@@ -20,13 +21,16 @@ from anysim.world.model import (
     HeightFieldShape,
     MeshShape,
     Plane,
+    Shape,
     Sphere,
     World,
 )  # fmt: skip
+from anysim.world.tessellate import triangles
 from anysim_sapien.layout import Layout
 from anysim_sapien.library import sapien
 from anysim_sapien.options import SapienOptions
 from anysim_sapien.shapes import X_TO_Z, relief, to_pose
+from anysim_sapien.skins import Skins
 from anysim_sapien.vulkan import drawing, open_device
 
 FROM_OPTICAL = np.array([0.5, -0.5, 0.5, 0.5])
@@ -54,7 +58,7 @@ class Painter:
             self._materials: dict[int, Any] = {}
             self._shapes: dict[int, Any] = {}
             self._names = {0: 0}
-            self._looks = looks
+            self._looks, self._skins, self._world = looks, Skins(world), world
             self._lights = [self._add_light(local) for local in looks.local.tolist()]
             if not self._lights:
                 self._shine(self._add_light(False), np.array(SUN), np.zeros(3), np.full(3, 0.6), False)
@@ -70,12 +74,14 @@ class Painter:
             self._lights.clear()
             self._materials.clear()
             self._shapes.clear()
+            self._skins.clear()
             self._scene = None
 
     def _add_light(self, local: bool) -> tuple[Any, Any]:
         """A light of the scene: its entity and its component."""
         entity = sapien.Entity()
         light = sapien.render.RenderPointLightComponent() if local else sapien.render.RenderDirectionalLightComponent()
+        light.disable_shadow()  # SAPIEN's own shader has room for few lights with shadows
         entity.add_component(light)
         self._scene.add_entity(entity)
         return entity, light
@@ -92,7 +98,7 @@ class Painter:
         material = sapien.render.RenderMaterial(base_color=list(geom.color))
         component = sapien.render.RenderBodyComponent()
         shape = _visual(world, geom, material)
-        shape.set_local_pose(to_pose(_local(geom)))
+        shape.set_local_pose(to_pose(_local(geom, own_axis=not world.textures)))
         component.attach(shape)
         entity = sapien.Entity()
         entity.add_component(component)
@@ -102,9 +108,10 @@ class Painter:
         self._names[int(entity.per_scene_id)] = entity_id
 
     def draw(
-        self, view: CameraView, ids: Array, poses: Array, colors: Array, there: Array, channels: tuple[str, ...]
-    ) -> dict[str, Array]:
-        """See `SimEngine.render`. Poses (E, B, 7) and presence (E, B) of the bodies, colours (E, G, 4) of the geoms."""
+        self, view: CameraView, ids: Array, poses: Array, skins: tuple[Array, ...], there: Array,
+        channels: tuple[str, ...],
+    ) -> dict[str, Array]:  # fmt: skip
+        """See `SimEngine.render`. Poses (E, B, 7) and presence (E, B) of bodies; colour, texture, material of geoms."""
         size = (len(poses), view.height, view.width)
         images: dict[str, Array] = {}
         for name in channels:
@@ -114,7 +121,7 @@ class Painter:
             camera, mount = self._camera(view)
             for row, index in enumerate(ids.tolist()):
                 look = self._looks.of(index)
-                self._compose(poses[row], colors[row], there[row], look)
+                self._compose(poses[row], tuple(part[row] for part in skins), there[row], look)
                 camera.set_fovy(radians(view.fov[row]), compute_x=True)
                 eye = np.concatenate([view.pose[row, :3], P.multiply(view.pose[row, 3:], FROM_OPTICAL)])
                 mount.set_pose(to_pose(eye))
@@ -137,15 +144,18 @@ class Painter:
         camera.set_far(view.far)
         return camera, mount
 
-    def _compose(self, poses: Array, colors: Array, there: Array, look: Look) -> None:
+    def _compose(self, poses: Array, skins: tuple[Array, ...], there: Array, look: Look) -> None:
+        colors, textures, materials = skins
         self._scene.render_system.set_ambient_light(look.ambient.tolist())
         for k, (light, local) in enumerate(zip(self._lights, self._looks.local.tolist(), strict=True)):
             self._shine(light, look.direction[k], look.position[k], look.emission[k], local)
         for index, (body, entity) in self._bodies.items():
             if body != WORLD:
-                self._shapes[index].visibility = float(there[body])
                 entity.set_pose(to_pose(poses[body]))
-            self._materials[index].set_base_color(colors[index].tolist())
+            opacity = self._skins.give(
+                self._materials[index], colors[index], int(textures[index]), int(materials[index]),
+            )  # fmt: skip
+            self._shapes[index].visibility = opacity if body == WORLD or there[body] else 0.0
 
     def _read(self, camera: Any, images: dict[str, Array], row: int, look: Look) -> None:
         seen = camera.get_picture("Segmentation")[..., 1]
@@ -167,18 +177,22 @@ def _shader_folder(name: str) -> Any:
     return files("anysim_sapien") / "shaders" / name if name == "lit" else files("sapien") / "vulkan_shader" / name
 
 
-def _local(geom: Geom) -> Array:
-    """The pose of the visual shape in its body's frame."""
+def _local(geom: Geom, own_axis: bool) -> Array:
+    """The pose of the visual shape in its body's frame; `own_axis` where SAPIEN's shape lies along its x axis."""
     position, turn = np.asarray(geom.position, dtype=float), np.asarray(geom.quaternion, dtype=float)
     if isinstance(geom.shape, Plane):
         position = position - P.rotate(turn, np.array([0.0, 0.0, THIN]))
-    if isinstance(geom.shape, Capsule | Cylinder):
+    if own_axis and isinstance(geom.shape, Capsule | Cylinder):
         turn = P.multiply(turn, X_TO_Z)
     return np.concatenate([position, turn])
 
 
 def _visual(world: World, geom: Geom, material: Any) -> Any:
     render = sapien.render
+    made = triangles(geom.shape) if world.textures else None
+    if made is not None:
+        # where a texture may come, it lies on its shape as on every engine
+        return _triangles(*made, material, round_shape=geom.shape)
     match geom.shape:
         case Plane(size):
             return render.RenderShapeBox([size, size, THIN], material)
@@ -194,17 +208,28 @@ def _visual(world: World, geom: Geom, material: Any) -> Any:
             mesh = next(mesh for mesh in world.meshes if mesh.name == name)
             return _triangles(np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces), material)
         case HeightFieldShape(name):
-            vertices, triangles = relief(next(field for field in world.heightfields if field.name == name))
-            return _triangles(vertices.astype(float), triangles, material)
+            vertices, faces = relief(next(field for field in world.heightfields if field.name == name))
+            return _triangles(vertices.astype(float), faces, material, flat=True)
 
 
-def _triangles(vertices: Array, faces: Array, material: Any) -> Any:
-    """A mesh with flat faces: each triangle has its own corners and normal."""
+def _triangles(
+    vertices: Array, faces: Array, material: Any, flat: bool = False, round_shape: Shape | None = None
+) -> Any:
+    """A mesh with flat faces, but for those of a ball or capsule.
+
+    Each triangle has its own corners, normals, and places in a texture, which is wrapped around the mesh or lies flat.
+    """
     corners = vertices[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1, keepdims=True)
+    places = (lying(corners) if flat else wrapped(corners)) * [1.0, -1.0]  # SAPIEN's images begin below, and repeat
     normals = np.repeat(normals / np.where(length > 0, length, 1.0), 3, axis=0)
+    if isinstance(round_shape, Sphere | Capsule):
+        middle = np.zeros_like(corners)
+        if isinstance(round_shape, Capsule):
+            middle[..., 2] = np.clip(corners[..., 2], -round_shape.half_length, round_shape.half_length)
+        normals = ((corners - middle) / round_shape.radius).reshape(-1, 3)
     return sapien.render.RenderShapeTriangleMesh(
         corners.reshape(-1, 3).astype(np.float32), np.arange(len(normals), dtype=np.uint32).reshape(-1, 3),
-        normals.astype(np.float32), np.zeros((len(normals), 2), dtype=np.float32), material,
+        normals.astype(np.float32), places.reshape(-1, 2).astype(np.float32), material,
     )  # fmt: skip

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anysim.conventions import WORLD, Array, wxyz_from_xyzw
-from anysim.world.model import BodyKind, JointType
+from anysim.engine.drag import gain
+from anysim.world.model import Body, BodyKind, JointType, Solver
 from anysim_sapien.absent import NOBODY, NOWHERE
 from anysim_sapien.exclusions import Group
 from anysim_sapien.journal import Journal, Op
@@ -58,6 +59,8 @@ class EnvScene:
         # as PhysX has them: what a snapshot says of them is what was read from PhysX
         self.mass, self.rubbing = np.zeros(len(world.bodies)), np.zeros(len(world.joints))
         """Masses (B,) [kg] and dry friction (J,) [N m] or [N] as they are now."""
+        self.slowing = np.zeros((len(world.bodies), 2))
+        """(B, 2) [1/s] what PhysX takes off velocities and rates in a step, over the step."""
         self.gravity = _single(self.values.gravity)
         """[m/s^2], as PhysX has it."""
         self.system = _system(recipe, values.gravity)
@@ -67,7 +70,7 @@ class EnvScene:
         self.entities: list[Any] = [None] * len(world.bodies)
         self.shapes: list[list[Any]] = [[] for _ in world.geoms]
         self.dry: dict[int, Any] = {}
-        self.copies = recipe.copies(values.geom_friction)
+        self.copies = recipe.copies(values.geom_friction, values.geom_restitution)
         """What the shapes of each geom that collides must be."""
         self.body_of: dict[Any, int] = {}
         """World body of each PhysX component, -1 for the world's own geoms."""
@@ -113,27 +116,36 @@ class EnvScene:
             self.bodies[body], self.entities[body] = component, entity
             if not isinstance(component, physx.PhysxRigidStaticComponent):
                 self.set_inertial(body, self.values.mass[body], self.values.com[body], self.values.inertia[body])
-                self._free_of_defaults(component, recipe.world.bodies[body].gravity_compensation)
+                self._free_of_defaults(component, recipe.world.bodies[body])
+                if self.values.damping[body].any():
+                    self.set_damping(body, self.values.damping[body])
         self.scene.add_entity(entity)
 
     def _actor(self, body: int) -> None:
-        recipe, options = self._recipe, self._recipe.options
+        recipe = self._recipe
         if recipe.world.bodies[body].kind is BodyKind.STATIC:
             self._enter(body, physx.PhysxRigidStaticComponent(), recipe.common.root_pose[body])
             return
         component = physx.PhysxRigidDynamicComponent()
-        component.set_sleep_threshold(0.0)
-        component.set_solver_position_iterations(options.position_iterations)
-        component.set_solver_velocity_iterations(options.velocity_iterations)
+        self._set_solver(component, recipe.world.bodies[body])
         self._enter(body, component, recipe.common.root_pose[body])
 
-    def _free_of_defaults(self, component: Any, weightless: bool) -> None:
+    def _set_solver(self, target: Any, root: Body) -> None:
+        """Iterations and sleep of an actor or an articulation: its own, or those of the engine's options."""
+        own, options = root.solver or Solver(), self._recipe.options
+        positions, velocities = own.position_iterations, own.velocity_iterations
+        target.set_sleep_threshold(own.sleep_threshold or 0.0)
+        target.set_solver_position_iterations(options.position_iterations if positions is None else positions)
+        target.set_solver_velocity_iterations(options.velocity_iterations if velocities is None else velocities)
+
+    def _free_of_defaults(self, component: Any, body: Body) -> None:
         component.set_linear_damping(0.0)
         component.set_angular_damping(0.0)
         component.set_max_linear_velocity(FAST)
         component.set_max_angular_velocity(FAST)
-        component.set_max_depenetration_velocity(self._recipe.options.depenetration_velocity)
-        component.set_disable_gravity(weightless)
+        own = None if body.solver is None else body.solver.depenetration_speed
+        component.set_max_depenetration_velocity(self._recipe.options.depenetration_velocity if own is None else own)
+        component.set_disable_gravity(body.gravity_compensation)
 
     def _tree(self, members: tuple[int, ...]) -> Tree:
         recipe, world = self._recipe, self._recipe.world
@@ -156,9 +168,7 @@ class EnvScene:
             joint.set_drive_velocity_target(0.0)
             joint.set_name(str(index))
         handle = made[members[0]].articulation
-        handle.set_sleep_threshold(0.0)
-        handle.set_solver_position_iterations(recipe.options.position_iterations)
-        handle.set_solver_velocity_iterations(recipe.options.velocity_iterations)
+        self._set_solver(handle, world.bodies[members[0]])
         for body in members:
             self._enter(body, made[body], recipe.common.root_pose[members[0]])
         for body in members[1:]:
@@ -216,6 +226,17 @@ class EnvScene:
         self.mass[body] = component.mass  # PhysX keeps its inverse, in single precision
         component.set_inertia(moments.tolist())
         component.set_cmass_local_pose(sapien.Pose(com, wxyz_from_xyzw(frame)))
+
+    def set_damping(self, body: int, rates: Array) -> None:
+        """Rates (2,) [1/s] at which a free body slows down.
+
+        PhysX takes a share of `damping dt` in each step; this share is that of an exponential.
+        """
+        self.journal.note(Op.DAMPING, body, rates)
+        linear, angular = gain(rates, self._recipe.world.physics.dt).tolist()
+        self.bodies[body].set_linear_damping(linear)
+        self.bodies[body].set_angular_damping(angular)
+        self.slowing[body] = self.bodies[body].linear_damping, self.bodies[body].angular_damping
 
     def set_dry(self, index: int, friction: float) -> None:
         """Dry friction [N m] or [N] of a joint: a drive to standstill that may exert this much and no more."""

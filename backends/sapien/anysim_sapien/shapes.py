@@ -62,7 +62,9 @@ def make_shape(world: World, geom: Geom, copy: Copy, group: Group, options: Sapi
         turn = P.multiply(turn, X_TO_Z)
     shape.set_local_pose(to_pose(np.concatenate([geom.position, turn])))
     shape.set_collision_groups([copy.kind, copy.meets, group.bits, group.number])
-    shape.set_contact_offset(BOUNCY_OFFSET if copy.touch.restitution > 0 else options.contact_offset)
+    own = geom.surface.contact_offset
+    offset = options.contact_offset if own is None else own
+    shape.set_contact_offset(BOUNCY_OFFSET if copy.touch.restitution > 0 else offset)
     shape.set_rest_offset(0.0)
     # what resists a turn about the normal is the distance of a contact's points; PhysX' own needs another solver
     shape.set_patch_radius(0.0)

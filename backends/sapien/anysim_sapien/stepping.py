@@ -74,6 +74,8 @@ def replay(scene: EnvScene, recipe: Recipe, rows: Array) -> tuple[Drives, Moment
                 scene.set_dry(int(values[0]), float(values[1]))
             case Op.ARMATURE:
                 scene.set_armature(int(values[0]), float(values[1]))
+            case Op.DAMPING:
+                scene.set_damping(int(values[0]), values[1:])
             case Op.BASE:
                 scene.journal.base()
     return drives, momentum

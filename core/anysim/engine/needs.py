@@ -21,6 +21,13 @@ def needs_of(world: World) -> list[Need]:
             need(Capability.ARTICULATIONS, f"body '{body.name}' is a link")
         if body.gravity_compensation:
             need(Capability.GRAVITY_COMPENSATION, f"body '{body.name}' is gravity compensated")
+        if any(body.damping):
+            need(Capability.BODY_DAMPING, f"body '{body.name}' is damped")
+        if body.solver is not None:
+            need(
+                Capability.SOLVER_SETTINGS,
+                f"body '{body.name}' has `solver` settings of its own; `engine.options` has those of a whole engine",
+            )
     for joint in world.joints:
         what = f"joint '{joint.name}'"
         if joint.mimic is not None:
@@ -68,6 +75,8 @@ def needs_of(world: World) -> list[Need]:
             need(Capability.SHAPE_MESH, f"{what} is a mesh")
         if geom.surface.restitution > 0:
             need(Capability.RESTITUTION, f"{what} bounces")
+        if geom.surface.contact_offset is not None:
+            need(Capability.CONTACT_OFFSET, f"{what} has a contact offset")
         if geom.surface.torsional:
             need(Capability.TORSIONAL_FRICTION, f"{what} has torsional friction")
     for slot in world.slots:
@@ -83,4 +92,8 @@ def needs_of(world: World) -> list[Need]:
     for camera in world.cameras:
         for channel in camera.channels:
             need(Capability(f"render: {channel}"), f"camera '{camera.name}' gives {channel}")
+        if "rgb" in camera.channels and world.textures:
+            need(Capability.TEXTURES, f"camera '{camera.name}' sees the texture '{world.textures[0].name}'")
+        if "rgb" in camera.channels and world.materials:
+            need(Capability.MATERIALS, f"camera '{camera.name}' sees the material '{world.materials[0].name}'")
     return [Need(capability, why) for capability, why in found.items()]

@@ -19,7 +19,7 @@ from anysim.engine.capability import Capabilities
 from anysim.engine.capability import Capability as C
 from anysim.engine.commands import MODES, Control
 from anysim.engine.looks import LIGHTS, SURROUNDINGS, Looks
-from anysim.engine.parameters import PARAMETERS
+from anysim.engine.parameters import PARAMETERS, nominal
 from anysim.engine.presence import Lifecycle
 from anysim.engine.state import Availability, SnapshotLevel
 from anysim.math import pose as P
@@ -51,7 +51,8 @@ class NullEngine(SimEngine):
                 (
                     C.CONTACTS, C.TERRAIN_PLANE, C.TERRAIN_HEIGHTFIELD, C.TERRAIN_TRIMESH, C.SHAPE_MESH,
                     C.JOINT_FRICTION, C.ARMATURE, C.EFFORT_LIMITS, C.ACTUATION_EXPLICIT, C.ACTUATION_NATIVE,
-                    C.GRAVITY_COMPENSATION, C.RESTITUTION, C.TORSIONAL_FRICTION,
+                    C.GRAVITY_COMPENSATION, C.RESTITUTION, C.TORSIONAL_FRICTION, C.BODY_DAMPING, C.CONTACT_OFFSET,
+                    C.SOLVER_SETTINGS,
                 ),
                 _IGNORED,
             ),
@@ -79,7 +80,7 @@ class NullEngine(SimEngine):
         self._driven = np.array([a.joint for a in world.actuators], dtype=int)
         self._followers = [(i, j.mimic) for i, j in enumerate(world.joints) if j.mimic is not None]
         self._control: Control | None = None
-        self._defaults = {name: _nominal(world, name) for name in PARAMETERS}
+        self._defaults = {name: _default(world, name) for name in PARAMETERS}
         self._values = {name: np.repeat(v[None], n, axis=0) for name, v in self._defaults.items()}
 
     def _free(self) -> None:
@@ -214,22 +215,6 @@ class NullEngine(SimEngine):
         self._position[ids], self._velocity[ids] = data["position"], data["velocity"]
 
 
-def _nominal(world: World, name: str) -> Array:
-    """The values (K, ...) of a parameter that the World gives."""
-    if name in LIGHTS or name in SURROUNDINGS:
-        return Looks(world, 1, _UNSEEN).default(name)
-    table = {
-        "body.mass": [b.inertial.mass for b in world.bodies],
-        "body.com": [b.inertial.com for b in world.bodies],
-        "body.inertia": [b.inertial.inertia for b in world.bodies],
-        "geom.friction": [g.surface.friction for g in world.geoms],
-        "geom.color": [g.color for g in world.geoms],
-        "joint.damping": [j.damping for j in world.joints],
-        "joint.friction": [j.friction for j in world.joints],
-        "joint.armature": [j.armature for j in world.joints],
-        "actuator.kp": [a.kp for a in world.actuators],
-        "actuator.kd": [a.kd for a in world.actuators],
-        "actuator.effort_limit": [a.effort_limit for a in world.actuators],
-        "world.gravity": [world.physics.gravity],
-    }
-    return np.array(table[name], dtype=np.float64).reshape(-1, *PARAMETERS[name].shape)
+def _default(world: World, name: str) -> Array:
+    """The values (K, ...) of a parameter before anything changes it."""
+    return Looks(world, 1, _UNSEEN).default(name) if name in (*LIGHTS, *SURROUNDINGS) else nominal(name, world)

@@ -1,27 +1,43 @@
 """The physical and visual parameters that can be changed per env, by neutral name."""
 
-from collections.abc import Mapping
-from typing import NamedTuple
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
-from anysim.world.model import World
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.errors import EngineError, listing
+from anysim.world.model import BodyKind, World
 
 
 class Parameter(NamedTuple):
-    """`target` is the list of the World it belongs to, `shape` the shape of one value."""
+    """`target` is the list of the World it belongs to, `shape` the shape of one value.
+
+    `index_of` names the list of the World of which it is an index, -1 for none; `loose` says that it is one of free
+    bodies without links, and 0 of all others.
+    """
 
     name: str
     target: str
     shape: tuple[int, ...]
     unit: str
     minimum: float | None = None
+    below: float | None = None
+    index_of: str = ""
+    loose: bool = False
 
 
 _ALL = (
     Parameter("body.mass", "bodies", (), "kg", 0.0),
     Parameter("body.com", "bodies", (3,), "m, body frame"),
     Parameter("body.inertia", "bodies", (6,), "kg m^2 about the centre of mass: xx yy zz xy xz yz, body axes"),
+    Parameter("body.linear_damping", "bodies", (), "1/s", 0.0, loose=True),
+    Parameter("body.angular_damping", "bodies", (), "1/s", 0.0, loose=True),
     Parameter("geom.friction", "geoms", (), "1", 0.0),
+    Parameter("geom.restitution", "geoms", (), "1", 0.0, 1.0),
     Parameter("geom.color", "geoms", (4,), "red green blue alpha", 0.0),
+    Parameter("geom.texture", "geoms", (), "index into World.textures", -1.0, index_of="textures"),
+    Parameter("geom.material", "geoms", (), "index into World.materials", -1.0, index_of="materials"),
     Parameter("joint.damping", "joints", (), "N m s/rad or N s/m", 0.0),
     Parameter("joint.friction", "joints", (), "N m or N", 0.0),
     Parameter("joint.armature", "joints", (), "kg m^2 or kg", 0.0),
@@ -45,3 +61,57 @@ PARAMETERS: Mapping[str, Parameter] = {p.name: p for p in _ALL}
 def count(parameter: Parameter, world: World) -> int:
     """How many values of this parameter a world has."""
     return 1 if parameter.target == "world" else len(getattr(world, parameter.target))
+
+
+def nominal(name: str, world: World) -> Array:
+    """The values (K, ...) of a parameter that the World gives, float64."""
+    bodies, geoms, joints, actuators = world.bodies, world.geoms, world.joints, world.actuators
+    table: Mapping[str, Callable[[], Any]] = {
+        "body.mass": lambda: [b.inertial.mass for b in bodies],
+        "body.com": lambda: [b.inertial.com for b in bodies],
+        "body.inertia": lambda: [b.inertial.inertia for b in bodies],
+        "body.linear_damping": lambda: [b.damping[0] for b in bodies],
+        "body.angular_damping": lambda: [b.damping[1] for b in bodies],
+        "geom.friction": lambda: [g.surface.friction for g in geoms],
+        "geom.restitution": lambda: [g.surface.restitution for g in geoms],
+        "geom.color": lambda: [g.color for g in geoms],
+        "geom.texture": lambda: world.geom_texture,
+        "geom.material": lambda: world.geom_material,
+        "joint.damping": lambda: [j.damping for j in joints],
+        "joint.friction": lambda: [j.friction for j in joints],
+        "joint.armature": lambda: [j.armature for j in joints],
+        "actuator.kp": lambda: [a.kp for a in actuators],
+        "actuator.kd": lambda: [a.kd for a in actuators],
+        "actuator.effort_limit": lambda: [a.effort_limit for a in actuators],
+        "world.gravity": lambda: [world.physics.gravity],
+    }
+    return np.array(table[name](), dtype=np.float64).reshape(-1, *PARAMETERS[name].shape)
+
+
+def check_values(parameter: Parameter, world: World, rows: Array, which: Array) -> None:
+    """Refuse values (E, K, ...) that the parameter cannot have, whatever the engine.
+
+    Raises:
+        EngineError: out of bounds, no index of the World's, or for a body that it does not apply to.
+    """
+    name, unit = parameter.name, parameter.unit
+    if not rows.size:
+        return
+    if parameter.minimum is not None and rows.min() < parameter.minimum:
+        raise EngineError(f"{name} [{unit}] must be at least {parameter.minimum:g}, got {rows.min():g}")
+    if parameter.below is not None and rows.max() >= parameter.below:
+        raise EngineError(f"{name} [{unit}] must be below {parameter.below:g}, got {rows.max():g}")
+    if parameter.index_of:
+        things = getattr(world, parameter.index_of)
+        if (rows != np.floor(rows)).any() or rows.max() >= len(things):
+            names = listing(f"{i} {thing.name}" for i, thing in enumerate(things))
+            worst = rows[(rows != np.floor(rows)) | (rows >= len(things))][0]
+            raise EngineError(f"{name} is an {unit} or -1, got {worst:g} ({parameter.index_of}: {names})")
+    if parameter.loose:
+        wrong = np.flatnonzero((rows != 0).any(axis=0) & ~world.loose[which])
+        if len(wrong):
+            body = world.bodies[which[wrong[0]]]
+            raise EngineError(
+                f"{name} is for free bodies without links, and '{body.name}' is "
+                f"{'fixed' if body.kind is BodyKind.STATIC else 'part of an articulation'}; joints have joint.damping"
+            )

@@ -37,8 +37,7 @@ class Presence:
         self._derive()
 
     def _derive(self) -> None:
-        # a body of no entity, whose index is -1, is always there
-        there = np.concatenate([self.entities, np.ones((len(self.entities), 1), dtype=bool)], axis=1)
+        there = np.append(self.entities, np.ones((len(self.entities), 1), dtype=bool), axis=1)  # no entity's: index -1
         self.bodies, self.joints = there[:, self._body_entity], there[:, self._joint_entity]
 
     def checked(self, present: object, ids: Array) -> Array:
@@ -95,3 +94,8 @@ def blocks(present: Array) -> Iterator[tuple[Array, Array]]:
     for number, pattern in enumerate(patterns):
         if pattern.any():
             yield np.flatnonzero(which.reshape(-1) == number), np.flatnonzero(pattern)
+
+
+def bodies_there(world: World, present: Array) -> Array:
+    """(B,) bool: the bodies that are there where these entities (E,) are; one of no entity always is."""
+    return np.append(present, True)[np.array(world.body_entity, dtype=int)]

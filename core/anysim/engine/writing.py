@@ -7,7 +7,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine import checks
-from anysim.engine.parameters import PARAMETERS, Parameter, count
+from anysim.engine.parameters import PARAMETERS, Parameter, check_values, count
 from anysim.engine.presence import blocks
 from anysim.errors import CapabilityError, EngineError, listing
 from anysim.world.model import BodyKind
@@ -73,8 +73,7 @@ def write_parameter(engine: "SimEngine", name: str, values: Any, env_ids: Any, i
     """See `SimEngine.set_parameters`."""
     parameter, ids, which = _chosen(engine, name, env_ids, indices)
     rows = checks.rows(name, values, (len(ids), len(which), *parameter.shape))
-    if parameter.minimum is not None and rows.size and rows.min() < parameter.minimum:
-        raise EngineError(f"{name} [{parameter.unit}] must be at least {parameter.minimum:g}, got {rows.min():g}")
+    check_values(parameter, engine.world, rows, which)
     engine._retire_state()
     engine._set_parameter(name, rows, ids, which)
     engine._changed[name] = None

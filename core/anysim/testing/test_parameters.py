@@ -1,14 +1,15 @@
 """Parameters per env: what is written is read back, and it matters to the motion."""
 
+from dataclasses import replace
 from math import exp
 
 import numpy as np
 import pytest
 
 from anysim.engine.capability import Capability as C
-from anysim.engine.parameters import PARAMETERS, count
+from anysim.engine.parameters import PARAMETERS, count, nominal
 from anysim.errors import CapabilityError, EngineError
-from anysim.testing import tolerances, worlds
+from anysim.testing import looks, tolerances, worlds
 from anysim.testing.compare import assert_close, assert_ratio, assert_same, play, read, tape
 from anysim.testing.fixtures import needs, skip_without_parameter
 from anysim.world.model import Box, ControlMode
@@ -16,27 +17,26 @@ from anysim.world.model import Box, ControlMode
 NAMES = sorted(PARAMETERS)
 
 
-def _nominal(world, name):
+def _scene():
+    """A world with something of everything that has parameters."""
+    return replace(worlds.lit(), textures=looks.TEXTURES, materials=looks.MATERIALS)
+
+
+def _wanted(world, name):
     """The values (K, ...) that the World gives."""
     target, field = name.split(".")
-    if target == "world":
-        owner = world.physics if field == "gravity" else world.scenery
-        return np.array([getattr(owner, field)], dtype=float)
-    if name == "light.position":
-        return np.array([light.position or (0.0, 0.0, 0.0) for light in world.lights])
-    things = {
-        "light": world.lights,
-        "body": world.bodies,
-        "geom": world.geoms,
-        "joint": world.joints,
-        "actuator": world.actuators,
-    }[target]
-    inner = {"body": "inertial", "geom": "surface" if field == "friction" else ""}.get(target, "")
-    return np.array([getattr(getattr(t, inner) if inner else t, field) for t in things], dtype=float)
+    if target == "light":
+        nowhere = (0.0, 0.0, 0.0)
+        return np.array([getattr(light, field) or nowhere for light in world.lights], dtype=float)
+    if target == "world" and field != "gravity":
+        return np.array([getattr(world.scenery, field)], dtype=float)
+    return nominal(name, world)
 
 
 def _changed(name, values):
     """Other values that are as plausible: 30 % more, and something where there was nothing."""
+    if PARAMETERS[name].index_of:
+        return np.where(values > 0, 0.0, 1.0)
     nothing = 0.0 if name == "body.inertia" else 0.004  # off the diagonal even little can be too much
     return np.clip(values, -1e3, 1e3) * 1.3 + np.where(values == 0, nothing, 0.0)
 
@@ -45,6 +45,8 @@ def _movable(world, name):
     """The indices whose value an engine must be able to change: not those of bodies that cannot move."""
     if name == "light.position":
         return [i for i, light in enumerate(world.lights) if light.position is not None]
+    if PARAMETERS[name].loose:
+        return np.flatnonzero(world.loose).tolist()
     if not name.startswith("body."):
         return list(range(count(PARAMETERS[name], world)))
     return [i for i, b in enumerate(world.bodies) if b.kind != "static"]
@@ -54,10 +56,10 @@ def _movable(world, name):
 def test_parameters_begin_as_the_world_says(build, engine_class, name):
     """Right after the build every parameter has the World's value in every env."""
     skip_without_parameter(engine_class, name)
-    world = worlds.lit()
+    world = _scene()
     engine = build(world, 2)
     which = _movable(world, name)
-    wanted = _nominal(world, name)[which]
+    wanted = _wanted(world, name)[which]
     for row in engine.get_parameters(name, indices=which):
         assert np.allclose(row, wanted, rtol=tolerances.READ_BACK, atol=1e-9), (
             f"{name}: {row} where the World has {wanted}"
@@ -68,7 +70,7 @@ def test_parameters_begin_as_the_world_says(build, engine_class, name):
 def test_parameters_are_per_env(build, engine_class, name):
     """A value written for one env and index is read back there, and nowhere else."""
     skip_without_parameter(engine_class, name)
-    world = worlds.lit()
+    world = _scene()
     engine = build(world, 3)
     before = engine.get_parameters(name)
     index = _movable(world, name)[-1]
@@ -87,7 +89,7 @@ def test_parameters_are_per_env(build, engine_class, name):
 def test_parameters_survive_a_reset(build, engine_class, name):
     """`reset` leaves parameters as they are."""
     skip_without_parameter(engine_class, name)
-    world = worlds.lit()
+    world = _scene()
     engine = build(world, 2)
     index = _movable(world, name)[0]
     engine.set_parameters(name, _changed(name, engine.get_parameters(name, [1], [index])), [1], [index])
@@ -101,7 +103,7 @@ def test_parameters_survive_a_reset(build, engine_class, name):
 def test_one_envs_parameters_leave_the_others(build, engine_class, name):
     """Envs whose parameters were not touched run on, bit for bit."""
     skip_without_parameter(engine_class, name)
-    world = worlds.lit()
+    world = _scene()
     engine, clean = build(world, 2), build(world, 2)
     which = _movable(world, name)
     engine.set_parameters(name, _changed(name, engine.get_parameters(name, [1], which)), [1], which)
@@ -112,7 +114,7 @@ def test_one_envs_parameters_leave_the_others(build, engine_class, name):
 
 def test_declared_parameters_are_served_and_no_others(build, engine_class):
     """What the engine does not declare in `parameters` raises CapabilityError on reading and writing."""
-    engine = build(worlds.scene())
+    engine = build(_scene())
     for name in NAMES:
         if name in engine_class.parameters:
             wanted = (1, count(PARAMETERS[name], engine.world), *PARAMETERS[name].shape)

@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from anysim.conventions import IDENTITY_QUATERNION, WORLD
+from anysim.errors import AssetError
 from anysim.world.imported import ImportedModel
 from anysim.world.model import (
     ORIGIN,
@@ -38,6 +39,8 @@ class WorldBuilder:
         self.robots = list(world.robots)
         self._meshes = {mesh.name: mesh for mesh in world.meshes}
         self._heightfields = {field.name: field for field in world.heightfields}
+        self._textures = {texture.name: texture for texture in world.textures}
+        self._materials = {material.name: material for material in world.materials}
         self.excluded = set(world.excluded_pairs)
         self.tiles = world.tiles
 
@@ -47,8 +50,8 @@ class WorldBuilder:
             self._world, bodies=tuple(self.bodies), joints=tuple(self.joints), geoms=tuple(self.geoms),
             sites=tuple(self.sites), actuators=tuple(self.actuators), entities=tuple(self.entities),
             robots=tuple(self.robots), meshes=tuple(self._meshes.values()),
-            heightfields=tuple(self._heightfields.values()), excluded_pairs=frozenset(self.excluded),
-            tiles=self.tiles,
+            heightfields=tuple(self._heightfields.values()), textures=tuple(self._textures.values()),
+            materials=tuple(self._materials.values()), excluded_pairs=frozenset(self.excluded), tiles=self.tiles,
         )  # fmt: skip
 
     def add(
@@ -61,6 +64,7 @@ class WorldBuilder:
         shift = lambda index: index if index == WORLD else index + body  # noqa: E731
         full = lambda local: f"{name}.{local}" if local else name  # noqa: E731
         own = {mesh.name: self.add_mesh(mesh) for mesh in model.meshes}
+        self._add_looks(model)
         for number, part in enumerate(model.bodies):
             moved = replace(part, name=full(part.name), parent=shift(part.parent))
             if number == 0:
@@ -93,6 +97,20 @@ class WorldBuilder:
         name = mesh.name if mesh.name.endswith(tag) else mesh.name + tag
         self._meshes.setdefault(name, replace(mesh, name=name))
         return name
+
+    def _add_looks(self, model: ImportedModel) -> None:
+        """Store textures and materials once, whoever uses them.
+
+        Raises:
+            AssetError: two different images have one name.
+        """
+        for texture in model.textures:
+            known = self._textures.setdefault(texture.name, texture)
+            if known.hash != texture.hash:
+                raise AssetError(
+                    f"two different images are called '{texture.name}', in the folders of two files; rename one of them"
+                )
+        self._materials |= {material.name: material for material in model.materials}
 
     def add_heightfields(self, fields: Iterable[HeightField]) -> None:
         """Store height fields under their own names."""

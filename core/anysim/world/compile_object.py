@@ -11,6 +11,7 @@ from anysim.world.assets import locate
 from anysim.world.builder import WorldBuilder
 from anysim.world.colors import Rgb, rgb
 from anysim.world.compile_joints import with_joints
+from anysim.world.compile_matter import with_matter
 from anysim.world.forms import INSTANCER, Origin, source_text
 from anysim.world.imported import ImportedModel, ImportNote
 from anysim.world.importers import import_asset
@@ -57,7 +58,10 @@ def add_object(
     model = object_model(name, spec, Origin(spec.source, "source"), spec.scale, issues, base)
     if model is None:
         return []
-    place_model(builder, name, spec, spec.source, model, position=position, quaternion=quaternion)
+    try:
+        place_model(builder, name, spec, spec.source, model, position=position, quaternion=quaternion)
+    except AssetError as error:
+        issues.asset("texture", error)
     return list(model.report)
 
 
@@ -93,7 +97,7 @@ def object_model(
             issues.add(f"{origin.key}.{issue.path}", issue.message)
         return None
     if model is not None:
-        model = with_joints(model, spec.joints, issues.at("joints"))
+        model = with_matter(with_joints(model, spec.joints, issues.at("joints")), spec, issues, base)
     if model is not None and not _of_family(spec, source, model, issues):
         return None
     return model
@@ -117,7 +121,7 @@ def _model(
 ) -> ImportedModel | None:
     color = _color(spec, issues)
     friction = DEFAULT_FRICTION if spec.friction is None else float(nominal(spec.friction))
-    touch = surface(spec.contact or ContactSpec(), friction, spec.restitution or 0.0)
+    touch = surface(spec.contact or ContactSpec(), friction, float(nominal(spec.restitution or 0.0)))
     if source.asset is not None:
         model = import_asset(source.asset, base=base, scale=source.scale)
         return _asset(spec, source, model, touch, color, issues, key)

@@ -20,7 +20,10 @@ class EntityRow(NamedTuple):
 
 
 class BodyRow(NamedTuple):
-    """One body: `parent` by name, `joint` as a phrase, mass [kg], what it collides with and how many geoms it shows."""
+    """One body: `parent` by name, `joint` as a phrase, mass [kg], what it collides with and how many geoms it shows.
+
+    `matter` says what is not usual about it: damping, solver settings, textures and materials.
+    """
 
     name: str
     kind: str
@@ -29,6 +32,7 @@ class BodyRow(NamedTuple):
     mass: float
     collides: str
     visuals: int
+    matter: str = ""
 
 
 def entity_rows(world: World) -> list[EntityRow]:
@@ -61,10 +65,23 @@ def body_rows(world: World) -> list[BodyRow]:
         rows.append(
             BodyRow(
                 body.name, str(body.kind), parent, joint_phrase(world, world.body_joint[i]), body.inertial.mass,
-                collides, sum(g.visible for g in own),
+                collides, sum(g.visible for g in own), matter_phrase(world, i),
             )
         )  # fmt: skip
     return rows
+
+
+def matter_phrase(world: World, body: int) -> str:
+    """`damped 0.5 and 0.1 /s, texture checker, material metal`; empty where nothing is unusual."""
+    found, own = world.bodies[body], [g for g in world.geoms if g.body == body]
+    parts: list[str] = []
+    if any(found.damping):
+        parts.append(f"damped {found.damping[0]:g} and {found.damping[1]:g} /s")
+    if found.solver is not None:
+        parts.append("solver settings of its own")
+    parts += [f"texture {name}" for name in dict.fromkeys(g.texture for g in own) if name]
+    parts += [f"material {name}" for name in dict.fromkeys(g.material for g in own) if name]
+    return ", ".join(parts)
 
 
 def joint_phrase(world: World, joint: int) -> str:

@@ -1,7 +1,8 @@
 """The hash of a World: equal across processes and machines.
 
 Numbers enter with ten significant digits, so that a last-bit difference between two machines' arithmetic does not
-change the hash; meshes enter by the hash of their source and processing, not by their vertices.
+change the hash; meshes enter by the hash of their source and processing, not by their vertices, and textures
+by the hash of their pixels.
 """
 
 import dataclasses
@@ -12,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from anysim.world.model import Mesh, World
+from anysim.world.model import Mesh, Texture, World
 
 FORMAT = "anysim-world-1"
 
@@ -20,6 +21,8 @@ FORMAT = "anysim-world-1"
 def _feed(digest: Any, value: Any) -> None:
     if isinstance(value, Mesh):
         _feed(digest, ("mesh", value.name, value.hash))
+    elif isinstance(value, Texture):
+        _feed(digest, ("texture", value.name, value.repeat, value.hash))
     elif isinstance(value, Enum):
         _feed(digest, value.value)
     elif dataclasses.is_dataclass(value):

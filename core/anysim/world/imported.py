@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, NamedTuple, Protocol
 
-from anysim.world.model import Body, ControlMode, Geom, HeightField, Joint, Mesh, Site
+from anysim.world.model import Body, ControlMode, Geom, HeightField, Joint, Material, Mesh, Site, Texture
 
 
 class ImportNote(NamedTuple):
@@ -57,6 +57,8 @@ class ImportedModel:
     sites: tuple[Site, ...] = ()
     meshes: tuple[Mesh, ...] = ()
     heightfields: tuple[HeightField, ...] = ()
+    textures: tuple[Texture, ...] = ()
+    materials: tuple[Material, ...] = ()
     links: Mapping[str, int] = field(default_factory=dict)
     actuator_hints: tuple[ActuatorHint, ...] = ()
     excluded_pairs: frozenset[tuple[int, int]] = frozenset()

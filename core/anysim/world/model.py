@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from anysim.conventions import IDENTITY_QUATERNION, WORLD, Array
+from anysim.world.looks import Material as Material
+from anysim.world.looks import Texture as Texture
 from anysim.world.shapes import (
     ORDINARY,
 )
@@ -105,9 +107,22 @@ class Inertial(NamedTuple):
     inertia: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
+class Solver(NamedTuple):
+    """Settings of the contact solver for one entity; None leaves one to the engine. See `anysim_schemas.matter`."""
+
+    position_iterations: int | None = None
+    velocity_iterations: int | None = None
+    sleep_threshold: float | None = None
+    depenetration_speed: float | None = None
+
+
 @dataclass(frozen=True, slots=True)
 class Body:
-    """A rigid body. `position`, `quaternion`: its frame in the parent's (or the world's) at zero joint position."""
+    """A rigid body. `position`, `quaternion`: its frame in the parent's (or the world's) at zero joint position.
+
+    `damping` are the rates [1/s] at which a free body without links loses linear and angular speed by itself: they
+    fall as exp(-rate t). `solver` stands on the root of an entity.
+    """
 
     name: str
     kind: BodyKind
@@ -116,6 +131,8 @@ class Body:
     quaternion: Quat = IDENTITY_QUATERNION
     inertial: Inertial = Inertial(0.0)
     gravity_compensation: bool = False
+    damping: tuple[float, float] = (0.0, 0.0)
+    solver: Solver | None = None
 
 
 class Mimic(NamedTuple):
@@ -153,7 +170,10 @@ class Joint:
 
 @dataclass(frozen=True, slots=True)
 class Geom:
-    """A shape fixed to a body (or to the world: body -1)."""
+    """A shape fixed to a body (or to the world: body -1).
+
+    `texture` and `material` are names in the World's lists, empty for none; a texture is tinted with `color`.
+    """
 
     name: str
     body: int
@@ -164,6 +184,8 @@ class Geom:
     surface: Surface = ORDINARY
     collides: bool = True
     visible: bool = True
+    texture: str = ""
+    material: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -374,6 +396,9 @@ class World:
 
     A parent and its child never collide and are not listed.
     """
+    textures: tuple[Texture, ...] = ()
+    materials: tuple[Material, ...] = ()
+    """Those that geoms have, and those that they may be given later."""
     slots: tuple[Slot, ...] = ()
     """Logical objects that may differ between envs. An entity that is in none of them is there in every env."""
     tiles: tuple[Tile, ...] = ()
@@ -423,6 +448,27 @@ class World:
         from anysim.world.slots import categories
 
         return categories(self)
+
+    @cached_property
+    def loose(self) -> Array:
+        """(B,) bool, read-only: free bodies that carry no links."""
+        parents = {body.parent for body in self.bodies}
+        single = [body.kind is BodyKind.FREE and i not in parents for i, body in enumerate(self.bodies)]
+        loose = np.array(single, dtype=bool)
+        loose.setflags(write=False)
+        return loose
+
+    @cached_property
+    def geom_texture(self) -> tuple[int, ...]:
+        """For each geom the index of its texture, or -1."""
+        table = {texture.name: i for i, texture in enumerate(self.textures)}
+        return tuple(table[geom.texture] if geom.texture else -1 for geom in self.geoms)
+
+    @cached_property
+    def geom_material(self) -> tuple[int, ...]:
+        """For each geom the index of its material, or -1."""
+        table = {material.name: i for i, material in enumerate(self.materials)}
+        return tuple(table[geom.material] if geom.material else -1 for geom in self.geoms)
 
     @cached_property
     def initial_presence(self) -> Array:

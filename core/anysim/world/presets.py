@@ -31,4 +31,6 @@ def surface(contact: ContactSpec, friction: float, restitution: float = 0.0) -> 
         chosen = replace(chosen, rolling_friction=contact.rolling_friction)
     if contact.priority is not None:
         chosen = replace(chosen, priority=contact.priority)
+    if contact.offset is not None:
+        chosen = replace(chosen, contact_offset=contact.offset)
     return chosen

@@ -86,6 +86,7 @@ class Surface:
     impedance: tuple[float, float] = (0.9, 0.95)
     priority: int = 0
     torsional: bool = False  # torsional friction takes part in contacts of this geom
+    contact_offset: float | None = None  # [m] from which on contacts are prepared; None leaves it to the engine
 
 
 ORDINARY = Surface()

@@ -7,6 +7,8 @@ from anysim.errors import EngineError
 from anysim.testing import worlds
 from anysim.testing.sketch import Sketch
 from anysim.world.model import Box, Sphere, Surface
+from anysim_pybullet.bullet import bullet
+from anysim_pybullet.engine import PybulletEngine
 from anysim_pybullet.urdf import roll_pitch_yaw
 
 
@@ -22,7 +24,7 @@ def _gaps(engine):
     """What Bullet has less what the rule wants, for the pairs of shapes that meet."""
     rules = engine._envs.plan.rules
     friction = engine._envs.parameters.friction[0, rules.geoms]
-    values = rules.numbers(friction).friction
+    values = rules.numbers(friction, np.zeros(len(friction))).friction
     return (np.multiply.outer(values, values) - rules.pair_friction(friction))[rules.weight > 0]
 
 
@@ -48,9 +50,26 @@ def test_changed_frictions_come_near(build):
     engine = build(_objects(0.8, 0.8, 0.8, 0.8))
     engine.set_parameters("geom.friction", [[0.8, 0.2, 0.2, 0.5, 1.0]])
     rules = engine._envs.plan.rules
-    numbers = rules.numbers(engine._envs.parameters.friction[0, rules.geoms]).friction
+    friction = engine._envs.parameters.friction[0, rules.geoms]
+    numbers = rules.numbers(friction, np.zeros(len(friction))).friction
     assert numbers[0] * numbers[1:] == pytest.approx([0.8, 0.8, 0.8, 1.0], abs=0.006)
     assert np.abs(_gaps(engine)).max() < 0.45
+
+
+def test_changed_restitution_reaches_its_pairs_and_leaves():
+    """The ground does not bounce: what one thing bounces with, it bounces with on the ground, and nothing else does."""
+    engine = PybulletEngine()
+    with engine.create_world(_objects(0.8, 0.8)):
+        engine.set_parameters("geom.restitution", [[0.0, 0.6, 0.0]])
+        rules, p = engine._envs.plan.rules, bullet()
+        env, wanted = engine._envs.clients[0], rules.pair_restitution(np.array([0.0, 0.6, 0.0])[rules.geoms])
+        found = [p.getDynamicsInfo(*env.shape_at[i], physicsClientId=env.id)[5] for i in range(len(rules.geoms))]
+        ground = int(np.flatnonzero(rules.geoms == 0)[0])
+        assert found[ground] * np.array(found)[rules.geoms == 1] == pytest.approx(
+            wanted[ground][rules.geoms == 1], abs=0.02
+        )
+        engine.set_parameters("geom.restitution", [[0.0, 0.0, 0.0]])
+        assert not any(p.getDynamicsInfo(*env.shape_at[i], physicsClientId=env.id)[5] for i in range(len(rules.geoms)))
 
 
 def test_torsional_friction_slows_a_spin(build):

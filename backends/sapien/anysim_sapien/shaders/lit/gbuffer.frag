@@ -1,6 +1,9 @@
 #version 450
-// Matte surfaces: the colour times the light that arrives, which is the ambient light and that of each lamp times the
-// cosine of its angle to the surface. No shadows, no reflections.
+// Lambert's cosine law and Blinn's highlights, in one pass and without shadows: cheap enough to be compiled and run
+// without a graphics card. A material without specular and metallic has no highlights.
+
+layout(constant_id = 0) const int NUM_DIRECTIONAL_LIGHTS = 0;
+layout(constant_id = 1) const int NUM_POINT_LIGHTS = 0;
 
 layout(set = 0, binding = 0) uniform CameraBuffer {
   mat4 viewMatrix;
@@ -10,16 +13,6 @@ layout(set = 0, binding = 0) uniform CameraBuffer {
   float width;
   float height;
 } cameraBuffer;
-
-layout(set = 1, binding = 0) uniform ObjectTransformBuffer {
-  mat4 modelMatrix;
-} objectTransformBuffer;
-
-layout(set = 1, binding = 1) uniform ObjectDataBuffer {
-  uvec4 segmentation;
-  float transparency;
-  int shadeFlat;
-} objectDataBuffer;
 
 layout(set = 2, binding = 0) uniform MaterialBuffer {
   vec4 emission;
@@ -60,46 +53,48 @@ struct SpotLight {
 layout(set = 3, binding = 0) uniform SceneBuffer {
   vec4 ambientLight;
   DirectionalLight directionalLights[8];
-  SpotLight spotLights[1];
-  PointLight pointLights[8];
+  SpotLight spotLights[10];
+  PointLight pointLights[10];
   SpotLight texturedLights[1];
 } sceneBuffer;
 
-layout(location = 0) in vec4 seenAt;
-layout(location = 1) in vec2 textureAt;
-layout(location = 2) in flat uvec4 owner;
-layout(location = 3) in vec3 facing;
+layout(location = 0) in vec4 inPosition;
+layout(location = 1) in vec2 inUV;
+layout(location = 2) in flat uvec4 inSegmentation;
+layout(location = 3) in vec3 inNormal;
 
 layout(location = 0) out vec4 outColor;
 layout(location = 1) out vec4 outPosition;
 layout(location = 2) out uvec4 outSegmentation;
 
 void main() {
-  vec3 here = seenAt.xyz;
-  vec3 normal = normalize(facing);
-  if (dot(normal, here) > 0.0) {
-    normal = -normal;
-  }
-  mat3 turn = mat3(cameraBuffer.viewMatrix);
-  vec3 light = sceneBuffer.ambientLight.rgb;
-  for (int k = 0; k < 8; ++k) {
-    DirectionalLight lamp = sceneBuffer.directionalLights[k];
-    if (dot(lamp.emission.rgb, lamp.emission.rgb) > 0.0) {
-      light += lamp.emission.rgb * max(0.0, dot(normal, -normalize(turn * lamp.direction.xyz)));
-    }
-  }
-  for (int k = 0; k < 8; ++k) {
-    PointLight lamp = sceneBuffer.pointLights[k];
-    if (dot(lamp.emission.rgb, lamp.emission.rgb) > 0.0) {
-      vec3 away = (cameraBuffer.viewMatrix * vec4(lamp.position.xyz, 1.0)).xyz - here;
-      light += lamp.emission.rgb * max(0.0, dot(normal, normalize(away)));
-    }
-  }
-  vec4 base = materialBuffer.baseColor;
+  vec4 albedo = materialBuffer.baseColor;
   if ((materialBuffer.textureMask & 1) != 0) {
-    base = texture(colorTexture, textureAt);
+    vec4 place = materialBuffer.textureTransforms[0];
+    albedo = texture(colorTexture, inUV * place.zw + place.xy);
   }
-  outColor = vec4(base.rgb * light, 1.0);
-  outPosition = seenAt;
-  outSegmentation = owner;
+  vec3 facing = normalize(inNormal);
+  facing = dot(facing, inPosition.xyz) > 0 ? -facing : facing;  // a surface is seen, and lit, from both sides
+  vec3 toEye = normalize(-inPosition.xyz);
+  // the lobe that is as wide as that of a rough surface of microscopic mirrors
+  float width = max(materialBuffer.roughness, 0.15);
+  float sharpness = max(2.0 / pow(width, 4.0) - 2.0, 1.0);
+  vec3 light = sceneBuffer.ambientLight.rgb, shine = vec3(0);
+  for (int i = 0; i < NUM_DIRECTIONAL_LIGHTS; ++i) {
+    vec3 along = normalize(mat3(cameraBuffer.viewMatrix) * sceneBuffer.directionalLights[i].direction.xyz);
+    light += max(0.0, dot(facing, -along)) * sceneBuffer.directionalLights[i].emission.rgb;
+    shine += pow(max(0.0, dot(facing, normalize(toEye - along))), sharpness)
+        * sceneBuffer.directionalLights[i].emission.rgb;
+  }
+  for (int i = 0; i < NUM_POINT_LIGHTS; ++i) {
+    vec4 lamp = cameraBuffer.viewMatrix * vec4(sceneBuffer.pointLights[i].position.xyz, 1);
+    vec3 along = normalize(inPosition.xyz - lamp.xyz);
+    light += max(0.0, dot(facing, -along)) * sceneBuffer.pointLights[i].emission.rgb;
+    shine += pow(max(0.0, dot(facing, normalize(toEye - along))), sharpness) * sceneBuffer.pointLights[i].emission.rgb;
+  }
+  vec3 gloss = mix(vec3(materialBuffer.fresnel), albedo.rgb, materialBuffer.metallic) * (1.0 - materialBuffer.roughness);
+  vec3 matte = albedo.rgb * (1.0 - 0.5 * materialBuffer.metallic);
+  outColor = vec4(materialBuffer.emission.rgb + matte * light + gloss * shine, albedo.a);
+  outPosition = inPosition;
+  outSegmentation = inSegmentation;
 }

@@ -1,6 +1,5 @@
 #version 450
-// Places a vertex, and hands its place and its normal in the world to the fragment shader.
-// The names and the order of the members of the uniform blocks are those that SAPIEN fills.
+// Where a corner is, and which way its surface faces, both as the camera sees them.
 
 layout(set = 0, binding = 0) uniform CameraBuffer {
   mat4 viewMatrix;
@@ -27,16 +26,16 @@ layout(location = 2) in vec2 uv;
 layout(location = 3) in vec3 tangent;
 layout(location = 4) in vec3 bitangent;
 
-layout(location = 0) out vec4 seenAt;
-layout(location = 1) out vec2 textureAt;
-layout(location = 2) out flat uvec4 owner;
-layout(location = 3) out vec3 facing;
+layout(location = 0) out vec4 outPosition;
+layout(location = 1) out vec2 outUV;
+layout(location = 2) out flat uvec4 outSegmentation;
+layout(location = 3) out vec3 outNormal;
 
 void main() {
-  mat4 toCamera = cameraBuffer.viewMatrix * objectTransformBuffer.modelMatrix;
-  seenAt = toCamera * vec4(position, 1.0);
-  facing = mat3(transpose(inverse(toCamera))) * normal;
-  textureAt = uv;
-  owner = objectDataBuffer.segmentation;
-  gl_Position = cameraBuffer.projectionMatrix * seenAt;
+  mat4 modelView = cameraBuffer.viewMatrix * objectTransformBuffer.modelMatrix;
+  outPosition = modelView * vec4(position, 1);
+  outNormal = transpose(inverse(mat3(modelView))) * normal;
+  outUV = uv;
+  outSegmentation = objectDataBuffer.segmentation;
+  gl_Position = cameraBuffer.projectionMatrix * outPosition;
 }
