@@ -34,6 +34,11 @@ _APPROXIMATE = {
         "an underdamped contact: within 0.07 of the coefficient, within 0.04 from 0.5 on; it sinks 6 mm "
         "per m/s at 2 ms; 0 gives 0.13"
     ),
+    Capability.VARYING_ENTITIES: (
+        "what is absent stays in the model, where nothing meets it: the rest moves within 3e-10 m over 3.6 s of a "
+        "world without it, contacts included. It still takes time: 10 absent objects beside a Panda and 5 that are "
+        "there make a step 1.5 times as long, 25 of them 1.9 times"
+    ),
 }
 _ABSENT = (Capability.LIVE_EDIT_NATIVE,)
 CAPABILITIES = Capabilities.of(
