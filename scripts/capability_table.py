@@ -22,7 +22,11 @@ DISTRIBUTIONS = ("anysim", "anysim-mujoco", "anysim-pybullet", "anysim-sapien")
 def table() -> str:
     """Engines as columns, capabilities as rows; notes of approximations below."""
     names = [n for n in registry.names("engines") if registry.distribution("engines", n) in DISTRIBUTIONS]
-    engines, rows, notes = matrix({name: registry.load("engines", name).capabilities for name in names})
+    found = {name: registry.load("engines", name) for name in names}
+    engines, rows, notes = matrix(
+        {name: engine.capabilities for name, engine in found.items()},
+        {name: engine.lifecycle.words for name, engine in found.items()},
+    )
     lines = [f"| | {' | '.join(engines)} |", f"|---|{'---|' * len(engines)}"]
     lines += [f"| {' | '.join(row)} |" for row in rows]
     lines += ["", *(f"[{number}] {note}  " for number, note in enumerate(notes, 1))]

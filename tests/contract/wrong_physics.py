@@ -225,3 +225,16 @@ class LostTurns(Right):
             world,
             bodies=tuple(replace(b, quaternion=IDENTITY_QUATERNION) if b.parent >= 0 else b for b in world.bodies),
         )
+
+
+class Ghosts(Right):
+    """What is absent is still there for contacts and rays."""
+
+    caught_by = (
+        "test_varying.py::test_nothing_touches_what_is_absent",
+        "test_varying.py::test_what_is_there_moves_as_if_the_rest_were_not_in_the_world",
+        "test_varying.py::test_no_ray_hits_what_is_absent",
+    )
+
+    def _populate(self, ids):
+        return

@@ -1,10 +1,13 @@
 """Engines whose states mean something else, or are not the caller's own. `caught_by` names the tests that find it."""
 
+from dataclasses import replace
+
 import numpy as np
 from right_engine import Right, also
 
 from anysim.conventions import wxyz_from_xyzw, xyzw_from_wxyz
 from anysim.engine.capability import Capability
+from anysim.engine.presence import Lifecycle
 from anysim.engine.state import RayHits
 from anysim.math import pose as P
 
@@ -192,3 +195,29 @@ class ClaimsDynamics(Right):
 
     capabilities = also(Capability.DYNAMICS)
     caught_by = ("test_stepping.py::test_a_dropped_ball_falls", "test_physics.py::test_free_fall")
+
+
+class PresenceOfAll(Right):
+    """A change of who is there resets the other envs as well."""
+
+    caught_by = ("test_varying.py::test_other_envs_do_not_notice",)
+
+    def _populate(self, ids):
+        self._reset(self._all)
+
+
+class SnapshotForgetsPresence(Right):
+    """Snapshots do not say who was there."""
+
+    caught_by = ("test_varying_snapshots.py::test_rows_of_a_snapshot_go_into_envs_of_another_presence",)
+
+    def snapshot(self, env_ids=None, level="trajectory"):
+        taken = super().snapshot(env_ids, level)
+        return replace(taken, data={k: v for k, v in taken.data.items() if k != "present"})
+
+
+class NoLifecycle(Right):
+    """Lets entities vary and says that they cannot."""
+
+    lifecycle = Lifecycle.P3
+    caught_by = ("test_varying.py::test_the_lifecycle_is_declared",)

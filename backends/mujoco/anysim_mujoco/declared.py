@@ -38,6 +38,11 @@ _APPROXIMATE = {
     Capability.MATERIALS: (
         "one lamp's highlight: as strong as specular or metallic says, as small as it is smooth; nothing is mirrored"
     ),
+    Capability.VARYING_ENTITIES: (
+        "what is absent stays in the model, where nothing meets it: the rest moves within 3e-10 m over 3.6 s of a "
+        "world without it, contacts included. It still takes time: 10 absent objects beside a Panda and 5 that are "
+        "there make a step 1.5 times as long, 25 of them 1.9 times"
+    ),
 }
 _ABSENT = (
     Capability.LIVE_EDIT_NATIVE,

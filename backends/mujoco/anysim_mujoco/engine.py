@@ -238,6 +238,12 @@ class MujocoEngine(SimEngine):
             model, layout = self._model, self._layout
             return {"joint.limits": joint_limits(model, layout), "geom.volume": geom_volumes(model, layout)}
 
+    def handles(self) -> Mapping[str, int]:
+        """Simulations, and the fields of the model that envs have for themselves."""
+        with self._lock:
+            self._require_world()
+            return {"simulations": self._batch.nsim, "fields": len(self._batch._expanded)}  # noqa: SLF001
+
     def raw_loop(self) -> Callable[[int], None]:
         """MuJoCo's own batch, stepped without this engine."""
         with self._lock:

@@ -1,5 +1,6 @@
 """What Bullet says of an env, for an audit against the World."""
 
+from collections.abc import Sequence
 from math import pi
 
 import numpy as np
@@ -7,9 +8,19 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.world.shapes import is_ground
-from anysim_pybullet.bullet import bullet
+from anysim_pybullet.bullet import MOST_CLIENTS, bullet
 from anysim_pybullet.client import Env
 from anysim_pybullet.urdf import UNLIMITED
+
+
+def handles(envs: Sequence[Env]) -> dict[str, int]:
+    """Open clients of the process, and what the clients of some envs hold."""
+    p = bullet()
+    return {
+        "clients": sum(bool(p.isConnected(physicsClientId=number)) for number in range(MOST_CLIENTS)),
+        "bodies": sum(p.getNumBodies(physicsClientId=env.id) for env in envs),
+        "constraints": sum(p.getNumConstraints(physicsClientId=env.id) for env in envs),
+    }
 
 
 def joint_limits(env: Env) -> Array:

@@ -7,6 +7,9 @@ from typing import Any
 from anysim.errors import EngineError
 from anysim.quiet import quiet
 
+MOST_CLIENTS = 1024
+"""Clients that Bullet has room for in a process."""
+
 
 @cache
 def bullet() -> Any:
@@ -26,8 +29,8 @@ def connect() -> int:
         client = p.connect(p.DIRECT)
     if client < 0:
         raise EngineError(
-            f"Bullet opens no further world in this process: {words.tail}. It holds at most 1024; use fewer envs, or "
-            f"more processes"
+            f"Bullet opens no further world in this process: {words.tail}. It holds at most {MOST_CLIENTS}; use fewer "
+            f"envs, or more processes"
         )
     return client
 

@@ -129,6 +129,14 @@ class PybulletEngine(SimEngine):
             env = self._envs.clients[0]
             return {"joint.limits": joint_limits(env), "geom.volume": geom_volumes(env), **inertials(env)}
 
+    def handles(self) -> Mapping[str, int]:
+        """Clients that are open in this process, and the bodies and constraints in those of this engine."""
+        from anysim_pybullet.audit import handles
+
+        with self._lock:
+            self._require_world()
+            return handles(self._envs.clients)
+
     def raw_loop(self) -> Callable[[int], None]:
         """Bullet's own loop, stepped without this engine."""
         from anysim_pybullet.raw import raw_loop

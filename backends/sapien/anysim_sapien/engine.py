@@ -275,6 +275,13 @@ class SapienEngine(SimEngine):
                 "geom.volume": geom_volumes(self.world, self._scenes[0]),
             }
 
+    def handles(self) -> Mapping[str, int]:
+        """Scenes that are alive in this process, and the entities in those of this engine."""
+        with self._lock:
+            self._require_world()
+            entities = sum(len(scene.scene.entities) for scene in self._scenes)
+            return {"scenes": len(EnvScene.alive), "entities": entities}
+
     def raw_loop(self) -> Callable[[int], None]:
         """SAPIEN's own loop, stepped without this engine."""
         with self._lock:

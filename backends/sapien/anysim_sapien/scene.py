@@ -6,7 +6,8 @@ and for parameters that PhysX reads once. Nothing here knows of rendering, so no
 
 import threading
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
+from weakref import WeakSet
 
 import numpy as np
 
@@ -49,8 +50,12 @@ class Tree(NamedTuple):
 class EnvScene:
     """A scene, and its parts in the World's order."""
 
+    alive: ClassVar[WeakSet["EnvScene"]] = WeakSet()
+    """Scenes that somebody still holds."""
+
     def __init__(self, recipe: Recipe, values: Values) -> None:
         world = recipe.world
+        EnvScene.alive.add(self)
         self._recipe = recipe
         self.values = Values(*(np.array(part) for part in values))
         """The parameters that it was built with."""

@@ -1,6 +1,6 @@
 """`anysim bench`: what anysim costs."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -98,3 +98,55 @@ def shards(
         ("shards", "steps/s", f"ratio to {numbers[0]} (wall)", "ratio (cpu)"),
         [(g.shards, f"{g.rate:,.0f}", f"{g.ratio:.3f}", f"{g.cpu_ratio:.3f}") for g in gains],
     )
+
+
+@app.command("resets")
+def resets(
+    engine: Annotated[
+        str, typer.Option("--engine", "-e", help="Engines, separated by commas; `all` are those whose entities vary.")
+    ] = "all",
+    count: Annotated[int, typer.Option("--resets", "-r", min=20, help="Partial resets, each with other entities.")] = (
+        10_000
+    ),
+    num_envs: Annotated[
+        int, typer.Option("--num-envs", "-n", min=1, help="Envs, of which each reset changes one.")
+    ] = 4,
+    json: AsJson = False,
+) -> None:
+    """Change who is there in thousands of partial resets, and see whether anything accumulates.
+
+    A Panda, a table and ten things, each a box, a ball, a can or nothing. Memory, open files, threads and what the
+    engine holds of its library are printed on the way; the exit code is 1 where something grew.
+    """
+    from anysim.benchmark_resets import Sample, engines_that_vary, reset_cost
+    from anysim.cli.output import print_json, print_table
+
+    def tell(sample: Sample) -> None:
+        typer.echo(f"  {sample.resets} resets: {_held(sample)}", err=True)
+
+    names = engines_that_vary() if engine == "all" else [name.strip() for name in engine.split(",")]
+    costs = []
+    for name in names:
+        typer.echo(f"resetting {name} {count:,} times…", err=True)
+        costs.append(reset_cost(name, count, num_envs, tell))
+    if json:
+        print_json([cost._asdict() | {"samples": [s._asdict() for s in cost.samples]} for cost in costs])
+    else:
+        print_table(
+            f"{count:,} partial resets with other entities, {num_envs} envs; processor time of one reset",
+            ("engine", "lifecycle", "first [ms]", "last [ms]", "same entities [ms]", "early", "late", "growth"),
+            [
+                (
+                    c.engine, c.lifecycle, f"{c.first_ms:.2f}", f"{c.last_ms:.2f}", f"{c.same_ms:.2f}",
+                    _held(c.samples[len(c.samples) // 5]), _held(c.samples[-1]), "; ".join(c.grown) or "none",
+                )
+                for c in costs
+            ],
+        )  # fmt: skip
+    if any(cost.grown for cost in costs):
+        raise typer.Exit(1)
+
+
+def _held(sample: Any) -> str:
+    handles = "".join(f", {number} {name}" for name, number in sample.handles.items())
+    return f"{sample.memory_mib:.0f} MiB, {sample.descriptors} files, {sample.threads} threads{handles}"

@@ -40,13 +40,14 @@ def _capabilities() -> None:
     from anysim.engine.factory import engine_class
     from anysim.errors import PluginError
 
-    declared = {}
+    declared, lifecycles = {}, {}
     for name in registry.names("engines"):
         try:
-            declared[name] = engine_class(name).capabilities
+            found = engine_class(name)
         except PluginError:
             continue  # its row above says why
-    engines, rows, notes = matrix(declared)
+        declared[name], lifecycles[name] = found.capabilities, found.lifecycle.words
+    engines, rows, notes = matrix(declared, lifecycles)
     typer.echo()
     print_table("capabilities", ("capability", *engines), rows)
     for number, note in enumerate(notes, 1):

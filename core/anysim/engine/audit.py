@@ -45,13 +45,44 @@ def audit(engine: SimEngine) -> list[AuditLine]:
     """Compare masses, centres, moments, limits, joint constants, volumes, axes, order and frames of env 0.
 
     The engine is reset. An axis is how the link turns or shifts against its parent when its joint alone is moved, in
-    the link's frame; the order is which bodies do (`moves`, indices into `World.bodies`).
+    the link's frame; the order is which bodies do (`moves`, indices into `World.bodies`). Of what may be absent the
+    first of each slot is looked at, then the second, and so on; who was there is there again afterwards.
     """
-    engine.reset([0])
-    expected = world_rows(engine.world)
-    found = {(row.subject, row.quantity): row.value for row in engine_rows(engine)}
-    lines = [_line(engine, row, found.get((row.subject, row.quantity), ())) for row in expected]
-    return lines + _axes_and_order(engine) + _frames(engine)
+    world, before = engine.world, engine.presence
+    expected = world_rows(world)
+    rounds = max((len(slot.entities) for slot in world.slots), default=1)
+    lines: dict[tuple[str, str, tuple[float, ...]], AuditLine] = {}
+    for number in range(rounds):
+        present = _present(world, number)
+        engine.reset([0], present=present[None])
+        found = {(row.subject, row.quantity): row.value for row in engine_rows(engine)}
+        seen = [_line(engine, row, found.get((row.subject, row.quantity), ())) for row in expected]
+        there = _subjects(world, present)
+        for line in (*seen, *_axes_and_order(engine), *_frames(engine)):
+            if line.subject in there:
+                lines.setdefault((line.subject, line.quantity, line.expected), line)
+    if rounds > 1:
+        engine.reset([0], present=before[:1])
+    return list(lines.values())
+
+
+def _present(world: World, number: int) -> Array:
+    """(E,) bool: what is always there, and of each slot the entity of this number or its last one."""
+    present = world.initial_presence.copy()
+    for slot in world.slots:
+        present[list(slot.entities)] = False
+        present[slot.entities[min(number, len(slot.entities) - 1)]] = True
+    return present
+
+
+def _subjects(world: World, present: Array) -> set[str]:
+    """The names of what is there: entities, bodies, joints, actuators and geoms."""
+    bodies = [bool(present[entity]) for entity in world.body_entity] + [True]  # the last one is the world's own
+    names = {entity.name for entity, there in zip(world.entities, present, strict=True) if there}
+    names |= {body.name for body, there in zip(world.bodies, bodies, strict=False) if there}
+    names |= {joint.name for joint in world.joints if bodies[joint.body]}
+    names |= {actuator.name for actuator in world.actuators if bodies[world.joints[actuator.joint].body]}
+    return names | {geom.name for geom in world.geoms if bodies[geom.body]}
 
 
 def _line(engine: SimEngine, row: AuditRow, value: tuple[float, ...]) -> AuditLine:
@@ -160,7 +191,10 @@ def _frames(engine: SimEngine) -> list[AuditLine]:
     rng = np.random.default_rng(0)
     lower = np.array([max(j.lower, -np.pi) for j in world.joints])
     upper = np.array([min(j.upper, np.pi) for j in world.joints])
-    leaders = np.array([i for i, j in enumerate(world.joints) if j.mimic is None])
+    here = engine.presence[0]
+    leaders = np.array([i for i, j in enumerate(world.joints) if j.mimic is None and here[world.body_entity[j.body]]])
+    if not len(leaders):
+        return []
     worst = np.zeros((len(world.bodies), 2))
     for _ in range(CONFIGURATIONS):
         q = lower + (upper - lower) * rng.random(len(lower))

@@ -118,8 +118,8 @@ class Matrix(NamedTuple):
     notes: tuple[str, ...]
 
 
-def matrix(engines: Mapping[str, Capabilities]) -> Matrix:
-    """The table of capabilities by engine."""
+def matrix(engines: Mapping[str, Capabilities], lifecycles: Mapping[str, str] | None = None) -> Matrix:
+    """The table of capabilities by engine; `lifecycles` adds a row on how entities come and go."""
     notes: list[str] = []
     rows: list[tuple[str, ...]] = []
     for capability in Capability:
@@ -134,4 +134,6 @@ def matrix(engines: Mapping[str, Capabilities]) -> Matrix:
                 notes.append(note)
             cells.append(f"approx. [{notes.index(note) + 1}]")
         rows.append((str(capability), *cells))
+        if capability is Capability.VARYING_ENTITIES and lifecycles is not None:
+            rows.append(("lifecycle of entities", *(lifecycles[name] for name in engines)))
     return Matrix(tuple(engines), tuple(rows), tuple(notes))

@@ -21,6 +21,11 @@ class Lifecycle(StrEnum):
     P2 = "import only"  # what leaves is retired: hidden, disabled, moved aside, and taken up again
     P3 = "neither"  # everything stays and is reset in place
 
+    @property
+    def words(self) -> str:
+        """As tables print it: `P1 (import and delete)`."""
+        return f"{self.name} ({self.value})"
+
 
 class Presence:
     """The entities of all envs: `entities` (N, E), and `bodies` (N, B) and `joints` (N, J) that follow from them."""

@@ -117,6 +117,10 @@ class Primitives(ABC):
         """
         return {}
 
+    def handles(self) -> Mapping[str, int]:
+        """How many things of its library the engine holds, by kind, for checks that nothing accumulates."""
+        return {}
+
     def renderer_name(self) -> str:
         """What draws the images (driver, software or GPU), for `anysim doctor`; empty if nothing does."""
         return ""

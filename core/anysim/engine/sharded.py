@@ -313,6 +313,13 @@ class ShardedEngine(SimEngine):
             self._require_world()
             return self._ask("read_back", {0: ()})[0]
 
+    def handles(self) -> Mapping[str, int]:
+        """Those of the engine, over all workers."""
+        with self._lock:
+            self._require_world()
+            answers = list(self._ask("handles", self._everyone()).values())
+            return {name: sum(answer[name] for answer in answers) for name in answers[0]}
+
     # ------------------------------------------------------------------ sensing
 
     def renderer_name(self) -> str:

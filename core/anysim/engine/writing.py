@@ -29,7 +29,11 @@ def write_joints(engine: "SimEngine", position: Any, velocity: Any, ids: Array, 
 
 def put_joints(engine: "SimEngine", ids: Array, joints: Array, position: Array | None, velocity: Array | None) -> None:
     """Write values (E, K) of what is there, and nothing of what is not."""
-    for rows, columns in blocks(engine._presence.joints[np.ix_(ids, joints)]):
+    there = engine._presence.joints[np.ix_(ids, joints)]
+    if there.all():
+        engine._write_joints(ids, joints, position, velocity)
+        return
+    for rows, columns in blocks(there):
         at = np.ix_(rows, columns)
         values = (None if v is None else v[at] for v in (position, velocity))
         engine._write_joints(ids[rows], joints[columns], *values)
@@ -49,7 +53,11 @@ def write_bodies(engine: "SimEngine", pose: Any, twist: Any, ids: Array, bodies:
 
 def put_bodies(engine: "SimEngine", ids: Array, bodies: Array, pose: Array | None, twist: Array | None) -> None:
     """Write poses (E, K, 7) and twists (E, K, 6) of what is there, and nothing of what is not."""
-    for rows, columns in blocks(engine._presence.bodies[np.ix_(ids, bodies)]):
+    there = engine._presence.bodies[np.ix_(ids, bodies)]
+    if there.all():
+        engine._write_bodies(ids, bodies, pose, twist)
+        return
+    for rows, columns in blocks(there):
         at = np.ix_(rows, columns)
         values = (None if v is None else v[at] for v in (pose, twist))
         engine._write_bodies(ids[rows], bodies[columns], *values)

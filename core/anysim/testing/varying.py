@@ -32,6 +32,10 @@ CHOICES = {
 }
 """Slots of `varied` and the entities that each can be."""
 
+FULL = ("mug~1", "chest~0", "post", "lid")
+BARE: tuple[str, ...] = ()
+"""Two choices of `varied`: something of each slot, and nothing of any."""
+
 EYE: Vec3 = (0.0, -2.2, 0.9)
 
 

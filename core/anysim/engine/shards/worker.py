@@ -250,5 +250,8 @@ class Host:
     def read_back(self) -> dict[str, Array]:
         return dict(self._here.read_back())
 
+    def handles(self) -> dict[str, int]:
+        return dict(self._here.handles())
+
     def renderer_name(self) -> str:
         return self._here.renderer_name()

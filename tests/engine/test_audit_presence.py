@@ -1,0 +1,30 @@
+"""An audit looks at everything that may be there, and leaves who was there."""
+
+import numpy as np
+import pytest
+
+from anysim import registry
+from anysim.engine.audit import audit
+from anysim.errors import PluginError
+from anysim.testing.varying import having, varied
+from anysim.world.audit import world_rows
+
+
+@pytest.mark.parametrize("name", ["null", "mujoco", "pybullet", "sapien"])
+def test_what_is_absent_now_is_audited_too(name):
+    try:
+        engine_class = registry.load("engines", name)
+    except PluginError as error:
+        pytest.skip(str(error))
+    if not engine_class.availability().available:
+        pytest.skip(f"{name} cannot run here")
+    world = varied(engine_class.capabilities)
+    with engine_class().create_world(world, 2) as engine:
+        engine.reset([0], present=having(world, "mug~1"))
+        before = engine.presence
+        lines = audit(engine)
+        assert np.array_equal(engine.presence, before)
+        assert {(row.subject, row.quantity) for row in world_rows(world)} <= {(x.subject, x.quantity) for x in lines}
+        assert not [line for line in lines if line.ok is False]
+        found = {line.subject for line in lines if line.ok}
+        assert {"mug~0", "mug~1", "mug~2", "mug~2.handle", "chest~0.drawer", "chest~1", "lid"} <= found
