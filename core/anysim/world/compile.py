@@ -64,12 +64,15 @@ def compile_with_report(
         notes[name] = tuple(add_robot(builder, name, robot, issues.at("robots", name)))
     for name, thing in content.objects.items():
         notes[name] = tuple(add_object(builder, name, thing, issues.at("objects", name), base=_base(base, name)))
-    order = check_layout(content.layout, list(content.objects), list(content.robots), issues.at("layout"))
+    instances = [slot.name for slot in builder.build().slots]
+    order = check_layout(
+        content.layout, list(content.objects), list(content.robots), issues.at("layout"), instances, list(content.regions)
+    )
     world = replace(builder.build(), lights=compile_lights(content.lights, issues.at("lights")))
     missing = {*content.robots, *content.objects} - {entity.name for entity in world.entities}
     if missing:  # what looks at a thing that could not be made would only repeat its error
         issues.raise_if_any()
-    world = place_nominally(world, content.layout, order)
+    world = place_nominally(world, content.layout, order, issues.at("layout"), content.regions)
     world = with_exclusions(world, content.collisions, issues.at("collisions"))
     world = with_sensors(world, content.cameras, content.contact_sensors, issues)
     issues.raise_if_any()
