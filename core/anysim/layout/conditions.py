@@ -1,7 +1,7 @@
 """Whether a candidate can stay: everything that its entry says, and everybody else's room."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from anysim.layout.contact import TOUCH, Contact
@@ -47,6 +47,7 @@ class Crowd:
 
     contact: Contact
     settled: dict[str, Settled]
+    _supports: dict[str, set[str]] = field(default_factory=dict)
 
     def objection(
         self, item: Item, solid: Solid, place: PlaceFields, found: Candidate, view: View, constant: bool
@@ -85,14 +86,17 @@ class Crowd:
             walls = self.contact.walls
             if walls is not None and self.contact.gap(found.placed, walls, 0.0) < -TOUCH:
                 return Objection("would be inside of the terrain")
-        below = _below(place, view) if place.clearance else ()
         clear_of = _clear_of(place, view) if place.clear_of else {}
         for name, other in self.settled.items():
             if name == item.name or (solid.fixed and other.fixed and constant and other.constant):
                 continue
             wanted = clear_of.get(name, 0.0)
-            if other.listed and name not in below:
-                wanted = max(wanted, place.clearance)
+            if other.listed:  # clearances hold both ways, but not against what something rests on
+                theirs = view.places[name]
+                wanted = max(wanted, _clear_of(theirs, view).get(item.name, 0.0) if theirs.clear_of else 0.0)
+                asked = max(place.clearance, theirs.clearance)
+                if asked > wanted and not self._stacked(item.name, name, view):
+                    wanted = asked
             if wanted <= 0 and not (solid.collides and other.collides):
                 continue
             gap = self.contact.gap(found.placed, other.placed, wanted)
@@ -101,6 +105,14 @@ class Crowd:
                     return Objection(f"cannot keep its clearance of {wanted:g} m from '{name}'", name)
                 return Objection(f"would be inside of '{name}'", name)
         return None
+
+
+    def _stacked(self, one: str, other: str, view: View) -> bool:
+        """Whether one of two things rests on the other, or on what does."""
+        for name in (one, other):
+            if name not in self._supports:
+                self._supports[name] = _below(view.places[name], view)
+        return other in self._supports[one] or one in self._supports[other]
 
 
 def _clear_of(place: PlaceFields, view: View) -> Mapping[str, float]:

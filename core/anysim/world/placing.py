@@ -144,6 +144,8 @@ def candidate(
             else:
                 spot, drawn_from = G.point_in(area, *dice.uniform("place", 3)), "area"
         return _finished(solid, place, base, turn, spot, None, None, area, drawn_from, around)
+    if spot is None and not any(f.area for f in footings) and region is None and under is None:
+        spot, drawn_from = footings[0].owner.pose.position[:2], "point"  # nothing level: over its origin
     if drawn_from == "point":  # x and y are taken as they are, also over an edge
         assert spot is not None
         return _finished(solid, place, base, turn, spot, _under_point(footings, spot), footings[0].owner, region,

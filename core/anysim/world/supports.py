@@ -24,6 +24,9 @@ HEADROOM = 0.02
 SMALLEST = 1e-4
 """[m^2] of the smallest surface."""
 
+FLAT = 0.2
+"""Share of the box around a hull, seen from above, that its level top must have: the summit of a bump is no surface."""
+
 SAMPLES = 8
 """Points along each side of a surface at which the room above it is measured."""
 
@@ -86,7 +89,10 @@ def _faces(one: PlacedPart) -> list[tuple[float, G.Polygon]]:
     thickness = max(1e-3, 0.01 * (one.high[2] - one.low[2]))
     level = world[2] + cz >= top - thickness  # the top face of a hull, however many facets make it
     outline = G.hull([(cx + float(a), cy + float(b)) for a, b in zip(world[0][level], world[1][level], strict=True)])
-    return [(top, outline)] if len(outline) > 2 and G.size(outline) >= SMALLEST else []
+    if len(outline) < 3:
+        return []
+    footprint = (one.high[0] - one.low[0]) * (one.high[1] - one.low[1])
+    return [(top, outline)] if G.size(outline) >= max(SMALLEST, FLAT * footprint) else []
 
 
 def _box_faces(shape: Box, one: PlacedPart) -> list[tuple[float, G.Polygon]]:
