@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from anysim_schemas.base import Fraction, Name, NonNegative, Positive, Reference, Spec
 from anysim_schemas.errors import KeyFault
@@ -30,9 +30,12 @@ class PlaceFields(Spec):
     in_: Reference | None = Field(
         default=None, alias="in", description="rests inside this object: a bin, a drawer (`cabinet.drawer`), a shelf"
     )
-    under: Name | None = Field(default=None, description="rests below this object; on the ground where `on` says no more")
+    under: Name | None = Field(
+        default=None, description="rests below this object; on the ground where `on` says no more"
+    )
     x: FloatValue | None = Field(
-        default=None, description="x [m], world frame; with y, instead of anywhere on the support. 0 where only y is given"
+        default=None,
+        description="x [m], world frame; with y, instead of anywhere on the support. 0 where only y is given",
     )
     y: FloatValue | None = Field(default=None, description="y [m], world frame; 0 where only x is given")
     region: Annotated[RegionSpec | Name | None, Field(union_mode="left_to_right")] = Field(
@@ -62,7 +65,8 @@ class PlaceFields(Spec):
     )
     clearance: NonNegative = Field(default=0.0, description="smallest distance to any other placed object [m]")
     clear_of: dict[Name, NonNegative] = Field(
-        default_factory=dict, description="smallest distance to single objects or robots by name [m], as they are shaped"
+        default_factory=dict,
+        description="smallest distance to single objects or robots by name [m], as they are shaped",
     )
     checked: bool = Field(
         default=True, strict=True, description="false for something that may start inside of others, as a peg in a hole"
@@ -169,14 +173,16 @@ def _check(place: PlaceFields) -> None:
             more.append("arrange")
         if more:
             raise ValueError(f"give either `position` or `{more[0]}`")
-    elif not supports and not any(field != "aligned" or place.aligned and place.aligned.along for field in places):
+    elif not supports and not any(field != "aligned" or (place.aligned and place.aligned.along) for field in places):
         raise ValueError("give either `position` or `on`; `in`, `under`, a region or a relation say a place too")
     if place.on is not None and place.in_ is not None:
         raise KeyFault("give either `on` or `in`", "in")
     if points and place.arrange == "pack":
         raise KeyFault(f"what is packed has its place found; leave `{points[0]}` out", "arrange")
     if place.facing is not None and place.aligned is not None and place.aligned.along is None:
-        raise KeyFault("it is turned by `aligned`; leave `facing` out, or give `aligned` an axis with `along`", "facing")
+        raise KeyFault(
+            "it is turned by `aligned`; leave `facing` out, or give `aligned` an axis with `along`", "facing"
+        )
 
 
 class RepairSpec(Spec):
@@ -201,7 +207,8 @@ class LayoutSourceSpec(Spec):
     )
     repair: RepairSpec = Field(default=RepairSpec(), description="how far a proposed pose may be moved")
     on_refusal: Literal["error", "layout"] = Field(
-        default="error", description="what a proposal that cannot be kept leads to: an error, or the layout's own entries"
+        default="error",
+        description="what a proposal that cannot be kept leads to: an error, or the layout's own entries",
     )
 
     @classmethod

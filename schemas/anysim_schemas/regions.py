@@ -60,9 +60,7 @@ def _crosses_itself(corners: tuple[Vec2, ...]) -> bool:
     area = sum(a[0] * b[1] - b[0] * a[1] for a, b in edges)
     if area == 0:
         return True
-    return any(
-        _cross(*edges[i], *edges[j]) for i in range(n) for j in range(i + 2, n) if not (i == 0 and j == n - 1)
-    )
+    return any(_cross(*edges[i], *edges[j]) for i in range(n) for j in range(i + 2, n) if not (i == 0 and j == n - 1))
 
 
 def _cross(a: Vec2, b: Vec2, c: Vec2, d: Vec2) -> bool:

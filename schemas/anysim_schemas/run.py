@@ -28,8 +28,12 @@ class WorldSpec(Spec):
     robots: dict[Name, RobotSpec] = Field(default_factory=dict, description="robots by name")
     objects: dict[Name, ObjectSpec] = Field(default_factory=dict, description="objects by name")
     layout: dict[Name, PlacementSpec] = Field(default_factory=dict, description="where each object goes at reset")
-    layout_source: LayoutSourceSpec | None = Field(default=None, description="who proposes where objects go, if anybody")
-    regions: dict[Name, RegionSpec] = Field(default_factory=dict, description="named parts of the plane, for the layout")
+    layout_source: LayoutSourceSpec | None = Field(
+        default=None, description="who proposes where objects go, if anybody"
+    )
+    regions: dict[Name, RegionSpec] = Field(
+        default_factory=dict, description="named parts of the plane, for the layout"
+    )
     cameras: dict[Name, CameraSpec] = Field(default_factory=dict, description="cameras by name")
     lights: dict[Name, LightSpec] = Field(default_factory=dict, description="lights by name")
     contact_sensors: dict[Name, ContactSensorSpec] = Field(default_factory=dict, description="contact sensors by name")

@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 from anysim.layout.contact import TOUCH, Contact
 from anysim.world import polygons as G
+from anysim.world.beside import extent, side_direction, sideways
 from anysim.world.items import Item, meant
-from anysim.world.placing import Candidate, extent, side_direction, sideways
+from anysim.world.placing import Candidate
 from anysim.world.scenery import View
 from anysim.world.solid import Placed, Solid
 from anysim_schemas.layout import PlaceFields
@@ -54,9 +55,13 @@ class Crowd:
     ) -> Objection | None:  # fmt: skip
         """Why a candidate cannot stay; None where it can."""
         x, y, _ = found.pose.position
-        if found.area is not None and found.drawn_from not in ("area", "origin") and not G.holds(found.area, x, y, EXACT):
-            return Objection("is outside of its region" if found.support is None else "would stick out over the edge, or "
-                             "is outside of its region")  # fmt: skip
+        if (
+            found.area is not None
+            and found.drawn_from not in ("area", "origin")
+            and not G.holds(found.area, x, y, EXACT)
+        ):
+            edge = "" if found.support is None else "would stick out over the edge, or "
+            return Objection(f"{edge}is outside of its region")
         for side in SIDES:
             relation = getattr(place, side)
             if relation is not None and side != found.drawn_from:
@@ -105,7 +110,6 @@ class Crowd:
                     return Objection(f"cannot keep its clearance of {wanted:g} m from '{name}'", name)
                 return Objection(f"would be inside of '{name}'", name)
         return None
-
 
     def _stacked(self, one: str, other: str, view: View) -> bool:
         """Whether one of two things rests on the other, or on what does."""
@@ -157,4 +161,3 @@ def _beside(side: str, relation: SideSpec, placed: Placed, view: View) -> Object
     if abs(own - middle) > free + EXACT:
         return Objection(f"is {words} '{relation.of}', but too far to the side")
     return None
-

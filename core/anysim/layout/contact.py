@@ -1,7 +1,7 @@
 """Distances between placed things, by their real shapes: boxes first, exact convex distances for what is near.
 
-The exact ones are from Coal (GJK and EPA): each query starts afresh and is made on one thread, so equal input gives equal
-output. A query between shapes changes neither of them.
+The exact ones are from Coal (GJK and EPA): each query starts afresh and is made on one thread, so equal input gives
+equal output. A query between shapes changes neither of them.
 """
 
 from math import inf
@@ -51,7 +51,7 @@ class Contact:
         """What stands on the ground and is part of it; None where there is nothing."""
 
     def gap(self, a: Placed, b: Placed, limit: float) -> float:
-        """The least distance [m] between two things; negative is how deep they are in each other, inf beyond `limit`."""
+        """The least distance [m] between two things; negative where they are in each other, inf beyond `limit`."""
         if _apart(a.low, a.high, b.low, b.high, limit):
             return inf
         least = inf
@@ -89,7 +89,7 @@ class Contact:
         return float(ground_top(self._world, point, point))
 
     def _distance(self, one: PlacedPart, other: PlacedPart) -> float:
-        import coal
+        import coal  # pyright: ignore[reportMissingImports]  (found by its .pth file)
 
         a, b = self._geometry(one.part), self._geometry(other.part)
         request, result = coal.DistanceRequest(), coal.DistanceResult()
@@ -126,7 +126,7 @@ def _transform(coal: Any, pose: Pose) -> Any:
 
 def _geometry(part: Part) -> Any:
     """The shape as Coal has it; meshes are convex hulls, as they are for the engines."""
-    import coal
+    import coal  # pyright: ignore[reportMissingImports]  (found by its .pth file)
 
     shape = part.shape
     match shape:
@@ -173,7 +173,7 @@ def _low_points(one: PlacedPart) -> list[Vec]:
         case Cylinder(radius, half):
             turns = np.arange(8) * np.pi / 4
             ring = np.stack([radius * np.cos(turns), radius * np.sin(turns), np.zeros(8)], axis=1)
-            corners = np.concatenate([ring + [0, 0, half], ring - [0, 0, half]])
+            corners = np.concatenate([ring + np.array([0, 0, half]), ring - np.array([0, 0, half])])
         case Capsule(radius, half):
             ends = (turned(m, (0.0, 0.0, half)), turned(m, (0.0, 0.0, -half)))
             return [(x + a, y + b, z + c - radius) for a, b, c in ends]

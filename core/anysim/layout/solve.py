@@ -13,8 +13,10 @@ from anysim.layout.conditions import Crowd, Objection, Settled
 from anysim.layout.contact import Contact
 from anysim.layout.packing import GAP, packed
 from anysim.world import polygons as G
+from anysim.world.around import Dice, Impossible
+from anysim.world.footings import Footing, footings_of
 from anysim.world.items import Item, meant
-from anysim.world.placing import Candidate, Dice, Footing, Impossible, candidate, footings_of
+from anysim.world.placing import Candidate, candidate
 from anysim.world.scenery import Scenery, View
 from anysim.world.solid import Solid, Vec
 from anysim_schemas.layout import PlaceFields
@@ -53,7 +55,7 @@ class Task:
     tick: int = 0
 
 
-class NoPlace(Exception):  # noqa: N818  (it becomes the message of a TaskError, which knows the env)
+class NoPlace(Exception):
     """Something does not fit; the message is a sentence."""
 
 
@@ -89,7 +91,7 @@ class Search:
                 culprit = self._culprit(task, order[:done], reasons)
                 if culprit is not None:
                     retreats += 1
-                    leaving = self._with_dependents(order[culprit], order[: done])
+                    leaving = self._with_dependents(order[culprit], order[:done])
                     for gone in leaving:
                         self._remove(gone, found)
                     kept = [t for t in order[:done] if t not in leaving]
@@ -188,8 +190,12 @@ class Search:
 
     def _packed(self, task: Task, reasons: Counter[Objection]) -> Candidate | None:
         """The first place in rows, with the drawn turn that takes the least room."""
-        return packed(self._turns(task), lambda proposed: self._objected(task, proposed, reasons), self._standing(),
-                      max(GAP, task.place.clearance))
+        return packed(
+            self._turns(task),
+            lambda proposed: self._objected(task, proposed, reasons),
+            self._standing(),
+            max(GAP, task.place.clearance),
+        )
 
     def _objected(self, task: Task, proposed: Candidate, reasons: Counter[Objection]) -> bool:
         wrong = self._objection(task, proposed)
@@ -212,10 +218,12 @@ class Search:
         return [s for s in self.settled.values() if s.listed]
 
     def _pack_together(self, task: Task, before: Sequence[Task], found: dict[str, Candidate]) -> Candidate | None:
-        """Everything that goes anywhere on the same support, the largest first, in rows; undone where that fails too."""
+        """What goes anywhere on the same support, the largest first, in rows; undone where that fails too."""
         if not _scattered(task):
             return None
-        group = [t for t in before if _scattered(t) and _support(t) == _support(task) and t.place.region == task.place.region]
+        group = [
+            t for t in before if _scattered(t) and _support(t) == _support(task) and t.place.region == task.place.region
+        ]
         group = [t for t in group if not any(t.item.name in self._needs(o, before) for o in before)]
         kept = {t.item.name: (found[t.item.name], self.settled[t.item.name]) for t in group}
         for one in group:
@@ -280,12 +288,19 @@ def _free_area(footings: Sequence[Footing], settled: Mapping[str, Settled]) -> t
     whole = free = 0.0
     for footing in footings:
         own = footing.owner.name
-        boxes = [s.placed for s in settled.values()
-                 if s.placed.name != own and s.placed.low[2] < footing.height + 0.02 < s.placed.high[2] + 0.02]  # fmt: skip
+        level = footing.height
+        boxes = [
+            s.placed for s in settled.values()
+            if s.placed.name != own and s.placed.low[2] < level + 0.02 and s.placed.high[2] > level
+        ]  # fmt: skip
         (x0, y0), (x1, y1) = G.bounds(footing.area)
-        points = [(x0 + (i + 0.5) / 32 * (x1 - x0), y0 + (j + 0.5) / 32 * (y1 - y0)) for i in range(32) for j in range(32)]
+        points = [
+            (x0 + (i + 0.5) / 32 * (x1 - x0), y0 + (j + 0.5) / 32 * (y1 - y0)) for i in range(32) for j in range(32)
+        ]
         inside = [p for p in points if G.holds(footing.area, *p)]
-        bare = [p for p in inside if not any(b.low[0] <= p[0] <= b.high[0] and b.low[1] <= p[1] <= b.high[1] for b in boxes)]
+        bare = [
+            p for p in inside if not any(b.low[0] <= p[0] <= b.high[0] and b.low[1] <= p[1] <= b.high[1] for b in boxes)
+        ]
         size = G.total(footing.area)
         whole, free = whole + size, free + size * len(bare) / max(1, len(inside))
     return whole, free

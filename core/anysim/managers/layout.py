@@ -56,9 +56,7 @@ class LayoutManager(Manager):
             for entity in item.entities:
                 first = self._world.bodies[self._world.entities[entity].root]
                 fixed = first.kind is BodyKind.STATIC
-                for body, (position, quaternion) in roots_at(
-                    self._world, entity, IDENTITY, IDENTITY[:3], IDENTITY[3:]
-                ):
+                for body, (position, quaternion) in roots_at(self._world, entity, IDENTITY, IDENTITY[:3], IDENTITY[3:]):
                     roots.append((fixed, entity, body, P.pose(position, quaternion)))
         roots.sort(key=lambda root: root[0])
         self._bodies = np.array([body for _, _, body, _ in roots], dtype=int)
@@ -106,7 +104,8 @@ class LayoutManager(Manager):
 
     def _plan(self, env: int, there: Mapping[str, int | None]) -> dict[str, Candidate]:
         """A place for each listed item that is there."""
-        origin = tuple(float(v) for v in self.board.origin[env])
+        x, y, z = (float(v) for v in self.board.origin[env])
+        origin = (x, y, z)
         tasks: list[Task] = []
         middles: dict[str, Middle] = {}
         for item in self._listed:
@@ -170,4 +169,3 @@ class LayoutManager(Manager):
         entry = self.spec.world.layout[self._entries[task.item.name]]
         own = entry.any_of[int(number)].said()
         return {field: f"{base}.{field}" for field in PlaceFields.model_fields if field not in own}
-

@@ -35,7 +35,7 @@ class Dice:
     def __init__(
         self, streams: Streams, env: int, name: str, path: str, tick: int, inherited: Mapping[str, str] | None = None
     ) -> None:
-        """`name` is that of the object, `path` that of its entry; `inherited` has the paths of fields said elsewhere."""
+        """`name` is the object's, `path` its entry's; `inherited` has the paths of fields said elsewhere."""
         self._streams, self._env, self._name, self._path, self._tick = streams, env, name, path, tick
         self._inherited = inherited or {}
         self._aside = _Aside(streams)

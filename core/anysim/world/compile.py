@@ -66,7 +66,12 @@ def compile_with_report(
         notes[name] = tuple(add_object(builder, name, thing, issues.at("objects", name), base=_base(base, name)))
     instances = [slot.name for slot in builder.build().slots]
     order = check_layout(
-        content.layout, list(content.objects), list(content.robots), issues.at("layout"), instances, list(content.regions)
+        content.layout,
+        list(content.objects),
+        list(content.robots),
+        issues.at("layout"),
+        instances,
+        list(content.regions),
     )
     world = replace(builder.build(), lights=compile_lights(content.lights, issues.at("lights")))
     missing = {*content.robots, *content.objects} - {entity.name for entity in world.entities}

@@ -1,7 +1,7 @@
-"""What is placed: logical objects, each with an entry of the layout or none, and the order in which they need each other.
+"""What is placed: logical objects, each with an entry of the layout or none, and the order in which they go.
 
-A logical object is a slot of the World, or an entity that is in none. An entry of the layout is for one of them by name,
-or for all of a category; a reference is one of them by name, or the one of a category that goes with who refers to it.
+A logical object is a slot of the World, or an entity that is in none. An entry of the layout is for one of them by
+name, or for all of a category; a reference is one of them by name, or of a category, then the one of one's own number.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -26,7 +26,9 @@ def items_of(world: World) -> tuple[Item, ...]:
     taken = {entity for slot in world.slots for entity in slot.entities}
     found = [Item(s.name, s.category, s.instance, s.entities, False) for s in world.slots]
     found += [
-        Item(e.name, e.name, 0, (k,), e.kind is EntityKind.ROBOT) for k, e in enumerate(world.entities) if k not in taken
+        Item(e.name, e.name, 0, (k,), e.kind is EntityKind.ROBOT)
+        for k, e in enumerate(world.entities)
+        if k not in taken
     ]
     return tuple(sorted(found, key=lambda item: item.entities))
 

@@ -7,11 +7,12 @@ from typing import Any
 from anysim.conventions import GROUND, Array
 from anysim.errors import listing, suggest
 from anysim.math import pose as P
+from anysim.world.around import Impossible
 from anysim.world.issues import Issues
 from anysim.world.items import Item, entry_of, items_of, meant, ordered
 from anysim.world.model import BodyKind, World
 from anysim.world.nominal import nominal
-from anysim.world.placing import Impossible, candidate
+from anysim.world.placing import candidate
 from anysim.world.rounding import split
 from anysim.world.scenery import Scenery, View
 from anysim.world.solid import Placed, pose_of, row_of
@@ -25,7 +26,9 @@ LOOSE = PlacementSpec(on=GROUND, x=0.0, y=0.0)
 """Where something free goes that has no entry."""
 
 
-def placement_order(layout: Mapping[str, PlacementSpec], items: Sequence[Item] = ()) -> tuple[list[str], list[list[str]]]:
+def placement_order(
+    layout: Mapping[str, PlacementSpec], items: Sequence[Item] = ()
+) -> tuple[list[str], list[list[str]]]:
     """The entries with what each refers to before it (else as written), and the circles that prevent it.
 
     With `items`, the names of items instead: all that have an entry. A circle is listed once, as the names along it;
@@ -77,7 +80,9 @@ def check_layout(
                 resting = key.rpartition(".")[2] in ("on", "in", "under")
                 names = [*known, GROUND] if key.rpartition(".")[2] == "on" else known
                 purpose = "to rest on" if resting else "that its place could refer to"
-                at.add(key, f"there is no object '{other}' {purpose}{suggest(other, names)} (objects: {listing(names)})")
+                at.add(
+                    key, f"there is no object '{other}' {purpose}{suggest(other, names)} (objects: {listing(names)})"
+                )
                 broken.add(name)
         for path, place in spec.variants():
             if isinstance(place.region, str) and place.region not in regions:
@@ -91,7 +96,8 @@ def check_layout(
                 if other not in known:
                     at.add(
                         ".".join((*path, "clear_of", other)),
-                        f"there is no object '{other}' to stay clear of{suggest(other, known)} (objects: {listing(known)})",
+                        f"there is no object '{other}' to stay clear of{suggest(other, known)} "
+                        f"(objects: {listing(known)})",
                     )
     order, circles = placement_order(layout)
     for circle in circles:
@@ -190,7 +196,9 @@ def place_nominally(
     return replace(world, bodies=tuple(bodies))
 
 
-def roots_at(world: World, entity: int, row: Array, position: Any, quaternion: Any) -> list[tuple[int, tuple[Any, Any]]]:
+def roots_at(
+    world: World, entity: int, row: Array, position: Any, quaternion: Any
+) -> list[tuple[int, tuple[Any, Any]]]:
     """The pose of each body of an entity that hangs on no other, its first one at `row` (7,)."""
     found = world.entities[entity]
     roots = [(found.root, (position, quaternion))]

@@ -60,7 +60,9 @@ def cut(polygon: Polygon, nx: float, ny: float, d: float) -> Polygon:
             out.append(here)
         if (a < 0 < b) or (b < 0 < a):
             share = a / (a - b)
-            out.append((here[0] + share * (polygon[after][0] - here[0]), here[1] + share * (polygon[after][1] - here[1])))
+            out.append(
+                (here[0] + share * (polygon[after][0] - here[0]), here[1] + share * (polygon[after][1] - here[1]))
+            )
     return tuple(out) if len(out) >= 3 else ()
 
 
@@ -74,7 +76,7 @@ def within(polygon: Polygon, planes: Sequence[tuple[float, float, float]]) -> Po
 
 
 def eroded(polygon: Polygon, reach: Callable[[float, float], float]) -> Polygon:
-    """Where the origin of a thing may be that is to lie inside, `reach(nx, ny)` being how far it goes in a direction."""
+    """Where the origin of a thing that lies inside may be; `reach(nx, ny)` is how far it goes in a direction."""
     return within(polygon, [(nx, ny, d - reach(nx, ny)) for nx, ny, d in half_planes(polygon)])
 
 
@@ -119,11 +121,11 @@ def point_in(area: Area, u: float, v: float, w: float) -> Point:
     triangles = [(p[0], p[k], p[k + 1]) for p in area for k in range(1, len(p) - 1)]
     sizes = [size(t) for t in triangles]
     wanted = u * sum(sizes)
-    for chosen, own in zip(triangles, sizes, strict=True):
-        if wanted <= own:
-            break
-        wanted -= own
-    (ax, ay), (bx, by), (cx, cy) = chosen
+    chosen = 0
+    while chosen < len(sizes) - 1 and wanted > sizes[chosen]:
+        wanted -= sizes[chosen]
+        chosen += 1
+    (ax, ay), (bx, by), (cx, cy) = triangles[chosen]
     root = sqrt(v)
     along = (1 - root, root * (1 - w), root * w)
     return along[0] * ax + along[1] * bx + along[2] * cx, along[0] * ay + along[1] * by + along[2] * cy

@@ -106,4 +106,3 @@ class View:
 
     def region(self, name: str) -> RegionSpec:
         return self.scenery.regions[name]
-

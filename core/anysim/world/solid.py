@@ -22,6 +22,10 @@ Matrix = tuple[Vec, Vec, Vec]
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
+Quaternion = tuple[float, float, float, float]
+"""xyzw, unit length."""
+
+
 class Pose(NamedTuple):
     """Where a frame is: its origin [m], and the rotation from it to the world."""
 
@@ -56,9 +60,9 @@ def product(a: Matrix, b: Matrix) -> Matrix:
     return ((x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2]))
 
 
-def pose_of(row: Sequence[float]) -> Pose:
+def pose_of(row: Sequence[float] | Array) -> Pose:
     """Of a row (7,)."""
-    return Pose((float(row[0]), float(row[1]), float(row[2])), matrix_of(row[3:7]))
+    return Pose((float(row[0]), float(row[1]), float(row[2])), matrix_of([float(c) for c in row[3:7]]))
 
 
 def about_z(angle: float) -> Matrix:
@@ -189,3 +193,28 @@ def boxed(part: Part, pose: Pose) -> PlacedPart:
 def row_of(pose: Pose, quaternion: Sequence[float]) -> Array:
     """A row (7,) of a place and the quaternion that its rotation came from."""
     return np.array([*pose.position, *quaternion], dtype=float)
+
+
+def quaternion_of(roll: float, pitch: float, yaw: float) -> Quaternion:
+    """Fixed-axis roll, then pitch, then yaw."""
+    sr, cr, sp, cp = sin(0.5 * roll), cos(0.5 * roll), sin(0.5 * pitch), cos(0.5 * pitch)
+    sy, cy = sin(0.5 * yaw), cos(0.5 * yaw)
+    return (
+        sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy,
+    )  # fmt: skip
+
+
+def times(a: Quaternion, b: Quaternion) -> Quaternion:
+    """The rotation b first, then a."""
+    ax, ay, az, aw = a
+    bx, by, bz, bw = b
+    return (
+        aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz,
+    )  # fmt: skip
+
+
+def turn_about_z(angle: float) -> Quaternion:
+    """A turn about the vertical."""
+    return (0.0, 0.0, sin(0.5 * angle), cos(0.5 * angle))

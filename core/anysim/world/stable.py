@@ -98,10 +98,10 @@ def _toppled(normals: Sequence[Array], outlines: Sequence[Array], shares: Sequen
     settled = [0.0] * len(normals)
     for start, share in enumerate(shares):
         here, seen = start, {start}
-        while onto[here] is not None and onto[here] not in seen:
-            here = onto[here]  # type: ignore[assignment]
+        while (following := onto[here]) is not None and following not in seen:
+            here = following
             seen.add(here)
-        if onto[here] is None:
+        if following is None:
             settled[here] += share
     return settled
 
@@ -134,7 +134,7 @@ def _solid_angle(a: Array, b: Array, c: Array) -> float:
 
 
 def _cylinder(part: Part, com: Array, points: Array) -> tuple[RestingPose, ...]:
-    """Upright, upside down, or on its side, where it may also be turned about its axis."""
+    """Upright or upside down; on its side, where it rolls and so never quite rests, only if it cannot stand."""
     assert isinstance(part.shape, Cylinder)
     axis = np.array(_axis(part))
     poses: list[RestingPose] = []
@@ -143,9 +143,8 @@ def _cylinder(part: Part, com: Array, points: Array) -> tuple[RestingPose, ...]:
     for normal, share in zip(normals, settled, strict=True):
         if abs(float(normal @ axis)) > 0.999 and share >= SMALLEST:
             poses.append(RestingPose(_onto(normal), share))
-    lying = 1.0 - sum(pose.share for pose in poses)
-    if lying >= SMALLEST:
-        poses.append(RestingPose(_lying(part), lying, _axis(part)))
+    if not poses:
+        return (RestingPose(_lying(part), 1.0, _axis(part)),)
     total = sum(pose.share for pose in poses)
     ordered = sorted(poses, key=lambda pose: (-round(pose.share, 6), pose.quaternion))
     return tuple(pose._replace(share=pose.share / total) for pose in ordered)

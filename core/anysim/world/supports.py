@@ -106,7 +106,11 @@ def _box_faces(shape: Box, one: PlacedPart) -> list[tuple[float, G.Polygon]]:
         corners: list[G.Point] = []
         for sa, sb in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
             local = [0.0, 0.0, 0.0]
-            local[axis], local[a], local[b] = (side * shape.half_size[axis], sa * shape.half_size[a], sb * shape.half_size[b])
+            local[axis], local[a], local[b] = (
+                side * shape.half_size[axis],
+                sa * shape.half_size[a],
+                sb * shape.half_size[b],
+            )
             x, y, _ = turned(m, (local[0], local[1], local[2]))
             corners.append((cx + x, cy + y))
         outline = tuple(corners) if G.size(tuple(corners)) > 0 else tuple(reversed(corners))
@@ -168,4 +172,3 @@ def choose(found: Sequence[SupportSurface], part: str, inside: bool) -> SupportS
     if inside:
         return next((s for s in found if s.inner or np.isfinite(s.headroom)), None)
     return next((s for s in found if s.name == "top"), None)
-
