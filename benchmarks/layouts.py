@@ -4,8 +4,8 @@
 
 Each tabletop has 10 to 15 objects: boxes, cylinders, capsules, balls and convex hulls of random sizes, in resting poses
 drawn from their shapes, scattered over a table, some beside others. Printed for each engine: how deep contacts are at
-the start (the engine's own, in the first step), how far things are from their planned places after one simulated second,
-and what a layout costs. Exit code 1 if a contact is deeper than 1 mm or a thing more than 5 mm off its place.
+the start (the engine's own, in the first step), how far things are from their places after one simulated second, and
+what a layout costs. Exit code 1 if a contact is deeper than 1 mm or a thing more than 5 mm off its place.
 """
 
 import argparse

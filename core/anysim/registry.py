@@ -22,6 +22,7 @@ KINDS: Mapping[str, str] = {
     "writers": "record writers",
     "readers": "record readers, by the writer's name",
     "importers": "asset importers, by file format",
+    "layouts": "proposers of layouts",
 }
 """The kinds that anysim looks up, and what each is."""
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from anysim.layout import repair
 from anysim.layout.conditions import Crowd, Objection, Settled
 from anysim.layout.contact import Contact
 from anysim.layout.packing import GAP, packed
@@ -19,7 +20,8 @@ from anysim.world.items import Item, meant
 from anysim.world.placing import Candidate, candidate
 from anysim.world.scenery import Scenery, View
 from anysim.world.solid import Solid, Vec
-from anysim_schemas.layout import PlaceFields
+from anysim_schemas.layout import PlaceFields, RepairSpec
+from anysim_schemas.proposals import ProposedPose
 from anysim_schemas.values import Drawn
 
 ATTEMPTS = 100
@@ -50,13 +52,17 @@ class Task:
     place: PlaceFields
     path: str
     constant: bool
-    given: Candidate | None = None
-    """A place that was proposed by somebody else, checked and repaired."""
+    proposed: ProposedPose | None = None
+    """A pose that somebody proposes; nothing else is tried then."""
     tick: int = 0
 
 
 class NoPlace(Exception):
     """Something does not fit; the message is a sentence."""
+
+
+class Refused(NoPlace):
+    """A proposal cannot be kept; the message has a sentence for each object."""
 
 
 @dataclass
@@ -68,6 +74,8 @@ class Search:
     dice: Callable[[Task, int], Notes]
     origin: Vec = (0.0, 0.0, 0.0)
     present: Callable[[Item], bool] = lambda item: True
+    bounds: RepairSpec = field(default_factory=RepairSpec)
+    """How far proposed poses may be moved."""
     settled: dict[str, Settled] = field(default_factory=dict)
     """What has its place already and keeps it: robots, and what the layout says nothing of."""
 
@@ -76,6 +84,7 @@ class Search:
 
         Raises:
             NoPlace: one of them has none.
+            Refused: proposed poses cannot be kept; a sentence for each.
         """
         self.view = View(self.scenery, {n: s.placed for n, s in self.settled.items()}, {}, self.origin, self.present)
         self.crowd = Crowd(self.contact, self.settled)
@@ -84,8 +93,20 @@ class Search:
         for task in tasks:
             self.view.places[task.item.name] = task.place
         retreats = 0
+        refused: list[str] = []
         while done < len(order):
             task = order[done]
+            if task.proposed is not None:
+                kept_pose = self._repaired(task, task.proposed)
+                if isinstance(kept_pose, str):
+                    refused.append(f"'{task.item.name}' {kept_pose}")
+                else:
+                    self._settle(task, kept_pose, found)
+                done += 1
+                continue
+            if refused:  # the rest would be judged without those
+                done += 1
+                continue
             result, reasons = self._place(task)
             if result is None and retreats < RETREATS:
                 culprit = self._culprit(task, order[:done], reasons)
@@ -106,6 +127,8 @@ class Search:
                 continue
             self._settle(task, result, found)
             done += 1
+        if refused:
+            raise Refused("; ".join(refused))
         return found
 
     # ------------------------------------------------------------------ one thing
@@ -113,12 +136,6 @@ class Search:
     def _place(self, task: Task) -> tuple[Candidate | None, Counter[Objection]]:
         reasons: Counter[Objection] = Counter()
         self.view.by = task.item
-        if task.given is not None:
-            wrong = self._objection(task, task.given)
-            if wrong is None:
-                return task.given, reasons
-            reasons[wrong] += 1
-            return None, reasons
         if task.place.arrange == "pack":
             return self._packed(task, reasons), reasons
         for _ in range(1 if task.constant else ATTEMPTS):
@@ -136,6 +153,23 @@ class Search:
                 return proposed, reasons
             reasons[wrong] += 1
         return None, reasons
+
+    def _repaired(self, task: Task, proposed: ProposedPose) -> Candidate | str:
+        """The proposed pose within the bounds, or what is wrong with it in words after the name."""
+        self.view.by = task.item
+        first = repair.start(task.solid, proposed, task.place, self.bounds, self.view)
+        if isinstance(first, str):
+            return first
+
+        def objection(one: Candidate) -> str | None:
+            wrong = self._objection(task, one)
+            return None if wrong is None else wrong.reason
+
+        found = repair.repaired(first, self.bounds, objection)
+        if isinstance(found, str):
+            near = f", and no place within {self.bounds.distance:g} m is free" if self.bounds.distance > 0 else ""
+            return f"{found}{near}"
+        return found
 
     def _candidate(self, task: Task, dice: Dice) -> Candidate | Impossible:
         return candidate(task.solid, task.place, lambda: self.scenery.resting(task.solid.name), dice, self.view)
@@ -164,7 +198,7 @@ class Search:
         votes: Counter[int] = Counter()
         for objection, count in reasons.items():
             rank = ranks.get(objection.blocker or "")
-            if rank is not None and not before[rank].constant and before[rank].given is None:
+            if rank is not None and not before[rank].constant and before[rank].proposed is None:
                 if before[rank].item.name not in needed and before[rank].place.arrange != "pack":
                     votes[rank] += count
         return max(votes, key=lambda rank: (votes[rank], rank)) if votes else None
@@ -319,7 +353,7 @@ def _scattered(task: Task) -> bool:
     """Whether it goes anywhere on a support or in a region, without further relations."""
     place = task.place
     related = (place.near, place.left_of, place.right_of, place.in_front_of, place.behind, place.aligned, place.facing)
-    free = place.position is None and place.x is None and place.y is None and task.given is None
+    free = place.position is None and place.x is None and place.y is None and task.proposed is None
     return free and not any(related) and (place.on is not None or place.in_ is not None)
 
 

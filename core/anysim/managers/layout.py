@@ -1,6 +1,7 @@
 """LayoutManager: a pose for every object that is there, from the layout of the spec or from somebody's proposal."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -9,8 +10,9 @@ from anysim.engine.base import SimEngine
 from anysim.errors import TaskError
 from anysim.layout.conditions import Settled
 from anysim.layout.contact import Contact
-from anysim.layout.solve import NoPlace, Search, Task, is_constant
+from anysim.layout.solve import NoPlace, Refused, Search, Task, is_constant
 from anysim.managers.base import Manager
+from anysim.managers.layout_desk import Desk
 from anysim.managers.layout_dice import Dice, Middle
 from anysim.math import pose as P
 from anysim.world.items import Item, entry_of
@@ -19,7 +21,7 @@ from anysim.world.placement import initially_placed, nominal_place, placement_or
 from anysim.world.placing import Candidate
 from anysim.world.scenery import Scenery
 from anysim.world.solid import Solid, row_of
-from anysim_schemas.layout import PlaceFields
+from anysim_schemas.layout import PlaceFields, RepairSpec
 
 IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 
@@ -29,8 +31,18 @@ class LayoutManager(Manager):
 
     name = "layout"
 
+    def __init__(self, proposals: Any = None) -> None:
+        """`proposals` are poses by somebody else, or who gives them, as in `anysim.make`; they win over the spec's."""
+        self._proposals = proposals
+
+    def recall(self, env: int, drawn: Mapping[str, Any]) -> None:
+        if self._desk is not None:
+            self._desk.recall(env, drawn)
+
     def build(self, world: World) -> None:
         self._world = world
+        source = self.spec.world.layout_source
+        self._desk = Desk(source, self._proposals) if source is not None or self._proposals is not None else None
         content = self.spec.world
         self._scenery = Scenery(world, content.regions)
         self._contact = Contact(world)
@@ -121,10 +133,21 @@ class LayoutManager(Manager):
         def dice(task: Task, tick: int) -> Dice | Middle:
             return middles.get(task.item.name) or self._dice(env, task, tick)
 
-        search = Search(
-            self._scenery, self._contact, dice, origin, lambda item: there[item.name] is not None, settled
-        )  # fmt: skip
-        return search.solve(tasks)
+        def search() -> Search:
+            present = lambda item: there[item.name] is not None  # noqa: E731
+            bounds = RepairSpec() if self._desk is None else self._desk.bounds
+            return Search(self._scenery, self._contact, dice, origin, present, bounds, dict(settled))
+
+        if self._desk is None:
+            return search().solve(tasks)
+        try:
+            self._desk.propose(env, self.streams, self._scenery, tasks, settled)
+            return search().solve(tasks)
+        except Refused as error:
+            if not self._desk.falls_back:
+                raise NoPlace(f"the proposal is refused: {error}; see {self._desk.path}") from None
+            self._desk.dismiss(env, self.streams, str(error), tasks)
+            return search().solve(tasks)
 
     def _shifted(self, entity: int, origin: Sequence[float]) -> Settled:
         still = self._still[entity]

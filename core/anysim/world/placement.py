@@ -101,8 +101,9 @@ def check_layout(
                     )
     order, circles = placement_order(layout)
     for circle in circles:
-        key = next(key for key, other in references(layout[circle[0]]) if other == [*circle[1:], circle[0]][0])
-        if all(layout[name].on is not None for name in circle):
+        following = [*circle[1:], circle[0]]
+        key = next(key for key, other in references(layout[circle[0]]) if other == following[0])
+        if all(layout[name].on == other for name, other in zip(circle, following, strict=True)):
             text = f"the objects rest on each other in a circle: {' on '.join([*circle, circle[0]])}"
         else:
             text = f"the places depend on each other in a circle: {' on '.join([*circle, circle[0]])}"
