@@ -18,6 +18,7 @@ from anysim.world.model import (
     HeightFieldShape,
     MeshShape,
     Plane,
+    Shape,
     Sphere,
     World,
 )  # fmt: skip
@@ -37,7 +38,7 @@ class Contact:
         self._excluded = world.excluded_pairs
         ground = [g for g in world.geoms if g.body == WORLD and g.collides]
         self._planes = max((g.position[2] for g in ground if isinstance(g.shape, Plane)), default=None)
-        self._fields = any(isinstance(g.shape, HeightFieldShape) for g in ground)
+        self._fields = any(isinstance(g.shape, HeightFieldShape) or _concave(g.shape) for g in ground)
         meshes = {mesh.name: mesh for mesh in world.meshes}
         known = (Box, Sphere, Capsule, Cylinder, MeshShape)
         parts = [
@@ -45,7 +46,7 @@ class Contact:
                 g.shape, pose_of((*g.position, *g.quaternion)), WORLD,
                 meshes[g.shape.mesh].vertices if isinstance(g.shape, MeshShape) else None,
             )
-            for g in ground if isinstance(g.shape, known)
+            for g in ground if isinstance(g.shape, known) and not _concave(g.shape)
         ]  # fmt: skip
         self.walls = _placed("terrain", parts)
         """What stands on the ground and is part of it; None where there is nothing."""
@@ -101,6 +102,11 @@ class Contact:
             found = self._geometries[id(part)] = _geometry(part)
             self._kept.append(part)  # so that its id stays its own
         return found
+
+
+def _concave(shape: Shape) -> bool:
+    """Whether a mesh is ground, triangle by triangle."""
+    return bool(getattr(shape, "concave", False))
 
 
 def _placed(name: str, parts: list[Part]) -> Placed | None:

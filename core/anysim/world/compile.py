@@ -66,13 +66,9 @@ def compile_with_report(
         notes[name] = tuple(add_object(builder, name, thing, issues.at("objects", name), base=_base(base, name)))
     instances = [slot.name for slot in builder.build().slots]
     order = check_layout(
-        content.layout,
-        list(content.objects),
-        list(content.robots),
-        issues.at("layout"),
-        instances,
-        list(content.regions),
-    )
+        content.layout, list(content.objects), list(content.robots), issues.at("layout"), instances=instances,
+        regions=list(content.regions),
+    )  # fmt: skip
     world = replace(builder.build(), lights=compile_lights(content.lights, issues.at("lights")))
     missing = {*content.robots, *content.objects} - {entity.name for entity in world.entities}
     if missing:  # what looks at a thing that could not be made would only repeat its error

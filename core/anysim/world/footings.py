@@ -69,8 +69,8 @@ def standing_places(place: PlaceFields, around: Around) -> list[Footing] | Impos
                 )
             reference, inside = found
             break
-    if reference is None or reference == GROUND:
-        return None
+    if reference is None or reference == GROUND or around.find(reference.partition(".")[0]) is None:
+        return None  # what it would rest on is not there in this env
     return footings_of(reference, inside, around)
 
 

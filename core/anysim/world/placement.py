@@ -58,14 +58,15 @@ def references(entry: PlacementSpec) -> list[tuple[str, str]]:
 
 def check_layout(
     layout: Mapping[str, PlacementSpec], objects: Sequence[str], robots: Sequence[str], issues: Issues,
-    instances: Sequence[str] = (), regions: Sequence[str] = (),
+    fixtures: Sequence[str] = (), *, instances: Sequence[str] = (), regions: Sequence[str] = (),
 ) -> list[str]:  # fmt: skip
     """The entries that can be placed, in order; what is wrong goes to `issues`, whose path is that of the layout.
 
-    `instances` are names of single objects where `objects` are categories.
+    `instances` are names of single objects where `objects` are categories; `fixtures` have their place and can be
+    referred to, as the furniture of a room.
     """
     known_objects = list(dict.fromkeys([*objects, *instances]))
-    known = [*known_objects, *robots]
+    known = [*known_objects, *robots, *fixtures]
     broken: set[str] = set()
     for name, spec in layout.items():
         at = issues.at(name)
