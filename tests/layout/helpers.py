@@ -20,7 +20,12 @@ class Layouts:
     """Envs of one world on the kinematic engine; `pose[name]` (N, 7) after a reset."""
 
     def __init__(
-        self, objects: Mapping[str, Any], layout: Mapping[str, Any], num_envs: int = 4, proposals: Any = None, **world: Any
+        self,
+        objects: Mapping[str, Any],
+        layout: Mapping[str, Any],
+        num_envs: int = 4,
+        proposals: Any = None,
+        **world: Any,
     ) -> None:
         source = {
             "engine": "null", "num_envs": num_envs,

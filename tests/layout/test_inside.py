@@ -92,5 +92,5 @@ def test_what_is_too_high_for_a_shelf_does_not_fit(cabinet: dict) -> None:
         {"cabinet": cabinet, "pole": {"source": {"box": [0.05, 0.05, 0.24]}}},
         {"cabinet": {"on": "terrain", "x": 2.0}, "pole": {"on": "cabinet.shelf_1"}}, 1,
     )  # fmt: skip
-    with pytest.raises(TaskError, match="'pole'.*would be inside of 'cabinet'"):
+    with pytest.raises(TaskError, match=r"'pole'.*would be inside of 'cabinet'"):
         layouts.reset()

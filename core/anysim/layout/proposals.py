@@ -17,6 +17,7 @@ from pydantic import ValidationError
 from anysim.errors import SpecError, SpecIssue, listing, suggest
 from anysim_schemas.proposals import Proposal, Proposals
 
+
 @dataclass(frozen=True)
 class Thing:
     """Something that can be placed.

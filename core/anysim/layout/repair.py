@@ -20,7 +20,7 @@ SNUG = 1e-6
 def start(
     solid: Solid, proposed: ProposedPose, place: PlaceFields, bounds: RepairSpec, around: Around
 ) -> Candidate | str:
-    """The pose as proposed, set upright and onto its support within the bounds; else why not, in words after its name."""
+    """The pose as proposed, upright and on its support within the bounds; else why not, in words after its name."""
     quaternion = _orientation(proposed, bounds)
     x, y, z = (a + b for a, b in zip(proposed.position, around.origin, strict=True))
     pose = Pose((x, y, z), matrix_of(quaternion))
