@@ -7,6 +7,7 @@ import pytest
 
 from anysim.errors import SpecError, TaskError
 from tests.layout.helpers import Layouts
+from tests.task.helpers import BLOCKS
 
 OBJECTS = {"a": {"source": {"box": [0.06, 0.04, 0.05]}}, "b": {"source": {"sphere": 0.03}}}
 LAYOUT = {"a": {"on": "table"}, "b": {"on": "table"}}
@@ -96,9 +97,26 @@ def test_a_proposer_is_told_the_scene_and_what_it_says_is_in_the_record() -> Non
     assert json.loads(asked[0].to_json())["scene"] == "world"
     again = Layouts(OBJECTS, LAYOUT, 3, lambda request: pytest.fail("asked in a replay"))
     for env in range(3):
-        again.manager.recall(env, layouts.streams.draws[env])
+        again.manager.recall(env, json.loads(json.dumps(layouts.streams.draws[env])))
     replayed = again.reset(seed=4)
     assert all(np.array_equal(pose[name], replayed[name]) for name in pose)
+
+
+def test_a_file_beside_the_world(tmp_path) -> None:
+    """Relative to the YAML that names it, wherever one is; `anysim check` reads it."""
+    import anysim
+    from anysim.cli.check import check_one
+
+    (tmp_path / "plans").mkdir()
+    (tmp_path / "plans" / "plan.json").write_text(json.dumps(propose(red={"position": [0.1, 0.2, 0.42]})))
+    world = {"world": {**BLOCKS["world"], "layout_source": "plans/plan.json"}}
+    (tmp_path / "world.yaml").write_text(json.dumps({**BLOCKS, **world}))
+    with anysim.make(tmp_path / "world.yaml") as env:
+        env.reset(seed=0)
+        assert np.allclose(env.engine.get_state().body_pose[0, env.engine.index.body("red"), :3], [0.1, 0.2, 0.425])
+    (tmp_path / "plans" / "plan.json").write_text('{"poses": {"red": {"position": [0.1]}}}')
+    said = "\n".join(check_one(str(tmp_path / "world.yaml"), None, False, []))
+    assert "poses.red.position" in said
 
 
 def test_each_episode_draws_one_of_several() -> None:

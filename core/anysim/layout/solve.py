@@ -12,10 +12,10 @@ from typing import Any, Protocol
 from anysim.layout import repair
 from anysim.layout.conditions import Crowd, Objection, Settled
 from anysim.layout.contact import Contact
+from anysim.layout.free import free_area
 from anysim.layout.packing import GAP, packed
-from anysim.world import polygons as G
 from anysim.world.around import Dice, Impossible
-from anysim.world.footings import Footing, footings_of
+from anysim.world.footings import footings_of
 from anysim.world.items import Item, meant
 from anysim.world.placing import Candidate, candidate
 from anysim.world.scenery import Scenery, View
@@ -313,31 +313,8 @@ class Search:
         footings = footings_of(reference, task.place.in_ is not None, self.view)
         if isinstance(footings, Impossible) or not any(f.area for f in footings):
             return ""
-        whole, free = _free_area(footings, self.settled)
+        whole, free = free_area(footings, self.settled)
         return f" (of the {whole:.3g} m^2 of '{reference}' {free:.3g} m^2 are free)"
-
-
-def _free_area(footings: Sequence[Footing], settled: Mapping[str, Settled]) -> tuple[float, float]:
-    """[m^2] of surfaces, and of what has no box of anything else over it, counted on a grid of 32 by 32 points."""
-    whole = free = 0.0
-    for footing in footings:
-        own = footing.owner.name
-        level = footing.height
-        boxes = [
-            s.placed for s in settled.values()
-            if s.placed.name != own and s.placed.low[2] < level + 0.02 and s.placed.high[2] > level
-        ]  # fmt: skip
-        (x0, y0), (x1, y1) = G.bounds(footing.area)
-        points = [
-            (x0 + (i + 0.5) / 32 * (x1 - x0), y0 + (j + 0.5) / 32 * (y1 - y0)) for i in range(32) for j in range(32)
-        ]
-        inside = [p for p in points if G.holds(footing.area, *p)]
-        bare = [
-            p for p in inside if not any(b.low[0] <= p[0] <= b.high[0] and b.low[1] <= p[1] <= b.high[1] for b in boxes)
-        ]
-        size = G.total(footing.area)
-        whole, free = whole + size, free + size * len(bare) / max(1, len(inside))
-    return whole, free
 
 
 def _footprint(found: Candidate) -> float:
