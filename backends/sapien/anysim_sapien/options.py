@@ -35,10 +35,10 @@ class SapienOptions(BaseModel):
         description="Vulkan driver that draws: auto (what the environment says, a system driver, else Chromium's "
         "software driver), none, or the path of a driver's JSON file",
     )
-    shader: Literal["auto", "trivial", "default"] = Field(
+    shader: Literal["auto", "trivial", "lit", "default"] = Field(
         default="auto",
-        description="trivial: flat colours, fast in software; default: lights, half a minute to the first image "
-        "without a graphics card; auto: trivial in software, else default",
+        description="trivial: flat colours; lit: lights without shadows, fast in software; default: SAPIEN's own, half "
+        "a minute to the first image without a graphics card; auto: lit in software, else default",
     )
 
     def trajectory_stamp(self) -> str:

@@ -36,6 +36,9 @@ THIN = 1e-3
 
 SUN = (0.3, -0.5, -1.0)
 
+BACKGROUND = (0.80, 0.87, 0.94)
+"""Colour of what is beyond everything."""
+
 
 class Painter:
     """Draws the envs of one engine. Its methods may be called from any thread."""
@@ -45,7 +48,7 @@ class Painter:
             device = open_device(options.vulkan_icd)
             self._shader = options.shader
             if self._shader == "auto":
-                self._shader = "trivial" if device.is_cpu else "default"
+                self._shader = "lit" if device.is_cpu else "default"
             self._scene: Any = sapien.Scene([sapien.render.RenderSystem()])
             self._cameras: dict[tuple[int, int], Any] = {}
             self._bodies: dict[int, Any] = {}
@@ -130,12 +133,12 @@ class Painter:
             self._materials[index].set_base_color(colors[index].tolist())
 
     def _read(self, camera: Any, images: dict[str, Array], row: int) -> None:
+        seen = camera.get_picture("Segmentation")[..., 1]
         if "rgb" in images:
             color = np.clip(camera.get_picture("Color")[..., :3], 0.0, 1.0)
+            if self._shader != "default":  # which has a background of its own
+                color[seen == 0] = BACKGROUND
             images["rgb"][row] = np.rint(color * 255)
-        if not {"depth", "segmentation"} & set(images):
-            return
-        seen = camera.get_picture("Segmentation")[..., 1]
         if "depth" in images:
             depth = -camera.get_picture("Position")[..., 2]
             images["depth"][row] = np.where(seen > 0, depth, np.inf)
@@ -148,7 +151,7 @@ class Painter:
 def _shader_folder(name: str) -> Any:
     from importlib.resources import files
 
-    return files("sapien") / "vulkan_shader" / name
+    return files("anysim_sapien") / "shader" / name if name == "lit" else files("sapien") / "vulkan_shader" / name
 
 
 def _local(geom: Geom) -> Array:

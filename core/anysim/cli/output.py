@@ -1,9 +1,9 @@
 """Tables on a terminal, plain tab-separated lines in a pipe."""
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Protocol
 
 import typer
 
@@ -56,14 +56,20 @@ def working_on(what: str) -> Iterator[None]:
         yield
 
 
+class Told(Protocol):
+    """What is called once per finished thing: its line, and a few words on how all of it goes."""
+
+    def __call__(self, line: str, standing: str = "") -> object: ...
+
+
 @contextmanager
-def counting(what: str, total: int, quiet: bool = False) -> Iterator[Callable[[str], None]]:
+def counting(what: str, total: int, quiet: bool = False) -> Iterator[Told]:
     """Call what it gives once per finished thing: a progress bar for a person, the line in a pipe, else nothing."""
     if quiet:
-        yield lambda line: None
+        yield lambda line, standing="": None
         return
     if not interactive():
-        yield typer.echo
+        yield lambda line, standing="": typer.echo(line)
         return
     from rich.progress import (
         BarColumn,
@@ -75,7 +81,8 @@ def counting(what: str, total: int, quiet: bool = False) -> Iterator[Callable[[s
     )
 
     with Progress(
-        TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn()
-    ) as progress:
-        bar = progress.add_task(what, total=total)
-        yield lambda line: progress.advance(bar)
+        TextColumn(what), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[standing]}"),
+        TimeElapsedColumn(), TimeRemainingColumn(),
+    ) as progress:  # fmt: skip
+        bar = progress.add_task(what, total=total, standing="")
+        yield lambda line, standing="": progress.update(bar, advance=1, standing=standing)

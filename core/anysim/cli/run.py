@@ -80,35 +80,16 @@ def _announce(env: "TaskEnv", directory: Path, episodes: int, seed: int, present
 
 @contextmanager
 def _progress(total: int, quiet: bool) -> Iterator[Any]:
-    """A progress bar for a person, a line for each episode in a pipe, nothing with --json."""
-    from anysim.cli.output import interactive
+    """What is told of each episode that has ended."""
+    from anysim.cli.output import counting
 
-    if quiet:
-        yield lambda result: None
-        return
-    if not interactive():
-        yield lambda result: typer.echo(_line(result))
-        return
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-
-    with Progress(
-        TextColumn("episodes"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[good]} succeeded"),
-        TimeElapsedColumn(), TimeRemainingColumn(),
-    ) as progress:  # fmt: skip
-        bar = progress.add_task("episodes", total=total, good=0)
+    with counting("episodes", total, quiet) as told:
         good = 0
 
         def show(result: "EpisodeResult") -> None:
             nonlocal good
             good += result.success
-            progress.update(bar, advance=1, good=good)
+            told(_line(result), f"{good} succeeded")
 
         yield show
 

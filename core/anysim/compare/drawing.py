@@ -28,8 +28,8 @@ _STYLE: dict[Any, Any] = {
 REMEDY = "pip install 'anysim[report]'"
 
 
-def require_matplotlib() -> None:
-    """Say at once that plots cannot be drawn, and what to do.
+def require_matplotlib(why: str = "the page needs matplotlib for its plots") -> None:
+    """Say at once that nothing can be drawn, and what to do.
 
     Raises:
         AnysimError: matplotlib is not installed.
@@ -37,7 +37,7 @@ def require_matplotlib() -> None:
     try:
         import matplotlib  # noqa: F401
     except ImportError as error:
-        raise AnysimError(f"the page needs matplotlib for its plots, which is not installed: {REMEDY}") from error
+        raise AnysimError(f"{why}, which is not installed: {REMEDY}") from error
 
 
 def plot_svg(plot: Plot, engines: Sequence[str], prefix: str) -> str:

@@ -10,8 +10,11 @@ import pytest
 
 from anysim.errors import EngineError
 from anysim.testing import worlds
+from anysim.world.compile import compile_world
 from anysim_sapien import diagnosis, vulkan
-from anysim_sapien.render import Painter
+from anysim_sapien.engine import SapienEngine
+from anysim_sapien.render import BACKGROUND, Painter
+from anysim_schemas.run import WorldSpec
 
 NOTHING = "/no/such/driver.json"
 
@@ -109,7 +112,7 @@ def test_the_doctor_names_the_driver_and_how_to_choose_it(monkeypatch, tmp_path)
 
 
 def test_a_driver_in_software_gets_the_cheap_shader(make):
-    """SwiftShader does not call itself a CPU; the shader with lights takes half a minute to its first image there."""
+    """SwiftShader does not call itself a CPU; SAPIEN's own shader takes half a minute to its first image there."""
     engine = make(worlds.scene(cameras=True))
     try:
         where = engine.renderer_name().rpartition(", ")[2]
@@ -119,7 +122,27 @@ def test_a_driver_in_software_gets_the_cheap_shader(make):
     computes = any(word in device.name.lower() for word in ("swiftshader", "llvmpipe"))
     assert device.is_cpu == computes
     assert where == ("in software" if computes else "on the GPU")
-    assert Painter(engine.world, engine._layout, engine.options)._shader == ("trivial" if computes else "default")
+    assert Painter(engine.world, engine._layout, engine.options)._shader == ("lit" if computes else "default")
+
+
+def test_faces_are_as_bright_as_light_falls_on_them():
+    """Lambert's law: the sun shines along (0, 0.6, -0.8), so of a white box the top has 0.8 of it and a side 0.6."""
+    box = {"source": {"box": [0.2, 0.2, 0.2]}, "color": [0.5, 0.5, 0.5], "fixed": True}
+    spec = {
+        "objects": {"box": box}, "layout": {"box": {"position": [0, 0, 0.1]}}, "terrain": "none",
+        "lights": {"sun": {"direction": [0.0, 0.6, -0.8]}},
+        "cameras": {"front": {"from": [0.0, -0.6, 0.7], "look_at": "box", "size": [120, 120]}},
+    }  # fmt: skip
+    with SapienEngine(shader="lit").create_world(compile_world(WorldSpec.model_validate(spec))) as engine:
+        try:
+            images = engine.render("front", channels=("rgb", "segmentation"))
+        except EngineError as error:
+            pytest.skip(f"no image can be drawn here: {error}")
+    image, seen = images["rgb"][0], images["segmentation"][0]
+    assert (image[seen == 0] == np.rint(np.array(BACKGROUND) * 255)).all()
+    side, top = np.unique(image[seen == 1][:, 0])  # the side that the sun is behind is not in the picture
+    ambient = 0.4 * 0.5 * 255
+    assert (top - ambient) / (side - ambient) == pytest.approx(0.8 / 0.6, rel=0.03)
 
 
 def test_drawing_leaves_the_environment_alone(make):
