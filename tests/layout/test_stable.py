@@ -25,7 +25,7 @@ def test_poses_of_a_hull_are_those_of_trimesh(seed: int, tmp_path: Path) -> None
     theirs = {tuple(np.round(-t[2, :3], 3)): share for t, share in zip(transforms, shares, strict=True)}
     down = [P.rotate_inverse(np.array(pose.quaternion), np.array([0.0, 0.0, -1.0])) for pose in own]
     assert sum(pose.share for pose in own) == pytest.approx(1.0)
-    for pose, normal in zip(own, down, strict=True):
+    for normal in down:
         nearest = min(theirs, key=lambda n: float(np.linalg.norm(np.array(n) - normal)))
         assert np.linalg.norm(np.array(nearest) - normal) < 5e-3
     likeliest = max(theirs, key=lambda n: theirs[n])
