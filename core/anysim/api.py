@@ -167,12 +167,25 @@ def blind_env(loaded: LoadedRun, world: "World", name: str) -> "TaskEnv":
 
     blind = replace(world, cameras=tuple(replace(camera, channels=()) for camera in world.cameras))
     try:
-        return _env(loaded, blind, NullEngine(), 1, name)
+        return _env(loaded, blind, NullEngine(), 1, name, _proposals(loaded, None))
     except SpecError as error:
         raise located(error, loaded) from None
 
 
-def _env(loaded: LoadedRun, world: "World", simulation: "SimEngine", num_envs: int, name: str) -> "TaskEnv":
+def _proposals(loaded: LoadedRun, given: Any) -> Any:
+    """Who proposes poses: what was given, else the file that the spec names, relative to the file that names it."""
+    source = loaded.spec.world.layout_source
+    if given is not None or source is None or not source.proposal.endswith(".json"):
+        return Path(given) if isinstance(given, str) and given.endswith(".json") else given
+    path = Path(source.proposal)
+    place = place_of(loaded, "world.layout_source.proposal").rsplit(":", 2)[0]
+    folder = Path(place).parent if place and Path(place).is_file() else Path()
+    return path if path.is_absolute() else folder / path
+
+
+def _env(
+    loaded: LoadedRun, world: "World", simulation: "SimEngine", num_envs: int, name: str, proposals: Any = None
+) -> "TaskEnv":
     """An env on a fresh engine; the engine is destroyed if anything fails."""
     from anysim.managers.changes import check_run
     from anysim.managers.standard import standard_managers
@@ -180,7 +193,7 @@ def _env(loaded: LoadedRun, world: "World", simulation: "SimEngine", num_envs: i
 
     try:
         spec = loaded.spec
-        managers = standard_managers(spec, world, num_envs)
+        managers = standard_managers(spec, world, num_envs, proposals)
         check_run(simulation, world, managers, f"'{world.name}'", lambda path: place_of(loaded, path))
         simulation.create_world(world, num_envs)
         return TaskEnv(spec, simulation, managers, name)
@@ -200,7 +213,7 @@ def simulation(spec: "RunSpec") -> "SimEngine":
 
 def make(
     source: str | Path | LoadedRun | Mapping[str, Any], *, engine: str | None = None, num_envs: int | None = None,
-    seed: int | None = None, overrides: Sequence[str] = (), base: Path | None = None,
+    seed: int | None = None, overrides: Sequence[str] = (), base: Path | None = None, proposals: Any = None,
 ) -> "TaskEnv":  # fmt: skip
     """An env of a task: `env = anysim.make("pick_cube", engine="mujoco", num_envs=16)`.
 
@@ -211,6 +224,8 @@ def make(
         seed: seeds the envs now; otherwise the first `reset(seed=...)` does.
         overrides: dotted overrides, as `-o` on the command line.
         base: the folder that relative asset paths are relative to; that of the file where there is one.
+        proposals: poses of objects that somebody else proposes: a mapping, a JSON file, or a callable that takes a
+            `anysim.layout.proposals.Request` and gives one; wins over `world.layout_source` of the file.
 
     Raises:
         SpecError: the file, with line and column.
@@ -229,7 +244,7 @@ def make(
     world = compile_world(loaded, base=base)
     name = str(source) if isinstance(source, str) and "/" not in str(source) else world.name
     try:
-        env = _env(loaded, world, simulation(spec), spec.num_envs, name)
+        env = _env(loaded, world, simulation(spec), spec.num_envs, name, _proposals(loaded, proposals))
     except SpecError as error:
         raise located(error, loaded) from None
     if seed is not None:

@@ -13,7 +13,8 @@ class Draw(NamedTuple):
     """One draw of an episode.
 
     Attributes:
-        name: the name under which recordings keep it; `@n` is the n-th further attempt, or step n.
+        name: the name under which recordings keep it; `@n` is step n. Of a layout's attempts
+            only what holds is kept.
         value: what was drawn.
         stream: the stream it was drawn from; `shared/NAME` where fields share a draw, `…/ratio` where a ratio left the
             nominal value.

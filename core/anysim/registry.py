@@ -23,6 +23,7 @@ KINDS: Mapping[str, str] = {
     "readers": "record readers, by the writer's name",
     "importers": "asset importers, by file format",
     "assets": "builders of procedural assets",
+    "layouts": "proposers of layouts",
 }
 """The kinds that anysim looks up, and what each is."""
 

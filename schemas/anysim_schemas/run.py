@@ -10,10 +10,11 @@ from anysim_schemas.collisions import CollisionsSpec
 from anysim_schemas.contact_sensors import ContactSensorSpec
 from anysim_schemas.engine import EngineSpec, PhysicsSpec
 from anysim_schemas.errors import KeyFault
-from anysim_schemas.layout import PlacementSpec
+from anysim_schemas.layout import LayoutSourceSpec, PlacementSpec
 from anysim_schemas.lights import LightSpec, ScenerySpec
 from anysim_schemas.objects import ObjectSpec
 from anysim_schemas.record import RecordSpec
+from anysim_schemas.regions import RegionSpec
 from anysim_schemas.robots import RobotSpec
 from anysim_schemas.rooms import RoomSpec
 from anysim_schemas.task import TaskSpec
@@ -29,6 +30,12 @@ class WorldSpec(Spec):
     robots: dict[Name, RobotSpec] = Field(default_factory=dict, description="robots by name")
     objects: dict[Name, ObjectSpec] = Field(default_factory=dict, description="objects by name")
     layout: dict[Name, PlacementSpec] = Field(default_factory=dict, description="where each object goes at reset")
+    layout_source: LayoutSourceSpec | None = Field(
+        default=None, description="who proposes where objects go, if anybody"
+    )
+    regions: dict[Name, RegionSpec] = Field(
+        default_factory=dict, description="named parts of the plane, for the layout"
+    )
     cameras: dict[Name, CameraSpec] = Field(default_factory=dict, description="cameras by name")
     lights: dict[Name, LightSpec] = Field(default_factory=dict, description="lights by name")
     scenery: ScenerySpec = Field(default=ScenerySpec(), description="background, ambient light and shadows")

@@ -153,7 +153,7 @@ def test_a_snapshot_brings_back_who_was_there() -> None:
 
 def test_one_more_thing_that_varies_moves_no_other_draw() -> None:
     more = "world.objects.other={source: {choice: [{sphere: 0.02}, {box: [0.1, 0.1, 0.1]}]}, count: {range: [0, 2]}}"
-    with toys(8) as plain, toys(8, more) as with_other:
+    with toys(8) as plain, toys(8, more, "world.layout.other={on: table}") as with_other:
         plain.reset(seed=5)
         with_other.reset(seed=5)
         for a, b in zip(plain.streams.draws, with_other.streams.draws, strict=True):

@@ -10,7 +10,7 @@ comes before whom.
 
 from abc import ABC
 from collections.abc import Iterable, Mapping
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
@@ -56,6 +56,9 @@ class Manager(ABC):
     def bind(self, engine: SimEngine) -> None:
         """The engine is live: allocate buffers."""
         self.engine = engine
+
+    def recall(self, env: int, drawn: Mapping[str, Any]) -> None:
+        """Before the reset that replays a recorded episode: what the record holds and no stream can give again."""
 
     def reset(self, env_ids: Array) -> None:
         """Write the initial state of these envs, from their streams."""

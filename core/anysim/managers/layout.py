@@ -1,122 +1,194 @@
-"""LayoutManager: a pose for every placed object, from the declarative layout of the spec."""
+"""LayoutManager: a pose for every object that is there, from the layout of the spec or from somebody's proposal."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from anysim.conventions import GROUND, Array
+from anysim.conventions import Array
+from anysim.engine.base import SimEngine
 from anysim.errors import TaskError
+from anysim.layout.conditions import Settled
+from anysim.layout.contact import Contact
+from anysim.layout.solve import NoPlace, Refused, Search, Task, is_constant
 from anysim.managers.base import Manager
-from anysim.managers.values import draw
+from anysim.managers.layout_desk import Desk
+from anysim.managers.layout_dice import Dice, Middle
 from anysim.math import pose as P
-from anysim.world.geometry import EntityShape, ground_top
+from anysim.world.items import Item, entry_of
 from anysim.world.model import BodyKind, World
-from anysim.world.placement import initial_root, placement_order, root_offsets, roots_of
-from anysim.world.slots import ABSENT, by_object
-from anysim_schemas.layout import PlacementSpec
+from anysim.world.placement import initially_placed, nominal_place, placement_order, roots_at
+from anysim.world.placing import Candidate
+from anysim.world.scenery import Scenery
+from anysim.world.solid import Solid, row_of
+from anysim_schemas.layout import PlaceFields, RepairSpec
 
-ATTEMPTS = 100
-"""Draws of one object's place before the layout is given up."""
+IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 
 
 class LayoutManager(Manager):
-    """Draws poses in the order of support (a table before what stands on it) and writes them to the engine."""
+    """Finds places in the order in which they need each other (a table before what stands on it) and writes them."""
 
     name = "layout"
 
+    def __init__(self, proposals: Any = None) -> None:
+        """`proposals` are poses by somebody else, or who gives them, as in `anysim.make`; they win over the spec's."""
+        self._proposals = proposals
+
+    def recall(self, env: int, drawn: Mapping[str, Any]) -> None:
+        if self._desk is not None:
+            self._desk.recall(env, drawn)
+
     def build(self, world: World) -> None:
         self._world = world
-        entries = by_object(self.spec.world.layout, self.spec.world.objects)
-        self._entries = {name: entry for name, entry in entries.items() if name in world.logical_objects}
-        order = placement_order({name: entry for name, (_, entry) in self._entries.items()})[0]
-        self._order = [name for name in order if name in self._entries]
-        self._slots = world.logical_objects
-        used = {*self._order, *(entry.on for _, entry in self._entries.values())} - {None, GROUND}
-        every = [e for name in used if name for e in self._slots[name].entities]
-        self._shapes = {e: EntityShape(world, world.entities[e].name) for e in every}
-        self._placed = [e for name in self._order for e in self._slots[name].entities]
-        self._column = {entity: k for k, entity in enumerate(self._placed)}
-        offsets = [root_offsets(world, world.entities[e]) for e in self._placed]
-        self._roots = np.array([b for e in self._placed for b in roots_of(world, world.entities[e])], dtype=int)
-        self._owner = np.repeat(np.arange(len(offsets)), [len(own) for own in offsets])
-        self._offsets = np.concatenate([np.zeros((0, 7)), *offsets])
-        self._several = np.array([len(offsets[k]) > 1 for k in self._owner], dtype=bool)
-        self._free = np.array([world.bodies[b].kind is BodyKind.FREE for b in self._roots], dtype=bool)
+        source = self.spec.world.layout_source
+        self._desk = Desk(source, self._proposals) if source is not None or self._proposals is not None else None
+        content = self.spec.world
+        self._scenery = Scenery(world, content.regions)
+        self._contact = Contact(world)
+        items = {item.name: item for item in self._scenery.items}
+        order, _ = placement_order(content.layout, self._scenery.items)
+        self._listed = [items[name] for name in order]
+        self._others = [item for item in self._scenery.items if item.name not in order]
+        self._entries = {name: entry_of(content.layout, items[name]) or "" for name in order}
+        self._still = {
+            entity: Settled(initially_placed(self._scenery, entity), self._solid(entity).fixed, True,
+                            self._solid(entity).collides, False)
+            for item in self._others for entity in item.entities
+        }  # fmt: skip
+        self._columns()
+
+    def _solid(self, entity: int) -> Solid:
+        return self._scenery.solid(self._world.entities[entity].name)
+
+    def _columns(self) -> None:
+        """The bodies whose poses are written, free ones before fixed ones, and the column of each entity's first."""
+        roots: list[tuple[bool, int, int, Array]] = []
+        for item in (*self._listed, *(i for i in self._others if not i.robot)):
+            for entity in item.entities:
+                first = self._world.bodies[self._world.entities[entity].root]
+                fixed = first.kind is BodyKind.STATIC
+                for body, (position, quaternion) in roots_at(self._world, entity, IDENTITY, IDENTITY[:3], IDENTITY[3:]):
+                    roots.append((fixed, entity, body, P.pose(position, quaternion)))
+        roots.sort(key=lambda root: root[0])
+        self._bodies = np.array([body for _, _, body, _ in roots], dtype=int)
+        self._owner = np.array([entity for _, entity, _, _ in roots], dtype=int)
+        self._offset = np.array([offset for *_, offset in roots]).reshape(-1, 7)
+        self._free = sum(not fixed for fixed, *_ in roots)
+
+    def bind(self, engine: SimEngine) -> None:
+        super().bind(engine)
+        self._initial = np.array([[*b.position, *b.quaternion] for b in self._world.bodies]).reshape(-1, 7)
 
     def reset(self, env_ids: Array) -> None:
-        if not self._order:
+        if not len(self._bodies):
             return
         presence = self.engine.presence
-        roots = np.stack([self._place(int(env), presence[env]) for env in env_ids])[:, self._owner]
-        poses = roots.copy()
-        moved = roots[:, self._several]
-        poses[:, self._several] = P.compose(moved, np.broadcast_to(self._offsets[self._several], moved.shape))
-        free = self._roots[self._free]
+        poses = np.stack([self._rows(int(env), presence[env]) for env in env_ids])
+        free, fixed = self._bodies[: self._free], self._bodies[self._free :]
         if len(free):
-            self.engine.set_body_state(poses[:, self._free], np.zeros((len(env_ids), len(free), 6)), env_ids, free)
-        fixed = self._roots[~self._free]
+            still = np.zeros((len(env_ids), len(free), 6))
+            self.engine.set_body_state(poses[:, : self._free], still, env_ids, free)
         if len(fixed):
-            self.engine.set_body_state(poses[:, ~self._free], None, env_ids, fixed)
+            self.engine.set_body_state(poses[:, self._free :], None, env_ids, fixed)
 
-    def _place(self, env: int, present: Array) -> Array:
-        """Poses (K, 7) of the roots of all that can be placed, in an env where `present` (entities,) is there.
+    def _rows(self, env: int, presence: Array) -> Array:
+        """The poses (K, 7) of the bodies that are written, in one env."""
+        origin = self.board.origin[env]
+        there = {item.name: next((e for e in item.entities if presence[e]), None) for item in self._scenery.items}
+        try:
+            found = self._plan(env, there)
+        except NoPlace as error:
+            raise TaskError(f"env {env}: {error}") from None
+        rows: dict[int, Array] = {}
+        for name, candidate in found.items():
+            entity = there[name]
+            assert entity is not None
+            rows[entity] = row_of(candidate.pose, candidate.quaternion)
+        for item in self._others:  # where they are initially, from the origin of the env
+            for entity in item.entities:
+                rows[entity] = self._initial[self._world.entities[entity].root] + [*origin, 0.0, 0.0, 0.0, 0.0]
+        whole = np.array([rows.get(int(entity), IDENTITY) for entity in self._owner])
+        lone = (self._offset == IDENTITY).all(axis=1)
+        if lone.all():
+            return whole
+        return np.where(lone[:, None], whole, P.compose(whole, self._offset))
 
-        What is absent keeps the world's frame: the engine heeds no pose of it.
-        """
-        placed: dict[str, Array] = {}
-        poses = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (len(self._placed), 1))
-        self._there = {
-            name: next((e for e in slot.entities if present[e]), ABSENT) for name, slot in self._slots.items()
-        }
-        for name in self._order:
-            if self._there[name] == ABSENT:
-                continue
-            key, entry = self._entries[name]
-            for attempt in range(ATTEMPTS):
-                pose = self._draw_pose(env, name, entry, placed, attempt)
-                crowding = self._crowding(name, entry, pose, placed)
-                if crowding is None:
-                    placed[name] = poses[self._column[self._there[name]]] = pose
-                    break
-            else:
-                raise TaskError(
-                    f"env {env}: no place for '{name}' in {ATTEMPTS} draws that keeps its clearance of "
-                    f"{entry.clearance:g} m from '{crowding}'; widen world.layout.{key} or lower its clearance"
-                )
-        return poses
+    def _plan(self, env: int, there: Mapping[str, int | None]) -> dict[str, Candidate]:
+        """A place for each listed item that is there."""
+        x, y, z = (float(v) for v in self.board.origin[env])
+        origin = (x, y, z)
+        tasks: list[Task] = []
+        middles: dict[str, Middle] = {}
+        for item in self._listed:
+            entity = there[item.name]
+            if entity is not None:
+                tasks.append(self._task(env, item, self._solid(entity), middles))
+        settled: dict[str, Settled] = {}
+        for item in self._others:
+            entity = there[item.name]
+            if entity is not None:
+                settled[item.name] = self._shifted(entity, origin)
 
-    def _draw_pose(self, env: int, name: str, entry: PlacementSpec, placed: dict[str, Array], attempt: int) -> Array:
-        def value(field: str) -> float:
-            return self._draw(env, name, entry, field, attempt)
+        def dice(task: Task, tick: int) -> Dice | Middle:
+            return middles.get(task.item.name) or self._dice(env, task, tick)
 
-        turn = P.from_roll_pitch_yaw(np.array([value("roll"), value("pitch"), value("yaw")]))
-        if entry.on is None:
-            position = self._draw(env, name, entry, "position", attempt)
-            return np.concatenate([np.asarray(position, dtype=float), turn])
-        shape, x, y = self._shapes[self._there[name]], value("x"), value("y")
-        if entry.on == GROUND or self._there[entry.on] == ABSENT:  # what it stands on is not there: on the ground
-            low, high = shape.bounds(np.concatenate([[x, y, 0.0], turn]))
-            top = ground_top(self._world, low[:2], high[:2])
-        else:
-            support = placed.get(entry.on, initial_root(self._world, entry.on))
-            top = self._shapes[self._there[entry.on]].top_height(support)
-        return shape.resting_on(top, np.asarray(x), np.asarray(y), turn)
+        def search() -> Search:
+            present = lambda item: there[item.name] is not None  # noqa: E731
+            bounds = RepairSpec() if self._desk is None else self._desk.bounds
+            return Search(self._scenery, self._contact, dice, origin, present, bounds, dict(settled))
 
-    def _draw(self, env: int, name: str, entry: PlacementSpec, field: str, attempt: int) -> Any:
-        source = f"world.layout.{self._entries[name][0]}.{field}"
-        return draw(getattr(entry, field), f"layout/{name}/{field}", self.streams, env, attempt, source=source)
+        if self._desk is None:
+            return search().solve(tasks)
+        try:
+            self._desk.propose(env, self.streams, self._scenery, tasks, settled)
+            return search().solve(tasks)
+        except Refused as error:
+            if not self._desk.falls_back:
+                raise NoPlace(f"the proposal is refused: {error}; see {self._desk.path}") from None
+            self._desk.dismiss(env, self.streams, str(error), tasks)
+            return search().solve(tasks)
 
-    def _crowding(self, name: str, entry: PlacementSpec, pose: Array, placed: dict[str, Array]) -> str | None:
-        """The first placed object that is nearer than the clearance, measured between balls around both."""
-        if entry.clearance <= 0:
-            return None
-        for other, theirs in placed.items():
-            if other == entry.on:
-                continue
-            gap = float(P.norm(pose[:3] - theirs[:3])) - self._radius(name) - self._radius(other)
-            if gap < entry.clearance:
-                return other
-        return None
+    def _shifted(self, entity: int, origin: Sequence[float]) -> Settled:
+        still = self._still[entity]
+        if not any(origin):
+            return still
+        pose = still.placed.pose
+        x, y, z = (a + b for a, b in zip(pose.position, origin, strict=True))
+        return still._replace(placed=self._solid(entity).at(pose._replace(position=(x, y, z))))
 
-    def _radius(self, name: str) -> float:
-        return self._shapes[self._there[name]].radius
+    # ------------------------------------------------------------------ what an entry says in this episode
+
+    def _task(self, env: int, item: Item, solid: Solid, middles: dict[str, Middle]) -> Task:
+        """The place that an item's entry says in this episode: gated, and one of its alternatives."""
+        name = self._entries[item.name]
+        entry, path = self.spec.world.layout[name], f"world.layout.{name}"
+        if entry.ratio < 1.0:
+            dice = Dice(self.streams, env, item.name, path, 0)
+            holds = dice.uniform("ratio", 1)[0] < entry.ratio
+            dice.keep()
+            if not holds and entry.otherwise is None:
+                middles[item.name] = Middle(item.instance)
+                return Task(item, solid, nominal_place(entry), path, True)
+            if not holds:
+                assert entry.otherwise is not None
+                return Task(item, solid, entry.otherwise, f"{path}.otherwise", is_constant(entry.otherwise))
+        if not entry.any_of:
+            return Task(item, solid, entry, path, is_constant(entry))
+        dice = Dice(self.streams, env, item.name, path, 0)
+        number = dice.pick("any_of", [one.weight for one in entry.any_of])
+        dice.keep()
+        place = entry.chosen(number)
+        return Task(item, solid, place, f"{path}.any_of.{number}", is_constant(place))
+
+    def _dice(self, env: int, task: Task, tick: int) -> Dice:
+        return Dice(self.streams, env, task.item.name, task.path, tick, self._inherited(task))
+
+    def _inherited(self, task: Task) -> Mapping[str, str]:
+        """The fields that an alternative has from its entry, with their paths."""
+        base, _, number = task.path.partition(".any_of.")
+        if not number:
+            return {}
+        entry = self.spec.world.layout[self._entries[task.item.name]]
+        own = entry.any_of[int(number)].said()
+        return {field: f"{base}.{field}" for field in PlaceFields.model_fields if field not in own}

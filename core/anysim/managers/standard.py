@@ -1,5 +1,7 @@
 """The managers that every env has."""
 
+from typing import Any
+
 from anysim.managers.base import Manager
 from anysim.managers.board import Board
 from anysim.managers.camera import CameraManager
@@ -17,12 +19,12 @@ from anysim.world.model import World
 from anysim_schemas.run import RunSpec
 
 
-def standard_managers(spec: RunSpec, world: World, num_envs: int) -> list[Manager]:
-    """Configured and built, sharing one set of streams."""
+def standard_managers(spec: RunSpec, world: World, num_envs: int, proposals: Any = None) -> list[Manager]:
+    """Configured and built, sharing one set of streams. `proposals` is what `make` takes for poses."""
     streams, board = Streams(num_envs), Board(num_envs)
     managers: list[Manager] = [
-        TerrainManager(), PopulationManager(), LayoutManager(), SceneManager(), JointManager(), PhysicsManager(),
-        RobotManager(), LightManager(), CameraManager(), CaptureManager(),
+        TerrainManager(), PopulationManager(), LayoutManager(proposals), SceneManager(), JointManager(),
+        PhysicsManager(), RobotManager(), LightManager(), CameraManager(), CaptureManager(),
     ]  # fmt: skip
     for manager in managers:
         manager.configure(spec, streams, board)

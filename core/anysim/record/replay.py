@@ -82,6 +82,8 @@ def replay(directory: str | Path, engine: str | None = None, base: Path | None =
 def _run(env: TaskEnv, reader: TrajectoryReader) -> tuple[dict[str, Array], dict[str, Array]]:
     """The state (…) after the reset, and the states (T, …) after each step as far as the replayed episode goes."""
     fields = tuple(reader.manifest.layout.state)
+    for manager in env.managers:
+        manager.recall(0, reader.manifest.drawn)
     env.reset(episode_seeds=[reader.manifest.episode_seed])
 
     def now() -> dict[str, Array]:

@@ -19,12 +19,12 @@ from anysim.world.compile_robot import add_robot
 from anysim.world.compile_room import add_room, furniture_names
 from anysim.world.compile_sensors import with_sensors
 from anysim.world.compile_terrain import add_terrain
+from anysim.world.forms import instances
 from anysim.world.imported import ImportNote
 from anysim.world.issues import Issues
 from anysim.world.model import Actuation, Physics, Slot, World
 from anysim.world.nominal import nominal
 from anysim.world.placement import check_layout, place_nominally
-from anysim.world.slots import by_object
 from anysim_schemas.engine import PhysicsSpec
 from anysim_schemas.run import RunSpec, WorldSpec
 
@@ -76,7 +76,11 @@ def compile_with_report(
         notes[name] = tuple(found)
         slots += varying
     fixtures = [] if content.room is None else furniture_names(content.room)
-    order = check_layout(content.layout, content.objects, list(content.robots), issues.at("layout"), fixtures)
+    logical = [one for name, thing in content.objects.items() for one in instances(name, thing)]
+    order = check_layout(
+        content.layout, list(content.objects), list(content.robots), issues.at("layout"), fixtures, instances=logical,
+        regions=list(content.regions),
+    )  # fmt: skip
     lights = compile_lights(content.lights, issues.at("lights"))
     scenery = compile_scenery(content.scenery, issues.at("scenery"))
     world = replace(builder.build(), slots=tuple(slots), lights=lights, scenery=scenery)
@@ -84,8 +88,7 @@ def compile_with_report(
     if missing:  # what looks at a thing that could not be made would only repeat its error
         issues.raise_if_any()
     world = with_dynamics(world, content.robots, issues.at("robots"))
-    places = {name: entry for name, (_, entry) in by_object(content.layout, content.objects).items()}
-    world = place_nominally(world, places, order)
+    world = place_nominally(world, content.layout, order, issues.at("layout"), content.regions)
     world = with_exclusions(world, content.collisions, issues.at("collisions"))
     world = with_sensors(world, content.cameras, content.contact_sensors, issues)
     issues.raise_if_any()

@@ -72,11 +72,14 @@ class EntityShape:
             body, joint = world.bodies[i], world.body_joint[i]
             rest = P.compose(poses[body.parent], P.pose(body.position, body.quaternion))
             poses[i] = P.compose(rest, joint_pose(world, joint, np.array(world.joints[joint].initial)))
-        own = [g for g in world.geoms if start <= g.body < stop and not is_ground(g.shape)]
-        chosen: list[Geom] = [g for g in own if g.collides] or own
-        self.shapes = tuple(
-            PlacedShape(g.shape, P.compose(poses[g.body], P.pose(g.position, g.quaternion))) for g in chosen
+        shown = [g for g in world.geoms if start <= g.body < stop and not is_ground(g.shape)]
+        chosen: list[Geom] = [g for g in shown if g.collides] or shown
+        self.collides = any(g.collides for g in shown)
+        self.owned = tuple(
+            (PlacedShape(g.shape, P.compose(poses[g.body], P.pose(g.position, g.quaternion))), g.body) for g in chosen
         )
+        """The shapes with the bodies that they are fixed to."""
+        self.shapes = tuple(shape for shape, _ in self.owned)
 
     def bounds(self, root_pose: Array) -> tuple[Array, Array]:
         """Lowest and highest corner (..., 3) [m] around the entity with its root at poses (..., 7)."""

@@ -1,163 +1,217 @@
-"""Where things are nominally: the layout with the middle of its ranges, support chains resolved."""
+"""Where things are nominally: the layout with the middle of its ranges, each thing where its supports are."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
-
-import numpy as np
 
 from anysim.conventions import GROUND, Array
 from anysim.errors import listing, suggest
 from anysim.math import pose as P
-from anysim.world.forms import INSTANCER, instances
-from anysim.world.geometry import EntityShape, ground_top
+from anysim.world.around import Impossible
+from anysim.world.geometry import EntityShape
 from anysim.world.issues import Issues
-from anysim.world.model import Body, BodyKind, Entity, Slot, World
+from anysim.world.items import Item, entry_of, items_of, meant, ordered
+from anysim.world.model import BodyKind, World
 from anysim.world.nominal import nominal
+from anysim.world.placing import candidate
 from anysim.world.rounding import split
-from anysim.world.slots import by_object, single
-from anysim_schemas.layout import PlacementSpec
-from anysim_schemas.objects import ObjectSpec
+from anysim.world.scenery import Scenery, View
+from anysim.world.solid import Placed, pose_of, row_of
+from anysim_schemas.layout import PlaceFields, PlacementSpec
+from anysim_schemas.regions import RegionSpec
+
+SPREAD = (0.8191725133961645, 0.6710436067037893, 0.5497004779019703)
+"""Steps of an even sequence in the unit cube (the powers of the inverse of the root of x^4 = x + 1)."""
 
 
-def placement_order(layout: Mapping[str, PlacementSpec]) -> tuple[list[str], list[list[str]]]:
-    """The entries with every support before what rests on it (else as written), and the cycles that prevent it.
+def _in_a_row(world: World, item: Item) -> PlacementSpec:
+    """The entry of something free that has none: on the ground, the instances of a category side by side along x."""
+    radius = EntityShape(world, world.entities[item.entities[0]].name).radius if item.instance else 0.0
+    return PlacementSpec(on=GROUND, x=2.2 * radius * item.instance, y=0.0)
 
-    A cycle is listed once, as the names along it; what is in or on a cycle is missing from the order.
+
+def placement_order(
+    layout: Mapping[str, PlacementSpec], items: Sequence[Item] = ()
+) -> tuple[list[str], list[list[str]]]:
+    """The entries with what each refers to before it (else as written), and the circles that prevent it.
+
+    With `items`, the names of items instead: all that have an entry. A circle is listed once, as the names along it;
+    what is in or on a circle is missing from the order.
     """
-    order: list[str] = []
-    cycles: list[list[str]] = []
-    state: dict[str, str] = {}
-    for start in layout:
-        chain: list[str] = []
-        name = start
-        while name in layout and name not in state:
-            state[name] = "open"
-            chain.append(name)
-            name = layout[name].on or ""
-        broken = state.get(name, "done") != "done"
-        if broken and name in chain:
-            cycles.append(chain[chain.index(name) :])
-        for link in reversed(chain):
-            state[link] = "broken" if broken else "done"
-            if not broken:
-                order.append(link)
-    return order, cycles
+    if not items:
+        return ordered({name: [other for _, other in references(layout[name])] for name in layout})
+    rank = {name: k for k, name in enumerate(layout)}
+    own = {item.name: entry for item in items if (entry := entry_of(layout, item)) is not None}
+    by_name = {item.name: item for item in items}
+    needs = {
+        name: [other.name for _, reference in references(layout[own[name]])
+               for other in meant(reference, items, by_name[name])]
+        for name in sorted(own, key=lambda name: (rank[own[name]], by_name[name].instance))
+    }  # fmt: skip
+    return ordered(needs)
+
+
+def references(entry: PlacementSpec) -> list[tuple[str, str]]:
+    """What an entry depends on, in any of its variants: the dotted key below it, and the name."""
+    found = [
+        (".".join((*keys, *path)), name) for keys, place in entry.variants() for path, name in place.references()
+        if name != GROUND
+    ]  # fmt: skip
+    return list(dict.fromkeys(found))
 
 
 def check_layout(
-    layout: Mapping[str, PlacementSpec], objects: Mapping[str, ObjectSpec], robots: Sequence[str], issues: Issues,
-    fixtures: Sequence[str] = (),
+    layout: Mapping[str, PlacementSpec], objects: Sequence[str], robots: Sequence[str], issues: Issues,
+    fixtures: Sequence[str] = (), *, instances: Sequence[str] = (), regions: Sequence[str] = (),
 ) -> list[str]:  # fmt: skip
-    """The logical objects that can be placed, in order; what is wrong goes to `issues`, at the path of the layout.
+    """The entries that can be placed, in order; what is wrong goes to `issues`, whose path is that of the layout.
 
-    `fixtures` have their place and can carry others: the furniture of a room.
+    `instances` are names of single objects where `objects` are categories; `fixtures` have their place and can be
+    referred to, as the furniture of a room.
     """
-    logical = [one for name, spec in objects.items() for one in instances(name, spec)]
-    known = list(dict.fromkeys([*objects, *logical]))
-    supports = [*logical, *robots, *fixtures, GROUND]
+    known_objects = list(dict.fromkeys([*objects, *instances]))
+    known = [*known_objects, *robots, *fixtures]
+    broken: set[str] = set()
     for name, spec in layout.items():
+        at = issues.at(name)
         if name in robots:
             issues.add(name, f"'{name}' is a robot; its place is in world.robots.{name} (position, yaw)")
-        elif name not in known:
-            issues.add(name, f"there is no object '{name}'{suggest(name, known)} (objects: {listing(known)})")
-        if spec.on is not None and spec.on not in supports:
-            several = instances(spec.on, objects[spec.on]) if spec.on in objects else ()
-            named = f"{suggest(spec.on, supports)} (objects: {listing(supports)})"
-            message = f"there is no object '{spec.on}' to rest on{named}"
-            if several:
-                message = f"there are {len(several)} of '{spec.on}'; rest on one of them: {listing(several)}"
-            issues.add(f"{name}.on", message)
-    entries = by_object(layout, objects)
-    order, cycles = placement_order({name: entry for name, (_, entry) in entries.items()})
-    for cycle in cycles:
-        issues.add(
-            f"{entries[cycle[0]][0]}.on",
-            f"the objects rest on each other in a circle: {' on '.join([*cycle, cycle[0]])}",
-        )
-    placeable = {name: entry for name, (_, entry) in entries.items() if name in logical}
-    return [name for name in order if name in placeable and placeable[name].on in (None, *supports)]
+        elif name not in known_objects:
+            issues.add(
+                name, f"there is no object '{name}'{suggest(name, known_objects)} (objects: {listing(known_objects)})"
+            )
+        for key, other in references(spec):
+            if other not in known:
+                resting = key.rpartition(".")[2] in ("on", "in", "under")
+                names = [*known, GROUND] if key.rpartition(".")[2] == "on" else known
+                purpose = "to rest on" if resting else "that its place could refer to"
+                at.add(
+                    key, f"there is no object '{other}' {purpose}{suggest(other, names)} (objects: {listing(names)})"
+                )
+                broken.add(name)
+        for path, place in spec.variants():
+            if isinstance(place.region, str) and place.region not in regions:
+                at.add(
+                    ".".join((*path, "region")),
+                    f"there is no region '{place.region}'{suggest(place.region, regions)} "
+                    f"(world.regions: {listing(regions) or 'none'})",
+                )
+                broken.add(name)
+            for other in place.clear_of:
+                if other not in known:
+                    at.add(
+                        ".".join((*path, "clear_of", other)),
+                        f"there is no object '{other}' to stay clear of{suggest(other, known)} "
+                        f"(objects: {listing(known)})",
+                    )
+    order, circles = placement_order(layout)
+    for circle in circles:
+        following = [*circle[1:], circle[0]]
+        key = next(key for key, other in references(layout[circle[0]]) if other == following[0])
+        if all(layout[name].on == other for name, other in zip(circle, following, strict=True)):
+            text = f"the objects rest on each other in a circle: {' on '.join([*circle, circle[0]])}"
+        else:
+            text = f"the places depend on each other in a circle: {' on '.join([*circle, circle[0]])}"
+        issues.add(f"{circle[0]}.{key}", text)
+    return [name for name in order if name in known_objects and name not in broken]
 
 
-def placed(
-    world: World, name: str, spec: PlacementSpec, value: Callable[[Any], Any], supports: Mapping[str, Array]
-) -> Array:
-    """The root pose (..., 7) of an object whose placement has the drawn or nominal values `value(field)`.
+def spread(number: int, count: int) -> Sequence[float]:
+    """The `number`-th of a sequence of points that fill the unit cube evenly, its middle first."""
+    return tuple((0.5 + number * step) % 1.0 for step in SPREAD[:count])
 
-    `supports` has the root poses of entities placed before; others are at the World's initial ones.
-    """
-    angles = np.stack(np.broadcast_arrays(value(spec.roll), value(spec.pitch), value(spec.yaw)), axis=-1)
-    quaternion = P.from_roll_pitch_yaw(angles)
-    if spec.position is not None:
-        position = np.asarray(value(spec.position), dtype=float)
-        shape = np.broadcast_shapes(position.shape[:-1], quaternion.shape[:-1])
-        parts = [np.broadcast_to(position, (*shape, 3)), np.broadcast_to(quaternion, (*shape, 4))]
-        return np.concatenate(parts, axis=-1)
-    x, y = np.asarray(value(spec.x), dtype=float), np.asarray(value(spec.y), dtype=float)
-    own = EntityShape(world, name)
-    if spec.on == GROUND:
-        flat = own.resting_on(np.array(0.0), x, y, quaternion)
-        low, high = own.bounds(flat)
-        return own.resting_on(ground_top(world, low[..., :2], high[..., :2]), x, y, quaternion)
-    assert spec.on is not None  # a placement has either a position or a support
-    support = EntityShape(world, world.entities[single(world, spec.on).entities[0]].name)
-    return own.resting_on(support.top_height(supports.get(spec.on, initial_root(world, spec.on))), x, y, quaternion)
+
+class _Middle:
+    """The middle of what may be drawn; what goes anywhere on one support is spread over it, one after the other."""
+
+    def __init__(self, number: int) -> None:
+        self._number = number
+
+    def value(self, field: str, value: Any) -> Any:
+        del field
+        return nominal(value)
+
+    def uniform(self, purpose: str, count: int) -> Sequence[float]:
+        if purpose == "rest":
+            return (0.0,) * count
+        return spread(self._number, count)
+
+
+def nominal_place(entry: PlacementSpec) -> PlaceFields:
+    """The place that counts where nothing is drawn: that of the episodes which a ratio leaves out, else the first."""
+    if entry.otherwise is not None:
+        return entry.otherwise
+    return entry.chosen(0) if entry.any_of else entry
 
 
 def initial_root(world: World, name: str) -> Array:
-    """The initial pose (7,) of the root of a logical object, as it is nominally."""
-    root = world.entities[single(world, name).entities[0]].root
+    """The initial pose (7,) of an entity's root."""
+    root = next(e.root for e in world.entities if e.name == name)
     return P.pose(world.bodies[root].position, world.bodies[root].quaternion)
 
 
-def roots_of(world: World, entity: Entity) -> range:
-    """The root bodies of an entity: one, or those of all instances of an instancer."""
-    return range(entity.body_start, entity.body_stop if entity.family == INSTANCER else entity.body_start + 1)
+def initially_placed(scenery: Scenery, entity: int) -> Placed:
+    """An entity at its initial pose."""
+    found = scenery.world.entities[entity]
+    body = scenery.world.bodies[found.root]
+    return scenery.solid(found.name).at(pose_of((*body.position, *body.quaternion)))
 
 
-def root_offsets(world: World, entity: Entity) -> Array:
-    """Poses (K, 7) of the root bodies of an entity in the frame of the first of them, as they are nominally."""
-    roots = [world.bodies[b] for b in roots_of(world, entity)]
-    poses = np.array([[*body.position, *body.quaternion] for body in roots])
-    return P.compose(np.broadcast_to(P.inverse(poses[0]), poses.shape), poses)
-
-
-def place_nominally(world: World, layout: Mapping[str, PlacementSpec], order: Sequence[str]) -> World:
-    """The World with its objects where the layout, by logical object, has them nominally.
+def place_nominally(
+    world: World, layout: Mapping[str, PlacementSpec], order: Sequence[str], issues: Issues | None = None,
+    regions: Mapping[str, RegionSpec] | None = None,
+) -> World:  # fmt: skip
+    """The World with its objects where the layout has them nominally.
 
     An object without an entry that moves freely is set onto the ground at the origin (several of a category in a row
     from there, along x), a fixed one with its frame there.
-    All that an object can be is at its place: no two of them are there at once.
+    What an entry asks for that no draw can give goes to `issues`, whose path is that of the layout.
     """
-    poses: dict[str, Array] = {}
-    objects = {slot.name: slot for group in world.categories.values() for slot in group}
-    free = [
-        name for name, slot in objects.items()
-        if name not in layout and world.bodies[world.entities[slot.entities[0]].root].kind is BodyKind.FREE
+    scenery = Scenery(world, regions or {})
+    items = {item.name: item for item in items_of(world)}
+    names, _ = placement_order(layout, tuple(items.values()))
+    entries = {name: entry_of(layout, items[name]) for name in items}
+    view = View(scenery)
+    for item in items.values():
+        view.placed[item.name] = initially_placed(scenery, item.entities[0])
+    loose = [
+        item.name for item in items.values()
+        if entries[item.name] is None and not item.robot
+        and world.bodies[world.entities[item.entities[0]].root].kind is BodyKind.FREE
     ]  # fmt: skip
+    rows: dict[int, Array] = {}
+    count: dict[str, int] = {}
+    for name in [*(n for n in names if entries[n] in order), *loose]:
+        entry = entries[name]
+        spec = _in_a_row(world, items[name]) if entry is None else layout[entry]
+        place, view.by = nominal_place(spec), items[name]
+        view.places[name] = place
+        number = count[entry or ""] = count.get(entry or "", -1) + 1
+        for entity in reversed(items[name].entities):  # the first one is what the others see
+            solid = scenery.solid(world.entities[entity].name)
+            found = candidate(solid, place, lambda s=solid: scenery.resting(s.name), _Middle(number), view)
+            if not isinstance(found, Impossible):
+                view.placed[name] = found.placed
+                rows[entity] = row_of(found.pose, found.quaternion)
+            elif found.hopeless and issues is not None and number == 0:
+                issues.add(str(entry), f"'{name}' cannot be placed: {found.reason}")
     bodies = list(world.bodies)
-    for name in [*order, *free]:
-        if name not in objects:  # an object whose import failed is not there
-            continue
-        for index in reversed(objects[name].entities):  # the nominal one last: others rest on it
-            entity = world.entities[index]
-            entry = layout.get(name) or _in_a_row(world, objects[name], entity)
-            pose = placed(world, entity.name, entry, nominal, poses)
-            _move(world, bodies, entity, pose)
-        poses[name] = pose
+    for entity, row in rows.items():
+        position, quaternion = split(row)
+        for body, pose in roots_at(world, entity, row, position, quaternion):
+            bodies[body] = replace(bodies[body], position=pose[0], quaternion=pose[1])
     return replace(world, bodies=tuple(bodies))
 
 
-def _in_a_row(world: World, slot: Slot, entity: Entity) -> PlacementSpec:
-    """The entry of what has none: on the ground, the instances of a category side by side."""
-    step = 0.0 if slot.instance == 0 else 2.2 * EntityShape(world, entity.name).radius
-    return PlacementSpec(on=GROUND, x=step * slot.instance)
-
-
-def _move(world: World, bodies: list[Body], entity: Entity, pose: Array) -> None:
-    """Put the root of an entity to a pose (7,), and with it the other roots that it has."""
-    placed = P.compose(np.broadcast_to(pose, (len(roots_of(world, entity)), 7)), root_offsets(world, entity))
-    placed[0] = pose
-    for i, one in zip(roots_of(world, entity), placed, strict=True):
-        position, quaternion = split(one)
-        bodies[i] = replace(world.bodies[i], position=position, quaternion=quaternion)
+def roots_at(
+    world: World, entity: int, row: Array, position: Any, quaternion: Any
+) -> list[tuple[int, tuple[Any, Any]]]:
+    """The pose of each body of an entity that hangs on no other, its first one at `row` (7,)."""
+    found = world.entities[entity]
+    roots = [(found.root, (position, quaternion))]
+    first = P.inverse(P.pose(world.bodies[found.root].position, world.bodies[found.root].quaternion))
+    for body in range(found.body_start + 1, found.body_stop):
+        own = world.bodies[body]
+        if own.kind is not BodyKind.LINK:
+            roots.append((body, split(P.compose(row, P.compose(first, P.pose(own.position, own.quaternion))))))
+    return roots
