@@ -29,7 +29,7 @@ from anysim_sapien.rays import cast
 from anysim_sapien.recipe import Recipe
 from anysim_sapien.scene import EnvScene
 from anysim_sapien.state import StateReader
-from anysim_sapien.stepping import advance, pasts_of, relive, wrenches
+from anysim_sapien.stepping import advance, pasts_of, refuse_pasts, relive, wrenches
 
 _BUILT = ("_recipe", "_layout", "_drives", "_parameters", "_momentum", "_reader", "_fields", "_wrench", "_scenes")
 """What `_build` makes and `_free` lets go of."""
@@ -211,6 +211,11 @@ class SapienEngine(SimEngine):
         scenes = [self._scenes[env] for env in ids]
         data = pasts_of(scenes) if level is SnapshotLevel.TRAJECTORY else motions_of(scenes, self._layout)
         return data | {"effort": self._drives.effort[ids]} | self._reader.rows(ids)
+
+    @classmethod
+    def _refuse_rows(cls, data: Mapping[str, Array], level: SnapshotLevel) -> None:
+        if level is SnapshotLevel.TRAJECTORY:
+            refuse_pasts(data)
 
     def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:
         for row, env in enumerate(ids.tolist()):

@@ -366,6 +366,12 @@ class SimEngine(Primitives):
             if name in ("actuator.kp", "actuator.kd"):
                 self._commands.control_changed = True
 
+    def built_parameters(self, name: str) -> Array:
+        """Values (K, ...) of a parameter that the World gives, whatever they are now."""
+        with self._lock:
+            self._parameter(name, None, None)
+            return self._default_parameter(name).copy()
+
     def _parameter(self, name: str, env_ids: EnvIds, indices: Indices) -> tuple[Any, Array, Array]:
         self._require_world()
         parameter = PARAMETERS.get(name)
@@ -397,6 +403,7 @@ class SimEngine(Primitives):
             self._require_world()
             ids = self._ids(env_ids)
             checks.same_stamp(snapshot, self.name, self.version, self.world.hash, len(ids))
+            saving.refuse_foreign(self, snapshot)
             saving.put_back(self, ids, snapshot)
 
     # ------------------------------------------------------------------ sensing

@@ -7,6 +7,7 @@ import numpy as np
 from anysim.conventions import GROUND, Array
 from anysim.errors import TaskError
 from anysim.managers.base import Manager
+from anysim.managers.overrides import WORLD, Overridable, drawn
 from anysim.managers.values import draw
 from anysim.math import pose as P
 from anysim.world.geometry import EntityShape, ground_top
@@ -42,6 +43,14 @@ class LayoutManager(Manager):
         fixed = self._roots[~self._free]
         if len(fixed):
             self.engine.set_body_state(poses[:, ~self._free], None, env_ids, fixed)
+
+    def overridable(self) -> list[Overridable]:
+        entries: list[Overridable] = []
+        for name in self._order:
+            entry = self.spec.world.layout[name]
+            place = ("position",) if entry.on is None else ("x", "y")
+            entries += drawn(f"{WORLD}layout.{name}", entry, (*place, "roll", "pitch", "yaw"))
+        return entries
 
     def _place(self, env: int) -> Array:
         """Poses (K, 7) of the placed objects of one env, in `_order`."""

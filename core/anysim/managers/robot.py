@@ -11,6 +11,7 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.errors import SpecError, SpecIssue, TaskError, listing, suggest
 from anysim.managers.base import Manager
+from anysim.managers.overrides import WORLD, Overridable, drawn
 from anysim.managers.streams import Origin
 from anysim.managers.values import draw_rows
 from anysim.signatures import options_model
@@ -97,6 +98,12 @@ class RobotManager(Manager):
         for s in self.slices:
             s.controller.reset(env_ids, self._targets[np.ix_(env_ids, s.controller.channel.actuators)])
         self.engine.set_control(position=self._targets[env_ids], env_ids=env_ids)
+
+    def overridable(self) -> list[Overridable]:
+        robots = self.spec.world.robots
+        return [
+            e for r in self._world.robots for e in drawn(f"{WORLD}robots.{r.name}", robots[r.name], ("home_noise",))
+        ]
 
     def _add_noise(
         self, position: Array, column: int, joint: int, robot: str, deviation: Array, env_ids: Array

@@ -8,12 +8,14 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import AnysimError, SpecError, SpecIssue, TaskError
+from anysim.managers.overrides import Overridable
 from anysim.managers.streams import Streams
-from anysim.managers.values import draw_rows
+from anysim.managers.values import draw_rows, is_random
+from anysim.signatures import options_model
 from anysim.task.contract import Obs
-from anysim.task.library import bind
+from anysim.task.library import bind, find
 from anysim.task.view import SceneView
-from anysim_schemas.task import TaskSpec
+from anysim_schemas.task import EventTermSpec, TaskSpec
 
 Term = Callable[..., Any]
 
@@ -116,6 +118,20 @@ class Mdp:
         for term in self._failure.values():
             failure |= term()
         return self.held[rows] >= self.spec.hold, failure
+
+    def overridable(self) -> list[Overridable]:
+        """The parameters of commands and events that are drawn; those of events in steps may change midway."""
+        entries: list[Overridable] = []
+        for kind, section, terms in (("command", "command", self.spec.command), ("event", "events", self.spec.events)):
+            for name, term in terms.items():
+                midway = isinstance(term, EventTermSpec) and term.when == "step"
+                values = options_model(find(kind, term.term)).model_validate(term.params)
+                entries += [
+                    Overridable(f"task.{section}.{name}.{key}", values, key, midway=midway)
+                    for key in type(values).model_fields
+                    if is_random(getattr(values, key))
+                ]
+        return entries
 
     def snapshot(self, env_ids: Array) -> dict[str, Array]:
         """Copies of the goals and counters."""
