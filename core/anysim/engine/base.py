@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine import checks, saving
+from anysim.engine import carrying, checks, saving
 from anysim.engine.actuation import check_drives
 from anysim.engine.allowance import Allowance
 from anysim.engine.cameras import CameraRig
@@ -33,6 +33,7 @@ from anysim.engine.state import (
     SnapshotLevel,
     State,
 )  # fmt: skip
+from anysim.engine.world_state import Carried, Missing, WorldState
 from anysim.errors import CapabilityError, EngineError, listing
 from anysim.world.model import BodyKind, ControlMode, World
 
@@ -405,6 +406,24 @@ class SimEngine(Primitives):
             checks.same_stamp(snapshot, self.name, self.version, self.world.hash, len(ids))
             saving.refuse_foreign(self, snapshot)
             saving.put_back(self, ids, snapshot)
+
+    def world_state(self, env_ids: EnvIds = None) -> WorldState:
+        """Where everything is, by name, in a form for any engine; close and not exact, unlike a snapshot."""
+        with self._lock:
+            self._require_world()
+            return carrying.read(self, self._ids(env_ids))
+
+    def set_world_state(self, state: WorldState, env_ids: EnvIds = None, missing: Missing = "refuse") -> Carried:
+        """Put envs into a state, from whatever engine and world, as if they had just been reset into it.
+
+        Where names differ: `refuse`, or carry over what both have and `keep` the rest. Returns what differs.
+
+        Raises:
+            SnapshotError: names differ and that is refused, or another number of rows; nothing was changed.
+        """
+        with self._lock:
+            self._require_world()
+            return carrying.write(self, state, self._ids(env_ids), missing)
 
     # ------------------------------------------------------------------ sensing
 
