@@ -83,7 +83,9 @@ BLOCKS_ONLY: dict[str, Any] = {
     | {
         "horizon": 5,
         "on_success": "continue",
-        "observations": {"policy": [{"term": "frame_pose", "frame": "block"}, {"term": "frame_twist", "frame": "ball"}]},
+        "observations": {
+            "policy": [{"term": "frame_pose", "frame": "block"}, {"term": "frame_twist", "frame": "ball"}]
+        },
         "rewards": {"close": {"term": "distance", "a": "block", "b": "goal", "weight": -1.0}},
         "events": {"polish": SLIDE["task"]["events"]["polish"]},
     },

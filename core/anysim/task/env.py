@@ -118,6 +118,8 @@ class TaskEnv:
         """
         ids = self._chosen(mask)
         plan = self.counterfactuals.checked(overrides, len(ids), midway=False)
+        if len(ids) == 0:  # managers need not know how to reset nobody
+            return {g: r[:0] for g, r in self.mdp.observe().items()}, {k: v[ids] for k, v in self._info().items()}
         if seed is not None:
             self.streams.seed(seed, ids)
         self.counterfactuals.over(ids)
@@ -152,7 +154,7 @@ class TaskEnv:
 
     def _store(self, rows: Obs, ids: Array | None) -> None:
         """Keep the latest observation: a fresh array for a full batch, rows written into the present one otherwise."""
-        if ids is None or len(ids) == self.num_envs:
+        if ids is None or np.array_equal(ids, np.arange(self.num_envs)):  # all of them may come in another order
             self._obs = rows
             return
         for group, values in rows.items():

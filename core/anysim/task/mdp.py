@@ -74,10 +74,14 @@ class Mdp:
             if self.spec.events[name].when == when:
                 term(partial(self._draw, f"event/{name}", tick))
 
-    def _draw(self, stream: str, tick: Any, name: str, value: Any) -> Array:
+    def _draw(self, stream: str, tick: Any, name: str, value: Any, where: Array | None = None) -> Array:
+        """Draw for the rows at hand, or for those of them where `where` (n,) is true."""
+        env_ids = self.scene.env_ids
+        if where is not None:
+            env_ids, tick = env_ids[where], np.broadcast_to(tick, len(env_ids))[where]
         section, _, term = stream.partition("/")
         source = f"task.{'events' if section == 'event' else section}.{term}.{name}"
-        return draw_rows(value, f"task/{stream}/{name}", self.streams, self.scene.env_ids, tick, source=source)
+        return draw_rows(value, f"task/{stream}/{name}", self.streams, env_ids, tick, source=source)
 
     def observe(self) -> Obs:
         """All groups for the rows at hand, float32 (n, D)."""
