@@ -28,13 +28,15 @@ def get() -> Iterator[Get]:
 
 
 @pytest.fixture(scope="module")
-def alone(get: Get) -> Callable[[str, str], Alone]:
+def alone() -> Iterator[Callable[..., Alone]]:
     """`alone("mujoco", "slide")`: episodes of an env that is alone."""
     made: dict[tuple[str, str], Alone] = {}
 
     def one(engine: str, spec: str = "slide") -> Alone:
         if (engine, spec) not in made:
-            made[engine, spec] = Alone(get(engine, 1, spec))
+            made[engine, spec] = Alone(light.make(engine, 1, light.SPECS[spec]))
         return made[engine, spec]
 
-    return one
+    yield one
+    for one_alone in made.values():
+        one_alone.env.close()

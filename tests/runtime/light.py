@@ -1,4 +1,4 @@
-"""A light task that has everything the runtime deals with, so that a real engine runs thousands of its steps in seconds.
+"""A light task with everything that the runtime deals with: real engines run thousands of its steps in seconds.
 
 A planar arm of two joints pushes a sliding block and a ball on the ground. Fields are drawn by every kind of value,
 gated and shared ones among them, in layout, scene, robot, command and events of both kinds.
@@ -54,7 +54,9 @@ SLIDE: dict[str, Any] = {
             },
         },
         "layout": {
-            "block": {"on": "terrain", "x": {"range": [0.3, 0.4]}, "y": {"range": [0.08, 0.2]}, "yaw": {"range": [-3, 3]}},
+            "block": {
+                "on": "terrain", "x": {"range": [0.3, 0.4]}, "y": {"range": [0.08, 0.2]}, "yaw": {"range": [-3, 3]},
+            },
             "ball": {"on": "terrain", "x": {"range": [0.3, 0.5]}, "y": {"range": [-0.3, -0.1]}, "clearance": 0.01},
         },
     },
@@ -124,5 +126,5 @@ def make(engine: str, num_envs: int, spec: Mapping[str, Any] = SLIDE, *, shards:
     if engine == "null" and "shove" in events:  # nothing can be pushed there
         spec = {**spec, "task": spec["task"] | {"events": events | {"shove": _RUB}}}
     entry = CatalogueEntry(load(RobotModelSpec, dict(ARM)).spec, HERE / "two_link.yaml")
-    with mock.patch("anysim.world.compile_robot.load_robot", lambda name: entry):
+    with mock.patch("anysim.world.compile_robot.load_robot", return_value=entry):
         return anysim.make({**spec, "engine": {"name": engine, "shards": shards}}, num_envs=num_envs)

@@ -1,8 +1,8 @@
 """A small model of the contract of TaskEnv, which says what any program of calls must come to.
 
-An env's episode is a function of its episode seed and its actions alone. So what env 2 of four shows after resets, steps
-and snapshots in any order is what an env that is all alone shows at the same step of the same episode. `Alone` runs
-such an env, once for each episode; `Model` keeps for each env which episode it is in, and where.
+An env's episode is a function of its episode seed and its actions alone. So what env 2 of four shows after resets,
+steps and snapshots in any order is what an env that is all alone shows at the same step of the same episode. `Alone`
+runs such an env, once for each episode; a `Row` keeps for an env which episode it is in, and where.
 """
 
 from dataclasses import dataclass
@@ -47,13 +47,13 @@ class Alone:
 
     def __init__(self, env: TaskEnv) -> None:
         assert env.num_envs == 1
-        self._env = env
+        self.env = env
         self._episodes: dict[int, list[Moment]] = {}
 
     def at(self, seed: int, step: int) -> Moment:
         """What there is to see after `step` steps of an episode."""
         if seed not in self._episodes:
-            env = self._env
+            env = self.env
             env.reset(episode_seeds=[seed])
             seen = [moment(env, 0, 0.0)]
             while env.running[0]:

@@ -235,7 +235,8 @@ class SimEngine(Primitives):
                 self._apply_wrench(commands.wrench)
             self._step(n_steps, ids)
             if commands.wrench is not None:
-                self._apply_wrench(commands.spend_wrench(ids))
+                commands.spend_wrench(ids)
+                self._apply_wrench(None)  # what waits for others comes with their step, unless a reset forgets it
             if ids is None:
                 self._ticks += n_steps
             else:

@@ -150,5 +150,6 @@ def _merged(ours: Sequence[str], here: Array, theirs: Sequence[str], values: Arr
     places: Mapping[str, int] = {name: i for i, name in enumerate(theirs)}
     pairs = np.array([(i, places[n]) for i, n in enumerate(ours) if n in places], dtype=int).reshape(-1, 2)
     merged = np.array(here)
-    merged[:, pairs[:, 0]] = values[:, pairs[:, 1]]
+    if len(pairs):
+        merged[:, pairs[:, 0]] = values[:, pairs[:, 1]]
     return merged

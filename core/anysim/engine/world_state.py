@@ -145,9 +145,9 @@ class WorldState:
     @classmethod
     def _of(cls, tree: Mapping[str, Any]) -> "WorldState":
         parameters = {name: NamedRows(tuple(p["names"]), p["values"]) for name, p in tree["parameters"].items()}
-        given = {f.name: tree[f.name] for f in fields(cls)}
-        named = {name: tuple(value) for name, value in given.items() if isinstance(value, list)}
-        state = cls(**(given | named | {"parameters": parameters}))
+        given: dict[str, Any] = {f.name: tree[f.name] for f in fields(cls)} | {"parameters": parameters}
+        given |= {name: tuple(value) for name, value in given.items() if isinstance(value, list)}
+        state = cls(**given)
         shapes = {"present": (len(state.entities),), "body_pose": (len(state.bodies), 7),
                   "body_twist": (len(state.bodies), 6), "joint_pos": (len(state.joints),),
                   "joint_vel": (len(state.joints),)}  # fmt: skip

@@ -49,14 +49,19 @@ class Counterfactuals:
                 self._streams.override(int(env), self.paths[path].source, value)
 
     def settle(self, env_ids: Array, plan: Plan) -> None:
-        """The managers have reset: write what none of them draws, and mark everything."""
+        """The managers have reset: write what none of them draws."""
         for env, values in zip(env_ids, plan, strict=True):
             for path, value in values.items():
                 source = self.paths[path].source
                 drawn = any(origin.source == source for origin in self._streams.origins[env].values())
                 if not drawn and self.paths[path].midway and path in self._owners:
                     self._owners[path].override(path, value, np.array([env]))
-                self._streams.note_override(int(env), source)
+
+    def mark(self, env_ids: Array, plan: Plan) -> None:
+        """All has been drawn that is drawn at a reset: mark every override among the draws."""
+        for env, values in zip(env_ids, plan, strict=True):
+            for path in values:
+                self._streams.note_override(int(env), self.paths[path].source)
 
     def change(self, env_ids: Array, plan: Plan) -> None:
         """Write values in the middle of episodes."""

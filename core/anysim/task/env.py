@@ -134,6 +134,7 @@ class TaskEnv:
         self._code[ids], self._fault[ids], self._success[ids] = RUNNING, False, False
         self.scene.look(ids)
         self.mdp.reset(ids)
+        self.counterfactuals.mark(ids, plan)
         rows = self.mdp.observe()
         self._store(rows, ids)
         self._hooks.before_episode(env=self, env_ids=ids)
