@@ -67,10 +67,10 @@ def draw(value: Any, name: str, streams: Streams, env: int, tick: int = 0, *, so
     if not is_random(value):
         return value
     stream = name if value.shared is None else f"shared/{value.shared}"
-    if value.ratio < 1.0 and streams.generator(env, f"{name}/ratio", tick).random() >= value.ratio:
+    if value.ratio < 1.0 and streams.quantiles(env, f"{name}/ratio", tick)() >= value.ratio:
         stream, drawn = f"{name}/ratio", nominal(value)
     else:
-        drawn = draw_one(value, streams.generator(env, stream, tick if value.shared is None else 0).random)
+        drawn = draw_one(value, streams.quantiles(env, stream, tick if value.shared is None else 0))
     streams.note(env, name if tick == 0 else f"{name}@{tick}", drawn, Origin(stream, source))
     return drawn
 

@@ -1,8 +1,9 @@
 """The environment stream of a trajectory as WorldStates: any recorded step can be gone on from, on any engine."""
 
+from typing import Any
+
 import numpy as np
 
-from anysim.conventions import Array
 from anysim.engine.commands import Control
 from anysim.engine.world_state import WorldState
 from anysim.errors import RecordError, listing
@@ -30,7 +31,7 @@ def world_state(reader: TrajectoryReader, step: int) -> WorldState:
         raise RecordError(f"{reader.directory} has the steps {first} to {reader.manifest.steps}, not {step}")
     arrays = reader.initial_state if step == 0 else {name: rows[step - 1] for name, rows in reader.states.items()}
     rows = {name: np.array(arrays[name], dtype=float)[None] for name in _MOTION}
-    commands: dict[str, Array] = {}
+    commands: dict[str, Any] = {}
     if "control_position" in layout.state:
         none = np.zeros(len(layout.actuators))
         commands = {name: np.array(arrays.get(name, none), dtype=float)[None] for name in _COMMANDS}
