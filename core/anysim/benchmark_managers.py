@@ -8,8 +8,7 @@ each clock counts; the share is a ratio of two clocks of one run.
 
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,18 +56,6 @@ class Clock:
         self._stack: list[tuple[str, bool]] = [(_REST, False)]
         self._since = time.perf_counter()
 
-    @contextmanager
-    def at_work(self, part: str | None) -> Iterator[None]:
-        """A part begins; None is the engine, on behalf of whoever called it."""
-        self._turn()
-        # an engine's method that calls another of its own is the engine all the while
-        self._stack.append((self._stack[-1][0], True) if part is None else (part, False))
-        try:
-            yield
-        finally:
-            self._turn()
-            self._stack.pop()
-
     def _turn(self) -> None:
         now = time.perf_counter()
         self.spent[self._stack[-1]] += now - self._since
@@ -85,12 +72,19 @@ class Clock:
         return dict(self.spent)
 
     def watch(self, owner: Any, method: str, part: str | None) -> Callable[[], None]:
-        """Measure a method of one object; call what it returns to leave off."""
-        inner = getattr(owner, method)
+        """Measure a method of one object, as the engine's where `part` is None; call what it returns to leave off."""
+        inner, stack = getattr(owner, method), self._stack
 
         def timed(*arguments: Any, **keywords: Any) -> Any:
-            with self.at_work(part):
+            if part is None and stack[-1][1]:  # an engine's method that calls another of its own
                 return inner(*arguments, **keywords)
+            self._turn()
+            stack.append((stack[-1][0], True) if part is None else (part, False))
+            try:
+                return inner(*arguments, **keywords)
+            finally:
+                self._turn()
+                stack.pop()
 
         setattr(owner, method, timed)
         return lambda: delattr(owner, method)
