@@ -20,8 +20,8 @@ STEP_BUDGET = 0.10
 RESET_BUDGET_MS = 2.0
 """For each env of a reset, without the engine."""
 _ENGINE = (
-    "step", "reset", "get_state", "_read_locked", "set_joint_state", "set_body_state", "set_control", "set_parameters", "set_camera_pose",
-    "apply_wrench", "get_parameters",
+    "step", "reset", "get_state", "_read_locked", "set_joint_state", "set_body_state", "set_control",
+    "set_parameters", "set_camera_pose", "apply_wrench", "get_parameters",
 )  # fmt: skip
 _TERMS = ("reset", "observe", "judge", "reward", "interval_events")
 _TASK, _REST = "task", "streams and bookkeeping"

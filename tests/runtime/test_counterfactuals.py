@@ -1,10 +1,15 @@
 """The same episode with one factor changed: it differs from when that factor acts, and no other draw moves."""
 
+import json
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from anysim.errors import CapabilityError, TaskError
 from anysim.managers.streams import OVERRIDDEN
+from anysim.record import replay
+from anysim.record.plain import dump_json
 from tests.runtime import light
 from tests.runtime.model import STATE, action
 
@@ -185,3 +190,15 @@ def test_what_cannot_be_overridden_is_refused_with_a_reason(get) -> None:
     with pytest.raises(TaskError, match="did you mean"):
         env.reset(seed=1, overrides={"layout.block.xx": 0.1})
     assert env.streams.episode_seed.tolist() == list(snapshot.streams["episode_seed"])
+
+
+def test_a_recorded_episode_is_replayed_with_its_overrides(get) -> None:
+    """What a manifest says of them is plain data, and enough."""
+    env = get("null", 1)
+    env.reset(seed=3, overrides={"layout.block.x": 0.31, "objects.ball.color": (0.5, 0.25, 0.0)})
+    first, seed = env.obs["policy"], int(env.streams.episode_seed[0])
+    said = json.loads(dump_json(env.streams.overridden[0]))
+    env.reset(seed=9)
+    replay.begin(env, SimpleNamespace(episode_seed=seed, overridden=said))
+    assert (env.obs["policy"] == first).all()
+    assert env.streams.overridden[0]["world.objects.ball.color"] == (0.5, 0.25, 0.0)
