@@ -32,7 +32,7 @@ from anysim_sapien.rays import cast
 from anysim_sapien.recipe import Recipe, Recipes
 from anysim_sapien.scene import EnvScene
 from anysim_sapien.state import StateReader
-from anysim_sapien.stepping import advance, pasts_of, relive, wrenches
+from anysim_sapien.stepping import advance, pasts_of, refuse_pasts, relive, wrenches
 
 SKINS = ("color", "texture", "material")
 
@@ -237,6 +237,11 @@ class SapienEngine(SimEngine):
         scenes = [self._scenes[env] for env in ids]
         data = pasts_of(scenes) if level is SnapshotLevel.TRAJECTORY else motions_of(scenes)
         return data | {"effort": self._drives.effort[ids]} | self._reader.rows(ids) | self._parameters.rows(ids)
+
+    @classmethod
+    def _refuse_rows(cls, data: Mapping[str, Array], level: SnapshotLevel) -> None:
+        if level is SnapshotLevel.TRAJECTORY:
+            refuse_pasts(data)
 
     def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:
         self._parameters.put_rows(ids, data)

@@ -15,6 +15,9 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.errors import SnapshotError
 
+FORMAT = 1
+"""Of the entries, in a snapshot: a new number for each change of what an entry means, or of what is done for it."""
+
 _HEAD = struct.Struct("=dd")
 _COUNT = struct.Struct("=d")
 

@@ -7,8 +7,9 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.commands import Control
+from anysim.errors import SnapshotError
 from anysim_sapien.drives import Drives
-from anysim_sapien.journal import Op, entries
+from anysim_sapien.journal import FORMAT, Op, entries
 from anysim_sapien.momentum import Momentum
 from anysim_sapien.native import drives_of
 from anysim_sapien.recipe import Recipe, Values
@@ -89,7 +90,30 @@ def pasts_of(scenes: Sequence[EnvScene]) -> dict[str, Array]:
     rows = np.zeros((len(scenes), length.max(initial=0)))
     for row, journal in zip(rows, journals, strict=True):
         row[: len(journal)] = journal
-    return data | {"journal": rows, "length": length}
+    return data | {"journal": rows, "length": length, "journal_format": np.full(len(scenes), FORMAT)}
+
+
+def refuse_pasts(data: Mapping[str, Array]) -> None:
+    """Refuse rows that `relive` could not read.
+
+    Raises:
+        SnapshotError: of another format, or damaged.
+    """
+    wanted = {"journal", "length", *(f"base.{name}" for name in Values._fields)}
+    missing = sorted(wanted - data.keys())
+    if missing:
+        raise SnapshotError(f"the snapshot is damaged: it has no '{missing[0]}'; take a new one")
+    other = [int(number) for number in data.get("journal_format", np.zeros(1)) if number != FORMAT]
+    if other:
+        raise SnapshotError(
+            f"the snapshot's journal has format {other[0]}, this anysim-sapien reads {FORMAT}; nothing was changed. "
+            f"Take a new one, replay its episode here from seed and actions, or carry a WorldState over"
+        )
+    for row, length in zip(data["journal"], data["length"], strict=True):
+        if not 0 <= length <= len(row):
+            raise SnapshotError(f"the snapshot is damaged: a journal of {len(row)} numbers says that it has {length}")
+        for _ in entries(row[: int(length)]):
+            pass
 
 
 def relive(recipe: Recipe, data: Mapping[str, Array], row: int) -> tuple[EnvScene, Drives, Momentum]:

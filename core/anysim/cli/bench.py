@@ -100,6 +100,47 @@ def shards(
     )
 
 
+@app.command("managers")
+def managers(
+    engine: Annotated[
+        str, typer.Option("--engine", "-e", help="Engines, separated by commas; `all` are those with a raw loop.")
+    ] = "all",
+    num_envs: Annotated[int, typer.Option("--num-envs", "-n", min=1, help="Envs.")] = 16,
+    task: Annotated[str, typer.Option(help="The task.")] = "pick_cube",
+    rounds: Annotated[int, typer.Option(min=1, help="Control steps and, a tenth as many, resets.")] = 300,
+    json: AsJson = False,
+) -> None:
+    """What managers, terms and streams cost: their share of a control step, and milliseconds of a reset.
+
+    Each part's own time is told from that of the engine at its calls. The budget of a reset is without the engine: what
+    it takes to write a friction, or to build a scene anew, is its own.
+    """
+    from anysim.benchmark import engines_with_raw_loop
+    from anysim.benchmark_managers import RESET_BUDGET_MS, STEP_BUDGET, reset_costs, step_costs, task_env
+    from anysim.cli.output import print_json, print_table
+
+    names = engines_with_raw_loop() if engine == "all" else [name.strip() for name in engine.split(",")]
+    steps, resets = [], []
+    for name in names:
+        typer.echo(f"measuring {num_envs} envs on {name}…", err=True)
+        with task_env(name, num_envs, task) as env:
+            steps += step_costs(env, rounds)
+            resets += reset_costs(env, max(1, rounds // 10))
+    if json:
+        print_json({"steps": [s._asdict() for s in steps], "resets": [r._asdict() for r in resets]})
+        return
+    print_table(
+        f"A control step of {task} of {num_envs} envs [ms]; budget {STEP_BUDGET:.0%} for what is not the engine's",
+        ("engine", "part", "own", "engine at its calls", "share"),
+        [(c.engine, c.part, f"{c.own_ms:.3f}", f"{c.engine_ms:.3f}", f"{c.share:.1%}") for c in steps],
+    )
+    print_table(
+        f"A reset of {task} [ms for each env]; budget {RESET_BUDGET_MS:g} for all that is not the engine's",
+        ("engine", "part", "own", "engine at its calls"),
+        [(c.engine, c.part, f"{c.own_ms:.3f}", f"{c.engine_ms:.3f}") for c in resets],
+    )
+
+
 @app.command("resets")
 def resets(
     engine: Annotated[

@@ -5,7 +5,7 @@ import sys
 import typer
 
 from anysim import __version__
-from anysim.cli import audit, bench, check, compare, doctor, explain, listing, picture, replay, run, schema
+from anysim.cli import audit, bench, check, compare, doctor, explain, listing, picture, replay, run, schema, snapshot
 
 EXIT_CODES = """Exit codes: 0 done; 1 it ran, and the answer is no (a replay that differs, a file with faults, too few
 successes); 2 bad input; 130 interrupted."""
@@ -30,6 +30,7 @@ app.command("compare")(compare.compare)
 app.command("picture")(picture.picture)
 app.command("schema")(schema.schema)
 app.add_typer(bench.app, name="bench")
+app.add_typer(snapshot.app, name="snapshot")
 
 
 def _version(show: bool) -> None:

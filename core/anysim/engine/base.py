@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine import checks, saving, writing
+from anysim.engine import carrying, checks, saving, writing
 from anysim.engine.actuation import check_drives
 from anysim.engine.allowance import Allowance
 from anysim.engine.cameras import CameraRig
@@ -32,6 +32,7 @@ from anysim.engine.state import (
     SnapshotLevel,
     State,
 )  # fmt: skip
+from anysim.engine.world_state import Carried, Missing, WorldState
 from anysim.errors import CapabilityError, EngineError, listing
 from anysim.world.model import ControlMode, World
 
@@ -239,7 +240,8 @@ class SimEngine(Primitives):
                 self._apply_wrench(commands.wrench)
             self._step(n_steps, ids)
             if commands.wrench is not None:
-                self._apply_wrench(commands.spend_wrench(ids))
+                commands.spend_wrench(ids)
+                self._apply_wrench(None)  # what waits for others comes with their step, unless a reset forgets it
             if ids is None:
                 self._ticks += n_steps
             else:
@@ -340,6 +342,12 @@ class SimEngine(Primitives):
             self._require_world()
             writing.write_parameter(self, name, values, env_ids, indices)
 
+    def built_parameters(self, name: str) -> Array:
+        """Values (K, ...) of a parameter that the World gives, whatever they are now."""
+        with self._lock:
+            self._require_world()
+            return writing.built_parameter(self, name)
+
     # ------------------------------------------------------------------ snapshots
 
     def snapshot(self, env_ids: EnvIds = None, level: SnapshotLevel | str = SnapshotLevel.TRAJECTORY) -> Snapshot:
@@ -360,7 +368,26 @@ class SimEngine(Primitives):
             self._require_world()
             ids = self._ids(env_ids)
             checks.same_stamp(snapshot, self.name, self.version, self.world.hash, len(ids))
+            saving.refuse_foreign(self, snapshot)
             saving.put_back(self, ids, snapshot)
+
+    def world_state(self, env_ids: EnvIds = None) -> WorldState:
+        """Where everything is, by name, in a form for any engine; close and not exact, unlike a snapshot."""
+        with self._lock:
+            self._require_world()
+            return carrying.read(self, self._ids(env_ids))
+
+    def set_world_state(self, state: WorldState, env_ids: EnvIds = None, missing: Missing = "refuse") -> Carried:
+        """Put envs into a state, from whatever engine and world, as if they had just been reset into it.
+
+        Where names differ: `refuse`, or carry over what both have and `keep` the rest. Returns what differs.
+
+        Raises:
+            SnapshotError: names differ and that is refused, or another number of rows; nothing was changed.
+        """
+        with self._lock:
+            self._require_world()
+            return carrying.write(self, state, self._ids(env_ids), missing)
 
     # ------------------------------------------------------------------ sensing
 

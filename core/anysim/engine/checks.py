@@ -116,8 +116,8 @@ def same_stamp(snapshot: Snapshot, engine: str, version: str, world_hash: str, r
     ):
         if theirs != ours:
             raise SnapshotError(
-                f"the snapshot was taken with {what} {theirs}, this is {ours}; "
-                f"take a new one, or carry a WorldState over"
+                f"the snapshot was taken with {what} {theirs}, this is {ours}; nothing was changed. Take a new one, "
+                f"replay its episode here from seed and actions, or carry a WorldState over"
             )
     if snapshot.num_envs != rows_wanted:
         raise SnapshotError(f"the snapshot holds {snapshot.num_envs} envs, {rows_wanted} were asked for; pass env_ids")

@@ -85,6 +85,10 @@ class Primitives(ABC):
         their end are to be passed over, since rows of several engines may be joined.
         """
 
+    @classmethod
+    def _refuse_rows(cls, data: Mapping[str, Array], level: SnapshotLevel) -> None:
+        """Raise SnapshotError where `_restore` could not read these rows: they may come from a file."""
+
     @abstractmethod
     def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:
         """Write rows that `_snapshot` made."""

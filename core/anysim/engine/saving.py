@@ -1,11 +1,15 @@
 """What a snapshot holds beside the engine's own rows, in which order it is put back, and how snapshots are joined."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.engine import container
+from anysim.engine.commands import Control
 from anysim.engine.parameters import PARAMETERS
 from anysim.engine.state import Snapshot, SnapshotLevel
 from anysim.errors import SnapshotError
@@ -30,6 +34,26 @@ def take(engine: "SimEngine", ids: Array, level: SnapshotLevel) -> Snapshot:
     data |= {f"engine.{name}": rows for name, rows in engine._snapshot(ids, level).items()}
     copies = {name: np.array(rows) for name, rows in data.items()}
     return Snapshot(engine.name, engine.version, engine.world.hash, level, copies)
+
+
+def refuse_foreign(engine: "SimEngine", snapshot: Snapshot) -> None:
+    """Refuse data that this engine did not make, before anything is changed.
+
+    Raises:
+        SnapshotError: rows are missing, have other shapes, or are in a form that the engine no longer reads.
+    """
+    data, world = snapshot.data, engine.world
+    drives, cameras = (len(world.actuators),), (len(world.cameras), 7)
+    shapes = {"ticks": (), "cameras": cameras} | {f"commands.{name}": drives for name in Control._fields}
+    if engine._presence.varies:
+        shapes["present"] = (len(world.entities),)
+    for name, shape in shapes.items():
+        if name not in data or data[name].shape[1:] != shape:
+            found = "is missing" if name not in data else f"has rows of shape {data[name].shape[1:]}, not {shape}"
+            raise SnapshotError(f"the snapshot is damaged or not of this world: '{name}' {found}; take a new one")
+    if len({len(rows) for rows in data.values()}) > 1:
+        raise SnapshotError("the snapshot is damaged: its arrays hold different numbers of envs; take a new one")
+    engine._refuse_rows(_under("engine.", data), snapshot.level)
 
 
 def put_back(engine: "SimEngine", ids: Array, snapshot: Snapshot) -> None:
@@ -57,6 +81,51 @@ def put_back(engine: "SimEngine", ids: Array, snapshot: Snapshot) -> None:
 def _under(prefix: str, data: Mapping[str, Array]) -> dict[str, Array]:
     """The entries of a snapshot whose names begin with `prefix`, without it."""
     return {name[len(prefix) :]: rows for name, rows in data.items() if name.startswith(prefix)}
+
+
+def save(snapshot: Snapshot, path: str | Path) -> Path:
+    """See `Snapshot.save`."""
+    return container.write(path, container.ENGINE, stamp_of(snapshot), snapshot.data)
+
+
+def load(path: str | Path) -> Snapshot:
+    """See `Snapshot.load`."""
+    content = container.read(path)
+    return stamped(content.stamp, container.expect(content, container.ENGINE, path))
+
+
+def stamp_of(snapshot: Snapshot) -> dict[str, object]:
+    """What a snapshot belongs to, as plain data."""
+    return {
+        "engine": snapshot.engine, "engine_version": snapshot.engine_version, "world_hash": snapshot.world_hash,
+        "level": str(snapshot.level), "envs": snapshot.num_envs,
+    }  # fmt: skip
+
+
+def stamped(stamp: Mapping[str, Any], data: Mapping[str, Array]) -> Snapshot:
+    """The snapshot of a stamp and its data."""
+    level = SnapshotLevel(stamp["level"])
+    return Snapshot(stamp["engine"], stamp["engine_version"], stamp["world_hash"], level, data)
+
+
+def chosen_rows(snapshot: Snapshot, rows: Sequence[int] | Array) -> Snapshot:
+    """See `Snapshot.rows`."""
+    which = row_numbers(rows, snapshot.num_envs)
+    return replace(snapshot, data={name: array[which] for name, array in snapshot.data.items()})
+
+
+def row_numbers(rows: Sequence[int] | Array, count: int) -> Array:
+    """Row numbers of a snapshot as an index array.
+
+    Raises:
+        SnapshotError: one is not in it.
+    """
+    which = np.asarray(rows)
+    if which.ndim != 1 or (which.size and not np.issubdtype(which.dtype, np.integer)):
+        raise SnapshotError(f"rows of a snapshot are chosen by their numbers, got {which.dtype} {which.shape}")
+    if which.size and not 0 <= which.min() <= which.max() < count:
+        raise SnapshotError(f"the snapshot has rows 0 to {count - 1}, not {which.tolist()}")
+    return which.astype(int)
 
 
 def joined(snapshots: Sequence[Snapshot]) -> Snapshot:

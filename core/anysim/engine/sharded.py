@@ -293,6 +293,10 @@ class ShardedEngine(SimEngine):
         answers = self._ask("snapshot", {p.worker: (p.ids, level) for p in parts})
         return joined_by_name(((p.rows, answers[p.worker]) for p in parts), len(ids))
 
+    @classmethod
+    def _refuse_rows(cls, data: Mapping[str, Array], level: SnapshotLevel) -> None:
+        cls.inner._refuse_rows(data, level)  # noqa: SLF001  it stands in for that engine
+
     def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:
         parts = self._blocks.split(ids)
         rows = {p.worker: {name: values[p.rows] for name, values in data.items()} for p in parts}

@@ -1,8 +1,9 @@
 """What flows through an engine: State out, control and snapshots in."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+from pathlib import Path
 from typing import NamedTuple
 
 from anysim.conventions import Array
@@ -34,6 +35,29 @@ class Snapshot:
     def num_envs(self) -> int:
         """How many envs the snapshot holds."""
         return next((len(rows) for rows in self.data.values()), 0)
+
+    def rows(self, rows: Sequence[int] | Array) -> "Snapshot":
+        """Some of its envs, in this order; one may come several times."""
+        from anysim.engine.saving import chosen_rows
+
+        return chosen_rows(self, rows)
+
+    def save(self, path: str | Path) -> Path:
+        """Write a file that `load` reads in any process; an existing one is replaced."""
+        from anysim.engine.saving import save
+
+        return save(self, path)
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Snapshot":
+        """Read what `save` wrote.
+
+        Raises:
+            SnapshotError: the file is damaged, of a newer format, or was made with other versions.
+        """
+        from anysim.engine.saving import load
+
+        return load(path)
 
 
 class Availability(NamedTuple):

@@ -77,6 +77,12 @@ def read_parameter(engine: "SimEngine", name: str, env_ids: Any, indices: Any) -
     return engine._get_parameter(name)[np.ix_(ids, which)].copy()
 
 
+def built_parameter(engine: "SimEngine", name: str) -> Array:
+    """See `SimEngine.built_parameters`."""
+    _chosen(engine, name, None, None)
+    return engine._default_parameter(name).copy()
+
+
 def write_parameter(engine: "SimEngine", name: str, values: Any, env_ids: Any, indices: Any) -> None:
     """See `SimEngine.set_parameters`."""
     parameter, ids, which = _chosen(engine, name, env_ids, indices)

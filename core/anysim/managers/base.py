@@ -9,8 +9,8 @@ comes before whom.
 """
 
 from abc import ABC
-from collections.abc import Iterable, Mapping
-from typing import Any, ClassVar, Self
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
@@ -18,6 +18,9 @@ from anysim.managers.board import Board
 from anysim.managers.streams import Streams
 from anysim.world.model import World
 from anysim_schemas.run import RunSpec
+
+if TYPE_CHECKING:
+    from anysim.managers.overrides import Overridable
 
 RESET_ORDER = (
     "terrain", "population", "layout", "scene", "joints", "physics", "robot", "light", "camera", "capture", "task",
@@ -62,6 +65,17 @@ class Manager(ABC):
 
     def reset(self, env_ids: Array) -> None:
         """Write the initial state of these envs, from their streams."""
+
+    def overridable(self) -> Sequence["Overridable"]:
+        """The values of the spec that may be overridden for an episode: see `anysim.managers.overrides`."""
+        return ()
+
+    def override(self, path: str, value: Any, env_ids: Array) -> None:
+        """Write one of `overridable` that can change midway, now, as if it had been drawn so."""
+        raise NotImplementedError(f"{self.name} lists {path} as overridable and does not write it")
+
+    def revert(self, path: str, env_ids: Array) -> None:
+        """An episode in which `path` was overridden is over: what `reset` does not write anew is as built again."""
 
     def before_step(self, env_ids: Array | None) -> None:
         """Before the physics steps of a control step; `env_ids` None means all envs."""

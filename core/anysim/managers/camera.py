@@ -10,6 +10,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.managers.base import Manager
+from anysim.managers.overrides import WORLD, Overridable, random_fields
 from anysim.managers.values import draw_rows, is_random
 from anysim.math import pose as P
 from anysim.world.lookup import find_frame
@@ -37,6 +38,11 @@ class CameraManager(Manager):
         }
         self._still = {name: s for name, s in cameras.items() if s.mount is None and name not in self._aimed}
         self._zoomed = {name: spec for name, spec in cameras.items() if is_random(spec.fov)}
+
+    def overridable(self) -> list[Overridable]:
+        cameras = self.spec.world.cameras
+        keys = ("look_at_offset", "position", "roll_pitch_yaw", "fov")
+        return [e for name in cameras for e in random_fields(f"{WORLD}cameras.{name}", cameras[name], keys)]
 
     def reset(self, env_ids: Array) -> None:
         moved = self._still if self.board.origin[env_ids].any() else {}  # they stand in their env's scene

@@ -14,6 +14,7 @@ from anysim.layout.solve import NoPlace, Refused, Search, Task, is_constant
 from anysim.managers.base import Manager
 from anysim.managers.layout_desk import Desk
 from anysim.managers.layout_dice import Dice, Middle
+from anysim.managers.overrides import WORLD, Overridable, drawn
 from anysim.math import pose as P
 from anysim.world.items import Item, entry_of
 from anysim.world.model import BodyKind, World
@@ -91,6 +92,15 @@ class LayoutManager(Manager):
             self.engine.set_body_state(poses[:, : self._free], still, env_ids, free)
         if len(fixed):
             self.engine.set_body_state(poses[:, self._free :], None, env_ids, fixed)
+
+    def overridable(self) -> list[Overridable]:
+        entries: list[Overridable] = []
+        for name, entry in self.spec.world.layout.items():
+            if not entry.any_of:
+                place = ("position",) if entry.position is not None else ("x", "y")
+                given = [key for key in place if getattr(entry, key) is not None]
+                entries += drawn(f"{WORLD}layout.{name}", entry, (*given, "roll", "pitch", "yaw"))
+        return entries
 
     def _rows(self, env: int, presence: Array) -> Array:
         """The poses (K, 7) of the bodies that are written, in one env."""

@@ -3,13 +3,13 @@
 What is drawn for an attempt that comes to nothing leaves no trace; what holds is kept under the name of its stream.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from anysim.managers.streams import Origin, Streams
-from anysim.managers.values import draw, is_random
+from anysim.managers.values import draw
 from anysim.world.nominal import nominal
 from anysim.world.placement import spread
 
@@ -18,11 +18,14 @@ class _Aside(Streams):
     """Streams whose notes are put aside."""
 
     def __init__(self, streams: Streams) -> None:
-        self._of, self.noted = streams, {}
-        self.noted: dict[str, tuple[object, Origin]]
+        self._of, self.overridden = streams, streams.overridden
+        self.noted: dict[str, tuple[object, Origin]] = {}
 
     def generator(self, env: int, name: str, tick: int = 0) -> np.random.Generator:
         return self._of.generator(env, name, tick)
+
+    def quantiles(self, env: int, name: str, tick: int = 0) -> Callable[..., Any]:
+        return self._of.quantiles(env, name, tick)
 
     def note(self, env: int, name: str, drawn: object, origin: Origin) -> None:
         del env
@@ -42,8 +45,6 @@ class Dice:
 
     def value(self, field: str, value: Any) -> Any:
         """A field of the entry, drawn."""
-        if not is_random(value):
-            return value
         source = self._inherited.get(field, f"{self._path}.{field}")
         return draw(value, f"layout/{self._name}/{field}", self._aside, self._env, self._tick, source=source)
 

@@ -8,6 +8,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.managers.base import Manager
+from anysim.managers.overrides import WORLD, Overridable, random_fields
 from anysim.managers.values import draw, is_random
 from anysim.world.colors import rgb
 
@@ -34,6 +35,11 @@ class LightManager(Manager):
 
     def parameters(self) -> Iterable[tuple[str, str]]:
         return [(parameter, path) for _, _, parameter, _, path in self._random()]
+
+    def overridable(self) -> list[Overridable]:
+        world = self.spec.world
+        lights = [e for name, light in world.lights.items() for e in random_fields(f"{WORLD}lights.{name}", light)]
+        return lights + random_fields(f"{WORLD}scenery", world.scenery)
 
     def bind(self, engine: SimEngine) -> None:
         super().bind(engine)

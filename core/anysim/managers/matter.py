@@ -63,18 +63,24 @@ Rows = Array | None
 
 
 class Rule(NamedTuple):
-    """A parameter, the fields of an ObjectSpec that it follows from (dotted), and how."""
+    """A parameter, the fields of an ObjectSpec that it follows from (dotted), and how; what else it reads of them."""
 
     parameter: str
     fields: tuple[str, ...]
     rows: Callable[[Part, ObjectSpec, Drawn], Rows]
+    reads: tuple[str, ...] = ()
+
+
+def owner_of(spec: ObjectSpec, field: str) -> tuple[Any, str]:
+    """The part of an ObjectSpec that a field is in, None where the spec does not give it, and the field's key there."""
+    within, _, key = field.rpartition(".")
+    return (getattr(spec, within) if within else spec), key
 
 
 def field_of(spec: ObjectSpec, field: str) -> Any:
     """A field by its dotted name, as something to be drawn: textures and materials by their names."""
-    value: Any = spec
-    for name in field.split("."):
-        value = None if value is None else getattr(value, name)
+    holder, key = owner_of(spec, field)
+    value = None if holder is None else getattr(holder, key)
     if field == "texture" and value is not None:
         return by_name(value, texture_name)
     if field == "material" and value is not None:
@@ -91,11 +97,9 @@ def _heavier(part: Part, spec: ObjectSpec, drawn: Drawn) -> Array | None:
     total = part.mass
     if part.world.bodies[part.bodies[0]].kind is BodyKind.STATIC and not total:
         return None
-    if spec.mass is not None:
-        return _column(drawn, "mass") / total
     if spec.density is not None:
         return _column(drawn, "density") / float(nominal(spec.density))
-    return np.ones(len(drawn["mass"]))
+    return np.array([1.0 if mass is None else mass / total for mass in drawn["mass"]])
 
 
 def _mass(part: Part, spec: ObjectSpec, drawn: Drawn) -> Rows:
@@ -107,13 +111,15 @@ def _inertia(part: Part, spec: ObjectSpec, drawn: Drawn) -> Rows:
     ratio = _heavier(part, spec, drawn)
     if ratio is None:
         return None
-    if spec.inertia_scale is not None:
-        ratio = ratio * (_column(drawn, "inertia_scale") / float(nominal(spec.inertia_scale)))
+    if drawn["inertia_scale"][0] is not None:
+        ratio = ratio * (_column(drawn, "inertia_scale") / float(nominal(spec.inertia_scale or 1.0)))
     return ratio[:, None, None] * np.array([part.world.bodies[b].inertial.inertia for b in part.bodies])
 
 
 def _com(part: Part, spec: ObjectSpec, drawn: Drawn) -> Rows:
-    built = np.array([part.world.bodies[b].inertial.com for b in part.roots]) - np.array(nominal(spec.com_offset))
+    built = np.array([part.world.bodies[b].inertial.com for b in part.roots]) - np.array(
+        nominal(spec.com_offset or 0.0)
+    )
     return built + _column(drawn, "com_offset")[:, None]
 
 
@@ -156,7 +162,7 @@ RULES: tuple[Rule, ...] = (
     Rule("body.angular_damping", ("damping.angular",), _root("damping.angular")),
     Rule("geom.friction", ("friction",), _surface("friction")),
     Rule("geom.restitution", ("restitution",), _surface("restitution")),
-    Rule("geom.color", ("color", "material"), _color),
+    Rule("geom.color", ("color", "material"), _color, ("texture",)),
     Rule("geom.texture", ("texture",), _look("texture", "textures")),
     Rule("geom.material", ("material",), _look("material", "materials")),
 )

@@ -12,6 +12,7 @@ from anysim.engine.base import SimEngine
 from anysim.errors import SpecError, SpecIssue, TaskError, listing, suggest
 from anysim.managers.base import Manager
 from anysim.managers.noise import DelayLine, longest_delay, noise_rows, note_noise
+from anysim.managers.overrides import WORLD, Overridable, drawn, random_fields
 from anysim.managers.robot_dynamics import RobotDynamics
 from anysim.managers.streams import Origin
 from anysim.managers.values import draw_rows, is_random
@@ -121,6 +122,16 @@ class RobotManager(Manager):
             self._reset_imperfections(s, env_ids)
             s.controller.reset(env_ids, self._targets[np.ix_(env_ids, s.controller.channel.actuators)])
         self.engine.set_control(position=self._targets[env_ids], env_ids=env_ids)
+
+    def overridable(self) -> list[Overridable]:
+        entries: list[Overridable] = []
+        for robot in self._world.robots:
+            spec, path = self.spec.world.robots[robot.name], f"{WORLD}robots.{robot.name}"
+            entries += drawn(path, spec, ("home_noise",)) + random_fields(path, spec, ("position", "yaw"))
+            entries += random_fields(f"{path}.dynamics", spec.dynamics)
+            for channel, action in spec.actions.items():
+                entries += random_fields(f"{path}.actions.{channel}", action, ("delay",))
+        return entries
 
     def _place_base(self, robot: str, spec: RobotSpec, env_ids: Array) -> None:
         """Put a robot's base where this episode wants it: as drawn, on the ground of its env."""

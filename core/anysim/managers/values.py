@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.managers.streams import Origin, Streams
+from anysim.managers.streams import OVERRIDDEN, Origin, Streams
 from anysim.world.nominal import nominal
 from anysim_schemas.values import Choice, Drawn, LogUniform, Normal, Range
 
@@ -61,22 +61,26 @@ def draw(value: Any, name: str, streams: Streams, env: int, tick: int = 0, *, so
     """Draw a value of an env's episode from the stream `name`, and note it in `streams.draws`.
 
     `source` is the dotted path of the value in the spec, for whoever asks where a draw comes from. A shared draw is one
-    for the episode: it is the same at every tick.
+    for the episode: it is the same at every tick. A value that is overridden for the episode is not drawn.
     """
+    fixed = streams.overridden[env]
+    if fixed and source in fixed:
+        streams.note(env, name if tick == 0 else f"{name}@{tick}", fixed[source], Origin(OVERRIDDEN, source))
+        return fixed[source]
     if not is_random(value):
         return value
     stream = name if value.shared is None else f"shared/{value.shared}"
-    if value.ratio < 1.0 and streams.generator(env, f"{name}/ratio", tick).random() >= value.ratio:
+    if value.ratio < 1.0 and streams.quantiles(env, f"{name}/ratio", tick)() >= value.ratio:
         stream, drawn = f"{name}/ratio", nominal(value)
     else:
-        drawn = draw_one(value, streams.generator(env, stream, tick if value.shared is None else 0).random)
+        drawn = draw_one(value, streams.quantiles(env, stream, tick if value.shared is None else 0))
     streams.note(env, name if tick == 0 else f"{name}@{tick}", drawn, Origin(stream, source))
     return drawn
 
 
 def draw_rows(value: Any, name: str, streams: Streams, env_ids: Array, tick: Any = 0, *, source: str = "") -> Array:
     """Draw a number or vector for each env: (E,) or (E, k) float64. `tick` is one step number, or one for each env."""
-    if not is_random(value):
+    if not is_random(value) and not any(source in streams.overridden[e] for e in env_ids):
         constant = np.asarray(value, dtype=float)
         return np.broadcast_to(constant, (len(env_ids), *constant.shape)).copy()
     ticks = np.broadcast_to(np.asarray(tick), len(env_ids))

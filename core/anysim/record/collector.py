@@ -145,7 +145,8 @@ class Collector:
             cameras[name] = camera_info(env.engine.world, camera, self._capture.every, pose, fov)
         return EpisodeHeader(
             env=i, episode=int(self._episode[i]), episode_seed=int(env.streams.episode_seed[i]),
-            drawn=env.streams.draws[i], instruction=env.spec.task.description, cameras=cameras,
+            drawn=env.streams.draws[i], overridden=env.streams.overridden[i],
+            instruction=env.spec.task.description, cameras=cameras,
         )  # fmt: skip
 
     def _resumed(self, env: int, episode: int) -> EpisodeResult:

@@ -84,6 +84,9 @@ class EpisodeHeader(Spec):
     episode: Annotated[int, Field(ge=0, lt=10**9)]
     episode_seed: Annotated[int, Field(ge=0)]
     drawn: dict[str, Any] = Field(default_factory=dict, description="randomised values, by name")
+    overridden: dict[str, Any] = Field(
+        default_factory=dict, description="values set for this episode instead of drawn ones, by dotted path"
+    )
     instruction: str = Field(default="", max_length=1 << 16, description="the task in words, for this episode")
     cameras: dict[Name, CameraInfo] = Field(default_factory=dict)
 

@@ -47,6 +47,7 @@ class Manifest(RunHeader):
     episode: Count
     episode_seed: Annotated[int, Field(ge=0)]
     drawn: dict[str, Any] = Field(default_factory=dict)
+    overridden: dict[str, Any] = Field(default_factory=dict)
     instruction: str = Field(default="", max_length=1 << 16)
     status: Label
     steps: Count

@@ -115,7 +115,8 @@ class Recorder:
         final = self._final(episode)
         if final.exists():
             raise RecordError(_taken(final))
-        episode = EpisodeHeader.model_validate({**dict(episode), "drawn": plain(episode.drawn, "drawn")})
+        values = {name: plain(getattr(episode, name), name) for name in ("drawn", "overridden")}
+        episode = EpisodeHeader.model_validate({**dict(episode), **values})
         header = Header(self.run, episode)
         where = f"cannot begin env {env}, episode {episode.episode}"
         try:

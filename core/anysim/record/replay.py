@@ -79,12 +79,17 @@ def replay(directory: str | Path, engine: str | None = None, base: Path | None =
         )  # fmt: skip
 
 
+def begin(env: TaskEnv, manifest: Manifest) -> None:
+    """Begin the recorded episode: drawn from its seed, with what was overridden for it."""
+    for manager in env.managers:
+        manager.recall(0, manifest.drawn)
+    env.reset(episode_seeds=[manifest.episode_seed], overrides=manifest.overridden)
+
+
 def _run(env: TaskEnv, reader: TrajectoryReader) -> tuple[dict[str, Array], dict[str, Array]]:
     """The state (…) after the reset, and the states (T, …) after each step as far as the replayed episode goes."""
     fields = tuple(reader.manifest.layout.state)
-    for manager in env.managers:
-        manager.recall(0, reader.manifest.drawn)
-    env.reset(episode_seeds=[reader.manifest.episode_seed])
+    begin(env, reader.manifest)
 
     def now() -> dict[str, Array]:
         rows = state_rows(env.engine.get_state(), 0, fields, env.engine.control)

@@ -1,14 +1,11 @@
 """The MDP contract: what a step returns, and what its words mean."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.state import Snapshot
 
 
 class Status(StrEnum):
@@ -59,17 +56,3 @@ class StepResult(NamedTuple):
     def done(self) -> Array:
         """(N,) bool: not running any more."""
         return self.status != Status.RUNNING
-
-
-@dataclass(frozen=True)
-class EnvSnapshot:
-    """Envs at one moment: the engine's rows, every manager's rows, the streams and the clocks."""
-
-    engine: Snapshot
-    managers: Mapping[str, Mapping[str, Array]] = field(repr=False)
-    streams: Mapping[str, Any] = field(repr=False)
-
-    @property
-    def num_envs(self) -> int:
-        """How many envs it holds."""
-        return self.engine.num_envs

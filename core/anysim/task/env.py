@@ -1,14 +1,15 @@
 """TaskEnv: the loop. No autoreset here; gymnasium's modes and other dialects are views on it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
 
 from anysim import hooks
 from anysim.conventions import Array
+from anysim.engine import checks
 from anysim.engine.base import SimEngine
-from anysim.errors import SnapshotError, TaskError
+from anysim.errors import TaskError
 from anysim.managers.base import RESET_ORDER, Manager
 from anysim.managers.capture import CaptureManager
 from anysim.managers.robot import RobotManager
@@ -20,13 +21,17 @@ from anysim.task.contract import (
     STATUS_NAMES,
     SUCCESS,
     TRUNCATED,
-    EnvSnapshot,
     Obs,
     StepResult,
 )  # fmt: skip
+from anysim.task.counterfactual import Counterfactuals
 from anysim.task.mdp import Mdp
+from anysim.task.snapshot import EnvSnapshot, refuse_foreign, spec_hash
 from anysim.task.view import SceneView
 from anysim_schemas.run import RunSpec
+
+Overriding = Mapping[str, Any] | Sequence[Mapping[str, Any]] | None
+"""Values by dotted path, for all envs alike or for each."""
 
 
 class TaskEnv:
@@ -56,6 +61,7 @@ class TaskEnv:
         self.action_dim = 0 if self.robots is None else self.robots.action_dim
         self.mdp = Mdp(spec.task, self.scene, self.streams)
         self.scene.last_action = np.zeros((self.num_envs, self.action_dim))
+        self.counterfactuals = Counterfactuals(self.managers, self.mdp, engine, self.streams)
         self._task = spec.task
         self._substeps = engine.world.physics.substeps
         self._code = np.full(self.num_envs, -1, dtype=np.int8)  # -1: never reset
@@ -104,7 +110,7 @@ class TaskEnv:
 
     def reset(
         self, *, seed: int | Sequence[int] | None = None, mask: Array | None = None,
-        episode_seeds: Sequence[int] | Array | None = None,
+        episode_seeds: Sequence[int] | Array | None = None, overrides: Overriding = None,
     ) -> tuple[Obs, dict[str, Array]]:  # fmt: skip
         """Start new episodes in all envs, or where `mask` (N,) is true.
 
@@ -112,23 +118,32 @@ class TaskEnv:
             seed: an int seeds env i with (seed, i), whatever N; a sequence gives each chosen env its own seed; None
                 goes on with the generators as they are.
             episode_seeds: draw exactly these episodes instead (for replay).
+            overrides: for these episodes, values in place of those that the spec has drawn or fixed, by dotted path, as
+                in `{"layout.cube.x": 0.4}`; or a list of such mappings, one for each env. Nothing else moves.
 
         Returns:
             Observations and info of the chosen envs only, in order.
         """
         ids = self._chosen(mask)
+        plan = self.counterfactuals.checked(overrides, len(ids), midway=False)
+        if len(ids) == 0:  # managers need not know how to reset nobody
+            return {g: r[:0] for g, r in self.mdp.observe().items()}, {k: v[ids] for k, v in self._info().items()}
         if seed is not None:
             self.streams.seed(seed, ids)
+        self.counterfactuals.over(ids)
         self.streams.begin(ids, episode_seeds)
+        self.counterfactuals.begin(ids, plan)
         self.engine.reset(ids)
         for manager in self.managers:
             manager.reset(ids)
+        self.counterfactuals.settle(ids, plan)
         self.scene.elapsed[ids] = 0
         self.scene.last_action[ids] = 0.0
         self._code[ids], self._fault[ids], self._success[ids] = RUNNING, False, False
         self.scene.meet()
         self.scene.look(ids)
         self.mdp.reset(ids)
+        self.counterfactuals.mark(ids, plan)
         rows = self._observe(ids)
         self._store(rows, ids)
         self._hooks.before_episode(env=self, env_ids=ids)
@@ -156,7 +171,7 @@ class TaskEnv:
 
     def _store(self, rows: Obs, ids: Array | None) -> None:
         """Keep the latest observation: a fresh array for a full batch, rows written into the present one otherwise."""
-        if ids is None or len(ids) == self.num_envs:
+        if ids is None or np.array_equal(ids, np.arange(self.num_envs)):  # all of them may come in another order
             self._obs = rows
             return
         for group, values in rows.items():
@@ -265,23 +280,40 @@ class TaskEnv:
     def snapshot(self, mask: Array | None = None) -> EnvSnapshot:
         """Envs at this moment. Continuing from it equals the uninterrupted run, bit for bit."""
         ids = self._chosen(mask)
-        managers = {m.name: m.snapshot(ids) for m in self.managers}
+        return EnvSnapshot(
+            self.engine.snapshot(ids), self._managed(ids), self.streams.snapshot(ids), self.name, spec_hash(self.spec)
+        )
+
+    def _managed(self, ids: Array) -> dict[str, Mapping[str, Array]]:
+        """The rows of all managers and of the task."""
+        managers: dict[str, Mapping[str, Array]] = {m.name: m.snapshot(ids) for m in self.managers}
         managers["task"] = self.mdp.snapshot(ids) | {
             "elapsed": self.scene.elapsed[ids], "last_action": self.scene.last_action[ids],
             "code": self._code[ids], "fault": self._fault[ids], "success": self._success[ids],
         }  # fmt: skip
-        return EnvSnapshot(self.engine.snapshot(ids), managers, self.streams.snapshot(ids))
+        return managers
 
-    def reset_to(self, snapshot: EnvSnapshot, env_ids: Sequence[int] | Array | None = None) -> Obs:
+    def reset_to(
+        self, snapshot: EnvSnapshot, env_ids: Sequence[int] | Array | None = None, overrides: Overriding = None
+    ) -> Obs:
         """Put a snapshot's envs into `env_ids` (default: all, in order); returns their observations.
 
+        Args:
+            overrides: values to go on with in place of those of the snapshot, by dotted path, as in
+                `{"objects.cube.friction": 0.2}`; or a list of such mappings, one for each env. Nothing else moves.
+
         Raises:
-            SnapshotError: it was taken in another world, engine or version, or of another number of envs.
+            SnapshotError: it was taken in another world or task, engine or version, or of another number of envs.
+            TaskError: something cannot be overridden, or not in the middle of an episode.
+
+        Whatever is raised before the first row is written: nothing was changed then.
         """
+        engine = self.engine
         ids = np.arange(self.num_envs) if env_ids is None else np.asarray(env_ids, dtype=int)
-        if snapshot.num_envs != len(ids):
-            raise SnapshotError(f"the snapshot holds {snapshot.num_envs} envs, {len(ids)} were asked for; pass env_ids")
-        self.engine.restore(snapshot.engine, ids)
+        checks.same_stamp(snapshot.engine, engine.name, engine.version, engine.world.hash, len(ids))
+        refuse_foreign(snapshot, self.name, spec_hash(self.spec), self._managed(np.array([0])))
+        plan = self.counterfactuals.checked(overrides, len(ids), midway=True)
+        engine.restore(snapshot.engine, ids)
         for manager in self.managers:
             manager.restore(ids, snapshot.managers[manager.name])
         task = snapshot.managers["task"]
@@ -289,7 +321,8 @@ class TaskEnv:
         self.scene.elapsed[ids], self.scene.last_action[ids] = task["elapsed"], task["last_action"]
         self._code[ids], self._fault[ids] = task["code"], task["fault"]
         self._success[ids] = task["success"]
-        self.streams.restore(ids, dict(snapshot.streams))
+        self.streams.restore(ids, snapshot.streams)
+        self.counterfactuals.change(ids, plan)
         self.scene.meet()
         self.scene.look(ids)
         rows = self._observe(ids)

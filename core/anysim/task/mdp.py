@@ -8,13 +8,15 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import AnysimError, SpecError, SpecIssue, TaskError
+from anysim.managers.overrides import Overridable
 from anysim.managers.streams import Streams
-from anysim.managers.values import draw_rows
+from anysim.managers.values import draw_rows, is_random
+from anysim.signatures import options_model
 from anysim.task.contract import Obs
-from anysim.task.library import bind
+from anysim.task.library import bind, find
 from anysim.task.sensing import Sensed
 from anysim.task.view import SceneView
-from anysim_schemas.task import TaskSpec
+from anysim_schemas.task import EventTermSpec, TaskSpec
 
 Term = Callable[..., Any]
 
@@ -87,10 +89,14 @@ class Mdp:
             if self.spec.events[name].when == when:
                 term(partial(self._draw, f"event/{name}", tick))
 
-    def _draw(self, stream: str, tick: Any, name: str, value: Any) -> Array:
+    def _draw(self, stream: str, tick: Any, name: str, value: Any, where: Array | None = None) -> Array:
+        """Draw for the rows at hand, or for those of them where `where` (n,) is true."""
+        env_ids = self.scene.env_ids
+        if where is not None:
+            env_ids, tick = env_ids[where], np.broadcast_to(tick, len(env_ids))[where]
         section, _, term = stream.partition("/")
         source = f"task.{'events' if section == 'event' else section}.{term}.{name}"
-        return draw_rows(value, f"task/{stream}/{name}", self.streams, self.scene.env_ids, tick, source=source)
+        return draw_rows(value, f"task/{stream}/{name}", self.streams, env_ids, tick, source=source)
 
     def observe(self) -> Obs:
         """All groups for the rows at hand, float32 (n, D)."""
@@ -131,6 +137,20 @@ class Mdp:
         for term in self._failure.values():
             failure |= term()
         return self.held[rows] >= self.spec.hold, failure
+
+    def overridable(self) -> list[Overridable]:
+        """The parameters of commands and events that are drawn; those of events in steps may change midway."""
+        entries: list[Overridable] = []
+        for kind, section, terms in (("command", "command", self.spec.command), ("event", "events", self.spec.events)):
+            for name, term in terms.items():
+                midway = isinstance(term, EventTermSpec) and term.when == "step"
+                values = options_model(find(kind, term.term)).model_validate(term.params)
+                entries += [
+                    Overridable(f"task.{section}.{name}.{key}", values, key, midway=midway)
+                    for key in type(values).model_fields
+                    if is_random(getattr(values, key))
+                ]
+        return entries
 
     def snapshot(self, env_ids: Array) -> dict[str, Array]:
         """Copies of the goals and counters."""

@@ -1,7 +1,9 @@
-"""Events: `(scene, draw, *, parameters)`, on reset or in each step; they act through the engine's public methods."""
+"""Events: `(scene, draw, *, parameters)`, on reset or in each step; they act through the engine's public methods.
+
+`draw(name, value)` gives one draw for each env at hand, `draw(name, value, where)` for those where a mask is true.
+"""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +16,7 @@ from anysim_schemas.values import NonNegativeValue, Vec3Value
 
 __all__ = ["climb_levels", "push", "set_friction"]
 
-Draw = Callable[[str, Any], Array]
+Draw = Callable[..., Array]
 
 
 def climb_levels(scene: SceneView, draw: Draw, *, frame: Frame, promote: NonNegative, demote: NonNegative) -> None:
@@ -31,13 +33,13 @@ def climb_levels(scene: SceneView, draw: Draw, *, frame: Frame, promote: NonNega
 
 def push(scene: SceneView, draw: Draw, *, object: ObjectView, force: Vec3Value, every: NonNegative = 50) -> None:
     """A force [N], world axes, on an object during one control step out of `every`."""
-    due = scene.env_ids[(scene.elapsed[scene.rows] % max(1, int(every))) == 0]
-    if len(due) == 0:
+    due = (scene.elapsed[scene.rows] % max(1, int(every))) == 0
+    if not due.any():
         return
-    wrench = np.zeros((scene.engine.num_envs, 6))
-    wrench[scene.env_ids, :3] = draw("force", force)
-    for entity, ids in object.by_entity(due):
-        scene.engine.apply_wrench(wrench[ids, None], [entity.root], ids)
+    wrench, ids = np.zeros((scene.engine.num_envs, 6)), scene.env_ids[due]
+    wrench[ids, :3] = draw("force", force, due)  # an env that is not due draws nothing, whatever the others do
+    for entity, own in object.by_entity(ids):
+        scene.engine.apply_wrench(wrench[own, None], [entity.root], own)
 
 
 def set_friction(scene: SceneView, draw: Draw, *, object: ObjectView, friction: NonNegativeValue) -> None:

@@ -1,0 +1,224 @@
+"""The file of a snapshot: one zip of .npy arrays and one JSON header, whole or refused.
+
+The header holds everything that is no array, and for each array its member, size and SHA-256; a third kind of member
+holds the SHA-256 of the header. So one hash covers all, and any changed byte is noticed. Members are stored as they
+are, not compressed: a small file cannot unfold into a large one. Equal content gives equal bytes.
+
+A file is written aside and renamed, so that under its name it is complete or it is not there.
+"""
+
+import hashlib
+import io
+import json
+import os
+import platform
+import threading
+import zipfile
+from collections.abc import Mapping
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from anysim import __version__
+from anysim.conventions import Array
+from anysim.engine.exact_json import decode, encode
+from anysim.errors import SnapshotError
+
+FORMAT, VERSION = "anysim-snapshot", 1
+HEADER, SEAL = "header.json", "header.sha256"
+MAX_HEADER_BYTES = 256 << 20
+"""Longer headers are refused, unread."""
+_MATTER = ("numpy", "numba")
+"""What computes states beside the engine: another version of it may round another last bit."""
+
+
+class Content(NamedTuple):
+    """What a file holds: the stamp that says what it belongs to, and the data.
+
+    Attributes:
+        kind: `engine snapshot`, `env snapshot` or `world state`.
+        stamp: plain data about its origin, shown to people.
+        made_with: versions of what computed it, and the kind of machine.
+        data: the tree that was saved, with read-only arrays.
+        arrays: shape and type of each array, by its place in the tree.
+        sha256: the hash of everything.
+        size: of the file [bytes].
+    """
+
+    kind: str
+    stamp: dict[str, Any]
+    made_with: dict[str, str]
+    data: Any
+    arrays: dict[str, str]
+    sha256: str
+    size: int
+
+
+@cache
+def made_with() -> Mapping[str, str]:
+    """The versions on which equal bits depend, beside the engine's own."""
+    versions = {"anysim": __version__}
+    for name in _MATTER:
+        try:
+            versions[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return versions | {"machine": platform.machine()}
+
+
+def write(path: str | Path, kind: str, stamp: Mapping[str, Any], data: Any) -> Path:
+    """Write a tree of mappings, lists, tuples, arrays and plain values; an existing file is replaced.
+
+    Raises:
+        SnapshotError: something in it has no exact form in a file, or the file cannot be written.
+    """
+    path = Path(path)
+    arrays: dict[str, Array] = {}
+    tree = encode(data, arrays)
+    members = {f"arrays/{number}.npy": _npy(array) for number, array in enumerate(arrays.values())}
+    table = {
+        name: {"member": member, "bytes": len(content), "sha256": hashlib.sha256(content).hexdigest()}
+        for name, (member, content) in zip(arrays, members.items(), strict=True)
+    }
+    head = {
+        "format": FORMAT, "version": VERSION, "kind": kind, "stamp": encode(dict(stamp), {}),
+        "made_with": dict(made_with()), "arrays": table, "data": tree,
+    }  # fmt: skip
+    header = json.dumps(head, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()
+    aside = path.with_name(f".{path.name}.{os.getpid()}-{threading.get_ident()}.partial")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            with aside.open("wb") as file:
+                with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
+                    for name, content in {HEADER: header, SEAL: _sha(header).encode(), **members}.items():
+                        # a date of its own would make equal content unequal
+                        archive.writestr(zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0)), content)
+                file.flush()
+                os.fsync(file.fileno())
+            aside.replace(path)
+        except BaseException:
+            aside.unlink(missing_ok=True)
+            raise
+    except OSError as error:
+        raise SnapshotError(f"{path} cannot be written: {error.strerror or error}") from error
+    return path
+
+
+def read(path: str | Path) -> Content:
+    """Everything in a file, checked against its hashes.
+
+    Raises:
+        SnapshotError: it cannot be read, is no snapshot, is damaged, or has a newer format.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            size = file.seek(0, os.SEEK_END)
+            with zipfile.ZipFile(file) as archive:
+                return _content(path, archive, size)
+    except OSError as error:
+        raise SnapshotError(f"{path} cannot be read: {error.strerror or error}") from error
+    except (zipfile.BadZipFile, ValueError, KeyError, TypeError, EOFError, RuntimeError, RecursionError) as error:
+        raise SnapshotError(
+            f"{path} is no snapshot, or a damaged or truncated one: {error}; copy it anew, or save it anew"
+        ) from error
+
+
+def expect(content: Content, kind: str, path: str | Path) -> Any:
+    """The data of a file of a kind that belongs to this installation.
+
+    Raises:
+        SnapshotError: another kind, or made with other versions, all of them named.
+    """
+    same_kind(content, kind, path)
+    here = made_with()
+    names = dict.fromkeys([*content.made_with, *here])
+    other = [
+        f"{name} {content.made_with.get(name, 'absent')} (here {here.get(name, 'absent')})"
+        for name in names
+        if content.made_with.get(name) != here.get(name)
+    ]
+    if other:
+        raise SnapshotError(
+            f"{path} was made with {', '.join(other)}, so going on from it would not give the same bits; install those "
+            f"versions, or replay the episode here from its seed and actions, or carry a WorldState over"
+        )
+    return content.data
+
+
+def same_kind(content: Content, kind: str, path: str | Path) -> None:
+    """Refuse a file of another kind, with what loads it."""
+    if content.kind != kind:
+        raise SnapshotError(f"{path} holds an {content.kind}, not an {kind}; load it with {_LOADERS[content.kind]}")
+
+
+ENGINE, ENV, WORLD = "engine snapshot", "env snapshot", "world state"
+_LOADERS = {ENGINE: "Snapshot.load", ENV: "EnvSnapshot.load", WORLD: "WorldState.load"}
+
+
+def _content(path: Path, archive: zipfile.ZipFile, size: int) -> Content:
+    infos = {info.filename: info for info in archive.infolist()}
+    if HEADER not in infos or SEAL not in infos:
+        raise ValueError(f"it has no {HEADER} with a {SEAL}")
+    header = _member(archive, infos[HEADER], MAX_HEADER_BYTES)
+    seal = _sha(header)
+    if _member(archive, infos[SEAL], 64).decode() != seal:
+        raise ValueError(f"{HEADER} does not have the hash in {SEAL}")
+    head = json.loads(header)
+    if head["format"] != FORMAT:
+        raise ValueError(f"its format is {head['format']!r}")
+    if head["version"] > VERSION:
+        raise SnapshotError(
+            f"{path} has format {FORMAT} {head['version']}; anysim {__version__} reads up to {VERSION}: "
+            f"install a newer anysim"
+        )
+    if head["kind"] not in _LOADERS:
+        raise ValueError(f"it holds a {head['kind']!r}")
+    table = head["arrays"]
+    known = {HEADER, SEAL, *(entry["member"] for entry in table.values())}
+    if infos.keys() != known:
+        raise ValueError(f"it should hold {len(known)} members, and holds {len(infos)}")
+    arrays: dict[str, Array] = {}
+    for name, entry in table.items():
+        content = _member(archive, infos[entry["member"]], entry["bytes"])
+        if len(content) != entry["bytes"] or _sha(content) != entry["sha256"]:
+            raise ValueError(f"'{name}' does not have its hash")
+        arrays[name] = _array(content, name)
+    shapes = {name: f"{rows.dtype} {rows.shape}" for name, rows in arrays.items()}
+    return Content(
+        head["kind"], decode(head["stamp"], {}), head["made_with"], decode(head["data"], arrays), shapes, seal, size
+    )
+
+
+def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, limit: int) -> bytes:
+    """The bytes of a member: stored as they are, and not more of them than there may be."""
+    if info.compress_type != zipfile.ZIP_STORED or info.file_size != info.compress_size or info.file_size > limit:
+        raise ValueError(f"{info.filename} is packed, or larger than it says")
+    with archive.open(info) as file:
+        return file.read(limit + 1)
+
+
+def _npy(array: Array) -> bytes:
+    buffer = io.BytesIO()
+    np.lib.format.write_array(buffer, np.ascontiguousarray(array), version=(1, 0), allow_pickle=False)
+    return buffer.getvalue()
+
+
+def _array(content: bytes, name: str) -> Array:
+    """A read-only array of a .npy file, whose header must agree with its length."""
+    buffer = io.BytesIO(content)
+    if np.lib.format.read_magic(buffer) != (1, 0):
+        raise ValueError(f"'{name}' is a .npy file of another version than 1.0")
+    shape, fortran, dtype = np.lib.format.read_array_header_1_0(buffer)
+    body = memoryview(content)[buffer.tell() :]
+    if dtype.hasobject or fortran or min(shape, default=0) < 0 or int(np.prod(shape)) * dtype.itemsize != len(body):
+        raise ValueError(f"'{name}' is not the array that it says")
+    return np.frombuffer(body, dtype=dtype).reshape(shape)
+
+
+def _sha(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
