@@ -145,7 +145,7 @@ def test_a_constant_comes_back_after_the_episode(get, engine) -> None:
     env.reset(seed=1, overrides=[{}, {"objects.ball.color": (0.1, 0.9, 0.1)}])
     assert np.allclose(colours()[1, :3], [0.1, 0.9, 0.1])
     assert (colours()[0] == usual[0]).all()
-    assert env.streams.draws[1]["world.objects.ball.color"] == (0.1, 0.9, 0.1)
+    assert env.streams.draws[1]["scene/ball/color"] == (0.1, 0.9, 0.1)
     kept = env.snapshot(np.array([False, True]))
     env.reset(mask=np.array([False, True]))
     assert (colours() == usual).all()
