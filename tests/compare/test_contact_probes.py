@@ -121,7 +121,6 @@ DECLARED = {
     ("mujoco", "lift: slip in a lift of 0.1 m"): SOFT,
     ("mujoco", "lift: slip in 2 s of holding"): SOFT,
     ("pybullet", "roll: acceleration of a cylinder down 15 degrees"): MULTIPLIES,
-    ("pybullet", "lift: force of a finger on the cube"): "computed in each step",
     ("sapien", "roll: acceleration of a cylinder down 15 degrees"): "a cylinder is a prism",
 }
 """What the engines are known to be off in, and the declared words that account for it."""

@@ -49,9 +49,9 @@ def test_the_null_engine_passes(tmp_path):
 
 
 DYNAMIC = {
-    "mujoco": {"render: rgb"},
-    "pybullet": {"render: rgb", "parameter body.com"},
-    "sapien": {"render: rgb"},
+    "mujoco": {"render: rgb", "solver settings by entity", "terrain: triangle mesh (concave)"},
+    "pybullet": {"render: rgb", "solver settings by entity", "parameter world.shadows"},
+    "sapien": {"render: rgb", "parameter world.shadows"},
 }
 """The engines of the repository that move things, and for want of what a test of theirs may be skipped."""
 

@@ -32,6 +32,9 @@ from anysim.world.model import (
 from anysim.world.tessellate import triangles
 from anysim_pybullet.bullet import bullet, connect, disconnect
 
+MOST_TRIANGLES = 40_000
+"""Of one shape: Bullet takes 131,072 corners, and each triangle has its own."""
+
 GROUND_TILES = 16
 """Tiles along an edge of a plane: the renderer is poor at large triangles that reach behind the camera."""
 
@@ -51,7 +54,8 @@ class Painter:
     def __init__(self, world: World, looks: Looks) -> None:
         self._world, self._looks = world, looks
         self._middle = world.initial_body_pose[:, :3].mean(axis=0) if world.bodies else np.zeros(3)
-        self._geoms = [i for i, g in enumerate(world.geoms) if g.visible]
+        self._geoms: list[int] = []
+        """The geom of each body that is drawn: several where it has more corners than Bullet takes at once."""
         self._meshes = {m.name: m for m in world.meshes}
         self._fields = {f.name: f for f in world.heightfields}
         self._client = connect()
@@ -61,7 +65,11 @@ class Painter:
         with quiet() as words:
             try:
                 self._painted = self._load_textures(p)
-                self._uids = [self._add(p, world.geoms[i]) for i in self._geoms]
+                for i, geom in enumerate(world.geoms):
+                    if geom.visible:
+                        added = self._add(p, geom)
+                        self._uids += added
+                        self._geoms += [i] * len(added)
             except p.error as error:
                 failure = error
         if failure is not None:
@@ -174,18 +182,19 @@ class Painter:
                 numbers.append(p.loadTexture(str(file), physicsClientId=self._client))
         return numbers
 
-    def _add(self, p: Any, geom: Geom) -> int:
-        client = self._client
+    def _add(self, p: Any, geom: Geom) -> list[int]:
+        client, color = self._client, geom.color
         match geom.shape:
             case Box(half) if not self._painted:
-                shape = p.createVisualShape(p.GEOM_BOX, halfExtents=half, rgbaColor=geom.color, physicsClientId=client)
+                shapes = [p.createVisualShape(p.GEOM_BOX, halfExtents=half, rgbaColor=color, physicsClientId=client)]
             case _:
                 vertices, faces = self._triangles(geom)
                 flat = isinstance(geom.shape, Plane | HeightFieldShape)
-                shape = self._add_mesh(p, vertices, faces, geom.color, flat)
-        if shape < 0:
+                pieces = np.split(faces, range(MOST_TRIANGLES, len(faces), MOST_TRIANGLES))
+                shapes = [self._add_mesh(p, vertices, piece, color, flat) for piece in pieces]
+        if min(shapes) < 0:
             raise p.error(f"createVisualShape failed for geom '{geom.name}'")
-        return p.createMultiBody(0, -1, shape, physicsClientId=client)
+        return [p.createMultiBody(0, -1, shape, physicsClientId=client) for shape in shapes]
 
     def _triangles(self, geom: Geom) -> tuple[Array, Array]:
         match geom.shape:
