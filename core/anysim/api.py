@@ -211,6 +211,12 @@ def simulation(spec: "RunSpec") -> "SimEngine":
     return create_simulation(chosen.name, shards=shards, shard_timeout=chosen.shard_timeout, **chosen.options)
 
 
+def _loaded(source: str | Path | LoadedRun | Mapping[str, Any], overrides: Sequence[str]) -> LoadedRun:
+    if not isinstance(source, Loaded):
+        return load(source, overrides=overrides)
+    return replace(load(source.data, overrides=overrides), files=source.files) if overrides else source
+
+
 def make(
     source: str | Path | LoadedRun | Mapping[str, Any], *, engine: str | None = None, num_envs: int | None = None,
     seed: int | None = None, overrides: Sequence[str] = (), base: Path | None = None, proposals: Any = None,
@@ -219,7 +225,7 @@ def make(
 
     Args:
         source: an installed task by name, a YAML file, or what `load` returned.
-        engine: an installed engine by name; wins over the file.
+        engine: an installed engine by name; wins over the file, whose options are kept for the engine it names.
         num_envs: parallel environments; wins over the file.
         seed: seeds the envs now; otherwise the first `reset(seed=...)` does.
         overrides: dotted overrides, as `-o` on the command line.
@@ -231,15 +237,10 @@ def make(
         SpecError: the file, with line and column.
         CapabilityError: the engine cannot run this world; nothing was built.
     """
-    more = [
-        *overrides,
-        *([f"engine={json.dumps(engine)}"] if engine else []),
-        *([f"num_envs={num_envs}"] if num_envs else []),
-    ]
-    if isinstance(source, Loaded):
-        loaded = replace(load(source.data, overrides=more), files=source.files) if more else source
-    else:
-        loaded = load(source, overrides=more)
+    more = [*overrides, *([f"num_envs={num_envs}"] if num_envs else [])]
+    loaded = _loaded(source, more)
+    if engine and loaded.spec.engine.name != engine:  # the options of a file are those of its own engine
+        loaded = _loaded(source, [*more, f"engine={json.dumps(engine)}"])
     spec = loaded.spec
     world = compile_world(loaded, base=base)
     name = str(source) if isinstance(source, str) and "/" not in str(source) else world.name
