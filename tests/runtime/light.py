@@ -95,8 +95,53 @@ BLOCKS_ONLY: dict[str, Any] = {
 }
 """Without robots and actions."""
 
+MIXED: dict[str, Any] = {
+    **SLIDE,
+    "physics": {**SLIDE["physics"], "gravity": {"range": [[0, 0, -12], [0, 0, -8]]}},
+    "world": {
+        **SLIDE["world"],
+        "name": "mixed",
+        "robots": {
+            "arm": {
+                **SLIDE["world"]["robots"]["arm"],
+                "dynamics": {"kp_scale": {"range": [0.8, 1.2]}},
+                "actions": {
+                    "arm": {"controller": "joint_delta_position", "noise": {"normal": {"mean": 0.0, "std": 0.05}},
+                            "delay": {"choice": [0, 1, 2]}},
+                },
+            },
+        },
+        "objects": {
+            **SLIDE["world"]["objects"],
+            "block": {
+                **SLIDE["world"]["objects"]["block"],
+                "source": {"choice": [{"box": [0.08, 0.08, 0.08]}, {"cylinder": [0.04, 0.06]}], "weights": [2, 1]},
+            },
+            "toy": {
+                "source": {"choice": [{"sphere": 0.03}, {"box": [0.05, 0.05, 0.05]}]},
+                "scale": {"choice": [0.8, 1.0]},
+                "count": {"range": [0, 2]},
+                "damping": {"linear": {"range": [0.0, 0.5]}},
+            },
+        },
+        "layout": {
+            **SLIDE["world"]["layout"],
+            "toy": {"on": "terrain", "region": {"rectangle": [[-0.6, -0.6], [-0.2, 0.6]]}, "checked": False},
+        },
+    },
+    "task": {
+        **SLIDE["task"],
+        "observations": {
+            "policy": [*SLIDE["task"]["observations"]["policy"], {"term": "category_pose", "category": "toy"},
+                       {"term": "joint_pos", "noise": {"normal": {"mean": 0.0, "std": 0.01}}, "delay": 1}],
+            "privileged": [{"term": "category_present", "category": "toy"}],
+        },
+    },
+}  # fmt: skip
+"""Envs with different things in them: kinds, sizes and numbers, and a robot whose commands come late and rough."""
+
 _RUB = {"term": "set_friction", "object": "block", "when": "step", "friction": {"range": [0.2, 0.9]}}
-SPECS: Mapping[str, dict[str, Any]] = {"slide": SLIDE, "blocks_only": BLOCKS_ONLY}
+SPECS: Mapping[str, dict[str, Any]] = {"slide": SLIDE, "blocks_only": BLOCKS_ONLY, "mixed": MIXED}
 """What the properties of the runtime are tested on. A new spec is held to all of them."""
 REAL = ("mujoco", "pybullet", "sapien")
 ENGINES = ["null", *(pytest.param(name, marks=pytest.mark.slow) for name in REAL)]

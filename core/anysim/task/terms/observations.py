@@ -50,6 +50,11 @@ def _unsigned(pose: Array) -> Array:
     return np.concatenate([pose[..., :3], np.where(pose[..., 6:] < 0, -pose[..., 3:], pose[..., 3:])], axis=-1)
 
 
+def _flat(rows: Array) -> Array:
+    """(n, K, k) as (n, K k), also of nobody."""
+    return rows.reshape(len(rows), rows.shape[1] * rows.shape[2])
+
+
 def frame_twist(scene: SceneView, *, frame: Frame) -> Array:
     """Velocity of a frame's origin and its rate, world axes [m/s, rad/s]."""
     return frame.twist
@@ -77,20 +82,19 @@ def category_present(scene: SceneView, *, category: CategoryView) -> Array:
 
 def category_pose(scene: SceneView, *, category: CategoryView) -> Array:
     """Poses of all instances of a category, one after the other [m, xyzw]; absent ones have the world's own frame."""
-    return _unsigned(category.poses).reshape(len(category.poses), -1)
+    return _flat(_unsigned(category.poses))
 
 
 def category_twist(scene: SceneView, *, category: CategoryView) -> Array:
     """Velocities of all instances of a category, one after the other [m/s, rad/s]; zero for absent ones."""
-    twists = category.twists
-    return twists.reshape(len(twists), -1)
+    return _flat(category.twists)
 
 
 def category_offset(scene: SceneView, *, frame: Frame, category: CategoryView) -> Array:
     """From a frame to each instance of a category, in the frame's axes [m]; zero for absent ones."""
     apart = category.positions - frame.position[:, None]
     turn = np.broadcast_to(frame.quaternion[:, None], (*apart.shape[:2], 4))
-    return np.where(category.present[..., None], P.rotate_inverse(turn, apart), 0.0).reshape(len(apart), -1)
+    return _flat(np.where(category.present[..., None], P.rotate_inverse(turn, apart), 0.0))
 
 
 def height_scan(
