@@ -126,7 +126,8 @@ class Momentum:
         if noted.pushes is not None:
             pushed[noted.pushes[:, 0].astype(int)] = noted.pushes[:, 1:4]
         mass = noted.mass[moving, None]
-        gained = np.outer(self._weighs[moving], noted.gravity) + pushed[moving] / mass
+        pulled = np.divide(pushed[moving], mass, out=np.zeros((len(mass), 3)), where=mass > 0)  # 0 of what is absent
+        gained = np.outer(self._weighs[moving], noted.gravity) + pulled
         return noted.slowing[moving, None] * mass * (noted.before.astype(float) + dt * gained)
 
     def _exerted(self, noted: _Noted) -> Array:

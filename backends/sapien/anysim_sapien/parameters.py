@@ -126,7 +126,7 @@ class Parameters:
     def _read_damping(self, which: int, row: Array, scene: EnvScene) -> None:
         """A rate is the wanted one where PhysX has the single-precision share that it makes."""
         dt = self._world.physics.dt
-        for body in np.flatnonzero(self._world.loose):
+        for body in np.flatnonzero(scene.layout.there & self._world.loose):
             component = scene.bodies[body]
             found = (component.linear_damping, component.angular_damping)[which]
             if abs(found - gain(row[body], dt)) > 1e-6 * max(1.0, found):

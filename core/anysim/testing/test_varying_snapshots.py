@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from anysim.engine.capability import Capability as C
+from anysim.engine.parameters import PARAMETERS
 from anysim.testing import plugin, tolerances
 from anysim.testing.compare import MOTION, assert_close, assert_same, play, read, tape
 from anysim.testing.fixtures import needs, skip_without_parameter
@@ -109,8 +110,25 @@ def snapshot_elsewhere(name, options):
 # ---------------------------------------------------------------------- parameters and live editing
 
 
+def _other_values(world, name, values):
+    """Other values (N, K, ...) of a parameter, where it can be changed."""
+    changed = {"body.inertia": 1.5 * values, "body.com": values + 0.004, "geom.color": 0.5 * values}
+    rows = changed.get(name, 0.5 * values + 0.2)
+    if name.startswith("body."):
+        kinds = np.array([body.kind == "static" for body in world.bodies])
+        kept = ~world.loose if PARAMETERS[name].loose else kinds
+        rows[:, kept] = values[:, kept]
+    return rows
+
+
 @varies
-@pytest.mark.parametrize("name", ["body.mass", "geom.friction", "geom.color", "joint.damping"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "body.mass", "body.com", "body.inertia", "body.linear_damping", "body.angular_damping", "geom.friction",
+        "geom.restitution", "geom.color", "joint.damping", "joint.friction", "joint.armature",
+    ],
+)  # fmt: skip
 def test_parameters_of_what_is_absent_wait_for_it(build, engine_class, name):
     """What is written while an entity is absent is read back then, and acts when it comes, like one written there."""
     skip_without_parameter(engine_class, name)
@@ -118,10 +136,7 @@ def test_parameters_of_what_is_absent_wait_for_it(build, engine_class, name):
     world = late.world
     if name.startswith("joint") and not world.joints:
         pytest.skip("this engine's world has no joints")
-    values = late.get_parameters(name) * 0.5 + (0.2 if name != "geom.color" else 0.0)
-    fixed = [i for i, b in enumerate(world.bodies) if b.kind == "static"]
-    if name == "body.mass":
-        values[:, fixed] = late.get_parameters(name)[:, fixed]
+    values = _other_values(world, name, late.get_parameters(name))
     late.reset(present=having(world).repeat(2, axis=0))
     late.set_parameters(name, values)
     assert_close(late.get_parameters(name), values, tolerances.READ_BACK, "read back while absent")
