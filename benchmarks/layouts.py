@@ -1,9 +1,10 @@
-"""Do layouts hold? Cluttered tabletops on every engine: nothing starts inside of anything, all stays where it was put.
+"""Do layouts hold? Cluttered tabletops, or rooms, on every engine: nothing begins inside of anything, all stays put.
 
-    python benchmarks/layouts.py [--engine NAME] [--count N] [--seconds S] [--picture FILE]
+    python benchmarks/layouts.py [--what tabletops|rooms] [--engine NAME] [--count N] [--seconds S] [--picture FILE]
 
 Each tabletop has 10 to 15 objects: boxes, cylinders, capsules, balls and convex hulls of random sizes, in resting poses
-drawn from their shapes, scattered over a table, some beside others. Printed for each engine: how deep contacts are at
+drawn from their shapes, scattered over a table, some beside others. Each room is another one, with furniture of its
+style, boxes and tins on its floor and books on what has a top. Printed for each engine: how deep contacts are at
 the start (the engine's own, in the first step), how far things are from their places after one simulated second, and
 what a layout costs. Exit code 1 if a contact is deeper than 1 mm or a thing more than 5 mm off its place.
 """
@@ -21,10 +22,14 @@ from anysim.api import compile_world, load
 from anysim.engine.factory import create_simulation, engine_class
 from anysim.managers.standard import standard_managers
 from anysim.math import pose as P
+from anysim.world.compile_room import furniture_names
+from anysim_schemas.rooms import RoomSpec
 
 DEPTH, DRIFT = 1e-3, 5e-3  # [m]
 SLACK = 2e-5  # [m] of rounding: PyBullet has hulls 1 mm larger than they are, which is DEPTH exactly
 PER_WORLD = 10  # layouts of one set of objects
+TOPS = ("table", "desk", "nightstand")
+"""Furniture that books lie on."""
 KINDS = ("box", "box", "cylinder", "capsule", "sphere", "mesh")
 
 
@@ -72,6 +77,31 @@ def tabletop(seed: int, folder: Path) -> dict:
     }  # fmt: skip
 
 
+def room(seed: int, folder: Path) -> dict:
+    """A world with a furnished room, and what lies about in it."""
+    del folder
+    rng = np.random.default_rng([8, seed])
+    style = str(rng.choice(["living_room", "bedroom", "office", "kitchen"]))
+    size = [round(float(v), 2) for v in rng.uniform((4.6, 4.2), (6.0, 5.4))]
+    spec = {"style": style, "size": size, "seed": seed, "doors": [{"wall": "south", "at": 0.3}]}
+    floor = {"rectangle": [[-size[0] / 2, -size[1] / 2], [size[0] / 2, size[1] / 2]]}
+    objects: dict = {}
+    layout: dict = {}
+    for k in range(int(rng.integers(3, 7))):
+        edges = [round(float(v), 3) for v in rng.uniform(0.1, 0.35, size=3)]
+        source = {"box": edges} if k % 3 else {"cylinder": [round(edges[0] / 2, 3), edges[1]]}
+        objects[f"thing_{k}"] = {
+            "source": source,
+            "color": [round(float(v), 2) for v in rng.uniform(0.2, 0.95, size=3)],
+        }
+        layout[f"thing_{k}"] = {"on": "terrain", "region": floor, "rest": "stable", "yaw": {"range": [-3.14, 3.14]}}
+    tops = [name for name in furniture_names(RoomSpec.model_validate(spec)) if name.startswith(TOPS)]
+    for k, piece in enumerate(tops):
+        objects[f"book_{k}"] = {"source": {"box": [0.2, 0.14, 0.03]}}
+        layout[f"book_{k}"] = {"on": piece, "yaw": {"range": [-3.14, 3.14]}}
+    return {"world": {"name": f"room_{seed}", "room": spec, "objects": objects, "layout": layout}}
+
+
 class Scene:
     """Envs of one world, without a task."""
 
@@ -99,12 +129,13 @@ class Scene:
                 self.cost = (time.process_time() - start) / len(self.envs)
 
 
-def check(engine: str, count: int, seconds: float, folder: Path) -> bool:
+def check(engine: str, what: str, count: int, seconds: float, folder: Path) -> bool:
     """Print what came of `count` layouts; True if all of them hold."""
     depths, drifts, costs, failed = [], [], [], []
-    for number in range(-(-count // PER_WORLD)):
-        envs = min(PER_WORLD, count - number * PER_WORLD)
-        scene = Scene(tabletop(number, folder), engine, envs)
+    make, per_world = (tabletop, PER_WORLD) if what == "tabletops" else (room, 1)
+    for number in range(-(-count // per_world)):
+        envs = min(per_world, count - number * per_world)
+        scene = Scene(make(number, folder), engine, envs)
         with scene.engine as simulation:
             scene.reset(number)
             costs.append(scene.cost)
@@ -114,7 +145,7 @@ def check(engine: str, count: int, seconds: float, folder: Path) -> bool:
             touching = simulation.contacts()
             depths += list(touching.depth)
             failed += [
-                f"tabletop {number} env {e}: {_name(names, a)} is {1e3 * d:.2f} mm inside of {_name(names, b)}"
+                f"{what} {number} env {e}: {_name(names, a)} is {1e3 * d:.2f} mm inside of {_name(names, b)}"
                 for e, a, b, d in zip(touching.env, touching.body_a, touching.body_b, touching.depth, strict=True)
                 if d > DEPTH + SLACK
             ]
@@ -123,11 +154,11 @@ def check(engine: str, count: int, seconds: float, folder: Path) -> bool:
             drift = P.norm(rest[..., :3] - plan[..., :3])
             drifts += list(drift.ravel())
             failed += [
-                f"tabletop {number} env {e}: {names[b]} ({_shape(scene, b)}) is {1e3 * drift[e, b]:.1f} mm off"
+                f"{what} {number} env {e}: {names[b]} ({_shape(scene, b)}) is {1e3 * drift[e, b]:.1f} mm off"
                 for e, b in np.argwhere(drift > DRIFT)
             ]
     print(
-        f"{engine}: {count} tabletops, {len(depths)} contacts in the first step, "
+        f"{engine}: {count} {what}, {len(depths)} contacts in the first step, "
         f"deepest {1e3 * max(depths, default=0.0):.3f} mm; "
         f"after {seconds:g} s farthest {1e3 * max(drifts):.3f} mm off, "
         f"99 % within {1e3 * np.quantile(drifts, 0.99):.3f} mm; "
@@ -162,6 +193,7 @@ def _shape(scene: Scene, body: int) -> str:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--what", choices=("tabletops", "rooms"), default="tabletops")
     parser.add_argument("--engine", action="append", help="an engine; all that are installed where not given")
     parser.add_argument("--count", type=int, default=20)
     parser.add_argument("--seconds", type=float, default=1.0)
@@ -174,7 +206,8 @@ def main() -> int:
         if chosen.picture is not None:
             draw(engines[0], chosen.picture, Path(folder))
             return 0
-        return 0 if all([check(name, chosen.count, chosen.seconds, Path(folder)) for name in engines]) else 1
+        held = [check(name, chosen.what, chosen.count, chosen.seconds, Path(folder)) for name in engines]
+        return 0 if all(held) else 1
 
 
 if __name__ == "__main__":

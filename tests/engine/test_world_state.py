@@ -14,8 +14,8 @@ CLOSE = 1e-6
 READ = ("body_pose", "body_twist", "joint_pos", "joint_vel", "control_position", "control_velocity", "control_effort")
 
 
-def moving(engine: str, steps: int = 6):
-    env = light.make(engine, 2)
+def moving(engine: str, steps: int = 6, spec: str = "slide"):
+    env = light.make(engine, 2, light.SPECS[spec])
     env.reset(seed=3)
     for step in range(steps):
         env.step(np.full((2, 2), 0.4 if step % 2 else 0.9))
@@ -45,8 +45,11 @@ def test_files_and_json_hold_all_of_it(tmp_path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("target", ["mujoco", "pybullet", "sapien"])
 @pytest.mark.parametrize("source", ["mujoco", "sapien", "pybullet"])
-def test_a_state_reads_back_on_another_engine(source, target) -> None:
-    with moving(source) as one, moving(target, 3) as other:
+@pytest.mark.parametrize("spec", ["slide", "mixed"])
+def test_a_state_reads_back_on_another_engine(source, target, spec) -> None:
+    """Also where other things are there than before."""
+    with moving(source, spec=spec) as one, moving(target, 3, spec) as other:
+        other.reset(seed=8)
         state = one.engine.world_state()
         carried = other.engine.set_world_state(state)
         assert carried == ((), ())
@@ -54,12 +57,12 @@ def test_a_state_reads_back_on_another_engine(source, target) -> None:
         assert all(gap < CLOSE for gap in gaps(state, back).values()), gaps(state, back)
         assert np.allclose(back.time, state.time)
         assert (back.present == state.present).all()
-        _goes_on_like_a_fresh_one(other.engine, state, target)
+        _goes_on_like_a_fresh_one(other.engine, state, target, spec)
 
 
-def _goes_on_like_a_fresh_one(engine: SimEngine, state: WorldState, name: str) -> None:
+def _goes_on_like_a_fresh_one(engine: SimEngine, state: WorldState, name: str, spec: str) -> None:
     """Nothing of what the engine did before is left: to the bit what a new engine comes to."""
-    with light.make(name, 2) as fresh:
+    with light.make(name, 2, light.SPECS[spec]) as fresh:
         fresh.engine.set_world_state(state)
         for one in (engine, fresh.engine):
             one.step(10)

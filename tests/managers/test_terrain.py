@@ -201,3 +201,25 @@ def test_the_look_of_a_room_is_drawn_and_its_form_is_not() -> None:
         assert any(d["terrain/chair_0/color"] != d["terrain/chair_1/color"] for d in drawn)
         poses = engine.get_state().body_pose
         assert (poses == poses[:1]).all()
+
+
+def test_a_replay_stands_on_the_level_that_the_record_says() -> None:
+    """By the record's draws alone: another env, which has climbed nothing."""
+    with env_of(1, CURRICULUM, "world.terrain.tiles.start=0") as env, env_of(1, CURRICULUM) as other:
+        env.reset(seed=0)
+        terrain(env).promote(np.array([0]), 2)
+        env.reset()
+        drawn, seed = dict(env.streams.draws[0]), env.streams.episode_seed.copy()
+        assert terrain(env).level.tolist() == [2]
+        assert drawn["terrain/level"] == 2.0
+        other.reset(seed=1)
+        for manager in other.managers:
+            manager.recall(0, drawn)
+        other.reset(episode_seeds=seed)
+        assert (other.scene.origin == env.scene.origin).all()
+        assert dict(other.streams.draws[0]) == drawn
+        other.reset(episode_seeds=seed)  # the record counts once
+        assert terrain(other).level.tolist() == [2]
+        terrain(other).demote(np.array([0]))
+        other.reset()
+        assert terrain(other).level.tolist() == [1]

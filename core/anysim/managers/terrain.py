@@ -14,6 +14,7 @@ from anysim.conventions import GROUND, WORLD, Array
 from anysim.engine.base import SimEngine
 from anysim.errors import TaskError
 from anysim.managers.base import Manager
+from anysim.managers.streams import Origin
 from anysim.managers.values import draw, is_random
 from anysim.world.colors import rgb
 from anysim.world.compile_room import MAIN, ROOM, furniture_names
@@ -57,6 +58,10 @@ def _looks(spec: WorldSpec, world: World) -> list[Look]:
     return [Look(c, s, p, np.array(g)) for c, s, p, g in parts if is_random(c) and g]
 
 
+LEVEL = "terrain/level"
+"""The stream of a tile's row, and the name under which recordings keep it."""
+
+
 class TerrainManager(Manager):
     """Chooses tiles and writes `board.origin`; draws colours of ground and room. Geometry is part of the World."""
 
@@ -76,6 +81,7 @@ class TerrainManager(Manager):
         self.column = np.zeros(n, dtype=int)
         """(N,) the column of each env's tile."""
         self._change = np.zeros(n, dtype=int)
+        self._recalled: dict[int, int] = {}
         self._looks = _looks(self.spec.world, world)
 
     def bind(self, engine: SimEngine) -> None:
@@ -104,6 +110,11 @@ class TerrainManager(Manager):
         """As `promote`, to easier ground; the easiest is level 0."""
         self.promote(env_ids, -by)
 
+    def recall(self, env: int, drawn: Mapping[str, Any]) -> None:
+        """A level of a curriculum follows from earlier episodes; the record of this one says it."""
+        if self.tiled and LEVEL in drawn:
+            self._recalled[env] = min(int(drawn[LEVEL]), self.rows - 1)
+
     # ------------------------------------------------------------------ lifecycle
 
     def reset(self, env_ids: Array) -> None:
@@ -120,18 +131,26 @@ class TerrainManager(Manager):
         path = "world.terrain.tiles"
         self.column[env] = draw(self._columns, "terrain/column", self.streams, env, source=f"{path}.columns")
         wanted = self.level[env] + self._change[env]
-        if self._tiling.choose == "draw" or wanted >= self.rows:
+        recalled = self._recalled.pop(env, None)
+        if self._tiling.choose == "curriculum" and recalled is not None:
+            self.level[env] = self._kept_level(env, recalled)
+        elif self._tiling.choose == "draw" or wanted >= self.rows:
             self.level[env] = self._drawn_level(env, self.rows - 1, f"{path}.rows")
         elif self.level[env] == NEVER:
             top = self.rows - 1 if self._tiling.start is None else self._tiling.start
             self.level[env] = self._drawn_level(env, top, f"{path}.start")
         else:
-            self.level[env] = max(0, wanted)
+            self.level[env] = self._kept_level(env, max(0, wanted))
         self._change[env] = 0
+
+    def _kept_level(self, env: int, level: int) -> int:
+        """A level that is not drawn, noted like one that is."""
+        self.streams.note(env, LEVEL, float(level), Origin("", "world.terrain.tiles.choose"))
+        return level
 
     def _drawn_level(self, env: int, top: int, source: str) -> int:
         levels: Any = Choice[float](choice=tuple(map(float, range(top + 1))))
-        return int(draw(levels, "terrain/level", self.streams, env, source=source))
+        return int(draw(levels, LEVEL, self.streams, env, source=source))
 
     def snapshot(self, env_ids: Array) -> dict[str, Array]:
         return {
