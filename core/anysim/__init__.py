@@ -20,9 +20,7 @@ _LAZY = {
 __all__ = [*_LAZY, "__version__"]
 
 if TYPE_CHECKING:
-    from anysim.api import compile_world as compile_world
-    from anysim.api import load as load
-    from anysim.api import make as make
+    from anysim.api import compile_world as compile_world, load as load, make as make
     from anysim.engine.base import SimEngine as SimEngine
     from anysim.engine.factory import create_simulation as create_simulation
     from anysim.task.env import TaskEnv as TaskEnv

@@ -8,8 +8,7 @@ from anysim_schemas.base import Flag, Integer, NonNegative, Number, Positive, Sp
 from anysim_schemas.errors import KeyFault
 from anysim_schemas.joints import ObjectJointSpec
 from anysim_schemas.matter import DampingSpec, MaterialValue, SolverSpec, TextureValue
-from anysim_schemas.object_source import Count, Source, most
-from anysim_schemas.object_source import SourceSpec as SourceSpec
+from anysim_schemas.object_source import Count, Source, SourceSpec as SourceSpec, most
 from anysim_schemas.values import BounceValue, ColorValue, NonNegativeValue, PositiveValue, Vec3Value
 
 Columns = Annotated[int, Strict(), Field(gt=0)]

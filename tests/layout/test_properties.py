@@ -1,8 +1,7 @@
 """Whatever is asked for: what is given is apart, the same again, and independent of what else there is."""
 
 import numpy as np
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from anysim.errors import TaskError
 from anysim.world import polygons as G

@@ -3,8 +3,7 @@
 import math
 
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 
 from anysim_schemas import yaml as spec_yaml
 from anysim_schemas.nodes import Node

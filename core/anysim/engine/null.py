@@ -15,8 +15,7 @@ import numpy as np
 from anysim import __version__
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
-from anysim.engine.capability import Capabilities
-from anysim.engine.capability import Capability as C
+from anysim.engine.capability import Capabilities, Capability as C
 from anysim.engine.commands import MODES, Control
 from anysim.engine.looks import LIGHTS, SURROUNDINGS, Looks
 from anysim.engine.parameters import PARAMETERS, nominal

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
+from anysim.errors import TaskError
 from anysim.managers.board import Board
 from anysim.managers.streams import Streams
 from anysim.world.model import World
@@ -72,7 +73,7 @@ class Manager(ABC):
 
     def override(self, path: str, value: Any, env_ids: Array) -> None:
         """Write one of `overridable` that can change midway, now, as if it had been drawn so."""
-        raise NotImplementedError(f"{self.name} lists {path} as overridable and does not write it")
+        raise TaskError(f"the manager '{self.name}' says that {path} can change midway, and has no `override` for it")
 
     def revert(self, path: str, env_ids: Array) -> None:
         """An episode in which `path` was overridden is over: what `reset` does not write anew is as built again."""

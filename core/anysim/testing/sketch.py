@@ -1,5 +1,3 @@
 """Small Worlds by hand, as the contract suite names them; see `anysim.world.sketch`."""
 
-from anysim.world.sketch import ORIGIN as ORIGIN
-from anysim.world.sketch import Sketch as Sketch
-from anysim.world.sketch import inertial as inertial
+from anysim.world.sketch import ORIGIN as ORIGIN, Sketch as Sketch, inertial as inertial

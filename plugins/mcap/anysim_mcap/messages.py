@@ -57,8 +57,7 @@ def json_bytes(value: Any) -> bytes:
 
 def file_descriptor_set(name: str, layout: StateLayout) -> bytes:
     """The serialised FileDescriptorSet of one of the anysim messages."""
-    from google.protobuf.descriptor_pb2 import FieldDescriptorProto as F
-    from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSet
+    from google.protobuf.descriptor_pb2 import FieldDescriptorProto as F, FileDescriptorProto, FileDescriptorSet
 
     one, many = F.LABEL_OPTIONAL, F.LABEL_REPEATED
     fields = [("step", 1, F.TYPE_UINT64, one), ("time", 2, F.TYPE_DOUBLE, one)]

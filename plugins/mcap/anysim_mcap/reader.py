@@ -14,8 +14,7 @@ from anysim.errors import RecordError, listing, suggest
 from anysim.record.frame import state_digest
 from anysim.record.manifest import CameraEntry
 from anysim.record.reader import TrajectoryReader
-from anysim_mcap import messages as m
-from anysim_mcap import video
+from anysim_mcap import messages as m, video
 from anysim_mcap.chunks import records
 from anysim_mcap.writer import TRAJECTORY_FILE
 

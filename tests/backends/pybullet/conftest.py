@@ -10,8 +10,8 @@ import pytest
 from anysim.engine.base import SimEngine
 from anysim.engine.factory import create_simulation
 from anysim.testing.sketch import Sketch, inertial
-from anysim.world.model import Body as WorldBody
 from anysim.world.model import (
+    Body as WorldBody,
     BodyKind,
     Box,
     ContactSensor,
