@@ -59,10 +59,8 @@ def _array(path: Path) -> Array:
 
 def _image(path: Path) -> Array:
     """Grey values (rows, cols) in [0, 1], the top row first."""
-    try:
-        from PIL import Image
-    except ModuleNotFoundError as error:
-        raise AssetError(f"{path}: images need pillow, which is not installed (pip install pillow)") from error
+    from PIL import Image
+
     try:
         with Image.open(path) as image:
             deep = image.mode.startswith(("I", "F"))
