@@ -37,8 +37,8 @@ class Skins:
             return look.opacity
         self._given[id(target)] = wanted
         target.set_base_color(color.tolist())
-        if texture != NONE or (before is not None and before[1] != NONE):
-            # a texture that was taken away does not come back, so what had one goes on with a plain one
+        if self._world.textures:
+            # SAPIEN settles at the first image whether a material has a texture: what has none gets a plain one
             target.set_base_color_texture(self._tinted(texture, color))
         if material != NONE or (before is not None and before[2] != NONE):
             target.set_roughness(look.roughness)

@@ -235,6 +235,18 @@ def test_textures_per_env(build, engine_class, shape):
 
 
 @needs(C.RENDER_RGB, C.TEXTURES)
+def test_a_texture_comes_after_the_first_image(build, engine_class):
+    """What was first seen without a texture can be given one."""
+    skip_without_parameter(engine_class, "geom.texture")
+    engine = build(_painted("red"), 1)
+    seen = []
+    for texture in (-1.0, 1.0, -1.0, 0.0):
+        engine.set_parameters("geom.texture", [[texture]])
+        seen.append(_hue(engine.render("front")["rgb"][0, 20:28, 20:28]))
+    assert seen == ["grey", "green", "grey", "red"]
+
+
+@needs(C.RENDER_RGB, C.TEXTURES)
 def test_a_texture_stands_upright_on_a_side(build):
     """The top row of the image is on top."""
     image = build(_painted("halves")).render("front")["rgb"][0]
