@@ -56,14 +56,16 @@ def test_an_episode_depends_on_its_own_seed_alone(get, alone, engine, spec) -> N
 
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ["null", *light.REAL])
-def test_an_episode_does_not_depend_on_shards(get, alone, engine) -> None:
-    assert follow(get(engine, 4, shards=2), alone(engine), [[0, 1], [3], [2, 0, 1]], 3) >= 12
+@pytest.mark.parametrize("spec", ["slide", "mixed"])
+def test_an_episode_does_not_depend_on_shards(get, alone, engine, spec) -> None:
+    assert follow(get(engine, 4, spec, shards=2), alone(engine, spec), [[0, 1], [3], [2, 0, 1]], 3) >= 12
 
 
 @pytest.mark.parametrize("engine", light.ENGINES)
-def test_a_partial_reset_touches_its_rows_alone(get, engine) -> None:
+@pytest.mark.parametrize("spec", ["slide", "mixed"])
+def test_a_partial_reset_touches_its_rows_alone(get, engine, spec) -> None:
     """To the bit: state, observation, streams and managers of the others; also by `reset_to`."""
-    env = get(engine, 4)
+    env = get(engine, 4, spec)
 
     def rows(ids: np.ndarray) -> dict[str, bytes]:
         state = env.engine.get_state()
