@@ -12,8 +12,9 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ["mujoco", "pybullet", "sapien"])
-def test_cluttered_tabletops_stay(engine: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("what", ["tabletops", "rooms"])
+def test_layouts_stay(what: str, engine: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     if not engine_class(engine).availability().available:
         pytest.skip(f"{engine} cannot run here")
     check = runpy.run_path(str(ROOT / "benchmarks" / "layouts.py"))["check"]
-    assert check(engine, 20, 1.0, tmp_path), capsys.readouterr().out
+    assert check(engine, what, 20, 1.0, tmp_path), capsys.readouterr().out

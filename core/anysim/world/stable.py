@@ -23,6 +23,9 @@ ROUND = 32
 TILT = radians(4.0)
 """Poses that less than this turns over are left out: engines and their margins are not that exact."""
 
+INSIDE = 0.0015
+"""[m] from the edge of the face that the centre of mass must be above it: Bullet rounds the edges of hulls by 1 mm."""
+
 SMALLEST = 0.005
 """Share of the drops from which on a pose counts."""
 
@@ -117,7 +120,7 @@ def _topples_to(face: int, normals: Sequence[Array], outlines: Sequence[Array], 
     depth = np.where(keep, ((com - corners) * inward).sum(axis=1) / np.where(keep, length, 1.0), np.inf)
     worst = int(np.argmin(depth))
     height = float((corners[0] - com) @ normal)  # of the centre of mass above the face
-    if depth[worst] > height * tan(TILT):
+    if depth[worst] > max(height * tan(TILT), INSIDE):
         return None
     edge = {tuple(np.round(corners[worst], 9)), tuple(np.round(following[worst], 9))}
     for other, outline in enumerate(outlines):
