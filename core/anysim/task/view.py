@@ -204,7 +204,28 @@ class SlotFrame(Frame):
         return self._follower.present[:, 0]
 
 
-class ObjectView:
+class Jointed(ABC):
+    """What has joints of its own."""
+
+    scene: SceneView
+
+    @property
+    @abstractmethod
+    def joints(self) -> slice:
+        """Its joints among the world's."""
+
+    @property
+    def joint_pos(self) -> Array:
+        """(n, J) [rad, m] of its joints."""
+        return self.scene.state.joint_pos[self.scene.rows, self.joints]
+
+    @property
+    def joint_vel(self) -> Array:
+        """(n, J) [rad/s, m/s] of its joints."""
+        return self.scene.state.joint_vel[self.scene.rows, self.joints]
+
+
+class ObjectView(Jointed):
     """An object of the world, whatever it is in each env. In YAML: its name."""
 
     reference_kind: ClassVar[str] = "object"
@@ -250,21 +271,12 @@ class ObjectView:
                 yield entity, own
 
     @property
-    def joint_pos(self) -> Array:
-        """(n, J) [rad, m] of its joints."""
-        return self.scene.state.joint_pos[self.scene.rows, self._joints]
-
-    @property
-    def joint_vel(self) -> Array:
-        """(n, J) [rad/s, m/s] of its joints."""
-        return self.scene.state.joint_vel[self.scene.rows, self._joints]
-
-    @property
-    def _joints(self) -> slice:
+    def joints(self) -> slice:
+        """Its joints among the world's; TaskError where it can be several things."""
         return slice(self.entity.joint_start, self.entity.joint_stop)
 
 
-class RobotView:
+class RobotView(Jointed):
     """A robot of the world. In YAML: its name."""
 
     reference_kind: ClassVar[str] = "robot"
@@ -282,14 +294,9 @@ class RobotView:
         self.upper = np.array([j.upper for j in world.joints[self._joints]])
 
     @property
-    def joint_pos(self) -> Array:
-        """(n, J) [rad, m] of the robot's joints."""
-        return self.scene.state.joint_pos[self.scene.rows, self._joints]
-
-    @property
-    def joint_vel(self) -> Array:
-        """(n, J) [rad/s, m/s] of the robot's joints."""
-        return self.scene.state.joint_vel[self.scene.rows, self._joints]
+    def joints(self) -> slice:
+        """Its joints among the world's."""
+        return self._joints
 
     @property
     def arm_speed(self) -> Array:
