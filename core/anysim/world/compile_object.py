@@ -9,7 +9,7 @@ from anysim.errors import AssetError, PluginError, SpecError, listing
 from anysim.world import inertia
 from anysim.world.assets import locate
 from anysim.world.builder import WorldBuilder
-from anysim.world.colors import Rgb, rgb
+from anysim.world.colors import Rgb, nominal_rgb
 from anysim.world.compile_joints import with_joints
 from anysim.world.compile_matter import with_matter
 from anysim.world.forms import INSTANCER, Origin, source_text
@@ -40,7 +40,7 @@ from anysim.world.presets import surface
 from anysim.world.procedural.build import build
 from anysim_schemas.object_source import PROCEDURAL, SourceSpec
 from anysim_schemas.objects import ContactSpec, ObjectSpec
-from anysim_schemas.values import Choice, Drawn, Range
+from anysim_schemas.values import Drawn
 
 DEFAULT_DENSITY = 1000.0  # [kg/m^3], water
 DEFAULT_FRICTION = 0.8
@@ -119,7 +119,7 @@ def _of_family(spec: ObjectSpec, source: SourceSpec, model: ImportedModel, issue
 def _model(
     name: str, spec: ObjectSpec, source: SourceSpec, issues: Issues, key: str, base: Path | None
 ) -> ImportedModel | None:
-    color = _color(spec, issues)
+    color = nominal_rgb(spec.color, DEFAULT_COLOR, issues)
     friction = DEFAULT_FRICTION if spec.friction is None else float(nominal(spec.friction))
     touch = surface(spec.contact or ContactSpec(), friction, float(nominal(spec.restitution or 0.0)))
     if source.asset is not None:
@@ -208,18 +208,3 @@ def _asset(
         if text is not None:
             model = replace(model, report=(*model.report, ImportNote("repaired", f"link '{bodies[0].name}'", text)))
     return replace(model, geoms=tuple(geoms), bodies=bodies)
-
-
-def _color(spec: ObjectSpec, issues: Issues) -> Rgb:
-    """The nominal colour; all colours that may be drawn are checked."""
-    try:
-        if isinstance(spec.color, Choice):
-            first, *_ = [rgb(color) for color in spec.color.choice]
-            return first
-        if isinstance(spec.color, Range):
-            low, high = (rgb(color) for color in spec.color.range)
-            return (0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]))
-        return DEFAULT_COLOR if spec.color is None else rgb(nominal(spec.color))
-    except ValueError as error:
-        issues.add("color", str(error))
-        return DEFAULT_COLOR

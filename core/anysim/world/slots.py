@@ -3,19 +3,13 @@
 A logical object is (category, instance). Its name is that of a slot, or of an entity that is the same in every env.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import NameLookupError, listing, suggest
-from anysim.world.forms import instances
 from anysim.world.model import EntityKind, Slot, World
-from anysim_schemas.objects import ObjectSpec
-
-T = TypeVar("T")
 
 ABSENT = -1
 """The entity, or body, of a logical object that is not there."""
@@ -77,23 +71,3 @@ def active_entity(slot: Slot, presence: Array) -> Array:
     choices = np.array(slot.entities)
     there = presence[:, choices]
     return np.where(there.any(axis=1), choices[there.argmax(axis=1)], ABSENT)
-
-
-def active(world: World, presence: Array) -> Array:
-    """(N, S) int: the entity of each slot of the World in each env, or ABSENT; `presence` is (N, entities) bool."""
-    columns = [active_entity(slot, presence) for slot in world.slots]
-    return np.stack(columns, axis=1) if columns else np.zeros((len(presence), 0), dtype=int)
-
-
-def by_object(given: Mapping[str, T], objects: Mapping[str, ObjectSpec]) -> dict[str, tuple[str, T]]:
-    """For each logical object the key and value of a mapping by name: an entry of its own, else its category's.
-
-    In the order of the mapping, a category's instances in its place. What the names do not stand for stays as it is.
-    """
-    made = {name: instances(name, spec) for name, spec in objects.items()}
-    found: dict[str, tuple[str, T]] = {}
-    for key, value in given.items():
-        for name in made.get(key, (key,)):
-            own = name in given
-            found[name] = (name, given[name]) if own else (key, value)
-    return found
