@@ -1,13 +1,20 @@
 """The models of options that plugins own, for the loader of specs."""
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ConfigDict
 
 from anysim import registry
+from anysim.controllers.base import DEFAULT_CONTROLLER
 from anysim.errors import PluginError
 from anysim.signatures import options_model
 from anysim_schemas.plugin import UnknownPlugin
 
 TERM_KINDS = ("observation", "reward", "predicate", "command", "event")
+
+
+class _Anything(BaseModel):
+    """Options that somebody else checks."""
+
+    model_config = ConfigDict(extra="allow")
 
 
 def resolve_options(kind: str, name: str) -> type[BaseModel] | None:
@@ -19,6 +26,8 @@ def resolve_options(kind: str, name: str) -> type[BaseModel] | None:
     from anysim.task.library import find
 
     try:
+        if (kind, name) == ("controller", DEFAULT_CONTROLLER):
+            return _Anything
         if kind in TERM_KINDS:
             return options_model(find(kind, name))
         if kind in ("engine", "writer"):

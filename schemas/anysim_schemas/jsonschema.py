@@ -21,7 +21,7 @@ from pydantic_core import core_schema
 
 from anysim_schemas.base import Spec
 from anysim_schemas.proposals import Proposals
-from anysim_schemas.robots import RobotModelSpec
+from anysim_schemas.robot_model import RobotModelSpec
 from anysim_schemas.run import RunSpec
 
 SCHEMAS: Mapping[str, type[BaseModel]] = {

@@ -27,8 +27,8 @@ def loaded_by(module: str, watched: tuple[str, ...]) -> list[str]:
 
 
 PACKAGES = (
-    "anysim_schemas", "anysim", "anysim_mujoco", "anysim_sapien", "anysim_ik", "anysim_mcap", "anysim_robots",
-    "anysim_tasks",
+    "anysim_schemas", "anysim", "anysim_mujoco", "anysim_sapien", "anysim_control", "anysim_ik", "anysim_legged",
+    "anysim_mcap", "anysim_mink", "anysim_policy", "anysim_robots", "anysim_tasks",
 )  # fmt: skip
 
 

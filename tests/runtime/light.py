@@ -17,7 +17,7 @@ from anysim import registry
 from anysim.task.env import TaskEnv
 from anysim.world.catalogue import CatalogueEntry
 from anysim_schemas.load import load
-from anysim_schemas.robots import RobotModelSpec
+from anysim_schemas.robot_model import RobotModelSpec
 
 HERE = Path(__file__).parent
 ARM = {

@@ -12,7 +12,7 @@ import pytest
 
 from anysim_schemas.errors import SpecError
 from anysim_schemas.load import load
-from anysim_schemas.robots import RobotModelSpec
+from anysim_schemas.robot_model import RobotModelSpec
 from anysim_schemas.run import RunSpec
 
 BROKEN = Path(__file__).parent / "broken"

@@ -8,7 +8,7 @@ from jsonschema import Draft202012Validator
 
 from anysim_schemas.jsonschema import SCHEMAS, json_schema, main
 from anysim_schemas.load import load, load_run
-from anysim_schemas.robots import RobotModelSpec
+from anysim_schemas.robot_model import RobotModelSpec
 from anysim_schemas.run import RunSpec
 from anysim_schemas.yaml import parse
 

@@ -7,7 +7,7 @@ from pydantic import BaseModel
 
 from anysim_schemas.errors import SpecError
 from anysim_schemas.load import load, load_run
-from anysim_schemas.robots import RobotModelSpec
+from anysim_schemas.robot_model import RobotModelSpec
 from anysim_schemas.run import RunSpec
 from anysim_schemas.values import Choice, Normal, Range
 

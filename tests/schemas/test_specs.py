@@ -10,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 from anysim_schemas.base import Spec
 from anysim_schemas.load import load_run
 from anysim_schemas.objects import ObjectSpec
-from anysim_schemas.robots import RobotModelSpec
+from anysim_schemas.robot_model import RobotModelSpec
 from anysim_schemas.run import RunSpec
 from anysim_schemas.shapes import inside, shapes_of_field
 from anysim_schemas.terrain import TerrainSpec

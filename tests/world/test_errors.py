@@ -11,7 +11,7 @@ from anysim.world.catalogue import CatalogueEntry, load_robot
 from anysim.world.compile import compile_world
 from anysim.world.placement import placement_order
 from anysim_schemas.layout import PlacementSpec
-from anysim_schemas.robots import RobotModelSpec
+from anysim_schemas.robot_model import RobotModelSpec
 from anysim_schemas.run import RunSpec, WorldSpec
 
 CUBE = {"source": {"box": [0.04, 0.04, 0.04]}}

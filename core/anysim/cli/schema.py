@@ -19,7 +19,7 @@ def schema(
     """Print the JSON Schema of a kind of file, for completion and checks in an editor."""
     from anysim.cli.output import print_json
     from anysim_schemas.jsonschema import json_schema
-    from anysim_schemas.robots import RobotModelSpec
+    from anysim_schemas.robot_model import RobotModelSpec
     from anysim_schemas.run import RunSpec
 
     print_json(json_schema(RunSpec if root is Root.RUN else RobotModelSpec))

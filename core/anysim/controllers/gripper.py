@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from anysim.controllers.base import ChannelView, Controller
+from anysim.controllers.base import ChannelView, Command, Controller
 from anysim.conventions import Array
 from anysim.errors import TaskError
 
@@ -24,8 +24,8 @@ class GripperBinary(Controller):
         self.dim = 1
         self.low, self.high = -np.ones(1), np.ones(1)
 
-    def apply(self, action: Array, env_ids: Array | None) -> Array:
-        return np.where(action >= 0, self._opened, self._closed)
+    def apply(self, action: Array, env_ids: Array | None) -> Command:
+        return Command(position=np.where(action >= 0, self._opened, self._closed))
 
     def action_for(self, targets: Array, env_ids: Array) -> Array:
         nearer_open = np.abs(targets - self._opened).sum(axis=1) <= np.abs(targets - self._closed).sum(axis=1)

@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from anysim.controllers.base import ChannelView, Controller
+from anysim.controllers.base import ChannelView, Command, Controller
 from anysim.conventions import Array
 
 
@@ -18,8 +18,8 @@ class JointPosition(Controller):
         self.dim = len(channel.actuators)
         self.low, self.high = channel.lower, channel.upper
 
-    def apply(self, action: Array, env_ids: Array | None) -> Array:
-        return action
+    def apply(self, action: Array, env_ids: Array | None) -> Command:
+        return Command(position=action)
 
     def action_for(self, targets: Array, env_ids: Array) -> Array:
         return np.minimum(np.maximum(targets, self.low), self.high)
@@ -44,11 +44,11 @@ class JointDeltaPosition(Controller):
     def reset(self, env_ids: Array, targets: Array) -> None:
         self._target[env_ids] = targets
 
-    def apply(self, action: Array, env_ids: Array | None) -> Array:
+    def apply(self, action: Array, env_ids: Array | None) -> Command:
         rows = slice(None) if env_ids is None else env_ids
         moved = self._target[rows] + self.scale * action
         self._target[rows] = np.minimum(np.maximum(moved, self.channel.lower), self.channel.upper)
-        return self._target[rows]
+        return Command(position=self._target[rows])
 
     def action_for(self, targets: Array, env_ids: Array) -> Array:
         wanted = (targets - self._target[env_ids]) / self.scale

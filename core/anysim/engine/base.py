@@ -220,11 +220,11 @@ class SimEngine(Primitives):
         self._reset(ids)
         self._ticks[ids] = 0
 
-    def step(self, n_steps: int = 1, env_ids: EnvIds = None) -> None:
+    def step(self, n_steps: int = 1, env_ids: EnvIds = None, *, keep_wrench: bool = False) -> None:
         """Advance by `n_steps` physics steps of `world.physics.dt`; with `env_ids`, only those envs.
 
-        Commands persist; a wrench lasts for the next call that steps its env. A non-finite env is marked in
-        `State.fault`, the others go on.
+        Commands persist; a wrench lasts for the next call that steps its env, and with `keep_wrench` for the one after
+        it too, where a control step is made in parts. A non-finite env is marked in `State.fault`, the others go on.
         """
         with self._lock:
             self._require_world()
@@ -239,7 +239,7 @@ class SimEngine(Primitives):
             if commands.wrench is not None:
                 self._apply_wrench(commands.wrench)
             self._step(n_steps, ids)
-            if commands.wrench is not None:
+            if commands.wrench is not None and not keep_wrench:
                 commands.spend_wrench(ids)
                 self._apply_wrench(None)  # what waits for others comes with their step, unless a reset forgets it
             if ids is None:

@@ -1,38 +1,21 @@
-"""RobotManager: where robots stand and how they begin, and actions from their channels to drive targets."""
+"""RobotManager: where robots stand and how they begin, and the actions of their channels."""
 
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
 
 import numpy as np
 
-from anysim import registry
-from anysim.controllers.base import ChannelView, Controller
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
-from anysim.errors import SpecError, SpecIssue, TaskError, listing, suggest
+from anysim.errors import TaskError, listing
+from anysim.managers.actions import Actions, ActionSlice
 from anysim.managers.base import Manager
-from anysim.managers.noise import DelayLine, longest_delay, noise_rows, note_noise
 from anysim.managers.overrides import WORLD, Overridable, drawn, random_fields
 from anysim.managers.robot_dynamics import RobotDynamics
 from anysim.managers.streams import Origin
 from anysim.managers.values import draw_rows, is_random
 from anysim.math import pose as P
-from anysim.signatures import options_model
 from anysim.world.model import BodyKind, World
-from anysim_schemas.robots import ActionSpec, RobotSpec
-
-
-class ActionSlice(NamedTuple):
-    """Which columns of the action belong to a channel."""
-
-    robot: str
-    channel: str
-    start: int
-    stop: int
-    controller: Controller
-    spec: ActionSpec
-    line: DelayLine | None
-    """What was asked for in the last steps, where it acts late."""
+from anysim_schemas.robots import RobotSpec
 
 
 class RobotManager(Manager):
@@ -42,23 +25,7 @@ class RobotManager(Manager):
 
     def build(self, world: World) -> None:
         self._world = world
-        self._channels: list[tuple[str, str, ChannelView]] = []
-        issues: list[SpecIssue] = []
-        for robot in world.robots:
-            for channel_name in self.spec.world.robots[robot.name].actions:
-                channel = robot.channels.get(channel_name)
-                if channel is None:
-                    path = f"world.robots.{robot.name}.actions.{channel_name}"
-                    hint = suggest(channel_name, list(robot.channels))
-                    issues.append(
-                        SpecIssue(
-                            "", path, f"{robot.model} has no such channel{hint} (channels: {listing(robot.channels)})"
-                        )
-                    )
-                    continue
-                self._channels.append((robot.name, channel_name, ChannelView.of(world, channel)))
-        if issues:
-            raise SpecError(issues)
+        self._actions = Actions(world, self.spec.world.robots, self.streams)
         self._dynamics = {
             robot.name: RobotDynamics(world, robot.name, self.spec.world.robots[robot.name].dynamics, self.streams)
             for robot in world.robots
@@ -69,31 +36,16 @@ class RobotManager(Manager):
 
     def bind(self, engine: SimEngine) -> None:
         super().bind(engine)
-        n = engine.num_envs
-        self.slices: list[ActionSlice] = []
-        start = 0
-        for robot, channel, view in self._channels:
-            action = self.spec.world.robots[robot].actions[channel]
-            controller_class: type[Controller] = registry.load("controllers", action.controller)
-            params = options_model(controller_class).model_validate(action.params)
-            values = {name: getattr(params, name) for name in type(params).model_fields}
-            controller = controller_class(view, n, **values)
-            longest = longest_delay(action.delay)
-            line = DelayLine(n, controller.dim, longest) if longest else None
-            stop = start + controller.dim
-            self.slices.append(ActionSlice(robot, channel, start, stop, controller, action, line))
-            start += controller.dim
-        self.action_dim = start
-        self.action_low = np.concatenate([s.controller.low for s in self.slices] or [np.zeros(0)])
-        self.action_high = np.concatenate([s.controller.high for s in self.slices] or [np.zeros(0)])
-        initial = [self._world.joints[a.joint].initial for a in self._world.actuators]
-        self._targets = np.tile(np.array(initial, dtype=float), (n, 1))
-        self._ticks = np.zeros(n, dtype=np.int64)
-        """Control steps since the reset (N,)."""
+        self._actions.bind(engine)
+        self.slices = self._actions.slices
+        self.action_dim, self.action_low, self.action_high = (
+            self._actions.dim, self._actions.low, self._actions.high,
+        )  # fmt: skip
+        self._initial = np.array([self._world.joints[a.joint].initial for a in self._world.actuators], dtype=float)
 
     def reset(self, env_ids: Array) -> None:
         """Where bases stand, home positions with the noise of the spec on the arm's joints; drives hold them."""
-        self._ticks[env_ids] = 0
+        targets = np.tile(self._initial, (len(env_ids), 1))
         for robot in self._world.robots:
             spec = self.spec.world.robots[robot.name]
             entity = self.engine.index.entity(robot.name)
@@ -117,11 +69,8 @@ class RobotManager(Manager):
             self.engine.set_joint_state(position[:, leaders], velocity[:, leaders], env_ids, joints[leaders])
             for number, actuator in enumerate(self._world.actuators):
                 if entity.joint_start <= actuator.joint < entity.joint_stop:
-                    self._targets[env_ids, number] = position[:, actuator.joint - entity.joint_start]
-        for s in self.slices:
-            self._reset_imperfections(s, env_ids)
-            s.controller.reset(env_ids, self._targets[np.ix_(env_ids, s.controller.channel.actuators)])
-        self.engine.set_control(position=self._targets[env_ids], env_ids=env_ids)
+                    targets[:, number] = position[:, actuator.joint - entity.joint_start]
+        self._actions.reset(env_ids, targets)
 
     def overridable(self) -> list[Overridable]:
         entries: list[Overridable] = []
@@ -144,6 +93,8 @@ class RobotManager(Manager):
         )  # fmt: skip
         yaw = draw_rows(spec.yaw, f"robot/{robot}/yaw", self.streams, env_ids, source=f"{path}.yaw")
         turn = P.from_roll_pitch_yaw(np.stack([np.zeros_like(yaw), np.zeros_like(yaw), yaw], axis=1))
+        entry = self.engine.index.robot(robot).entry
+        place[:, 2] += 0.0 if entry is None else entry.base_height
         pose = np.concatenate([place + origin, turn], axis=1)[:, None]
         root = self.engine.index.entity(robot).root
         free = self._world.bodies[root].kind is BodyKind.FREE
@@ -166,14 +117,6 @@ class RobotManager(Manager):
                 source=f"{path}.home_velocity.{name}",
             )  # fmt: skip
 
-    def _reset_imperfections(self, s: ActionSlice, env_ids: Array) -> None:
-        """Draw the delay of a channel, and say that it has noise."""
-        stream, path = f"robot/{s.robot}/{s.channel}", f"world.robots.{s.robot}.actions.{s.channel}"
-        if s.line is not None:
-            delay = draw_rows(s.spec.delay, f"{stream}/delay", self.streams, env_ids, source=f"{path}.delay")
-            s.line.reset(env_ids, delay.astype(np.int64))
-        note_noise(s.spec.noise, f"{stream}/noise", self.streams, env_ids, f"{path}.noise")
-
     def _add_noise(
         self, position: Array, column: int, joint: int, robot: str, deviation: Array, env_ids: Array
     ) -> None:
@@ -192,40 +135,18 @@ class RobotManager(Manager):
             self.streams.note(int(env), stream, noise, Origin(stream, f"world.robots.{robot}.home_noise"))
             position[row, column] = min(max(position[row, column] + noise, found.lower), found.upper)
 
-    def act(self, action: Array, env_ids: Array | None) -> None:
-        """Turn actions (N, A) into drive targets of all envs, or of `env_ids`; the others keep their commands."""
-        for s in self.slices:
-            rows = action[:, s.start : s.stop] if env_ids is None else action[env_ids, s.start : s.stop]
-            rows, obeying = self._imperfect(s, rows, env_ids)
-            if obeying is not None and len(obeying) == 0:
-                continue
-            targets = s.controller.apply(rows, obeying)
-            if obeying is None:
-                self._targets[:, s.controller.channel.columns] = targets
-            else:
-                self._targets[np.ix_(obeying, s.controller.channel.actuators)] = targets
-        if env_ids is None:
-            self._ticks += 1
-        else:
-            self._ticks[env_ids] += 1
-        if self.slices:
-            self.engine.set_control(position=self._targets)
+    @property
+    def schedule(self) -> tuple[int, ...]:
+        """Physics steps of a control step, in the parts between which `update` is to be called."""
+        return self._actions.schedule
 
-    def _imperfect(self, s: ActionSlice, rows: Array, env_ids: Array | None) -> tuple[Array, Array | None]:
-        """What reaches the controller of what was asked for, and the envs for which anything does by now."""
-        if s.line is None and s.spec.noise is None:
-            return rows, env_ids
-        ids = np.arange(self.engine.num_envs) if env_ids is None else env_ids
-        if s.line is not None:
-            s.line.write(ids, self._ticks[ids], rows)
-            there = s.line.arrived(ids, self._ticks[ids])
-            rows = s.line.read(ids, self._ticks[ids])[there]
-            ids, env_ids = ids[there], env_ids if there.all() else ids[there]
-        if s.spec.noise is not None:
-            name = f"robot/{s.robot}/{s.channel}/noise"
-            noisy = rows + noise_rows(s.spec.noise, name, self.streams, ids, self._ticks[ids], rows.shape[1])
-            rows = np.clip(noisy, s.controller.low, s.controller.high)
-        return rows, env_ids
+    def act(self, action: Array, env_ids: Array | None) -> None:
+        """Turn actions (N, A) into commands of all envs, or of `env_ids`; the others keep their commands."""
+        self._actions.act(action, env_ids)
+
+    def update(self, part: int) -> None:
+        """Before part 1, 2, … of `schedule`: the controllers that are due command again."""
+        self._actions.update(part)
 
     def slice_of(self, robot: str, channel: str) -> ActionSlice:
         """The part of the action that belongs to a robot's channel.
@@ -259,19 +180,7 @@ class RobotManager(Manager):
         return clipped
 
     def snapshot(self, env_ids: Array) -> dict[str, Array]:
-        data = {"targets": self._targets[env_ids], "ticks": self._ticks[env_ids]}
-        for s in self.slices:
-            if s.line is not None:
-                data[f"delayed.{s.robot}.{s.channel}.delay"] = s.line.delay[env_ids]
-                data[f"delayed.{s.robot}.{s.channel}.rows"] = s.line.rows[env_ids]
-            data |= {f"{s.robot}.{s.channel}.{k}": v for k, v in s.controller.snapshot(env_ids).items()}
-        return data
+        return self._actions.snapshot(env_ids)
 
     def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
-        self._targets[env_ids], self._ticks[env_ids] = data["targets"], data["ticks"]
-        for s in self.slices:
-            if s.line is not None:
-                s.line.delay[env_ids] = data[f"delayed.{s.robot}.{s.channel}.delay"]
-                s.line.rows[env_ids] = data[f"delayed.{s.robot}.{s.channel}.rows"]
-            prefix = f"{s.robot}.{s.channel}."
-            s.controller.restore(env_ids, {k[len(prefix) :]: v for k, v in data.items() if k.startswith(prefix)})
+        self._actions.restore(env_ids, data)

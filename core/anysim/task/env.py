@@ -207,7 +207,7 @@ class TaskEnv:
                 self.scene.last_action[ids] = clipped[ids]
         for manager in self.managers:
             manager.before_step(ids)
-        self.engine.step(self._substeps, ids)
+        self._advance(ids)
         for manager in self.managers:
             manager.after_step(ids)
         rows = slice(None) if ids is None else ids
@@ -221,6 +221,14 @@ class TaskEnv:
         result = StepResult(self._full(observed, ids), reward, STATUS_NAMES[self._code], self._info())
         self._announce(result, ids)
         return result
+
+    def _advance(self, ids: Array | None) -> None:
+        """The physics of a control step, in as many parts as controllers want."""
+        schedule = (self._substeps,) if self.robots is None else self.robots.schedule
+        for part, steps in enumerate(schedule):
+            if part and self.robots is not None:
+                self.robots.update(part)
+            self.engine.step(steps, ids, keep_wrench=part + 1 < len(schedule))
 
     def _stepped(self, running: Array, mask: Array | None) -> Array | None:
         """The envs to step: None for all of them."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from anysim import registry
 from anysim.errors import PluginError
-from anysim_schemas.robots import RobotModelSpec
+from anysim_schemas.robot_model import RobotModelSpec
 
 
 class CatalogueEntry(NamedTuple):

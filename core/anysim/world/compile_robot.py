@@ -1,6 +1,6 @@
 """A robot of a spec, by its catalogue entry, into a World under construction."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from itertools import combinations
@@ -10,7 +10,7 @@ import numpy as np
 from anysim.errors import AssetError, PluginError, SpecError, listing, suggest
 from anysim.math import pose as P
 from anysim.world.builder import WorldBuilder
-from anysim.world.catalogue import load_robot
+from anysim.world.catalogue import CatalogueEntry, load_robot
 from anysim.world.imported import ImportedModel, ImportNote
 from anysim.world.importers import import_asset
 from anysim.world.issues import Issues
@@ -30,8 +30,30 @@ from anysim.world.model import (
 )  # fmt: skip
 from anysim.world.nominal import extremes, nominal
 from anysim.world.presets import GRIPPER_LIMIT_SOFTNESS, surface
+from anysim.world.procedural.build import build
 from anysim.world.rounding import split
-from anysim_schemas.robots import RobotModelSpec, RobotSpec
+from anysim_schemas.object_source import PROCEDURAL
+from anysim_schemas.robot_model import ChannelSpec, GainSpec, RobotModelSpec, SensorSpec, ToolSpec
+from anysim_schemas.robots import RobotSpec
+
+
+def import_robot(entry: CatalogueEntry) -> ImportedModel:
+    """The model of a catalogue entry, as its source has it.
+
+    Raises:
+        AssetError: the source is missing or damaged; says what to install where it comes with another package.
+        PluginError: no importer or builder for it is installed.
+    """
+    spec = entry.spec
+    try:
+        if spec.source.startswith(PROCEDURAL):
+            return build(spec.source.removeprefix(PROCEDURAL), spec.params)
+        return import_asset(spec.source, base=entry.file.parent)
+    except SpecError as error:
+        raise AssetError(f"the source of robot '{spec.name}' is not valid: {error}") from None
+    except AssetError as error:
+        remedy = f"; it needs another package: pip install '{spec.needs}'" if spec.needs else ""
+        raise AssetError(f"{error}{remedy}") from None
 
 
 def add_robot(builder: WorldBuilder, name: str, spec: RobotSpec, issues: Issues) -> list[ImportNote]:
@@ -45,7 +67,7 @@ def add_robot(builder: WorldBuilder, name: str, spec: RobotSpec, issues: Issues)
         issues.add("robot", f"the catalogue entry is not valid: {error}")
         return []
     try:
-        model = import_asset(entry.spec.source, base=entry.file.parent)
+        model = import_robot(entry)
     except (AssetError, PluginError) as error:
         issues.asset("robot", AssetError(f"robot '{spec.robot}': {error}"))
         return []
@@ -72,19 +94,36 @@ class _Assembly:
             for i, body in enumerate(self.model.bodies)
         )
         model = replace(self.model, joints=tuple(joints), bodies=bodies, geoms=self._geoms())
-        collides = self.entry.self_collision if self.spec.self_collision is None else self.spec.self_collision
-        if not collides:
-            pairs = combinations(range(len(bodies)), 2)
-            apart = frozenset(p for p in pairs if bodies[p[1]].parent != p[0])
-            model = replace(model, excluded_pairs=model.excluded_pairs | apart)
-        position, quaternion = placement(nominal(self.spec.position), (0.0, 0.0, nominal(self.spec.yaw)))
+        model = replace(model, excluded_pairs=model.excluded_pairs | self._apart())
+        x, y, z = nominal(self.spec.position)
+        standing = (x, y, z + self.entry.base_height)
+        position, quaternion = placement(standing, (0.0, 0.0, nominal(self.spec.yaw)))
         entity = builder.add(
             self.name, EntityKind.ROBOT, model, root=BodyKind.FREE if floating else BodyKind.STATIC, position=position,
             quaternion=quaternion, source=self.entry.source, license=self.entry.license,
         )  # fmt: skip
         channels = self._channels(builder, entity, joints)
         tools = self._tools(builder, entity)
-        builder.robots.append(Robot(self.name, self.entry.name, channels, tools))
+        self._sensors(builder, entity, tools)
+        builder.robots.append(Robot(self.name, self.entry.name, channels, tools, self.entry))
+
+    def _apart(self) -> frozenset[tuple[int, int]]:
+        """Pairs of bodies that do not collide: all of them, or those that the entry excludes."""
+        collides = self.entry.self_collision if self.spec.self_collision is None else self.spec.self_collision
+        parents = [body.parent for body in self.model.bodies]
+        pairs = [pair for pair in combinations(range(len(parents)), 2) if parents[pair[1]] != pair[0]]
+        if not collides:
+            return frozenset(pairs)
+        links = list(self.model.links)
+        apart: set[tuple[int, int]] = set()
+        for number, patterns in enumerate(self.entry.self_collision_exclusions):
+            found = [{self.model.links[k] for k in links if fnmatchcase(k, pattern)} for pattern in patterns]
+            for pattern, bodies in zip(patterns, found, strict=True):
+                if not bodies:
+                    known = f"{suggest(pattern, links)} (links: {listing(links, 20)})"
+                    self.own.add(f"self_collision_exclusions.{number}", f"no link matches '{pattern}'{known}")
+            apart |= {(min(a, b), max(a, b)) for a in found[0] for b in found[1]}
+        return frozenset(apart & set(pairs))
 
     # ------------------------------------------------------------------ joints and drives
 
@@ -94,9 +133,10 @@ class _Assembly:
         for channel, spec in self.entry.channels.items():
             for index in self._known(spec.joints, self.own.at("channels", channel, "joints")):
                 soft = GRIPPER_LIMIT_SOFTNESS if channel == "eef" else joints[index].limit_softness
+                armature = self._gains(channel, joints[index].name).armature
                 for i, joint in enumerate(joints):
                     if i == index or (joint.mimic is not None and joint.mimic.joint == index):
-                        joints[i] = replace(joint, armature=spec.gains.armature, limit_softness=soft)
+                        joints[i] = replace(joint, armature=armature, limit_softness=soft)
         for home, issues in ((self.entry.home, self.own.at("home")), (self.spec.home, self.issues.at("home"))):
             for name, value in home.items():
                 for index in self._known((name,), issues):
@@ -122,6 +162,16 @@ class _Assembly:
                 joints[i] = replace(joint, initial=joint.mimic.multiplier * leader.initial + joint.mimic.offset)
         return joints
 
+    def _gains(self, channel: str, joint: str) -> GainSpec:
+        """The drive of a joint: the last of `joint_gains` that matches, else the channel's."""
+        spec = self.entry.channels[channel]
+        matching = [gains for pattern, gains in spec.joint_gains.items() if fnmatchcase(joint, pattern)]
+        if not matching and spec.gains is None:
+            self.own.at("channels", channel).add(
+                "joint_gains", f"no gains for the joint '{joint}'; add them here or give the channel `gains`"
+            )
+        return matching[-1] if matching else spec.gains or GainSpec(kp=0.0, kd=0.0)
+
     def _known(self, names: Sequence[str], issues: Issues) -> list[int]:
         unknown = [name for name in names if name not in self.number]
         for name in unknown:
@@ -142,19 +192,14 @@ class _Assembly:
                 if index in driven:
                     issues.add("joints", f"'{joints[index].name}' is driven by the channel '{driven[index]}' already")
                 driven[index] = name
-                limit = spec.gains.effort_limit
+                gains = self._gains(name, joints[index].name)
                 actuators.append(len(builder.actuators))
-                effort = joints[index].effort_limit if limit is None else limit
+                effort = joints[index].effort_limit if gains.effort_limit is None else gains.effort_limit
                 drive = f"{self.name}.{joints[index].name}"
                 builder.actuators.append(
-                    Actuator(
-                        drive, entity.joint_start + index, ControlMode.POSITION, spec.gains.kp, spec.gains.kd, effort
-                    )
+                    Actuator(drive, entity.joint_start + index, ControlMode(spec.mode), gains.kp, gains.kd, effort)
                 )
-            for end in ("opened", "closed"):
-                values = getattr(spec, end)
-                if values is not None and len(values) != len(spec.joints):
-                    issues.add(end, f"expected {len(spec.joints)} values, one a joint, got {len(values)}")
+            self._check_channel(spec, issues)
             world = tuple(entity.joint_start + index for index in indices)
             channels[name] = Channel(name, world, tuple(actuators), spec.opened, spec.closed)
         for name in self.spec.actions:
@@ -163,27 +208,58 @@ class _Assembly:
                 self.issues.add(f"actions.{name}", f"the robot '{self.entry.name}' has no channel '{name}'{known}")
         return channels
 
+    def _check_channel(self, spec: ChannelSpec, issues: Issues) -> None:
+        """Names and lengths inside of a channel."""
+        postures = {"opened": spec.opened, "closed": spec.closed}
+        postures |= {f"synergies.{name}": values for name, values in spec.synergies.items()}
+        for place, values in postures.items():
+            if values is not None and len(values) != len(spec.joints):
+                issues.add(place, f"expected {len(spec.joints)} values, one a joint, got {len(values)}")
+        for group, joints in spec.groups.items():
+            for joint in joints:
+                if joint not in spec.joints:
+                    known = f"{suggest(joint, list(spec.joints))} (joints: {listing(spec.joints, 20)})"
+                    issues.add(f"groups.{group}", f"the channel has no joint '{joint}'{known}")
+        for pattern in spec.joint_gains:
+            if not any(fnmatchcase(joint, pattern) for joint in spec.joints):
+                known = f"{suggest(pattern, list(spec.joints))} (joints: {listing(spec.joints, 20)})"
+                issues.add(f"joint_gains.{pattern}", f"no joint of the channel matches{known}")
+
     # ------------------------------------------------------------------ frames and surfaces
 
     def _tools(self, builder: WorldBuilder, entity: Entity) -> dict[str, int]:
-        tools: dict[str, int] = {}
+        """The sites of the tools by name."""
+        return {
+            name: site for name, spec in self.entry.tools.items()
+            if (site := self._frame(builder, entity, "tools", name, spec)) is not None
+        }  # fmt: skip
+
+    def _sensors(self, builder: WorldBuilder, entity: Entity, tools: Mapping[str, int]) -> None:
+        for name, spec in self.entry.sensors.items():
+            if name in tools:
+                self.own.add(f"sensors.{name}", f"there is a tool '{name}' already; give the sensor another name")
+                continue
+            self._frame(builder, entity, "sensors", name, spec)
+
+    def _frame(
+        self, builder: WorldBuilder, entity: Entity, kind: str, name: str, spec: ToolSpec | SensorSpec
+    ) -> int | None:
+        """Add the site of a tool or sensor; None where its link is not there or its name is taken."""
         frames = {site.name: (site.body, P.pose(site.position, site.quaternion)) for site in self.model.sites}
         for link, body in self.model.links.items():
             frames.setdefault(link, (body, P.pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))))
-        for name, spec in self.entry.tools.items():
-            if spec.link not in frames:
-                known = f"{suggest(spec.link, list(frames))} (links: {listing(frames, 20)})"
-                self.own.add(f"tools.{name}.link", f"there is no link '{spec.link}'{known}")
-                continue
-            if name in frames:
-                self.own.add(f"tools.{name}", f"there is a link named '{name}' already; give the tool another name")
-                continue
-            body, frame = frames[spec.link]
-            local = P.pose(spec.position, P.from_roll_pitch_yaw(np.array(spec.roll_pitch_yaw)))
-            position, quaternion = split(P.compose(frame, local))
-            tools[name] = len(builder.sites)
-            builder.sites.append(Site(f"{self.name}.{name}", entity.body_start + body, position, quaternion))
-        return tools
+        if spec.link not in frames:
+            known = f"{suggest(spec.link, list(frames))} (links: {listing(frames, 20)})"
+            self.own.add(f"{kind}.{name}.link", f"there is no link '{spec.link}'{known}")
+            return None
+        if name in frames:
+            self.own.add(f"{kind}.{name}", f"there is a link named '{name}' already; give the {kind[:-1]} another name")
+            return None
+        body, frame = frames[spec.link]
+        local = P.pose(spec.position, P.from_roll_pitch_yaw(np.array(spec.roll_pitch_yaw)))
+        position, quaternion = split(P.compose(frame, local))
+        builder.sites.append(Site(f"{self.name}.{name}", entity.body_start + body, position, quaternion))
+        return len(builder.sites) - 1
 
     def _geoms(self) -> tuple[Geom, ...]:
         """The model's geoms with the surfaces that the entry gives to their links; a later entry wins."""

@@ -28,6 +28,8 @@ def _feed(digest: Any, value: Any) -> None:
     elif dataclasses.is_dataclass(value):
         digest.update(f"<{type(value).__name__}".encode())
         for field in dataclasses.fields(value):
+            if field.metadata.get("hashed") == "never":
+                continue
             if field.metadata.get("hashed") == "if given" and getattr(value, field.name) == field.default:
                 continue
             digest.update(f"|{field.name}=".encode())

@@ -1,13 +1,15 @@
 """The parts of a World: bodies, joints, geoms and what is fixed to them, and which of them belong together."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from math import inf
+from types import MappingProxyType
 from typing import NamedTuple
 
 from anysim.conventions import IDENTITY_QUATERNION, WORLD
 from anysim.world.shapes import ORDINARY, Shape, Surface, Vec3
+from anysim_schemas.robot_model import RobotModelSpec
 
 Quat = tuple[float, float, float, float]
 ORIGIN: Vec3 = (0.0, 0.0, 0.0)
@@ -294,6 +296,8 @@ class Robot:
     model: str
     channels: Mapping[str, Channel]
     tools: Mapping[str, int]
+    entry: RobotModelSpec | None = field(default=None, compare=False, metadata=MappingProxyType({"hashed": "never"}))
+    """Its entry in the catalogue, for controllers; None for one that is in none. What it says of physics is above."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,120 @@
+"""What a controller knows of its robot: the model, its place in the World, and its state now."""
+
+from functools import cached_property
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.engine.index import Index
+from anysim.engine.state import State
+from anysim.errors import NameLookupError, TaskError, listing, suggest
+from anysim.kinematics.model import RobotModel
+from anysim.math import pose as P
+from anysim.world.model import BodyKind, World
+from anysim_schemas.robot_model import RobotModelSpec
+
+
+class ControlledRobot:
+    """One robot of every env. Read state inside `apply` and `update` only; rows are those of the env_ids given there.
+
+    Attributes:
+        name: its name in the world.
+        world: the World it is in.
+        joints: (J,) world indices of its joints, depth first.
+        drives: (D,) world indices of its actuators.
+        drive_columns: (D,) the joint of each drive among the J.
+        root: the world index of its base's body.
+        floating: whether the base is free.
+        dt, control_dt: physics and control time steps [s].
+    """
+
+    def __init__(self, world: World, name: str) -> None:
+        index = Index(world)
+        entity = index.entity(name)
+        self.name, self.world = name, world
+        self.robot = index.robot(name)
+        self.root = entity.root
+        self.floating = world.bodies[entity.root].kind is BodyKind.FREE
+        self.joints = np.arange(entity.joint_start, entity.joint_stop)
+        owned = [i for i, a in enumerate(world.actuators) if entity.joint_start <= a.joint < entity.joint_stop]
+        self.drives = np.array(owned, dtype=int)
+        self.drive_columns = np.array([world.actuators[i].joint - entity.joint_start for i in owned], dtype=int)
+        self.dt, self.control_dt = world.physics.dt, world.physics.control_dt
+        self._state: State | None = None
+
+    @cached_property
+    def kinematics(self) -> RobotModel:
+        """Its Pinocchio model, made when first asked for; all controllers of the robot share it."""
+        return RobotModel(self.world, self.name)
+
+    @property
+    def entry(self) -> RobotModelSpec:
+        """Its entry in the catalogue.
+
+        Raises:
+            TaskError: the World was not made from a catalogue.
+        """
+        if self.robot.entry is None:
+            raise TaskError(f"robot '{self.name}' ({self.robot.model}) is in no catalogue, so it has no controllers")
+        return self.robot.entry
+
+    def see(self, state: State) -> None:
+        """The state that the properties below read; the manager calls this before each `apply` and `update`."""
+        self._state = state
+
+    @property
+    def state(self) -> State:
+        """The engine's state now."""
+        if self._state is None:
+            raise NameLookupError(f"robot '{self.name}' has not been shown a state yet; read it in `apply` or `update`")
+        return self._state
+
+    def joint_pos(self, env_ids: Array | None) -> Array:
+        """(E, J) [rad] or [m]."""
+        return self.state.joint_pos[_rows(env_ids)][:, self.joints]
+
+    def joint_vel(self, env_ids: Array | None) -> Array:
+        """(E, J) [rad/s] or [m/s]."""
+        return self.state.joint_vel[_rows(env_ids)][:, self.joints]
+
+    def base_pose(self, env_ids: Array | None) -> Array:
+        """(E, 7) of the base's frame in the world [m, xyzw]."""
+        return self.state.body_pose[_rows(env_ids), self.root]
+
+    def base_twist(self, env_ids: Array | None) -> Array:
+        """(E, 6) of the base's frame, world axes [m/s, rad/s]."""
+        return self.state.body_twist[_rows(env_ids), self.root]
+
+    def frame_pose(self, env_ids: Array | None, name: str) -> Array:
+        """(E, 7) of a tool, sensor or link in the world, as measured [m, xyzw].
+
+        Raises:
+            NameLookupError: lists the frames that exist.
+        """
+        body, local = self._frame(name)
+        return P.compose(self.state.body_pose[_rows(env_ids), body], local)
+
+    def _frame(self, name: str) -> tuple[int, Array]:
+        sites = {site.name.removeprefix(f"{self.name}."): site for site in self.world.sites if self._mine(site.body)}
+        if name in sites:
+            site = sites[name]
+            return site.body, P.pose(site.position, site.quaternion)
+        bodies = {self.world.bodies[b].name.removeprefix(f"{self.name}."): b for b in self._bodies}
+        if name not in bodies:
+            known = [*self.robot.tools, *bodies]
+            raise NameLookupError(
+                f"robot '{self.name}' has no frame '{name}'{suggest(name, known)} (frames: {listing(known, 20)})"
+            )
+        return bodies[name], P.pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+
+    @cached_property
+    def _bodies(self) -> range:
+        entity = Index(self.world).entity(self.name)
+        return range(entity.body_start, entity.body_stop)
+
+    def _mine(self, body: int) -> bool:
+        return body in self._bodies
+
+
+def _rows(env_ids: Array | None) -> slice | Array:
+    return slice(None) if env_ids is None else env_ids

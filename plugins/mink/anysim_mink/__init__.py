@@ -1,0 +1,1 @@
+"""Inverse kinematics for anysim with mink: quadratic programs over MuJoCo's kinematics."""

@@ -1,0 +1,1 @@
+"""Learned policies as low-level controllers of anysim: ONNX and TorchScript."""

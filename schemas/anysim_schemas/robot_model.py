@@ -1,0 +1,138 @@
+"""The catalogue's entry of a robot: what it is, independent of any world."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from anysim_schemas.base import Flag, Name, NonNegative, Number, Positive, Spec, Vec3
+from anysim_schemas.objects import ContactSpec
+
+Category = Literal["arm", "dual_arm", "hand", "base", "mobile_manipulator", "humanoid", "quadruped", "camera"]
+
+
+class GainSpec(Spec):
+    """The drive of a joint: u = kp (q* - q) + kd (qd* - qd) + ff, clipped to the effort limit."""
+
+    kp: NonNegative = Field(description="stiffness [N m/rad] or [N/m]")
+    kd: NonNegative = Field(description="damping [N m s/rad] or [N s/m]")
+    effort_limit: Positive | None = Field(
+        default=None, description="largest effort [N m] or [N]; the source's limit where not given"
+    )
+    armature: NonNegative = Field(default=0.0, description="rotor inertia seen at the joint [kg m^2] or [kg]")
+
+
+class ChannelSpec(Spec):
+    """A group of joints that is commanded together: the `base`, an `arm` or an `eef`."""
+
+    joints: tuple[str, ...] = Field(min_length=1, description="joint names, in the order of the command")
+    groups: dict[Name, tuple[str, ...]] = Field(
+        default_factory=dict, description="named parts of the channel, as `left` and `right`: some of its joints"
+    )
+    gains: GainSpec | None = Field(default=None, description="the drive of every joint of the channel")
+    joint_gains: dict[str, GainSpec] = Field(
+        default_factory=dict, description="drives that differ: by joint name, `*` matches any part; a later one wins"
+    )
+    mode: Literal["position", "velocity", "effort"] = Field(
+        default="position", description="what the drives obey until a controller says otherwise; wheels: velocity"
+    )
+    controllers: dict[str, dict[str, Any]] = Field(
+        default_factory=dict,
+        description="controllers that suit the channel, with their parameters on this robot; the first is the default",
+    )
+    opened: tuple[Number, ...] | None = Field(default=None, description="eef: joint positions of the open gripper")
+    closed: tuple[Number, ...] | None = Field(default=None, description="eef: joint targets of the closed gripper")
+    synergies: dict[Name, tuple[Number, ...]] = Field(
+        default_factory=dict,
+        description="eef: grasps by name, as `power` or `pinch`: joint targets when fully closed, from `opened` on",
+    )
+
+
+class ToolSpec(Spec):
+    """A frame that tasks refer to, fixed to a link. Convention: z points out of the hand, y along the opening."""
+
+    link: str = Field(description="the link that carries it")
+    position: Vec3 = Field(default=(0.0, 0.0, 0.0), description="place in the link's frame [m]")
+    roll_pitch_yaw: Vec3 = Field(default=(0.0, 0.0, 0.0), description="orientation in the link's frame [rad]")
+    group: str | None = Field(
+        default=None, description="the group of the arm that moves it, where an arm has several, as `left`"
+    )
+
+
+class LegSpec(Spec):
+    """A leg: its joints from the body down, and the foot at its end."""
+
+    joints: tuple[str, ...] = Field(min_length=1, description="joint names, from the body to the foot")
+    foot: str = Field(description="the link whose frame is the foot")
+    radius: NonNegative = Field(default=0.0, description="radius of a ball foot about that frame [m]")
+    sole: tuple[Number, Number, Number, Number] | None = Field(
+        default=None, description="flat foot: x_min, x_max, y_min, y_max of the sole in the foot's frame [m]"
+    )
+    sole_height: NonNegative = Field(default=0.0, description="flat foot: height of its frame above the sole [m]")
+
+
+class SensorSpec(Spec):
+    """A place for a sensor on the robot, a frame that worlds refer to: `cameras: {wrist: {mount: panda.camera}}`."""
+
+    kind: Literal["camera", "imu", "force_torque", "lidar", "tactile"] = Field(description="what belongs there")
+    link: str = Field(description="the link that carries it")
+    position: Vec3 = Field(default=(0.0, 0.0, 0.0), description="place in the link's frame [m]")
+    roll_pitch_yaw: Vec3 = Field(
+        default=(0.0, 0.0, 0.0), description="orientation in the link's frame [rad]; a camera looks along z, y down"
+    )
+
+
+class PartSpec(Spec):
+    """Another model fixed to a link: a gripper on an arm, an arm on a base."""
+
+    source: str = Field(description="URI of the part's URDF or MJCF file, or `procedural:` with a builder")
+    params: dict[str, Any] = Field(default_factory=dict, description="parameters of a procedural source")
+    link: str = Field(description="the link that carries it")
+    position: Vec3 = Field(default=(0.0, 0.0, 0.0), description="place of the part's root in that link's frame [m]")
+    roll_pitch_yaw: Vec3 = Field(default=(0.0, 0.0, 0.0), description="orientation in that link's frame [rad]")
+    prefix: str = Field(default="", description="put before the names of the part's links and joints")
+    license: str = Field(description="SPDX expression of the part's licence")
+    license_source: str = Field(description="where the licence is stated")
+
+
+class SurfaceSpec(Spec):
+    """Contact parameters of the links whose names match."""
+
+    links: tuple[str, ...] = Field(min_length=1, description="link names, `*` matches any part")
+    friction: NonNegative | None = Field(
+        default=None, description="sliding friction coefficient; the source's where not given"
+    )
+    contact: ContactSpec = Field(default=ContactSpec(), description="how the surface gives")
+
+
+class RobotModelSpec(Spec):
+    """A catalogue entry: what a robot is, independent of any world."""
+
+    name: Name = Field(description="the name in the catalogue")
+    description: str = Field(description="one line for people")
+    source: str = Field(description="URI of the URDF or MJCF file, or `procedural:` with a builder")
+    params: dict[str, Any] = Field(default_factory=dict, description="parameters of a procedural source")
+    needs: str | None = Field(
+        default=None, description="the package to install for it, where that is not a dependency: `pip install NEEDS`"
+    )
+    license: str = Field(description="SPDX expression of the asset's licence")
+    license_source: str = Field(description="where the licence is stated")
+    category: Category = Field(description="what kind of robot it is")
+    base: Literal["fixed", "floating"] = Field(default="fixed", description="bolted down, or free to move")
+    base_height: Number = Field(
+        default=0.0, description="height of the base's frame above the ground that it stands on, at home [m]"
+    )
+    parts: tuple[PartSpec, ...] = Field(default=(), description="models that are fixed to it")
+    channels: dict[str, ChannelSpec] = Field(description="the groups of joints that are commanded, by name")
+    home: dict[str, Number] = Field(default_factory=dict, description="joint positions [rad] or [m]; 0 where not given")
+    tools: dict[str, ToolSpec] = Field(default_factory=dict, description="frames that tasks refer to, by name")
+    sensors: dict[str, SensorSpec] = Field(default_factory=dict, description="places for sensors, by name")
+    legs: dict[Name, LegSpec] = Field(default_factory=dict, description="its legs by name, front left first")
+    surfaces: tuple[SurfaceSpec, ...] = Field(default=(), description="contact parameters of links")
+    self_collision: Flag = Field(default=False, description="whether links of this robot collide with each other")
+    self_collision_exclusions: tuple[Annotated[tuple[str, str], Field()], ...] = Field(
+        default=(), description="pairs of links that never collide, where others do; `*` matches any part"
+    )
+    gravity_compensation: Flag = Field(
+        default=True,
+        description="the robot's own controller cancels its weight; never of one that stands on the ground",
+    )
