@@ -26,7 +26,7 @@ def test_a_broken_file_gives_its_golden_message(path: Path, monkeypatch: pytest.
     ):
         text = text.replace(place, word)
     text = text.replace(", ".join(registry.names("engines")), "<engines>")  # which are installed differs
-        text = text.replace(listing(registry.names("robots")), "<robots>")
+    text = text.replace(listing(registry.names("robots")), "<robots>")
     golden = path.with_suffix(".expected.txt")
     if os.environ.get("ANYSIM_UPDATE_GOLDENS"):
         golden.write_text(text)
