@@ -83,3 +83,29 @@ def test_disabled_refuses_to_step_ended_envs() -> None:
     with pytest.raises(TaskError, match="reset_mask"):
         vector.step(np.zeros((2, 0)))
     vector.close()
+
+
+def test_named_actions_check_and_step_as_the_flat_ones() -> None:
+    with arm(1, "task.horizon=20") as env, warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=".*Box.*(infinity|unbounded).*")
+        warnings.filterwarnings("ignore", message=".*not having any render modes.*|.*render_mode.*")
+        warnings.filterwarnings("ignore", message=".*No render.*|.*spec.*|.*dictionary.*")
+        check_env(GymEnv(env, action="named"), skip_render_check=True)
+    flat, named = GymVectorEnv(arm(3, "task.horizon=9")), GymVectorEnv(arm(3, "task.horizon=9"), action="named")
+    try:
+        assert isinstance(named.single_action_space, gym.spaces.Dict)
+        assert list(named.single_action_space) == ["panda.arm", "panda.eef"]
+        named.action_space.seed(0)
+        assert same(dict(enumerate(flat.reset(seed=1))), dict(enumerate(named.reset(seed=1))))
+        for _ in range(12):
+            action = named.action_space.sample()
+            whole = np.concatenate([action["panda.arm"], action["panda.eef"]], axis=1)
+            assert same(dict(enumerate(flat.step(whole))), dict(enumerate(named.step(action))))
+    finally:
+        flat.close()
+        named.close()
+
+
+def test_an_unknown_form_of_action_is_refused() -> None:
+    with arm(1) as env, pytest.raises(TaskError, match="'flat' or 'named', got 'names'"):
+        GymEnv(env, action="names")  # type: ignore[arg-type]

@@ -1,6 +1,6 @@
 """Gymnasium views: one env as `gymnasium.Env`, many as `gymnasium.vector.VectorEnv` in all three autoreset modes."""
 
-from typing import Any
+from typing import Any, Literal
 
 import gymnasium as gym
 import numpy as np
@@ -23,10 +23,32 @@ def observation_space(env: TaskEnv) -> gym.spaces.Dict:
     return gym.spaces.Dict(spaces)
 
 
-def action_space(env: TaskEnv) -> gym.spaces.Box:
-    """A float32 Box with the bounds of the robots' channels."""
-    low, high = env.action_bounds
+ActionForm = Literal["flat", "named"]
+"""One vector for all robots, or an array for each `robot.channel`."""
+
+
+def action_space(env: TaskEnv, form: ActionForm = "flat") -> gym.spaces.Space[Any]:
+    """A float32 Box with the bounds of the robots' channels, or a Dict with one for each channel.
+
+    Raises:
+        TaskError: there is no such form.
+    """
+    if form not in ("flat", "named"):
+        raise TaskError(f"an action space is 'flat' or 'named', got '{form}'")
+    if form == "flat":
+        return _box(*env.action_bounds)
+    return gym.spaces.Dict({name: _box(space.low, space.high) for name, space in env.action_spaces.items()})
+
+
+def _box(low: Array, high: Array) -> gym.spaces.Box:
     return gym.spaces.Box(low.astype(np.float32), high.astype(np.float32), dtype=np.float32)
+
+
+def _batch(action: Any, form: ActionForm) -> Any:
+    """The action of one env as that of a batch of one."""
+    if form == "flat":
+        return np.asarray(action)[None]
+    return {name: np.asarray(part)[None] for name, part in action.items()}
 
 
 def _metadata(env: TaskEnv) -> dict[str, Any]:
@@ -42,17 +64,18 @@ def _with_masks(values: dict[str, Array], present: Array) -> dict[str, Any]:
     return {k: v for key, value in values.items() for k, v in ((key, value), (f"_{key}", present.copy()))}
 
 
-class GymEnv(gym.Env[dict[str, Array], Array]):
+class GymEnv(gym.Env[dict[str, Array], Any]):
     """One env. `info` holds `status`, `is_success`, `fault`, `elapsed_steps` and `episode_seed`."""
 
-    def __init__(self, env: TaskEnv, render_mode: str | None = None) -> None:
+    def __init__(self, env: TaskEnv, render_mode: str | None = None, action: ActionForm = "flat") -> None:
         if env.num_envs != 1:
             raise TaskError(f"GymEnv views an env with num_envs=1, this one has {env.num_envs}; use GymVectorEnv")
         self.env = env
         self.metadata = _metadata(env)
         self.render_mode = render_mode
         self.observation_space: gym.spaces.Space[Any] = observation_space(env)
-        self.action_space = action_space(env)
+        self.action_space: gym.spaces.Space[Any] = action_space(env, action)
+        self._form: ActionForm = action
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -65,9 +88,9 @@ class GymEnv(gym.Env[dict[str, Array], Array]):
         )
         return {g: rows[0] for g, rows in obs.items()}, _single_info(info, self.env.status, 0)
 
-    def step(self, action: Array) -> tuple[dict[str, Array], float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> tuple[dict[str, Array], float, bool, bool, dict[str, Any]]:
         """One control step."""
-        result = self.env.step(np.asarray(action)[None])
+        result = self.env.step(_batch(action, self._form))
         return (
             {g: rows[0] for g, rows in result.obs.items()}, float(result.reward[0]),
             bool(result.terminated[0]), bool(result.truncated[0]), _single_info(result.info, result.status, 0),
@@ -81,7 +104,7 @@ class GymEnv(gym.Env[dict[str, Array], Array]):
         self.env.close()
 
 
-class GymVectorEnv(VectorEnv[dict[str, Array], Array, Any]):
+class GymVectorEnv(VectorEnv[dict[str, Array], Any, Any]):
     """Many envs, the same to the bit as gymnasium's `SyncVectorEnv` of single views, without its loop.
 
     SAME_STEP resets ended envs within the step and gives their last observation and info as `final_obs` and
@@ -94,6 +117,7 @@ class GymVectorEnv(VectorEnv[dict[str, Array], Array, Any]):
         env: TaskEnv,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
+        action: ActionForm = "flat",
     ) -> None:
         self.env = env
         self.num_envs = env.num_envs
@@ -101,7 +125,7 @@ class GymVectorEnv(VectorEnv[dict[str, Array], Array, Any]):
         self.metadata = _metadata(env) | {"autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode
         self.single_observation_space = observation_space(env)
-        self.single_action_space = action_space(env)
+        self.single_action_space = action_space(env, action)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._pending = np.zeros(self.num_envs, dtype=bool)
@@ -126,7 +150,7 @@ class GymVectorEnv(VectorEnv[dict[str, Array], Array, Any]):
         self._pending[mask] = False
         return self.env.obs, _with_masks(self._spread(info, mask), mask)
 
-    def step(self, actions: Array) -> tuple[dict[str, Array], Array, Array, Array, dict[str, Any]]:
+    def step(self, actions: Any) -> tuple[dict[str, Array], Array, Array, Array, dict[str, Any]]:
         """One control step of all envs; what becomes of ended ones is the autoreset mode's."""
         fresh = self._pending.copy()
         if self.autoreset_mode is AutoresetMode.DISABLED:
@@ -138,7 +162,7 @@ class GymVectorEnv(VectorEnv[dict[str, Array], Array, Any]):
             self.env.reset(mask=fresh)
         stepped = ~fresh
         if stepped.any():
-            result = self.env.step(np.asarray(actions), None if stepped.all() else stepped)
+            result = self.env.step(actions, None if stepped.all() else stepped)
             reward, status, info = result.reward.astype(np.float64), result.status, result.info
         else:
             reward, status, info = np.zeros(self.num_envs), self.env.status, self.env.info
@@ -193,12 +217,16 @@ class GymVectorEnv(VectorEnv[dict[str, Array], Array, Any]):
 
 
 def make_gym(
-    source: Any, *, autoreset_mode: AutoresetMode | str | None = None, render_mode: str | None = None, **options: Any
-) -> Any:
-    """`make_gym("pick_cube")` is a single env; with `num_envs` in `options` and an autoreset mode, a vector env."""
+    source: Any, *, autoreset_mode: AutoresetMode | str | None = None, render_mode: str | None = None,
+    action: ActionForm = "flat", **options: Any,
+) -> Any:  # fmt: skip
+    """`make_gym("pick_cube")` is a single env; with `num_envs` in `options` and an autoreset mode, a vector env.
+
+    `action="named"` makes the action space a Dict with a Box for each `robot.channel`.
+    """
     from anysim.api import make
 
     if autoreset_mode is None:
         options["num_envs"] = 1
-        return GymEnv(make(source, **options), render_mode)
-    return GymVectorEnv(make(source, **options), autoreset_mode, render_mode)
+        return GymEnv(make(source, **options), render_mode, action)
+    return GymVectorEnv(make(source, **options), autoreset_mode, render_mode, action)

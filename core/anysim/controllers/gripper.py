@@ -13,6 +13,8 @@ class GripperBinary(Controller):
     The closed target lies beyond contact, so that the drives press with their effort limit.
     """
 
+    labels = ("open",)
+
     def __init__(self, channel: ChannelView, num_envs: int) -> None:
         super().__init__(channel, num_envs)
         if channel.opened is None or channel.closed is None:

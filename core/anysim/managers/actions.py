@@ -12,6 +12,7 @@ from anysim.controllers.robot import ControlledRobot
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.errors import SpecError, SpecIssue, TaskError, listing, suggest
+from anysim.managers.action_space import ActionSpaces, ChannelSpace, component_labels
 from anysim.managers.noise import DelayLine, longest_delay, noise_rows, note_noise
 from anysim.managers.streams import Streams
 from anysim.managers.values import draw_rows
@@ -75,6 +76,7 @@ class Actions:
             )
             start = stop
         self.dim = start
+        self.spaces = ActionSpaces({f"{s.robot}.{s.channel}": self._space(s) for s in self.slices})
         self.low = np.concatenate([s.controller.low for s in self.slices] or [np.zeros(0)])
         self.high = np.concatenate([s.controller.high for s in self.slices] or [np.zeros(0)])
         tick = gcd(physics.substeps, *(s.steps for s in self.slices if s.steps is not None))
@@ -91,6 +93,11 @@ class Actions:
         self._ticks = np.zeros(n, dtype=np.int64)
         """Control steps since the reset (N,)."""
         self._obeying: list[Array | None] = [None] * len(self.slices)
+
+    def _space(self, s: ActionSlice) -> ChannelSpace:
+        names = [self._world.actuators[a].name.removeprefix(f"{s.robot}.") for a in s.controller.channel.actuators]
+        labels = component_labels(s.controller, names)
+        return ChannelSpace(s.controller.low.copy(), s.controller.high.copy(), labels, s.start, s.stop)
 
     # ------------------------------------------------------------------ reset
 

@@ -1,6 +1,7 @@
 """RobotManager: where robots stand and how they begin, and the actions of their channels."""
 
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +38,7 @@ class RobotManager(Manager):
     def bind(self, engine: SimEngine) -> None:
         super().bind(engine)
         self._actions.bind(engine)
-        self.slices = self._actions.slices
+        self.slices, self.spaces = self._actions.slices, self._actions.spaces
         self.action_dim, self.action_low, self.action_high = (
             self._actions.dim, self._actions.low, self._actions.high,
         )  # fmt: skip
@@ -163,12 +164,14 @@ class RobotManager(Manager):
             f"(channels with one: {listing(known)})"
         )
 
-    def validated(self, action: Array) -> Array:
-        """The action as float64 (N, A), clipped to the channels' bounds.
+    def validated(self, action: Any) -> Array:
+        """The action, flat (N, A) or by channel, as float64 (N, A), clipped to the channels' bounds.
 
         Raises:
-            TaskError: another shape, or a value that is not finite.
+            TaskError: another shape, a channel that is unknown or missing, or a value that is not finite.
         """
+        if isinstance(action, Mapping):
+            action = self.spaces.flatten(action, self.engine.num_envs)
         array = np.asarray(action, dtype=np.float64)
         if array.shape != (self.engine.num_envs, self.action_dim):
             raise TaskError(

@@ -69,7 +69,7 @@ class EpisodeResult:
 def run_header(env: TaskEnv, seed: int) -> RunHeader:
     """What all trajectories of a run of this env have in common."""
     assert env.robots is not None
-    action = [f"{s.robot}.{s.channel}.{i}" for s in env.robots.slices for i in range(s.stop - s.start)]
+    action = list(env.action_spaces.labels)
     example = {group: np.zeros(size, np.float32) for group, size in env.observation_sizes.items()}
     world = env.engine.world
     return RunHeader(

@@ -10,6 +10,7 @@ from anysim.conventions import Array
 from anysim.engine import checks
 from anysim.engine.base import SimEngine
 from anysim.errors import TaskError
+from anysim.managers.action_space import ActionSpaces
 from anysim.managers.base import RESET_ORDER, Manager
 from anysim.managers.capture import CaptureManager
 from anysim.managers.robot import RobotManager
@@ -59,6 +60,7 @@ class TaskEnv:
         self.robots = next((m for m in self.managers if isinstance(m, RobotManager)), None)
         self.capture = next((m for m in self.managers if isinstance(m, CaptureManager)), None)
         self.action_dim = 0 if self.robots is None else self.robots.action_dim
+        self.scene.action_columns = {name: slice(s.start, s.stop) for name, s in self.action_spaces.items()}
         self.mdp = Mdp(spec.task, self.scene, self.streams)
         self.scene.last_action = np.zeros((self.num_envs, self.action_dim))
         self.counterfactuals = Counterfactuals(self.managers, self.mdp, engine, self.streams)
@@ -85,6 +87,11 @@ class TaskEnv:
         if self.robots is None:
             return np.zeros(0), np.zeros(0)
         return self.robots.action_low.copy(), self.robots.action_high.copy()
+
+    @property
+    def action_spaces(self) -> ActionSpaces:
+        """What each channel takes, by `robot.channel`, in the order of the flat action."""
+        return ActionSpaces({}) if self.robots is None else self.robots.spaces
 
     @property
     def obs(self) -> Obs:
@@ -191,7 +198,8 @@ class TaskEnv:
         observation and have reward 0.
 
         Args:
-            action: (N, A); clipped to `action_bounds`. Rows of envs that are not stepped are ignored.
+            action: (N, A), or an array (N, k) for each of `action_spaces` by its name; clipped to the bounds. Rows of
+                envs that are not stepped are ignored.
 
         Raises:
             TaskError: an env has not been reset since it ended (with `ended: hold` and no mask it is left out instead).

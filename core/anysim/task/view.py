@@ -18,7 +18,7 @@ from anysim.errors import NameLookupError, TaskError, listing, suggest
 from anysim.managers.terrain import TerrainManager
 from anysim.math import pose as P
 from anysim.task.logical import CategoryView, Column, Follower, columns_of, varies
-from anysim.world.model import BodyKind, Entity
+from anysim.world.model import BodyKind, Channel, Entity
 from anysim.world.slots import members, single
 
 
@@ -32,6 +32,8 @@ class SceneView:
         """Goal poses (N, 7) by command name."""
         self.last_action = np.zeros((engine.num_envs, 0))
         """The last action (N, A), clipped."""
+        self.action_columns: dict[str, slice] = {}
+        """Columns of the action by `robot.channel`."""
         self.origin = np.zeros((engine.num_envs, 3))
         """Where each env's scene stands on the ground (N, 3) [m]."""
         self.terrain: TerrainManager | None = None
@@ -307,3 +309,21 @@ class RobotView(Jointed):
     def tool(self, name: str = "tool") -> Frame:
         """The frame of one of its tools."""
         return self.scene.frame(f"{self.name}.{name}")
+
+    @property
+    def base(self) -> Frame:
+        """The frame of its base."""
+        return self.scene.frame(self.name)
+
+    def channel(self, name: str) -> Channel:
+        """One of its channels.
+
+        Raises:
+            NameLookupError: lists those that it has.
+        """
+        if name not in self.model.channels:
+            known = list(self.model.channels)
+            raise NameLookupError(
+                f"robot '{self.name}' has no channel '{name}'{suggest(name, known)} (channels: {listing(known)})"
+            )
+        return self.model.channels[name]

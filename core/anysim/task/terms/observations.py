@@ -6,13 +6,26 @@ from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.joints import RangedJointView
 from anysim.task.logical import CategoryView
+from anysim.task.terms.robots import (
+    base_ang_vel,
+    base_lin_vel,
+    base_pose,
+    channel_action,
+    channel_joint_pos,
+    channel_joint_vel,
+    commanded_velocity,
+    projected_gravity,
+    tool_pose,
+    tool_twist,
+)
 from anysim.task.view import Frame, ObjectView, RobotView, SceneView
 from anysim_schemas.base import Number, Positive
 
 __all__ = [
-    "category_offset", "category_pose", "category_present", "category_twist", "frame_pose", "frame_twist",
-    "goal_position", "height_scan", "joint_opening", "joint_pos", "joint_vel", "last_action", "object_joint_pos",
-    "object_joint_vel", "offset", "present",
+    "base_ang_vel", "base_lin_vel", "base_pose", "category_offset", "category_pose", "category_present",
+    "category_twist", "channel_action", "channel_joint_pos", "channel_joint_vel", "commanded_velocity", "frame_pose",
+    "frame_twist", "goal_position", "height_scan", "joint_opening", "joint_pos", "joint_vel", "last_action",
+    "object_joint_pos", "object_joint_vel", "offset", "present", "projected_gravity", "tool_pose", "tool_twist",
 ]  # fmt: skip
 
 
