@@ -6,6 +6,7 @@ from pydantic import Field
 
 from anysim_schemas.base import Flag, Name, NonNegative, Number, Positive, Spec, Vec3
 from anysim_schemas.objects import ContactSpec
+from anysim_schemas.vehicle import VehicleSpec
 
 Category = Literal["arm", "dual_arm", "hand", "base", "mobile_manipulator", "humanoid", "quadruped", "camera"]
 
@@ -117,7 +118,11 @@ class RobotModelSpec(Spec):
     license: str = Field(description="SPDX expression of the asset's licence")
     license_source: str = Field(description="where the licence is stated")
     category: Category = Field(description="what kind of robot it is")
-    base: Literal["fixed", "floating"] = Field(default="fixed", description="bolted down, or free to move")
+    base: Literal["fixed", "floating", "planar"] = Field(
+        default="fixed",
+        description="bolted down, free to move, or `planar`: at its height on joints base_x, base_y and base_yaw, "
+        "which are put under the robot and move it over the ground",
+    )
     base_height: Number = Field(
         default=0.0, description="height of the base's frame above the ground that it stands on, at home [m]"
     )
@@ -126,6 +131,7 @@ class RobotModelSpec(Spec):
     home: dict[str, Number] = Field(default_factory=dict, description="joint positions [rad] or [m]; 0 where not given")
     tools: dict[str, ToolSpec] = Field(default_factory=dict, description="frames that tasks refer to, by name")
     sensors: dict[str, SensorSpec] = Field(default_factory=dict, description="places for sensors, by name")
+    vehicle: VehicleSpec | None = Field(default=None, description="how it drives, where it does")
     legs: dict[Name, LegSpec] = Field(default_factory=dict, description="its legs by name, front left first")
     surfaces: tuple[SurfaceSpec, ...] = Field(default=(), description="contact parameters of links")
     self_collision: Flag = Field(default=False, description="whether links of this robot collide with each other")

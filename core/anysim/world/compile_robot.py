@@ -13,6 +13,7 @@ from anysim.math import pose as P
 from anysim.world.attach import attach
 from anysim.world.builder import WorldBuilder
 from anysim.world.catalogue import CatalogueEntry, load_robot
+from anysim.world.compile_vehicle import check_vehicle
 from anysim.world.imported import ImportedModel, ImportNote
 from anysim.world.importers import import_asset
 from anysim.world.issues import Issues
@@ -34,6 +35,7 @@ from anysim.world.nominal import extremes, nominal
 from anysim.world.presets import GRIPPER_LIMIT_SOFTNESS, surface
 from anysim.world.procedural.build import build
 from anysim.world.rounding import split
+from anysim.world.vehicles import as_vehicle
 from anysim_schemas.object_source import PROCEDURAL
 from anysim_schemas.robot_model import ChannelSpec, GainSpec, RobotModelSpec, SensorSpec, ToolSpec
 from anysim_schemas.robots import RobotSpec
@@ -87,7 +89,7 @@ def add_robot(builder: WorldBuilder, name: str, spec: RobotSpec, issues: Issues)
         issues.add("robot", f"the catalogue entry is not valid: {error}")
         return []
     try:
-        model = import_robot(entry)
+        model = as_vehicle(import_robot(entry), entry.spec)
     except (AssetError, PluginError) as error:
         issues.asset("robot", AssetError(f"robot '{spec.robot}': {error}"))
         return []
@@ -107,6 +109,7 @@ class _Assembly:
         self.number = {joint.name: i for i, joint in enumerate(model.joints)}
 
     def add_to(self, builder: WorldBuilder) -> None:
+        check_vehicle(self.entry, self.model, self.own)
         joints = self._joints()
         floating = self.entry.base == "floating"
         bodies = tuple(
