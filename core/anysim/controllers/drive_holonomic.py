@@ -66,7 +66,7 @@ class HolonomicDrive(Controller):
         twist = self._ramp.toward(wanted * within_limits(speeds, self._limits)[:, None], env_ids)
         angles, speeds = swerve_modules(twist, self._positions)
         measured = self.channel.joint_pos(env_ids)[:, self._drives.steered]
-        angles, speeds = shortest_turn(angles, speeds, self._angles[rows])
+        angles, speeds = shortest_turn(angles, speeds, measured)
         angles = np.where(np.abs(speeds) > _STANDING, angles, self._angles[rows])
         self._angles[rows] = angles
         aligned = np.maximum(np.cos(angles - measured), 0.0).min(axis=1)
