@@ -16,6 +16,7 @@ KINDS: Mapping[str, str] = {
     "tasks": "tasks (a package with a task.yaml)",
     "robots": "robots (a package with NAME.yaml)",
     "controllers": "action controllers",
+    "policies": "learned policies, which the controller `policy` runs",
     "terms": "libraries of observation, reward, predicate, command and event terms",
     "skills": "skills",
     "planners": "planners",
@@ -35,6 +36,7 @@ INSTALL_HINTS: Mapping[tuple[str, str], str] = {
     ("readers", "mcap"): "anysim-mcap",
     ("planners", "numba_ik"): "anysim-ik",
     ("importers", "mjcf"): "anysim-mujoco",
+    ("controllers", "policy"): "anysim-policy",
 }
 """Where well-known plugins come from, for the remedy in an error."""
 
@@ -51,6 +53,11 @@ def _entries(kind: str) -> Mapping[str, tuple[metadata.EntryPoint, ...]]:
 
 def _dist(entry: metadata.EntryPoint) -> str:
     return entry.dist.name if entry.dist is not None else "unknown distribution"
+
+
+def _one(kind: str) -> str:
+    """What one of a kind is called."""
+    return f"{kind[:-3]}y" if kind.endswith("ies") else kind.removesuffix("s")
 
 
 def refresh() -> None:
@@ -78,12 +85,12 @@ def entry(kind: str, name: str) -> metadata.EntryPoint:
         package = INSTALL_HINTS.get((kind, bare))
         remedy = f"; it comes with the package {package}: pip install {package}" if package else ""
         raise PluginError(
-            f"no {kind.removesuffix('s')} named '{name}' is installed{suggest(bare, installed)}{remedy} "
+            f"no {_one(kind)} named '{name}' is installed{suggest(bare, installed)}{remedy} "
             f"(installed: {listing(installed)})"
         )
     if len(found) > 1:
         offers = ", ".join(f"{_dist(e)}:{bare}" for e in found)
-        raise PluginError(f"the {kind.removesuffix('s')} '{bare}' is offered twice; choose one of {offers}")
+        raise PluginError(f"the {_one(kind)} '{bare}' is offered twice; choose one of {offers}")
     return found[0]
 
 
@@ -103,6 +110,6 @@ def load(kind: str, name: str) -> Any:
         return found.load()
     except Exception as error:
         raise PluginError(
-            f"the {kind.removesuffix('s')} '{name}' of {_dist(found)} does not load: "
+            f"the {_one(kind)} '{name}' of {_dist(found)} does not load: "
             f"{type(error).__name__}: {error} (entry point {found.value})"
         ) from error
