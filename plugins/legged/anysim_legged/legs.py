@@ -71,10 +71,10 @@ class Legs:
         for i, name in enumerate(legs):
             for k, letter in enumerate("xyy"):
                 if abs(abs(signs[i, k]) - 1.0) > ALIGNED**2 / 2:
+                    joint, found = model.joint_names[columns[i, k]], np.round(axes[i, k], 4).tolist()
                     raise TaskError(
-                        f"{where}: leg '{name}' is of another kind: at zero positions the axis of "
-                        f"'{model.joint_names[columns[i, k]]}' is {np.round(axes[i, k], 4).tolist()}, expected it along "
-                        f"{letter} of the base (hip about x, thigh and knee about y)"
+                        f"{where}: leg '{name}' is of another kind: at zero the axis of '{joint}' is {found}; "
+                        f"expected along {letter} of the base (hip about x, thigh and knee about y)"
                     )
         made = cls(
             tuple(legs), points, axes, np.sign(signs), np.ones(len(legs)), model.initial[columns],
