@@ -1,6 +1,6 @@
 """How fast quadrupeds trot, on every engine: speeds reached per robot, engine and command, one controller for all.
 
-    python benchmarks/trot.py [ROBOT ...] [--engines mujoco,sapien] [--seconds 7]
+    python -m benchmarks.trot [ROBOT ...] [--engines mujoco,sapien] [--seconds 7]
 
 Each row is one run of three envs: forward, sideways and turning at once. Means of the last 60 %, in the heading frame.
 The walks are deterministic; no figure is a time.

@@ -3,7 +3,7 @@
 Everything is elementwise over (E, L): E envs, L legs, so a row's bits do not depend on the rows beside it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -82,7 +82,7 @@ class Legs:
         )  # fmt: skip
         knee = made.signs[:, 2] * made.home[:, 2] + made._angles[1] - made._angles[0]
         bend = np.where(np.sin(knee) >= 0.0, 1.0, -1.0)
-        return cls(*(bend if f == "bend" else getattr(made, f) for f in cls.__dataclass_fields__))
+        return replace(made, bend=bend)
 
     # ------------------------------------------------------------------ forward
 
