@@ -15,8 +15,11 @@ MOST_SLIP = 0.3
 
 @dataclass(frozen=True)
 class GaitParameters:
-    """How a robot trots: frequency [1/s] of strides, clearance [m] of a swinging foot, share of a stride on the ground
-    (`duty`), and the gains of the controller's docstring."""
+    """How a robot trots.
+
+    Frequency of strides [1/s], clearance [m] of a swinging foot, share of a stride on the ground (`duty`), and the
+    gains of the feedbacks that `TrotController` explains: `placement` [s], `levelling`, `tracking` [1/s].
+    """
 
     frequency: float
     clearance: float
@@ -45,9 +48,11 @@ class Footing(NamedTuple):
 
 
 class Trot:
-    """Diagonal pairs of feet step in turn. Stance feet move against the body; swinging feet go to where half of a stance
-    at the commanded velocity brings them back to their nominal places. Positions are where feet shall be at the end of
-    a tick.
+    """Diagonal pairs of feet step in turn.
+
+    Stance feet move against the body; swinging feet go to where half of a
+    stance at the commanded velocity brings them back to their nominal places. Positions are where feet shall be at the
+    end of a tick.
 
     Attributes:
         nominal: (L, 3) [m] where the feet are when the robot stands.

@@ -3,7 +3,7 @@
 Everything is elementwise over (E, L): E envs, L legs, so a row's bits do not depend on the rows beside it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -71,10 +71,10 @@ class Legs:
         for i, name in enumerate(legs):
             for k, letter in enumerate("xyy"):
                 if abs(abs(signs[i, k]) - 1.0) > ALIGNED**2 / 2:
+                    joint, found = model.joint_names[columns[i, k]], np.round(axes[i, k], 4).tolist()
                     raise TaskError(
-                        f"{where}: leg '{name}' is of another kind: at zero positions the axis of "
-                        f"'{model.joint_names[columns[i, k]]}' is {np.round(axes[i, k], 4).tolist()}, expected it along "
-                        f"{letter} of the base (hip about x, thigh and knee about y)"
+                        f"{where}: leg '{name}' is of another kind: at zero the axis of '{joint}' is {found}; "
+                        f"expected along {letter} of the base (hip about x, thigh and knee about y)"
                     )
         made = cls(
             tuple(legs), points, axes, np.sign(signs), np.ones(len(legs)), model.initial[columns],
@@ -82,7 +82,7 @@ class Legs:
         )  # fmt: skip
         knee = made.signs[:, 2] * made.home[:, 2] + made._angles[1] - made._angles[0]
         bend = np.where(np.sin(knee) >= 0.0, 1.0, -1.0)
-        return cls(*(bend if f == "bend" else getattr(made, f) for f in cls.__dataclass_fields__))
+        return replace(made, bend=bend)
 
     # ------------------------------------------------------------------ forward
 

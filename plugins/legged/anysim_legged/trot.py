@@ -12,6 +12,7 @@ from anysim.errors import TaskError, listing
 from anysim.math import pose as P
 from anysim_legged.gait import Footing, GaitParameters, Motion, Trot
 from anysim_legged.legs import Legs, solve
+from anysim_legged.weight import Balance, shares
 
 Limits = tuple[Annotated[float, Field(gt=0)], Annotated[float, Field(gt=0)], Annotated[float, Field(gt=0)]]
 
@@ -20,9 +21,9 @@ class TrotController(Controller):
     """The action is the velocity of the base in its own frame: forward [m/s], left [m/s], turn to the left [rad/s].
 
     Diagonal pairs of legs step in turn, and at zero all feet stand. Feet follow targets in the base frame through exact
-    leg kinematics and the drives' law; feed-forward torques carry the weight, shared by the feet that stand. Two
-    feedbacks: a swinging foot lands further out the faster the base drifts (Raibert), and standing legs push the low
-    side of the base up.
+    leg kinematics and the drives' law; feed-forward torques carry the weight, shared by the feet that stand. Three
+    feedbacks: a swinging foot lands further out the faster the base drifts (Raibert), standing legs push the low side
+    of the base up, and a lasting error of the velocity is added to what the feet are told.
     """
 
     labels = ("forward", "left", "turn")
@@ -35,14 +36,16 @@ class TrotController(Controller):
         duty: Annotated[float, Field(ge=0.5, lt=1, description="share of a stride that a foot stands")] = 0.6,
         placement: Annotated[float, Field(ge=0, description="feet land further by this times the drift [s]")] = 0.1,
         levelling: Annotated[float, Field(ge=0, description="share of a tilt that standing legs push against")] = 0.4,
-        tracking: Annotated[float, Field(ge=0, description="how fast a lasting error of speed is made good [1/s]")] = 0.5,
+        tracking: Annotated[float, Field(ge=0, description="how fast lasting errors of speed are mended [1/s]")] = 0.5,
         ramp: Annotated[float, Field(gt=0, description="time from zero to a limit [s]")] = 0.5,
         in_place: Annotated[bool, Field(description="go on stepping at zero velocity")] = False,
         period: Annotated[float, Field(gt=0, description="time between commands [s]; a control step")] | None = None,
     ) -> None:  # fmt: skip
         super().__init__(channel, num_envs)
         if frequency is None or clearance is None or limits is None:
-            lack = [n for n, v in {"frequency": frequency, "clearance": clearance, "limits": limits}.items() if v is None]
+            lack = [
+                n for n, v in {"frequency": frequency, "clearance": clearance, "limits": limits}.items() if v is None
+            ]
             raise TaskError(
                 f"trot needs {listing(lack)} of '{self.robot.name}.{channel.name}'; give them in `params`, or under "
                 f"channels.{channel.name}.controllers.trot in the robot's catalogue entry"
@@ -52,6 +55,7 @@ class TrotController(Controller):
         self.low = -self.high
         self.legs = Legs.of(self.robot)
         self._order = self._drives()
+        self._balance = Balance(self.robot, self.legs.columns)
         self._fastest = self.channel.velocity_limit[self._order]
         nominal = self.legs.feet(self.legs.home[None])[0]
         nominal[:, 2] = nominal[:, 2].mean()
@@ -102,15 +106,14 @@ class TrotController(Controller):
         rows = _rows(env_ids)
         pose, twist = self.robot.base_pose(env_ids), self.robot.base_twist(env_ids)
         footing = self.gait.tick(rows, self._command[rows], _motion(pose, twist), self._dt)
-        return self._drive(pose, footing)
+        return self._drive(pose, self._balance.com(env_ids, len(pose)), footing)
 
-    def _drive(self, pose: Array, footing: Footing) -> Command:
+    def _drive(self, pose: Array, com: Array, footing: Footing) -> Command:
         """Positions of the legs' drives, and the torques that carry the weight."""
         postures = self.legs.inverse(footing.feet)
         joints = np.minimum(np.maximum(postures.joints, self.legs.lower), self.legs.upper)
         up = P.rotate_inverse(pose[:, 3:], np.broadcast_to(self._weight, (len(pose), 3)))
-        standing = np.maximum(footing.stance.sum(axis=1), 1)
-        share = footing.stance / standing[:, None]
+        share = shares(footing.stance, footing.feet, com)
         force = up[:, None] * share[..., None]  # of the ground on each foot
         jacobian = postures.jacobian
         effort = -np.stack([P.dot(jacobian[..., k], force) for k in range(3)], axis=-1)
