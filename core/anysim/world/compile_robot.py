@@ -34,13 +34,14 @@ from anysim.world.nominal import extremes, nominal
 from anysim.world.presets import GRIPPER_LIMIT_SOFTNESS, surface
 from anysim.world.procedural.build import build
 from anysim.world.rounding import split
+from anysim.world.solids import with_solids
 from anysim_schemas.object_source import PROCEDURAL
 from anysim_schemas.robot_model import ChannelSpec, GainSpec, RobotModelSpec, SensorSpec, ToolSpec
 from anysim_schemas.robots import RobotSpec
 
 
 def import_robot(entry: CatalogueEntry) -> ImportedModel:
-    """The model of a catalogue entry, as its source has it, with its parts fixed to it.
+    """The model of a catalogue entry: its source, with its parts fixed to it and its `collision` in place.
 
     Raises:
         AssetError: a source is missing or damaged, says what to install where it comes with another package; or a part
@@ -63,7 +64,7 @@ def import_robot(entry: CatalogueEntry) -> ImportedModel:
             model = attach(model, more, part.link, pose, part.prefix)
         except AssetError as error:
             raise AssetError(f"parts.{i} of robot '{spec.name}': {error}") from None
-    return model
+    return with_solids(model, spec.collision)
 
 
 def _read(entry: CatalogueEntry, source: str, params: Mapping[str, Any], where: str) -> ImportedModel:
