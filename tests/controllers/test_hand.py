@@ -9,6 +9,7 @@ import pytest
 from anysim.controllers.base import ChannelView
 from anysim.controllers.hand import GripperMultiFinger
 from anysim.controllers.robot import ControlledRobot
+from anysim.conventions import Array
 from anysim.errors import TaskError
 from anysim.world.parts import Mimic
 
@@ -44,33 +45,40 @@ def hand(num_envs: int = 1, **params: Any) -> GripperMultiFinger:
     return made
 
 
+def commanded(controller: GripperMultiFinger, action: Array, env_ids: Array | None = None) -> Array:
+    """The position targets (E, K) of one control step."""
+    position = controller.apply(action, env_ids).position
+    assert position is not None
+    return position.copy()
+
+
 def test_one_synergy_goes_from_opened_to_its_posture() -> None:
     controller = hand(3)
     assert (controller.dim, controller.labels) == (2, ("power", "pinch"))
     assert (controller.low == 0).all()
     assert (controller.high == 1).all()
     action = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.5]])
-    position = controller.apply(action, None).position
+    position = commanded(controller, action)
     np.testing.assert_allclose(position, [[-0.5, 0.1, 0.2], [0.0, 1.5, 1.0], [0.0, 0.55, 0.1]], atol=1e-15)
 
 
 def test_synergies_add_up_and_stay_within_the_limits() -> None:
     """opened + (power - opened) + (pinch - opened) = [1.0, 2.4, 0.8], of which the second is beyond its limit of 2."""
-    np.testing.assert_allclose(hand().apply(np.array([[1.0, 1.0]]), None).position, [[1.0, 2.0, 0.8]], atol=1e-15)
+    np.testing.assert_allclose(commanded(hand(), np.array([[1.0, 1.0]])), [[1.0, 2.0, 0.8]], atol=1e-15)
 
 
 def test_a_posture_of_the_catalogue_may_lie_beyond_a_limit_to_press() -> None:
     view = channel(synergies={"power": [0.0, 2.5, 1.0]}, opened=[0.0, 0.0, -0.1])
     controller = GripperMultiFinger(view, 1, mode="synergies")
     controller.reset(ONE, np.zeros((1, 3)))
-    np.testing.assert_allclose(controller.apply(np.array([[1.0]]), None).position, [[0.0, 2.5, 1.0]])
-    np.testing.assert_allclose(controller.apply(np.array([[0.0]]), None).position, [[0.0, 0.0, -0.1]])
+    np.testing.assert_allclose(commanded(controller, np.array([[1.0]])), [[0.0, 2.5, 1.0]])
+    np.testing.assert_allclose(commanded(controller, np.array([[0.0]])), [[0.0, 0.0, -0.1]])
 
 
 def test_synergies_can_be_chosen() -> None:
     controller = hand(synergies=("pinch",))
     assert controller.labels == ("pinch",)
-    np.testing.assert_allclose(controller.apply(np.array([[1.0]]), None).position, [[0.5, 1.0, 0.0]])
+    np.testing.assert_allclose(commanded(controller, np.array([[1.0]])), [[0.5, 1.0, 0.0]])
 
 
 def test_a_row_of_the_action_does_not_depend_on_the_rows_beside_it() -> None:
@@ -84,17 +92,17 @@ def test_a_row_of_the_action_does_not_depend_on_the_rows_beside_it() -> None:
 def test_targets_move_no_faster_than_the_speed() -> None:
     controller = hand(speed=5.0)  # 0.1 rad in a step
     close = np.array([[1.0, 0.0]])
-    np.testing.assert_allclose(controller.apply(close, None).position, [[-0.4, 0.2, 0.3]])
+    np.testing.assert_allclose(commanded(controller, close), [[-0.4, 0.2, 0.3]])
     for _ in range(3):
         controller.apply(close, None)
-    np.testing.assert_allclose(controller.apply(close, None).position, [[0.0, 0.6, 0.7]], atol=1e-12)
-    np.testing.assert_allclose(controller.apply(np.zeros((1, 2)), None).position, [[-0.1, 0.5, 0.6]], atol=1e-12)
+    np.testing.assert_allclose(commanded(controller, close), [[0.0, 0.6, 0.7]], atol=1e-12)
+    np.testing.assert_allclose(commanded(controller, np.zeros((1, 2))), [[-0.1, 0.5, 0.6]], atol=1e-12)
 
 
 def test_the_joints_own_velocity_limit_holds_where_the_speed_is_higher() -> None:
     controller = GripperMultiFinger(channel(speed=1.0), 1, speed=5.0)
     controller.reset(ONE, np.zeros((1, 3)))
-    np.testing.assert_allclose(controller.apply(np.ones((1, 3)), None).position, [[0.02, 0.02, 0.02]])
+    np.testing.assert_allclose(commanded(controller, np.ones((1, 3))), [[0.02, 0.02, 0.02]])
 
 
 def test_all_joints_within_their_limits() -> None:
@@ -103,7 +111,7 @@ def test_all_joints_within_their_limits() -> None:
     assert (controller.low == [-1, 0, 0]).all()
     assert (controller.high == [1, 2, 2]).all()
     action = np.array([[0.3, 1.1, 0.7]])
-    assert (controller.apply(action, None).position == action).all()
+    assert (commanded(controller, action) == action).all()
     assert (controller.action_for(np.array([[3.0, 1.0, -1.0]]), ONE) == [[1.0, 1.0, 0.0]]).all()
 
 
@@ -112,14 +120,14 @@ def test_followers_are_not_commanded_and_go_where_their_leader_puts_them() -> No
     controller = GripperMultiFinger(channel({1: Mimic(0, 2.0, 0.1), 2: Mimic(1, 0.5, 0.2)}), 1)
     assert (controller.dim, controller.labels) == (1, ("j0",))
     controller.reset(ONE, np.zeros((1, 3)))
-    np.testing.assert_allclose(controller.apply(np.array([[0.4]]), None).position, [[0.4, 0.9, 0.65]])
+    np.testing.assert_allclose(commanded(controller, np.array([[0.4]])), [[0.4, 0.9, 0.65]])
 
 
 def test_followers_keep_to_their_leader_in_synergies_and_at_any_speed() -> None:
     view = channel({1: Mimic(0, 2.0, 0.0)}, {"power": [0.8, 0.0, 1.0]}, [0.0, 0.0, 0.0])
     controller = GripperMultiFinger(view, 1, mode="synergies", speed=5.0)
     controller.reset(ONE, np.zeros((1, 3)))
-    np.testing.assert_allclose(controller.apply(np.array([[1.0]]), None).position, [[0.1, 0.2, 0.1]])
+    np.testing.assert_allclose(commanded(controller, np.array([[1.0]])), [[0.1, 0.2, 0.1]])
 
 
 def test_action_for_inverts_the_blend() -> None:
@@ -133,21 +141,18 @@ def test_a_snapshot_holds_the_target_on_its_way() -> None:
     close = np.tile([1.0, 0.0], (2, 1))
     controller.apply(close, None)
     kept = controller.snapshot(np.array([1]))
-    expected = controller.apply(close, None).position
-    assert expected is not None
-    expected = expected.copy()
+    expected = commanded(controller, close)
     controller.apply(close, None)
     controller.restore(np.array([1]), kept)
-    position = controller.apply(close, None).position
-    assert position is not None
+    position = commanded(controller, close)
     assert (position[1] == expected[1]).all()
     assert (position[0] != expected[0]).any()
 
 
 def test_only_the_given_envs_move() -> None:
     controller = hand(3, speed=5.0)
-    assert np.allclose(controller.apply(np.array([[1.0, 0.0]]), np.array([2])).position, [[-0.4, 0.2, 0.3]])
-    assert np.allclose(controller.apply(np.zeros((3, 2)), None).position, [[-0.5, 0.1, 0.2]] * 3)
+    assert np.allclose(commanded(controller, np.array([[1.0, 0.0]]), np.array([2])), [[-0.4, 0.2, 0.3]])
+    assert np.allclose(commanded(controller, np.zeros((3, 2))), [[-0.5, 0.1, 0.2]] * 3)
 
 
 @pytest.mark.parametrize(
