@@ -61,6 +61,7 @@ check-schema:
 check-tables:
 	$(BIN)/python scripts/capability_table.py --check
 	$(BIN)/python scripts/axes_table.py --check
+	$(BIN)/python scripts/robot_table.py --check
 check-types:
 	$(BIN)/pyright
 
@@ -77,6 +78,7 @@ schema: $(STAMP)  ## write the JSON Schemas that editors complete YAML from
 docs: schema  ## write what is generated and run the examples of docs/
 	$(BIN)/python scripts/capability_table.py
 	$(BIN)/python scripts/axes_table.py
+	$(BIN)/python scripts/robot_table.py
 	$(BIN)/python -m pytest tests/docs $(ARGS)
 
 bench: $(STAMP)  ## measure speed against the budgets, as ratios

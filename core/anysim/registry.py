@@ -23,6 +23,7 @@ KINDS: Mapping[str, str] = {
     "writers": "record writers",
     "readers": "record readers, by the writer's name",
     "importers": "asset importers, by file format",
+    "oracles": "independent readers of robots that importers are held against, by file format",
     "assets": "builders of procedural assets",
     "layouts": "proposers of layouts",
 }
@@ -37,6 +38,7 @@ INSTALL_HINTS: Mapping[tuple[str, str], str] = {
     ("planners", "numba_ik"): "anysim-ik",
     ("importers", "mjcf"): "anysim-mujoco",
     ("controllers", "policy"): "anysim-policy",
+    ("oracles", "mjcf"): "anysim-mujoco",
 }
 """Where well-known plugins come from, for the remedy in an error."""
 

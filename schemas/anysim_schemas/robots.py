@@ -43,7 +43,7 @@ class ActionSpec(Spec):
 class RobotSpec(Spec):
     """A robot in the world."""
 
-    robot: str = Field(description="a robot of the catalogue, as in `anysim list robots`")
+    robot: str = Field(description="a robot of the catalogue, as in `anysim list robots`, or the YAML file of one")
     position: Vec3Value = Field(
         default=(0.0, 0.0, 0.0),
         description="place of the base [m], world frame; of the ground under a robot that stands on it",

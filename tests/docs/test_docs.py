@@ -16,7 +16,8 @@ BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 EXCERPT = re.compile(r"^```(\w+) (\S+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FENCE = re.compile(r"^```(\w+)$", re.MULTILINE)
-SOURCES = (ROOT / "tests" / "external" / "anysim-ballistic", ROOT)
+EXTERNAL = ROOT / "tests" / "external"
+SOURCES = (EXTERNAL / "anysim-ballistic", EXTERNAL / "anysim-thirdarm", EXTERNAL, ROOT)
 """Where the file at the head of an excerpt is looked for."""
 
 

@@ -23,6 +23,9 @@ def list_(
         raise PluginError(
             f"there is no kind '{kind}'{suggest(kind, list(registry.KINDS))} (kinds: {listing(registry.KINDS, 20)})"
         )
+    if kind == "robots":
+        _robots(json)
+        return
     rows = [{"name": name, "from": _origin(kind, name), "what": _what(kind, name)} for name in registry.names(kind)]
     if json:
         print_json(rows)
@@ -30,6 +33,37 @@ def list_(
     print_table(f"{kind}: {registry.KINDS[kind]}", ("name", "from", "what"), [tuple(r.values()) for r in rows])
     if kind == "engines":
         _capabilities()
+
+
+def _robots(json: bool) -> None:
+    """The catalogue: what each robot is, how many joints are commanded, and whether its files are here."""
+    from anysim import registry
+    from anysim.cli.output import print_json, print_table
+    from anysim.errors import AnysimError
+    from anysim.qualify.stage import missing_source
+    from anysim.world.catalogue import load_robot
+
+    rows: list[dict[str, object]] = []
+    for name in registry.names("robots"):
+        row: dict[str, object] = {"name": name, "from": _origin("robots", name)}
+        try:
+            entry = load_robot(name)
+        except AnysimError as error:
+            rows.append({**row, "what": f"does not load: {error}", "available": False})
+            continue
+        spec, absent = entry.spec, missing_source(entry)
+        commanded = sum(len(channel.joints) for channel in spec.channels.values())
+        row |= {"category": spec.category, "dof": commanded, "source": spec.source, "license": spec.license}
+        row |= {"available": not absent, "remedy": absent}
+        rows.append({**row, "what": f"{spec.category}: {spec.description} ({spec.license})"})
+    if json:
+        print_json(rows)
+        return
+    columns = ("name", "category", "dof", "license", "available", "source", "from")
+    told = [[r.get(c) for c in columns] for r in rows]
+    for line, row in zip(told, rows, strict=True):
+        line[4] = "yes" if row["available"] else row.get("remedy") or row["what"]
+    print_table("robots: dof counts the joints that are commanded; see `anysim robot NAME`", columns, told)
 
 
 def _capabilities() -> None:
@@ -80,11 +114,6 @@ def _what(kind: str, name: str) -> str:
 
             task = load(task_path(name)).spec.task
             return task.description if task else ""
-        if kind == "robots":
-            from anysim.world.catalogue import load_robot
-
-            robot = load_robot(name).spec
-            return f"{robot.category}: {robot.description} ({robot.license})"
         if kind == "terms":
             from anysim.task.library import term_names
 

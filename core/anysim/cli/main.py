@@ -5,7 +5,22 @@ import sys
 import typer
 
 from anysim import __version__
-from anysim.cli import audit, bench, check, compare, doctor, explain, listing, picture, replay, run, schema, snapshot
+from anysim.cli import (
+    audit,
+    bench,
+    check,
+    compare,
+    doctor,
+    explain,
+    gallery,
+    listing,
+    picture,
+    replay,
+    robot,
+    run,
+    schema,
+    snapshot,
+)
 
 EXIT_CODES = """Exit codes: 0 done; 1 it ran, and the answer is no (a replay that differs, a file with faults, too few
 successes); 2 bad input; 130 interrupted."""
@@ -29,6 +44,8 @@ app.command("audit")(audit.audit)
 app.command("compare")(compare.compare)
 app.command("picture")(picture.picture)
 app.command("schema")(schema.schema)
+app.command("gallery")(gallery.gallery)
+app.add_typer(robot.app, name="robot")
 app.add_typer(bench.app, name="bench")
 app.add_typer(snapshot.app, name="snapshot")
 

@@ -149,6 +149,11 @@ class RobotModel:
             )
         return self._frames[name]
 
+    @property
+    def frames(self) -> dict[str, int]:
+        """Pinocchio's indices of all frames by name."""
+        return dict(self._frames)
+
     def columns(self, joints: Array) -> Array:
         """Where world joints stand among the robot's J."""
         return np.asarray(joints) - self.joints[0] if len(self.joints) else np.asarray(joints)

@@ -19,10 +19,17 @@ class CatalogueEntry(NamedTuple):
 def load_robot(name: str) -> CatalogueEntry:
     """A robot of the catalogue by name (or `dist:name`). The package is found, not imported.
 
+    A name that ends with `.yaml` is a file with an entry that is not installed (yet).
+
     Raises:
-        PluginError: unknown (lists what is installed), or the package lacks the file.
+        PluginError: unknown (lists what is installed), or there is no such file.
         SpecError: the file is not a valid RobotModelSpec.
     """
+    if name.endswith((".yaml", ".yml")):
+        file = Path(name)
+        if not file.is_file():
+            raise PluginError(f"there is no file '{name}' with the entry of a robot (looked in {Path.cwd()})")
+        return CatalogueEntry(_read(file), file)
     entry = registry.entry("robots", name)
     package = entry.value
     spec = importlib.util.find_spec(package)

@@ -1,0 +1,66 @@
+"""`anysim robot` and `anysim gallery`."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.cli.test_cli import anysim
+
+ARM = Path(__file__).parents[1] / "external" / "anysim-thirdarm" / "anysim_thirdarm"
+
+
+def test_a_robot_is_shown_with_its_joints() -> None:
+    found = json.loads(anysim("robot", "franka_panda", "--json").stdout)
+    assert (found["category"], found["joints"], found["drives"], found["available"]) == ("arm", 9, 9, True)
+    assert found["license"] == "Apache-2.0"
+    first = found["joint_table"][0]
+    assert (first["joint"], first["channel"], first["kp"], first["effort_limit"]) == ("panda_joint1", "arm", 1000, 87)
+    told = anysim("robot", "franka_panda").stdout
+    assert "panda_finger_joint2" in told
+    assert "tool tool: panda_hand_tcp" in told
+
+
+def test_a_wrong_name_lists_what_there_is() -> None:
+    found = anysim("robot", "franka_pand")
+    assert found.returncode == 2
+    assert "did you mean 'franka_panda'" in found.stderr
+
+
+def test_help_teaches() -> None:
+    assert "anysim robot import my_arm.urdf" in anysim("robot", "--help").stdout
+    assert "--picture panda.png" in anysim("robot", "show", "--help").stdout
+    assert "anysim gallery --hold 1" in anysim("gallery", "--help").stdout
+
+
+@pytest.mark.slow
+def test_a_draft_is_written_read_back_checked_and_drawn(tmp_path: Path) -> None:
+    shutil.copy(ARM / "third_arm.urdf", tmp_path / "new_arm.urdf")
+    made = anysim("robot", "import", "new_arm.urdf", cwd=tmp_path)
+    assert made.returncode == 0, made.stderr
+    assert "TODO license" in made.stdout
+    assert "audit on mujoco: audit: passed" in made.stdout
+    again = anysim("robot", "import", "new_arm.urdf", cwd=tmp_path)
+    assert again.returncode == 2
+    assert "--force" in again.stderr
+    words = ("--check", "-e", "mujoco", "--hold", "0.2", "--random", "0.1", "--picture", "new.png")
+    checked = anysim("robot", "new_arm.yaml", *words, cwd=tmp_path)
+    assert checked.returncode == 0, checked.stdout + checked.stderr
+    assert "replay: passed" in checked.stdout
+    assert (tmp_path / "new.png").read_bytes()[:4] == b"\x89PNG"
+
+
+@pytest.mark.slow
+def test_the_gallery_is_a_page_without_a_network(tmp_path: Path) -> None:
+    out = tmp_path / "gallery"
+    words = ("--robots", "franka_panda", "-e", "mujoco", "--hold", "0.1", "--random", "0.1", "--out", str(out))
+    made = anysim("gallery", *words)
+    assert made.returncode == 0, made.stderr
+    html = (out / "index.html").read_text()
+    assert "pictures/franka_panda-mujoco.png" in html
+    assert "qualified" in html
+    assert "://" not in html
+    assert (out / "arm.png").stat().st_size < 1_000_000
+    assert anysim("gallery", "--robots", "frank").stderr.count("did you mean") == 1
+    assert "0 to measure" in anysim("gallery", *words).stderr

@@ -1,0 +1,18 @@
+"""A stranger's robot: its wheel beside ours in a fresh environment."""
+
+import json
+
+import pytest
+
+pytestmark = pytest.mark.slow
+
+
+def test_its_wheel_brings_a_robot_that_runs(environment, program, external_wheels, tmp_path) -> None:
+    wheel = external_wheels["anysim-thirdarm"]
+    python = environment("anysim", "anysim-mujoco", others=(wheel,), tools=("yourdfpy", "pin"))
+    anysim = python.with_name("anysim")
+    (row,) = json.loads(program(anysim, "list", "robots", "--json", cwd=tmp_path).stdout)
+    assert (row["name"], row["from"], row["available"]) == ("third_arm", "anysim-thirdarm", True)
+    words = ("robot", "third_arm", "--check", "--hold", "0.5", "--random", "0.2", "--json")
+    (found,) = json.loads(program(anysim, *words, cwd=tmp_path).stdout)["checks"]
+    assert (found["engine"], found["status"]) == ("mujoco", "qualified")
