@@ -38,7 +38,7 @@ def load_model(path: Path, size: int, outputs: int) -> Runtime:
         words = str(error).strip().splitlines()
         raise TaskError(
             f"the policy {path} does not take observations (1, {size}): {words[0] if words else error!r}"
-        ) from None
+        ) from error
     if given.shape != (outputs,):
         raise TaskError(
             f"the policy {path} gives {given.shape[-1] if given.ndim else 0} numbers for an observation, but it has "
@@ -60,12 +60,12 @@ def _onnx(path: Path, size: int) -> Runtime:
     try:
         session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
     except Exception as error:
-        raise TaskError(f"the policy {path} is no ONNX model that onnxruntime reads: {error}") from None
+        raise TaskError(f"the policy {path} is no ONNX model that onnxruntime reads: {error}") from error
     inputs, outputs = session.get_inputs(), session.get_outputs()
     if len(inputs) != 1 or len(outputs) != 1:
         raise TaskError(
-            f"the policy {path} has inputs {[i.name for i in inputs]} and outputs {[o.name for o in outputs]}; expected "
-            "one of each (recurrent policies keep their state in further ones and cannot be run)"
+            f"the policy {path} has inputs {[i.name for i in inputs]} and outputs {[o.name for o in outputs]}; "
+            "expected one of each (recurrent policies keep their state in further ones and cannot be run)"
         )
     shape = inputs[0].shape
     if len(shape) != 2 or (isinstance(shape[1], int) and shape[1] != size):
@@ -89,7 +89,7 @@ def _torch(path: Path, size: int) -> Runtime:
     try:
         module = torch.jit.load(str(path), map_location="cpu").eval()
     except Exception as error:
-        raise TaskError(f"the policy {path} is no TorchScript module: {error}") from None
+        raise TaskError(f"the policy {path} is no TorchScript module: {error}") from error
 
     def run(row: Array) -> Array:
         with torch.inference_mode():

@@ -1,4 +1,4 @@
-"""The controller `policy`: a small model that was made here, against numpy; clocks, snapshots, batches, and bad files."""
+"""The controller `policy`: a small model that is made here, against numpy; clocks, snapshots, batches, bad files."""
 
 import importlib.util
 from pathlib import Path
@@ -93,8 +93,8 @@ def test_the_output_is_that_of_numpy(tmp_path: Path) -> None:
                 turns = 2 * np.pi * (2 * tick + part) * 0.01 * 1.5
                 position, rate = state.joint_pos[:, ::-1] - [0.3, 0.0], state.joint_vel[:, ::-1]
                 parts = [
-                    np.zeros((2, 3)), np.tile([0.0, 0.0, -1.0], (2, 1)), command * [2.0, 0.5], position, 0.05 * rate, last,
-                    np.tile([np.sin(turns), np.cos(turns)], (2, 1)),
+                    np.zeros((2, 3)), np.tile([0.0, 0.0, -1.0], (2, 1)), command * [2.0, 0.5], position, 0.05 * rate,
+                    last, np.tile([np.sin(turns), np.cos(turns)], (2, 1)),
                 ]  # fmt: skip
                 x = np.concatenate(parts, axis=1).astype(np.float32)
                 last = (np.tanh(x @ a1 + b1) @ a2 + b2).astype(float)
@@ -152,7 +152,7 @@ def test_velocities_and_efforts(tmp_path: Path, control_type: str) -> None:
         (SIZE, 2, 2, {}, "expected one of each"),
         (SIZE, 2, 1, {"period": 0.007}, "the policy's period of 0.007 s does not fit"),
         (SIZE, 2, 1, {"joints": ["elbow", "wrist"]}, "joint 'wrist' is not in 'arm.arm'"),
-        (SIZE, 2, 1, {"joints": ["elbow"]}, "missing: shoulder"),
+        (SIZE, 2, 1, {"joints": ["elbow"]}, "left out: shoulder"),
         (SIZE, 2, 1, {"action_scale": [1, 2, 3]}, "expected one number or 2, got 3"),
         (SIZE, 2, 1, {"model": "nett.onnx"}, "net.onnx"),
         (SIZE, 2, 1, {"model": "../net.onnx"}, "leaves its root"),
