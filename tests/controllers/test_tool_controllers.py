@@ -73,9 +73,8 @@ def test_the_posture_does_not_move_the_tool(controller: str) -> None:
     reference = robot.controller._servo._reference
     # the elbow elsewhere, the tool where it was: along the nullspace, then held
     home = reference.copy()
-    robot.controller._servo._posture[:] = np.clip(
-        home + [0.4, 0.0, -0.4, 0.0, 0.3, 0.0, 0.0], robot.view.lower, robot.view.upper
-    )
+    elsewhere = home + np.array([0.4, 0.0, -0.4, 0.0, 0.3, 0.0, 0.0])
+    robot.controller._servo._posture[:] = np.clip(elsewhere, robot.view.lower, robot.view.upper)
     for _ in range(120):
         robot.step(target)
     assert np.abs(robot.joint_pos[:, robot.columns] - home).max() > 0.02, "the posture pulls"
