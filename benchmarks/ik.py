@@ -1,10 +1,12 @@
-"""How many inverse kinematics problems a second: the compiled solver against a plain loop over problems in numpy.
+"""How many inverse kinematics problems a second: the compiled solver and its numpy twin against plain loops.
 
     python benchmarks/ik.py [--rows 4000] [--threads 2]
 
 Problems are poses of a Panda at uniformly random joint positions, so all can be reached; solved means within 1e-4 m and
 1e-4 rad and within the limits. Seeds are uniformly random too, or within 0.1 rad of a solution. Times are the best of
-three.
+three. `cpu us` is what all threads together take, which a machine that does other things changes least. The last column
+compares it with that of the loop over problems that calls Pinocchio for kinematics and Jacobians, the usual way to do
+it, with the same method and restarts, in the same run.
 """
 
 import argparse
@@ -14,10 +16,12 @@ from collections.abc import Callable
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.kinematics.model import RobotModel
 from anysim.math import pose as P
 from anysim.planning.api import inverse_kinematics
 from anysim.planning.chain import Chain
 from anysim.testing.arms import panda_arm
+from anysim.world.model import World
 from anysim_ik.frames import canonical_frames
 
 RESTARTS = 60
@@ -66,6 +70,24 @@ class NumpyLoop:
         return False
 
 
+class PinocchioLoop(NumpyLoop):
+    """One problem at a time, kinematics and Jacobians by Pinocchio."""
+
+    def __init__(self, chain: Chain, world: World) -> None:
+        super().__init__(chain)
+        self.robot = RobotModel(world, "panda")
+        self.tool = self.robot.frame("tool")
+
+    def residual_and_jacobian(self, q: Array, rotation: Array, position: Array) -> tuple[Array, Array]:
+        import pinocchio as pin
+
+        model, data = self.robot.model, self.robot.data
+        jacobian = pin.computeFrameJacobian(model, data, q, self.tool, pin.LOCAL_WORLD_ALIGNED)
+        place = pin.updateFramePlacement(model, data, self.tool)
+        error = np.concatenate([position - place.translation, pin.log3(rotation @ place.rotation.T)])
+        return error, jacobian
+
+
 def best_of(repeats: int, work: Callable[[], object]) -> float:
     """The shortest time [s] of some calls."""
     times: list[float] = []
@@ -82,7 +104,8 @@ def main() -> None:
     parser.add_argument("--loop-rows", type=int, default=100, help="problems for the numpy loop")
     parser.add_argument("--threads", type=int, default=2, help="the largest number of threads")
     options = parser.parse_args()
-    chain = Chain.from_world(panda_arm(), "panda", "arm", "tool")
+    world = panda_arm()
+    chain = Chain.from_world(world, "panda", "arm", "tool")
     rng = np.random.default_rng(0)
     n = options.rows
     base = np.tile(ROOT, (n, 1))
@@ -92,27 +115,46 @@ def main() -> None:
     seeds = {"random": rng.uniform(chain.lower, chain.upper, goals.shape), "near": near}
     keys = np.arange(n, dtype=np.uint64)
 
-    print(f"{'solver':24} {'seeds':7} {'rows':>6} {'solved':>8} {'steps':>6} {'us/solve':>9} {'solves/s':>9}")
+    header = f"{'solver':24} {'seeds':7} {'rows':>6} {'solved':>8} {'steps':>6}"
+    header += f" {'us/solve':>9} {'cpu us':>9} {'solves/s':>9}"
+    print(f"{header} {'x Pinocchio':>11}")
+    reference: dict[str, float] = {}
 
-    def line(name: str, kind: str, rows: int, solved: float, steps: float, seconds: float) -> None:
+    def line(name: str, kind: str, rows: int, solved: float, steps: float, seconds: float, cpu: float) -> None:
         each = seconds / rows
-        print(f"{name:24} {kind:7} {rows:6} {100 * solved:7.2f}% {steps:6.1f} {1e6 * each:9.2f} {1 / each:9.0f}")
+        reference.setdefault(kind, cpu / rows)
+        figures = (
+            f"{rows:6} {100 * solved:7.2f}% {steps:6.1f} {1e6 * each:9.2f} {1e6 * cpu / rows:9.2f} {1 / each:9.0f}"
+        )
+        print(f"{name:24} {kind:7} {figures} {reference[kind] * rows / cpu:11.1f}")
 
-    for threads in range(1, options.threads + 1):
-        ik = inverse_kinematics(chain, threads=threads)
+    loop_rows = min(n, options.loop_rows)
+    for name, loop in (("pinocchio, loop", PinocchioLoop(chain, world)), ("numpy, loop", NumpyLoop(chain))):
+        for kind, start in seeds.items():
+            start_time, cpu_time = time.perf_counter(), time.process_time()
+            solved = [loop.solve(targets[i], start[i], rng) for i in range(loop_rows)]
+            line(
+                name,
+                kind,
+                loop_rows,
+                float(np.mean(solved)),
+                float("nan"),
+                time.perf_counter() - start_time,
+                time.process_time() - cpu_time,
+            )
+    solvers = [
+        (f"numba_ik, {t} thread(s)", inverse_kinematics(chain, threads=t)) for t in range(1, options.threads + 1)
+    ]
+    for name, ik in (*solvers, ("numpy_ik", inverse_kinematics(chain, "numpy_ik"))):
         for kind, start in seeds.items():
 
             def work(ik=ik, start=start):
                 return ik.solve(targets, base, start, random_restarts=RESTARTS, rng_seeds=keys)
 
+            cpu_time = time.process_time()
             result = work()
-            seconds = best_of(3, work)
-            line(f"numba_ik, {threads} thread(s)", kind, n, result.converged.mean(), result.iterations.mean(), seconds)
-    loop, rows = NumpyLoop(chain), min(n, options.loop_rows)
-    for kind, start in seeds.items():
-        start_time = time.perf_counter()
-        solved = [loop.solve(targets[i], start[i], rng) for i in range(rows)]
-        line("numpy, loop", kind, rows, float(np.mean(solved)), float("nan"), time.perf_counter() - start_time)
+            cpu_time = time.process_time() - cpu_time
+            line(name, kind, n, result.converged.mean(), result.iterations.mean(), best_of(3, work), cpu_time)
 
     ik = inverse_kinematics(chain, threads=1)
     print(f"\n{'one call':24} {'rows':>6} {'us/call':>9}")

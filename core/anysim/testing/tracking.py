@@ -7,11 +7,13 @@ from typing import Any, NamedTuple, Self, cast
 import numpy as np
 
 from anysim import registry
+from anysim.api import make
 from anysim.controllers.base import ChannelView, Command, Controller
 from anysim.controllers.robot import ControlledRobot
 from anysim.conventions import Array
 from anysim.engine.state import State
 from anysim.math import pose as P
+from anysim.task.env import TaskEnv
 from anysim.world.compile import compile_world
 from anysim.world.kinematics import forward_kinematics
 from anysim.world.model import World
@@ -121,3 +123,41 @@ def errors(targets: Array, poses: Array) -> Tracking:
     distance = P.norm(targets[:, :3] - poses[:, :3])
     turn = P.angle_between(poses[:, 3:], targets[:, 3:])
     return Tracking(float(np.sqrt((distance**2).mean())), float(distance.max()), float(np.sqrt((turn**2).mean())))
+
+
+def tool_env(robot: str, controller: str, engine: str, *, params: Mapping[str, Any] | None = None) -> TaskEnv:
+    """An env with one robot of the catalogue, named `robot`, whose arm has a controller of tools."""
+    spec = {
+        "engine": engine,
+        "physics": {"dt": 0.002, "control_dt": 0.02},
+        "world": {
+            "terrain": "plane",
+            "robots": {
+                "robot": {"robot": robot, "actions": {"arm": {"controller": controller, "params": dict(params or {})}}}
+            },
+        },
+        "task": {"horizon": 10_000, "observations": {"policy": ["joint_pos"]}},
+    }
+    return make(spec, seed=0)
+
+
+def follow(robot: str, controller: str, engine: str, circle: Circle, *, seconds: float = 2.0) -> Tracking:
+    """Move the arm's tool along a circle from where it is at home, and see how far off its way it was."""
+    with tool_env(robot, controller, engine) as env:
+        env.reset(seed=0)
+        assert env.robots is not None
+        controlled, control_dt = env.robots.slices[0].controller.robot, env.engine.world.physics.control_dt
+        tool = next(iter(controlled.robot.tools))
+
+        def pose() -> Array:
+            controlled.see(env.engine.get_state())
+            return controlled.frame_pose(None, tool)
+
+        start = pose()
+        targets, poses = [], []
+        for step in range(round(seconds / control_dt)):
+            target = circle.pose(start, (step + 1) * control_dt)
+            env.step(target)
+            targets.append(target[0])
+            poses.append(pose()[0])
+    return errors(np.array(targets), np.array(poses))
