@@ -19,6 +19,12 @@ class GainSpec(Spec):
         default=None, description="largest effort [N m] or [N]; the source's limit where not given"
     )
     armature: NonNegative = Field(default=0.0, description="rotor inertia seen at the joint [kg m^2] or [kg]")
+    damping: NonNegative | None = Field(
+        default=None, description="of the joint itself [N m s/rad] or [N s/m]; the source's where not given"
+    )
+    friction: NonNegative | None = Field(
+        default=None, description="dry friction of the joint itself [N m] or [N]; the source's where not given"
+    )
 
 
 class ChannelSpec(Spec):

@@ -128,15 +128,19 @@ class _Assembly:
     # ------------------------------------------------------------------ joints and drives
 
     def _joints(self) -> list[Joint]:
-        """Home positions, and what the channels say of armature and of the gripper's limits."""
+        """Home positions, and what the channels say of armature, of losses, and of the gripper's limits."""
         joints = list(self.model.joints)
         for channel, spec in self.entry.channels.items():
             for index in self._known(spec.joints, self.own.at("channels", channel, "joints")):
                 soft = GRIPPER_LIMIT_SOFTNESS if channel == "eef" else joints[index].limit_softness
-                armature = self._gains(channel, joints[index].name).armature
+                gains = self._gains(channel, joints[index].name)
                 for i, joint in enumerate(joints):
                     if i == index or (joint.mimic is not None and joint.mimic.joint == index):
-                        joints[i] = replace(joint, armature=armature, limit_softness=soft)
+                        joints[i] = replace(
+                            joint, armature=gains.armature, limit_softness=soft,
+                            damping=joint.damping if gains.damping is None else gains.damping,
+                            friction=joint.friction if gains.friction is None else gains.friction,
+                        )  # fmt: skip
         for home, issues in ((self.entry.home, self.own.at("home")), (self.spec.home, self.issues.at("home"))):
             for name, value in home.items():
                 for index in self._known((name,), issues):

