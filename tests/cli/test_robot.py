@@ -62,5 +62,5 @@ def test_the_gallery_is_a_page_without_a_network(tmp_path: Path) -> None:
     assert "qualified" in html
     assert "://" not in html
     assert (out / "arm.png").stat().st_size < 1_000_000
-    assert anysim("gallery", "--robots", "frank").stderr.count("did you mean") == 1
+    assert anysim("gallery", "--robots", "franka_pand").stderr.count("did you mean") == 1
     assert "0 to measure" in anysim("gallery", *words).stderr

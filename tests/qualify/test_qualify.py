@@ -1,5 +1,6 @@
 """Qualification finds what is wrong with a robot, and calls it by its name."""
 
+import re
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -68,6 +69,9 @@ def test_what_stands_is_held_and_what_topples_is_not(tmp_path: Path) -> None:
     (tmp_path / "box.yaml").write_text(entry)
     standing = qualify(str(tmp_path / "box.yaml"), "mujoco", SHORT)
     assert standing.status == "qualified", [check.told for check in standing.checks]
+    (tmp_path / "box.urdf").write_text(re.sub("<collision>.*</collision>", "", BOX))
+    sinking = qualify(str(tmp_path / "box.yaml"), "mujoco", Durations(0.4, 0.02, 0.02))
+    assert "the base rises or sinks" in sinking.failed[0].words
     thin = BOX.replace("0.2 0.2 0.2", "0.01 0.2 0.2").replace("<collision>", '<collision><origin rpy="0 0.3 0"/>')
     (tmp_path / "box.urdf").write_text(thin)
     falling = qualify(str(tmp_path / "box.yaml"), "mujoco", Durations(1.0, 0.02, 0.02))

@@ -15,7 +15,7 @@ from anysim.task.env import TaskEnv
 from anysim.world.model import BodyKind, JointType
 
 HOLD = 0.05
-"""[rad], or [m] of a slide: how far a driven joint may leave the home position, and a floating base its attitude."""
+"""[rad], or [m]: how far a driven joint may leave the home position, and a floating base its attitude and height."""
 UNBOUNDED = np.pi
 """Bound of an action that has none [rad or its own unit]."""
 SEED = 0
@@ -55,18 +55,22 @@ def hold_check(env: TaskEnv, seconds: float) -> Check:
     root = engine.index.entity(NAME).root
     floating = world.bodies[root].kind is BodyKind.FREE
     start, base = engine.get_state().joint_pos[0, driven].copy(), engine.get_state().body_pose[0, root].copy()
-    worst, where, when = 0.0, "", 0.0
+    worst, where, when, unit = 0.0, "", 0.0, "rad"
     steps = _steps(env, seconds)
     for step in range(steps):
         env.step(action)
         state = engine.get_state()
         if state.fault[0]:
             return Check("hold", False, words=f"a fault after {(step + 1) * world.physics.control_dt:g} s")
-        off = np.abs(state.joint_pos[0, driven] - start)
-        tilt = float(P.angle_between(state.body_pose[0, root, 3:], base[3:])) if floating else 0.0
-        if max(off.max(initial=0.0), tilt) > worst:
-            worst, when = float(max(off.max(initial=0.0), tilt)), (step + 1) * world.physics.control_dt
-            where = "the base tilts" if tilt >= worst else world.joints[driven[int(off.argmax())]].name
+        far = [(float(off), j) for off, j in zip(np.abs(state.joint_pos[0, driven] - start), driven, strict=True)]
+        found = [(off, world.joints[j].name, _unit(kind)) for (off, j), kind in zip(far, kinds, strict=True)]
+        if floating:
+            pose = state.body_pose[0, root]
+            found.append((float(P.angle_between(pose[3:], base[3:])), "the base tilts", "rad"))
+            found.append((abs(float(pose[2] - base[2])), "the base rises or sinks", "m"))
+        farthest = max(found, default=(0.0, "", "rad"))
+        if farthest[0] > worst:
+            (worst, where, unit), when = farthest, (step + 1) * world.physics.control_dt
     drop = base[2] - engine.get_state().body_pose[0, root, 2]
     told = [f"for {seconds:g} s"]
     if worst > 0:
@@ -75,8 +79,11 @@ def hold_check(env: TaskEnv, seconds: float) -> Check:
         told.append(f"base {1000 * drop:.1f} mm lower")
     if zeros:
         told.append(f"zeros for {', '.join(zeros)}")
-    unit = "m" if kinds and all(kind is JointType.PRISMATIC for kind in kinds) else "rad"
     return Check("hold", bool(worst <= HOLD), worst, unit, HOLD, ", ".join(told))
+
+
+def _unit(kind: JointType) -> str:
+    return "m" if kind is JointType.PRISMATIC else "rad"
 
 
 def random_checks(
