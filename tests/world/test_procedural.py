@@ -97,7 +97,7 @@ def test_a_wheel_counts_no_mass_twice() -> None:
 
 @pytest.mark.parametrize("name", registry.names("assets"))
 def test_every_builder_makes_a_sound_model(name: str) -> None:
-    """Depth first, one joint a link, possible inertias, boxes, cylinders and capsules, unique names."""
+    """Depth first, one joint a link, possible inertias, simple solids, unique names."""
     model = build(name, {})
     assert [body.kind for body in model.bodies] == [BodyKind.FREE, *[BodyKind.LINK] * len(model.joints)]
     assert [joint.body for joint in model.joints] == list(range(1, len(model.bodies)))
@@ -106,7 +106,7 @@ def test_every_builder_makes_a_sound_model(name: str) -> None:
         moments = np.linalg.eigvalsh(inertia.tensor(body.inertial))
         assert moments[0] > 0
         assert moments[2] <= moments[0] + moments[1]
-    assert {type(geom.shape) for geom in model.geoms} <= {Box, Cylinder, Capsule}
+    assert {type(geom.shape) for geom in model.geoms} <= {Box, Sphere, Cylinder, Capsule}
     for things in (model.bodies, model.joints, model.geoms, model.sites):
         names = [thing.name for thing in things]
         assert len(set(names)) == len(names)
