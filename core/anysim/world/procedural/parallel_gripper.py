@@ -39,9 +39,10 @@ def parallel_gripper(
     """A palm and two fingers with rubber pads; its frame is in the middle of the palm's back, where it is mounted.
 
     z points out of the hand and y along the opening. The links and joints `finger_left` (towards +y) and
-    `finger_right` (towards -y) are closed at zero and open up to half the stroke each; the right one follows the left, as
-    the gears of a real gripper make it: without that nothing would hold what is gripped in the middle. The frame `tcp` is in the middle
-    between the pads, z out of the hand, y along the opening. The pads have the contact preset `pad`.
+    `finger_right` (towards -y) are closed at zero and open up to half the stroke each. The right one follows the left,
+    as the gears of a real gripper make it: without that nothing would hold what is gripped in the middle. The frame
+    `tcp` is in the middle between the pads, z out of the hand, y along the opening. The pads have the contact preset
+    `pad`.
 
     Args:
         stroke: the distance of the pads when fully open [m].
