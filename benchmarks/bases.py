@@ -17,7 +17,9 @@ import numpy as np
 
 from anysim import registry
 from anysim.api import compile_world, load
+from anysim.controllers.robot import ControlledRobot
 from anysim.engine.factory import create_simulation
+from anysim.managers.robot import RobotManager
 from anysim.managers.standard import standard_managers
 from anysim.world.catalogue import load_robot
 
@@ -129,8 +131,8 @@ def drive(robot: str, engine: str, *, side: float = SIDE, sign: float = 1.0, dt:
         simulation.reset()
         for manager in managers:
             manager.reset(envs)
-        robots = next(manager for manager in managers if manager.name == "robot")
-        base = robots._actions._robots[0]
+        robots = next(manager for manager in managers if isinstance(manager, RobotManager))
+        base = ControlledRobot(world, "robot")
         pieces = square(entry.vehicle.kind, 0.02, side, sign)
         action = np.concatenate([piece.action for piece in pieces])
         path = path_of(np.concatenate([piece.twist for piece in pieces]), 0.02)
@@ -177,7 +179,8 @@ def main() -> int:
     print(f"{'robot':<20}{'engine':<10}{'off path':>10}{'end':>10}{'end yaw':>10}{'behind':>10}{'height':>9}")
     good = True
     for robot in robots:
-        kind = load_robot(robot).spec.vehicle.kind
+        vehicle = load_robot(robot).spec.vehicle
+        kind = vehicle.kind if vehicle is not None else parser.error(f"'{robot}' has no vehicle")
         for engine in engines:
             r = drive(robot, engine, sign=1.0 if options.turns == "left" else -1.0)
             fine = max(r.off_path, r.end) <= BOUNDS[kind][0] and r.end_yaw <= BOUNDS[kind][1]

@@ -111,7 +111,9 @@ def test_a_ramp_goes_straight() -> None:
 
 
 def test_another_vehicle_is_refused() -> None:
-    with pytest.raises(TaskError, match="has a vehicle of kind ackermann; suited to its channel 'base': ackermann_drive"):
+    with pytest.raises(
+        TaskError, match="has a vehicle of kind ackermann; suited to its channel 'base': ackermann_drive"
+    ):
         made("ackermann_base", DifferentialDrive)
     world = compile_world(load({"world": {"name": "w", "robots": {"r": {"robot": "franka_panda"}}}}))
     view = ChannelView.of(world, world.robots[0].channels["arm"], ControlledRobot(world, "r"))

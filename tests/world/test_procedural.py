@@ -106,11 +106,11 @@ def test_every_builder_makes_a_sound_model(name: str) -> None:
         moments = np.linalg.eigvalsh(inertia.tensor(body.inertial))
         assert moments[0] > 0
         assert moments[2] <= moments[0] + moments[1]
-    assert {type(geom.shape) for geom in model.geoms} <= {Box, Cylinder, Capsule}
+    assert {type(geom.shape) for geom in model.geoms} <= {Box, Sphere, Cylinder, Capsule}
     for things in (model.bodies, model.joints, model.geoms, model.sites):
         names = [thing.name for thing in things]
         assert len(set(names)) == len(names)
-    assert any(site.name.endswith((".handle", "tcp")) for site in model.sites)
+    assert any(site.name.endswith((".handle", "tcp", "top")) for site in model.sites)
     assert build(name, {}) == model
 
 

@@ -9,6 +9,8 @@ import pytest
 
 from anysim.errors import AssetError
 from anysim.world import inertia
+from anysim.world.catalogue import load_robot
+from anysim.world.compile_robot import import_robot
 from anysim.world.imported import ImportedModel
 from anysim.world.model import BodyKind, Box, Cylinder, JointType, Sphere
 from anysim.world.urdf import import_urdf
@@ -299,3 +301,12 @@ def test_trailing_null_bytes_and_deep_chains(tmp_path: Path, inertial: Text) -> 
     assert len(model.bodies) == count
     assert model.joints[-1].body == count - 1
     assert pi > model.joints[0].upper
+
+
+def test_a_follower_has_room_to_follow() -> None:
+    """PR2's grippers: a follower's own limits would lock its leader at 0."""
+    robot = import_robot(load_robot("pr2"))
+    joints = {joint.name: joint for joint in robot.joints}
+    follower, leader = joints["l_gripper_r_parallel_root_joint"], joints["l_gripper_l_finger_joint"]
+    assert follower.lower == pytest.approx(-leader.upper)
+    assert any(note.kind == "repaired" and "now as far as that" in note.message for note in robot.report)

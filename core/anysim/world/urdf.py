@@ -193,7 +193,8 @@ class _UrdfImport:
         if max(joint.lower - lower, upper - joint.upper) <= _LIMIT_SLACK:
             return joint.lower, joint.upper
         self._note(
-            "repaired", "joint", joint.name, f"stops at [{joint.lower:g}, {joint.upper:g}], but follows '{leader.name}' "
+            "repaired", "joint", joint.name,
+            f"stops at [{joint.lower:g}, {joint.upper:g}], but follows '{leader.name}' "
             f"from {ends[0]:g} to {ends[1]:g}; now as far as that",
         )  # fmt: skip
         return lower, upper
