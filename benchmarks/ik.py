@@ -16,7 +16,7 @@ from collections.abc import Callable
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.kinematics.model import RobotModel
+from anysim.kinematics.model import RobotModel, pinocchio
 from anysim.math import pose as P
 from anysim.planning.api import inverse_kinematics
 from anysim.planning.chain import Chain
@@ -79,9 +79,7 @@ class PinocchioLoop(NumpyLoop):
         self.tool = self.robot.frame("tool")
 
     def residual_and_jacobian(self, q: Array, rotation: Array, position: Array) -> tuple[Array, Array]:
-        import pinocchio as pin
-
-        model, data = self.robot.model, self.robot.data
+        pin, model, data = pinocchio(), self.robot.model, self.robot.data
         jacobian = pin.computeFrameJacobian(model, data, q, self.tool, pin.LOCAL_WORLD_ALIGNED)
         place = pin.updateFramePlacement(model, data, self.tool)
         error = np.concatenate([position - place.translation, pin.log3(rotation @ place.rotation.T)])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from anysim import registry
-from anysim.controllers.base import ChannelView, Controller
+from anysim.controllers.base import ChannelView
 from anysim.controllers.robot import ControlledRobot
 from anysim.engine.factory import create_simulation
 from anysim.math import pose as P
@@ -39,8 +39,8 @@ def test_two_hands_carry_a_tray(robot: str, engine: str) -> None:
     seen = ControlledRobot(world, "robot")
     channel = world.robots[0].channels["arm"]
     view = ChannelView.of(world, channel, seen)
-    made: type[Controller] = registry.load("controllers", "pink_ik")
-    controller: Any = made(view, 1, velocity_scale=0.5)
+    made: Any = registry.load("controllers", "pink_ik")
+    controller = made(view, 1, velocity_scale=0.5)
     with create_simulation(engine) as sim:
         sim.create_world(world, 1)
         sim.reset()
