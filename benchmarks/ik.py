@@ -18,7 +18,7 @@ from anysim.math import pose as P
 from anysim.planning.api import inverse_kinematics
 from anysim.planning.chain import Chain
 from anysim.testing.arms import panda_arm
-from anysim_ik.planner import canonical_frames
+from anysim_ik.frames import canonical_frames
 
 RESTARTS = 60
 ROOT = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])

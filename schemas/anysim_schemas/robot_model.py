@@ -1,11 +1,12 @@
 """The catalogue's entry of a robot: what it is, independent of any world."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from anysim_schemas.base import Flag, Name, NonNegative, Number, Positive, Spec, Vec3
 from anysim_schemas.objects import ContactSpec
+from anysim_schemas.vehicle import VehicleSpec
 
 Category = Literal["arm", "dual_arm", "hand", "base", "mobile_manipulator", "humanoid", "quadruped", "camera"]
 
@@ -94,6 +95,29 @@ class PartSpec(Spec):
     license_source: str = Field(description="where the licence is stated")
 
 
+class SolidSpec(Spec):
+    """A solid that a link collides with: exactly one shape, of full sizes."""
+
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("box",), ("sphere",), ("cylinder",), ("capsule",))
+
+    box: tuple[Positive, Positive, Positive] | None = Field(default=None, description="edge lengths x, y, z [m]")
+    sphere: Positive | None = Field(default=None, description="radius [m]")
+    cylinder: tuple[Positive, Positive] | None = Field(default=None, description="radius, height along z [m]")
+    capsule: tuple[Positive, Positive] | None = Field(
+        default=None, description="radius, length of the straight part along z [m]"
+    )
+    position: Vec3 = Field(default=(0.0, 0.0, 0.0), description="place of its middle in the link's frame [m]")
+    roll_pitch_yaw: Vec3 = Field(default=(0.0, 0.0, 0.0), description="orientation in the link's frame [rad]")
+
+    @model_validator(mode="after")
+    def _exactly_one(self) -> "SolidSpec":
+        shapes = ("box", "sphere", "cylinder", "capsule")
+        given = [shape for shape in shapes if getattr(self, shape) is not None]
+        if len(given) != 1:
+            raise ValueError(f"expected exactly one of {', '.join(shapes)}; got {' and '.join(given) or 'none'}")
+        return self
+
+
 class SurfaceSpec(Spec):
     """Contact parameters of the links whose names match."""
 
@@ -117,7 +141,11 @@ class RobotModelSpec(Spec):
     license: str = Field(description="SPDX expression of the asset's licence")
     license_source: str = Field(description="where the licence is stated")
     category: Category = Field(description="what kind of robot it is")
-    base: Literal["fixed", "floating"] = Field(default="fixed", description="bolted down, or free to move")
+    base: Literal["fixed", "floating", "planar"] = Field(
+        default="fixed",
+        description="bolted down, free to move, or `planar`: at its height on joints base_x, base_y and base_yaw, "
+        "which are put under the robot and move it over the ground",
+    )
     base_height: Number = Field(
         default=0.0, description="height of the base's frame above the ground that it stands on, at home [m]"
     )
@@ -126,7 +154,13 @@ class RobotModelSpec(Spec):
     home: dict[str, Number] = Field(default_factory=dict, description="joint positions [rad] or [m]; 0 where not given")
     tools: dict[str, ToolSpec] = Field(default_factory=dict, description="frames that tasks refer to, by name")
     sensors: dict[str, SensorSpec] = Field(default_factory=dict, description="places for sensors, by name")
+    vehicle: VehicleSpec | None = Field(default=None, description="how it drives, where it does")
     legs: dict[Name, LegSpec] = Field(default_factory=dict, description="its legs by name, front left first")
+    collision: dict[str, tuple[SolidSpec, ...]] = Field(
+        default_factory=dict,
+        description="links that collide with these solids instead of what the source says, which may be nothing, or a "
+        "mesh whose convex hull fills what should be hollow",
+    )
     surfaces: tuple[SurfaceSpec, ...] = Field(default=(), description="contact parameters of links")
     self_collision: Flag = Field(default=False, description="whether links of this robot collide with each other")
     self_collision_exclusions: tuple[Annotated[tuple[str, str], Field()], ...] = Field(

@@ -1,5 +1,6 @@
 """Controllers: actions to drive targets, and back."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 
 from anysim.controllers.base import ChannelView
-from anysim.controllers.gripper import GripperBinary
+from anysim.controllers.gripper import GripperBinary, GripperContinuous
 from anysim.controllers.joint import JointDeltaPosition, JointPosition
 from anysim.controllers.robot import ControlledRobot
 from anysim.errors import TaskError
@@ -71,3 +72,33 @@ def test_gripper_binary() -> None:
     assert np.allclose(controller.action_for(np.array([[0.04], [-0.01]]), np.array([0, 1])), [[1.0], [-1.0]])
     with pytest.raises(TaskError, match="no `opened` and `closed` targets"):
         GripperBinary(ARM, 1)
+
+
+def test_a_continuous_gripper_opens_as_far_as_it_is_told_and_closes_beyond_contact() -> None:
+    controller = GripperContinuous(HAND, 3)
+    targets = controller.apply(np.array([[1.0], [0.25], [0.0]]), None).position
+    assert np.allclose(targets, [[0.04], [0.01], [-0.01]])
+    wide = GripperContinuous(HAND, 1, range=(0.0, 0.08))
+    assert np.allclose(wide.apply(np.array([[0.02]]), None).position, [[0.01]])
+    assert np.allclose(wide.action_for(np.array([[0.01], [-0.01], [0.07]]), np.arange(3))[:, 0], [0.02, 0.0, 0.08])
+    with pytest.raises(TaskError, match=r"the range \[1\.0, 0\.0\] has to rise"):
+        GripperContinuous(HAND, 1, range=(1.0, 0.0))
+    with pytest.raises(TaskError, match="which gripper_continuous needs"):
+        GripperContinuous(ARM, 1)
+
+
+def test_a_continuous_gripper_keeps_its_speed_and_does_not_wind_up() -> None:
+    """Blocked at 20 mm, its target stays within effort_limit / kp of the finger, and leaves at once when it opens."""
+    finger = np.array([[0.04]])
+    robot = SimpleNamespace(name="r", control_dt=0.02, joint_pos=lambda env_ids: finger)
+    hand = replace(HAND, robot=cast(ControlledRobot, robot), kp=np.array([1000.0]), effort_limit=np.array([5.0]))
+    controller = GripperContinuous(hand, 1, speed=2.0)
+    controller.reset(np.array([0]), np.array([[0.04]]))
+    step = 2.0 * 0.02 * 0.04
+    for k in range(1, 4):
+        assert np.allclose(controller.apply(np.zeros((1, 1)), None).position, 0.04 - k * step)
+    finger[:] = 0.02
+    for _ in range(50):
+        controller.apply(np.zeros((1, 1)), None)
+    assert np.allclose(controller.snapshot(np.array([0]))["target"], 0.015)
+    assert np.allclose(controller.apply(np.ones((1, 1)), None).position, 0.015 + step)

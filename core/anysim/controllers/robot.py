@@ -10,7 +10,8 @@ from anysim.engine.state import State
 from anysim.errors import NameLookupError, TaskError, listing, suggest
 from anysim.kinematics.model import RobotModel
 from anysim.math import pose as P
-from anysim.world.model import BodyKind, World
+from anysim.world.model import BodyKind, Robot, World
+from anysim.world.vehicles import PLANAR_JOINTS
 from anysim_schemas.robot_model import RobotModelSpec
 
 
@@ -33,8 +34,8 @@ class ControlledRobot:
         entity = index.entity(name)
         self.name, self.world = name, world
         self.robot = index.robot(name)
-        self.root = entity.root
-        self.floating = world.bodies[entity.root].kind is BodyKind.FREE
+        self.root = _base_of(world, self.robot, entity.root)
+        self.floating = world.bodies[self.root].kind is BodyKind.FREE
         self.joints = np.arange(entity.joint_start, entity.joint_stop)
         owned = [i for i, a in enumerate(world.actuators) if entity.joint_start <= a.joint < entity.joint_stop]
         self.drives = np.array(owned, dtype=int)
@@ -114,6 +115,13 @@ class ControlledRobot:
 
     def _mine(self, body: int) -> bool:
         return body in self._bodies
+
+
+def _base_of(world: World, robot: Robot, root: int) -> int:
+    """The body that the robot stands on: of a `planar` base what the last of its joints moves, not the rail."""
+    if robot.entry is None or robot.entry.base != "planar":
+        return root
+    return next(joint.body for joint in world.joints if joint.name == f"{robot.name}.{PLANAR_JOINTS[-1]}")
 
 
 def _rows(env_ids: Array | None) -> slice | Array:

@@ -82,6 +82,7 @@ class RobotModel:
         if not self.floating:
             return 0
         joint = self.model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")
+        self.model.addJointFrame(joint)  # pin.buildReducedModel needs one of each joint, before those on it
         self.model.appendBodyToJoint(joint, self._inertia(body), pin.SE3.Identity())
         return joint
 
@@ -107,6 +108,7 @@ class RobotModel:
             np.array([min(joint.effort_limit, 1e6)]), np.array([min(joint.velocity_limit, 1e6)]),
             np.array([max(joint.lower, -1e6)]), np.array([min(joint.upper, 1e6)]),
         )  # fmt: skip
+        self.model.addJointFrame(added)
         self.model.armature[self.model.joints[added].idx_v] = joint.armature
         shift = se3(self._in_joint(body, P.pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))))
         self.model.appendBodyToJoint(added, self._inertia(body), shift)

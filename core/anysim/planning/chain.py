@@ -1,6 +1,6 @@
 """The serial chain from a robot's root body to one of its tools, as plain arrays that any solver can read."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Self, TypeVar
 
@@ -68,8 +68,10 @@ class Chain:
         return len(self.joints)
 
     @classmethod
-    def from_world(cls, world: World, robot: str, channel: str, tool: str) -> Self:
-        """The chain that the joints of a robot's channel form under its tool.
+    def from_world(
+        cls, world: World, robot: str, channel: str, tool: str, *, joints: Sequence[int] | Array | None = None
+    ) -> Self:
+        """The chain that the joints of a robot's channel form under its tool; or some of them, world indices.
 
         Joints on the way that the channel does not command are held at their initial position. Columns go from the root
         to the tool, whatever the order of the channel; `joints` tells which is which.
@@ -81,12 +83,13 @@ class Chain:
         """
         index = Index(world)
         model = index.robot(robot)
-        joints = _part(model, "channel", model.channels, channel).joints
+        whole = _part(model, "channel", model.channels, channel).joints
+        chosen = whole if joints is None else tuple(int(j) for j in joints)
         site = world.sites[_part(model, "tool", model.tools, tool)]
         name = f"{robot}.{channel} -> {tool}"
         root = index.entity(robot).root
         path = _path(world, root, site.body, name)
-        _check_path(world, joints, path, name, tool)
+        _check_path(world, chosen, path, name, tool)
 
         held = P.pose(ORIGIN, IDENTITY_QUATERNION)  # what lies between the last moving joint and here
         rest: list[Array] = []
@@ -95,7 +98,7 @@ class Chain:
             frame = world.bodies[body]
             held = P.compose(held, P.pose(frame.position, frame.quaternion))
             joint = world.body_joint[body]
-            if joint in joints:
+            if joint in chosen:
                 rest.append(held)
                 order.append(joint)
                 held = P.pose(ORIGIN, IDENTITY_QUATERNION)

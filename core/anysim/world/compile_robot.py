@@ -4,13 +4,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
 from anysim.errors import AssetError, PluginError, SpecError, listing, suggest
 from anysim.math import pose as P
+from anysim.world.attach import attach
 from anysim.world.builder import WorldBuilder
 from anysim.world.catalogue import CatalogueEntry, load_robot
+from anysim.world.compile_vehicle import check_vehicle
 from anysim.world.imported import ImportedModel, ImportNote
 from anysim.world.importers import import_asset
 from anysim.world.issues import Issues
@@ -32,28 +35,51 @@ from anysim.world.nominal import extremes, nominal
 from anysim.world.presets import GRIPPER_LIMIT_SOFTNESS, surface
 from anysim.world.procedural.build import build
 from anysim.world.rounding import split
+<<<<<<< HEAD
+from anysim.world.vehicles import as_vehicle
+=======
+from anysim.world.solids import with_solids
+>>>>>>> wt-ik
 from anysim_schemas.object_source import PROCEDURAL
 from anysim_schemas.robot_model import ChannelSpec, GainSpec, RobotModelSpec, SensorSpec, ToolSpec
 from anysim_schemas.robots import RobotSpec
 
 
 def import_robot(entry: CatalogueEntry) -> ImportedModel:
-    """The model of a catalogue entry, as its source has it.
+    """The model of a catalogue entry: its source, with its parts fixed to it and its `collision` in place.
 
     Raises:
-        AssetError: the source is missing or damaged; says what to install where it comes with another package.
+        AssetError: a source is missing or damaged, says what to install where it comes with another package; or a part
+            does not fit.
         PluginError: no importer or builder for it is installed.
     """
     spec = entry.spec
     try:
-        if spec.source.startswith(PROCEDURAL):
-            return build(spec.source.removeprefix(PROCEDURAL), spec.params)
-        return import_asset(spec.source, base=entry.file.parent)
-    except SpecError as error:
-        raise AssetError(f"the source of robot '{spec.name}' is not valid: {error}") from None
+        model = _read(entry, spec.source, spec.params, f"the source of robot '{spec.name}'")
+        brought = [
+            _read(entry, part.source, part.params, f"the source of parts.{i} of robot '{spec.name}'")
+            for i, part in enumerate(spec.parts)
+        ]  # fmt: skip
     except AssetError as error:
         remedy = f"; it needs another package: pip install '{spec.needs}'" if spec.needs else ""
         raise AssetError(f"{error}{remedy}") from None
+    for i, (part, more) in enumerate(zip(spec.parts, brought, strict=True)):
+        pose = P.pose(part.position, P.from_roll_pitch_yaw(np.array(part.roll_pitch_yaw)))
+        try:
+            model = attach(model, more, part.link, pose, part.prefix)
+        except AssetError as error:
+            raise AssetError(f"parts.{i} of robot '{spec.name}': {error}") from None
+    return with_solids(model, spec.collision)
+
+
+def _read(entry: CatalogueEntry, source: str, params: Mapping[str, Any], where: str) -> ImportedModel:
+    """The model of one source of an entry."""
+    try:
+        if source.startswith(PROCEDURAL):
+            return build(source.removeprefix(PROCEDURAL), params)
+        return import_asset(source, base=entry.file.parent)
+    except SpecError as error:
+        raise AssetError(f"{where} is not valid: {error}") from None
 
 
 def add_robot(builder: WorldBuilder, name: str, spec: RobotSpec, issues: Issues) -> list[ImportNote]:
@@ -67,7 +93,7 @@ def add_robot(builder: WorldBuilder, name: str, spec: RobotSpec, issues: Issues)
         issues.add("robot", f"the catalogue entry is not valid: {error}")
         return []
     try:
-        model = import_robot(entry)
+        model = as_vehicle(import_robot(entry), entry.spec)
     except (AssetError, PluginError) as error:
         issues.asset("robot", AssetError(f"robot '{spec.robot}': {error}"))
         return []
@@ -87,6 +113,7 @@ class _Assembly:
         self.number = {joint.name: i for i, joint in enumerate(model.joints)}
 
     def add_to(self, builder: WorldBuilder) -> None:
+        check_vehicle(self.entry, self.model, self.own)
         joints = self._joints()
         floating = self.entry.base == "floating"
         bodies = tuple(
@@ -100,7 +127,7 @@ class _Assembly:
         position, quaternion = placement(standing, (0.0, 0.0, nominal(self.spec.yaw)))
         entity = builder.add(
             self.name, EntityKind.ROBOT, model, root=BodyKind.FREE if floating else BodyKind.STATIC, position=position,
-            quaternion=quaternion, source=self.entry.source, license=self.entry.license,
+            quaternion=quaternion, source=self.entry.source, license=_license(self.entry),
         )  # fmt: skip
         channels = self._channels(builder, entity, joints)
         tools = self._tools(builder, entity)
@@ -275,6 +302,12 @@ class _Assembly:
                     friction = geom.surface.friction if spec.friction is None else spec.friction
                     geoms[k] = replace(geom, surface=surface(spec.contact, friction, geom.surface.restitution))
         return tuple(geoms)
+
+
+def _license(entry: RobotModelSpec) -> str:
+    """The licences of the robot and its parts, as one SPDX expression."""
+    several = list(dict.fromkeys([entry.license, *(part.license for part in entry.parts)]))
+    return several[0] if len(several) == 1 else " AND ".join(f"({x})" if " " in x else x for x in several)
 
 
 def placement(position: Sequence[float], roll_pitch_yaw: Sequence[float]) -> tuple[Vec3, Quat]:

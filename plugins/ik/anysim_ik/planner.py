@@ -5,21 +5,17 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from anysim.conventions import IDENTITY_QUATERNION, Array
+from anysim.conventions import Array
 from anysim.errors import AnysimError
-from anysim.math import pose as P
 from anysim.planning.api import IkRequest, IkResult, IkStep, InverseKinematics
 from anysim.planning.chain import Chain
+from anysim_ik.frames import LENGTH_PER_REACH, canonical_frames
 
 BLOCK = 64
 """Rows a thread takes at a time. A row with restarts costs ten times another: blocks keep threads equally busy."""
 
 SHARED_FROM = 4 * BLOCK
 """Rows from which on a batch is shared between threads; below, starting them costs more than they bring."""
-
-LENGTH_PER_REACH = 0.3
-"""The length that makes an angle comparable to a distance, as a part of the arm's reach. Needs the fewest iterations
-on a Panda over 0.1 to 2 m (a third of them more at either end), and makes small arms behave as large ones."""
 
 
 class NumbaIk(InverseKinematics):
@@ -111,35 +107,6 @@ class NumbaIk(InverseKinematics):
         seed = self.chain.initial[None]
         self.solve(identity, identity, seed, random_restarts=0, rng_seeds=np.zeros(1, np.uint64))
         self.step(identity, identity, seed, max_step=1.0)
-
-
-def canonical_frames(chain: Chain) -> Array:
-    """Constant transforms [R | p] (K+1, 3, 4), one before each joint and one for the tool.
-
-    They make the same chain, but every joint is about or along the z axis of its frame, through its origin.
-    """
-    frames = np.empty((len(chain) + 1, 3, 4))
-    undo = P.pose((0.0, 0.0, 0.0), IDENTITY_QUATERNION)  # from a joint's canonical frame back to its body's, at zero
-    for k in range(len(chain)):
-        align = P.pose(chain.anchor[k], P.from_matrix(_with_z(chain.axis[k])))
-        _write(P.compose(P.compose(undo, chain.rest[k]), align), frames[k])
-        undo = P.inverse(align)
-    _write(P.compose(undo, chain.tool_offset), frames[-1])
-    frames.setflags(write=False)
-    return frames
-
-
-def _write(pose: Array, frame: Array) -> None:
-    frame[:, :3] = P.to_matrix(pose[3:])
-    frame[:, 3] = pose[:3]
-
-
-def _with_z(axis: Array) -> Array:
-    """A rotation matrix (3, 3) whose third column is the unit vector `axis`."""
-    other = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    x = np.cross(other, axis)
-    x /= P.norm(x)
-    return np.stack([x, np.cross(axis, x), axis], axis=1)
 
 
 def _cores() -> int:

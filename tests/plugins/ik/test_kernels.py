@@ -10,7 +10,7 @@ from anysim.planning.chain import Chain
 from anysim.testing.arms import Link, panda_arm, serial_arm
 from anysim.world.model import JointType, World
 from anysim_ik import kernels
-from anysim_ik.planner import canonical_frames
+from anysim_ik.frames import canonical_frames
 
 ODD = serial_arm(
     (

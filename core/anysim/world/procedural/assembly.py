@@ -22,6 +22,7 @@ from anysim.world.model import (
     Quat,
     Shape,
     Site,
+    Surface,
     Vec3,
 )  # fmt: skip
 from anysim.world.rounding import split, tidy
@@ -42,32 +43,50 @@ class Assembly:
 
     def link(
         self, name: str, position: Vec3, type: JointType, axis: Vec3, *, lower: float = -inf, upper: float = inf,
-        friction: float = 0.0, damping: float = 0.0,
+        friction: float = 0.0, damping: float = 0.0, velocity_limit: float = inf, effort_limit: float = inf,
+        parent: int = 0,
     ) -> int:  # fmt: skip
-        """A link on the root, its frame at `position` and parallel to the root's where the joint is at zero."""
-        self._bodies.append(Body(name, BodyKind.LINK, 0, tidy(np.array(position))))
+        """A link on the root or on `parent`, its frame at `position` and parallel to that one's at joint zero.
+
+        What is on a link comes right after it: bodies are depth first.
+        """
+        self._bodies.append(Body(name, BodyKind.LINK, parent, tidy(np.array(position))))
         self._masses.append([])
         body = len(self._bodies) - 1
         start = min(max(0.0, lower), upper)
         self._joints.append(
-            Joint(name, body, type, axis, lower=lower, upper=upper, friction=friction, damping=damping, initial=start)
-        )
+            Joint(
+                name, body, type, axis, lower=lower, upper=upper, velocity_limit=velocity_limit,
+                effort_limit=effort_limit, damping=damping, friction=friction, initial=start,
+            )
+        )  # fmt: skip
         return body
 
     def solid(
         self, body: int, name: str, shape: Shape, position: Vec3, density: float, color: Colour,
-        quaternion: Quat = IDENTITY_QUATERNION, *, filled: Shape | None = None,
+        quaternion: Quat = IDENTITY_QUATERNION, *, filled: Shape | None = None, collides: bool = True,
     ) -> None:  # fmt: skip
         """A homogeneous solid [kg/m^3] on a link, which has the mass of `filled` where that is given.
+
+        One that does not collide is there for its mass and its looks.
 
         Solids of one link should not overlap but where `filled` says which part of one counts.
         """
         place, turn = split(np.array([*position, *quaternion]))
         owner = self._bodies[body].name
-        self._geoms.append(Geom(f"{owner}.{name}", body, shape, place, turn, color=(*rgb(color), 1.0)))
+        self._geoms.append(
+            Geom(f"{owner}.{name}", body, shape, place, turn, color=(*rgb(color), 1.0), collides=collides)
+        )
         heavy = filled or shape
         own = inertia.of_shape(heavy, density * inertia.volume(heavy, {}), {})
         self._masses[body].append(inertia.moved(own, np.array([*place, *turn])))
+
+    def contact(self, body: int, name: str, shape: Shape, position: Vec3, surface: Surface) -> None:
+        """A shape on a link that has neither mass nor looks: what touches in place of a solid that does not."""
+        owner = self._bodies[body].name
+        self._geoms.append(
+            Geom(f"{owner}.{name}", body, shape, tidy(np.array(position)), surface=surface, visible=False)
+        )
 
     def board(
         self, body: int, name: str, low: Vec3, high: Vec3, density: float, color: Colour, origin: Vec3 = ORIGIN

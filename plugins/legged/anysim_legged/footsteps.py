@@ -1,0 +1,169 @@
+"""Which foot goes where and when, and where the centre of pressure is meanwhile, for every env.
+
+A step begins with both feet on the ground while the pressure moves from the foot behind to the one that will carry
+(`double` s), then the other foot swings (`single` s). What a step does is decided a step ahead, so that the centre of
+mass can prepare for it. Places are (x, y, heading) in the plan's frame.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim_legged.support import turned
+
+STANDING, STEPPING = 0, 1
+
+
+@dataclass(frozen=True)
+class Gait:
+    """Times of a step [s], how high a foot is lifted [m], and how a walk begins."""
+
+    double: float
+    single: float
+    clearance: float
+    lead: float
+    """From the wish to walk to the first shift of weight: what the preview needs to see it coming."""
+    width: float
+    """Between the feet [m]."""
+
+    @property
+    def period(self) -> float:
+        """Of a step."""
+        return self.double + self.single
+
+
+class Feet(NamedTuple):
+    """What the feet do now."""
+
+    places: Array
+    """(2, 3)."""
+    lift: Array
+    """(2,) of the soles [m]."""
+    standing: tuple[bool, bool]
+
+
+class Footsteps:
+    """Plans of all envs."""
+
+    def __init__(self, gait: Gait, tick: float, num_envs: int) -> None:
+        self._gait, self._tick = gait, tick
+        self._mode = np.zeros(num_envs, dtype=np.int64)
+        self._stance = np.zeros(num_envs, dtype=np.int64)
+        self._time = np.zeros(num_envs)
+        """Since this step, or this stand, began [s]."""
+        self._double = np.zeros(num_envs)
+        """How long this step's double support takes; the pressure moves in the last `gait.double` of it."""
+        self._feet = np.zeros((num_envs, 2, 3))
+        self._target = np.zeros((num_envs, 3))
+        """Where the swinging foot lands."""
+        self._from = np.zeros((num_envs, 2))
+        """Where the pressure was when this step, or this stand, began."""
+        self._next = np.zeros((num_envs, 3))
+        """The command that the step after this one obeys."""
+
+    def begin(self, env: int, places: Array) -> None:
+        """The env stands with its feet there."""
+        self._mode[env], self._time[env] = STANDING, 10.0
+        self._feet[env] = places
+        self._from[env] = places[:, :2].mean(axis=0)
+        self._double[env], self._next[env] = 0.0, 0.0
+
+    def advance(self, env: int, command: Array, middles: Array) -> None:
+        """A tick later; `command` is (vx, vy, turn rate) and `middles` (2, 2) the feet's centres of pressure now."""
+        gait = self._gait
+        self._time[env] += self._tick
+        moving = bool(np.abs(command).max() > 1e-3)
+        if self._mode[env] == STANDING:
+            if moving and self._time[env] > gait.period:
+                self._next[env] = command
+                self._from[env] = middles.mean(axis=0)
+                self._step(env, 1 if command[1] >= 0.0 else 0, gait.lead + gait.double, command)
+        elif self._time[env] >= self._double[env] + gait.single - 1e-9:
+            landed = 1 - int(self._stance[env])
+            self._feet[env, landed] = self._target[env]
+            self._from[env] = middles[self._stance[env]]
+            if not self._next[env].any() and self._parallel(self._feet[env]):
+                self._mode[env], self._time[env], self._double[env] = STANDING, 0.0, gait.double
+            else:
+                self._step(env, landed, gait.double, command)
+
+    def _step(self, env: int, stance: int, double: float, command: Array) -> None:
+        self._mode[env], self._stance[env] = STEPPING, stance
+        self._time[env], self._double[env] = 0.0, double
+        self._target[env] = self._landing(self._feet[env, stance], stance, self._next[env])
+        self._next[env] = command if np.abs(command).max() > 1e-3 else 0.0
+
+    def _landing(self, stance: Array, side: int, command: Array) -> Array:
+        """Where the other foot lands, for a stance foot 0 (left) or 1 (right) at a place."""
+        half = self._gait.width / 2.0 * (-1.0 if side == 0 else 1.0)
+        middle = turned(stance, 0.0, half, 0.0)
+        vx, vy, rate = command * self._gait.period
+        return turned(turned(middle, vx, vy, rate), 0.0, half, 0.0)
+
+    def _parallel(self, feet: Array) -> bool:
+        return bool(np.abs(self._landing(feet[1], 1, np.zeros(3)) - feet[0]).max() < 0.002)
+
+    def now(self, env: int) -> Feet:
+        """Places and lifts at this time."""
+        places, lift = self._feet[env].copy(), np.zeros(2)
+        since = self._time[env] - self._double[env]
+        if self._mode[env] == STANDING or since <= 0.0:
+            return Feet(places, lift, (True, True))
+        swing = 1 - int(self._stance[env])
+        s = min(since / self._gait.single, 1.0)
+        smooth = s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+        places[swing] += smooth * (self._target[env] - places[swing])
+        lift[swing] = self._gait.clearance * 64.0 * (s * (1.0 - s)) ** 3
+        return Feet(places, lift, (swing == 1, swing == 0))
+
+    def pressure(self, env: int, command: Array, times: Array, offset: Array) -> Array:
+        """The centre of pressure (H, 2) at times from now, if the command (3,) stays.
+
+        Args:
+            env: which.
+            command: (vx, vy, turn rate).
+            times: (H,) [s].
+            offset: (2, 2) of the centre of pressure in each foot's place when it carries alone.
+        """
+        gait, now = self._gait, self._time[env]
+        feet = self._feet[env].copy()
+        knots, points = [0.0], [self._from[env]]
+        clock, double = 0.0, float(self._double[env])
+        stance, mode, target, coming = int(self._stance[env]), int(self._mode[env]), self._target[env], self._next[env]
+        while True:
+            middles = np.array([turned(feet[k], *offset[k], 0.0)[:2] for k in range(2)])
+            end = middles.mean(axis=0) if mode == STANDING else middles[stance]
+            knots += [clock + max(double - gait.double, 0.0), clock + double]
+            points += [points[-1], end]
+            clock += double + gait.single
+            knots.append(clock)
+            points.append(end)
+            if mode == STANDING or clock - now > times[-1]:
+                break
+            feet[1 - stance] = target
+            if not coming.any() and self._parallel(feet):
+                mode, double = STANDING, gait.double
+                continue
+            stance, double = 1 - stance, gait.double
+            target = self._landing(feet[stance], stance, coming)
+            coming = command if np.abs(command).max() > 1e-3 else np.zeros(3)
+        at, where = np.array(knots), np.array(points)
+        return np.stack([np.interp(now + times, at, where[:, k]) for k in range(2)], axis=1)
+
+    def _arrays(self) -> dict[str, Array]:
+        return {
+            "mode": self._mode, "stance": self._stance, "time": self._time, "double": self._double,
+            "places": self._feet, "target": self._target, "from": self._from, "next": self._next,
+        }  # fmt: skip
+
+    def snapshot(self, env_ids: Array) -> dict[str, Array]:
+        """Copies of the plans."""
+        return {f"step.{name}": values[env_ids].copy() for name, values in self._arrays().items()}
+
+    def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
+        """Write what `snapshot` returned."""
+        for name, values in self._arrays().items():
+            values[env_ids] = data[f"step.{name}"]
