@@ -21,8 +21,8 @@ from anysim.engine.factory import create_simulation
 from anysim.managers.standard import standard_managers
 from anysim.world.catalogue import load_robot
 
-SIDE, SPEED, GATHER = 2.0, 0.6, 0.8  # [m], [m/s], [m/s^2]; the controllers allow 1 m/s^2
-TURN, TURN_GATHER = 1.2, 2.0  # [rad/s], [rad/s^2]
+SIDE, SPEED, GATHER = 2.0, 0.6, 0.5  # [m], [m/s], [m/s^2]: less than controllers allow
+TURN, TURN_GATHER = 1.2, 1.5  # [rad/s], [rad/s^2]
 PAUSE = 0.3  # [s] after each piece, in which drives come to rest and wheels steer
 CREEP = 1e-3  # [m/s] that tells steered wheels where they are to go
 BOUNDS = {"differential": (0.02, 0.02), "ackermann": (0.03, 0.02), "swerve": (0.03, 0.02), "planar": (0.01, 0.01)}

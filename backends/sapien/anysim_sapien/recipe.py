@@ -83,24 +83,39 @@ class Recipe:
         return self._meeting.copies(np.frombuffer(friction), np.frombuffer(restitution))
 
 
-def tendon_chain(world: World, follower: int) -> tuple[list[int], list[float]]:
-    """The links of a fixed tendon, and their coefficients, that hold `follower - multiplier * leader` at the offset.
+class Tendon(NamedTuple):
+    """A fixed tendon: links, a coefficient for the joint of each, and what their weighted sum is held at."""
+
+    links: list[int]
+    coefficients: list[float]
+    rest: float
+
+
+def tendon_of(world: World, follower: int) -> Tendon:
+    """The tendon that holds `follower - multiplier * leader` at the offset of its mimic.
+
+    Where the leader is out of a tendon's reach, another joint that follows the same leader stands for it.
 
     Raises:
-        EngineError: the two joints do not move links that are neighbours or have one parent.
+        EngineError: neither moves a link that is a neighbour of the follower's or has the same parent.
     """
     joint = world.joints[follower]
     assert joint.mimic is not None
-    leader = world.joints[joint.mimic.joint]
-    child, guide = joint.body, leader.body
-    parent = world.bodies[child].parent
-    if parent == world.bodies[guide].parent:
-        return [parent, guide, child], [0.0, -joint.mimic.multiplier, 1.0]
-    if parent == guide:
-        return [world.bodies[guide].parent, guide, child], [0.0, -joint.mimic.multiplier, 1.0]
+    leader, multiplier, offset = joint.mimic
+    guides = [(leader, multiplier, offset)]
+    for index, other in enumerate(world.joints):
+        if index != follower and other.mimic is not None and other.mimic.joint == leader and other.mimic.multiplier:
+            ratio = multiplier / other.mimic.multiplier
+            guides.append((index, ratio, offset - ratio * other.mimic.offset))
+    parent = world.bodies[joint.body].parent
+    for index, ratio, rest in guides:
+        guide = world.joints[index].body
+        above = world.bodies[guide].parent
+        if parent in (above, guide):
+            return Tendon([above, guide, joint.body], [0.0, -ratio, 1.0], rest)
     raise EngineError(
-        f"SAPIEN cannot make joint '{joint.name}' follow '{leader.name}': a tendon joins links with one parent, or a "
-        f"link and its child; drive the joint itself, or use another engine"
+        f"SAPIEN cannot make joint '{joint.name}' follow '{world.joints[leader].name}': a tendon joins links with one "
+        f"parent, or a link and its child; drive the joint itself, or use another engine"
     )
 
 
@@ -127,7 +142,7 @@ def _check(world: World) -> None:
             raise EngineError(f"body '{body.name}' moves and has no mass; give it one, or join it to its parent")
     for index, joint in enumerate(world.joints):
         if joint.mimic is not None:
-            tendon_chain(world, index)
+            tendon_of(world, index)
     for geom in world.geoms:
         loose = geom.body != WORLD and world.bodies[geom.body].kind is not BodyKind.STATIC
         if loose and geom.collides and is_ground(geom.shape):

@@ -18,7 +18,7 @@ from anysim_sapien.absent import NOBODY, NOWHERE
 from anysim_sapien.exclusions import Group
 from anysim_sapien.journal import Journal, Op
 from anysim_sapien.library import physx, sapien
-from anysim_sapien.recipe import Recipe, Values, tendon_chain
+from anysim_sapien.recipe import Recipe, Values, tendon_of
 from anysim_sapien.shapes import make_shape, to_pose
 
 FAST = 1e9
@@ -197,14 +197,13 @@ class EnvScene:
         """Mimic joints: a stiff spring between follower and leader."""
         world = self._recipe.world
         for index in sorted(int(j) for j in joints):
-            mimic = world.joints[index].mimic
-            if mimic is not None:
-                chain, coefficients = tendon_chain(world, index)
+            if world.joints[index].mimic is not None:
+                tendon = tendon_of(world, index)
                 handle.create_fixed_tendon(
-                    [self.bodies[body] for body in chain],
-                    coefficients,
-                    [0.0 if c == 0.0 else 1.0 / c for c in coefficients],
-                    rest_length=mimic.offset, offset=0.0, stiffness=COUPLING, damping=0.0,
+                    [self.bodies[body] for body in tendon.links],
+                    tendon.coefficients,
+                    [0.0 if c == 0.0 else 1.0 / c for c in tendon.coefficients],
+                    rest_length=tendon.rest, offset=0.0, stiffness=COUPLING, damping=0.0,
                 )  # fmt: skip
 
     def _joints(self) -> list[Any]:

@@ -35,11 +35,8 @@ from anysim.world.nominal import extremes, nominal
 from anysim.world.presets import GRIPPER_LIMIT_SOFTNESS, surface
 from anysim.world.procedural.build import build
 from anysim.world.rounding import split
-<<<<<<< HEAD
 from anysim.world.vehicles import as_vehicle
-=======
 from anysim.world.solids import with_solids
->>>>>>> wt-ik
 from anysim_schemas.object_source import PROCEDURAL
 from anysim_schemas.robot_model import ChannelSpec, GainSpec, RobotModelSpec, SensorSpec, ToolSpec
 from anysim_schemas.robots import RobotSpec

@@ -30,6 +30,7 @@ from anysim.world.rounding import split, tidy
 from anysim.world.urdf_geometry import GeometryReader
 from anysim.world.urdf_xml import InertialElement, JointElement, UrdfFile
 
+_LIMIT_SLACK = 1e-3  # [rad] or [m] that limits of followers and leaders may differ by, from rounding
 VIRTUAL_MASS = 0.001  # [kg] of a moving link that has none and carries some
 _TYPES = {"revolute": JointType.REVOLUTE, "continuous": JointType.REVOLUTE, "prismatic": JointType.PRISMATIC}
 _IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -179,7 +180,23 @@ class _UrdfImport:
             if joint.type is JointType.PRISMATIC:
                 offset *= self.scale
             mimic = Mimic(number[leader.name], multiplier, offset)
-            self.joints[i] = replace(joint, mimic=mimic, initial=multiplier * target.initial + offset)
+            lower, upper = self._room_to_follow(joint, target, mimic)
+            start = multiplier * target.initial + offset
+            self.joints[i] = replace(joint, mimic=mimic, initial=start, lower=lower, upper=upper)
+
+    def _room_to_follow(self, joint: Joint, leader: Joint, mimic: Mimic) -> tuple[float, float]:
+        """Limits that let a follower go where its leader takes it: narrower ones would lock the leader as well."""
+        if not mimic.multiplier:
+            return joint.lower, joint.upper
+        ends = sorted(mimic.multiplier * end + mimic.offset for end in (leader.lower, leader.upper))
+        lower, upper = min(joint.lower, ends[0]), max(joint.upper, ends[1])
+        if max(joint.lower - lower, upper - joint.upper) <= _LIMIT_SLACK:
+            return joint.lower, joint.upper
+        self._note(
+            "repaired", "joint", joint.name, f"stops at [{joint.lower:g}, {joint.upper:g}], but follows '{leader.name}' "
+            f"from {ends[0]:g} to {ends[1]:g}; now as far as that",
+        )  # fmt: skip
+        return lower, upper
 
     # ------------------------------------------------------------------ joints
 
