@@ -44,7 +44,7 @@ def test_a_world_runs_on_every_engine_that_declares_it_can(world: Path, engine: 
     assert np.abs(found["later"][..., :3] - found["pose"][..., :3]).max() < 4e-3
 
 
-def test_the_six_are_there() -> None:
+def test_the_seven_are_there() -> None:
     assert [path.stem for path in WORLDS] == [
-        "cluttered_table", "four_worlds", "kitchen", "room", "rough_terrain", "thousand",
+        "cluttered_table", "four_worlds", "kitchen", "room", "rough_terrain", "team", "thousand",
     ]  # fmt: skip
