@@ -74,7 +74,7 @@ class LegSpec(Spec):
     sole: tuple[Number, Number, Number, Number] | None = Field(
         default=None, description="flat foot: x_min, x_max, y_min, y_max of the sole in the foot's frame [m]"
     )
-    sole_height: NonNegative = Field(default=0.0, description="flat foot: height of its frame above the sole [m]")
+    sole_height: Number = Field(default=0.0, description="flat foot: height of its frame above the sole [m]")
 
 
 class SensorSpec(Spec):
