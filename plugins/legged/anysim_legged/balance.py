@@ -35,7 +35,7 @@ class HumanoidBalance(Controller):
     """
 
     labels = ("height", "lean_x", "lean_y", "roll", "pitch", "yaw")
-    period = 0.01
+    period: float = 0.01
 
     def __init__(
         self, channel: ChannelView, num_envs: int, *, height: tuple[float, float] = (-0.25, 0.02), lean: float = 0.05,

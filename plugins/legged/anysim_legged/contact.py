@@ -4,7 +4,7 @@ import numpy as np
 
 from anysim.controllers.robot import ControlledRobot
 from anysim.conventions import Array
-from anysim.kinematics.model import pinocchio
+from anysim.kinematics.model import pinocchio, se3
 from anysim_legged.wholebody import WholeBody
 
 
@@ -29,11 +29,10 @@ class Pushes:
         """What the ground is expected to give each foot at the middle of its sole: force and torque, world axes."""
 
     def required(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
-        """Efforts (nv,) of inverse dynamics, and the force (3,) and torque about the origin (3,) that the ground owes."""
+        """Efforts (nv,) of inverse dynamics; force (3,) and torque about the origin (3,) that the ground owes."""
         pin = pinocchio()
         efforts = self._whole.model.inverse_dynamics(q, v, a)
-        base = self._whole.model.data.oMi[1]
-        owed = base.act(pin.Force(efforts[:6]))
+        owed = se3(q[:7]).act(pin.Force(efforts[:6]))
         return efforts, np.array(owed.linear), np.array(owed.angular)
 
     def solve(
@@ -87,7 +86,7 @@ def pressure(force: Array, torque: Array) -> Array:
 
 
 def shifted(force: Array, torque: Array, by: Array, com: Array) -> tuple[Array, Array]:
-    """The ground's force with its centre of pressure moved by (2,) on the ground, its line still past the centre of mass.
+    """The ground's force with its centre of pressure moved by (2,), its torque about the centre of mass kept.
 
     A pendulum whose foot moves: the horizontal force that belongs to it acts at the centre of mass (3,).
     """
@@ -96,7 +95,7 @@ def shifted(force: Array, torque: Array, by: Array, com: Array) -> tuple[Array, 
 
 
 def share_of(cop: Array, middles: Array) -> Array:
-    """Shares (2,) of two feet in the force: how far the centre of pressure (2,) is on the line between their middles."""
+    """Shares (2,) of two feet in the force: where the pressure's centre (2,) is between their middles."""
     across = middles[0] - middles[1]
     left = float(np.clip((cop - middles[1]) @ across / max(float(across @ across), 1e-9), 0.0, 1.0))
     return np.array([left, 1.0 - left])

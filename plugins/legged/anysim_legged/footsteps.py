@@ -12,9 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from anysim.conventions import Array
-from anysim_legged.support import turned
+from anysim_legged.support import turned, wrapped
 
 STANDING, STEPPING = 0, 1
+CORRECTION = np.array([0.03, 0.03, 0.05])
+"""How far a step goes, beyond what it was to do, to where it would land had no foot ever slipped [m, m, rad]."""
 
 
 @dataclass(frozen=True)
@@ -63,17 +65,29 @@ class Footsteps:
         """Where the pressure was when this step, or this stand, began."""
         self._next = np.zeros((num_envs, 3))
         """The command that the step after this one obeys."""
+        self._path = np.zeros((num_envs, 3))
+        """Where the middle of the feet would be in the world, after the step that lands next, had none slipped."""
+        self._lead = np.zeros((num_envs, 3))
 
     def begin(self, env: int, places: Array) -> None:
         """The env stands with its feet there."""
         self._mode[env], self._time[env] = STANDING, 10.0
         self._feet[env] = places
         self._from[env] = places[:, :2].mean(axis=0)
-        self._double[env], self._next[env] = 0.0, 0.0
+        self._double[env], self._next[env], self._lead[env] = 0.0, 0.0, 0.0
+        self._path[env] = turned(places[1], 0.0, self._gait.width / 2.0, 0.0)
 
-    def advance(self, env: int, command: Array, middles: Array) -> None:
-        """A tick later; `command` is (vx, vy, turn rate) and `middles` (2, 2) the feet's centres of pressure now."""
+    def advance(self, env: int, command: Array, middles: Array, lead: Array) -> None:
+        """A tick later.
+
+        Args:
+            env: which.
+            command: (vx, vy, turn rate).
+            middles: (2, 2) the feet's centres of pressure now.
+            lead: (3,) place and heading of the world in the plan's frame.
+        """
         gait = self._gait
+        self._lead[env] = lead
         self._time[env] += self._tick
         moving = bool(np.abs(command).max() > 1e-3)
         if self._mode[env] == STANDING:
@@ -94,14 +108,34 @@ class Footsteps:
         self._mode[env], self._stance[env] = STEPPING, stance
         self._time[env], self._double[env] = 0.0, double
         self._target[env] = self._landing(self._feet[env, stance], stance, self._next[env])
+        if self._next[env].any():
+            vx, vy, rate = self._next[env] * self._gait.period
+            self._path[env] = turned(self._path[env], vx, vy, rate)
+            wanted = turned(turned(self._lead[env], *self._path[env]), 0.0, self._half(stance), 0.0)
+            miss = wanted - self._target[env]
+            miss[2] = wrapped(miss[2])
+            self._target[env] += np.clip(miss, -CORRECTION, CORRECTION)
         self._next[env] = command if np.abs(command).max() > 1e-3 else 0.0
 
     def _landing(self, stance: Array, side: int, command: Array) -> Array:
         """Where the other foot lands, for a stance foot 0 (left) or 1 (right) at a place."""
-        half = self._gait.width / 2.0 * (-1.0 if side == 0 else 1.0)
+        half = self._half(side)
         middle = turned(stance, 0.0, half, 0.0)
         vx, vy, rate = command * self._gait.period
         return turned(turned(middle, vx, vy, rate), 0.0, half, 0.0)
+
+    def _half(self, stance: int) -> float:
+        """From the middle of the feet to the one that swings, to the left [m]."""
+        return self._gait.width / 2.0 * (-1.0 if stance == 0 else 1.0)
+
+    def planned(self, env: int, place: Array) -> Array:
+        """Where a place (2,) of the plan would be in the world, had no foot ever slipped."""
+        stance = int(self._stance[env])
+        own = self._target[env] if self._mode[env] == STEPPING else self._feet[env, 1 - stance]
+        middle = turned(own, 0.0, -self._half(stance), 0.0)
+        away = place - middle[:2]
+        c, s = np.cos(middle[2]), np.sin(middle[2])
+        return turned(self._path[env], c * away[0] + s * away[1], c * away[1] - s * away[0], 0.0)[:2]
 
     def _parallel(self, feet: Array) -> bool:
         return bool(np.abs(self._landing(feet[1], 1, np.zeros(3)) - feet[0]).max() < 0.002)
@@ -134,7 +168,7 @@ class Footsteps:
         clock, double = 0.0, float(self._double[env])
         stance, mode, target, coming = int(self._stance[env]), int(self._mode[env]), self._target[env], self._next[env]
         while True:
-            middles = np.array([turned(feet[k], *offset[k], 0.0)[:2] for k in range(2)])
+            middles = np.array([turned(feet[k], float(offset[k, 0]), float(offset[k, 1]), 0.0)[:2] for k in range(2)])
             end = middles.mean(axis=0) if mode == STANDING else middles[stance]
             knots += [clock + max(double - gait.double, 0.0), clock + double]
             points += [points[-1], end]
@@ -157,6 +191,7 @@ class Footsteps:
         return {
             "mode": self._mode, "stance": self._stance, "time": self._time, "double": self._double,
             "places": self._feet, "target": self._target, "from": self._from, "next": self._next,
+            "path": self._path, "lead": self._lead,
         }  # fmt: skip
 
     def snapshot(self, env_ids: Array) -> dict[str, Array]:

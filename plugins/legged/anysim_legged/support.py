@@ -33,7 +33,7 @@ def nearest_inside(point: Array, corners: Array) -> Array:
 
 
 def sole_corners(place: Array, sole: Array) -> Array:
-    """Corners (4, 2) on the ground of a sole (x_min, x_max, y_min, y_max in the foot's frame) at a place (x, y, yaw)."""
+    """Corners (4, 2) on the ground of a sole (x_min, x_max, y_min, y_max in the foot's frame) at (x, y, yaw)."""
     x = sole[[0, 1, 1, 0]]
     y = sole[[2, 2, 3, 3]]
     c, s = np.cos(place[2]), np.sin(place[2])

@@ -53,8 +53,8 @@ class Tracker:
         self.v = np.zeros((num_envs, model.nv))
         self._shares = np.full((num_envs, 2), 0.5)
         self._feet = np.zeros((num_envs, 2, 3))
-        self.lead = np.zeros((num_envs, 2))
-        """Where the plan's frame is in the world, minus where it was at the reset [m]: what slipping added up to."""
+        self.lead = np.zeros((num_envs, 3))
+        """What slipping added up to: place and heading of the world at the reset in the plan's frame [m, rad]."""
 
     def begin(self, env: int, joint_pos: Array, base: Array) -> Array:
         """The env was reset: plan from what is measured. Returns the feet's places (2, 3)."""
@@ -113,7 +113,7 @@ class Tracker:
         c, s = np.cos(turn), np.sin(turn)
         rotation = np.array([[c, -s], [s, c]])
         offset = (shares[:, None] * (feet[:, :2] - places[:, :2] @ rotation.T)).sum(axis=0)
-        self.lead[env] = offset
+        self.lead[env] = [*offset, turn]
         return rotation @ (com[:2] + speed[:2] / omega) + offset
 
     def snapshot(self, env_ids: Array) -> dict[str, Array]:

@@ -14,7 +14,7 @@ from anysim_legged.tracking import Tracker
 from anysim_legged.wholebody import Targets, about_z
 
 HORIZON = 2.2
-"""[s] of footsteps that the pendulum knows ahead: what is beyond moves it by exp(-omega HORIZON), below a thousandth."""
+"""[s] of footsteps that the pendulum knows ahead: beyond, exp(-omega HORIZON) is below a thousandth."""
 
 
 class LipmWalk(Controller):
@@ -38,7 +38,7 @@ class LipmWalk(Controller):
     """
 
     labels = ("vx", "vy", "turn_rate")
-    period = 0.01
+    period: float = 0.01
 
     def __init__(
         self, channel: ChannelView, num_envs: int, *, forward: float = 0.3, sideways: float = 0.1,
@@ -68,12 +68,11 @@ class LipmWalk(Controller):
         self._offset[:, 0] += self._lean[0]
         self._wanted, self._command = np.zeros((num_envs, 3)), np.zeros((num_envs, 3))
         self._com = np.zeros((num_envs, 2))
-        self.start = np.zeros((num_envs, 2))
-        """Where the plan's centre of mass was at the reset (N, 2) [m]."""
 
     def planned(self, env_ids: Array | None = None) -> Array:
-        """Where the plan's centre of mass is now (E, 2) [m], in the world if no foot ever slipped."""
-        return self._com[slice(None) if env_ids is None else env_ids].copy()
+        """Where the centre of mass of the plan is now (E, 2) [m], in the world, had no foot ever slipped."""
+        envs = np.arange(self.num_envs) if env_ids is None else env_ids
+        return np.array([self._steps.planned(int(env), self._com[env]) for env in envs])
 
     def reset(self, env_ids: Array, targets: Array) -> None:
         positions, bases = self.robot.joint_pos(env_ids), self.robot.base_pose(env_ids)
@@ -81,7 +80,6 @@ class LipmWalk(Controller):
             places = self.tracker.begin(int(env), positions[row], bases[row])
             self._steps.begin(int(env), places)
             self._com[env] = self._middles(places).mean(axis=0)
-        self.start[env_ids] = self._com[env_ids]
         self._wanted[env_ids], self._command[env_ids] = 0.0, 0.0
 
     def apply(self, action: Array, env_ids: Array | None) -> Command:
@@ -110,7 +108,7 @@ class LipmWalk(Controller):
         command = self._command[env]
         pressure = self._steps.pressure(env, command, self._preview.times, self._offset)
         self._com[env] = self._preview.next(self._com[env], pressure)
-        self._steps.advance(env, command, self._middles(feet.places))
+        self._steps.advance(env, command, self._middles(feet.places), self.tracker.lead[env])
         feet = self._steps.now(env)
         left, right = feet.places
         heading = right[2] + wrapped(left[2] - right[2]) / 2.0
@@ -134,4 +132,4 @@ class LipmWalk(Controller):
             values[env_ids] = data[name]
 
     def _arrays(self) -> dict[str, Array]:
-        return {"wanted": self._wanted, "command": self._command, "com": self._com, "start": self.start}
+        return {"wanted": self._wanted, "command": self._command, "com": self._com}

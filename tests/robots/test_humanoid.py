@@ -1,0 +1,118 @@
+"""The G1 stands, is pushed, squats, reaches and walks with the controllers of its catalogue entry."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import anysim
+from anysim.task.env import TaskEnv
+from anysim_legged.walk import LipmWalk
+
+ENGINES = ("mujoco", "pybullet", "sapien")
+STEP = 0.02
+
+
+def env(engine: str, controller: str, num_envs: int = 1, arm: str | None = None) -> TaskEnv:
+    """A G1 on a plane, reset."""
+    actions = {"base": controller} | ({} if arm is None else {"arm": arm})
+    spec: dict[str, Any] = {
+        "physics": {"dt": 0.002, "control_dt": STEP},
+        "world": {
+            "name": "humanoid", "terrain": "plane", "robots": {"g1": {"robot": "unitree_g1", "actions": actions}}
+        },
+        "task": {"horizon": 10_000, "observations": {"policy": ["joint_pos"]}},
+    }  # fmt: skip
+    made = anysim.make(spec, engine=engine, num_envs=num_envs)
+    made.reset(seed=0)
+    return made
+
+
+def pelvis(made: TaskEnv) -> np.ndarray:
+    """(N, 7)."""
+    return np.array(made.engine.get_state().body_pose[:, made.engine.index.entity("g1").root])
+
+
+def run(made: TaskEnv, action: np.ndarray, seconds: float) -> None:
+    """Hold an action."""
+    rows = np.tile(action, (made.num_envs, 1))
+    for _ in range(round(seconds / STEP)):
+        made.step(rows)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ENGINES)
+def test_it_stands_squats_and_comes_back(engine: str) -> None:
+    made = env(engine, "default")
+    home = np.array(made.engine.get_state().joint_pos)
+    start = pelvis(made)
+    run(made, np.zeros(6), 5.0)
+    assert np.abs(made.engine.get_state().joint_pos - home).max() < 0.05
+    run(made, np.array([-0.18, 0, 0, 0, 0, 0]), 3.0)
+    assert pelvis(made)[0, 2] - start[0, 2] == pytest.approx(-0.18, abs=0.01)
+    run(made, np.zeros(6), 3.0)
+    assert np.abs(pelvis(made) - start)[0, :3].max() < 0.01
+    made.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ENGINES)
+def test_pushes_from_eight_sides_do_not_fell_it(engine: str) -> None:
+    made = env(engine, "default", num_envs=8)
+    run(made, np.zeros(6), 0.2)
+    state, root = made.engine.get_state(), made.engine.index.entity("g1").root
+    pose, twist = state.body_pose[:, [root]].copy(), state.body_twist[:, [root]].copy()
+    side = np.arange(8) * np.pi / 4.0
+    twist[:, 0, :2] += 0.3 * np.stack([np.cos(side), np.sin(side)], axis=1)
+    made.engine.set_body_state(pose, twist, np.arange(8), [root])
+    start = pose[:, 0, 2]
+    run(made, np.zeros(6), 2.0)
+    assert (np.abs(pelvis(made)[:, 2] - start) < 0.02).all()
+    made.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ENGINES)
+def test_it_balances_arms_that_somebody_else_moves(engine: str) -> None:
+    made = env(engine, "default", arm="joint_position")
+    assert made.robots is not None
+    arm = made.robots.slice_of("g1", "arm").controller.channel
+    start = pelvis(made)
+    home = arm.robot.joint_pos(None)[0, arm.joint_columns]
+    action = np.concatenate([np.zeros(6), home])
+    for side in (0, 7):
+        action[6 + side] -= 1.2  # shoulders: both hands forward and up
+    for k in range(100):
+        made.step((action * min(1.0, k / 75.0) + np.concatenate([np.zeros(6), home]) * max(0.0, 1.0 - k / 75.0))[None])
+    run(made, action, 2.0)
+    assert np.abs(pelvis(made)[0, 2] - start[0, 2]) < 0.02
+    assert np.abs(arm.robot.joint_pos(None)[0, arm.joint_columns] - action[6:]).max() < 0.1
+    made.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["mujoco", "sapien"])
+def test_it_walks_where_it_planned(engine: str) -> None:
+    made = env(engine, "lipm_walk")
+    assert made.robots is not None
+    controller = made.robots.slice_of("g1", "base").controller
+    assert isinstance(controller, LipmWalk)
+    start, planned = pelvis(made)[0], controller.planned()[0]
+    run(made, np.array([0.2, 0.0, 0.0]), 10.0)
+    moved, plan = pelvis(made)[0, :2] - start[:2], controller.planned()[0] - planned
+    assert plan[0] > 1.2
+    assert moved[0] == pytest.approx(plan[0], rel=0.05), "how far; the path drifts sideways by several centimetres"
+    made.close()
+
+
+def test_a_snapshot_of_a_step_continues_bit_for_bit() -> None:
+    made = env("mujoco", "lipm_walk", num_envs=2)
+    run(made, np.array([0.2, 0.05, 0.1]), 1.5)
+    saved = made.snapshot()
+    run(made, np.array([0.2, 0.05, 0.1]), 0.5)
+    once = np.array(made.engine.get_state().joint_pos)
+    made.reset_to(saved)
+    run(made, np.array([0.2, 0.05, 0.1]), 0.5)
+    assert (made.engine.get_state().joint_pos == once).all()
+    assert (once[0] == once[1]).all(), "a row does not depend on its place"
+    made.close()
