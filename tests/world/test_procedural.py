@@ -97,7 +97,7 @@ def test_a_wheel_counts_no_mass_twice() -> None:
 
 @pytest.mark.parametrize("name", registry.names("assets"))
 def test_every_builder_makes_a_sound_model(name: str) -> None:
-    """Depth first, one joint a link, possible inertias, simple shapes, unique names, a place to hold or to hold with."""
+    """Depth first, one joint a link, possible inertias, simple shapes, unique names, a place to hold or hold with."""
     model = build(name, {})
     assert [body.kind for body in model.bodies] == [BodyKind.FREE, *[BodyKind.LINK] * len(model.joints)]
     assert [joint.body for joint in model.joints] == list(range(1, len(model.bodies)))
