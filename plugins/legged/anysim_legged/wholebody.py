@@ -185,6 +185,32 @@ class WholeBody:
             q[7 + self.columns] = np.clip(q[7 + self.columns], self._lower, self._upper)
         return q
 
+    def swing_pressure(self) -> Array:
+        """(2, 2, 3) what an acceleration (x, y, up) of each foot adds to the centre of pressure [s^2], at home.
+
+        A foot that moves while the centre of mass stays turns the body's angular momentum, and the ground has to give
+        that: its pressure moves by the rate of angular momentum over the weight.
+        """
+        pin = pinocchio()
+        model, data = self.model.model, self.model.data
+        com, _, places = self.measured(self.home, np.zeros(model.nv))
+        weight = self.mass * float(np.linalg.norm(model.gravity.linear))
+        posture, by = self.home[7 + self.columns], 1e-3
+        added = np.zeros((2, 2, 3))
+        for foot in range(2):
+            for axis in range(3):
+                feet, lift = places.copy(), np.zeros(2)
+                if axis < 2:
+                    feet[foot, axis] += by
+                else:
+                    lift[foot] = by
+                targets = Targets(feet, lift, com[:2], float(self.home[2]), self.upright)
+                moved = self.solve(self.home, targets, posture, iterations=4)
+                pin.computeCentroidalMomentum(model, data, self.home, self.difference(self.home, moved) / by)
+                lx, ly, _ = data.hg.angular
+                added[foot, :, axis] = [ly / -weight, lx / weight]
+        return added
+
     def difference(self, before: Array, after: Array) -> Array:
         """Velocity (nv,) that leads from one configuration to another in a second."""
         return np.array(pinocchio().difference(self.model.model, before, after))
