@@ -51,7 +51,7 @@ class Footsteps:
     """Plans of all envs."""
 
     def __init__(self, gait: Gait, tick: float, num_envs: int, swing: Array) -> None:
-        """`swing` (2, 2, 3): what an acceleration of the left or the right foot adds to the pressure [s^2], as at home."""
+        """`swing` (2, 2, 3): what an acceleration of the left and the right foot adds to the pressure [s^2]."""
         self._gait, self._tick, self._swing = gait, tick, swing
         self._mode = np.zeros(num_envs, dtype=np.int64)
         self._stance = np.zeros(num_envs, dtype=np.int64)
@@ -157,8 +157,8 @@ class Footsteps:
     def pressure(self, env: int, command: Array, times: Array, offset: Array) -> Array:
         """The pressure (H, 2) that the pendulum is to have at times from now, if the command (3,) stays.
 
-        It is where the feet want it less what swinging legs add, so that their sum stays in the middle of the soles: the
-        trunk is carried along by a leg that is flung forward instead of the toes holding it back.
+        It is where the feet want it less what swinging legs add, so that their sum stays in the middle of the soles:
+        a leg that is flung forward carries the trunk along, instead of the toes holding it back.
 
         Args:
             env: which.

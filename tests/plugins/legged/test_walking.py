@@ -148,7 +148,7 @@ def test_feet_press_only_within_their_soles(whole: WholeBody) -> None:
 
 def test_footsteps_walk_at_the_commanded_speed_and_end_side_by_side() -> None:
     gait = Gait(double=0.2, single=0.5, clearance=0.05, lead=1.0, width=0.2)
-    steps = Footsteps(gait, TICK, 1)
+    steps = Footsteps(gait, TICK, 1, np.zeros((2, 2, 3)))
     steps.begin(0, np.array([[0.0, 0.1, 0.0], [0.0, -0.1, 0.0]]))
     lifts, still = [], np.zeros(3)
     for k in range(1500):
