@@ -112,7 +112,7 @@ def test_it_walks_where_it_planned(engine: str) -> None:
     assert plan[0] > 1.2
     assert np.linalg.norm(moved - plan) < 0.02 * np.linalg.norm(plan), "the same point of the body at the same instant"
     assert abs(pelvis(made)[0, 2] - height) < 0.02
-    run(made, np.zeros(3), 3.0)
+    run(made, np.zeros(3), 4.0)
     assert np.abs(pelvis(made)[0, 2] - height) < 0.005, "it stands after the last step"
     assert np.abs(made.engine.get_state().joint_vel).max() < 0.05
     made.close()
