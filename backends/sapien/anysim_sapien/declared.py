@@ -15,7 +15,9 @@ REMEDY = "pip install 'sapien>=3.0.3'"
 
 _APPROXIMATE = {
     Capability.CONTACTS: "a cylinder is a prism of many sides: it rolls 11 % slower than a round one down 15 degrees",
-    Capability.SHAPE_MESH: "PhysX cooks hulls and drops corners within 0.7 mm of the rest: 0.2 % less volume at a hand's size, 4 % at 3 cm",
+    Capability.SHAPE_MESH: (
+        "PhysX cooks hulls and drops corners within 0.7 mm of the rest: 0.2 % less volume at a hand's size, 4 % at 3 cm"
+    ),
     Capability.MIMIC_JOINTS: (
         "a stiff spring: 0.04 mm at 20 N on a gripper's finger; only links with one parent, or a link and its child"
     ),
