@@ -42,15 +42,17 @@ def source_check(world: World, oracle: Oracle, notes: tuple[ImportNote, ...]) ->
         return Check("source", None, words=f"there is no file to compare with ({oracle.name})")
     off = abs(mass - oracle.mass) / max(oracle.mass, 1e-9)
     repaired = [str(note) for note in notes if note.kind == "repaired"]
+    frozen = sum(note.kind == "dropped" and note.where.startswith("joint ") for note in notes)
     words: list[str] = []
-    if joints != oracle.joints:
+    if joints + frozen != oracle.joints:
         words.append(f"{joints} joints, and {oracle.joints} in the source as {oracle.name} reads it")
     invented = repaired and 0 < mass - oracle.mass < VIRTUAL
     if off > MASS and not invented:
         words.append(f"{mass:.6g} kg, and {oracle.mass:.6g} kg in the source as {oracle.name} reads it")
     if words:
         return Check("source", False, off, "", MASS, "; ".join([*words, *repaired[:3]]))
-    told = f"{joints} joints, {mass:.4g} kg" + (f"; repaired: {listing(repaired, 3)}" if repaired else "")
+    fixed = f" ({frozen} that move no mass are frozen)" * bool(frozen)
+    told = f"{joints} joints{fixed}, {mass:.4g} kg" + (f"; repaired: {listing(repaired, 3)}" if repaired else "")
     return Check("source", True, off, "", None if invented else MASS, told)
 
 
