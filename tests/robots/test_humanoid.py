@@ -13,13 +13,13 @@ ENGINES = ("mujoco", "pybullet", "sapien")
 STEP = 0.02
 
 
-def env(engine: str, controller: str, num_envs: int = 1, arm: str | None = None) -> TaskEnv:
+def env(engine: str, controller: str, num_envs: int = 1, arm: str | None = None, robot: str = "unitree_g1") -> TaskEnv:
     """A G1 on a plane, reset."""
     actions = {"base": controller} | ({} if arm is None else {"arm": arm})
     spec: dict[str, Any] = {
         "physics": {"dt": 0.002, "control_dt": STEP},
         "world": {
-            "name": "humanoid", "terrain": "plane", "robots": {"g1": {"robot": "unitree_g1", "actions": actions}}
+            "name": "humanoid", "terrain": "plane", "robots": {"g1": {"robot": robot, "actions": actions}}
         },
         "task": {"horizon": 10_000, "observations": {"policy": ["joint_pos"]}},
     }  # fmt: skip
@@ -90,18 +90,41 @@ def test_it_balances_arms_that_somebody_else_moves(engine: str) -> None:
     made.close()
 
 
+def centre(controller: LipmWalk) -> np.ndarray:
+    """Where the measured centre of mass is (2,) [m], world frame."""
+    robot, whole = controller.robot, controller.tracker.whole
+    base = robot.base_pose(None)[0]
+    q = whole.model.q(robot.joint_pos(None)[0], base)
+    v = whole.model.v(robot.joint_vel(None)[0], base, robot.base_twist(None)[0])
+    return np.array(whole.measured(q, v)[0][:2])
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", ["mujoco", "sapien"])
+@pytest.mark.parametrize("engine", ENGINES)
 def test_it_walks_where_it_planned(engine: str) -> None:
     made = env(engine, "lipm_walk")
     assert made.robots is not None
     controller = made.robots.slice_of("g1", "base").controller
     assert isinstance(controller, LipmWalk)
-    start, planned = pelvis(made)[0], controller.planned()[0]
+    start, planned, height = centre(controller), controller.planned()[0], pelvis(made)[0, 2]
     run(made, np.array([0.2, 0.0, 0.0]), 10.0)
-    moved, plan = pelvis(made)[0, :2] - start[:2], controller.planned()[0] - planned
+    moved, plan = centre(controller) - start, controller.planned()[0] - planned
     assert plan[0] > 1.2
-    assert moved[0] == pytest.approx(plan[0], rel=0.05), "how far; the path drifts sideways by several centimetres"
+    assert np.linalg.norm(moved - plan) < 0.02 * np.linalg.norm(plan), "the same point of the body at the same instant"
+    assert abs(pelvis(made)[0, 2] - height) < 0.02
+    run(made, np.zeros(3), 4.0)
+    assert np.abs(pelvis(made)[0, 2] - height) < 0.005, "it stands after the last step"
+    assert np.abs(made.engine.get_state().joint_vel).max() < 0.05
+    made.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ENGINES)
+def test_arms_with_hands_do_not_swing_up_by_themselves(engine: str) -> None:
+    made = env(engine, "default", robot="unitree_g1_hands")
+    home = np.array(made.engine.get_state().joint_pos)
+    run(made, np.zeros(6), 6.0)
+    assert np.abs(made.engine.get_state().joint_pos - home).max() < 0.01
     made.close()
 
 

@@ -29,10 +29,20 @@ class Pushes:
         """What the ground is expected to give each foot at the middle of its sole: force and torque, world axes."""
 
     def required(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
-        """Efforts (nv,) of inverse dynamics; force (3,) and torque about the origin (3,) that the ground owes."""
+        """Efforts (nv,) of inverse dynamics; force (3,) and torque about the origin (3,) that the ground owes.
+
+        The acceleration of joints that others move comes from their measured motion. Their weight on the ground obeys
+        it, their own drives do not: an effort that follows what is measured takes their inertia away, and light gains
+        then swing up by themselves.
+        """
         pin = pinocchio()
         efforts = self._whole.model.inverse_dynamics(q, v, a)
         owed = se3(q[:7]).act(pin.Force(efforts[:6]))
+        others = 6 + self._whole.others
+        if others.size:
+            planned = a.copy()
+            planned[others] = 0.0
+            efforts[others] = self._whole.model.inverse_dynamics(q, v, planned)[others]
         return efforts, np.array(owed.linear), np.array(owed.angular)
 
     def solve(

@@ -50,8 +50,9 @@ class Feet(NamedTuple):
 class Footsteps:
     """Plans of all envs."""
 
-    def __init__(self, gait: Gait, tick: float, num_envs: int) -> None:
-        self._gait, self._tick = gait, tick
+    def __init__(self, gait: Gait, tick: float, num_envs: int, swing: Array) -> None:
+        """`swing` (2, 2, 3): what an acceleration of the left and the right foot adds to the pressure [s^2]."""
+        self._gait, self._tick, self._swing = gait, tick, swing
         self._mode = np.zeros(num_envs, dtype=np.int64)
         self._stance = np.zeros(num_envs, dtype=np.int64)
         self._time = np.zeros(num_envs)
@@ -154,7 +155,10 @@ class Footsteps:
         return Feet(places, lift, (swing == 1, swing == 0))
 
     def pressure(self, env: int, command: Array, times: Array, offset: Array) -> Array:
-        """The centre of pressure (H, 2) at times from now, if the command (3,) stays.
+        """The pressure (H, 2) that the pendulum is to have at times from now, if the command (3,) stays.
+
+        It is where the feet want it less what swinging legs add, so that their sum stays in the middle of the soles:
+        a leg that is flung forward carries the trunk along, instead of the toes holding it back.
 
         Args:
             env: which.
@@ -167,11 +171,14 @@ class Footsteps:
         knots, points = [0.0], [self._from[env]]
         clock, double = 0.0, float(self._double[env])
         stance, mode, target, coming = int(self._stance[env]), int(self._mode[env]), self._target[env], self._next[env]
+        added = np.zeros((len(times), 2))
         while True:
             middles = np.array([turned(feet[k], float(offset[k, 0]), float(offset[k, 1]), 0.0)[:2] for k in range(2)])
             end = middles.mean(axis=0) if mode == STANDING else middles[stance]
             knots += [clock + max(double - gait.double, 0.0), clock + double]
             points += [points[-1], end]
+            if mode == STEPPING:
+                added += self._added(1 - stance, feet[1 - stance], target, now + times - clock - double)
             clock += double + gait.single
             knots.append(clock)
             points.append(end)
@@ -185,7 +192,20 @@ class Footsteps:
             target = self._landing(feet[stance], stance, coming)
             coming = command if np.abs(command).max() > 1e-3 else np.zeros(3)
         at, where = np.array(knots), np.array(points)
-        return np.stack([np.interp(now + times, at, where[:, k]) for k in range(2)], axis=1)
+        return np.stack([np.interp(now + times, at, where[:, k]) for k in range(2)], axis=1) - added
+
+    def _added(self, side: int, start: Array, target: Array, since: Array) -> Array:
+        """What a foot that swings from one place to another adds to the pressure (H, 2), at times since it left."""
+        gait = self._gait
+        s = np.clip(since / gait.single, 0.0, 1.0)
+        u, slope = s * (1.0 - s), 1.0 - 2.0 * s
+        along = 60.0 * u * slope / gait.single**2
+        up = gait.clearance * 64.0 * 6.0 * u * (slope**2 - u) / gait.single**2
+        c, n = np.cos(start[2]), np.sin(start[2])
+        away = target[:2] - start[:2]
+        x, y = c * away[0] + n * away[1], c * away[1] - n * away[0]
+        shift = np.stack([along * x, along * y, up], axis=1) @ self._swing[side].T
+        return np.stack([c * shift[:, 0] - n * shift[:, 1], n * shift[:, 0] + c * shift[:, 1]], axis=1)
 
     def _arrays(self) -> dict[str, Array]:
         return {

@@ -15,20 +15,20 @@ from anysim.conventions import Array
 
 
 class Preview:
-    """Weights for one height and tick.
+    """Weights for one height of each direction, and a tick.
 
     Attributes:
         times: (H,) [s] from now, at which the pressure is to be given: one tick ahead first.
     """
 
-    def __init__(self, omega: float, tick: float, horizon: float) -> None:
+    def __init__(self, omega: Array | float, tick: float, horizon: float) -> None:
         b = (omega * tick) ** 2
-        self._root = 1.0 + b / 2.0 - float(np.sqrt(b + b * b / 4.0))
+        self._root = 1.0 + b / 2.0 - np.sqrt(b + b * b / 4.0)
         count = max(1, round(horizon / tick))
         self.times = tick * np.arange(1, count + 1)
-        self._weights = b * self._root ** np.arange(1, count + 1)
+        self._weights = b * self._root ** np.arange(1, count + 1)[:, None]
         self._weights[-1] /= 1.0 - self._root  # from there on the pressure stays
 
     def next(self, com: Array, pressure: Array) -> Array:
         """The centre of mass (2,) a tick after `com` (2,), for the pressure (H, 2) at `times`."""
-        return self._root * com + (self._weights[:, None] * pressure).sum(axis=0)
+        return self._root * com + (self._weights * pressure).sum(axis=0)

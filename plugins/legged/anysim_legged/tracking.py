@@ -92,9 +92,12 @@ class Tracker:
         a = (v - rate) / tick
         self.q[env], self.v[env] = q, v
         efforts, force, torque = self._pushes.required(q, v, a)
-        com, speed, _ = whole.measured(q, v)
-        omega = np.sqrt(self._gravity / com[2])
-        error = self._capture_point(env, targets.feet, seen, omega) - (com[:2] + speed[:2] / omega)
+        # What is measured belongs to the beginning of the tick: compared with the plan's end, it seems to lag by a tick
+        # of motion, several millimetres, and the feedback presses the soles' outer rims to catch up.
+        now, speed, _ = whole.measured(before, (rate + v) / 2.0)
+        omega = np.sqrt(self._gravity / now[2])
+        error = self._capture_point(env, seen, omega) - (now[:2] + speed[:2] / omega)
+        com, _, _ = whole.measured(q, v)
         cop = pressure(force, torque)
         corners = convex_hull(whole.corners(targets.feet, standing, self._soles))
         wanted = nearest_inside(cop + self._gain * error, corners)
@@ -105,10 +108,10 @@ class Tracker:
         self._shares[env], self._feet[env] = shares, targets.feet
         return Orders(q[7 + whole.columns], v[6 + whole.columns], effort)
 
-    def _capture_point(self, env: int, feet: Array, seen: tuple[Array, Array], omega: float) -> Array:
+    def _capture_point(self, env: int, seen: tuple[Array, Array], omega: float) -> Array:
         """Where the measured robot would come to rest (2,), in the plan's frame."""
         com, speed, places = self.whole.measured(*seen)
-        shares = self._shares[env]
+        shares, feet = self._shares[env], self._feet[env]
         turn = sum(float(shares[k]) * wrapped(feet[k, 2] - places[k, 2]) for k in range(2))
         c, s = np.cos(turn), np.sin(turn)
         rotation = np.array([[c, -s], [s, c]])

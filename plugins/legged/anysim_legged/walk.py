@@ -58,8 +58,10 @@ class LipmWalk(Controller):
         self._slew = acceleration * self.high
         self._height = float(whole.home[2])
         com, _, places = whole.measured(whole.home, np.zeros(whole.model.model.nv))
-        omega = float(np.sqrt(-self.robot.world.physics.gravity[2] / com[2]))
-        self._steps = Footsteps(Gait(double, single, clearance, 1.0, whole.stance), self.tracker.tick, num_envs)
+        omega = np.sqrt(-self.robot.world.physics.gravity[2] / whole.pendulum_height())
+        self._steps = Footsteps(
+            Gait(double, single, clearance, 1.0, whole.stance), self.tracker.tick, num_envs, whole.swing_pressure()
+        )
         self._preview = Preview(omega, self.tracker.tick, HORIZON)
         middles = whole.middles(places)
         self._offset = middles - places[:, :2]

@@ -185,6 +185,43 @@ class WholeBody:
             q[7 + self.columns] = np.clip(q[7 + self.columns], self._lower, self._upper)
         return q
 
+    def swing_pressure(self) -> Array:
+        """(2, 2, 3) what an acceleration (x, y, up) of each foot adds to the centre of pressure [s^2], at home.
+
+        A foot that moves while the centre of mass stays turns the body's angular momentum, and the ground has to give
+        that: its pressure moves by the rate of angular momentum over the weight.
+        """
+        added = np.zeros((2, 2, 3))
+        for foot in range(2):
+            for axis in range(3):
+                by = np.zeros((2, 3))
+                by[foot, axis] = 1e-3
+                added[foot, :, axis] = self._turned(by, np.zeros(2)) / 1e-3
+        return added
+
+    def pendulum_height(self) -> Array:
+        """(2,) height [m] of the pendulum that moves as the robot does when it sways along x and along y.
+
+        A sway turns the legs about the feet, so that the pressure is not where a point mass would need it: the same
+        relation holds with another height.
+        """
+        com, _, _ = self.measured(self.home, np.zeros(self.model.model.nv))
+        gravity = float(np.linalg.norm(self.model.model.gravity.linear))
+        sway = [self._turned(np.zeros((2, 3)), by)[k] / 1e-3 for k, by in enumerate(1e-3 * np.eye(2))]
+        return float(com[2]) - gravity * np.array(sway)
+
+    def _turned(self, feet: Array, com: Array) -> Array:
+        """How far the pressure (2,) moves per 1/s^2 while feet (2, 3; x, y, up) and centre of mass (2,) move so."""
+        pin = pinocchio()
+        model, data = self.model.model, self.model.data
+        present, _, places = self.measured(self.home, np.zeros(model.nv))
+        places[:, :2] += feet[:, :2]
+        targets = Targets(places, feet[:, 2], present[:2] + com, float(self.home[2]), self.upright)
+        moved = self.solve(self.home, targets, self.home[7 + self.columns], iterations=4)
+        pin.computeCentroidalMomentum(model, data, self.home, self.difference(self.home, moved))
+        lx, ly, _ = data.hg.angular
+        return np.array([-ly, lx]) / (self.mass * float(np.linalg.norm(model.gravity.linear)))
+
     def difference(self, before: Array, after: Array) -> Array:
         """Velocity (nv,) that leads from one configuration to another in a second."""
         return np.array(pinocchio().difference(self.model.model, before, after))

@@ -146,9 +146,46 @@ def test_feet_press_only_within_their_soles(whole: WholeBody) -> None:
         assert ahead == pytest.approx((whole.soles[k, 1] - whole.soles[k, 0]) / 2.0)
 
 
+def test_a_swinging_leg_and_a_sway_move_the_pressure_as_inverse_dynamics_says(whole: WholeBody) -> None:
+    com, _, places = whole.measured(whole.home, np.zeros(whole.model.model.nv))
+    posture, gravity = whole.home[7 + whole.columns], 9.81
+    pushes = Pushes(whole, channel("unitree_g1").robot, whole.soles)
+    still = np.zeros(whole.model.model.nv)
+
+    def pressed(feet: np.ndarray, moved: np.ndarray) -> np.ndarray:
+        """Where the ground presses while the feet and the centre of mass begin to move with these accelerations."""
+        targets = Targets(places + np.pad(feet, ((0, 0), (0, 1))) * 1e-4, np.zeros(2), com[:2] + moved * 1e-4,
+                          float(whole.home[2]), whole.upright)  # fmt: skip
+        there = whole.solve(whole.home, targets, posture, iterations=4)
+        _, force, torque = pushes.required(whole.home, still, whole.difference(whole.home, there) / 1e-4)
+        return np.array([-torque[1], torque[0]]) / force[2]
+
+    nothing = np.zeros((2, 2))
+    forward = nothing.copy()
+    forward[0, 0] = 1.0
+    swing = pressed(forward, np.zeros(2)) - pressed(nothing, np.zeros(2))
+    assert np.allclose(swing, whole.swing_pressure()[0, :, 0], atol=3e-4)
+    for k, height in enumerate(whole.pendulum_height()):
+        sway = pressed(nothing, np.eye(2)[k]) - pressed(nothing, np.zeros(2))
+        assert sway[k] == pytest.approx(-height / gravity, rel=0.01)
+    assert whole.pendulum_height()[1] > com[2], "legs that turn about the feet make the pendulum longer"
+
+
+def test_drives_that_others_command_get_no_effort_from_their_measured_acceleration(whole: WholeBody) -> None:
+    pushes = Pushes(whole, channel("unitree_g1").robot, whole.soles)
+    still = np.zeros(whole.model.model.nv)
+    moving = still.copy()
+    moving[6 + whole.others] = 5.0
+    calm, _, _ = pushes.required(whole.home, still, still)
+    efforts, force, torque = pushes.required(whole.home, still, moving)
+    assert np.allclose(efforts[6 + whole.others], calm[6 + whole.others])
+    assert np.abs(torque - pushes.required(whole.home, still, still)[2]).max() > 0.1, "the ground does carry it"
+    assert np.isfinite(force).all()
+
+
 def test_footsteps_walk_at_the_commanded_speed_and_end_side_by_side() -> None:
     gait = Gait(double=0.2, single=0.5, clearance=0.05, lead=1.0, width=0.2)
-    steps = Footsteps(gait, TICK, 1)
+    steps = Footsteps(gait, TICK, 1, np.zeros((2, 2, 3)))
     steps.begin(0, np.array([[0.0, 0.1, 0.0], [0.0, -0.1, 0.0]]))
     lifts, still = [], np.zeros(3)
     for k in range(1500):
