@@ -12,7 +12,7 @@ from anysim.qualify.result import Check, Facts
 from anysim.qualify.stage import NAME
 from anysim.world.imported import ImportNote
 from anysim.world.lookup import Frame, find_frame
-from anysim.world.model import World
+from anysim.world.model import JointType, World
 
 CONFIGURATIONS = 20
 MASS = 1e-5
@@ -117,8 +117,10 @@ def _frames(world: World, oracle: Oracle, still: dict[str, float]) -> dict[str, 
 
 def _random_positions(world: World, oracle: Oracle, names: list[str], rng: np.random.Generator) -> Array:
     """(J,) within the limits; what follows another in the World or in the source does so."""
-    lower = np.array([max(joint.lower, -np.pi) for joint in world.joints])
-    upper = np.array([min(joint.upper, np.pi) for joint in world.joints])
+    # a metre is far enough for what slides without end: engines of single precision read frames further out less well
+    far = np.array([1.0 if joint.type is JointType.PRISMATIC else np.pi for joint in world.joints])
+    lower = np.maximum([joint.lower for joint in world.joints], -far)
+    upper = np.minimum([joint.upper for joint in world.joints], far)
     q = lower + (upper - lower) * rng.random(len(lower))
     entity = next(e for e in world.entities if e.name == NAME)
     place = {name: entity.joint_start + i for i, name in enumerate(names)}
