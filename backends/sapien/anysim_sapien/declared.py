@@ -16,7 +16,7 @@ REMEDY = "pip install 'sapien>=3.0.3'"
 _APPROXIMATE = {
     Capability.CONTACTS: "a cylinder is a prism of many sides: it rolls 11 % slower than a round one down 15 degrees",
     Capability.SHAPE_MESH: (
-        "PhysX cooks hulls and drops corners within 0.7 mm of the rest: 0.2 % less volume at a hand's size, up to 6 % at 3 cm"
+        "PhysX cooks hulls and drops corners within 0.7 mm of the rest: 0.2 % of a hand's volume, up to 6 % at 3 cm"
     ),
     Capability.MIMIC_JOINTS: (
         "a stiff spring: 0.04 mm at 20 N on a gripper's finger; only links with one parent, or a link and its child"
@@ -48,7 +48,7 @@ CAPABILITIES = Capabilities.of(
 AUDIT_ALLOWANCES = {
     "volume": Allowance(
         0.07,
-        "PhysX cooks hulls anew and drops corners within 0.7 mm of the rest: 0.2 % less volume at a hand's size, "
+        "PhysX cooks hulls anew and drops corners within 0.7 mm of the rest: 0.2 % of a hand's volume, "
         "up to 6 % at 3 cm",
     )
 }
