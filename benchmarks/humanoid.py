@@ -3,7 +3,8 @@
     python benchmarks/humanoid.py [ENGINE ...]
 
 Columns: largest joint error after five seconds of standing [rad]; falls in eight pushes of 0.3 m/s; pelvis height at
-the end of a squat of 18 cm, relative to home [m]; distance walked in ten seconds at 0.2 m/s, and planned [m].
+the end of a squat of 18 cm, relative to home [m]; where the centre of mass went in ten seconds of walking at 0.2 m/s,
+and where the plan had it at that instant, forward and to the left [m].
 """
 
 import argparse
@@ -51,13 +52,23 @@ def row(engine: str) -> str:
     made = env(engine, "lipm_walk")
     assert made.robots is not None
     walk: Any = made.robots.slice_of("g1", "base").controller
-    planned = walk.planned()[0]
+    planned, begin = walk.planned()[0], centre(walk)
     hold(made, np.array([0.2, 0.0, 0.0]), 10.0)
     end = made.engine.get_state().body_pose[0, root]
-    far, plan = float(end[0] - start[0]), float(walk.planned()[0, 0] - planned[0])
+    far, plan = centre(walk) - begin, walk.planned()[0] - planned
     fell = " (fell)" if abs(end[2] - start[2]) > 0.1 else ""
     made.close()
-    return f"| {engine} | {error:.4f} | {falls} of 8 | {squat:.3f} | {far:.3f} of {plan:.3f}{fell} |"
+    walked = f"{far[0]:.3f}, {far[1]:.3f} of {plan[0]:.3f}, {plan[1]:.3f}{fell}"
+    return f"| {engine} | {error:.4f} | {falls} of 8 | {squat:.3f} | {walked} |"
+
+
+def centre(walk: Any) -> np.ndarray:
+    """Where the measured centre of mass is (2,) [m]."""
+    robot, whole = walk.robot, walk.tracker.whole
+    base = robot.base_pose(None)[0]
+    q = whole.model.q(robot.joint_pos(None)[0], base)
+    v = whole.model.v(robot.joint_vel(None)[0], base, robot.base_twist(None)[0])
+    return np.array(whole.measured(q, v)[0][:2])
 
 
 def hold(made: TaskEnv, action: np.ndarray, seconds: float) -> None:

@@ -112,16 +112,15 @@ def test_it_walks_where_it_planned(engine: str) -> None:
     assert plan[0] > 1.2
     assert np.linalg.norm(moved - plan) < 0.02 * np.linalg.norm(plan), "the same point of the body at the same instant"
     assert abs(pelvis(made)[0, 2] - height) < 0.02
-    run(made, np.zeros(3), 4.0)
+    run(made, np.zeros(3), 3.0)
     assert np.abs(pelvis(made)[0, 2] - height) < 0.005, "it stands after the last step"
     assert np.abs(made.engine.get_state().joint_vel).max() < 0.05
     made.close()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", ENGINES)
-def test_arms_with_hands_do_not_swing_up_by_themselves(engine: str) -> None:
-    made = env(engine, "default", robot="unitree_g1_hands")
+def test_arms_with_hands_do_not_swing_up_by_themselves() -> None:
+    made = env("mujoco", "default", robot="unitree_g1_hands")
     home = np.array(made.engine.get_state().joint_pos)
     run(made, np.zeros(6), 6.0)
     assert np.abs(made.engine.get_state().joint_pos - home).max() < 0.01
