@@ -138,7 +138,7 @@ def efforts(robot: Puppet, target: np.ndarray, ids: np.ndarray | None = None) ->
     """(steps, E, K) of three control steps on robots that stand still."""
     found = []
     for step in range(3):
-        target = target + [0.002 * step, 0.0, 0.001, 0.0, 0.0, 0.0, 0.0]
+        target = target + np.array([0.002 * step, 0.0, 0.001, 0.0, 0.0, 0.0, 0.0])
         found += [robot.controller.apply(target, ids).effort]
         found += [robot.controller.update(ids).effort for _ in range(2)]
     return np.array(found)
@@ -164,7 +164,7 @@ def test_efforts_of_a_row_are_the_same_bits_in_any_batch(drives: str) -> None:
 def test_operational_space_goes_on_from_a_snapshot() -> None:
     robot = operational(2)
     start, ids = robot.tool(), np.array([1])
-    efforts(robot, start + [0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    efforts(robot, start + np.array([0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
     kept = robot.controller.snapshot(ids)
     first = efforts(robot, start)[:, 1]
     robot.controller.restore(ids, kept)

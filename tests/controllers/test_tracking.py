@@ -13,7 +13,7 @@ ENGINES = ("mujoco", "pybullet", "sapien")
 TURN = 0.002
 """[rad] root mean square, of the tool's orientation."""
 OTHERS = {"differential_ik": (0.0005, TURN), "batched_ik": (0.0005, TURN), "operational_space": (0.001, 0.003)}
-"""Root mean square distance [m] and turn [rad]. Of `operational_space`, tools give way to what its model does not know."""
+"""Root mean square distance [m] and turn [rad]. `operational_space` gives way to what it does not know."""
 
 
 @pytest.mark.slow

@@ -1,6 +1,6 @@
 """Two hands carry a tray: `pink_ik` solves both arms as one problem, and the hands keep their distance.
 
-The robot's trunk is fixed. There is no tray in contact: it is its weight, half of which pulls down at each hand, and its
+The robot's trunk is fixed. No tray is in contact: it is its weight, half of which pulls down at each hand, and its
 stiffness is what is tested: how far the hands come from the places at its ends, as seen from each other. What other
 channels move (fingers, a head) is held at home, and fingers that follow others have to follow throughout.
 """
@@ -83,7 +83,7 @@ def test_two_hands_carry_a_tray(robot: str, engine: str) -> None:
             lost += [abs(joints[i] - m.multiplier * joints[m.joint] - m.offset) for i, m in followers]
             off.append(P.norm(poses[:, :3] - P.compose(base, target)[:, :3]).max())
     print(
-        f"{robot} {engine}: hands {1e3 * max(apart):.2f} mm apart from the tray, {1e3 * max(off):.2f} mm off their way, "
+        f"{robot} {engine}: hands {1e3 * max(apart):.2f} mm apart, {1e3 * max(off):.2f} mm off their way, "
         f"followers off by {1e3 * max(lost):.3f} mm"
     )
     assert max(apart) <= 0.005

@@ -265,8 +265,8 @@ def drive_law(
     (M + A + dt (Kd + D)) qdd = u + f - D qd - c + known + outer. D is the joints' own damping, A their armature, M, c
     and known are those of `dynamics`. f is dry friction: it stops the joint by the end of the step where that takes no
     more than its coefficient. Bullet's own would hold the bare link, and let go of one with much armature only after
-    the torque has built up over many steps. `outer` is what else acted in the last step (contacts, limits): the momentum
-    M dv/dt + c that the applied forces do not explain. Joints that follow another are coupled in the equation,
+    the torque has built up over many steps. `outer` is what else acted in the last step (contacts, limits): the
+    momentum M dv/dt + c that the applied forces do not explain. Joints that follow another are coupled in the equation,
     and the forces of the coupling drop out of it.
 
     Args:
@@ -315,7 +315,7 @@ def drive_law(
         drag[i] = drives[i, DRAG]
         if not implicit:
             pull[i], drag[i] = min(max(pull[i], -drives[i, LIMIT]), drives[i, LIMIT]), 0.0
-    # What friction alone would not stop within the step slips on; the rest is taken as held. Either may prove wrong once.
+    # What friction alone would not stop within the step slips on; the rest is taken as held. Either may be wrong once.
     rub, grip, hold, passes = np.zeros(n), np.zeros(n), np.zeros(n), MAX_PASSES
     for i in range(n):
         if drives[i, DRY] > 0.0:

@@ -151,7 +151,7 @@ def test_worlds_without_drives_are_left_to_bullet():
 
 @pytest.mark.parametrize("kind", list(JointType))
 def test_dry_friction_acts_on_the_armature_too(build, kind):
-    """2 N m hold against 1.9 and take 2 off 3 of a link whose armature is 400 times its own inertia, and let go at once.
+    """2 N m hold against 1.9 and take 2 off 3 of a link with an armature hundreds of times its inertia, from the start.
 
     It stops what coasts, and ends where it is taken away.
     """
