@@ -1,11 +1,13 @@
-"""Standing and walking of the G1 on every engine: `python benchmarks/humanoid.py [ENGINE ...]` prints a table.
+"""Standing and walking of the G1 on every engine, as a table.
+
+    python benchmarks/humanoid.py [ENGINE ...]
 
 Columns: largest joint error after five seconds of standing [rad]; falls in eight pushes of 0.3 m/s; pelvis height at
 the end of a squat of 18 cm, relative to home [m]; where the centre of mass went in ten seconds of walking at 0.2 m/s,
 and where the plan had it at that instant, forward and to the left [m].
 """
 
-import sys
+import argparse
 from typing import Any
 
 import numpy as np
@@ -76,8 +78,16 @@ def hold(made: TaskEnv, action: np.ndarray, seconds: float) -> None:
         made.step(rows)
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("engines", nargs="*", default=["mujoco", "pybullet", "sapien"])
+    options = parser.parse_args()
     print("| engine | stand 5 s [rad] | pushes 0.3 m/s, falls | squat 0.18 m [m] | walk 10 s at 0.2 m/s [m] |")
     print("|---|---|---|---|---|")
-    for engine in sys.argv[1:] or ("mujoco", "pybullet", "sapien"):
+    for engine in options.engines:
         print(row(engine), flush=True)
+
+
+if __name__ == "__main__":
+    main()

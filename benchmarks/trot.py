@@ -1,6 +1,6 @@
 """How fast quadrupeds trot, on every engine: speeds reached per robot, engine and command, one controller for all.
 
-    python -m benchmarks.trot [ROBOT ...] [--engines mujoco,sapien] [--seconds 7]
+    python benchmarks/trot.py [ROBOT ...] [--engines mujoco,sapien] [--seconds 7]
 
 Each row is one run of three envs: forward, sideways and turning at once. Means of the last 60 %, in the heading frame.
 The walks are deterministic; no figure is a time.
@@ -10,7 +10,7 @@ import argparse
 
 import numpy as np
 
-from tests.robots.quadrupeds import QUADRUPEDS, WITH_ARM, made, walk
+from anysim.testing.quadrupeds import QUADRUPEDS, WITH_ARM, made, walk
 
 SLOW = {"solo12": 0.3, "hyq": 0.4, "anymal_kinova": 0.4}
 """[m/s] forward where half a metre a second is too fast: small, short of torque, and with a swaying load."""

@@ -83,4 +83,4 @@ def test_an_entry_says_its_licence_and_has_the_usual_controllers(name: str) -> N
 
 def test_the_licences_of_parts_are_the_robots_too() -> None:
     world = compile_world(RunSpec.model_validate({"world": {"robots": {"arm": {"robot": "ur5_gripper"}}}}))
-    assert world.entities[0].license == "BSD-3-Clause AND Apache-2.0"
+    assert world.entities[0].license == "LicenseRef-BSD AND Apache-2.0"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.robots.quadrupeds import QUADRUPEDS, WITH_ARM, made, stand, walk
+from anysim.testing.quadrupeds import QUADRUPEDS, WITH_ARM, made, stand, walk
 
 ENGINES = ("mujoco", "pybullet", "sapien")
 SPEED = {"unitree_go1": 0.5, "unitree_go2": 0.5, "unitree_b1": 0.5, "anymal_b": 0.5, "solo12": 0.3}

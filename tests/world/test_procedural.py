@@ -99,9 +99,10 @@ def test_a_wheel_counts_no_mass_twice() -> None:
 def test_every_builder_makes_a_sound_model(name: str) -> None:
     """Depth first, one joint a link, possible inertias, simple shapes, unique names, a place to hold or hold with."""
     model = build(name, {})
-    assert [body.kind for body in model.bodies] == [BodyKind.FREE, *[BodyKind.LINK] * len(model.joints)]
+    root = BodyKind.STATIC if name == "camera_body" else BodyKind.FREE
+    assert [body.kind for body in model.bodies] == [root, *[BodyKind.LINK] * len(model.joints)]
     assert [joint.body for joint in model.joints] == list(range(1, len(model.bodies)))
-    for body in model.bodies:
+    for body in model.bodies[root is BodyKind.STATIC :]:
         assert body.inertial.mass > 0
         moments = np.linalg.eigvalsh(inertia.tensor(body.inertial))
         assert moments[0] > 0
@@ -110,7 +111,7 @@ def test_every_builder_makes_a_sound_model(name: str) -> None:
     for things in (model.bodies, model.joints, model.geoms, model.sites):
         names = [thing.name for thing in things]
         assert len(set(names)) == len(names)
-    assert any(site.name.endswith((".handle", "tcp", "top")) for site in model.sites)
+    assert any(site.name.endswith((".handle", "tcp", "top", "lens")) for site in model.sites)
     assert build(name, {}) == model
 
 

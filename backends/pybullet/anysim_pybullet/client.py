@@ -139,6 +139,8 @@ class Env:
         p, world, plan = bullet(), self.plan.world, self.plan
         self.body_at: list[tuple[int, int]] = [(-1, -1)] * len(world.bodies)
         self.joint_link: list[int] = [-1] * len(world.joints)
+        self.rubbing: dict[int, float] = {}
+        """The dry friction that Bullet applies, by joint."""
         self.shape_at: dict[int, tuple[int, int]] = {}
         self.body_of: dict[int, dict[int, int]] = {}  # World body by Bullet body and link, -1 for the world
         self.root_ids: list[int] = [-1] * len(plan.trees)
@@ -254,6 +256,9 @@ class Env:
 
     def set_dry_friction(self, joint: int, friction: float) -> None:
         """Bullet's velocity motor with target 0: a constraint with a bounded force, which is dry friction."""
+        if self.rubbing.get(joint) == friction:
+            return
+        self.rubbing[joint] = friction
         p = bullet()
         uid = self.body_at[self.plan.world.joints[joint].body][0]
         p.setJointMotorControl2(

@@ -31,10 +31,14 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
 PARENT, PRISMATIC, LEADER = range(3)  # columns of `joint_ints` (n, 3)
 AXIS, ORIGIN, REST = 0, 3, 6  # columns of `joint_floats` (n, 15): axis, origin in the parent, rest rotation by rows
 MASS, COM, INERTIA, COMPENSATED = 0, 1, 4, 10  # columns of `bodies` (n + 1, 11); com and inertia in the link's frame
-DAMPING, ARMATURE, STIFFNESS, DRAG, LIMIT, PULL, MULTIPLIER, FEED, BOUND = range(9)  # columns of `drives` (n, 9)
+DAMPING, ARMATURE, STIFFNESS, DRAG, LIMIT, PULL, MULTIPLIER, FEED, BOUND, DRY = range(10)  # columns of `drives`
 
 MAX_PASSES = 3
-"""Solutions per step: each takes the drives that it finds beyond their limits as constant torques from then on."""
+"""Solutions per step: each takes the drives that it finds beyond their limits as constant torques from then on,
+and so the dry friction of joints that it cannot hold."""
+
+STICKING = 1e6
+"""A joint that dry friction holds is slowed down as if its inertia were this many times its own."""
 
 
 @compiled
@@ -258,15 +262,17 @@ def drive_law(
 
     The law is u = kp (q* - q) + kd (qd* - qd) + ff, clipped, its damping taken at the end of the step if `implicit`,
     else at the beginning, as if kd were 0 in what follows. The torque is clip(u - dt kd qdd) with
-    (M + A + dt (Kd + D)) qdd = u - D qd - c + known + outer. D is the joints' own damping, A their armature, M, c and
-    known are those of `dynamics`. `outer` is what else acted in the last step (contacts, limits, dry friction): the
+    (M + A + dt (Kd + D)) qdd = u + f - D qd - c + known + outer. D is the joints' own damping, A their armature, M, c
+    and known are those of `dynamics`. f is dry friction: it stops the joint by the end of the step where that takes no
+    more than its coefficient. Bullet's own would hold the bare link, and let go of one with much armature only after
+    the torque has built up over many steps. `outer` is what else acted in the last step (contacts, limits): the
     momentum M dv/dt + c that the applied forces do not explain. Joints that follow another are coupled in the equation,
     and the forces of the coupling drop out of it.
 
     Args:
-        drives: (n, 9): damping, armature, the stiffness and damping of the drive in its mode, its limit,
+        drives: (n, 10): damping, armature, the stiffness and damping of the drive in its mode, its limit,
             kp q* + kd qd*, the multiplier of a joint that follows another (`LEADER` >= 0), ff, and what bounds
-            kp (q* - q) + kd qd*.
+            kp (q* - q) + kd qd*, and dry friction.
         memory: of the last step: 1 if it holds one, velocity, c - applied, M. Brought up to date.
         out: (2 n + 6): torques for the joints, efforts of the drives, force and moment on a free root's origin.
 
@@ -309,8 +315,19 @@ def drive_law(
         drag[i] = drives[i, DRAG]
         if not implicit:
             pull[i], drag[i] = min(max(pull[i], -drives[i, LIMIT]), drives[i, LIMIT]), 0.0
+    # What friction alone would not stop within the step slips on; the rest is taken as held. Either may be wrong once.
+    rub, grip, hold, passes = np.zeros(n), np.zeros(n), np.zeros(n), MAX_PASSES
+    for i in range(n):
+        if drives[i, DRY] > 0.0:
+            passes += 2
+            own = matrix[first + i, first + i] + drives[i, ARMATURE]
+            hold[i] = STICKING * own / dt
+            if abs(motion[1, i]) * own > dt * drives[i, DRY]:
+                rub[i] = -math.copysign(drives[i, DRY], motion[1, i])
+            else:
+                rub[i], grip[i], hold[i] = -hold[i] * motion[1, i], hold[i], 0.0
     gained, reduced, right = np.empty(size), np.empty((free, free)), np.empty(free)
-    for _ in range(MAX_PASSES):
+    for _ in range(passes):
         for r in range(free):
             right[r] = 0.0
             for c in range(free):
@@ -319,12 +336,14 @@ def drive_law(
             row = column[leader[r]]
             total = known[r] + outer[r] - bias[r]
             if r >= first:
-                total += pull[r - first] - drives[r - first, DAMPING] * motion[1, r - first]
+                total += pull[r - first] + rub[r - first] - drives[r - first, DAMPING] * motion[1, r - first]
             right[row] += factor[r] * total
             for c in range(size):
                 entry = matrix[r, c]
                 if r == c and r >= first:
-                    entry += drives[r - first, ARMATURE] + dt * (drag[r - first] + drives[r - first, DAMPING])
+                    entry += drives[r - first, ARMATURE] + dt * (
+                        drag[r - first] + grip[r - first] + drives[r - first, DAMPING]
+                    )
                 reduced[row, column[leader[c]]] += factor[r] * factor[c] * entry
         if not _solve(reduced, right, free):
             return False
@@ -338,6 +357,13 @@ def drive_law(
                 effort[i] = limit if effort[i] > 0.0 else -limit
                 changed = changed or drag[i] != 0.0 or pull[i] != effort[i]
                 pull[i], drag[i] = effort[i], 0.0
+            held = rub[i] - dt * grip[i] * gained[first + i]
+            if grip[i] > 0.0 and abs(held) > drives[i, DRY]:
+                rub[i], grip[i] = math.copysign(drives[i, DRY], held), 0.0
+                changed = True
+            elif hold[i] > 0.0 and (motion[1, i] + dt * gained[first + i]) * motion[1, i] < 0.0:
+                rub[i], grip[i], hold[i] = -hold[i] * motion[1, i], hold[i], 0.0
+                changed = True
         if not changed:
             break
     for k in range(6):
@@ -345,7 +371,8 @@ def drive_law(
     for i in range(n):
         v = first + i
         slowed = motion[1, i] + dt * gained[v]
-        out[i] = effort[i] - drives[i, DAMPING] * slowed - drives[i, ARMATURE] * gained[v] + known[v]
+        rubbed = rub[i] - dt * grip[i] * gained[v]
+        out[i] = effort[i] + rubbed - drives[i, DAMPING] * slowed - drives[i, ARMATURE] * gained[v] + known[v]
         out[n + i] = effort[i]
     memory[0] = 1.0
     for r in range(size):

@@ -22,7 +22,7 @@ from anysim_pybullet.tree import Frames, Tree
 _POSITION, _EFFORT = MODES.index(ControlMode.POSITION), MODES.index(ControlMode.EFFORT)
 
 
-_ONLY_COUPLED = np.array([0, 0, 0, 0, 1, 0, 1, 0, 1], dtype=float)
+_ONLY_COUPLED = np.array([0, 0, 0, 0, 1, 0, 1, 0, 1, 0], dtype=float)
 """Takes everything away from the drive of a joint that a motor moves, but limits and its multiplier."""
 
 
@@ -44,12 +44,15 @@ class Laws:
         self.kp = np.tile(np.array([a.kp for a in actuators], dtype=float), (n, 1))
         self.kd = np.tile(np.array([a.kd for a in actuators], dtype=float), (n, 1))
         self.limit = np.tile(np.array([a.effort_limit for a in actuators], dtype=float), (n, 1))
-        self.drives = np.zeros((n, len(joints), 9))
+        self.drives = np.zeros((n, len(joints), 10))
         self.drives[:, :, K.DAMPING] = [j.damping for j in joints]
         self.drives[:, :, K.ARMATURE] = [j.armature for j in joints]
         self.drives[:, :, [K.LIMIT, K.BOUND]] = np.inf
+        self.drives[:, :, K.DRY] = [j.friction for j in joints]
         for tree in trees:
             self.drives[:, tree.joints, K.MULTIPLIER] = tree.multiplier
+        self.rubs = False
+        """Whether there is dry friction, or was."""
         self.acting = self.drives
         """What the law uses: `drives`, or a copy in which the joints that motors move have none."""
         self.bodies = np.zeros((n, len(bodies), 11))
@@ -81,6 +84,7 @@ class Laws:
         loose: Array = np.ones(len(law), dtype=bool)
         if self.motors is not None:
             loose = np.logical_not(np.all(self.motors.running, axis=0))
+        self.rubs = self.rubs or bool(self.drives[:, :, K.DRY].any())
         damped: Array = np.any(self.damping != 0, axis=(0, 2))
         lifted: Array = np.any(self.bodies[:, :, K.COMPENSATED] != 0, axis=0)
         self.needs = [
@@ -128,11 +132,19 @@ class Laws:
         """What is left to do in an env where Bullet's motors do everything else; None where the law is needed."""
         if self.motors is None or self.wrench is not None or any(self.needs):
             return None
+        if self.rubs:
+            for tree in env.cast.trees:
+                self.share_friction(env, index, tree, acts=False)
         lifter = self._lifters.get(index)
         if lifter is None or lifter.client != env.id or lifter.cast is not env.cast:
             lifter = Lifter(env, index, self, [t for t in env.cast.trees if self.lifts[t.number]])
             self._lifters[index] = lifter
         return lifter
+
+    def share_friction(self, env: Env, index: int, tree: Tree, *, acts: bool) -> None:
+        """Dry friction is the law's where it acts on an articulation, else Bullet's."""
+        for joint in tree.joints.tolist():
+            env.set_dry_friction(joint, 0.0 if acts else float(self.drives[index, joint, K.DRY]))
 
     def forget(self, ids: Array | int, trees: Array | None = None) -> None:
         """The velocities of these envs (of these trees) were written: the last step explains nothing now."""
@@ -162,6 +174,9 @@ class Pusher:
     def __init__(self, env: Any, index: int, laws: Laws, p: Any, dt: float) -> None:
         self._p, self._env, self._laws, self._index, self._dt = p, env, laws, index, dt
         self._work = [self._task(tree) for tree in env.cast.trees if self._needed(tree)]
+        if laws.rubs:
+            for tree in env.cast.trees:
+                laws.share_friction(env, index, tree, acts=self._needed(tree))
         lifted = [t for t in env.cast.trees if laws.lifts[t.number] and not self._needed(t)]
         self._lifter = Lifter(env, index, laws, lifted)
 

@@ -17,7 +17,7 @@ from anysim_pybullet.declared import PARAMETERS
 from anysim_pybullet.law import Laws
 from anysim_pybullet.motors import refuse_dry_friction
 
-_JOINT = {"joint.damping": K.DAMPING, "joint.armature": K.ARMATURE}
+_JOINT = {"joint.damping": K.DAMPING, "joint.armature": K.ARMATURE, "joint.friction": K.DRY}
 
 
 class Parameters:
@@ -35,7 +35,6 @@ class Parameters:
             np.tile(nominal(f"geom.{name}", world), (n, 1)) for name in ("restitution", "texture", "material")
         )
         self.color = np.tile(np.array([g.color for g in world.geoms], dtype=float).reshape(-1, 4), (n, 1, 1))
-        self.dry = np.tile(np.array([j.friction for j in world.joints], dtype=float), (n, 1))
         self.looks = looks
         self._defaults = {name: self._all(name)[0].copy() for name in PARAMETERS if name not in looks}
         self._touched: list[dict[str, None]] = [{} for _ in envs]
@@ -91,7 +90,7 @@ class Parameters:
             self._rebuild(index)
         elif name == "joint.friction":
             for joint in np.intersect1d(indices, env.cast.joints).tolist():
-                env.set_dry_friction(joint, float(self.dry[index, joint]))
+                env.set_dry_friction(joint, float(self._laws.drives[index, joint, K.DRY]))
         elif name in ("body.mass", "body.inertia"):
             for body in indices.tolist():
                 if env.cast.bodies[body] and self._world.bodies[body].kind != "static":
@@ -126,7 +125,7 @@ class Parameters:
             "geom.color": self.color,
             "geom.restitution": self.restitution, "geom.texture": self.texture, "geom.material": self.material,
             "body.linear_damping": laws.damping[:, :, 0], "body.angular_damping": laws.damping[:, :, 1],
-            "joint.friction": self.dry, "actuator.kp": laws.kp, "actuator.kd": laws.kd,
+            "actuator.kp": laws.kp, "actuator.kd": laws.kd,
             "actuator.effort_limit": laws.limit,
         }[name]  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""Efforts that a motion of a robot's joints takes: inertia, centrifugal forces, damping and weight."""
+"""Efforts that a motion of a robot's joints takes: inertia, centrifugal forces, damping, dry friction and weight."""
 
 from typing import Annotated
 
@@ -17,6 +17,10 @@ CarryWeight = Annotated[
 ]
 
 
+CREEP = 0.02
+"""[rad/s], [m/s] Dry friction is made up for by its tanh of the wanted rate over this: none at rest, where it holds."""
+
+
 class LinkEffort:
     """Inverse dynamics of one robot whose base does not accelerate.
 
@@ -28,16 +32,24 @@ class LinkEffort:
         self._model = robot.kinematics
         self._floating = 6 if robot.floating else 0
         self._damping = np.array([robot.world.joints[j].damping for j in robot.joints])
+        self._friction = np.array([robot.world.joints[j].friction for j in robot.joints])
         entry = robot.robot.entry
         cancelled = entry is not None and entry.gravity_compensation
         self.carries = not cancelled and (not robot.floating if carry_weight is None else carry_weight)
         self._still = np.zeros(self._model.model.nv)
 
-    def of(self, joint_pos: Array, joint_vel: Array, acceleration: Array, base: Array) -> Array:
-        """Efforts (J,) [N m], [N] of a state and an acceleration (J,) each; the base's world pose (7,) tells up."""
+    def of(
+        self, joint_pos: Array, joint_vel: Array, acceleration: Array, base: Array, wanted_vel: Array | None = None
+    ) -> Array:
+        """Efforts (J,) [N m], [N] of a state and an acceleration (J,) each; the base's world pose (7,) tells up.
+
+        Dry friction is made up for in the direction of `wanted_vel` (J,), or of `joint_vel` where that is a reference.
+        It is never more than the friction itself, which works against any other motion: together they only brake.
+        """
         model = self._model
         q = model.q(joint_pos, base)
         effort = model.inverse_dynamics(q, model.v(joint_vel), model.v(acceleration))
         if not self.carries:
             effort = effort - model.inverse_dynamics(q, self._still, self._still)
-        return effort[self._floating :] + self._damping * joint_vel
+        wanted = joint_vel if wanted_vel is None else wanted_vel
+        return effort[self._floating :] + self._damping * joint_vel + self._friction * np.tanh(wanted / CREEP)

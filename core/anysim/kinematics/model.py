@@ -40,6 +40,7 @@ class RobotModel:
         floating: whether the base is free.
         joints: (J,) world indices of the robot's joints, in the model's order.
         joint_names: their names without the robot's.
+        root: the name of the base's frame; it is called `base` as well, unless another link is.
         lower, upper, velocity_limit, effort_limit: (J,) of the World.
     """
 
@@ -73,6 +74,10 @@ class RobotModel:
             if site.body in parents:
                 pose = P.pose(site.position, site.quaternion)
                 self._add_frame(site.name, parents[site.body], self._in_joint(site.body, pose))
+        self.root = world.bodies[entity.root].name.removeprefix(f"{robot}.")
+        if self.root == robot:
+            self.root = "base"
+        self._frames.setdefault("base", self._frames[self.root])
         self.data = self.model.createData()
 
     # ------------------------------------------------------------------ building
@@ -137,7 +142,7 @@ class RobotModel:
     # ------------------------------------------------------------------ names and vectors
 
     def frame(self, name: str) -> int:
-        """Pinocchio's index of a tool, sensor, link or body of the robot; `base` is its root.
+        """Pinocchio's index of a tool, sensor, link or body; `base` is the root's, unless another link is called so.
 
         Raises:
             NameLookupError: lists what exists.

@@ -21,6 +21,7 @@ from anysim.qualify.stage import NAME
 from anysim.world.assets import AssetFile, locate
 from anysim.world.catalogue import CatalogueEntry
 from anysim.world.model import World
+from anysim.world.vehicles import CARRIAGES, PLANAR_JOINTS
 from anysim_schemas.object_source import PROCEDURAL
 from anysim_schemas.robot_model import PartSpec
 
@@ -66,9 +67,8 @@ def oracle_of(entry: CatalogueEntry, world: World) -> Oracle:
     if spec.source.startswith(PROCEDURAL) or any(part.source.startswith(PROCEDURAL) for part in spec.parts):
         return _Pinocchio(world)
     main = _reader(locate(spec.source, base=entry.file.parent))
-    if not spec.parts:
-        return main
-    return _Composed(main, entry)
+    whole = _Composed(main, entry) if spec.parts else main
+    return _OnPlane(whole) if spec.base == "planar" else whole
 
 
 def _reader(file: AssetFile) -> Oracle:
@@ -108,6 +108,27 @@ class _Composed:
         return found
 
 
+class _OnPlane:
+    """A robot on the three joints that `base: planar` puts under it, and their two carriages."""
+
+    def __init__(self, robot: Oracle) -> None:
+        self._robot = robot
+        self.name = f"{robot.name}, moved over the plane"
+        self.joints: int | None = None if robot.joints is None else robot.joints + len(PLANAR_JOINTS)
+        self.mass: float | None = None if robot.mass is None else robot.mass + CARRIAGES
+        self.followers = robot.followers
+        self.root = "rail"
+
+    def frames(self, joint_pos: Mapping[str, float]) -> Mapping[str, Array]:
+        x, y, yaw = (joint_pos[name] for name in PLANAR_JOINTS)
+        place = P.pose((x, y, 0.0), (0.0, 0.0, float(np.sin(yaw / 2)), float(np.cos(yaw / 2))))
+        own = {name: value for name, value in joint_pos.items() if name not in PLANAR_JOINTS}
+        found = self._robot.frames(own)
+        if self._robot.root in found:
+            place = P.compose(place, P.inverse(found[self._robot.root]))
+        return {link: P.compose(place, pose) for link, pose in found.items()}
+
+
 class _Pinocchio:
     """The World's robot as Pinocchio moves it."""
 
@@ -117,7 +138,7 @@ class _Pinocchio:
         self.joints: int | None = None
         self.mass: float | None = None
         self.followers: Mapping[str, Follower] = {}
-        self.root = "base"
+        self.root = self._model.root
 
     def frames(self, joint_pos: Mapping[str, float]) -> Mapping[str, Array]:
         model = self._model

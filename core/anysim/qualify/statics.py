@@ -12,7 +12,7 @@ from anysim.qualify.result import Check, Facts
 from anysim.qualify.stage import NAME
 from anysim.world.imported import ImportNote
 from anysim.world.lookup import Frame, find_frame
-from anysim.world.model import World
+from anysim.world.model import JointType, World
 
 CONFIGURATIONS = 20
 MASS = 1e-5
@@ -42,15 +42,17 @@ def source_check(world: World, oracle: Oracle, notes: tuple[ImportNote, ...]) ->
         return Check("source", None, words=f"there is no file to compare with ({oracle.name})")
     off = abs(mass - oracle.mass) / max(oracle.mass, 1e-9)
     repaired = [str(note) for note in notes if note.kind == "repaired"]
+    frozen = sum(note.kind == "dropped" and note.where.startswith("joint ") for note in notes)
     words: list[str] = []
-    if joints != oracle.joints:
+    if joints + frozen != oracle.joints:
         words.append(f"{joints} joints, and {oracle.joints} in the source as {oracle.name} reads it")
     invented = repaired and 0 < mass - oracle.mass < VIRTUAL
     if off > MASS and not invented:
         words.append(f"{mass:.6g} kg, and {oracle.mass:.6g} kg in the source as {oracle.name} reads it")
     if words:
         return Check("source", False, off, "", MASS, "; ".join([*words, *repaired[:3]]))
-    told = f"{joints} joints, {mass:.4g} kg" + (f"; repaired: {listing(repaired, 3)}" if repaired else "")
+    fixed = f" ({frozen} that move no mass are frozen)" * bool(frozen)
+    told = f"{joints} joints{fixed}, {mass:.4g} kg" + (f"; repaired: {listing(repaired, 3)}" if repaired else "")
     return Check("source", True, off, "", None if invented else MASS, told)
 
 
@@ -115,8 +117,10 @@ def _frames(world: World, oracle: Oracle, still: dict[str, float]) -> dict[str, 
 
 def _random_positions(world: World, oracle: Oracle, names: list[str], rng: np.random.Generator) -> Array:
     """(J,) within the limits; what follows another in the World or in the source does so."""
-    lower = np.array([max(joint.lower, -np.pi) for joint in world.joints])
-    upper = np.array([min(joint.upper, np.pi) for joint in world.joints])
+    # a metre is far enough for what slides without end: engines of single precision read frames further out less well
+    far = np.array([1.0 if joint.type is JointType.PRISMATIC else np.pi for joint in world.joints])
+    lower = np.maximum([joint.lower for joint in world.joints], -far)
+    upper = np.minimum([joint.upper for joint in world.joints], far)
     q = lower + (upper - lower) * rng.random(len(lower))
     entity = next(e for e in world.entities if e.name == NAME)
     place = {name: entity.joint_start + i for i, name in enumerate(names)}

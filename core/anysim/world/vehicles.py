@@ -23,6 +23,8 @@ PLANAR_JOINTS = ("base_x", "base_y", "base_yaw")
 _ADDED = 3  # bodies and joints under the robot
 # A tenth of a kilogram: nothing beside a base, yet no body without mass, which engines repair each in its own way.
 _CARRIAGE = Inertial(0.1, inertia=(1e-3, 1e-3, 1e-3, 0.0, 0.0, 0.0))
+CARRIAGES = 2 * _CARRIAGE.mass
+"""[kg] of what `base: planar` adds."""
 
 
 def as_vehicle(model: ImportedModel, entry: RobotModelSpec) -> ImportedModel:

@@ -50,7 +50,8 @@ class TaskSpace:
         flat = jacobian[:, : self._axes].reshape(-1, spread.shape[1])
         own_rate = joint_vel[columns]
         rate = (jacobian @ own_rate).reshape(-1, 6)
-        wanted = acceleration + self._kd * (self._towards(error) + twist - rate) - self._drift(joint_pos, joint_vel)
+        towards = self._towards(error) + twist
+        wanted = acceleration + self._kd * (towards - rate) - self._drift(joint_pos, joint_vel)
         mass = spread.T @ self._inertia(joint_pos) @ spread
         inverse = np.linalg.inv(mass)
         mobility = flat @ inverse @ flat.T
@@ -59,7 +60,12 @@ class TaskSpace:
         pull = mass @ (self._own_kp * (posture - joint_pos[columns]) - self._own_kd * own_rate)
         free = pull - flat.T @ (load @ (flat @ (inverse @ pull)))
         moving = tool + free
-        carried = self._links.of(joint_pos, joint_vel, self._still, base)
+        # The rates at which springs and dampers are in balance tell which way dry friction will be overcome; measured
+        # ones would say nothing of a joint that sticks.
+        back = inverse @ flat.T @ load
+        aim = self._own_kp / self._own_kd * (posture - joint_pos[columns])
+        aim = aim + back @ (towards[:, : self._axes].reshape(-1) - flat @ aim)
+        carried = self._links.of(joint_pos, joint_vel, self._still, base, spread @ aim)
         return moving + spread.T @ carried, inverse @ moving
 
     def _towards(self, error: Array) -> Array:

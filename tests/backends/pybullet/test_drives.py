@@ -8,8 +8,12 @@ import pytest
 from anysim.engine.factory import create_simulation
 from anysim.math import pose as P
 from anysim.testing import tolerances
+from anysim.testing.sketch import Sketch, inertial
+from anysim.world.model import Box, ControlMode, JointType
 from anysim_pybullet import kernels as K
 from anysim_pybullet.bullet import bullet
+
+Z, EFFORT, REVOLUTE = (0.0, 0.0, 1.0), ControlMode.EFFORT, JointType.REVOLUTE
 
 
 def _dynamics(engine, tree_number=0):
@@ -143,3 +147,30 @@ def test_worlds_without_drives_are_left_to_bullet():
 
     with create_simulation("pybullet").create_world(worlds.double_pendulum()) as engine:
         assert engine._envs.laws.needs == [False]
+
+
+@pytest.mark.parametrize("kind", list(JointType))
+def test_dry_friction_acts_on_the_armature_too(build, kind):
+    """2 N m hold against 1.9 and take 2 off 3 of a link with an armature hundreds of times its inertia, from the start.
+
+    It stops what coasts, and ends where it is taken away.
+    """
+    s = Sketch("dry", gravity=(0.0, 0.0, 0.0))
+    part = inertial(Box((0.01, 0.01, 0.01)), 0.5)
+    link = s.link("link", s.robot("dry"), kind, Z, part, friction=2.0, armature=0.08 if kind is REVOLUTE else 200.0)
+    s.drive(link, EFFORT)
+    engine = build(s.world(), 4)
+    size = 200.5 if kind is not REVOLUTE else 0.08 + part.inertia[2]
+    engine.set_control(effort=[[1.9], [3.0], [-3.0], [-1.9]])
+    engine.step(50)
+    time = 50 * engine.world.physics.dt
+    speed = np.array([0.0, 1.0, -1.0, 0.0]) * time / size
+    assert engine.get_state().joint_vel[:, 0] == pytest.approx(speed, rel=1e-3, abs=1e-6 / size)
+    engine.set_control(effort=[[0.0]] * 4)
+    engine.step(60)
+    assert np.abs(engine.get_state().joint_vel[:, 0]).max() < 1e-6 / size
+    engine.set_parameters("joint.friction", 0.0)
+    engine.set_control(effort=[[1.9], [3.0], [-3.0], [-1.9]])
+    engine.step(50)
+    wanted = np.array([1.9, 3.0, -3.0, -1.9]) * time / size
+    assert engine.get_state().joint_vel[:, 0] == pytest.approx(wanted, rel=1e-3)

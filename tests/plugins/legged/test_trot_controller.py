@@ -10,10 +10,10 @@ import anysim
 from anysim.controllers.robot import ControlledRobot
 from anysim.errors import TaskError
 from anysim.math import pose as P
+from anysim.testing.quadrupeds import QUADRUPEDS, WITH_ARM, made, spec
 from anysim_legged.gait import GaitParameters, Motion, Trot
 from anysim_legged.legs import Legs
 from anysim_legged.weight import shares
-from tests.robots.quadrupeds import QUADRUPEDS, WITH_ARM, made, spec
 
 ALL = slice(None)
 DT = 0.02

@@ -1,4 +1,4 @@
-"""Quadrupeds of the catalogue on a plane, for tests: worlds, and walks that are measured. Benchmarks use it too."""
+"""Quadrupeds of the catalogue on a plane, for tests and benchmarks: worlds, and walks that are measured."""
 
 from typing import Any, NamedTuple
 
