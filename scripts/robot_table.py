@@ -27,6 +27,8 @@ from anysim.world.catalogue import load_robot
 
 ROOT = Path(__file__).parents[1]
 STORE, TABLE = ROOT / "docs" / "robots.json", ROOT / "docs" / "robots.md"
+SHEETS = ROOT / "docs" / "images" / "robots"
+"""Contact sheets by category, as `anysim gallery` writes them."""
 DISTRIBUTION = "anysim-robots"
 """The catalogue of this repository; what else is installed on a developer's machine has no place in its table."""
 OURS = ("anysim", "anysim-control", "anysim-ik", "anysim-legged", "anysim-mink", "anysim-policy")
@@ -66,6 +68,11 @@ def page(stored: Stored) -> str:
     ]
     for name in sorted(rows, key=lambda name: (rows[name].get("category", ""), name)):
         lines.append(_row(name, rows[name], found[name]))
+    lines += ["", "## Pictures", "", "As each engine draws them, made by `anysim gallery`."]
+    for category in sorted({row.get("category", "") for row in rows.values()}):
+        if (SHEETS / f"{category}.png").is_file():
+            words = category.replace("_", " ")
+            lines += ["", f"### {words}", "", f"![{words}: each robot on each engine](images/robots/{category}.png)"]
     return "\n".join(lines) + "\n"
 
 
