@@ -87,7 +87,7 @@ class Actions:
         initial = [self._world.joints[a.joint].initial for a in self._world.actuators]
         self._position = np.tile(np.array(initial, dtype=float), (n, 1))
         self._velocity, self._effort = np.zeros((n, drives)), np.zeros((n, drives))
-        self._support = np.zeros((len(self.slices), n, drives)) if self.slices else np.zeros((0, n, drives))
+        self._support = np.zeros((len(self.slices), n, drives))
         self._feeds = False
         """Whether any controller ever commanded more than positions."""
         self._ticks = np.zeros(n, dtype=np.int64)
