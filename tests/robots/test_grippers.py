@@ -154,8 +154,9 @@ class Arm:
         self.base = np.array([[*root.position, *root.quaternion]])
         self.begin = np.array([j.initial for j in world.joints])
         eef = world.robots[0].channels["eef"]
-        fingers = [world.joints[world.actuators[a].joint].name for a in eef.actuators]
-        self.home = dict(zip([name.removeprefix("robot.") for name in fingers], eef.opened, strict=True))
+        assert eef.opened is not None
+        fingers = [world.joints[world.actuators[a].joint].name.removeprefix("robot.") for a in eef.actuators]
+        self.home = dict(zip(fingers, eef.opened, strict=True))
         if task.at is not None:
             found = self.ik.solve(
                 np.array([[*task.at, *DOWN]]), self.base, chain.initial[None],
