@@ -5,7 +5,6 @@ stiffness is what is tested: how far the hands come from the places at its ends,
 channels move (fingers, a head) is held at home, and fingers that follow others have to follow throughout.
 """
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,29 +15,18 @@ from anysim.controllers.base import ChannelView
 from anysim.controllers.robot import ControlledRobot
 from anysim.engine.factory import create_simulation
 from anysim.math import pose as P
-from anysim.testing.tracking import robot_world
-from anysim.world.model import BodyKind, World
+from anysim.testing.tracking import bolted, robot_world
 
 ENGINES = ("mujoco", "pybullet", "sapien")
 WEIGHT = 3.0
 """[N] of a tray of 0.3 kg, which the arms do not know of: their drives give way by what it takes."""
 
 
-def bolted(robot: str) -> World:
-    world = robot_world(robot, position=[0.0, 0.0, 0.5])
-    root = next(e.root for e in world.entities if e.name == "robot")
-    if world.bodies[root].kind is BodyKind.STATIC:
-        return world
-    bodies = list(world.bodies)
-    bodies[root] = replace(bodies[root], kind=BodyKind.STATIC)
-    return replace(world, bodies=tuple(bodies))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("robot", ["unitree_g1", "baxter", "dual_ur5"])
 def test_two_hands_carry_a_tray(robot: str, engine: str) -> None:
-    world = bolted(robot)
+    world = bolted(robot_world(robot, position=[0.0, 0.0, 0.5]))
     seen = ControlledRobot(world, "robot")
     channel = world.robots[0].channels["arm"]
     view = ChannelView.of(world, channel, seen)
