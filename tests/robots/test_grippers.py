@@ -1,6 +1,5 @@
 """Every gripper of the catalogue takes a cube of 0.2 kg from a stand, lifts it and holds it, on every engine."""
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +12,8 @@ from anysim.engine.factory import create_simulation
 from anysim.math import pose as P
 from anysim.planning.api import inverse_kinematics
 from anysim.planning.chain import Chain
-from anysim.world.model import BodyKind, World
+from anysim.testing.tracking import bolted
+from anysim.world.model import World
 from anysim_schemas.run import RunSpec
 
 
@@ -78,7 +78,7 @@ def test_a_gripper_lifts_a_cube(hand: str, engine: str) -> None:
     cube = place + task.beside * P.to_matrix(above[3:])[:, 1]
     world = _world(robot, arm.home, _scene(task, cube, _heading(above)))
     assert [j.name for j in world.joints] == [j.name for j in bare.joints]
-    with create_simulation(engine).create_world(_bolted(world) if task.bolted else world) as sim:
+    with create_simulation(engine).create_world(bolted(world) if task.bolted else world) as sim:
         script = Script(sim, world, arm, task)
         script.wait(0.4)
         sag = above[:3] - script.tool()[:3]
@@ -109,13 +109,6 @@ def _members(world: World, channel: str, group: str | None) -> list[int]:
         return list(joints)
     names = {f"robot.{name}" for name in robot.entry.channels[channel].groups[group]}
     return [j for j in joints if world.joints[j].name in names]
-
-
-def _bolted(world: World) -> World:
-    root = next(e.root for e in world.entities if e.name == "robot")
-    bodies = list(world.bodies)
-    bodies[root] = replace(bodies[root], kind=BodyKind.STATIC)
-    return replace(world, bodies=tuple(bodies))
 
 
 def _heading(tool: np.ndarray) -> float:
