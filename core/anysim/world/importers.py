@@ -52,14 +52,20 @@ def import_asset(uri: str, *, base: Path | None = None, scale: float = 1.0) -> I
     return registry.load("importers", file.kind)(file.path, root=file.root, scale=scale, body=file.body)
 
 
+def split_body(uri: str) -> tuple[str, str]:
+    """A URI without the body that it names, and that body; empty where it names none."""
+    named = _WITH_BODY.fullmatch(uri)
+    return (named[1], named[2]) if named else (uri, "")
+
+
 def model_file(uri: str, *, base: Path | None = None) -> ModelFile:
     """The file that a URI stands for, and the body in it.
 
     Raises:
         AssetError: see `anysim.world.assets.locate`; no format of models; a body of a URDF, which has one tree.
     """
-    named = _WITH_BODY.fullmatch(uri)
-    file = locate(named[1] if named else uri, base=base)
+    whole, body = split_body(uri)
+    file = locate(whole, base=base)
     kind = _FORMATS.get(file.path.suffix.lower())
     if kind is None:
         raise AssetError(
@@ -67,6 +73,6 @@ def model_file(uri: str, *, base: Path | None = None) -> ModelFile:
         )
     if kind == "mjcf" and file.path.read_bytes()[:4096].lstrip().find(b"<robot") >= 0:
         kind = "urdf"  # a URDF that is called .xml
-    if named and kind == "urdf":
+    if body and kind == "urdf":
         raise AssetError(f"asset '{uri}': a URDF is one tree; '#' chooses among the bodies of an MJCF file's world")
-    return ModelFile(file.path, file.root, kind, named[2] if named else "")
+    return ModelFile(file.path, file.root, kind, body)
