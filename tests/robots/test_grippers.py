@@ -11,6 +11,8 @@ from anysim.engine.base import SimEngine
 from anysim.engine.factory import create_simulation
 from anysim.kinematics.model import RobotModel
 from anysim.math import pose as P
+from anysim.qualify.stage import missing_source
+from anysim.world.catalogue import load_robot
 from anysim.world.model import World
 from anysim_schemas.run import RunSpec
 
@@ -30,6 +32,7 @@ TASKS = {
     "z1": Task(0.026, 0.06),
     "so100": Task(0.02, 0.04),
     "so101": Task(0.02, 0.04),
+    "koch": Task(0.02, 0.04),
 }
 HOLD = 3.0
 SLIP = 0.01
@@ -42,6 +45,9 @@ SLIP = 0.01
 def test_a_gripper_lifts_a_cube(robot: str, engine: str) -> None:
     if engine not in registry.names("engines") or not registry.load("engines", engine).availability().available:
         pytest.skip(f"{engine} is not installed")
+    absent = missing_source(load_robot(robot))
+    if absent:
+        pytest.skip(f"{robot}: {absent}")
     task = TASKS[robot]
     bare = compile_world(RunSpec.model_validate({"world": {"robots": {"arm": {"robot": robot}}}}))
     arm = Arm(bare)
