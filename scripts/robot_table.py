@@ -7,7 +7,8 @@ The table of controllers in docs/concepts/robots.md is written from what is inst
     python scripts/robot_table.py --check         write nothing; exit with 1 if either file is behind the catalogue
 
 Measuring goes on where it was stopped: the file is written after each robot and engine. Every robot of the
-catalogue has its row, whatever became of it.
+catalogue has its row, whatever became of it. Some need a package that is no dependency; what was measured where it is
+installed stays where it is not, and the table says which version it was.
 """
 
 import argparse
@@ -22,6 +23,7 @@ from anysim.gallery.store import Stored, due, estimate, fingerprint, measure, re
 from anysim.qualify.apart import LIMIT
 from anysim.qualify.result import CHECKS, Qualification
 from anysim.qualify.run import FULL
+from anysim.qualify.stage import missing_source
 from anysim.signatures import options_model
 from anysim.world.catalogue import load_robot
 
@@ -63,6 +65,7 @@ def page(stored: Stored) -> str:
         "loader of the source has them, and how far it gets from its home position. What that means and how to run it "
         "yourself stands in [robots](concepts/robots.md).",
         "",
+        *_packages(rows),
         f"| robot | category | mass | joints (driven) | licence | compared with | {' | '.join(ENGINES)} |",
         f"|---|---|---|---|---|---|{'---|' * len(ENGINES)}",
     ]
@@ -74,6 +77,18 @@ def page(stored: Stored) -> str:
             words = category.replace("_", " ")
             lines += ["", f"### {words}", "", f"![{words}: each robot on each engine](images/robots/{category}.png)"]
     return "\n".join(lines) + "\n"
+
+
+def _packages(rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """What says which versions of optional packages were measured, and a blank line; nothing where there are none."""
+    robots: dict[str, list[str]] = {}
+    for name, row in sorted(rows.items()):
+        if "package" in row:
+            robots.setdefault(row["package"], []).append(name)
+    if not robots:
+        return []
+    told = "; ".join(f"{package} ({', '.join(names)})" for package, names in sorted(robots.items()))
+    return [f"Robots whose files come with a package that is no dependency were measured with {told}.", ""]
 
 
 def _row(name: str, row: Mapping[str, Any], found: Mapping[str, Qualification]) -> str:
@@ -136,12 +151,16 @@ def faults(stored: Stored) -> list[str]:
             found.append(f"{name} was not measured on every engine")
             continue
         try:
-            same = row.get("digest") == fingerprint(load_robot(name))
+            entry = load_robot(name)
         except AnysimError as error:
             found.append(f"{name} does not load: {error}")
             continue
-        if not same:
-            found.append(f"{name} is not what was measured: its YAML or the version of {DISTRIBUTION} has changed")
+        if row.get("digest") != fingerprint(entry):
+            absent = missing_source(entry)
+            found.append(
+                f"{name} is not what was measured: its YAML or the version of {DISTRIBUTION} has changed"
+                f"{f'; {absent}' if absent else ''}"
+            )
     found += [f"{name} was measured and is no longer there" for name in stored["robots"] if name not in catalogue()]
     return found
 
@@ -165,11 +184,17 @@ def take(robots: Sequence[str], engines: Sequence[str], limit: float, again: boo
     stored = read(STORE)
     stored["robots"] = {name: row for name, row in stored["robots"].items() if name in catalogue()}
     write(STORE, stored)
+    robots = [name for name in robots if not _left(stored, name)]
     count = len(robots) * len(engines) if again else len(due(stored, robots, engines, FULL))
     print(f"{count} to measure, about {estimate(stored, count) / 60:.0f} minutes", flush=True)
     return measure(
         STORE, robots, engines, FULL, limit=limit, again=again, timed=False, tell=lambda words: print(words, flush=True)
     )
+
+
+def _left(stored: Stored, name: str) -> bool:
+    """Whether a robot was measured with a package that is not here, and stays as it is."""
+    return "package" in stored["robots"].get(name, {}) and bool(missing_source(load_robot(name)))
 
 
 def main() -> int:

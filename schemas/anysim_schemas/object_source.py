@@ -32,7 +32,7 @@ class SourceSpec(Spec):
         default=None, description="radius, length of the straight part along z [m]"
     )
     mesh: str | None = Field(default=None, description="URI of a mesh file; collides as its convex hull")
-    asset: str | None = Field(default=None, description="URI of a URDF or MJCF file")
+    asset: str | None = Field(default=None, description="URI of a URDF or MJCF file; FILE.xml#BODY for one of several")
     procedural: str | None = Field(
         default=None, description="a builder of articulated assets, as in `anysim list assets`"
     )

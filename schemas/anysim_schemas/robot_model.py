@@ -91,7 +91,10 @@ class SensorSpec(Spec):
 class PartSpec(Spec):
     """Another model fixed to a link: a gripper on an arm, an arm on a base."""
 
-    source: str = Field(description="URI of the part's URDF or MJCF file, or `procedural:` with a builder")
+    source: str = Field(
+        description="URI of the part's URDF or MJCF file, `FILE.xml#BODY` for one of several bodies, or `procedural:` "
+        "with a builder"
+    )
     params: dict[str, Any] = Field(default_factory=dict, description="parameters of a procedural source")
     link: str = Field(description="the link that carries it")
     position: Vec3 = Field(default=(0.0, 0.0, 0.0), description="place of the part's root in that link's frame [m]")
@@ -139,7 +142,10 @@ class RobotModelSpec(Spec):
 
     name: Name = Field(description="the name in the catalogue")
     description: str = Field(description="one line for people")
-    source: str = Field(description="URI of the URDF or MJCF file, or `procedural:` with a builder")
+    source: str = Field(
+        description="URI of the URDF or MJCF file, `FILE.xml#BODY` for one of several bodies, or `procedural:` with a "
+        "builder"
+    )
     params: dict[str, Any] = Field(default_factory=dict, description="parameters of a procedural source")
     needs: str | None = Field(
         default=None, description="the package to install for it, where that is not a dependency: `pip install NEEDS`"

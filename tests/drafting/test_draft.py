@@ -99,3 +99,16 @@ def test_a_floating_mjcf_with_wheels_is_a_base(tmp_path: Path) -> None:
 def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
     with pytest.raises(AssetError, match="takes a URDF or MJCF file"):
         draft(tmp_path / "none.urdf")
+
+
+def test_one_of_several_bodies_has_a_draft_of_its_own(tmp_path: Path) -> None:
+    bodies = "".join(
+        f'<body name="{side}"><body name="{side}_arm"><joint name="{side}_turn" axis="0 0 1"/>'
+        '<geom type="box" size="0.1 0.1 0.1"/></body></body>'
+        for side in ("left", "right")
+    )
+    (tmp_path / "pair.xml").write_text(f"<mujoco><worldbody>{bodies}</worldbody></mujoco>")
+    made = draft(tmp_path / "pair.xml#right")
+    assert made.name == "right"
+    assert 'source: "pair.xml#right"' in made.text(tmp_path)
+    assert [joint.name for joint in built(made, tmp_path).joints] == ["robot.right_turn"]

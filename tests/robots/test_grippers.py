@@ -12,7 +12,9 @@ from anysim.engine.factory import create_simulation
 from anysim.math import pose as P
 from anysim.planning.api import inverse_kinematics
 from anysim.planning.chain import Chain
+from anysim.qualify.stage import missing_source
 from anysim.testing.tracking import bolted
+from anysim.world.catalogue import load_robot
 from anysim.world.model import World
 from anysim_schemas.run import RunSpec
 
@@ -56,6 +58,7 @@ TASKS = {
     "talos_full left": Task(0.05, 0.1, "left_hand", "left", "left", (0.35, 0.25, 1.0), bolted=True),
     "talos_full right": Task(0.05, 0.1, "right_hand", "right", "right", (0.35, -0.25, 1.0), bolted=True),
     "b1_z1": Task(0.026, 0.06, at=(0.6, 0.0, 0.5), beside=0.002, bolted=True),
+    "koch": Task(0.02, 0.04),
 }
 DOWN = (1.0, 0.0, 0.0, 0.0)
 """The quaternion (x, y, z, w) of a tool that points down."""
@@ -71,6 +74,9 @@ def test_a_gripper_lifts_a_cube(hand: str, engine: str) -> None:
     if engine not in registry.names("engines") or not registry.load("engines", engine).availability().available:
         pytest.skip(f"{engine} is not installed")
     robot, task = hand.split()[0], TASKS[hand]
+    absent = missing_source(load_robot(robot))
+    if absent:
+        pytest.skip(f"{robot}: {absent}")
     bare = _world(robot)
     arm = Arm(bare, task)
     above = arm.tool_pose(arm.begin)

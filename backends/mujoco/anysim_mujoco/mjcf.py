@@ -1,8 +1,8 @@
 """MJCF to the parts of a World, from MuJoCo's own compiled reading of the file.
 
 Rules where the neutral model is narrower; each use is a note in the report:
-- One kinematic tree: geoms of the world beside it, cameras, lights and sensors stay behind. A tree whose first body has
-  hinges or slides gets a fixed base at the file's origin.
+- One kinematic tree, of several the one that is asked for: geoms of the world beside it, cameras, lights and sensors
+  stay behind. A tree whose first body has hinges or slides gets a fixed base at the file's origin.
 - Bodies without a joint are lumped into their parent; the frame survives as a site, the inertia is composed exactly.
 - A body with several joints becomes a chain, whose extra links weigh a gram.
 - Joint positions keep the file's zero, whatever its `ref`. A keyframe `home` gives the initial ones.
@@ -35,21 +35,21 @@ _IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 _HINGE, _SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
 
 
-def import_mjcf(path: Path, *, root: Path, scale: float = 1.0) -> ImportedModel:
+def import_mjcf(path: Path, *, root: Path, scale: float = 1.0, body: str = "") -> ImportedModel:
     """Read an MJCF file; see `anysim.world.imported.Importer` for the arguments.
 
     Raises:
         AssetError: a missing or damaged file, a reference that leaves `root`, something the neutral model cannot say.
     """
-    return _MjcfImport(compiled(path, root), path, scale).run()
+    notes: list[ImportNote] = []
+    return _MjcfImport(compiled(path, root, body, notes), path, scale, notes).run()
 
 
 class _MjcfImport:
     """One import: walks MuJoCo's bodies, which are depth first with children in source order."""
 
-    def __init__(self, model: Any, path: Path, scale: float) -> None:
-        self.model, self.path, self.scale = model, path, scale
-        self.notes: list[ImportNote] = []
+    def __init__(self, model: Any, path: Path, scale: float, notes: list[ImportNote]) -> None:
+        self.model, self.path, self.scale, self.notes = model, path, scale, notes
         self.links = [model.body(i).name or f"body{i}" for i in range(model.nbody)]
         self.bodies: list[Body] = []
         self.inertials: list[list[Inertial]] = []
@@ -103,7 +103,8 @@ class _MjcfImport:
         tops = [i for i in range(1, model.nbody) if model.body_parentid[i] == 0]
         if len(tops) != 1:
             names = listing([self.links[i] for i in tops], 6)
-            raise AssetError(f"{self.path}: an asset has exactly one body in its world; this one has {names}")
+            say = f"; name the one that is meant: {self.path.name}#{self.links[tops[0]]}" if tops else ""
+            raise AssetError(f"{self.path}: an asset has exactly one body in its world; this one has {names}{say}")
         if model.body_geomnum[0]:
             self._note("dropped", "world", f"{model.body_geomnum[0]} geoms of the world beside the model are left out")
         return tops[0]

@@ -1,22 +1,26 @@
 """An MJCF file as a compiled MuJoCo model, after looking where its references lead."""
 
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import mujoco
 
-from anysim.errors import AssetError
+from anysim.errors import AssetError, listing, suggest
 from anysim.world.assets import resolve_reference
+from anysim.world.imported import ImportNote
 
 
-def compiled(path: Path, root: Path) -> Any:
+def compiled(path: Path, root: Path, body: str = "", notes: list[ImportNote] | None = None) -> Any:
     """Parse and compile a file: defaults, orientations and inertias are MuJoCo's own reading of it.
 
     Textures and skins are left out: the neutral model has colours only. No body is fused, no visual geom discarded.
+    With `body`, all other bodies of the world are taken out, and with them whatever refers to them; `notes` gets what
+    tied them to it.
 
     Raises:
-        AssetError: a missing file, a reference that leaves `root`, or what MuJoCo says against the file.
+        AssetError: a missing file, a reference that leaves `root`, no such body, or what MuJoCo says against the file.
     """
     path, root = path.resolve(), root.resolve()
     included: dict[str, bytes] = {}
@@ -31,9 +35,37 @@ def compiled(path: Path, root: Path) -> Any:
         for material in spec.materials:
             material.textures = [""] * len(material.textures)
         spec.compiler.fusestatic = False
+        if body:
+            left_out = _keep(spec, path, body)
+            if notes is not None:
+                notes += left_out
         return spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         raise AssetError(f"{path}: MuJoCo cannot read it: {' '.join(str(error).split())}") from error
+
+
+def _keep(spec: Any, path: Path, body: str) -> list[ImportNote]:
+    """Take all bodies of the world out but one. MuJoCo removes what refers to them, and shortens keyframes."""
+    others = [one for one in spec.worldbody.bodies if one.name != body]
+    if len(others) == len(spec.worldbody.bodies):
+        names = [one.name for one in others if one.name]
+        raise AssetError(f"{path}: its world has no body '{body}'{suggest(body, names)} (bodies: {listing(names)})")
+    for looking in (*spec.cameras, *spec.lights):  # maybe at a body that goes; the importer leaves them behind anyway
+        spec.delete(looking)
+    rest = spec.copy()
+    rest.delete(rest.body(body))
+    whole = _ties(spec)
+    for one in others:
+        spec.delete(one)
+    return [
+        ImportNote("dropped", body, f"{kind} between it and other bodies of the file are left out ({count})")
+        for kind, count in (whole - _ties(rest) - _ties(spec)).items()
+    ]
+
+
+def _ties(spec: Any) -> Counter[str]:
+    """How many elements there are that may tie one body to another."""
+    return Counter({"equalities": len(spec.equalities), "tendons": len(spec.tendons)})
 
 
 def _parsed(path: Path, included: Mapping[str, bytes]) -> Any:

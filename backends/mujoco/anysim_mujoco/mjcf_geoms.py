@@ -1,5 +1,6 @@
 """The geoms of a compiled MJCF model as neutral geometry."""
 
+from dataclasses import replace
 from typing import Any, Literal
 
 import mujoco
@@ -38,7 +39,7 @@ class GeomReader:
     """Collects geoms, meshes and height fields, link by link.
 
     Geoms keep their names; unnamed ones are `<link>.collision0` or `<link>.visual0`. A geom that collides is drawn only
-    where its link has none that is there to be looked at.
+    where its link has none that is there to be looked at; a mesh that does both is drawn as it is, beside its hull.
     """
 
     def __init__(self, model: Any, source: str, scale: float, notes: list[ImportNote]) -> None:
@@ -65,12 +66,21 @@ class GeomReader:
             frame = P.compose(pose, pose_of(model.geom_pos[g], model.geom_quat[g], self._scale))
             position, quaternion = split(frame)
             name = model.geom(g).name or self._name(link, "collision" if collides[g] else "visual")
-            self.geoms.append(
-                Geom(name, body, shape, position, quaternion, self._color(g), self._surface(g), collides[g],
-                     visible=not (collides[g] and shown))
+            hull = collides[g] and model.geom_type[g] == mujoco.mjtGeom.mjGEOM_MESH
+            geom = Geom(
+                name, body, shape, position, quaternion, self._color(g), self._surface(g), collides[g],
+                visible=not (collides[g] and shown) and not hull,
             )  # fmt: skip
-            self.geom_links.append(link)
-            self.numbers.append(g)
+            self._add(geom, link, g)
+            if hull and not shown:
+                seen = self._mesh(int(model.geom_dataid[g]), collides=False)
+                name = self._name(link, "visual")
+                self._add(replace(geom, name=name, shape=seen, collides=False, visible=True), link, g)
+
+    def _add(self, geom: Geom, link: str, number: int) -> None:
+        self.geoms.append(geom)
+        self.geom_links.append(link)
+        self.numbers.append(number)
 
     def _name(self, link: str, kind: str) -> str:
         count = 0

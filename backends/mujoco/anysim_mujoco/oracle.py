@@ -17,8 +17,8 @@ class Mjcf:
 
     name = "raw MuJoCo"
 
-    def __init__(self, path: Path, root: Path) -> None:
-        self._model: Any = compiled(path, root)
+    def __init__(self, path: Path, root: Path, body: str = "") -> None:
+        self._model: Any = compiled(path, root, body)
         self._data: Any = mujoco.MjData(self._model)
         model = self._model
         single = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))

@@ -7,6 +7,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.world.model import Box, Capsule, Cylinder, MeshShape, Sphere, World
+from anysim_sapien.hulls import volume
 from anysim_sapien.scene import EnvScene
 
 
@@ -37,7 +38,6 @@ def _volume(kind: Any, shape: Any) -> float:
             radius = float(shape.radius)
             return 2 * pi * radius**2 * float(shape.half_length) + 4 / 3 * pi * radius**3
         case MeshShape(concave=False):
-            corners = np.asarray(shape.vertices, dtype=float)[np.asarray(shape.triangles)]
-            return abs(float(np.linalg.det(corners).sum() / 6))
+            return volume(shape)
         case _:
             return 0.0

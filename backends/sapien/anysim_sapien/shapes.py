@@ -21,14 +21,13 @@ from anysim.world.model import (
     World,
 )  # fmt: skip
 from anysim_sapien.exclusions import Group
+from anysim_sapien.hulls import UNIT_SCALE, convex
 from anysim_sapien.library import physx, sapien
 from anysim_sapien.options import SapienOptions
 from anysim_sapien.surfaces import Copy
 
 X_TO_Z = np.array([0.0, -sqrt(0.5), 0.0, sqrt(0.5)])
 """PhysX has the normal of a plane and the axis of a capsule or cylinder along x; the World has them along z."""
-
-UNIT_SCALE = [1.0, 1.0, 1.0]
 
 
 BOUNCY_OFFSET = 1e-4
@@ -90,9 +89,7 @@ def _shape(world: World, geom: Geom, material: Any) -> Any:
                 triangles = np.asarray(mesh.faces, dtype=np.uint32)
                 vertices = np.asarray(mesh.vertices, dtype=np.float32)
                 return physx.PhysxCollisionShapeTriangleMesh(vertices, triangles, UNIT_SCALE, material)
-            return physx.PhysxCollisionShapeConvexMesh(
-                np.asarray(mesh.vertices, dtype=np.float32), UNIT_SCALE, material
-            )
+            return convex(mesh, material)
         case HeightFieldShape(name):
             field = next(field for field in world.heightfields if field.name == name)
             vertices, triangles = relief(field)

@@ -96,7 +96,9 @@ def _engines(text: str | None) -> list[str]:
 
 @app.command("import")
 def import_(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A URDF or MJCF file.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="A URDF or MJCF file; FILE.xml#BODY for one of several bodies.")
+    ],
     out: Annotated[
         Path | None, typer.Option("--out", help="The YAML file to write; default NAME.yaml beside the model.")
     ] = None,

@@ -9,7 +9,7 @@ from anysim.drafting.gains import BANDWIDTH, ROTOR, SETTLING, STANDING, Gains, g
 from anysim.drafting.guess import Guess, guess, home_of
 from anysim.errors import AssetError
 from anysim.world.imported import ImportedModel
-from anysim.world.importers import import_asset
+from anysim.world.importers import import_asset, split_body
 
 NO_LICENCE = "LicenseRef-TODO"
 
@@ -126,19 +126,20 @@ def draft(file: Path, name: str | None = None) -> Draft:
     """Look at a model file.
 
     Args:
-        file: URDF or MJCF.
-        name: in the catalogue; that of the file where not given.
+        file: URDF or MJCF; `FILE.xml#BODY` for one of several bodies.
+        name: in the catalogue; that of the body or the file where not given.
 
     Raises:
         AssetError: there is no such file, or it cannot be imported.
     """
-    if not file.is_file():
-        raise AssetError(f"there is no file {file}; `anysim robot import` takes a URDF or MJCF file")
+    whole, body = split_body(str(file))
+    if not Path(whole).is_file():
+        raise AssetError(f"there is no file {whole}; `anysim robot import` takes a URDF or MJCF file")
     path = file.resolve()
     model = import_asset(str(path))
     found = guess(model)
     legs = frozenset(joint for leg in found.legs for joint in leg.joints)
-    chosen = re.sub(r"\W+", "_", name or path.stem).strip("_").lower()
+    chosen = re.sub(r"\W+", "_", name or body or path.stem).strip("_").lower()
     if not chosen or not chosen[0].isalpha():
         chosen = f"robot_{chosen}".rstrip("_")
     notes = tuple(str(note) for note in model.report)

@@ -11,6 +11,7 @@ from anysim.errors import AnysimError
 from anysim.qualify.apart import LIMIT, qualify_apart
 from anysim.qualify.result import Qualification, as_data, from_data
 from anysim.qualify.run import FULL, Durations
+from anysim.qualify.stage import missing_source
 from anysim.world.cache import digest
 from anysim.world.catalogue import CatalogueEntry, load_robot
 
@@ -27,6 +28,16 @@ def fingerprint(entry: CatalogueEntry) -> str:
     except (AnysimError, metadata.PackageNotFoundError):
         version = ""
     return digest(entry.file.read_bytes(), version)[:16]
+
+
+def package(entry: CatalogueEntry) -> str:
+    """The optional package that brings the entry's files, as `NAME VERSION`; empty where it needs or finds none."""
+    if not entry.spec.needs or missing_source(entry):
+        return ""
+    try:
+        return f"{entry.spec.needs} {metadata.version(entry.spec.needs)}"
+    except metadata.PackageNotFoundError:
+        return entry.spec.needs
 
 
 def read(path: Path) -> Stored:
@@ -58,15 +69,17 @@ def results(row: Mapping[str, Any]) -> dict[str, Qualification]:
 
 
 def due(stored: Stored, robots: Sequence[str], engines: Sequence[str], durations: Durations) -> list[tuple[str, str]]:
-    """What is missing or was measured of another entry or for another time."""
+    """What is missing or was measured of another entry, for another time, or with another version of its package.
+
+    What was measured where a package is installed stays where it is not.
+    """
     wanted: list[tuple[str, str]] = []
     for robot in robots:
         row = stored["robots"].get(robot, {})
         try:
-            same = row.get("digest") == fingerprint(load_robot(robot))
+            same = _same(row, load_robot(robot), durations)
         except AnysimError:
             same = False
-        same = same and row.get("durations") == list(durations)
         wanted += [(robot, engine) for engine in engines if not same or engine not in row.get("engines", {})]
     return wanted
 
@@ -124,16 +137,26 @@ def _undrawn(pictures: Path, robots: Sequence[str], engines: Sequence[str]) -> l
 
 def _row(stored: Stored, entry: CatalogueEntry, durations: Durations) -> Stored:
     """The row of a robot; a new one where the entry is another than before."""
-    spec, mark = entry.spec, fingerprint(entry)
+    spec = entry.spec
     row = stored["robots"].get(spec.name)
-    if row is None or row.get("digest") != mark or row.get("durations") != list(durations):
+    if row is None or not _same(row, entry, durations):
         row = stored["robots"][spec.name] = {"engines": {}}
-    facts = {
-        "digest": mark, "durations": list(durations), "category": spec.category, "description": spec.description,
-        "license": spec.license, "source": spec.source, "base": spec.base,
+    facts: Stored = {
+        "digest": fingerprint(entry), "durations": list(durations), "category": spec.category,
+        "description": spec.description, "license": spec.license, "source": spec.source, "base": spec.base,
     }  # fmt: skip
+    if package(entry):
+        facts["package"] = package(entry)
     row.update(facts)
     return row
+
+
+def _same(row: Mapping[str, Any], entry: CatalogueEntry, durations: Durations) -> bool:
+    """Whether a row is of this entry and this time, and of the files that are here, where there are some."""
+    return (
+        row.get("digest") == fingerprint(entry) and row.get("durations") == list(durations)
+        and package(entry) in ("", row.get("package"))
+    )  # fmt: skip
 
 
 def _line(robot: str, engine: str, found: Qualification | None, undrawn: str) -> str:

@@ -1,8 +1,9 @@
 """Independent readings of a robot's source, to hold our own against.
 
-A reader is an entry point of the group `anysim.oracles` by file format: a function of a file that returns an `Oracle`.
-It shares no code with the importer of that format. Where a robot has none (a procedural one), its Pinocchio model is
-asked, which shares the importer and nothing of the engines.
+A reader is an entry point of the group `anysim.oracles` by file format: a function of a file, its root folder and the
+body in it that is meant (see `anysim.world.importers.ModelFile`) that returns an `Oracle`. It shares no code with the
+importer of that format. Where a robot has none (a procedural one), its Pinocchio model is asked, which shares the
+importer and nothing of the engines.
 """
 
 from collections.abc import Mapping
@@ -18,8 +19,8 @@ from anysim.errors import PluginError
 from anysim.kinematics.model import RobotModel
 from anysim.math import pose as P
 from anysim.qualify.stage import NAME
-from anysim.world.assets import AssetFile, locate
 from anysim.world.catalogue import CatalogueEntry
+from anysim.world.importers import ModelFile, model_file
 from anysim.world.model import World
 from anysim.world.vehicles import CARRIAGES, PLANAR_JOINTS
 from anysim_schemas.object_source import PROCEDURAL
@@ -66,15 +67,13 @@ def oracle_of(entry: CatalogueEntry, world: World) -> Oracle:
     spec = entry.spec
     if spec.source.startswith(PROCEDURAL) or any(part.source.startswith(PROCEDURAL) for part in spec.parts):
         return _Pinocchio(world)
-    main = _reader(locate(spec.source, base=entry.file.parent))
+    main = _reader(model_file(spec.source, base=entry.file.parent))
     whole = _Composed(main, entry) if spec.parts else main
     return _OnPlane(whole) if spec.base == "planar" else whole
 
 
-def _reader(file: AssetFile) -> Oracle:
-    text = file.path.read_bytes()[:4096]
-    kind = "urdf" if file.path.suffix.lower() == ".urdf" or b"<robot" in text else "mjcf"
-    return registry.load("oracles", kind)(file.path, file.root)
+def _reader(file: ModelFile) -> Oracle:
+    return registry.load("oracles", file.kind)(file.path, file.root, file.body)
 
 
 class _Composed:
@@ -85,7 +84,7 @@ class _Composed:
         self._parts: list[tuple[PartSpec, Array, Oracle]] = []
         for part in entry.spec.parts:
             local = P.pose(part.position, P.from_roll_pitch_yaw(np.array(part.roll_pitch_yaw)))
-            self._parts.append((part, local, _reader(locate(part.source, base=entry.file.parent))))
+            self._parts.append((part, local, _reader(model_file(part.source, base=entry.file.parent))))
         read = [main, *(reader for _, _, reader in self._parts)]
         self.name = " + ".join(dict.fromkeys(reader.name for reader in read)) + ", composed"
         self.root = main.root
@@ -151,8 +150,8 @@ class Urdf:
 
     name = "yourdfpy"
 
-    def __init__(self, path: Path, root: Path) -> None:
-        del root
+    def __init__(self, path: Path, root: Path, body: str = "") -> None:
+        del root, body
         self._file = _yourdfpy(path)
         robot = self._file.robot
         moving = [joint for joint in robot.joints if joint.type not in ("fixed", "floating", "planar")]

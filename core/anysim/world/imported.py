@@ -68,8 +68,9 @@ class ImportedModel:
 class Importer(Protocol):
     """Reads one file. `root` is the folder that no reference in the file may leave; `scale` multiplies all lengths.
 
+    `body` names one of several trees in the file, all others and what refers to them stay behind; empty: there is one.
     Masses scale with the cube of `scale` and inertias with its fifth power (the density stays). Raises AssetError for a
     file that is missing or holds what the neutral model cannot say, naming the file and the element.
     """
 
-    def __call__(self, path: Path, *, root: Path, scale: float = 1.0) -> ImportedModel: ...
+    def __call__(self, path: Path, *, root: Path, scale: float = 1.0, body: str = "") -> ImportedModel: ...
