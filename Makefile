@@ -14,6 +14,8 @@ DEMO_COMPARE  = $(BIN)/anysim compare pick_cube --episodes 4 --seed 1 --out $(DE
 
 # More words for pytest: make test ARGS="-k pose -x"
 ARGS ?=
+# A worker for each core, each with engines of its own and up to 2 GB. One process: make test ARGS="-n 0"
+PYTEST = $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist loadgroup
 
 .DEFAULT_GOAL := help
 .PHONY: help venv demo test test-slow test-all check format lock schema docs bench wheels clean
@@ -35,14 +37,14 @@ demo: $(STAMP)  ## run a pick-and-place task in four worlds, record it, draw a p
 	@$(DEMO_PICTURE)
 	$(DEMO_COMPARE)
 
-test: $(STAMP)  ## run all tests that are not marked slow (minutes)
-	$(BIN)/python -m pytest -m "not slow" $(ARGS)
+test: $(STAMP)  ## run all tests that are not marked slow (minutes), on all cores
+	$(PYTEST) -m "not slow" $(ARGS)
 
 test-slow: $(STAMP)  ## run the tests that are marked slow
-	$(BIN)/python -m pytest -m slow $(ARGS)
+	$(PYTEST) -m slow $(ARGS)
 
 test-all: $(STAMP)  ## run every test
-	$(BIN)/python -m pytest $(ARGS)
+	$(PYTEST) $(ARGS)
 
 CHECKS := check-lint check-format check-style check-layers check-schema check-tables check-types
 check: $(CHECKS)  ## lint, format, types, layers, style and generated files (make -k check: do not stop at the first)

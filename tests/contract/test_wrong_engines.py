@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.xdist_group("wrong engines")  # one worker runs them, once, for all tests
+
 HERE = Path(__file__).parent
 KINEMATIC = ("wrong_engines", "wrong_states")
 PHYSICAL = ("wrong_physics",)

@@ -15,7 +15,7 @@ from anysim import registry
 from anysim.engine import factory
 from anysim.errors import PluginError
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("wheels")]  # built once, by one worker
 
 BACKENDS = ("mujoco", "pybullet", "sapien")
 LIBRARIES = {"mujoco": "mujoco", "pybullet": "pybullet", "sapien": "sapien"}

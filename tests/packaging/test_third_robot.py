@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("wheels")]  # built once, by one worker
 
 
 def test_its_wheel_brings_a_robot_that_runs(environment, program, external_wheels, tmp_path) -> None:

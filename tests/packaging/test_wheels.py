@@ -8,7 +8,7 @@ from checks.tree import Tree
 from packaging.utils import canonicalize_name, parse_wheel_filename
 
 ROOT = Path(__file__).parents[2]
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("wheels")]  # built once, by one worker
 
 SEE_ALL = """
 import importlib, importlib.util, sys

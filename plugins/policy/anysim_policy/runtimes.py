@@ -4,6 +4,7 @@ A model that is given a batch may sum in another order than for one row, so its 
 there are. One thread for the same reason, and because the envs are many and the models small.
 """
 
+import warnings
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -87,7 +88,10 @@ def _torch(path: Path, size: int) -> Runtime:
     except ImportError as error:
         raise PluginError(f"TorchScript policies need torch ({error}): pip install 'anysim-policy[torch]'") from None
     try:
-        module = torch.jit.load(str(path), map_location="cpu").eval()
+        with warnings.catch_warnings():
+            # Newer versions would rather have exported programs; the policies that people publish are TorchScript.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            module = torch.jit.load(str(path), map_location="cpu").eval()
     except Exception as error:
         raise TaskError(f"the policy {path} is no TorchScript module: {error}") from error
 
