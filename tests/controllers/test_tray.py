@@ -6,7 +6,6 @@ from each other, while they move up, forward, and to the side and back; and that
 channels move (a head) is held at home, and fingers that follow others have to follow throughout.
 """
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,9 +19,9 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.factory import create_simulation
 from anysim.math import pose as P
-from anysim.testing.tracking import robot_world
+from anysim.testing.tracking import bolted, robot_world
 from anysim.world.kinematics import forward_kinematics
-from anysim.world.model import BodyKind, World
+from anysim.world.model import World
 
 ENGINES = ("mujoco", "pybullet", "sapien")
 WEIGHT = 3.0
@@ -62,7 +61,7 @@ TRAYS = {
 @pytest.mark.parametrize("robot", TRAYS)
 def test_two_hands_carry_a_tray(robot: str, engine: str, tmp_path: Path) -> None:
     tray = TRAYS[robot]
-    world = _bolted(_world(robot, tray, tmp_path))
+    world = bolted(_world(robot, tray, tmp_path))
     with create_simulation(engine) as sim:
         sim.create_world(world, 1)
         sim.reset()
@@ -147,13 +146,6 @@ def _urdf(tray: Tray) -> str:
         '<inertia ixx="0.01" iyy="0.003" izz="0.012" ixy="0" ixz="0" iyz="0"/></inertial>'
         f"{solids}</link></robot>"
     )
-
-
-def _bolted(world: World) -> World:
-    root = next(e.root for e in world.entities if e.name == "robot")
-    bodies = list(world.bodies)
-    bodies[root] = replace(bodies[root], kind=BodyKind.STATIC)
-    return replace(world, bodies=tuple(bodies))
 
 
 class Hands:

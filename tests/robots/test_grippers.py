@@ -1,6 +1,5 @@
 """Every gripper of the catalogue takes a cube of 0.2 kg from a stand, lifts it and holds it, on every engine."""
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,8 +13,9 @@ from anysim.math import pose as P
 from anysim.planning.api import inverse_kinematics
 from anysim.planning.chain import Chain
 from anysim.qualify.stage import missing_source
+from anysim.testing.tracking import bolted
 from anysim.world.catalogue import load_robot
-from anysim.world.model import BodyKind, World
+from anysim.world.model import World
 from anysim_schemas.run import RunSpec
 
 
@@ -45,7 +45,6 @@ TASKS = {
     "z1": Task(0.026, 0.06),
     "so100": Task(0.02, 0.04),
     "so101": Task(0.02, 0.04),
-    "koch": Task(0.02, 0.04),
     "mobile_panda": Task(0.04, 0.1),
     "mobile_ur5": Task(0.04, 0.1),
     "mobile_dual_panda left": Task(0.04, 0.1, "left_tool", "left", "left"),
@@ -59,6 +58,7 @@ TASKS = {
     "talos_full left": Task(0.05, 0.1, "left_hand", "left", "left", (0.35, 0.25, 1.0), bolted=True),
     "talos_full right": Task(0.05, 0.1, "right_hand", "right", "right", (0.35, -0.25, 1.0), bolted=True),
     "b1_z1": Task(0.026, 0.06, at=(0.6, 0.0, 0.5), beside=0.002, bolted=True),
+    "koch": Task(0.02, 0.04),
     "aloha left": Task(0.04, 0.1, "left", "left", "left", (0.35, 0.0, 0.25)),
     "aloha right": Task(0.04, 0.1, "right", "right", "right", (0.588, 0.0, 0.25)),
 }
@@ -86,7 +86,7 @@ def test_a_gripper_lifts_a_cube(hand: str, engine: str) -> None:
     cube = place + task.beside * P.to_matrix(above[3:])[:, 1]
     world = _world(robot, arm.home, _scene(task, cube, _heading(above)))
     assert [j.name for j in world.joints] == [j.name for j in bare.joints]
-    with create_simulation(engine).create_world(_bolted(world) if task.bolted else world) as sim:
+    with create_simulation(engine).create_world(bolted(world) if task.bolted else world) as sim:
         script = Script(sim, world, arm, task)
         script.wait(0.4)
         sag = above[:3] - script.tool()[:3]
@@ -117,13 +117,6 @@ def _members(world: World, channel: str, group: str | None) -> list[int]:
         return list(joints)
     names = {f"robot.{name}" for name in robot.entry.channels[channel].groups[group]}
     return [j for j in joints if world.joints[j].name in names]
-
-
-def _bolted(world: World) -> World:
-    root = next(e.root for e in world.entities if e.name == "robot")
-    bodies = list(world.bodies)
-    bodies[root] = replace(bodies[root], kind=BodyKind.STATIC)
-    return replace(world, bodies=tuple(bodies))
 
 
 def _heading(tool: np.ndarray) -> float:

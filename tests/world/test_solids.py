@@ -50,6 +50,18 @@ def test_solids_take_the_place_of_what_a_link_collided_with(arm: ImportedModel) 
     assert with_solids(arm, {}) is arm
 
 
+def test_a_box_that_is_no_part_of_the_hand_is_gone(
+    urdf: Callable[..., ImportedModel], inertial: Callable[[float], str]
+) -> None:
+    """Without a visual its collision geometry is drawn: it stays where solids take its place, else it goes with it."""
+    arm = urdf(ARM.replace("<visual>", "<!--").replace("</visual>", "-->").format(i=inertial(1.0)))
+    assert [g.visible for g in arm.geoms] == [True]
+    assert with_solids(arm, {"hand": []}).geoms == ()
+    assert [(g.visible, g.collides) for g in with_solids(arm, {"hand": [SolidSpec(sphere=0.1)]}).geoms] == [
+        (True, False), (False, True),
+    ]  # fmt: skip
+
+
 def test_what_is_wrong_with_solids_is_said(arm: ImportedModel) -> None:
     with pytest.raises(AssetError) as caught:
         with_solids(arm, {"fingers": [SolidSpec(sphere=0.1)]})

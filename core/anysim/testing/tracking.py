@@ -1,6 +1,7 @@
 """For tests and benchmarks of controllers of tools: worlds of one robot, a puppet without an engine, circles."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, NamedTuple, Self, cast
 
@@ -16,7 +17,7 @@ from anysim.math import pose as P
 from anysim.task.env import TaskEnv
 from anysim.world.compile import compile_world
 from anysim.world.kinematics import forward_kinematics
-from anysim.world.model import World
+from anysim.world.model import BodyKind, World
 from anysim_schemas.engine import PhysicsSpec
 from anysim_schemas.run import WorldSpec
 
@@ -27,6 +28,14 @@ def robot_world(
     """A World with the ground and one robot of the catalogue, named `robot`."""
     world = {"terrain": "plane", "robots": {"robot": {"robot": robot, **spec}}, **(objects or {})}
     return compile_world(WorldSpec.model_validate(world), physics=PhysicsSpec(**(physics or {"control_dt": 0.02})))
+
+
+def bolted(world: World) -> World:
+    """The World with its robot's root fixed where it is, for tests of arms whose robot would roll or fall over."""
+    root = next(entity.root for entity in world.entities if entity.name == "robot")
+    bodies = list(world.bodies)
+    bodies[root] = replace(bodies[root], kind=BodyKind.STATIC)
+    return replace(world, bodies=tuple(bodies))
 
 
 class Puppet:

@@ -18,7 +18,8 @@ def with_solids(model: ImportedModel, solids: Mapping[str, Sequence[SolidSpec]])
 
     Args:
         model: whose masses and visual geometry do not change.
-        solids: for each link what it collides with, in the link's frame; nothing lets it touch nothing.
+        solids: for each link what it collides with, in the link's frame; nothing lets it touch nothing, and takes it
+            from pictures where it had no other shape.
 
     Raises:
         AssetError: there is no such link.
@@ -36,7 +37,7 @@ def with_solids(model: ImportedModel, solids: Mapping[str, Sequence[SolidSpec]])
     for geom, link in zip(model.geoms, model.geom_links, strict=True):
         if link not in solids or not geom.collides:
             geoms.append(geom)
-        elif geom.visible:
+        elif geom.visible and solids[link]:
             geoms.append(replace(geom, collides=False))
         else:
             continue
