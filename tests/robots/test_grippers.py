@@ -59,6 +59,8 @@ TASKS = {
     "talos_full right": Task(0.05, 0.1, "right_hand", "right", "right", (0.35, -0.25, 1.0), bolted=True),
     "b1_z1": Task(0.026, 0.06, at=(0.6, 0.0, 0.5), beside=0.002, bolted=True),
     "koch": Task(0.02, 0.04),
+    "aloha left": Task(0.04, 0.1, "left", "left", "left", (0.35, 0.0, 0.25)),
+    "aloha right": Task(0.04, 0.1, "right", "right", "right", (0.588, 0.0, 0.25)),
 }
 DOWN = (1.0, 0.0, 0.0, 0.0)
 """The quaternion (x, y, z, w) of a tool that points down."""
