@@ -156,8 +156,12 @@ class Arm:
         self.begin = np.array([j.initial for j in world.joints])
         eef = world.robots[0].channels["eef"]
         assert eef.opened is not None
-        fingers = [world.joints[world.actuators[a].joint].name.removeprefix("robot.") for a in eef.actuators]
-        self.home = dict(zip(fingers, eef.opened, strict=True))
+        fingers = [world.joints[world.actuators[a].joint] for a in eef.actuators]
+        self.home = {
+            joint.name.removeprefix("robot."): opened
+            for joint, opened in zip(fingers, eef.opened, strict=True)
+            if joint.mimic is None
+        }
         if task.at is not None:
             found = self.ik.solve(
                 np.array([[*task.at, *DOWN]]), self.base, chain.initial[None],
