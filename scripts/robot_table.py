@@ -23,9 +23,8 @@ from anysim.gallery.store import Stored, due, estimate, fingerprint, measure, re
 from anysim.qualify.apart import LIMIT
 from anysim.qualify.result import CHECKS, Qualification
 from anysim.qualify.run import FULL
-from anysim.qualify.stage import missing_source
 from anysim.signatures import options_model
-from anysim.world.catalogue import load_robot
+from anysim.world.catalogue import load_robot, missing_source
 
 ROOT = Path(__file__).parents[1]
 STORE, TABLE = ROOT / "docs" / "robots.json", ROOT / "docs" / "robots.md"

@@ -16,8 +16,8 @@ from anysim.qualify import apart, motion, oracle, run
 from anysim.qualify.apart import qualify_apart
 from anysim.qualify.result import CHECKS, Check, Qualification, as_data, from_data
 from anysim.qualify.run import Durations, qualify
-from anysim.qualify.stage import missing_source, stage
-from anysim.world.catalogue import load_robot
+from anysim.qualify.stage import stage
+from anysim.world.catalogue import load_robot, missing_source
 
 ROOT = Path(__file__).parents[2]
 ARM = ROOT / "tests" / "external" / "anysim-thirdarm" / "anysim_thirdarm"

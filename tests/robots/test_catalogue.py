@@ -12,8 +12,8 @@ from anysim import registry
 from anysim.api import load
 from anysim.qualify.apart import qualify_apart
 from anysim.qualify.run import Durations
-from anysim.qualify.stage import NAME, controllers, missing_source, stage
-from anysim.world.catalogue import CatalogueEntry, load_robot
+from anysim.qualify.stage import NAME, controllers, stage
+from anysim.world.catalogue import CatalogueEntry, load_robot, missing_source
 from anysim.world.compile import compile_with_report
 from anysim.world.model import World
 

@@ -12,9 +12,8 @@ from anysim.engine.factory import create_simulation
 from anysim.math import pose as P
 from anysim.planning.api import inverse_kinematics
 from anysim.planning.chain import Chain
-from anysim.qualify.stage import missing_source
 from anysim.testing.tracking import bolted
-from anysim.world.catalogue import load_robot
+from anysim.world.catalogue import load_robot, missing_source
 from anysim.world.model import World
 from anysim_schemas.run import RunSpec
 

@@ -12,8 +12,7 @@ from anysim.engine.factory import create_simulation
 from anysim.errors import AssetError
 from anysim.kinematics.model import RobotModel
 from anysim.math import pose as P
-from anysim.qualify.stage import missing_source
-from anysim.world.catalogue import load_robot
+from anysim.world.catalogue import load_robot, missing_source
 from anysim.world.model import World
 
 ENGINES = ("mujoco", "pybullet", "sapien")

@@ -40,8 +40,7 @@ def _robots(json: bool) -> None:
     from anysim import registry
     from anysim.cli.output import print_json, print_table
     from anysim.errors import AnysimError
-    from anysim.qualify.stage import missing_source
-    from anysim.world.catalogue import load_robot
+    from anysim.world.catalogue import load_robot, missing_source
 
     rows: list[dict[str, object]] = []
     for name in registry.names("robots"):

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def document(entry: "CatalogueEntry") -> dict[str, Any]:
     """Everything about a robot as plain data; joints only where its files are installed."""
-    from anysim.qualify.stage import missing_source
+    from anysim.world.catalogue import missing_source
 
     spec = entry.spec
     absent = missing_source(entry)

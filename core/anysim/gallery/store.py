@@ -11,9 +11,8 @@ from anysim.errors import AnysimError
 from anysim.qualify.apart import LIMIT, qualify_apart
 from anysim.qualify.result import Qualification, as_data, from_data
 from anysim.qualify.run import FULL, Durations
-from anysim.qualify.stage import missing_source
 from anysim.world.cache import digest
-from anysim.world.catalogue import CatalogueEntry, load_robot
+from anysim.world.catalogue import CatalogueEntry, load_robot, missing_source
 
 ESTIMATE = 20.0
 """[s] for one robot on one engine, before anything was measured."""

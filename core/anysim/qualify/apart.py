@@ -12,8 +12,7 @@ from anysim.engine.factory import availability
 from anysim.errors import AnysimError
 from anysim.qualify.result import CHECKS, Check, Qualification, from_data
 from anysim.qualify.run import FULL, Durations
-from anysim.qualify.stage import missing_source
-from anysim.world.catalogue import load_robot
+from anysim.world.catalogue import load_robot, missing_source
 
 LIMIT = 180.0
 """[s] of wall-clock time for one robot on one engine."""

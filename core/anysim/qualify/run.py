@@ -12,9 +12,9 @@ from anysim.errors import AnysimError, CapabilityError
 from anysim.qualify.motion import hold_check, random_checks
 from anysim.qualify.oracle import Oracle, oracle_of
 from anysim.qualify.result import CHECKS, Check, Facts, Qualification, Status
-from anysim.qualify.stage import missing_source, stage
+from anysim.qualify.stage import stage
 from anysim.qualify.statics import audit_check, facts_of, kinematics_check, source_check
-from anysim.world.catalogue import CatalogueEntry, load_robot
+from anysim.world.catalogue import CatalogueEntry, load_robot, missing_source
 from anysim.world.compile import Compiled, compile_with_report
 
 

@@ -1,12 +1,10 @@
 """The world that a robot is qualified in: alone, bolted down in empty space, or standing on a plane."""
 
-from importlib import metadata, util
 from pathlib import Path
 from typing import Any
 
 from anysim import registry
 from anysim.errors import AnysimError
-from anysim.world.assets import EXAMPLE_ROBOT_DATA
 from anysim.world.catalogue import CatalogueEntry
 from anysim_schemas.robot_model import RobotModelSpec
 
@@ -18,31 +16,6 @@ ENDLESS = 10**9
 
 FALLBACK = "joint_position"
 """The controller of a channel that the catalogue gives none."""
-
-
-def missing_source(entry: CatalogueEntry) -> str:
-    """What is not installed of the files that a robot needs, and what to do; empty where all is there."""
-    spec = entry.spec
-    for source in (spec.source, *(part.source for part in spec.parts)):
-        lacking = _lacking(source)
-        if lacking:
-            package = spec.needs or lacking
-            return f"its files come with the package {lacking}, which is not installed: pip install '{package}'"
-    return ""
-
-
-def _lacking(source: str) -> str:
-    """The package that a source needs and that is not there, or nothing."""
-    scheme, colon, rest = source.partition(":")
-    if not colon:
-        return ""
-    if scheme == EXAMPLE_ROBOT_DATA:
-        try:
-            metadata.distribution(EXAMPLE_ROBOT_DATA)
-        except metadata.PackageNotFoundError:
-            return EXAMPLE_ROBOT_DATA
-    package = rest.partition("/")[0] if scheme == "package" else scheme if scheme == "robot_descriptions" else ""
-    return package if package.isidentifier() and util.find_spec(package) is None else ""
 
 
 def controllers(spec: RobotModelSpec) -> dict[str, str]:

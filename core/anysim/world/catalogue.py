@@ -1,11 +1,12 @@
 """The robot catalogue: entries of the group `anysim.robots`, each a package with NAME.yaml."""
 
-import importlib.util
+from importlib import metadata, util
 from pathlib import Path
 from typing import NamedTuple
 
 from anysim import registry
 from anysim.errors import PluginError
+from anysim.world.assets import EXAMPLE_ROBOT_DATA
 from anysim_schemas.robot_model import RobotModelSpec
 
 
@@ -32,7 +33,7 @@ def load_robot(name: str) -> CatalogueEntry:
         return CatalogueEntry(_read(file), file)
     entry = registry.entry("robots", name)
     package = entry.value
-    spec = importlib.util.find_spec(package)
+    spec = util.find_spec(package)
     folders = [Path(folder) for folder in (spec.submodule_search_locations or [])] if spec is not None else []
     for folder in folders:
         file = folder / f"{entry.name}.yaml"
@@ -47,3 +48,28 @@ def _read(file: Path) -> RobotModelSpec:
     from anysim_schemas.load import load
 
     return load(RobotModelSpec, file).spec
+
+
+def missing_source(entry: CatalogueEntry) -> str:
+    """What is not installed of the files that a robot needs, and what to do; empty where all is there."""
+    spec = entry.spec
+    for source in (spec.source, *(part.source for part in spec.parts)):
+        lacking = _lacking(source)
+        if lacking:
+            package = spec.needs or lacking
+            return f"its files come with the package {lacking}, which is not installed: pip install '{package}'"
+    return ""
+
+
+def _lacking(source: str) -> str:
+    """The package that a source needs and that is not there, or nothing."""
+    scheme, colon, rest = source.partition(":")
+    if not colon:
+        return ""
+    if scheme == EXAMPLE_ROBOT_DATA:
+        try:
+            metadata.distribution(EXAMPLE_ROBOT_DATA)
+        except metadata.PackageNotFoundError:
+            return EXAMPLE_ROBOT_DATA
+    package = rest.partition("/")[0] if scheme == "package" else scheme if scheme == "robot_descriptions" else ""
+    return package if package.isidentifier() and util.find_spec(package) is None else ""

@@ -12,7 +12,7 @@ from anysim.errors import AssetError, PluginError, SpecError, listing, suggest
 from anysim.math import pose as P
 from anysim.world.attach import attach
 from anysim.world.builder import WorldBuilder
-from anysim.world.catalogue import CatalogueEntry, load_robot
+from anysim.world.catalogue import CatalogueEntry, load_robot, missing_source
 from anysim.world.compile_vehicle import check_vehicle
 from anysim.world.imported import ImportedModel, ImportNote
 from anysim.world.importers import import_asset
@@ -58,7 +58,8 @@ def import_robot(entry: CatalogueEntry) -> ImportedModel:
             for i, part in enumerate(spec.parts)
         ]  # fmt: skip
     except AssetError as error:
-        remedy = f"; it needs another package: pip install '{spec.needs}'" if spec.needs else ""
+        absent = missing_source(entry) if spec.needs else ""
+        remedy = f"; it needs another package: pip install '{spec.needs}'" if absent else ""
         raise AssetError(f"{error}{remedy}") from None
     for i, (part, more) in enumerate(zip(spec.parts, brought, strict=True)):
         pose = P.pose(part.position, P.from_roll_pitch_yaw(np.array(part.roll_pitch_yaw)))
