@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import anysim
+from anysim.math import pose as P
 from anysim.task.env import TaskEnv
 from anysim_legged.walk import LipmWalk
 
@@ -137,4 +138,36 @@ def test_a_snapshot_of_a_step_continues_bit_for_bit() -> None:
     run(made, np.array([0.2, 0.05, 0.1]), 0.5)
     assert (made.engine.get_state().joint_pos == once).all()
     assert (once[0] == once[1]).all(), "a row does not depend on its place"
+    made.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ENGINES)
+def test_it_reaches_with_both_hands_as_it_stands(engine: str) -> None:
+    """`pink_ik` moves both arms as one problem, seen from a trunk that the balance lets lean and sag."""
+    made = env(engine, "default", arm="pink_ik")
+    assert made.robots is not None
+    arm = made.robots.slice_of("g1", "arm").controller
+    start, robot = pelvis(made), arm.channel.robot
+
+    def hands() -> np.ndarray:
+        """Poses (2, 7) in the base's frame."""
+        robot.see(made.engine.get_state())
+        base = P.inverse(robot.base_pose(None)[0])
+        return np.array([P.compose(base, robot.frame_pose(None, name)[0]) for name in ("left_hand", "right_hand")])
+
+    wanted = hands()
+    began = wanted.copy()
+    wanted[:, :3] += [0.15, 0.0, 0.15]
+    for k in range(150):
+        share = min(1.0, k / 75.0)
+        target = wanted.copy()
+        target[:, :3] = began[:, :3] + share * (wanted - began)[:, :3]
+        made.step(np.concatenate([np.zeros(6), target.reshape(-1)])[None])
+    off = np.linalg.norm((hands() - wanted)[:, :3], axis=1)
+    print(
+        f"{engine}: hands {1e3 * off.max():.3f} mm off, pelvis {1e3 * np.abs(pelvis(made) - start)[0, :3].max():.2f} mm"
+    )
+    assert off.max() < 0.002
+    assert np.abs(pelvis(made) - start)[0, :3].max() < 0.03
     made.close()
