@@ -1,7 +1,8 @@
 """Model files as functions of one observation. Rows are run one by one: a row must not depend on those beside it.
 
 A model that is given a batch may sum in another order than for one row, so its last bits would depend on how many envs
-there are. One thread for the same reason, and because the envs are many and the models small.
+there are. ONNX models run in one thread for the same reason, and because the envs are many and the models small;
+torch's number of threads is that of the process, which is the caller's to set.
 """
 
 import warnings
