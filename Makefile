@@ -14,7 +14,7 @@ DEMO_COMPARE  = $(BIN)/anysim compare pick_cube --episodes 4 --seed 1 --out $(DE
 
 # More words for pytest: make test ARGS="-k pose -x"
 ARGS ?=
-# A worker for each core, each with engines of its own and up to 2 GB. One process: make test ARGS="-n 0"
+# A worker for each core, each with engines of its own and up to 3 GB. One process: make test ARGS="-n 0"
 PYTEST = $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist loadgroup
 
 .DEFAULT_GOAL := help
