@@ -7,18 +7,13 @@ from anysim.api import compile_world, load
 from anysim.engine.factory import create_simulation
 
 ROBOTS = ("tiago", "tiago_dual", "tiago_pro", "pr2", "mobile_panda", "mobile_dual_panda", "mobile_ur5")
-FALLS_SHORT = {
-    ("tiago_pro", "pybullet"): "the right gripper's six coupled fingers shake: PyBullet's gears between light links"
-}
 SAG, MOVED = 0.05, 0.01  # [rad] or [m]; [m] of the base
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ["mujoco", "pybullet", "sapien"])
 @pytest.mark.parametrize("robot", ROBOTS)
-def test_it_stands(robot: str, engine: str, request: pytest.FixtureRequest) -> None:
-    if (robot, engine) in FALLS_SHORT:
-        request.applymarker(pytest.mark.xfail(reason=FALLS_SHORT[robot, engine], strict=True))
+def test_it_stands(robot: str, engine: str) -> None:
     world = compile_world(
         load({"engine": engine, "world": {"name": "w", "terrain": "plane", "robots": {"r": {"robot": robot}}}})
     )

@@ -15,7 +15,7 @@ from anysim.quiet import quiet
 from anysim.world.model import Geom, HeightField, HeightFieldShape, MeshShape, Plane, World
 from anysim_pybullet.bullet import bullet, connect, disconnect
 from anysim_pybullet.cast import Cast
-from anysim_pybullet.options import PybulletOptions
+from anysim_pybullet.options import PybulletOptions, sweeps
 from anysim_pybullet.surfaces import PairRules
 from anysim_pybullet.tree import Frames, Tree, frames_of, shifted, trees_of
 from anysim_pybullet.urdf import body_link, joint_name, shape_link, tree_urdf, world_geom_urdf, write_meshes
@@ -44,7 +44,7 @@ class Plan:
     """What all envs of an engine share: the trees, their URDF files, the pairs that never touch."""
 
     def __init__(self, world: World, options: PybulletOptions) -> None:
-        self.world, self.options = world, options
+        self.world, self.options, self.sweeps = world, options, sweeps(options, world)
         self.frames: Frames = frames_of(world)
         self.trees: list[Tree] = trees_of(world, self.frames)
         self.rules = PairRules(world, self.trees, options.contact_erp)
@@ -176,7 +176,7 @@ class Env:
         # without ordered pairs neither equal runs nor saved states are exact
         p.setPhysicsEngineParameter(
             deterministicOverlappingPairs=1, fixedTimeStep=physics.dt, numSubSteps=0,
-            numSolverIterations=options.iterations, solverResidualThreshold=options.residual,
+            numSolverIterations=self.plan.sweeps, solverResidualThreshold=options.residual,
             erp=options.joint_erp, contactERP=options.contact_erp, restitutionVelocityThreshold=0.01,
             physicsClientId=self.id,
         )  # fmt: skip

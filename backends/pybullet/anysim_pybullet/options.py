@@ -2,7 +2,7 @@
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from anysim.world.model import Scenery
+from anysim.world.model import Scenery, World
 
 BACKGROUND = (221 / 255, 230 / 255, 240 / 255)
 AMBIENT = 0.35
@@ -14,7 +14,10 @@ class PybulletOptions(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    iterations: int = Field(default=50, ge=1, description="most sweeps of the constraint solver in a step")
+    iterations: int | None = Field(
+        default=None, ge=1, description="most sweeps of the constraint solver in a step; 50 where not given, "
+        "100 where more than two joints of a robot or object follow others"
+    )  # fmt: skip
     residual: float = Field(default=1e-7, ge=0, description="velocity residual at which the constraint solver stops")
     contact_erp: float = Field(default=0.1, ge=0, le=1, description="share of a penetration that a step takes back")
     joint_erp: float = Field(default=0.2, ge=0, le=1, description="share of a limit's error that a step takes back")
@@ -29,6 +32,19 @@ class PybulletOptions(BaseModel):
             if getattr(self, name) != getattr(defaults, name)
         ]
         return ",".join(changed)
+
+
+def sweeps(options: PybulletOptions, world: World) -> int:
+    """The most sweeps of the constraint solver in a step.
+
+    A sweep goes from coupling to coupling once. The five couplings of a finger linkage of 20 g links on an arm are not
+    met in 50: they shook at 10 rad/s; 75 were enough.
+    """
+    if options.iterations is not None:
+        return options.iterations
+    joints = [world.joints[entity.joint_start : entity.joint_stop] for entity in world.entities]
+    followers = max((sum(joint.mimic is not None for joint in some) for some in joints), default=0)
+    return 50 if followers <= 2 else 100
 
 
 def own_scenery(options: PybulletOptions) -> Scenery:

@@ -11,12 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from anysim.api import compile_world
 from anysim.engine.factory import create_simulation
 from anysim.errors import EngineError
 from anysim.quiet import quiet
 from anysim.testing import worlds
 from anysim.world.model import Plane
 from anysim_pybullet import declared
+from anysim_pybullet.options import PybulletOptions, sweeps
 
 
 def _run(code: str, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -117,6 +119,14 @@ def test_unknown_options_are_refused():
     """Options are checked by name."""
     with pytest.raises(EngineError, match="no option 'iteration'; did you mean 'iterations'"):
         create_simulation("pybullet", iteration=3)
+
+
+@pytest.mark.parametrize(("robot", "usual"), [("franka_panda", 50), ("tiago_pro", 100)])
+def test_linkages_get_more_sweeps(robot, usual):
+    """The Panda has one finger that follows, a gripper of TIAGo Pro five joints."""
+    world = compile_world({"world": {"robots": {"r": {"robot": robot}}}})
+    assert sweeps(PybulletOptions(), world) == usual
+    assert sweeps(PybulletOptions(iterations=7), world) == 7
 
 
 def test_options_that_shape_runs_are_in_the_version():
