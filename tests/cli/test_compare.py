@@ -26,6 +26,7 @@ def test_a_comparison_is_written_and_told(tmp_path: Path) -> None:
     assert "http" not in (out / "compare.html").read_text()
 
 
+@pytest.mark.slow
 def test_strict_answers_with_the_exit_code(tmp_path: Path) -> None:
     arguments = ("compare", "pick_cube", "-e", "mujoco,null", "--strict", "--json")
     fine = anysim(*arguments, "--layers", "kinematics", "--out", str(tmp_path / "a"))
@@ -50,6 +51,7 @@ def test_strict_answers_with_the_exit_code(tmp_path: Path) -> None:
     assert "within the declared" in layer["differ"][0]["explanation"]
 
 
+@pytest.mark.slow
 def test_what_does_not_apply_is_said_before_anything_is_measured(tmp_path: Path) -> None:
     world = tmp_path / "block.yaml"
     world.write_text(BLOCK)

@@ -56,6 +56,7 @@ def test_a_mass_that_is_not_admitted_shows_in_the_mass_matrix() -> None:
     assert off(layer) == {("wrong", "mass matrix: largest error of the kinetic energy")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [wrong.softer, wrong.slower])
 def test_a_wrong_drive_is_a_matter_of_actuation(change) -> None:
     engines = {"right": MUJOCO, "wrong": wrong.altered(change)}

@@ -169,6 +169,7 @@ print(hashlib.sha256(np.array(rows).tobytes()).hexdigest())
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", engines())
 def test_another_process_sees_the_same_bits(name: str) -> None:
     root = Path(__file__).parents[2]

@@ -201,6 +201,7 @@ def trajectory(engine: str, num_envs: int, episodes: int = 20) -> list[str]:
     return [digest.hexdigest() for digest in digests]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", varying_engines())
 def test_a_heterogeneous_scene_is_the_same_in_another_process_and_with_another_number_of_envs(engine: str) -> None:
     code = f"from tests.managers.test_population import trajectory; print(trajectory({engine!r}, 16))"
