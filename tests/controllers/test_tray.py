@@ -20,7 +20,6 @@ from anysim.engine.base import SimEngine
 from anysim.engine.factory import create_simulation
 from anysim.math import pose as P
 from anysim.testing.tracking import bolted, robot_world
-from anysim.world.kinematics import forward_kinematics
 from anysim.world.model import World
 
 ENGINES = ("mujoco", "pybullet", "sapien")
@@ -104,11 +103,7 @@ def _world(robot: str, tray: Tray | None, folder: Path) -> World:
     if tray is None:
         return robot_world(robot, position=[0.0, 0.0, 0.5])
     bare = robot_world(robot, position=[0.0, 0.0, 0.5], home=tray.home or {})
-    bodies = forward_kinematics(
-        bare,
-        np.array([[[*b.position, *b.quaternion] for b in bare.bodies]]),
-        np.array([[joint.initial for joint in bare.joints]]),
-    )[0]
+    bodies = bare.initial_body_pose
     sites = [bare.sites[site] for site in bare.robots[0].tools.values()]
     tools = [P.compose(bodies[site.body], P.pose(site.position, site.quaternion)) for site in sites]
     x, y, z = (float(number) for number in np.mean(tools, axis=0)[:3])
@@ -160,7 +155,7 @@ class Hands:
         self.controller = made(self.view, 1, velocity_scale=0.5)
         self.position = np.array([[world.joints[a.joint].initial for a in world.actuators]])
         self.controller.reset(np.array([0]), self.position[:, self.view.actuators])
-        self.tools = [world.sites[site].name.removeprefix("robot.") for site in world.robots[0].tools.values()]
+        self.tools = list(world.robots[0].tools)
         self.bodies = [world.sites[site].body for site in world.robots[0].tools.values()]
         self.base = self.seen.base_pose(None)
         self.start = P.compose(P.inverse(self.base), self.poses())
