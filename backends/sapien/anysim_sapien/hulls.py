@@ -1,5 +1,6 @@
 """Convex hulls as PhysX has them."""
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -21,11 +22,19 @@ def convex(mesh: Mesh, material: Any) -> Any:
     thick. A hull that would lose more than the audit allows is cooked at ten times its size and scaled back.
     """
     corners = np.asarray(mesh.vertices, dtype=np.float32)
-    shape = physx.PhysxCollisionShapeConvexMesh(corners, UNIT_SCALE, material)
+    if _loses(corners.tobytes(), np.asarray(mesh.faces, dtype=np.int32).tobytes()):
+        return physx.PhysxCollisionShapeConvexMesh(FINER * corners, [1.0 / FINER] * 3, material)
+    return physx.PhysxCollisionShapeConvexMesh(corners, UNIT_SCALE, material)
+
+
+@lru_cache(maxsize=4096)
+def _loses(corners: bytes, faces: bytes) -> bool:
+    """Whether a hull of (V, 3) float32 and (F, 3) int32 loses more than allowed; asked once, however many envs."""
+    vertices = np.frombuffer(corners, dtype=np.float32).reshape(-1, 3)
+    mesh = Mesh("hull", vertices.astype(float), np.frombuffer(faces, dtype=np.int32).reshape(-1, 3))
     whole = inertia.volume(MeshShape(mesh.name), {mesh.name: mesh})
-    if abs(volume(shape) - whole) > AUDIT_ALLOWANCES["volume"].relative * whole:
-        shape = physx.PhysxCollisionShapeConvexMesh(FINER * corners, [1.0 / FINER] * 3, material)
-    return shape
+    cooked = physx.PhysxCollisionShapeConvexMesh(vertices, UNIT_SCALE, physx.PhysxMaterial(0.0, 0.0, 0.0))
+    return abs(volume(cooked) - whole) > AUDIT_ALLOWANCES["volume"].relative * whole
 
 
 def volume(shape: Any) -> float:
