@@ -17,11 +17,11 @@ import numpy as np
 
 from anysim import registry
 from anysim.api import compile_world, load
+from anysim.assets.catalogue import load_robot
 from anysim.controllers.robot import ControlledRobot
 from anysim.engine.factory import create_simulation
 from anysim.managers.robot import RobotManager
 from anysim.managers.standard import standard_managers
-from anysim.world.catalogue import load_robot
 
 SIDE, SPEED, GATHER = 2.0, 0.6, 0.5  # [m], [m/s], [m/s^2]: less than controllers allow
 TURN, TURN_GATHER = 1.2, 1.5  # [rad/s], [rad/s^2]
@@ -162,9 +162,12 @@ def compare(found: np.ndarray, path: np.ndarray) -> Result:
     yaw = found[-1, 3] - start[3] - path[-1, 2]
     turned = np.remainder(yaw + np.pi, 2 * np.pi) - np.pi
     return Result(
-        float(distance.max()), float(np.hypot(*(xy[-1] - path[-1, :2]))), float(abs(turned)),
-        float(np.hypot(*(xy - path[:, :2]).T).max()), float(found[-1, 2]),
-    )  # fmt: skip
+        float(distance.max()),
+        float(np.hypot(*(xy[-1] - path[-1, :2]))),
+        float(abs(turned)),
+        float(np.hypot(*(xy - path[:, :2]).T).max()),
+        float(found[-1, 2]),
+    )
 
 
 def main() -> int:

@@ -16,13 +16,13 @@ from collections.abc import Callable
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.kinematics.model import RobotModel, pinocchio
+from anysim.kinematics.chain import Chain
+from anysim.kinematics.pinocchio_model import RobotModel, pinocchio
 from anysim.math import pose as P
+from anysim.model.world import World
 from anysim.planning.api import inverse_kinematics
-from anysim.planning.chain import Chain
 from anysim.testing.arms import panda_arm
-from anysim.world.model import World
-from anysim_ik.frames import canonical_frames
+from anysim_control.batch.frames import canonical_frames
 
 RESTARTS = 60
 ROOT = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])

@@ -19,10 +19,10 @@ import numpy as np
 
 from anysim import registry
 from anysim.api import compile_world, load
+from anysim.compile.room import furniture_names
 from anysim.engine.factory import create_simulation, engine_class
 from anysim.managers.standard import standard_managers
 from anysim.math import pose as P
-from anysim.world.compile_room import furniture_names
 from anysim_schemas.rooms import RoomSpec
 
 DEPTH, DRIFT = 1e-3, 5e-3  # [m]
@@ -71,10 +71,12 @@ def tabletop(seed: int, folder: Path) -> dict:
         layout[name] = place
     return {
         "world": {
-            "name": f"tabletop_{seed}", "objects": objects, "layout": layout,
+            "name": f"tabletop_{seed}",
+            "objects": objects,
+            "layout": layout,
             "cameras": {"front": {"from": [0.62, 0, 0.95], "look_at": [0.03, 0, 0.4], "fov": 40, "size": [320, 240]}},
         }
-    }  # fmt: skip
+    }
 
 
 def room(seed: int, folder: Path) -> dict:

@@ -11,8 +11,14 @@ from checks import constraints, junk, length, links, packages, words, yaml_heade
 from checks.tree import Fault, Tree
 
 CHECKS: Sequence[Callable[[Tree], Iterator[Fault]]] = (
-    length.check, words.check, junk.check, packages.check, constraints.check, yaml_header.check, links.check,
-)  # fmt: skip
+    length.check,
+    words.check,
+    junk.check,
+    packages.check,
+    constraints.check,
+    yaml_header.check,
+    links.check,
+)
 
 
 def faults(root: Path) -> list[Fault]:

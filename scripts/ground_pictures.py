@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from anysim.compile.world import compile_world
 from anysim.conventions import Array
 from anysim.engine.factory import create_simulation
-from anysim.world.compile import compile_world
 from anysim_schemas.run import WorldSpec
 from anysim_schemas.terrain import GENERATED
 
@@ -68,8 +68,10 @@ def room(style: str, more: dict[str, Any], seed: int) -> Array:
         "windows": [{"wall": wall} for wall in walls[: 1 + seed % 2]],
     }  # fmt: skip
     camera = {"from": [1.3, -4.2, 8.4], "look_at": [0.05, 0.1, 0.3], "fov": 40.0, "size": [400, 320]}
-    lights = {"sun": {"direction": [-0.25, 0.35, -1.0], "intensity": 0.75},
-              "sky": {"direction": [0.4, 0.5, -0.6], "intensity": 0.35}}  # fmt: skip
+    lights = {
+        "sun": {"direction": [-0.25, 0.35, -1.0], "intensity": 0.75},
+        "sky": {"direction": [0.4, 0.5, -0.6], "intensity": 0.35},
+    }
     spec = {"room": {**fields, **more}, "cameras": {"above": camera}, "lights": lights}
     with create_simulation("mujoco").create_world(compile_world(WorldSpec.model_validate(spec))) as engine:
         return engine.render("above")["rgb"][0]
@@ -79,8 +81,10 @@ def rooms(path: Path) -> None:
     """A row for each style, four seeds a row."""
     from PIL import Image
 
-    rows = [np.concatenate([room(style, more, seed) for seed in range(4 * i, 4 * i + 4)], axis=1)
-            for i, (style, more) in enumerate(ROOMS)]  # fmt: skip
+    rows = [
+        np.concatenate([room(style, more, seed) for seed in range(4 * i, 4 * i + 4)], axis=1)
+        for i, (style, more) in enumerate(ROOMS)
+    ]
     picture = Image.fromarray(np.concatenate(rows)).resize((1120, 896), Image.Resampling.LANCZOS)
     picture.quantize(256, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE).save(path, optimize=True)
 

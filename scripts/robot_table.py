@@ -18,13 +18,13 @@ from pathlib import Path
 from typing import Any
 
 from anysim import registry
+from anysim.assets.catalogue import load_robot, missing_source
 from anysim.errors import AnysimError
-from anysim.gallery.store import Stored, due, estimate, fingerprint, measure, read, results, write
-from anysim.qualify.apart import LIMIT
-from anysim.qualify.result import CHECKS, Qualification
-from anysim.qualify.run import FULL
-from anysim.signatures import options_model
-from anysim.world.catalogue import load_robot, missing_source
+from anysim.plugin_parameters import options_model
+from anysim_robots.gallery.store import Stored, due, estimate, fingerprint, measure, read, results, write
+from anysim_robots.qualify.apart import LIMIT
+from anysim_robots.qualify.result import CHECKS, Qualification
+from anysim_robots.qualify.run import FULL
 
 ROOT = Path(__file__).parents[1]
 STORE, TABLE = ROOT / "docs" / "robots.json", ROOT / "docs" / "robots.md"

@@ -53,7 +53,12 @@ if ! .venv/bin/python -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/d
 fi
 
 editable=""
-for member in "$@"; do editable="$editable --editable ./$member"; done
+for member in "$@"; do
+    case $member in
+        core) editable="$editable --editable ./core[all]" ;;  # with everything optional that is ours
+        *) editable="$editable --editable ./$member" ;;
+    esac
+done
 say "installing $* and the developers' tools into .venv"
 # shellcheck disable=SC2086  # the options are words
 "$uv" pip install --quiet --python .venv/bin/python --constraint constraints.txt --group dev $editable

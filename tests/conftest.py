@@ -3,10 +3,15 @@
 import multiprocessing
 import os
 import threading
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import pytest
+
+if TYPE_CHECKING:
+    from anysim.assets.model import ImportedModel
+    from anysim.model.world import World
 
 ROOT = Path(__file__).parents[1]
 OWN_LEFTOVERS = frozenset({".pytest_cache", ".hypothesis", ".cache", "__pycache__"})
@@ -54,3 +59,48 @@ def _nothing_runs_on() -> Iterator[None]:
     processes = [f"{p.name} ({p.pid})" for p in multiprocessing.active_children()]
     assert not threads, f"threads that no test stopped: {', '.join(threads)}"
     assert not processes, f"processes that no test stopped: {', '.join(processes)}"
+
+
+INERTIAL = '<inertial><mass value="{m}"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>'
+
+
+@pytest.fixture
+def inertial() -> Callable[[float], str]:
+    """The text of an inertial of some mass."""
+    return lambda mass: INERTIAL.format(m=mass)
+
+
+@pytest.fixture
+def urdf(tmp_path: Path) -> "Callable[..., ImportedModel]":
+    """Imports the body of a <robot> element from a file in tmp_path."""
+
+    from anysim.assets.urdf import import_urdf
+
+    def load(body: str, **options: Any) -> "ImportedModel":
+        path = tmp_path / "arm.urdf"
+        path.write_text(f'<?xml version="1.0"?>\n<robot name="arm">\n{body}\n</robot>\n')
+        return import_urdf(path, root=tmp_path, **options)
+
+    return load
+
+
+@pytest.fixture
+def world() -> "Callable[..., World]":
+    """Compiles a world given as plain data."""
+
+    from anysim.compile.world import compile_world
+    from anysim_schemas.run import WorldSpec
+
+    def make(base: Path | None = None, **content: Any) -> "World":
+        return compile_world(WorldSpec.model_validate(content), base=base)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def panda() -> "World":
+    """A world with the catalogue's Panda alone."""
+    from anysim.compile.world import compile_world
+    from anysim_schemas.run import WorldSpec
+
+    return compile_world(WorldSpec.model_validate({"robots": {"panda": {"robot": "franka_panda"}}}))

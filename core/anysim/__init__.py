@@ -14,7 +14,7 @@ _LAZY = {
     "compile_world": "anysim.api",
     "create_simulation": "anysim.engine.factory",
     "SimEngine": "anysim.engine.base",
-    "World": "anysim.world.model",
+    "World": "anysim.model.world",
     "TaskEnv": "anysim.task.env",
 }
 __all__ = [*_LAZY, "__version__"]
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from anysim.api import compile_world as compile_world, load as load, make as make
     from anysim.engine.base import SimEngine as SimEngine
     from anysim.engine.factory import create_simulation as create_simulation
+    from anysim.model.world import World as World
     from anysim.task.env import TaskEnv as TaskEnv
-    from anysim.world.model import World as World
 
 
 def __getattr__(name: str) -> Any:

@@ -20,8 +20,8 @@ from anysim_schemas.object_source import Source, SourceChoice, SourceFolder
 
 if TYPE_CHECKING:
     from anysim.engine.base import SimEngine
+    from anysim.model.world import World
     from anysim.task.env import TaskEnv
-    from anysim.world.model import World
     from anysim_schemas.run import RunSpec
 
 TASK_FILE = "task.yaml"
@@ -74,7 +74,7 @@ def compile_world(
     Raises:
         SpecError, AssetError: with the file, line and column of the key at fault where they are known.
     """
-    from anysim.world.compile import compile_world as compile_spec
+    from anysim.compile.world import compile_world as compile_spec
     from anysim_schemas.run import RunSpec
 
     if isinstance(source, RunSpec):
@@ -151,7 +151,7 @@ def check_engine(loaded: LoadedRun, world: "World", engine: "type[SimEngine]", s
         SpecError: with file, line and column.
         CapabilityError: lists every need that the engine does not meet.
     """
-    from anysim.managers.changes import check_run
+    from anysim.managers.requirements import check_run
     from anysim.managers.standard import standard_managers
 
     try:
@@ -163,7 +163,7 @@ def check_engine(loaded: LoadedRun, world: "World", engine: "type[SimEngine]", s
 
 def blind_env(loaded: LoadedRun, world: "World", name: str) -> "TaskEnv":
     """One env on the kinematic engine, which draws no images and can run any world."""
-    from anysim.engine.null import NullEngine
+    from anysim.engine.kinematic import NullEngine
 
     blind = replace(world, cameras=tuple(replace(camera, channels=()) for camera in world.cameras))
     try:
@@ -187,7 +187,7 @@ def _env(
     loaded: LoadedRun, world: "World", simulation: "SimEngine", num_envs: int, name: str, proposals: Any = None
 ) -> "TaskEnv":
     """An env on a fresh engine; the engine is destroyed if anything fails."""
-    from anysim.managers.changes import check_run
+    from anysim.managers.requirements import check_run
     from anysim.managers.standard import standard_managers
     from anysim.task.env import TaskEnv
 
@@ -204,7 +204,7 @@ def _env(
 
 def simulation(spec: "RunSpec") -> "SimEngine":
     """The engine that a spec asks for, without a world."""
-    from anysim.engine.shards.blocks import shard_count
+    from anysim.engine.sharded.blocks import shard_count
 
     chosen = spec.engine
     shards = shard_count(chosen.shards, engine_class(chosen.name), spec.num_envs)
@@ -218,9 +218,15 @@ def _loaded(source: str | Path | LoadedRun | Mapping[str, Any], overrides: Seque
 
 
 def make(
-    source: str | Path | LoadedRun | Mapping[str, Any], *, engine: str | None = None, num_envs: int | None = None,
-    seed: int | None = None, overrides: Sequence[str] = (), base: Path | None = None, proposals: Any = None,
-) -> "TaskEnv":  # fmt: skip
+    source: str | Path | LoadedRun | Mapping[str, Any],
+    *,
+    engine: str | None = None,
+    num_envs: int | None = None,
+    seed: int | None = None,
+    overrides: Sequence[str] = (),
+    base: Path | None = None,
+    proposals: Any = None,
+) -> "TaskEnv":
     """An env of a task: `env = anysim.make("pick_cube", engine="mujoco", num_envs=16)`.
 
     Args:
@@ -231,7 +237,7 @@ def make(
         overrides: dotted overrides, as `-o` on the command line.
         base: the folder that relative asset paths are relative to; that of the file where there is one.
         proposals: poses of objects that somebody else proposes: a mapping, a JSON file, or a callable that takes a
-            `anysim.layout.proposals.Request` and gives one; wins over `world.layout_source` of the file.
+            `anysim.placement.proposals.Request` and gives one; wins over `world.layout_source` of the file.
 
     Raises:
         SpecError: the file, with line and column.

@@ -5,7 +5,7 @@ from pydantic import BaseModel, ConfigDict
 from anysim import registry
 from anysim.controllers.base import DEFAULT_CONTROLLER
 from anysim.errors import PluginError
-from anysim.signatures import options_model
+from anysim.plugin_parameters import options_model
 from anysim_schemas.plugin import UnknownPlugin
 
 TERM_KINDS = ("observation", "reward", "predicate", "command", "event")
@@ -23,7 +23,7 @@ def resolve_options(kind: str, name: str) -> type[BaseModel] | None:
     Raises:
         UnknownPlugin: with a sentence that lists what exists.
     """
-    from anysim.task.library import find
+    from anysim.task.term_registry import find
 
     try:
         if (kind, name) == ("controller", DEFAULT_CONTROLLER):

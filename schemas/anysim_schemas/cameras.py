@@ -37,8 +37,7 @@ class CameraSpec(Spec):
     channels: tuple[Channel, ...] = Field(default=("rgb",), description="the images it takes")
     exposure: PositiveValue = Field(default=1.0, description="factor of the brightness of its colour images")
     noise: NonNegativeValue = Field(
-        default=0.0,
-        description="standard deviation of the noise of its colour images, drawn for each image; of white",
+        default=0.0, description="standard deviation of the noise of its colour images, drawn for each image; of white"
     )
     near: Positive = Field(default=0.01, description="distance of the near clipping plane [m]")
     far: Positive = Field(default=20.0, description="distance of the far clipping plane [m]")

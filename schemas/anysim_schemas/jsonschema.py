@@ -25,8 +25,10 @@ from anysim_schemas.robot_model import RobotModelSpec
 from anysim_schemas.run import RunSpec
 
 SCHEMAS: Mapping[str, type[BaseModel]] = {
-    "run.schema.json": RunSpec, "robot.schema.json": RobotModelSpec, "proposal.schema.json": Proposals,
-}  # fmt: skip
+    "run.schema.json": RunSpec,
+    "robot.schema.json": RobotModelSpec,
+    "proposal.schema.json": Proposals,
+}
 """The files that are generated, and the roots they describe."""
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"

@@ -103,9 +103,7 @@ class PlacementSpec(PlaceFields):
     an entry says holds at once, and an entry that cannot be kept is an error that says what is in the way.
     """
 
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
-        ("position",), ("on", "in", "under", "x", "y", "region"),
-    )  # fmt: skip
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("position",), ("on", "in", "under", "x", "y", "region"))
 
     any_of: tuple[Alternative, ...] = Field(
         default=(), description="places of which one is drawn in each episode; the rest of the entry holds for each"

@@ -22,8 +22,9 @@ class SourceSpec(Spec):
     """
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
-        *((shape, "scale") for shape in SHAPES[:-1]), ("procedural", "params", "scale"),
-    )  # fmt: skip
+        *((shape, "scale") for shape in SHAPES[:-1]),
+        ("procedural", "params", "scale"),
+    )
 
     box: tuple[Positive, Positive, Positive] | None = Field(default=None, description="edge lengths x, y, z [m]")
     sphere: Positive | None = Field(default=None, description="radius [m]")

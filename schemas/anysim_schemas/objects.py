@@ -109,8 +109,10 @@ class ObjectSpec(Spec):
             raise KeyFault("a count that is always 0 is no object; leave the object out, or set it to null", "count")
         if self.family == "rigid_instancer":
             if not isinstance(self.count, int):
-                raise KeyFault("a rigid_instancer needs a `count` that is one number: it is made once, as a whole",
-                               "count" if self.count is not None else "family")  # fmt: skip
+                raise KeyFault(
+                    "a rigid_instancer needs a `count` that is one number: it is made once, as a whole",
+                    "count" if self.count is not None else "family",
+                )
             return self
         for key in ("grid", "gap"):
             if getattr(self, key) is not None:

@@ -99,8 +99,7 @@ class ImageSpec(Spec):
     """How the images of a camera are observed."""
 
     fps: Positive | None = Field(
-        default=None,
-        description="images per second, the latest one holds meanwhile; each control step if not given",
+        default=None, description="images per second, the latest one holds meanwhile; each control step if not given"
     )
 
 

@@ -84,8 +84,9 @@ class TilesSpec(Spec):
 
     columns: tuple[TileColumnSpec, ...] = Field(
         default=tuple(TileColumnSpec(kind=kind) for kind in ("rough", "slopes", "stairs", "obstacles")),
-        min_length=1, description="kinds of ground, side by side along y",
-    )  # fmt: skip
+        min_length=1,
+        description="kinds of ground, side by side along y",
+    )
     rows: Integer = Field(default=5, gt=0, description="levels of difficulty, one behind the other along x")
     difficulty: tuple[Fraction, Fraction] = Field(default=(0.0, 1.0), description="of the first and the last row")
     size: Positive = Field(default=8.0, description="edge of a tile [m]")
@@ -111,9 +112,11 @@ class TilesSpec(Spec):
         for i, column in enumerate(self.columns):
             if column.platform >= self.size:
                 raise KeyFault(
-                    f"a platform of {column.platform:g} m does not fit a tile of {self.size:g} m", "columns", str(i),
+                    f"a platform of {column.platform:g} m does not fit a tile of {self.size:g} m",
+                    "columns",
+                    str(i),
                     "platform",
-                )  # fmt: skip
+                )
         return self
 
 
@@ -128,9 +131,19 @@ class TerrainSpec(ReliefSpec):
     """Keys that go with some kinds alone."""
 
     kind: Literal[
-        "plane", "none", "heightfield", "trimesh", "tiles", "rough", "waves", "slopes", "stairs", "stepping_stones",
-        "gaps", "obstacles",
-    ] = Field(default="plane", description="what the ground is")  # fmt: skip
+        "plane",
+        "none",
+        "heightfield",
+        "trimesh",
+        "tiles",
+        "rough",
+        "waves",
+        "slopes",
+        "stairs",
+        "stepping_stones",
+        "gaps",
+        "obstacles",
+    ] = Field(default="plane", description="what the ground is")
     friction: Number = Field(default=0.8, ge=0, description="sliding friction coefficient")
     restitution: Number = Field(default=0.0, ge=0, lt=1, description="ratio of speeds after and before a bounce")
     color: ColorValue = Field(

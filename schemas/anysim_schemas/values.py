@@ -22,7 +22,7 @@ from anysim_schemas.base import (
     Spec,
     Vec3,
     Whole,
-)  # fmt: skip
+)
 from anysim_schemas.errors import KeyFault
 
 T = TypeVar("T")
@@ -74,8 +74,11 @@ class Drawn(Variant, Generic[T]):
     """What the values that are drawn have in common: the key that says how, whether at all, and with whom."""
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
-        ("range",), ("log_uniform",), ("choice", "weights"), ("normal",),
-    )  # fmt: skip
+        ("range",),
+        ("log_uniform",),
+        ("choice", "weights"),
+        ("normal",),
+    )
 
     ratio: Fraction = Field(default=1.0, description="share of the episodes in which it is drawn at all")
     otherwise: T | None = Field(

@@ -38,9 +38,10 @@ def _metadata(tree: Tree) -> Iterator[Fault]:
         version = _assigned(tree.root / package / "__init__.py", "__version__")
         if version not in (None, member.project["version"]):
             yield Fault(
-                package / "__init__.py", 0,
+                package / "__init__.py",
+                0,
                 f"__version__ is {version!r}, pyproject.toml says {member.project['version']!r}; make them equal",
-            )  # fmt: skip
+            )
 
 
 def _known_to_tools(tree: Tree) -> Iterator[Fault]:

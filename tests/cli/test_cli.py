@@ -165,8 +165,10 @@ def test_bench_gives_a_ratio_for_each_loop() -> None:
     assert result.returncode == 0, result.stderr
     rows = json.loads(result.stdout)
     assert [(row["engine"], row["what"], row["actuation"]) for row in rows] == [
-        ("mujoco", "engine", "native"), ("mujoco", "engine", "implicit_pd"), ("mujoco", "env", "implicit_pd"),
-    ]  # fmt: skip
+        ("mujoco", "engine", "native"),
+        ("mujoco", "engine", "implicit_pd"),
+        ("mujoco", "env", "implicit_pd"),
+    ]
     assert all(row["ratio"] > 0 for row in rows)
 
 

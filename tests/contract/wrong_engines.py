@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from right_engine import Right
 
-from anysim.engine.commands import Control
+from anysim.engine.control import Control
 from anysim.errors import AnysimError
 
 

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from anysim.conventions import IDENTITY_QUATERNION
-from anysim.world.model import Capsule, Cylinder, World
+from anysim.model.world import Capsule, Cylinder, World
 from anysim_mujoco.engine import MujocoEngine
 
 

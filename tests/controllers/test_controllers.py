@@ -21,9 +21,20 @@ def channel(name: str, lower: list[float], upper: list[float], ends: tuple[list[
     opened, closed = (None, None) if ends is None else (np.array(ends[0]), np.array(ends[1]))
     robot = cast(ControlledRobot, SimpleNamespace(name="r"))
     return ChannelView(
-        name, np.arange(k), slice(0, k), np.array(lower), np.array(upper), far, far, np.ones(k), np.ones(k), opened,
-        closed, robot, np.arange(k),
-    )  # fmt: skip
+        name,
+        np.arange(k),
+        slice(0, k),
+        np.array(lower),
+        np.array(upper),
+        far,
+        far,
+        np.ones(k),
+        np.ones(k),
+        opened,
+        closed,
+        robot,
+        np.arange(k),
+    )
 
 
 ARM = channel("arm", [-1.0, -2.0], [1.0, 2.0])

@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from anysim.engine.commands import MODES
+from anysim.engine.control import MODES
 from anysim.errors import AnysimError, TaskError
+from anysim.model.world import ControlMode
 from anysim.task.env import TaskEnv
-from anysim.world.model import ControlMode
 from tests.runtime import light
 
 REAL = list(light.REAL)
@@ -18,10 +18,12 @@ def bench(action: Any, *, physics: dict[str, Any] | None = None) -> dict[str, An
     """The two-link arm alone, in the plane that gravity does not pull along."""
     return {
         "physics": physics or {"dt": 0.002, "control_dt": 0.02},
-        "world": {"name": "bench", "robots": {"arm": {"robot": "two_link", "position": [0, 0, 0.5],
-                                                      "actions": {"arm": action}}}},
+        "world": {
+            "name": "bench",
+            "robots": {"arm": {"robot": "two_link", "position": [0, 0, 0.5], "actions": {"arm": action}}},
+        },
         "task": {"horizon": 500, "observations": {"policy": ["joint_pos", "joint_vel"]}, "events": {}},
-    }  # fmt: skip
+    }
 
 
 def made(engine: str, n: int, action: Any, shards: int = 1) -> TaskEnv:

@@ -46,5 +46,11 @@ def test_a_world_runs_on_every_engine_that_declares_it_can(world: Path, engine: 
 
 def test_the_seven_are_there() -> None:
     assert [path.stem for path in WORLDS] == [
-        "cluttered_table", "four_worlds", "kitchen", "room", "rough_terrain", "team", "thousand",
-    ]  # fmt: skip
+        "cluttered_table",
+        "four_worlds",
+        "kitchen",
+        "room",
+        "rough_terrain",
+        "team",
+        "thousand",
+    ]

@@ -4,7 +4,7 @@ import os
 import signal
 import time
 
-from anysim.engine.null import NullEngine
+from anysim.engine.kinematic import NullEngine
 from anysim.errors import CapabilityError
 
 

@@ -6,13 +6,13 @@ from typing import ClassVar
 import pytest
 
 import anysim
-from anysim.engine.allowance import Allowance
 from anysim.engine.audit import audit
 from anysim.engine.base import SimEngine
+from anysim.engine.capability import Allowance
 from anysim.engine.factory import create_simulation
-from anysim.engine.null import NullEngine
-from anysim.world.kinematics import forward_kinematics
-from anysim.world.model import World
+from anysim.engine.kinematic import NullEngine
+from anysim.model.forward_kinematics import forward_kinematics
+from anysim.model.world import World
 from tests.task.helpers import BLIND
 
 

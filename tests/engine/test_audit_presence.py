@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from anysim import registry
-from anysim.engine.audit import audit
+from anysim.engine.audit import audit, world_rows
 from anysim.errors import PluginError
 from anysim.testing.varying import having, varied
-from anysim.world.audit import world_rows
 
 
 @pytest.mark.parametrize("name", ["null", "mujoco", "pybullet", "sapien"])

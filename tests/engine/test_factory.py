@@ -7,7 +7,7 @@ import pytest
 
 from anysim import registry
 from anysim.engine.factory import availability, create_simulation, engine_class
-from anysim.engine.null import NullEngine
+from anysim.engine.kinematic import NullEngine
 from anysim.errors import PluginError
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from anysim import registry
+from anysim.compile.world import compile_world
 from anysim.engine.factory import create_simulation
-from anysim.world.compile import compile_world
-from anysim.world.model import World
+from anysim.model.world import World
 from anysim_schemas.run import WorldSpec
 
 RADIUS, MASS = 0.02, 0.01

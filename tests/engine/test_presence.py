@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anysim.engine.null import NullEngine
+from anysim.compile.edit import without_entity
+from anysim.compile.world import compile_world
+from anysim.engine.kinematic import NullEngine
 from anysim.errors import CapabilityError, EngineError
-from anysim.world.compile import compile_world
-from anysim.world.edit import without_entity
-from anysim.world.model import Slot, World
+from anysim.model.world import Slot, World
 from anysim_schemas.run import WorldSpec
 
 

@@ -8,9 +8,9 @@ import pytest
 from anysim import registry
 from anysim.engine import factory
 from anysim.engine.capability import Capability
-from anysim.engine.null import NullEngine
-from anysim.engine.sharded import ShardedEngine, sharded
-from anysim.engine.shards.blocks import Blocks, joined, shard_count, usable_cores
+from anysim.engine.kinematic import NullEngine
+from anysim.engine.sharded.blocks import Blocks, joined, shard_count, usable_cores
+from anysim.engine.sharded.engine import ShardedEngine, sharded
 from anysim.errors import EngineError, PluginError, SnapshotError
 from anysim.testing import worlds
 from anysim.testing.compare import assert_same, play, read, spread, tape
@@ -134,8 +134,10 @@ def test_it_presents_the_engine():
     assert issubclass(made, ShardedEngine)
     assert made is sharded(NullEngine, 2)
     assert (made.name, made.capabilities, made.parameters) == (
-        NullEngine.name, NullEngine.capabilities, NullEngine.parameters
-    )  # fmt: skip
+        NullEngine.name,
+        NullEngine.capabilities,
+        NullEngine.parameters,
+    )
     assert made.availability() == NullEngine.availability()
     assert made().version == NullEngine().version
     with pytest.raises(EngineError, match="null takes no options, got colour"):
@@ -171,7 +173,7 @@ def test_more_shards_than_envs_are_not_started():
 
 def test_auto(monkeypatch):
     """One per usable core, at most one per env; none where the engine is parallel by itself."""
-    from anysim.engine.shards import blocks as module
+    from anysim.engine.sharded.engine import blocks as module
 
     monkeypatch.setattr(module, "usable_cores", lambda: 6)
     parallel = type("Parallel", (NullEngine,), {"parallel": True})

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from anysim.engine.null import NullEngine
-from anysim.engine.sharded import sharded
-from anysim.engine.shards.spares import keeping_workers
+from anysim.engine.kinematic import NullEngine
+from anysim.engine.sharded.engine import sharded
+from anysim.engine.sharded.pool_cache import keeping_workers
 from anysim.testing import worlds
 from anysim.testing.compare import assert_same, read
 from tests.engine.shards_help import PROC, alive, children, gone, segments
@@ -49,9 +49,15 @@ def _start(tmp_path, more, **options):
     environment = {**os.environ, "TMPDIR": str(tmp_path / "tmp")}
     (tmp_path / "tmp").mkdir()
     return subprocess.Popen(
-        [sys.executable, str(script), str(tmp_path / "runs")], cwd=tmp_path, env=environment, text=True,
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **options,
-    )  # fmt: skip
+        [sys.executable, str(script), str(tmp_path / "runs")],
+        cwd=tmp_path,
+        env=environment,
+        text=True,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        **options,
+    )
 
 
 def _workers(process):
@@ -188,7 +194,7 @@ def test_a_fork_does_not_keep_the_workers(tmp_path, shared_memory):
 def test_the_module_of_the_worker_is_light():
     """A worker imports what it needs: starting one costs little more than Python and numpy."""
     code = (
-        "import sys; import anysim.engine.shards.worker; "
+        "import sys; import anysim.engine.sharded.worker; "
         "loaded = {name.split('.')[0] for name in sys.modules}; "
         "assert not loaded & {'mujoco', 'pybullet', 'sapien', 'scipy', 'trimesh', 'numba', 'typer'}, loaded"
     )

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anysim.engine.null import NullEngine
-from anysim.engine.sharded import WorkerWarning, sharded
+from anysim.engine.kinematic import NullEngine
+from anysim.engine.sharded.engine import WorkerWarning, sharded
 from anysim.errors import CapabilityError, EngineError
 from anysim.testing import worlds
 from anysim.testing.compare import FIELDS, assert_same, play, read, spread, tape
@@ -49,9 +49,15 @@ def _lose(engine, blow, says):
 
 @pytest.mark.parametrize(
     ("blow", "says"),
-    [(signal.SIGKILL, r"worker 1 of null \(envs 3 to 4\) was ended by signal 9 \(SIGKILL\); a new worker.*until reset"),
-     (signal.SIGTERM, r"signal 15 \(SIGTERM\)"), (signal.SIGSTOP, r"did not answer within 1\.5 s and was killed")],
-)  # fmt: skip
+    [
+        (
+            signal.SIGKILL,
+            r"worker 1 of null \(envs 3 to 4\) was ended by signal 9 \(SIGKILL\); a new worker.*until reset",
+        ),
+        (signal.SIGTERM, r"signal 15 \(SIGTERM\)"),
+        (signal.SIGSTOP, r"did not answer within 1\.5 s and was killed"),
+    ],
+)
 def test_a_lost_worker_faults_its_own_envs(blow, says):
     alone, engine = _pair(timeout_s=60.0 if blow != signal.SIGSTOP else 1.5)
     with alone, engine:
@@ -123,9 +129,11 @@ def test_a_long_step_has_more_time(moody):
 
 @pytest.mark.parametrize(
     ("wish", "kind", "says"),
-    [(3, EngineError, r"ZeroDivisionError: no way\nin the worker:\nTraceback.*shard_engines\.py"),
-     (4, CapabilityError, r"^env 0 cannot do that \(in a worker, whose env 0 is env 3\)$")],
-)  # fmt: skip
+    [
+        (3, EngineError, r"ZeroDivisionError: no way\nin the worker:\nTraceback.*shard_engines\.py"),
+        (4, CapabilityError, r"^env 0 cannot do that \(in a worker, whose env 0 is env 3\)$"),
+    ],
+)
 def test_errors_come_back(moody, wish, kind, says):
     """One of anysim's has its type and message, another its traceback; the worker lives on."""
     alone, engine = _pair(moody.Moody)
@@ -217,7 +225,7 @@ def test_an_interrupted_call_leaves_a_usable_engine(moody, monkeypatch):
     """Ctrl-C while the workers step: their late answers are not taken for those to the next question."""
     alone, engine = _pair()
     with alone, engine:
-        from anysim.engine.shards.process import Worker
+        from anysim.engine.sharded.worker_handle import Worker
 
         def interrupted(*_):
             raise KeyboardInterrupt

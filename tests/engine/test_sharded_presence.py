@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from anysim import registry
-from anysim.engine.sharded import WorkerWarning, sharded
+from anysim.engine.sharded.engine import WorkerWarning, sharded
 from anysim.errors import PluginError
 from anysim.testing.compare import FIELDS, assert_same, play, read, tape
 from anysim.testing.varying import having, random_presence, varied

@@ -84,12 +84,14 @@ def test_rows_go_to_chosen_envs() -> None:
 def test_worlds_that_share_names() -> None:
     """Refused unless asked for; then what both have is carried over, and the rest stays."""
     with moving("null") as env, anysim.create_simulation("null") as other:
-        world = anysim.compile_world({
-            "world": {
-                "objects": {"block": {"source": {"box": [0.1, 0.1, 0.1]}}, "lamp": {"source": {"sphere": 0.1}}},
-                "layout": {"block": {"position": [0, 0, 1]}, "lamp": {"position": [0, 0, 2]}},
+        world = anysim.compile_world(
+            {
+                "world": {
+                    "objects": {"block": {"source": {"box": [0.1, 0.1, 0.1]}}, "lamp": {"source": {"sphere": 0.1}}},
+                    "layout": {"block": {"position": [0, 0, 1]}, "lamp": {"position": [0, 0, 2]}},
+                }
             }
-        })  # fmt: skip
+        )
         other.create_world(world, 2)
         other.set_body_state(np.tile([5, 5, 5, 0, 0, 0, 1.0], (2, 1, 1)), bodies=[world_body(other, "lamp")])
         state, before = env.engine.world_state(), other.world_state()
@@ -112,9 +114,16 @@ def test_a_state_without_commands_holds_where_the_joints_are() -> None:
     with moving("null") as env:
         full = env.engine.world_state()
         bare = WorldState(
-            full.time, full.entities, full.present, full.bodies, full.body_pose, full.body_twist, full.joints,
-            full.joint_pos, full.joint_vel,
-        )  # fmt: skip
+            full.time,
+            full.entities,
+            full.present,
+            full.bodies,
+            full.body_pose,
+            full.body_twist,
+            full.joints,
+            full.joint_pos,
+            full.joint_vel,
+        )
         env.reset(seed=9)
         env.engine.set_world_state(bare)
         assert np.allclose(env.engine.control.position, full.joint_pos)

@@ -12,16 +12,16 @@ import pytest
 
 import anysim
 from anysim import registry
+from anysim.compile.edit import with_object
 from anysim.engine.capability import Capability
-from anysim.engine.null import NullEngine
+from anysim.engine.kinematic import NullEngine
 from anysim.errors import SpecError
 from anysim.managers.joints import JointManager
-from anysim.managers.streams import Streams
+from anysim.model.world import Slot, World
+from anysim.randomization.streams import Streams
 from anysim.task.env import TaskEnv
 from anysim.task.joints import JointView, RangedJointView
-from anysim.task.view import SceneView
-from anysim.world.edit import with_object
-from anysim.world.model import Slot, World
+from anysim.task.scene import SceneView
 
 KITCHEN: dict[str, Any] = {
     "engine": "null",
@@ -102,9 +102,12 @@ def test_draws_are_noted_with_their_stream_and_source_and_read_back(name: str) -
         origin = env.streams.origins[0]["joints/cabinet/drawer_2/opened"]
         assert origin == ("joints/cabinet/drawer_2/opened", "world.objects.cabinet.joints.drawer_*.opened")
         assert set(draws[0]) == {
-            "joints/cabinet/drawer_1/opened", "joints/cabinet/drawer_2/opened", "joints/cabinet/drawer_3/friction",
-            "joints/cabinet/door_1/initial", "joints/cabinet/door_1/damping",
-        }  # fmt: skip
+            "joints/cabinet/drawer_1/opened",
+            "joints/cabinet/drawer_2/opened",
+            "joints/cabinet/drawer_3/friction",
+            "joints/cabinet/door_1/initial",
+            "joints/cabinet/door_1/damping",
+        }
 
 
 def test_another_draw_moves_none_and_env_i_does_not_depend_on_how_many_there_are() -> None:

@@ -8,12 +8,12 @@ import pytest
 
 import anysim
 from anysim.api import compile_world, load
-from anysim.engine.null import NullEngine
+from anysim.engine.kinematic import NullEngine
 from anysim.errors import AssetError, SpecError
-from anysim.explain import explain
 from anysim.managers.scene import SceneManager
-from anysim.managers.streams import Streams
-from anysim.world.model import Slot
+from anysim.model.world import Slot
+from anysim.randomization.streams import Streams
+from anysim.record.explain import explain
 from tests.task.helpers import BLOCKS
 
 DRAWN: dict[str, Any] = {
@@ -43,10 +43,20 @@ def test_every_field_is_drawn_written_and_noted(engine: str) -> None:
         geoms = sim.index.geoms_of(entity)
         read = {n: sim.get_parameters(n, indices=[body])[:, 0] for n in sim.parameters if n.startswith("body.")}
         look = {n: sim.get_parameters(n, indices=geoms)[:, 0] for n in sim.parameters if n.startswith("geom.")}
-        drawn = {key: [d[f"scene/red/{key}"] for d in draws] for key in (
-            "mass", "inertia_scale", "com_offset", "friction", "restitution", "damping.linear", "damping.angular",
-            "texture", "material",
-        )}  # fmt: skip
+        drawn = {
+            key: [d[f"scene/red/{key}"] for d in draws]
+            for key in (
+                "mass",
+                "inertia_scale",
+                "com_offset",
+                "friction",
+                "restitution",
+                "damping.linear",
+                "damping.angular",
+                "texture",
+                "material",
+            )
+        }
         assert np.allclose(read["body.mass"], drawn["mass"], rtol=1e-5)
         moments = np.array(drawn["mass"]) * np.array(drawn["inertia_scale"]) * 0.05**2 / 6
         assert np.allclose(read["body.inertia"][:, 0], moments, rtol=1e-5)

@@ -60,9 +60,8 @@ def varying_engines() -> list[str]:
     """The installed engines in which things come and go."""
     kinds = {name: registry.load("engines", name) for name in registry.names("engines")}
     return [
-        name for name, kind in kinds.items()
-        if kind.lifecycle is not Lifecycle.P3 and kind.availability().available
-    ]  # fmt: skip
+        name for name, kind in kinds.items() if kind.lifecycle is not Lifecycle.P3 and kind.availability().available
+    ]
 
 
 def test_every_slot_has_at_most_one_entity_and_the_draws_say_which() -> None:
@@ -172,8 +171,10 @@ def test_what_shares_a_name_is_drawn_together() -> None:
         env.reset(seed=6)
         pairs = {(d["population/mug/source"], d["population/spare/source"]) for d in env.streams.draws}
     assert pairs == {
-        ("sphere 0.03", "sphere 0.02"), ("box 0.05 0.06 0.07", "box 0.1 0.1 0.1"), ("capsule 0.02 0.06", "sphere 0.01"),
-    }  # fmt: skip
+        ("sphere 0.03", "sphere 0.02"),
+        ("box 0.05 0.06 0.07", "box 0.1 0.1 0.1"),
+        ("capsule 0.02 0.06", "sphere 0.01"),
+    }
 
 
 def test_a_ratio_leaves_the_nominal_source() -> None:

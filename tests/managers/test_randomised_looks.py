@@ -10,7 +10,7 @@ import anysim
 from anysim.api import check_engine, compile_world, load
 from anysim.engine.factory import engine_class
 from anysim.errors import CapabilityError, EngineError, SpecError
-from anysim.explain import explain
+from anysim.record.explain import explain
 from anysim.task.env import TaskEnv
 
 ENGINES = ("mujoco", "pybullet", "sapien")
@@ -269,8 +269,14 @@ def test_what_cannot_be_is_said_with_its_place(override: str, words: str) -> Non
 
 def test_a_camera_stands_in_the_scene_of_its_env() -> None:
     """Where an env's scene stands elsewhere on the ground, its cameras do too."""
-    with studio("null", 2, "task.images={}", "world.cameras.top.channels=[]", "world.cameras.side.channels=[]",
-                scene={**SCENE, "task": {"observations": SCENE["task"]["observations"]}}) as env:  # fmt: skip
+    with studio(
+        "null",
+        2,
+        "task.images={}",
+        "world.cameras.top.channels=[]",
+        "world.cameras.side.channels=[]",
+        scene={**SCENE, "task": {"observations": SCENE["task"]["observations"]}},
+    ) as env:
         env.reset(seed=0)
         before = env.engine.camera_poses("top")
         env.managers[0].board.origin[1] = [3.0, 0.0, 0.5]

@@ -8,11 +8,11 @@ import pytest
 import anysim
 from anysim.api import check_engine, compile_world, load
 from anysim.engine.factory import engine_class
-from anysim.engine.null import NullEngine
+from anysim.engine.kinematic import NullEngine
 from anysim.errors import CapabilityError, SpecError
-from anysim.explain import explain
-from anysim.managers.noise import noise_rows
-from anysim.managers.streams import Streams
+from anysim.randomization.noise import noise_rows
+from anysim.randomization.streams import Streams
+from anysim.record.explain import explain
 from anysim.task.env import TaskEnv
 from anysim_schemas.values import Choice, Normal, NormalParameters, Range
 from tests.task.helpers import BLIND, arm, blocks
@@ -73,10 +73,16 @@ def test_what_is_drawn_for_a_robot_is_what_the_engine_has(engine: str) -> None:
                 which = [i for i in index.geoms_of(entity) if world.geoms[i].collides]
             things = getattr(world, parameter.split(".")[0].replace("body", "bodie") + "s")
             name = parameter.split(".")[1]
-            built = np.array([
-                t.inertial.mass if name == "mass" else t.surface.friction if name == "friction" else getattr(t, name)
-                for t in (things[i] for i in which)
-            ])  # fmt: skip
+            built = np.array(
+                [
+                    t.inertial.mass
+                    if name == "mass"
+                    else t.surface.friction
+                    if name == "friction"
+                    else getattr(t, name)
+                    for t in (things[i] for i in which)
+                ]
+            )
             middle = 0.5 * (0.8 + 1.25)  # the World has it already
             assert np.allclose(
                 env.engine.get_parameters(parameter, indices=which), scale[:, None] / middle * built, rtol=1e-5
@@ -347,7 +353,7 @@ def test_a_record_says_what_was_drawn_and_is_replayed_to_the_bit(engine: str, tm
 
 def test_every_axis_names_parameters_that_exist() -> None:
     from anysim.engine.parameters import PARAMETERS
-    from anysim.managers.axes import AXES, can
+    from scripts.axes import AXES, can
 
     assert {name for axis in AXES for name in axis.parameters} <= PARAMETERS.keys()
     payload = next(axis for axis in AXES if "body.com" in axis.parameters)

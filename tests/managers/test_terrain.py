@@ -180,7 +180,7 @@ def test_the_look_of_a_room_is_drawn_and_its_form_is_not() -> None:
                 "wall_color": {"choice": ["white", "beige"]},
                 "floor_color": {"range": [[0.3, 0.2, 0.1], [0.6, 0.5, 0.4]]},
                 "furniture_color": {"choice": ["brown", "gray", "navy"]},
-            },
+            }
         },
         "task": {"observations": {"policy": ["last_action"]}},
     }

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from anysim.compile.world import compile_world
 from anysim.conventions import Array
+from anysim.kinematics.jacobians import frame_jacobians
 from anysim.math import pose as P
-from anysim.world.compile import compile_world
-from anysim.world.jacobians import frame_jacobians
-from anysim.world.model import Inertial, Joint, World
+from anysim.model.world import Inertial, Joint, World
 from anysim_schemas.engine import PhysicsSpec
 from anysim_schemas.run import WorldSpec
 

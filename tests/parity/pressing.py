@@ -10,17 +10,7 @@ from anysim.api import compile_world
 from anysim.conventions import WORLD, Array
 from anysim.engine.base import SimEngine
 from anysim.math import pose as P
-from anysim.world.model import (
-    Actuation,
-    Box,
-    ContactSensor,
-    Geom,
-    Mesh,
-    MeshShape,
-    Quat,
-    Surface,
-    World,
-)  # fmt: skip
+from anysim.model.world import Actuation, Box, ContactSensor, Geom, Mesh, MeshShape, Quat, Surface, World
 
 SMOOTH = Surface(friction=0.0)
 GAP = 0.002

@@ -13,17 +13,17 @@ from typing import Any
 
 import numpy as np
 
+from anysim.compile.world import compile_world
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capability
 from anysim.engine.factory import create_simulation
 from anysim.engine.parameters import PARAMETERS
 from anysim.engine.state import FIELDS, Snapshot, SnapshotLevel
+from anysim.geometry.hull import convex_hull
 from anysim.math import pose as P
-from anysim.testing.sketch import Sketch, inertial
-from anysim.world.compile import compile_world
-from anysim.world.hull import convex_hull
-from anysim.world.model import (
+from anysim.model.sketch import Sketch, inertial
+from anysim.model.world import (
     Box,
     Capsule,
     ContactSensor,
@@ -36,7 +36,7 @@ from anysim.world.model import (
     Sphere,
     Surface,
     World,
-)  # fmt: skip
+)
 from anysim_schemas.run import WorldSpec
 
 PANDA_EVERY = 10
@@ -128,10 +128,17 @@ def _arm(s: Sketch, rng: Rng) -> None:
         motor["friction"] = float(rng.choice([0.0, 0.0, 0.05]))
         reach = 0.1 if sliding else 2.0
         link = s.link(
-            f"link{i}", parent, JointType.PRISMATIC if sliding else JointType.REVOLUTE, axes[int(rng.integers(3))],
-            inertial(rod, 0.5, (0.08, 0.0, 0.0)), position=(0.16 if i else 0.0, 0.0, 0.0),
-            lower=-reach, upper=reach, initial=float(rng.uniform(-0.3, 0.3)) * reach, **motor,
-        )  # fmt: skip
+            f"link{i}",
+            parent,
+            JointType.PRISMATIC if sliding else JointType.REVOLUTE,
+            axes[int(rng.integers(3))],
+            inertial(rod, 0.5, (0.08, 0.0, 0.0)),
+            position=(0.16 if i else 0.0, 0.0, 0.0),
+            lower=-reach,
+            upper=reach,
+            initial=float(rng.uniform(-0.3, 0.3)) * reach,
+            **motor,
+        )
         s.shape(link, rod, (0.08, 0.0, 0.0), surface=_surface(rng))
         if rng.random() < 0.5:
             s.shape(link, Sphere(0.03), (0.16, 0.0, 0.0), surface=_surface(rng))

@@ -10,11 +10,11 @@ import pytest
 
 from anysim import registry
 from anysim.conventions import Array
-from anysim.engine.actuation import UnstableGainsWarning
 from anysim.engine.capability import Capability
+from anysim.engine.drive_checks import UnstableGainsWarning
 from anysim.engine.factory import create_simulation
+from anysim.model.world import Actuation, Actuator, World
 from anysim.testing import tolerances
-from anysim.world.model import Actuation, Actuator, World
 from tests.parity.pressing import Press, arm_joint, fingers, panda
 
 

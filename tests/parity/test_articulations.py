@@ -11,8 +11,8 @@ from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capability
 from anysim.engine.factory import create_simulation
 from anysim.math import pose as P
-from anysim.world.kinematics import forward_kinematics
-from anysim.world.model import JointType, World
+from anysim.model.forward_kinematics import forward_kinematics
+from anysim.model.world import JointType, World
 from tests.parity.articulated import (
     CABINET,
     DT,
@@ -25,7 +25,7 @@ from tests.parity.articulated import (
     random_positions,
     trolley,
     under_the_hand,
-)  # fmt: skip
+)
 
 
 @cache
@@ -66,10 +66,15 @@ def push(engine: SimEngine, joints: dict[str, float], steps: int) -> None:
 
 def test_an_audit_of_a_cabinet_a_box_and_a_valve_is_clean(name: str) -> None:
     """Masses, centres, inertias, limits, friction, damping, volumes, axes, order and frames."""
-    world = compiled({
-        "cabinet": CABINET, "box": {"source": "procedural:hinge_box"},
-        "tap": {"source": {"procedural": "valve", "params": {"limits": [0.0, 6.0]}}, "fixed": True},
-    }, box={"position": [0, 0, 0.71]}, tap={"position": [1.0, 0, 0]})  # fmt: skip
+    world = compiled(
+        {
+            "cabinet": CABINET,
+            "box": {"source": "procedural:hinge_box"},
+            "tap": {"source": {"procedural": "valve", "params": {"limits": [0.0, 6.0]}}, "fixed": True},
+        },
+        box={"position": [0, 0, 0.71]},
+        tap={"position": [1.0, 0, 0]},
+    )
     with started(name, world) as engine:
         lines = audit(engine)
     assert len(lines) > 100

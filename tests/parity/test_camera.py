@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from anysim import api, registry
-from anysim.compare.camera import DEPTH, OVERLAP, camera_layer
-from anysim.compare.judge import agreement
 from anysim.engine.factory import create_simulation
 from anysim.math import pose as P
+from anysim.model.sketch import Sketch
+from anysim.model.world import Box, Camera, Capsule, Cylinder, Sphere, World
 from anysim.testing.fixtures import drawing_trouble
-from anysim.world.model import Box, Camera, Capsule, Cylinder, Sphere, World
-from anysim.world.sketch import Sketch
+from anysim_parity.camera import DEPTH, OVERLAP, camera_layer
+from anysim_parity.judge import agreement
 
 ENGINES = ("mujoco", "pybullet", "sapien")
 pytestmark = pytest.mark.slow

@@ -15,7 +15,7 @@ SPEC = {
         "objects": {"cube": {"source": {"box": [0.04, 0.04, 0.04]}, "mass": 0.2, "friction": 0.5}},
         "layout": {"cube": {"position": [0.5, 0.0, 0.25]}},
         "contact_sensors": {"cube": {"body": "cube"}},
-    },
+    }
 }
 CREEP = 2e-4
 """[m/s] of a held cube of 2 N in a grip of 2 x 40 N: 0.04 mm/s on MuJoCo, 0.11 on PyBullet, none on SAPIEN."""

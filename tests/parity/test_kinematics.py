@@ -4,11 +4,11 @@ from functools import partial
 
 import pytest
 
-from anysim.compare.kinematics import ANGLE, MASS, POSITION, kinematics_layer
-from anysim.compare.result import Layer
-from anysim.compare.verdict import findings
+from anysim.compile.world import compile_world
 from anysim.engine.factory import create_simulation
-from anysim.world.compile import compile_world
+from anysim_parity.kinematics import ANGLE, MASS, POSITION, kinematics_layer
+from anysim_parity.result import Layer
+from anysim_parity.verdict import findings
 from anysim_schemas.run import WorldSpec
 
 ENGINES = ("mujoco", "pybullet", "sapien")

@@ -39,9 +39,21 @@ def test_picks_succeed_replay_to_the_bit_and_drift_little(
 ) -> None:
     """64 episodes in 16 envs, without cameras: images need graphics drivers that not every machine has."""
     run = anysim(
-        "run", "pick_cube", "--engine", engine, "-n", "16", "-k", "64", "-s", "1", "-o", "record.cameras=[]", "--out",
+        "run",
+        "pick_cube",
+        "--engine",
+        engine,
+        "-n",
+        "16",
+        "-k",
+        "64",
+        "-s",
+        "1",
+        "-o",
+        "record.cameras=[]",
+        "--out",
         str(tmp_path),
-    )  # fmt: skip
+    )
     assert run["attempts"] == 64
     assert run["successes"] >= rate * 64
     own = anysim("replay", str(tmp_path))

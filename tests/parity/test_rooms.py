@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from anysim import create_simulation, registry
-from anysim.world.compile import compile_world
+from anysim.compile.world import compile_world
 from anysim_schemas.run import WorldSpec
 
 ROOM = {

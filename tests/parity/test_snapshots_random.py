@@ -43,10 +43,7 @@ def test_snapshots_of_random_scenes(name, tmp_path, capsys):
             close = engine.snapshot(level="state")
             if exact:
                 taken[number] = engine.snapshot()
-                wanted[number] = [
-                    scenes.state_digest(engine, [0, 1]),
-                    scenes.treat(engine, number, 2, AFTER, [0, 1]),
-                ]
+                wanted[number] = [scenes.state_digest(engine, [0, 1]), scenes.treat(engine, number, 2, AFTER, [0, 1])]
                 scenes.wild(engine, number)
                 engine.restore(taken[number])
                 found = [scenes.state_digest(engine, [0, 1]), scenes.treat(engine, number, 2, AFTER, [0, 1])]

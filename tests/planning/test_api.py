@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from anysim.errors import AnysimError, PluginError
+from anysim.kinematics.chain import Chain
 from anysim.planning.api import IkRequest, IkResult, IkStep, InverseKinematics, inverse_kinematics
-from anysim.planning.chain import Chain
 from anysim.testing.arms import panda_arm
 
 

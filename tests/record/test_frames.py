@@ -2,14 +2,14 @@ import numpy as np
 import pytest
 
 from anysim.conventions import xyzw_from_wxyz
-from anysim.engine.commands import Control
+from anysim.engine.control import Control
 from anysim.engine.state import State
 from anysim.errors import RecordError
 from anysim.managers.capture import interval
+from anysim.model.world import Actuator, Body, BodyKind, Camera, ControlMode, Joint, JointType, World
 from anysim.record.episode import Episode
 from anysim.record.frame import state_digest, state_rows
 from anysim.record.header import CameraInfo, EpisodeHeader, Header, camera_info, state_layout
-from anysim.world.model import Actuator, Body, BodyKind, Camera, ControlMode, Joint, JointType, World
 
 
 class Sink:

@@ -28,8 +28,13 @@ def test_a_committed_trajectory_is_the_only_thing_left(tmp_path, writer, run_hea
     assert final == tmp_path / "run/episodes/env_0003_episode_0002"
     name = "episodes/env_0003_episode_0002"
     assert entries(tmp_path / "run") == [
-        "episodes", name, f"{name}/actions.txt", f"{name}/manifest.json", f"{name}/states.txt", "run.json"
-    ]  # fmt: skip
+        "episodes",
+        name,
+        f"{name}/actions.txt",
+        f"{name}/manifest.json",
+        f"{name}/states.txt",
+        "run.json",
+    ]
 
 
 def test_the_manifest_says_what_was_recorded(tmp_path, writer, run_header, record, make_frame):
@@ -134,8 +139,10 @@ def test_orphans_are_swept_and_the_living_are_not(tmp_path, writer, run_header, 
         with Recorder(tmp_path, writer, run_header) as second:
             assert second.swept == (f"env_0001_episode_0000.{os.getpid()}-1", "env_0002_episode_0000.77777-0")
         assert sorted(p.name for p in incoming.iterdir()) == [
-            f"{os.getpid()}-0.lock", f"env_0000_episode_0000.{os.getpid()}-0", "notes"
-        ]  # fmt: skip
+            f"{os.getpid()}-0.lock",
+            f"env_0000_episode_0000.{os.getpid()}-0",
+            "notes",
+        ]
         living.commit(0, "success")
     assert living.committed() == {(0, 0)}
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from anysim.api import compile_world
-from anysim.kinematics.model import RobotModel
+from anysim.assets.catalogue import load_robot
+from anysim.kinematics.pinocchio_model import RobotModel
 from anysim.math import pose as P
-from anysim.world.catalogue import load_robot
-from anysim.world.kinematics import forward_kinematics
-from anysim.world.model import Box, Geom, MeshShape, Sphere, World
+from anysim.model.forward_kinematics import forward_kinematics
+from anysim.model.world import Box, Geom, MeshShape, Sphere, World
 from anysim_schemas.run import RunSpec
 
 HOME = {

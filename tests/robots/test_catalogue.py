@@ -10,12 +10,12 @@ import pytest
 
 from anysim import registry
 from anysim.api import load
-from anysim.qualify.apart import qualify_apart
-from anysim.qualify.run import Durations
-from anysim.qualify.stage import NAME, controllers, stage
-from anysim.world.catalogue import CatalogueEntry, load_robot, missing_source
-from anysim.world.compile import compile_with_report
-from anysim.world.model import World
+from anysim.assets.catalogue import CatalogueEntry, load_robot, missing_source
+from anysim.compile.world import compile_with_report
+from anysim.model.world import World
+from anysim_robots.qualify.apart import qualify_apart
+from anysim_robots.qualify.run import Durations
+from anysim_robots.qualify.stage import NAME, controllers, stage
 
 ROBOTS = [n for n in registry.names("robots") if registry.distribution("robots", n) == "anysim-robots"]
 ENGINES = ("mujoco", "pybullet", "sapien")

@@ -7,14 +7,14 @@ import pytest
 
 from anysim import registry
 from anysim.api import compile_world
+from anysim.assets.catalogue import load_robot, missing_source
 from anysim.engine.base import SimEngine
 from anysim.engine.factory import create_simulation
+from anysim.kinematics.chain import Chain
 from anysim.math import pose as P
+from anysim.model.world import World
 from anysim.planning.api import inverse_kinematics
-from anysim.planning.chain import Chain
 from anysim.testing.tracking import bolted
-from anysim.world.catalogue import load_robot, missing_source
-from anysim.world.model import World
 from anysim_schemas.run import RunSpec
 
 
@@ -133,10 +133,7 @@ def _scene(task: Task, place: np.ndarray, yaw: float) -> dict:
             "stand": {"source": {"cylinder": [0.3 * task.edge, top]}, "fixed": True},
             "cube": {"source": {"box": [task.edge] * 3}, "mass": 0.2, "friction": 0.8},
         },
-        "layout": {
-            "stand": {"position": [x, y, top / 2]},
-            "cube": {"position": [x, y, float(place[2])], "yaw": yaw},
-        },
+        "layout": {"stand": {"position": [x, y, top / 2]}, "cube": {"position": [x, y, float(place[2])], "yaw": yaw}},
     }
 
 
@@ -163,9 +160,12 @@ class Arm:
         }
         if task.at is not None:
             found = self.ik.solve(
-                np.array([[*task.at, *DOWN]]), self.base, chain.initial[None],
-                random_restarts=50, rng_seeds=np.array([1], dtype=np.uint64),
-            )  # fmt: skip
+                np.array([[*task.at, *DOWN]]),
+                self.base,
+                chain.initial[None],
+                random_restarts=50,
+                rng_seeds=np.array([1], dtype=np.uint64),
+            )
             assert found.converged[0], "the tool cannot begin there"
             self.begin[chain.joints] = found.joint_pos[0]
             names = [name.removeprefix("robot.") for name in chain.joint_names]

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import anysim
+from anysim.assets.catalogue import load_robot, missing_source
 from anysim.conventions import Array
 from anysim.task.env import TaskEnv
-from anysim.world.catalogue import load_robot, missing_source
 
 ENGINES = ("mujoco", "pybullet", "sapien")
 HEIGHT = 0.6
@@ -83,20 +83,19 @@ def world(grasp: Grasp, engine: str) -> Iterator[TaskEnv]:
             "physics": {"dt": 0.002, "control_dt": 0.02},
             "world": {
                 "robots": {
-                    "hand": {
-                        "robot": grasp.robot, "position": [0, 0, HEIGHT - grasp.lift], "actions": {"eef": action},
-                    }
+                    "hand": {"robot": grasp.robot, "position": [0, 0, HEIGHT - grasp.lift], "actions": {"eef": action}}
                 },
                 "objects": {
                     "thing": {"source": grasp.source, "mass": grasp.mass, "friction": 0.8},
-                    "left_post": post, "right_post": post,
+                    "left_post": post,
+                    "right_post": post,
                 },
                 "layout": {"thing": {"position": [x, y, z], "roll": grasp.roll}, **posts},
             },
             "task": {"horizon": 1000, "observations": {"policy": ["joint_pos"]}},
         },
         engine=engine,
-    )  # fmt: skip
+    )
     try:
         env.reset(seed=0)
         yield env

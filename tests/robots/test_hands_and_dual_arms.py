@@ -7,13 +7,13 @@ import pytest
 import yourdfpy
 
 from anysim.api import compile_world
+from anysim.assets.catalogue import load_robot
+from anysim.assets.uri import locate
 from anysim.engine.factory import create_simulation
-from anysim.kinematics.model import RobotModel
+from anysim.kinematics.pinocchio_model import RobotModel
 from anysim.math import pose as P
-from anysim.world.assets import locate
-from anysim.world.catalogue import load_robot
-from anysim.world.kinematics import forward_kinematics
-from anysim.world.model import World
+from anysim.model.forward_kinematics import forward_kinematics
+from anysim.model.world import World
 
 FIXED = ("allegro_left", "allegro_right", "baxter")
 HELD = (*FIXED, "dual_ur5", "xarm7_allegro")

@@ -8,12 +8,12 @@ import pytest
 
 from anysim import registry
 from anysim.api import compile_world
+from anysim.assets.catalogue import load_robot, missing_source
 from anysim.engine.factory import create_simulation
 from anysim.errors import AssetError
-from anysim.kinematics.model import RobotModel
+from anysim.kinematics.pinocchio_model import RobotModel
 from anysim.math import pose as P
-from anysim.world.catalogue import load_robot, missing_source
-from anysim.world.model import World
+from anysim.model.world import World
 
 ENGINES = ("mujoco", "pybullet", "sapien")
 NEEDS = {
@@ -123,12 +123,16 @@ def test_the_hand_of_spot_holds_what_lies_on_its_jaw(engine: str) -> None:
     (at,) = frames("spot_arm", "tool")
     place = at[:3] + np.array([0.0, 0.0, bare.bodies[0].position[2] - 0.014])
     cube = {"source": {"box": [0.04] * 3}, "mass": 0.1, "friction": 0.8}
-    world = compile_world({
-        "world": {
-            "robots": {"r": {"robot": "spot_arm"}}, "terrain": "plane", "objects": {"cube": cube},
-            "layout": {"cube": {"position": place.tolist()}},
+    world = compile_world(
+        {
+            "world": {
+                "robots": {"r": {"robot": "spot_arm"}},
+                "terrain": "plane",
+                "objects": {"cube": cube},
+                "layout": {"cube": {"position": place.tolist()}},
+            }
         }
-    })  # fmt: skip
+    )
     drives = [world.joints[drive.joint] for drive in world.actuators]
     targets = np.array([joint.initial for joint in drives])
     shoulder = [joint.name for joint in drives].index("r.arm_sh1")

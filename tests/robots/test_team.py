@@ -50,9 +50,16 @@ def up(env: TaskEnv, name: str) -> np.ndarray:
 def test_nobody_falls(engine: str) -> None:
     with team(engine, ENVS) as env:
         assert list(env.action_spaces) == [
-            "panda.arm", "panda.eef", "rover.base", "rover.arm", "dog.base", "human.base", "human.arm", "cam.base",
+            "panda.arm",
+            "panda.eef",
+            "rover.base",
+            "rover.arm",
+            "dog.base",
+            "human.base",
+            "human.arm",
+            "cam.base",
             "cam.arm",
-        ]  # fmt: skip
+        ]
         env.reset(seed=0)
         action = neutral(env)
         robots = ("panda", "rover", "dog", "human", "cam")

@@ -14,8 +14,8 @@ import pytest
 
 import anysim
 from anysim import registry
+from anysim.assets.catalogue import CatalogueEntry
 from anysim.task.env import TaskEnv
-from anysim.world.catalogue import CatalogueEntry
 from anysim_schemas.load import load
 from anysim_schemas.robot_model import RobotModelSpec
 
@@ -172,5 +172,5 @@ def make(engine: str, num_envs: int, spec: Mapping[str, Any] = SLIDE, *, shards:
     if engine == "null" and "shove" in events:  # nothing can be pushed there
         spec = {**spec, "task": spec["task"] | {"events": events | {"shove": _RUB}}}
     entry = CatalogueEntry(load(RobotModelSpec, dict(ARM)).spec, HERE / "two_link.yaml")
-    with mock.patch("anysim.world.compile_robot.load_robot", return_value=entry):
+    with mock.patch("anysim.compile.robot.load_robot", return_value=entry):
         return anysim.make({**spec, "engine": {"name": engine, "shards": shards}}, num_envs=num_envs)

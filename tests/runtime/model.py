@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from anysim.managers.streams import episode_seed
+from anysim.randomization.streams import episode_seed
 from anysim.task.env import TaskEnv
 
 STATE = ("body_pose", "body_twist", "joint_pos", "joint_vel")

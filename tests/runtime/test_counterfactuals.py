@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from anysim.errors import CapabilityError, TaskError
-from anysim.managers.streams import OVERRIDDEN
+from anysim.randomization.streams import OVERRIDDEN
 from anysim.record import replay
-from anysim.record.plain import dump_json
+from anysim.record.json import dump_json
 from tests.runtime import light
 from tests.runtime.model import STATE, action
 

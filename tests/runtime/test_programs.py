@@ -31,9 +31,12 @@ programs = st.lists(operations, min_size=4, max_size=14)
 def settled(examples: int) -> settings:
     """The same programs in every run."""
     return settings(
-        max_examples=examples, deadline=None, derandomize=True, database=None,
+        max_examples=examples,
+        deadline=None,
+        derandomize=True,
+        database=None,
         suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture, HealthCheck.data_too_large],
-    )  # fmt: skip
+    )
 
 
 class Run:

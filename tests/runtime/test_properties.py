@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from anysim.managers.streams import episode_seed
+from anysim.randomization.streams import episode_seed
 from tests.runtime import light
 from tests.runtime.model import STATE, action, moment
 from tests.runtime.test_programs import settled

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anysim.engine import container
+from anysim.engine import snapshot_file
 from anysim.engine.exact_json import decode, encode
 from anysim.engine.state import Snapshot
 from anysim.engine.world_state import WorldState
 from anysim.errors import SnapshotError
-from anysim.managers.streams import Origin
+from anysim.randomization.streams import Origin
 from anysim.task.snapshot import EnvSnapshot
 from tests.runtime import light
 from tests.runtime.model import action
@@ -149,13 +149,13 @@ def test_any_changed_byte_is_noticed(get, tmp_path) -> None:
 def rewritten(path: Path, out: Path, change, *, compression=zipfile.ZIP_STORED, extra: str = "") -> Path:
     """The file with a changed header, sealed anew: not an accident but somebody's work."""
     with zipfile.ZipFile(path) as archive, zipfile.ZipFile(out, "w", compression) as other:
-        head = json.loads(archive.read(container.HEADER))
+        head = json.loads(archive.read(snapshot_file.HEADER))
         change(head)
         header = json.dumps(head).encode()
-        other.writestr(container.HEADER, header)
-        other.writestr(container.SEAL, container._sha(header))
+        other.writestr(snapshot_file.HEADER, header)
+        other.writestr(snapshot_file.SEAL, snapshot_file._sha(header))
         for info in archive.infolist():
-            if info.filename not in (container.HEADER, container.SEAL):
+            if info.filename not in (snapshot_file.HEADER, snapshot_file.SEAL):
                 other.writestr(info.filename, archive.read(info))
         if extra:
             other.writestr(extra, b"x")
@@ -182,7 +182,7 @@ def test_what_somebody_changed_is_refused(get, tmp_path) -> None:
     refused("load it with WorldState.load", lambda h: h.update(kind="world state"))
     header = np.lib.format.magic(1, 0) + b"v\x00{'descr': '|O', 'fortran_order': False, 'shape': (1,), }".ljust(120)
     with pytest.raises(ValueError, match="not the array"):
-        container._array(header[:-1] + b"\n", "x")
+        snapshot_file._array(header[:-1] + b"\n", "x")
     with pytest.raises(SnapshotError, match=r"load it with EnvSnapshot.load"):
         WorldState.load(path)
 
@@ -195,7 +195,7 @@ def test_a_file_is_there_whole_or_not_at_all(get, tmp_path, monkeypatch) -> None
     def fails(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(container.os, "fsync", fails)
+    monkeypatch.setattr(snapshot_file.os, "fsync", fails)
     with pytest.raises(SnapshotError, match="cannot be written: No space left"):
         snapshot.rows([0]).save(path)
     assert [p.name for p in tmp_path.iterdir()] == ["a.snapshot"]
@@ -243,8 +243,9 @@ def test_the_journal_of_sapien_has_a_format(get) -> None:
         ({"engine.length": np.full(3, 10**9)}, "damaged"),
         ({"engine.journal": np.full_like(snapshot.data["engine.journal"], 77.0)}, "no entry of a journal"),
     ):
-        damaged = Snapshot(snapshot.engine, snapshot.engine_version, snapshot.world_hash, snapshot.level,
-                           {**snapshot.data, **change})  # fmt: skip
+        damaged = Snapshot(
+            snapshot.engine, snapshot.engine_version, snapshot.world_hash, snapshot.level, {**snapshot.data, **change}
+        )
         before = env.engine.get_state().body_pose
         with pytest.raises(SnapshotError, match=says):
             env.engine.restore(damaged)

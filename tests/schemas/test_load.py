@@ -306,10 +306,14 @@ def test_all_errors_come_at_once_in_the_order_of_the_files(write, resolver):
     )
     found = issues("a.yaml", resolver=resolver, overrides=["physics.dt=0"])
     assert [line.split(": ")[0] for line in found] == [
-        "base.yaml:3:29", "base.yaml:3:34", "base.yaml:4:7",
-        "a.yaml:2:11", "a.yaml:3:42", "a.yaml:4:1",
+        "base.yaml:3:29",
+        "base.yaml:3:34",
+        "base.yaml:4:7",
+        "a.yaml:2:11",
+        "a.yaml:3:42",
+        "a.yaml:4:1",
         "-o physics.dt=0",
-    ]  # fmt: skip
+    ]
 
 
 def test_two_unreadable_files_are_both_reported(write):

@@ -88,11 +88,18 @@ def test_junk_anywhere_is_answered_in_sentences(junk, resolver):
 @pytest.mark.parametrize(
     ("value", "words"),
     [
-        (None, "nothing (null)"), (True, "true"), ("abc", "the text 'abc'"), (3, "the number 3"), ([], "an empty list"),
-        ([1], "a list of 1 item"), ([1, 2], "a list of 2 items"), ({}, "an empty mapping"),
-        ({"a": 1}, "a mapping with the key 'a'"), ({"a": 1, "b": 2}, "a mapping with the keys 'a', 'b'"),
+        (None, "nothing (null)"),
+        (True, "true"),
+        ("abc", "the text 'abc'"),
+        (3, "the number 3"),
+        ([], "an empty list"),
+        ([1], "a list of 1 item"),
+        ([1, 2], "a list of 2 items"),
+        ({}, "an empty mapping"),
+        ({"a": 1}, "a mapping with the key 'a'"),
+        ({"a": 1, "b": 2}, "a mapping with the keys 'a', 'b'"),
     ],
-)  # fmt: skip
+)
 def test_values_are_described(value, words):
     assert describe(value) == words
 

@@ -40,11 +40,22 @@ def test_the_resolver_is_asked_for_what_is_written():
     }
     load_run(data, resolver=resolver)
     assert asked == [
-        ("engine", "bullet"), ("controller", "pd"), ("controller", "grip"), ("command", "goal"),
-        ("observation", "q"), ("observation", "dq"), ("observation", "pose"),
-        ("reward", "reach"), ("reward", "height"), ("reward", "effort"), ("predicate", "near"), ("predicate", "fell"),
-        ("event", "push"), ("skill", "pick"), ("writer", "csv"),
-    ]  # fmt: skip
+        ("engine", "bullet"),
+        ("controller", "pd"),
+        ("controller", "grip"),
+        ("command", "goal"),
+        ("observation", "q"),
+        ("observation", "dq"),
+        ("observation", "pose"),
+        ("reward", "reach"),
+        ("reward", "height"),
+        ("reward", "effort"),
+        ("predicate", "near"),
+        ("predicate", "fell"),
+        ("event", "push"),
+        ("skill", "pick"),
+        ("writer", "csv"),
+    ]
 
 
 def test_a_default_name_is_checked_where_its_options_are_given():
@@ -68,8 +79,12 @@ def test_slots_are_checked_although_the_core_is_wrong(resolver):
         "task": {"expert": {"skill": "x"}},
     }
     assert [line.split(": ")[0] for line in issues(data, resolver)] == [
-        "engine.shard", "seed", "task.observations", "engine.options.iterations", "task.expert.skill",
-    ]  # fmt: skip
+        "engine.shard",
+        "seed",
+        "task.observations",
+        "engine.options.iterations",
+        "task.expert.skill",
+    ]
 
 
 def test_options_that_are_no_mapping_are_reported_once(resolver):

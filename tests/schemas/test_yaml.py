@@ -25,16 +25,42 @@ def good(text):
 @pytest.mark.parametrize(
     ("text", "value"),
     [
-        ("true", True), ("False", False), ("yes", "yes"), ("on", "on"), ("off", "off"), ("y", "y"),
-        ("null", None), ("~", None), ("", None), ("Nope", "Nope"),
-        ("12", 12), ("-3", -3), ("+4", 4), ("014", 14), ("0o14", 12), ("0x1f", 31), ("0b1", "0b1"),
-        ("1_000", "1_000"), ("1:30", "1:30"),
-        ("1e-3", 1e-3), ("1E3", 1000.0), (".5", 0.5), ("1.", 1.0), ("-2.5", -2.5),
-        (".inf", math.inf), ("-.Inf", -math.inf),
-        ("2001-01-01", "2001-01-01"), ("1.2.3", "1.2.3"), ("'1'", "1"), ('"true"', "true"), ("=", "="),
-        ("!!str 5", "5"), ("!!float 1", 1.0), ("'<<'", "<<"),
+        ("true", True),
+        ("False", False),
+        ("yes", "yes"),
+        ("on", "on"),
+        ("off", "off"),
+        ("y", "y"),
+        ("null", None),
+        ("~", None),
+        ("", None),
+        ("Nope", "Nope"),
+        ("12", 12),
+        ("-3", -3),
+        ("+4", 4),
+        ("014", 14),
+        ("0o14", 12),
+        ("0x1f", 31),
+        ("0b1", "0b1"),
+        ("1_000", "1_000"),
+        ("1:30", "1:30"),
+        ("1e-3", 1e-3),
+        ("1E3", 1000.0),
+        (".5", 0.5),
+        ("1.", 1.0),
+        ("-2.5", -2.5),
+        (".inf", math.inf),
+        ("-.Inf", -math.inf),
+        ("2001-01-01", "2001-01-01"),
+        ("1.2.3", "1.2.3"),
+        ("'1'", "1"),
+        ('"true"', "true"),
+        ("=", "="),
+        ("!!str 5", "5"),
+        ("!!float 1", 1.0),
+        ("'<<'", "<<"),
     ],
-)  # fmt: skip
+)
 def test_scalars_are_those_of_yaml_1_2(text, value):
     result = good(f"key: {text}")["key"]
     assert (result, type(result)) == (value, type(value))
@@ -118,10 +144,15 @@ def test_an_anchor_that_contains_itself_is_refused():
 @pytest.mark.parametrize("fast", [True, False])
 @pytest.mark.parametrize(
     "text",
-    ["[" * 1000, "[" * 100_000, "{a: " * 3000 + "}" * 3000, "- " * 3000,
-     "a0: &a0 [x]\n" + "".join(f"a{i}: &a{i} [*a{i - 1}]\n" for i in range(1, 300))],
+    [
+        "[" * 1000,
+        "[" * 100_000,
+        "{a: " * 3000 + "}" * 3000,
+        "- " * 3000,
+        "a0: &a0 [x]\n" + "".join(f"a{i}: &a{i} [*a{i - 1}]\n" for i in range(1, 300)),
+    ],
     ids=["open", "wide open", "mappings", "block", "aliases"],
-)  # fmt: skip
+)
 def test_depth_is_bounded(text, fast, monkeypatch):
     if not fast:
         monkeypatch.setattr(spec_yaml, "_C_LOADER", None)

@@ -128,9 +128,7 @@ def test_an_episode_is_drawn_again_from_its_seed() -> None:
         assert (again["policy"] == obs["policy"]).all()
 
 
-@pytest.mark.parametrize(
-    ("engine", "n"), [("null", 1), ("null", 3), ("mujoco", 2), ("pybullet", 2), ("sapien", 2)]
-)  # fmt: skip
+@pytest.mark.parametrize(("engine", "n"), [("null", 1), ("null", 3), ("mujoco", 2), ("pybullet", 2), ("sapien", 2)])
 def test_continuing_from_a_snapshot_equals_the_uninterrupted_run(engine: str, n: int) -> None:
     here = registry.load("engines", engine).availability()
     if not here.available:

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import anysim
-from anysim.explain import explain
+from anysim.record.explain import explain
 from tests.task.helpers import BLOCKS
 
 

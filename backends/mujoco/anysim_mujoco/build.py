@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 
 from anysim.conventions import WORLD, Array, wxyz_from_xyzw
-from anysim.engine.commands import MODES
+from anysim.engine.control import MODES
 from anysim.errors import EngineError
-from anysim.world.model import Actuation, Body, BodyKind, ContactSensor, Joint, JointType, World
+from anysim.model.world import Actuation, Body, BodyKind, ContactSensor, Joint, JointType, World
 from anysim_mujoco.audit import UNLIMITED
 from anysim_mujoco.drives import feedback
 from anysim_mujoco.geoms import add_assets, add_geom, add_look
@@ -109,9 +109,11 @@ def _bodies(spec: Any, world: World) -> list[Any]:
     for index, body in enumerate(world.bodies):
         parent = spec.worldbody if body.parent == WORLD else made[body.parent]
         element = parent.add_body(
-            name=body_name(world, index), pos=body.position, quat=wxyz_from_xyzw(np.asarray(body.quaternion)),
+            name=body_name(world, index),
+            pos=body.position,
+            quat=wxyz_from_xyzw(np.asarray(body.quaternion)),
             gravcomp=float(body.gravity_compensation),
-        )  # fmt: skip
+        )
         # the compiler's shortcut for diagonal inertia matrices forbids that the centre of mass is changed later
         element.simple = False
         if body.kind is BodyKind.FREE:
@@ -138,12 +140,20 @@ def _joint(element: Any, joint: Joint, world: World) -> Any:
     kinds = {JointType.REVOLUTE: mujoco.mjtJoint.mjJNT_HINGE, JointType.PRISMATIC: mujoco.mjtJoint.mjJNT_SLIDE}
     stiff = constraint_solref(0.0, world.physics.dt)
     return element.add_joint(
-        name=joint.name, type=kinds[joint.type], axis=joint.axis, pos=joint.anchor, armature=joint.armature,
-        damping=[joint.damping, 0.0, 0.0], frictionloss=joint.friction, solref_friction=stiff,
-        solimp_friction=DRY_IMPEDANCE, limited=int(limited),
+        name=joint.name,
+        type=kinds[joint.type],
+        axis=joint.axis,
+        pos=joint.anchor,
+        armature=joint.armature,
+        damping=[joint.damping, 0.0, 0.0],
+        frictionloss=joint.friction,
+        solref_friction=stiff,
+        solimp_friction=DRY_IMPEDANCE,
+        limited=int(limited),
         range=(max(joint.lower, -UNLIMITED), min(joint.upper, UNLIMITED)),
-        solref_limit=constraint_solref(joint.limit_softness, world.physics.dt), solimp_limit=STIFF_IMPEDANCE,
-    )  # fmt: skip
+        solref_limit=constraint_solref(joint.limit_softness, world.physics.dt),
+        solimp_limit=STIFF_IMPEDANCE,
+    )
 
 
 def _couplings(spec: Any, world: World) -> None:
@@ -151,10 +161,14 @@ def _couplings(spec: Any, world: World) -> None:
         if joint.mimic is None:
             continue
         equality = spec.add_equality(
-            name=f"{joint.name} (mimic)", type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT,
-            name1=joint.name, name2=world.joints[joint.mimic.joint].name,
-            solref=constraint_solref(joint.limit_softness, world.physics.dt), solimp=STIFF_IMPEDANCE,
-        )  # fmt: skip
+            name=f"{joint.name} (mimic)",
+            type=mujoco.mjtEq.mjEQ_JOINT,
+            objtype=mujoco.mjtObj.mjOBJ_JOINT,
+            name1=joint.name,
+            name2=world.joints[joint.mimic.joint].name,
+            solref=constraint_solref(joint.limit_softness, world.physics.dt),
+            solimp=STIFF_IMPEDANCE,
+        )
         data = np.zeros_like(equality.data)
         data[:2] = joint.mimic.offset, joint.mimic.multiplier
         equality.data = data
@@ -163,10 +177,15 @@ def _couplings(spec: Any, world: World) -> None:
 def _drives(spec: Any, world: World) -> None:
     for actuator in world.actuators:
         element = spec.add_actuator(
-            name=actuator.name, target=world.joints[actuator.joint].name, trntype=mujoco.mjtTrn.mjTRN_JOINT,
-            gaintype=mujoco.mjtGain.mjGAIN_FIXED, biastype=mujoco.mjtBias.mjBIAS_AFFINE,
-            ctrllimited=0, forcelimited=1, forcerange=(-actuator.effort_limit, actuator.effort_limit),
-        )  # fmt: skip
+            name=actuator.name,
+            target=world.joints[actuator.joint].name,
+            trntype=mujoco.mjtTrn.mjTRN_JOINT,
+            gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+            biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+            ctrllimited=0,
+            forcelimited=1,
+            forcerange=(-actuator.effort_limit, actuator.effort_limit),
+        )
         gain, bias = np.zeros_like(element.gainprm), np.zeros_like(element.biasprm)
         gain[0] = 1.0
         stiffness, damping = feedback(MODES.index(actuator.mode), actuator.kp, actuator.kd)
@@ -181,9 +200,11 @@ def _contact_sensor(spec: Any, world: World, sensor: ContactSensor) -> list[Any]
     for index in sensor.bodies:
         for other in sensor.against if sensor.against is not None else (None,):
             element = spec.add_sensor(
-                name=f"{sensor.name} ({len(parts)})", type=mujoco.mjtSensor.mjSENS_CONTACT,
-                objtype=body, objname=body_name(world, index),
-            )  # fmt: skip
+                name=f"{sensor.name} ({len(parts)})",
+                type=mujoco.mjtSensor.mjSENS_CONTACT,
+                objtype=body,
+                objname=body_name(world, index),
+            )
             if other is not None:
                 element.reftype, element.refname = body, body_name(world, other)
             setup = np.zeros_like(element.intprm)

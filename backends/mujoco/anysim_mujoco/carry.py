@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.world.model import World
+from anysim.model.world import World
 from anysim_mujoco.layout import Layout
 from anysim_mujoco.parameters import Parameters
 from anysim_mujoco.state import StateReader
@@ -59,9 +59,15 @@ def _shared_rows(before: Array, after: Array, old_rows: Array, new_rows: Array) 
 
 
 def take_rows(
-    carried: Carried, old: World, old_layout: Layout, new: World, batch: Any, layout: Layout, reader: StateReader,
+    carried: Carried,
+    old: World,
+    old_layout: Layout,
+    new: World,
+    batch: Any,
+    layout: Layout,
+    reader: StateReader,
     parameters: Parameters,
-) -> None:  # fmt: skip
+) -> None:
     """Write what `carried_rows` of the old build copied to where it is now."""
     names = ("qpos", "qvel", "qacc_warmstart")
     batch.bind("time")[:] = carried.time

@@ -4,13 +4,13 @@ from collections.abc import Mapping
 from functools import cache
 from importlib import metadata
 
+from anysim.engine.availability import judge
 from anysim.engine.capability import Capabilities, Capability
 from anysim.engine.state import Availability
-from anysim.engine.versions import judge
 
 MINIMUM = (3, 17, 0)
 WRONG: Mapping[tuple[int, ...], str] = {
-    (4, 0, 0): "its sparse solver is wrong where articulated bodies touch each other",
+    (4, 0, 0): "its sparse solver is wrong where articulated bodies touch each other"
 }
 """Versions whose results cannot be trusted, and why."""
 

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from anysim.engine.actuation import speed_bound
-from anysim.engine.commands import MODES, Control
-from anysim.world.model import ControlMode, World
+from anysim.engine.control import MODES, Control
+from anysim.engine.drive_checks import speed_bound
+from anysim.model.world import ControlMode, World
 from anysim_mujoco.layout import Layout
 
 _POSITION, _EFFORT = MODES.index(ControlMode.POSITION), MODES.index(ControlMode.EFFORT)

@@ -11,13 +11,13 @@ from anysim.conventions import Array, wxyz_from_xyzw, xyzw_from_wxyz
 from anysim.engine.base import SimEngine
 from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Capabilities
-from anysim.engine.commands import Control
-from anysim.engine.diagnosis import Finding, Health
-from anysim.engine.looks import Looks
+from anysim.engine.control import Control
+from anysim.engine.doctor import Finding, Health
+from anysim.engine.lighting import Looks
 from anysim.engine.presence import Lifecycle
 from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
 from anysim.math import pose as P
-from anysim.world.model import World
+from anysim.model.world import World
 from anysim_mujoco import declared
 from anysim_mujoco.audit import geom_volumes, joint_limits
 from anysim_mujoco.build import build, initial_row, silence
@@ -213,9 +213,12 @@ class MujocoEngine(SimEngine):
     def _snapshot(self, ids: Array, level: SnapshotLevel) -> dict[str, Array]:
         reader = self._reader
         return {
-            "rows": self._rows[ids], "effort": reader.joint_effort()[ids], "contact": reader.contact_force()[ids],
-            "fault": reader.fault()[ids], **self._parameters.rows(ids),
-        }  # fmt: skip
+            "rows": self._rows[ids],
+            "effort": reader.joint_effort()[ids],
+            "contact": reader.contact_force()[ids],
+            "fault": reader.fault()[ids],
+            **self._parameters.rows(ids),
+        }
 
     def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:
         self._rows[ids] = data["rows"]

@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 
 from anysim.conventions import Array, wxyz_from_xyzw
-from anysim.world.looks import NONE
-from anysim.world.model import (
+from anysim.model.appearance import NONE
+from anysim.model.world import (
     Box,
     Capsule,
     Cylinder,
@@ -20,7 +20,7 @@ from anysim.world.model import (
     Scenery,
     Sphere,
     World,
-)  # fmt: skip
+)
 from anysim_mujoco.options import MujocoOptions
 from anysim_mujoco.skins import GROUND, NEUTRAL_RGBA, PLAIN, add_looks, look_name
 from anysim_mujoco.surfaces import contact_parameters
@@ -54,13 +54,23 @@ def shadow_place(world: World, direction: Array) -> Array:
 def add_look(spec: Any, world: World, options: MujocoOptions) -> None:
     """Sky, ground material, light: what a picture needs beside the geoms."""
     spec.add_texture(
-        name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
-        rgb1=SKY[0], rgb2=SKY[1], width=256, height=1536,
-    )  # fmt: skip
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=SKY[0],
+        rgb2=SKY[1],
+        width=256,
+        height=1536,
+    )
     spec.add_texture(
-        name=GROUND, type=mujoco.mjtTexture.mjTEXTURE_2D, builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
-        rgb1=(1.0, 1.0, 1.0), rgb2=(0.92, 0.93, 0.94), width=128, height=128,
-    )  # fmt: skip
+        name=GROUND,
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        rgb1=(1.0, 1.0, 1.0),
+        rgb2=(0.92, 0.93, 0.94),
+        width=128,
+        height=128,
+    )
     spec.add_material(name=PLAIN, rgba=NEUTRAL_RGBA, specular=0.25, shininess=0.4)
     ground = spec.add_material(name=GROUND, rgba=NEUTRAL_RGBA, specular=0.05, texuniform=True, texrepeat=(1.0, 1.0))
     textures = ground.textures
@@ -82,10 +92,13 @@ def _add_light(spec: Any, light: Light, world: World) -> None:
     direction = np.asarray(light.direction, dtype=float)
     away = shadow_place(world, direction)
     element = spec.worldbody.add_light(
-        dir=direction, pos=away if light.position is None else light.position,
-        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, diffuse=[light.intensity * c for c in light.color],
-        specular=[SHINE * light.intensity] * 3, castshadow=True,  # the painter says in which envs
-    )  # fmt: skip
+        dir=direction,
+        pos=away if light.position is None else light.position,
+        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+        diffuse=[light.intensity * c for c in light.color],
+        specular=[SHINE * light.intensity] * 3,
+        castshadow=True,  # the painter says in which envs
+    )
     if light.position is not None:
         element.type = mujoco.mjtLightType.mjLIGHT_SPOT
         element.cutoff, element.exponent = 80.0, 1.0
@@ -126,12 +139,25 @@ def add_geom(spec: Any, owner: Any, geom: Geom, world: World) -> Any:
     finish = {m.name: i for i, m in enumerate(world.materials)}.get(geom.material, NONE)
     groups = {(True, True): VISIBLE, (True, False): VISUAL_ONLY, (False, True): COLLISION_ONLY}
     element = owner.add_geom(
-        name=geom.name, type=kind, size=size, pos=position, quat=wxyz_from_xyzw(np.asarray(geom.quaternion)),
-        rgba=geom.color, material=look_name(geom, number, finish),
-        contype=int(geom.collides), conaffinity=int(geom.collides), condim=surface.condim, priority=surface.priority,
-        friction=surface.friction, solref=surface.solref, solimp=surface.solimp, solmix=surface.solmix,
-        group=groups.get((geom.visible, geom.collides), UNSEEN), mass=0.0, gap=surface.gap,
-    )  # fmt: skip
+        name=geom.name,
+        type=kind,
+        size=size,
+        pos=position,
+        quat=wxyz_from_xyzw(np.asarray(geom.quaternion)),
+        rgba=geom.color,
+        material=look_name(geom, number, finish),
+        contype=int(geom.collides),
+        conaffinity=int(geom.collides),
+        condim=surface.condim,
+        priority=surface.priority,
+        friction=surface.friction,
+        solref=surface.solref,
+        solimp=surface.solimp,
+        solmix=surface.solmix,
+        group=groups.get((geom.visible, geom.collides), UNSEEN),
+        mass=0.0,
+        gap=surface.gap,
+    )
     if isinstance(geom.shape, MeshShape):
         element.meshname = geom.shape.mesh
     elif isinstance(geom.shape, HeightFieldShape):

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.world.model import BodyKind, World
+from anysim.model.world import BodyKind, World
 
 
 class Handles(NamedTuple):

@@ -9,11 +9,11 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import AssetError
-from anysim_mujoco.mjcf_file import compiled
+from anysim_mujoco.mjcf.file import compiled
 
 
 class Mjcf:
-    """See `anysim.qualify.oracle.Oracle`. Positions of joints are those of the file, `ref` and all."""
+    """See `anysim_robots.qualify.oracle.Oracle`. Positions of joints are those of the file, `ref` and all."""
 
     name = "raw MuJoCo"
 

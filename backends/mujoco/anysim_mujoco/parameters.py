@@ -8,10 +8,10 @@ import numpy as np
 from mujoco.batch import SimulationError
 
 from anysim.conventions import Array
-from anysim.engine.looks import LIGHTS, SURROUNDINGS, Looks
+from anysim.engine.lighting import LIGHTS, SURROUNDINGS, Looks
 from anysim.engine.parameters import nominal
 from anysim.errors import EngineError
-from anysim.world.model import World
+from anysim.model.world import World
 from anysim_mujoco.dampers import Dampers
 from anysim_mujoco.drives import Drives
 from anysim_mujoco.inertia import check_physical, full, principal
@@ -35,12 +35,29 @@ class _Field(NamedTuple):
 class Parameters:
     """Reads and writes neutral parameters. Derived constants are brought up to date by `settle`, for touched envs."""
 
-    NAMES = frozenset({
-        "body.mass", "body.com", "body.inertia", "body.linear_damping", "body.angular_damping", "geom.friction",
-        "geom.restitution", "geom.color", "geom.texture", "geom.material", "joint.damping", "joint.friction",
-        "joint.armature", "actuator.kp", "actuator.kd", "actuator.effort_limit", "world.gravity",
-        *LIGHTS, *SURROUNDINGS,
-    })  # fmt: skip
+    NAMES = frozenset(
+        {
+            "body.mass",
+            "body.com",
+            "body.inertia",
+            "body.linear_damping",
+            "body.angular_damping",
+            "geom.friction",
+            "geom.restitution",
+            "geom.color",
+            "geom.texture",
+            "geom.material",
+            "joint.damping",
+            "joint.friction",
+            "joint.armature",
+            "actuator.kp",
+            "actuator.kd",
+            "actuator.effort_limit",
+            "world.gravity",
+            *LIGHTS,
+            *SURROUNDINGS,
+        }
+    )
 
     def __init__(
         self, batch: Any, world: World, layout: Layout, drives: Drives, dampers: Dampers, looks: Looks

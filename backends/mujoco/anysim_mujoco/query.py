@@ -61,9 +61,14 @@ class Queries:
             mujoco.mj_contactForce(model, data, int(number), local)
             force[row] = local[0] * frames[row, 0] + local[1] * frames[row, 1] + local[2] * frames[row, 2]
         return [
-            np.full(len(chosen), index), bodies[:, 0], bodies[:, 1], contact.pos[chosen].copy(), frames[:, 0].copy(),
-            force, -contact.dist[chosen],
-        ]  # fmt: skip
+            np.full(len(chosen), index),
+            bodies[:, 0],
+            bodies[:, 1],
+            contact.pos[chosen].copy(),
+            frames[:, 0].copy(),
+            force,
+            -contact.dist[chosen],
+        ]
 
 
 def _nothing() -> list[Array]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.cameras import CameraView
-from anysim.engine.looks import Look, Looks
+from anysim.engine.lighting import Look, Looks
 from anysim.math import pose as P
 from anysim_mujoco.geoms import DRAWN_GROUPS, SHINE, shadow_place
 from anysim_mujoco.gl import gl_thread
@@ -53,8 +53,10 @@ class Painter:
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
         size = (len(ids), view.height, view.width)
         shapes: dict[str, tuple[tuple[int, ...], Any]] = {
-            "rgb": ((*size, 3), np.uint8), "depth": (size, np.float32), "segmentation": (size, np.int32)
-        }  # fmt: skip
+            "rgb": ((*size, 3), np.uint8),
+            "depth": (size, np.float32),
+            "segmentation": (size, np.int32),
+        }
         images = {name: np.empty(*shapes[name]) for name in channels}
         axes = P.to_matrix(view.pose[:, 3:])
         rect = mujoco.MjrRect(0, 0, view.width, view.height)

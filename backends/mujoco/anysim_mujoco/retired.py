@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.world.model import World
+from anysim.model.world import World
 from anysim_mujoco.geoms import UNSEEN
 from anysim_mujoco.layout import Layout
 from anysim_mujoco.parameters import Parameters

@@ -10,8 +10,8 @@ import mujoco
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.world.looks import NONE
-from anysim.world.model import Geom, HeightFieldShape, Plane, World
+from anysim.model.appearance import NONE
+from anysim.model.world import Geom, HeightFieldShape, Plane, World
 
 NEUTRAL_RGBA = (0.5, 0.5, 0.5, 1.0)
 """A geom of exactly this colour takes its material's, which is therefore the same."""

@@ -13,10 +13,13 @@ from anysim_mujoco.layout import Layout, as_slice
 _FATAL = [
     int(kind)
     for kind in (
-        mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL, mujoco.mjtWarning.mjWARN_BADQPOS,
-        mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC,
+        mujoco.mjtWarning.mjWARN_CONTACTFULL,
+        mujoco.mjtWarning.mjWARN_CNSTRFULL,
+        mujoco.mjtWarning.mjWARN_BADQPOS,
+        mujoco.mjtWarning.mjWARN_BADQVEL,
+        mujoco.mjtWarning.mjWARN_BADQACC,
     )
-]  # fmt: skip
+]
 """Warnings after which an env's state means nothing: it diverged, or contacts were dropped for want of memory."""
 
 

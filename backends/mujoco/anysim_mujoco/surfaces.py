@@ -11,7 +11,7 @@ from math import atan2, exp, log, pi, sqrt
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.world.model import Surface
+from anysim.model.world import Surface
 
 STIFF_IMPEDANCE = (0.99, 0.999, 0.001, 0.5, 2.0)
 """Impedance of joint limits and mimic couplings: they give way by next to nothing."""

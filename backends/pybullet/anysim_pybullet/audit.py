@@ -7,7 +7,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.math import pose as P
-from anysim.world.shapes import is_ground
+from anysim.model.shapes import is_ground
 from anysim_pybullet.bullet import MOST_CLIENTS, bullet
 from anysim_pybullet.client import Env
 from anysim_pybullet.urdf import UNLIMITED

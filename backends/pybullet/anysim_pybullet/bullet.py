@@ -4,8 +4,8 @@ import importlib
 from functools import cache
 from typing import Any
 
+from anysim.c_output import quiet
 from anysim.errors import EngineError
-from anysim.quiet import quiet
 
 MOST_CLIENTS = 1024
 """Clients that Bullet has room for in a process."""

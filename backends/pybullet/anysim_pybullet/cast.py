@@ -6,7 +6,7 @@ import numpy as np
 
 from anysim.conventions import WORLD, Array
 from anysim.engine.presence import bodies_there
-from anysim.world.model import World
+from anysim.model.world import World
 from anysim_pybullet.tree import Tree
 
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from anysim.c_output import quiet
 from anysim.conventions import WORLD, Array
 from anysim.errors import EngineError
 from anysim.math import pose as P
-from anysim.quiet import quiet
-from anysim.world.model import Geom, HeightField, HeightFieldShape, MeshShape, Plane, World
+from anysim.model.world import Geom, HeightField, HeightFieldShape, MeshShape, Plane, World
 from anysim_pybullet.bullet import bullet, connect, disconnect
 from anysim_pybullet.cast import Cast
 from anysim_pybullet.options import PybulletOptions, sweeps
@@ -175,11 +175,16 @@ class Env:
         p.resetSimulation(p.RESET_USE_SIMPLE_BROADPHASE, physicsClientId=self.id)
         # without ordered pairs neither equal runs nor saved states are exact
         p.setPhysicsEngineParameter(
-            deterministicOverlappingPairs=1, fixedTimeStep=physics.dt, numSubSteps=0,
-            numSolverIterations=self.plan.sweeps, solverResidualThreshold=options.residual,
-            erp=options.joint_erp, contactERP=options.contact_erp, restitutionVelocityThreshold=0.01,
+            deterministicOverlappingPairs=1,
+            fixedTimeStep=physics.dt,
+            numSubSteps=0,
+            numSolverIterations=self.plan.sweeps,
+            solverResidualThreshold=options.residual,
+            erp=options.joint_erp,
+            contactERP=options.contact_erp,
+            restitutionVelocityThreshold=0.01,
             physicsClientId=self.id,
-        )  # fmt: skip
+        )
         p.setGravity(*physics.gravity, physicsClientId=self.id)
 
     def _add_ground(self, p: Any, number: int, geom: Geom, file: str) -> None:
@@ -216,18 +221,23 @@ class Env:
         heights = np.asarray(field.heights, dtype=float)
         rows, cols = heights.shape
         shape = p.createCollisionShape(
-            p.GEOM_HEIGHTFIELD, meshScale=[field.size[1] / (rows - 1), field.size[0] / (cols - 1), 1.0],
-            heightfieldData=heights.T[::-1].ravel().tolist(), numHeightfieldRows=rows, numHeightfieldColumns=cols,
+            p.GEOM_HEIGHTFIELD,
+            meshScale=[field.size[1] / (rows - 1), field.size[0] / (cols - 1), 1.0],
+            heightfieldData=heights.T[::-1].ravel().tolist(),
+            numHeightfieldRows=rows,
+            numHeightfieldColumns=cols,
             physicsClientId=self.id,
-        )  # fmt: skip
+        )
         return shape, 0.5 * float(heights.min() + heights.max())
 
     def _add_tree(self, p: Any, tree: Tree) -> None:
         world, client = self.plan.world, self.id
         flags = (
-            p.URDF_USE_INERTIA_FROM_FILE | p.URDF_USE_SELF_COLLISION | p.URDF_IGNORE_VISUAL_SHAPES
+            p.URDF_USE_INERTIA_FROM_FILE
+            | p.URDF_USE_SELF_COLLISION
+            | p.URDF_IGNORE_VISUAL_SHAPES
             | p.URDF_USE_IMPLICIT_CYLINDER
-        )  # fmt: skip
+        )
         file = self.plan.urdf_of(tree, self.frames)
         uid = p.loadURDF(file, useFixedBase=0 if tree.free else 1, flags=flags, physicsClientId=client)
         self.plan.forget(file)
@@ -246,9 +256,15 @@ class Env:
                 self._know(number, uid, links[shape_link(number) if k else body_link(body)])
         for link in (-1, *links.values()):
             p.changeDynamics(
-                uid, link, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0, maxJointVelocity=SPEED_LIMIT,
-                rollingFriction=HOLD, physicsClientId=client,
-            )  # fmt: skip
+                uid,
+                link,
+                linearDamping=0.0,
+                angularDamping=0.0,
+                jointDamping=0.0,
+                maxJointVelocity=SPEED_LIMIT,
+                rollingFriction=HOLD,
+                physicsClientId=client,
+            )
         for j in tree.joints.tolist():
             self.joint_link[j] = joints[joint_name(j)]
             # every joint begins with a motor that holds it; what is left of it is the joint's dry friction
@@ -287,13 +303,24 @@ class Env:
             uid = self.body_at[joint.body][0]
             leader = world.joints[joint.mimic.joint]
             gear = p.createConstraint(
-                uid, self.joint_link[index], self.body_at[leader.body][0], self.joint_link[joint.mimic.joint],
-                p.JOINT_GEAR, [1, 0, 0], [0, 0, 0], [0, 0, 0], physicsClientId=self.id,
-            )  # fmt: skip
+                uid,
+                self.joint_link[index],
+                self.body_at[leader.body][0],
+                self.joint_link[joint.mimic.joint],
+                p.JOINT_GEAR,
+                [1, 0, 0],
+                [0, 0, 0],
+                [0, 0, 0],
+                physicsClientId=self.id,
+            )
             p.changeConstraint(
-                gear, gearRatio=-joint.mimic.multiplier, relativePositionTarget=joint.mimic.offset, erp=0.8,
-                maxForce=MIMIC_FORCE, physicsClientId=self.id,
-            )  # fmt: skip
+                gear,
+                gearRatio=-joint.mimic.multiplier,
+                relativePositionTarget=joint.mimic.offset,
+                erp=0.8,
+                maxForce=MIMIC_FORCE,
+                physicsClientId=self.id,
+            )
 
     # ------------------------------------------------------------------ contacts of the past
 
@@ -325,7 +352,9 @@ class Env:
                 self._begin[number] = begin
                 p.changeDynamics(*self.shape_at[number], contactProcessingThreshold=begin, physicsClientId=self.id)
             p.changeDynamics(
-                *self.shape_at[number], lateralFriction=float(numbers.friction[row]),
-                spinningFriction=float(numbers.spinning[row]), restitution=float(numbers.restitution[row]),
+                *self.shape_at[number],
+                lateralFriction=float(numbers.friction[row]),
+                spinningFriction=float(numbers.spinning[row]),
+                restitution=float(numbers.restitution[row]),
                 physicsClientId=self.id,
-            )  # fmt: skip
+            )

@@ -7,7 +7,7 @@ import numpy as np
 
 from anysim.conventions import WORLD, Array
 from anysim.engine.state import ContactPoints, RayHits
-from anysim.world.model import World
+from anysim.model.world import World
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.client import Env
 

@@ -3,11 +3,10 @@
 from functools import cache
 from importlib import metadata
 
-from anysim.engine.allowance import Allowance
-from anysim.engine.capability import Capabilities, Capability
-from anysim.engine.looks import LIGHTS
+from anysim.engine.availability import judge
+from anysim.engine.capability import Allowance, Capabilities, Capability
+from anysim.engine.lighting import LIGHTS
 from anysim.engine.state import Availability
-from anysim.engine.versions import judge
 
 MINIMUM = (3, 2, 7)
 REMEDY = "pip install 'pybullet>=3.2.7'"
@@ -50,12 +49,30 @@ CAPABILITIES = Capabilities.of(
     *(c for c in Capability if c not in _APPROXIMATE and c not in _ABSENT), approximate=_APPROXIMATE
 )
 
-PARAMETERS = frozenset({
-    "body.mass", "body.com", "body.inertia", "body.linear_damping", "body.angular_damping", "geom.friction",
-    "geom.restitution", "geom.color", "geom.texture", "geom.material", "joint.damping", "joint.friction",
-    "joint.armature", "actuator.kp", "actuator.kd", "actuator.effort_limit", "world.gravity",
-    *LIGHTS, "world.ambient", "world.background",
-})  # fmt: skip
+PARAMETERS = frozenset(
+    {
+        "body.mass",
+        "body.com",
+        "body.inertia",
+        "body.linear_damping",
+        "body.angular_damping",
+        "geom.friction",
+        "geom.restitution",
+        "geom.color",
+        "geom.texture",
+        "geom.material",
+        "joint.damping",
+        "joint.friction",
+        "joint.armature",
+        "actuator.kp",
+        "actuator.kd",
+        "actuator.effort_limit",
+        "world.gravity",
+        *LIGHTS,
+        "world.ambient",
+        "world.background",
+    }
+)
 """What can be changed per env."""
 
 AUDIT_ALLOWANCES = {

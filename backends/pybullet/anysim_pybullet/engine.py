@@ -4,15 +4,14 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from anysim.conventions import Array
-from anysim.engine.allowance import Allowance
 from anysim.engine.base import SimEngine
 from anysim.engine.cameras import CameraView
-from anysim.engine.capability import Capabilities
-from anysim.engine.commands import Control
-from anysim.engine.diagnosis import Finding, Health
+from anysim.engine.capability import Allowance, Capabilities
+from anysim.engine.control import Control
+from anysim.engine.doctor import Finding, Health
 from anysim.engine.presence import Lifecycle
 from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
-from anysim.world.model import World
+from anysim.model.world import World
 from anysim_pybullet import declared
 from anysim_pybullet.options import PybulletOptions
 

@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
+from anysim.c_output import quiet
 from anysim.conventions import Array
-from anysim.engine.looks import Looks
+from anysim.engine.lighting import Looks
 from anysim.engine.state import SnapshotLevel
 from anysim.errors import EngineError
 from anysim.math import pose as P
-from anysim.quiet import quiet
-from anysim.world.model import BodyKind, World
+from anysim.model.world import BodyKind, World
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.cast import Cast
 from anysim_pybullet.client import Env, Plan
@@ -192,9 +192,12 @@ class Envs:
         p, env, mirror = bullet(), self.clients[index], self.mirror
         for j in joints.tolist():
             p.resetJointState(
-                env.body_at[self.world.joints[j].body][0], env.joint_link[j], float(mirror.position[index, j]),
-                float(mirror.velocity[index, j]), physicsClientId=env.id,
-            )  # fmt: skip
+                env.body_at[self.world.joints[j].body][0],
+                env.joint_link[j],
+                float(mirror.position[index, j]),
+                float(mirror.velocity[index, j]),
+                physicsClientId=env.id,
+            )
 
     def _set_root(self, index: int, body: int, with_pose: bool) -> None:
         """Give Bullet the pose of a root's centre of mass, and its velocity, which writing a pose makes zero."""
@@ -273,9 +276,10 @@ class Envs:
     def take(self, carried: Mapping[str, Array], old: World) -> None:
         """Keep the bits of what stays: poses that went through Bullet come back with other last ones."""
         for kind, names in (
-            ("bodies", ("pose", "twist")), ("joints", ("position", "velocity", "effort")),
+            ("bodies", ("pose", "twist")),
+            ("joints", ("position", "velocity", "effort")),
             ("contact_sensors", ("contact",)),
-        ):  # fmt: skip
+        ):
             places = {thing.name: i for i, thing in enumerate(getattr(old, kind))}
             pairs = [(places[t.name], i) for i, t in enumerate(getattr(self.world, kind)) if t.name in places]
             before, after = np.array(pairs, dtype=int).reshape(-1, 2).T

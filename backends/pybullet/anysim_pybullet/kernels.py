@@ -97,9 +97,18 @@ def _solve(a: Array, b: Array, n: int) -> bool:
 
 @compiled
 def dynamics(
-    joint_ints: Array, joint_floats: Array, bodies: Array, wrench: Array, gravity: Array, root: Array, motion: Array,
-    first: int, mass_matrix: Array, bias: Array, known: Array,
-) -> None:  # fmt: skip
+    joint_ints: Array,
+    joint_floats: Array,
+    bodies: Array,
+    wrench: Array,
+    gravity: Array,
+    root: Array,
+    motion: Array,
+    first: int,
+    mass_matrix: Array,
+    bias: Array,
+    known: Array,
+) -> None:
     """The mass matrix, the bias forces and the known outer forces of an articulation in its present state.
 
     Args:
@@ -255,9 +264,20 @@ def dynamics(
 
 @compiled
 def drive_law(
-    dt: float, implicit: bool, joint_ints: Array, joint_floats: Array, bodies: Array, drives: Array, wrench: Array,
-    gravity: Array, root: Array, motion: Array, first: int, memory: Array, out: Array,
-) -> bool:  # fmt: skip
+    dt: float,
+    implicit: bool,
+    joint_ints: Array,
+    joint_floats: Array,
+    bodies: Array,
+    drives: Array,
+    wrench: Array,
+    gravity: Array,
+    root: Array,
+    motion: Array,
+    first: int,
+    memory: Array,
+    out: Array,
+) -> bool:
     """One step of the drives of an articulation.
 
     The law is u = kp (q* - q) + kd (qd* - qd) + ff, clipped, its damping taken at the end of the step if `implicit`,

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.actuation import speed_bound
-from anysim.engine.commands import MODES, Control
-from anysim.engine.drag import drag, gain
-from anysim.world.model import Actuation, ControlMode, World
+from anysim.engine.control import MODES, Control
+from anysim.engine.damping import drag, gain
+from anysim.engine.drive_checks import speed_bound
+from anysim.model.world import Actuation, ControlMode, World
 from anysim_pybullet import kernels as K
 from anysim_pybullet.client import Env
 from anysim_pybullet.lift import Lift, Lifter
@@ -192,10 +192,15 @@ class Pusher:
         buffer.wrench[...] = 0.0 if laws.wrench is None else laws.wrench[index, tree.bodies]
         buffer.root[:7], buffer.root[7:] = laws.roots[index, tree.bodies[0]], 0.0
         return (
-            tree, self._env.root_ids[tree.number], self._env.tree_links[tree.number], buffer,
-            laws.bodies[index, tree.bodies], laws.acting[index, tree.joints], laws.remembered(index, tree.number),
+            tree,
+            self._env.root_ids[tree.number],
+            self._env.tree_links[tree.number],
+            buffer,
+            laws.bodies[index, tree.bodies],
+            laws.acting[index, tree.joints],
+            laws.remembered(index, tree.number),
             Brake.of(laws, self._p, self._env, index, tree, self._dt),
-        )  # fmt: skip
+        )
 
     def run(self, steps: int) -> bool:
         """Advance; False where the state was found not finite, and the env stood still from then on."""
@@ -217,9 +222,18 @@ class Pusher:
         return True
 
     def _push(
-        self, p: Any, client: int, tree: Tree, uid: int, links: list[int], buffer: _Gathered, bodies: Array,
-        drives: Array, memory: Array, brake: "Brake | None",
-    ) -> bool:  # fmt: skip
+        self,
+        p: Any,
+        client: int,
+        tree: Tree,
+        uid: int,
+        links: list[int],
+        buffer: _Gathered,
+        bodies: Array,
+        drives: Array,
+        memory: Array,
+        brake: "Brake | None",
+    ) -> bool:
         place: Any = None
         if tree.free:
             place, turn = p.getBasePositionAndOrientation(uid, physicsClientId=client)
@@ -234,9 +248,20 @@ class Pusher:
         buffer.motion[0] = [s[0] for s in states]
         buffer.motion[1] = [s[1] for s in states]
         good = K.drive_law(
-            self._dt, self._laws.implicit, tree.joint_ints, tree.joint_floats, bodies, drives, buffer.wrench,
-            self._laws.gravity[self._index], buffer.root, buffer.motion, tree.first, memory, buffer.out,
-        )  # fmt: skip
+            self._dt,
+            self._laws.implicit,
+            tree.joint_ints,
+            tree.joint_floats,
+            bodies,
+            drives,
+            buffer.wrench,
+            self._laws.gravity[self._index],
+            buffer.root,
+            buffer.motion,
+            tree.first,
+            memory,
+            buffer.out,
+        )
         if not good:
             return False
         out = buffer.out.tolist()

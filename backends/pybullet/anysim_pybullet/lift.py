@@ -91,9 +91,18 @@ class Lifter:
             root[:7] = laws.roots[index, tree.bodies[0]]
             known = np.empty(size)
             K.dynamics(
-                tree.joint_ints, tree.joint_floats, laws.bodies[index, tree.bodies], np.zeros((n + 1, 6)),
-                laws.gravity[index], root, motion, tree.first, np.empty((size, size)), np.empty(size), known,
-            )  # fmt: skip
+                tree.joint_ints,
+                tree.joint_floats,
+                laws.bodies[index, tree.bodies],
+                np.zeros((n + 1, 6)),
+                laws.gravity[index],
+                root,
+                motion,
+                tree.first,
+                np.empty((size, size)),
+                np.empty(size),
+                known,
+            )
             if not np.isfinite(known).all():
                 return False
             self._lift.torque[index, tree.joints] = known[tree.first :]

@@ -12,10 +12,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.commands import MODES, Control
+from anysim.engine.control import MODES, Control
 from anysim.errors import EngineError
-from anysim.world.jacobians import mass_matrix
-from anysim.world.model import ControlMode, World
+from anysim.kinematics.jacobians import mass_matrix
+from anysim.model.world import ControlMode, World
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.client import Env
 from anysim_pybullet.tree import Tree

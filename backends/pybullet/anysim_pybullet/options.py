@@ -2,7 +2,7 @@
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from anysim.world.model import Scenery, World
+from anysim.model.world import Scenery, World
 
 BACKGROUND = (221 / 255, 230 / 255, 240 / 255)
 AMBIENT = 0.35
@@ -15,9 +15,11 @@ class PybulletOptions(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     iterations: int | None = Field(
-        default=None, ge=1, description="most sweeps of the constraint solver in a step; 50 where not given, "
-        "100 where more than two joints of a robot or object follow others"
-    )  # fmt: skip
+        default=None,
+        ge=1,
+        description="most sweeps of the constraint solver in a step; 50 where not given, "
+        "100 where more than two joints of a robot or object follow others",
+    )
     residual: float = Field(default=1e-7, ge=0, description="velocity residual at which the constraint solver stops")
     contact_erp: float = Field(default=0.1, ge=0, le=1, description="share of a penetration that a step takes back")
     joint_erp: float = Field(default=0.2, ge=0, le=1, description="share of a limit's error that a step takes back")

@@ -5,11 +5,11 @@ from collections.abc import Callable
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.looks import Looks
+from anysim.engine.lighting import Looks
 from anysim.engine.parameters import nominal
 from anysim.errors import EngineError
-from anysim.world.inertia import tensor
-from anysim.world.model import Inertial, World
+from anysim.kinematics.inertia import tensor
+from anysim.model.world import Inertial, World
 from anysim_pybullet import kernels as K
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.client import Env
@@ -96,9 +96,11 @@ class Parameters:
                 if env.cast.bodies[body] and self._world.bodies[body].kind != "static":
                     # a mass without moments would be given those of the shapes
                     p.changeDynamics(
-                        *env.body_at[body], mass=float(self._laws.bodies[index, body, K.MASS]),
-                        localInertiaDiagonal=self._moments(index, body), physicsClientId=env.id,
-                    )  # fmt: skip
+                        *env.body_at[body],
+                        mass=float(self._laws.bodies[index, body, K.MASS]),
+                        localInertiaDiagonal=self._moments(index, body),
+                        physicsClientId=env.id,
+                    )
 
     def shifted_com(self, index: int) -> Array | None:
         """The centres of mass (B, 3) of an env, None where they are the World's."""
@@ -121,13 +123,19 @@ class Parameters:
     def _array(self, name: str) -> Array:
         laws = self._laws
         return {
-            "body.mass": laws.bodies[:, :, K.MASS], "body.com": self.com, "geom.friction": self.friction,
+            "body.mass": laws.bodies[:, :, K.MASS],
+            "body.com": self.com,
+            "geom.friction": self.friction,
             "geom.color": self.color,
-            "geom.restitution": self.restitution, "geom.texture": self.texture, "geom.material": self.material,
-            "body.linear_damping": laws.damping[:, :, 0], "body.angular_damping": laws.damping[:, :, 1],
-            "actuator.kp": laws.kp, "actuator.kd": laws.kd,
+            "geom.restitution": self.restitution,
+            "geom.texture": self.texture,
+            "geom.material": self.material,
+            "body.linear_damping": laws.damping[:, :, 0],
+            "body.angular_damping": laws.damping[:, :, 1],
+            "actuator.kp": laws.kp,
+            "actuator.kd": laws.kd,
             "actuator.effort_limit": laws.limit,
-        }[name]  # fmt: skip
+        }[name]
 
     def _all(self, name: str) -> Array:
         laws = self._laws

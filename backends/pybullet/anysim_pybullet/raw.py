@@ -7,9 +7,9 @@ from weakref import finalize
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.commands import Control
+from anysim.engine.control import Control
 from anysim.engine.state import SnapshotLevel
-from anysim.world.model import Actuation
+from anysim.model.world import Actuation
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.envs import Envs
 

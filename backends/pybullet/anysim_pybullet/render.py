@@ -12,24 +12,15 @@ from typing import Any
 
 import numpy as np
 
+from anysim.c_output import quiet
 from anysim.conventions import WORLD, Array
 from anysim.engine.cameras import CameraView
-from anysim.engine.looks import Look, Looks
+from anysim.engine.lighting import Look, Looks
 from anysim.errors import EngineError
+from anysim.geometry.tessellate import triangles
 from anysim.math import pose as P
-from anysim.quiet import quiet
-from anysim.world.looks import NONE, lying, wrapped
-from anysim.world.model import (
-    Box,
-    Geom,
-    HeightField,
-    HeightFieldShape,
-    Mesh,
-    MeshShape,
-    Plane,
-    World,
-)
-from anysim.world.tessellate import triangles
+from anysim.model.appearance import NONE, lying, wrapped
+from anysim.model.world import Box, Geom, HeightField, HeightFieldShape, Mesh, MeshShape, Plane, World
 from anysim_pybullet.bullet import bullet, connect, disconnect
 
 MOST_TRIANGLES = 40_000
@@ -89,14 +80,22 @@ class Painter:
         disconnect(self._client)
 
     def draw(
-        self, view: CameraView, poses: Array, colors: Array, textures: Array, there: Array, ids: Array,
+        self,
+        view: CameraView,
+        poses: Array,
+        colors: Array,
+        textures: Array,
+        there: Array,
+        ids: Array,
         channels: tuple[str, ...],
-    ) -> dict[str, Array]:  # fmt: skip
+    ) -> dict[str, Array]:
         """See `SimEngine.render`: `poses` (N, B, 7), `colors` (N, G, 4), `textures` (N, G) and who is there (N, B)."""
         size = (len(ids), view.height, view.width)
         shapes: dict[str, tuple[tuple[int, ...], Any]] = {
-            "rgb": ((*size, 3), np.uint8), "depth": (size, np.float32), "segmentation": (size, np.int32)
-        }  # fmt: skip
+            "rgb": ((*size, 3), np.uint8),
+            "depth": (size, np.float32),
+            "segmentation": (size, np.int32),
+        }
         images = {name: np.empty(*shapes[name]) for name in channels}
         for row, index in enumerate(ids.tolist()):
             painted = textures[index, self._geoms].astype(int)
@@ -143,11 +142,19 @@ class Painter:
         lens = p.computeProjectionMatrix(aside - right, aside + right, up - top, up + top, view.near, view.far)
         towards, emission, brightness, tint = self._light(look)
         _, _, rgba, raw, owner = p.getCameraImage(
-            view.width, view.height, turned.T.ravel().tolist(), lens, shadow=int(look.shadows),
-            lightDirection=towards.tolist(), lightColor=(emission / tint).tolist(),
-            lightAmbientCoeff=brightness, lightDiffuseCoeff=1.0, lightSpecularCoeff=0.05,
-            renderer=p.ER_TINY_RENDERER, physicsClientId=self._client,
-        )  # fmt: skip
+            view.width,
+            view.height,
+            turned.T.ravel().tolist(),
+            lens,
+            shadow=int(look.shadows),
+            lightDirection=towards.tolist(),
+            lightColor=(emission / tint).tolist(),
+            lightAmbientCoeff=brightness,
+            lightDiffuseCoeff=1.0,
+            lightSpecularCoeff=0.05,
+            renderer=p.ER_TINY_RENDERER,
+            physicsClientId=self._client,
+        )
         size = (view.height, view.width)
         color = np.reshape(rgba, (*size, 4))[..., :3]
         if (tint < 1.0).any():
@@ -225,10 +232,14 @@ class Painter:
             places = lying(corners) if flat else 0.9999 * wrapped(corners)
             more["uvs"] = places.reshape(-1, 2).tolist()
         return p.createVisualShape(
-            p.GEOM_MESH, vertices=points.tolist(), indices=list(range(len(points))),
-            normals=np.repeat(normal, 3, axis=0).tolist(), rgbaColor=color, physicsClientId=self._client,
+            p.GEOM_MESH,
+            vertices=points.tolist(),
+            indices=list(range(len(points))),
+            normals=np.repeat(normal, 3, axis=0).tolist(),
+            rgbaColor=color,
+            physicsClientId=self._client,
             **more,
-        )  # fmt: skip
+        )
 
 
 def tga(pixels: Array) -> bytes:

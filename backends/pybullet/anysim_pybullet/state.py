@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.world.model import World
+from anysim.model.world import World
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.client import Env
 from anysim_pybullet.contacts import sensor_forces

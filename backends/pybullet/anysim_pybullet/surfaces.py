@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from anysim.conventions import WORLD, Array
-from anysim.world.model import BodyKind, Geom, World
+from anysim.model.world import BodyKind, Geom, World
 from anysim_pybullet.kernels import compiled
 from anysim_pybullet.tree import Tree
 

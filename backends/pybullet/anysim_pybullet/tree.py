@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.kinematics import inertia
 from anysim.math import pose as P
-from anysim.world import inertia
-from anysim.world.model import BodyKind, Inertial, JointType, World
+from anysim.model.world import BodyKind, Inertial, JointType, World
 
 Inertia6 = tuple[float, float, float, float, float, float]
 

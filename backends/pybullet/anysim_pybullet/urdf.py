@@ -14,7 +14,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.errors import EngineError
 from anysim.math import pose as P
-from anysim.world.model import Box, Capsule, Cylinder, Geom, JointType, Mesh, MeshShape, Sphere, World
+from anysim.model.world import Box, Capsule, Cylinder, Geom, JointType, Mesh, MeshShape, Sphere, World
 from anysim_pybullet.tree import Frames, Tree, link_pose
 
 UNLIMITED = 1e10
@@ -73,9 +73,11 @@ def tree_urdf(
             lines += [f'<link name="{shape_link(index)}">', _inertial_of_nothing()]
             lines += [*_collision(geom, frames.anchor[body], meshes), "</link>"]
             lines += [
-                f'<joint name="f{index}" type="fixed">', f'<parent link="{body_link(body)}"/>',
-                f'<child link="{shape_link(index)}"/>', "</joint>",
-            ]  # fmt: skip
+                f'<joint name="f{index}" type="fixed">',
+                f'<parent link="{body_link(body)}"/>',
+                f'<child link="{shape_link(index)}"/>',
+                "</joint>",
+            ]
     for body in tree.bodies[1:].tolist():
         lines += _joint(world, frames, body)
     return "\n".join([*lines, "</robot>"]) + "\n"
@@ -94,9 +96,13 @@ def _inertial_of_nothing() -> str:
 def _inertial(world: World, frames: Frames, body: int) -> list[str]:
     x, y, z = (float(m) for m in frames.moments[body])
     return [
-        "<inertial>", _origin(frames.inertial[body]), f'<mass value="{world.bodies[body].inertial.mass!r}"/>',
-        f'<inertia ixx="{x!r}" ixy="0" ixz="0"', f' iyy="{y!r}" iyz="0" izz="{z!r}"/>', "</inertial>",
-    ]  # fmt: skip
+        "<inertial>",
+        _origin(frames.inertial[body]),
+        f'<mass value="{world.bodies[body].inertial.mass!r}"/>',
+        f'<inertia ixx="{x!r}" ixy="0" ixz="0"',
+        f' iyy="{y!r}" iyz="0" izz="{z!r}"/>',
+        "</inertial>",
+    ]
 
 
 def _collision(geom: Geom, anchor: Array, meshes: dict[str, Path]) -> list[str]:
@@ -133,11 +139,15 @@ def _joint(world: World, frames: Frames, body: int) -> list[str]:
     x, y, z = joint.axis
     return [
         f'<joint name="{joint_name(index)}" type="{kind}">',
-        f'<parent link="{body_link(world.bodies[body].parent)}"/>', f'<child link="{body_link(body)}"/>',
-        _origin(link_pose(world, frames, body)), f'<axis xyz="{x!r} {y!r} {z!r}"/>',
-        f'<limit lower="{lower!r}" upper="{upper!r}"', f' effort="{UNLIMITED!r}" velocity="{UNLIMITED!r}"/>',
-        '<dynamics damping="0" friction="0"/>', "</joint>",
-    ]  # fmt: skip
+        f'<parent link="{body_link(world.bodies[body].parent)}"/>',
+        f'<child link="{body_link(body)}"/>',
+        _origin(link_pose(world, frames, body)),
+        f'<axis xyz="{x!r} {y!r} {z!r}"/>',
+        f'<limit lower="{lower!r}" upper="{upper!r}"',
+        f' effort="{UNLIMITED!r}" velocity="{UNLIMITED!r}"/>',
+        '<dynamics damping="0" friction="0"/>',
+        "</joint>",
+    ]
 
 
 def _origin(pose: Array) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.world.model import Box, Capsule, Cylinder, MeshShape, Sphere, World
+from anysim.model.world import Box, Capsule, Cylinder, MeshShape, Sphere, World
 from anysim_sapien.hulls import volume
 from anysim_sapien.scene import EnvScene
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from anysim.conventions import WORLD, Array
 from anysim.engine.state import ContactPoints
-from anysim.world.model import World
+from anysim.model.world import World
 from anysim_sapien.momentum import Balance, Momentum
 from anysim_sapien.scene import EnvScene
 
@@ -124,10 +124,17 @@ def contact_points(world: World, scenes: list[EnvScene], momentum: Momentum, ids
         for pair in pairs_of(world, scenes[env], momentum, env):
             counts = (pair.separation <= 0) | (pair.pressure != 0)
             size = int(counts.sum())
-            parts.append((
-                np.full(size, env), np.full(size, pair.first), np.full(size, pair.second), pair.position[counts],
-                -pair.normals[counts], -pair.shared()[counts], -pair.separation[counts],
-            ))  # fmt: skip
+            parts.append(
+                (
+                    np.full(size, env),
+                    np.full(size, pair.first),
+                    np.full(size, pair.second),
+                    pair.position[counts],
+                    -pair.normals[counts],
+                    -pair.shared()[counts],
+                    -pair.separation[counts],
+                )
+            )
     if not parts:
         whole, empty = np.zeros(0, dtype=int), np.zeros((0, 3))
         return ContactPoints(whole, whole, whole, empty, empty, empty, np.zeros(0))

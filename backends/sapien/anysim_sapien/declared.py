@@ -5,10 +5,9 @@ import sys
 from functools import cache
 from importlib import metadata
 
-from anysim.engine.allowance import Allowance
-from anysim.engine.capability import Capabilities, Capability
+from anysim.engine.availability import judge
+from anysim.engine.capability import Allowance, Capabilities, Capability
 from anysim.engine.state import Availability
-from anysim.engine.versions import judge
 
 MINIMUM = (3, 0, 3)
 REMEDY = "pip install 'sapien>=3.0.3'"

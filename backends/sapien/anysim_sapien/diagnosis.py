@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from anysim.engine.diagnosis import Finding, Health
+from anysim.engine.doctor import Finding, Health
 from anysim_sapien import vulkan
 
 
@@ -35,10 +35,11 @@ def driver() -> Finding:
             vulkan.REMEDY,
         )
     return Finding(
-        what, Health.OK, f"in software, {found}, found by itself",
-        f"to name it: -o engine.options.vulkan_icd={found}, "
-        f"for other programs: export VK_ICD_FILENAMES={found}",
-    )  # fmt: skip
+        what,
+        Health.OK,
+        f"in software, {found}, found by itself",
+        f"to name it: -o engine.options.vulkan_icd={found}, for other programs: export VK_ICD_FILENAMES={found}",
+    )
 
 
 def _folder(path: str) -> str:

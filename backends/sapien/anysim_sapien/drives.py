@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.actuation import speed_bound
-from anysim.engine.commands import MODES, Control
+from anysim.engine.control import MODES, Control
+from anysim.engine.drive_checks import speed_bound
 from anysim.errors import EngineError
-from anysim.world.model import Actuation, ControlMode, World
+from anysim.model.world import Actuation, ControlMode, World
 from anysim_sapien.journal import Journal, Op
 from anysim_sapien.scene import UNBOUNDED, EnvScene, velocities_of
 

@@ -6,17 +6,16 @@ from typing import Any, ClassVar
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.allowance import Allowance
 from anysim.engine.base import SimEngine
 from anysim.engine.cameras import CameraView
-from anysim.engine.capability import Capabilities
-from anysim.engine.commands import Control
-from anysim.engine.diagnosis import Finding
-from anysim.engine.looks import Looks
+from anysim.engine.capability import Allowance, Capabilities
+from anysim.engine.control import Control
+from anysim.engine.doctor import Finding
+from anysim.engine.lighting import Looks
 from anysim.engine.presence import Lifecycle
 from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
 from anysim.errors import EngineError
-from anysim.world.model import World
+from anysim.model.world import World
 from anysim_sapien import declared
 from anysim_sapien.audit import geom_volumes, joint_limits
 from anysim_sapien.carry import Carried, shared
@@ -37,8 +36,17 @@ from anysim_sapien.stepping import advance, pasts_of, refuse_pasts, relive, wren
 SKINS = ("color", "texture", "material")
 
 _BUILT = (
-    "_recipes", "_layout", "_drives", "_looks", "_parameters", "_momentum", "_reader", "_fields", "_wrench", "_scenes",
-)  # fmt: skip
+    "_recipes",
+    "_layout",
+    "_drives",
+    "_looks",
+    "_parameters",
+    "_momentum",
+    "_reader",
+    "_fields",
+    "_wrench",
+    "_scenes",
+)
 """What `_build` makes and `_free` lets go of."""
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from anysim.conventions import WORLD, Array
 from anysim.errors import EngineError
-from anysim.world.model import World
+from anysim.model.world import World
 
 BITS, NUMBERS = 32, 1 << 16
 

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.world import inertia
-from anysim.world.model import Mesh, MeshShape
+from anysim.kinematics import inertia
+from anysim.model.world import Mesh, MeshShape
 from anysim_sapien.declared import AUDIT_ALLOWANCES
 from anysim_sapien.library import physx
 

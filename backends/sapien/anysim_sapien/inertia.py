@@ -6,9 +6,9 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import EngineError
+from anysim.kinematics.inertia import tensor
 from anysim.math import pose as P
-from anysim.world.inertia import tensor
-from anysim.world.model import Inertial
+from anysim.model.world import Inertial
 
 
 class Principal(NamedTuple):

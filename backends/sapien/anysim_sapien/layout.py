@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anysim.conventions import WORLD, Array
-from anysim.world.model import BodyKind, World
+from anysim.model.world import BodyKind, World
 
 
 @dataclass(frozen=True)

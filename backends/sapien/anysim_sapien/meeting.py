@@ -8,7 +8,7 @@ import numpy as np
 
 from anysim.conventions import WORLD, Array
 from anysim.errors import EngineError
-from anysim.world.model import World
+from anysim.model.world import World
 from anysim_sapien.exclusions import Apart, apart_of
 from anysim_sapien.layout import Layout
 from anysim_sapien.surfaces import Copy, copies_of
@@ -56,9 +56,7 @@ class Meeting:
         if restitution is not None:
             pairs = zip(surfaces, restitution[self.solid].tolist(), strict=True)
             surfaces = [replace(surface, restitution=value) for surface, value in pairs]
-        made = copies_of(
-            surfaces, friction[self.solid], self._fixed, self._meet, self._labels, self.apart.between
-        )  # fmt: skip
+        made = copies_of(surfaces, friction[self.solid], self._fixed, self._meet, self._labels, self.apart.between)
         return dict(zip(self.solid.tolist(), made, strict=True))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from anysim.conventions import Array, xyzw_from_wxyz
 from anysim.math import pose as P
-from anysim.world.model import BodyKind, JointType, World
+from anysim.model.world import BodyKind, JointType, World
 from anysim_sapien.recipe import Recipes
 from anysim_sapien.scene import EnvScene
 
@@ -83,10 +83,17 @@ class Momentum:
         """Right after the last substep, with `pushes` (K, 7): bodies and the wrenches that were on them."""
         self._balance[env] = None
         self._noted[env] = _Noted(
-            self._velocity, self._velocities(scene), self._poses,
-            tuple(np.array(tree.handle.link_incoming_joint_forces) for tree in scene.trees), scene.link_order(),
-            scene.mass.copy(), scene.rubbing.copy(), scene.slowing[:, 0].copy(), scene.gravity, pushes,
-        )  # fmt: skip
+            self._velocity,
+            self._velocities(scene),
+            self._poses,
+            tuple(np.array(tree.handle.link_incoming_joint_forces) for tree in scene.trees),
+            scene.link_order(),
+            scene.mass.copy(),
+            scene.rubbing.copy(),
+            scene.slowing[:, 0].copy(),
+            scene.gravity,
+            pushes,
+        )
 
     def balance(self, env: int) -> Balance:
         """Net contact forces of the env's last substep; all in doubt where there was none."""

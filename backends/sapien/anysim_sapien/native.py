@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.world.model import Actuation, World
+from anysim.model.world import Actuation, World
 from anysim_sapien.drives import Drives
 from anysim_sapien.scene import UNBOUNDED, EnvScene, positions_of, velocities_of
 

@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from anysim.world.model import Scenery
+from anysim.model.world import Scenery
 
 OWN_SCENERY = Scenery((0.867, 0.902, 0.941), (0.35, 0.35, 0.35), False)
 """What is drawn where the World says nothing."""
@@ -16,9 +16,11 @@ class SapienOptions(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     position_iterations: int = Field(
-        default=30, ge=1, le=255,
+        default=30,
+        ge=1,
+        le=255,
         description="iterations of the constraint solver; with 15 a blocked drive is up to 6 % weaker than it says",
-    )  # fmt: skip
+    )
     velocity_iterations: int = Field(default=1, ge=0, le=255, description="further iterations on velocities alone")
     contact_offset: float = Field(
         default=0.005, gt=0, description="distance at which contacts are prepared [m]; forces act from touch on"

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array, xyzw_from_wxyz
-from anysim.engine.drag import gain
-from anysim.engine.looks import LIGHTS, SURROUNDINGS, Looks
+from anysim.engine.damping import gain
+from anysim.engine.lighting import LIGHTS, SURROUNDINGS, Looks
 from anysim.engine.parameters import nominal
-from anysim.world.model import World
+from anysim.model.world import World
 from anysim_sapien.drives import Drives
 from anysim_sapien.inertia import full, principal
 from anysim_sapien.layout import Layout
@@ -17,9 +17,7 @@ from anysim_sapien.recipe import Values
 from anysim_sapien.scene import EnvScene
 from anysim_sapien.surfaces import Copy
 
-_DRIVES = {
-    "joint.damping": "passive", "actuator.kp": "kp", "actuator.kd": "kd", "actuator.effort_limit": "limit",
-}  # fmt: skip
+_DRIVES = {"joint.damping": "passive", "actuator.kp": "kp", "actuator.kd": "kd", "actuator.effort_limit": "limit"}
 _BODIES = ("body.mass", "body.com", "body.inertia")
 _DAMPING = ("body.linear_damping", "body.angular_damping")
 _SURFACES = ("geom.friction", "geom.restitution")
@@ -41,9 +39,15 @@ class Parameters:
     NAMES = LOOKS | {*_DRIVES, *_BODIES, *_DAMPING, *_REBUILD, *_SKINS, "joint.friction", "joint.armature"}
 
     def __init__(
-        self, world: World, layout: Layout, drives: Drives, scenes: list[EnvScene], rebuild: Callable[[int], None],
-        num_envs: int, looks: Looks,
-    ) -> None:  # fmt: skip
+        self,
+        world: World,
+        layout: Layout,
+        drives: Drives,
+        scenes: list[EnvScene],
+        rebuild: Callable[[int], None],
+        num_envs: int,
+        looks: Looks,
+    ) -> None:
         self._world, self._layout, self._drives, self._scenes, self._rebuild = world, layout, drives, scenes, rebuild
         self._looks = looks
         self._defaults = {name: nominal(name, world) for name in sorted(self.NAMES - LOOKS)}
@@ -57,10 +61,16 @@ class Parameters:
         """What the scene of an env is built with."""
         w = self._wanted
         return Values(
-            w["body.mass"][env], w["body.com"][env], w["body.inertia"][env],
-            np.stack([w[name][env] for name in _DAMPING], axis=-1), w["geom.friction"][env], w["geom.restitution"][env],
-            w["joint.friction"][env], w["joint.armature"][env], w["world.gravity"][env, 0],
-        )  # fmt: skip
+            w["body.mass"][env],
+            w["body.com"][env],
+            w["body.inertia"][env],
+            np.stack([w[name][env] for name in _DAMPING], axis=-1),
+            w["geom.friction"][env],
+            w["geom.restitution"][env],
+            w["joint.friction"][env],
+            w["joint.armature"][env],
+            w["world.gravity"][env, 0],
+        )
 
     def default(self, name: str) -> Array:
         """Values (K, ...) as built."""

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.commands import Control
-from anysim.world.model import Actuation, World
+from anysim.engine.control import Control
+from anysim.model.world import Actuation, World
 from anysim_sapien.drives import Drives
 from anysim_sapien.motion import Motion, put_motion
 from anysim_sapien.native import NativeDrives
@@ -17,9 +17,14 @@ from anysim_sapien.scene import EnvScene
 
 
 def raw_loop(
-    world: World, options: SapienOptions, present: Array, values: list[Values], motions: list[Motion], drives: Drives,
+    world: World,
+    options: SapienOptions,
+    present: Array,
+    values: list[Values],
+    motions: list[Motion],
+    drives: Drives,
     control: Control,
-) -> Callable[[int], None]:  # fmt: skip
+) -> Callable[[int], None]:
     """A function of the number of physics steps: set targets, step private scenes, copy the state out into arrays.
 
     As one would write it for SAPIEN alone: PhysX' own drives, whose gains were set before; all targets are set in each

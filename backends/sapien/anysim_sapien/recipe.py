@@ -9,8 +9,8 @@ from anysim.conventions import WORLD, Array
 from anysim.engine.presence import bodies_there
 from anysim.errors import EngineError
 from anysim.math import pose as P
-from anysim.world.model import BodyKind, Joint, World
-from anysim.world.shapes import is_ground
+from anysim.model.shapes import is_ground
+from anysim.model.world import BodyKind, Joint, World
 from anysim_sapien.inertia import Principal, principal
 from anysim_sapien.layout import Layout
 from anysim_sapien.meeting import Meeting

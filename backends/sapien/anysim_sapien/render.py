@@ -10,22 +10,11 @@ import numpy as np
 
 from anysim.conventions import WORLD, Array
 from anysim.engine.cameras import CameraView
-from anysim.engine.looks import Look, Looks
+from anysim.engine.lighting import Look, Looks
+from anysim.geometry.tessellate import triangles
 from anysim.math import pose as P
-from anysim.world.looks import lying, wrapped
-from anysim.world.model import (
-    Box,
-    Capsule,
-    Cylinder,
-    Geom,
-    HeightFieldShape,
-    MeshShape,
-    Plane,
-    Shape,
-    Sphere,
-    World,
-)  # fmt: skip
-from anysim.world.tessellate import triangles
+from anysim.model.appearance import lying, wrapped
+from anysim.model.world import Box, Capsule, Cylinder, Geom, HeightFieldShape, MeshShape, Plane, Shape, Sphere, World
 from anysim_sapien.layout import Layout
 from anysim_sapien.library import sapien
 from anysim_sapien.options import SapienOptions
@@ -108,9 +97,14 @@ class Painter:
         self._names[int(entity.per_scene_id)] = entity_id
 
     def draw(
-        self, view: CameraView, ids: Array, poses: Array, skins: tuple[Array, ...], there: Array,
+        self,
+        view: CameraView,
+        ids: Array,
+        poses: Array,
+        skins: tuple[Array, ...],
+        there: Array,
         channels: tuple[str, ...],
-    ) -> dict[str, Array]:  # fmt: skip
+    ) -> dict[str, Array]:
         """See `SimEngine.render`. Poses (E, B, 7) and presence (E, B) of bodies; colour, texture, material of geoms."""
         size = (len(poses), view.height, view.width)
         images: dict[str, Array] = {}
@@ -153,8 +147,8 @@ class Painter:
             if body != WORLD:
                 entity.set_pose(to_pose(poses[body]))
             opacity = self._skins.give(
-                self._materials[index], colors[index], int(textures[index]), int(materials[index]),
-            )  # fmt: skip
+                self._materials[index], colors[index], int(textures[index]), int(materials[index])
+            )
             self._shapes[index].visibility = opacity if body == WORLD or there[body] else 0.0
 
     def _read(self, camera: Any, images: dict[str, Array], row: int, look: Look) -> None:
@@ -230,6 +224,9 @@ def _triangles(
             middle[..., 2] = np.clip(corners[..., 2], -round_shape.half_length, round_shape.half_length)
         normals = ((corners - middle) / round_shape.radius).reshape(-1, 3)
     return sapien.render.RenderShapeTriangleMesh(
-        corners.reshape(-1, 3).astype(np.float32), np.arange(len(normals), dtype=np.uint32).reshape(-1, 3),
-        normals.astype(np.float32), places.reshape(-1, 2).astype(np.float32), material,
-    )  # fmt: skip
+        corners.reshape(-1, 3).astype(np.float32),
+        np.arange(len(normals), dtype=np.uint32).reshape(-1, 3),
+        normals.astype(np.float32),
+        places.reshape(-1, 2).astype(np.float32),
+        material,
+    )

@@ -12,8 +12,8 @@ from weakref import WeakSet
 import numpy as np
 
 from anysim.conventions import WORLD, Array, wxyz_from_xyzw
-from anysim.engine.drag import gain
-from anysim.world.model import Body, BodyKind, JointType, Solver
+from anysim.engine.damping import gain
+from anysim.model.world import Body, BodyKind, JointType, Solver
 from anysim_sapien.absent import NOBODY, NOWHERE
 from anysim_sapien.exclusions import Group
 from anysim_sapien.journal import Journal, Op
@@ -103,11 +103,7 @@ class EnvScene:
         for index in recipe.geoms_on.get(body, ()):
             for copy in self.copies[index]:
                 shape = make_shape(
-                    recipe.world,
-                    recipe.world.geoms[index],
-                    copy,
-                    recipe.groups.get(body, Group()),
-                    recipe.options,
+                    recipe.world, recipe.world.geoms[index], copy, recipe.groups.get(body, Group()), recipe.options
                 )
                 component.attach(shape)
                 self.shapes[index].append(shape)
@@ -203,8 +199,11 @@ class EnvScene:
                     [self.bodies[body] for body in tendon.links],
                     tendon.coefficients,
                     [0.0 if c == 0.0 else 1.0 / c for c in tendon.coefficients],
-                    rest_length=tendon.rest, offset=0.0, stiffness=COUPLING, damping=0.0,
-                )  # fmt: skip
+                    rest_length=tendon.rest,
+                    offset=0.0,
+                    stiffness=COUPLING,
+                    damping=0.0,
+                )
 
     def _joints(self) -> list[Any]:
         joints: list[Any] = [None] * len(self._recipe.world.joints)
@@ -300,9 +299,12 @@ class EnvScene:
         """Write all joint positions and velocities (J,)."""
         nothing = np.zeros(len(self._recipe.world.joints))
         self.journal.note(
-            Op.JOINTS, position is not None, velocity is not None, nothing if position is None else position,
+            Op.JOINTS,
+            position is not None,
+            velocity is not None,
+            nothing if position is None else position,
             nothing if velocity is None else velocity,
-        )  # fmt: skip
+        )
         for tree in self.trees:
             if position is not None:
                 tree.handle.set_qpos(position[tree.joints].astype(np.float32))
@@ -379,10 +381,15 @@ def _system(recipe: Recipe, gravity: Array) -> Any:
     options = recipe.options
     with _configuring:
         physx.set_scene_config(
-            gravity=np.asarray(gravity, dtype=np.float32), bounce_threshold=options.bounce_threshold, enable_pcm=True,
-            enable_tgs=False, enable_ccd=False, enable_enhanced_determinism=True,
-            enable_friction_every_iteration=True, cpu_workers=0,
-        )  # fmt: skip
+            gravity=np.asarray(gravity, dtype=np.float32),
+            bounce_threshold=options.bounce_threshold,
+            enable_pcm=True,
+            enable_tgs=False,
+            enable_ccd=False,
+            enable_enhanced_determinism=True,
+            enable_friction_every_iteration=True,
+            cpu_workers=0,
+        )
         system = physx.PhysxCpuSystem()
     system.set_timestep(recipe.world.physics.dt)
     return system

@@ -8,7 +8,7 @@ import numpy as np
 from anysim.conventions import Array, wxyz_from_xyzw
 from anysim.errors import EngineError
 from anysim.math import pose as P
-from anysim.world.model import (
+from anysim.model.world import (
     Box,
     Capsule,
     Cylinder,
@@ -19,7 +19,7 @@ from anysim.world.model import (
     Plane,
     Sphere,
     World,
-)  # fmt: skip
+)
 from anysim_sapien.exclusions import Group
 from anysim_sapien.hulls import UNIT_SCALE, convex
 from anysim_sapien.library import physx, sapien

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.world.looks import NONE, Material
-from anysim.world.model import World
+from anysim.model.appearance import NONE, Material
+from anysim.model.world import World
 from anysim_sapien.library import sapien
 
 _KEPT = 256

@@ -6,7 +6,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.state import FIELDS
-from anysim.world.model import BodyKind, World
+from anysim.model.world import BodyKind, World
 from anysim_sapien.contacts import sensor_forces
 from anysim_sapien.drives import Drives
 from anysim_sapien.momentum import Momentum

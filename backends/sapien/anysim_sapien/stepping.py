@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.commands import Control
+from anysim.engine.control import Control
 from anysim.errors import SnapshotError
 from anysim_sapien.drives import Drives
 from anysim_sapien.journal import FORMAT, Op, entries

@@ -16,7 +16,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import EngineError
-from anysim.world.model import Surface
+from anysim.model.world import Surface
 
 BITS = 32
 """Collision groups of PhysX shapes, as SAPIEN lays them out."""
@@ -68,9 +68,13 @@ def pair(a: _Class, b: _Class) -> Touch:
 
 
 def copies_of(
-    surfaces: Sequence[Surface], frictions: Array, fixed: Array, may_meet: Array, labels: Sequence[int] = (),
+    surfaces: Sequence[Surface],
+    frictions: Array,
+    fixed: Array,
+    may_meet: Array,
+    labels: Sequence[int] = (),
     between: Collection[tuple[int, int]] = (),
-) -> list[list[Copy]]:  # fmt: skip
+) -> list[list[Copy]]:
     """The shapes of each of G geoms.
 
     Args:

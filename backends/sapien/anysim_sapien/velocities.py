@@ -4,7 +4,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.math import pose as P
-from anysim.world.model import BodyKind, JointType, World
+from anysim.model.world import BodyKind, JointType, World
 
 
 class LinkVelocities:

@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from anysim.c_output import quiet
 from anysim.errors import EngineError
-from anysim.quiet import quiet
 from anysim_sapien.library import sapien
 
 REMEDY = (

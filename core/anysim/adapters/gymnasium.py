@@ -92,9 +92,12 @@ class GymEnv(gym.Env[dict[str, Array], Any]):
         """One control step."""
         result = self.env.step(_batch(action, self._form))
         return (
-            {g: rows[0] for g, rows in result.obs.items()}, float(result.reward[0]),
-            bool(result.terminated[0]), bool(result.truncated[0]), _single_info(result.info, result.status, 0),
-        )  # fmt: skip
+            {g: rows[0] for g, rows in result.obs.items()},
+            float(result.reward[0]),
+            bool(result.terminated[0]),
+            bool(result.truncated[0]),
+            _single_info(result.info, result.status, 0),
+        )
 
     def render(self) -> Array | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """An image (H, W, 3) uint8 if the render mode is `rgb_array`."""
@@ -217,9 +220,13 @@ class GymVectorEnv(VectorEnv[dict[str, Array], Any, Any]):
 
 
 def make_gym(
-    source: Any, *, autoreset_mode: AutoresetMode | str | None = None, render_mode: str | None = None,
-    action: ActionForm = "flat", **options: Any,
-) -> Any:  # fmt: skip
+    source: Any,
+    *,
+    autoreset_mode: AutoresetMode | str | None = None,
+    render_mode: str | None = None,
+    action: ActionForm = "flat",
+    **options: Any,
+) -> Any:
     """`make_gym("pick_cube")` is a single env; with `num_envs` in `options` and an autoreset mode, a vector env.
 
     `action="named"` makes the action space a Dict with a Box for each `robot.channel`.

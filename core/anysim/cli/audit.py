@@ -54,7 +54,7 @@ def audit(
     """
     from anysim.api import compile_world, load
     from anysim.cli.output import print_json
-    from anysim.compare.variants import unseen
+    from anysim.compile.edit import unseen
     from anysim.engine.audit import audit as run_audit
     from anysim.engine.factory import create_simulation
 
@@ -89,10 +89,14 @@ def _engines(text: str | None, default: str) -> list[str]:
 
 def _document(one: _Audited, every: bool) -> dict[str, Any]:
     return {
-        "engine": one.engine, "version": one.version, "compared": one.compared, "different": len(one.wrong),
-        "declared": sum(bool(line.note) for line in one.lines), "not_reported": one.unreported,
+        "engine": one.engine,
+        "version": one.version,
+        "compared": one.compared,
+        "different": len(one.wrong),
+        "declared": sum(bool(line.note) for line in one.lines),
+        "not_reported": one.unreported,
         "rows": [line._asdict() for line in (one.lines if every else one.wrong)],
-    }  # fmt: skip
+    }
 
 
 def _tell(one: _Audited, every: bool) -> None:

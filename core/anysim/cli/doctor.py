@@ -19,7 +19,7 @@ def doctor(json: AsJson = False) -> None:
     from anysim import registry
     from anysim.cli.machine import machine
     from anysim.cli.output import print_json, print_table, working_on
-    from anysim.engine.diagnosis import Finding, Health, examine
+    from anysim.engine.doctor import Finding, Health, examine
 
     rows = machine()
     works = False

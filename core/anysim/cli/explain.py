@@ -21,7 +21,7 @@ def explain(
     The same on every engine, and whatever the number of envs. `anysim run TASK --seed S` has this episode in env I.
     """
     from anysim.cli.output import print_json, print_table
-    from anysim.explain import explain as explain_one
+    from anysim.record.explain import explain as explain_one
 
     found = explain_one(
         Path(task) if Path(task).exists() else task, seed=seed, env=env, episode=episode, overrides=override or []
@@ -30,9 +30,10 @@ def explain(
         print_json({"episode_seed": found.episode_seed, "draws": [draw._asdict() for draw in found.draws]})
         return
     print_table(
-        f"Env {env}, episode {episode} of seed {seed}", ("drawn", "value", "stream", "where"),
+        f"Env {env}, episode {episode} of seed {seed}",
+        ("drawn", "value", "stream", "where"),
         [(draw.path or draw.name, _text(draw.value), draw.stream, draw.where) for draw in found.draws],
-    )  # fmt: skip
+    )
     if not found.draws:
         typer.echo("nothing in this file is random")
     typer.echo(f"episode seed {found.episode_seed}")

@@ -38,9 +38,9 @@ def list_(
 def _robots(json: bool) -> None:
     """The catalogue: what each robot is, how many joints are commanded, and whether its files are here."""
     from anysim import registry
+    from anysim.assets.catalogue import load_robot, missing_source
     from anysim.cli.output import print_json, print_table
     from anysim.errors import AnysimError
-    from anysim.world.catalogue import load_robot, missing_source
 
     rows: list[dict[str, object]] = []
     for name in registry.names("robots"):
@@ -114,7 +114,7 @@ def _what(kind: str, name: str) -> str:
             task = load(task_path(name)).spec.task
             return task.description if task else ""
         if kind == "terms":
-            from anysim.task.library import term_names
+            from anysim.task.term_registry import term_names
 
             return ", ".join(term_names(name))
         doc = registry.load(kind, name).__doc__ or ""

@@ -5,9 +5,9 @@ import platform
 from pathlib import Path
 
 from anysim import __version__
-from anysim.engine.diagnosis import Finding, Health
+from anysim.cache import cache_folder
+from anysim.engine.doctor import Finding, Health
 from anysim.engine.factory import ENGINE_VARIABLE
-from anysim.world.cache import cache_folder
 
 VARIABLES = (ENGINE_VARIABLE, "ANYSIM_CACHE_DIR", "MUJOCO_GL", "VK_DRIVER_FILES", "VK_ICD_FILENAMES", "OMP_NUM_THREADS")
 """Environment variables that change what anysim or an engine does."""

@@ -5,22 +5,7 @@ import sys
 import typer
 
 from anysim import __version__
-from anysim.cli import (
-    audit,
-    bench,
-    check,
-    compare,
-    doctor,
-    explain,
-    gallery,
-    listing,
-    picture,
-    replay,
-    robot,
-    run,
-    schema,
-    snapshot,
-)
+from anysim.cli import audit, check, doctor, explain, listing, replay, run, schema, snapshot
 
 EXIT_CODES = """Exit codes: 0 done; 1 it ran, and the answer is no (a replay that differs, a file with faults, too few
 successes); 2 bad input; 130 interrupted."""
@@ -41,12 +26,7 @@ app.command("list")(listing.list_)
 app.command("explain")(explain.explain)
 app.command("doctor")(doctor.doctor)
 app.command("audit")(audit.audit)
-app.command("compare")(compare.compare)
-app.command("picture")(picture.picture)
 app.command("schema")(schema.schema)
-app.command("gallery")(gallery.gallery)
-app.add_typer(robot.app, name="robot")
-app.add_typer(bench.app, name="bench")
 app.add_typer(snapshot.app, name="snapshot")
 
 
@@ -69,7 +49,7 @@ def main() -> None:
     """Run the command line; errors of anysim become sentences on stderr and exit code 2."""
     from anysim_schemas.errors import AnysimError
 
-    if any(not argument.startswith("-") for argument in sys.argv[1:2]):
+    if sys.argv[1:2] != ["--version"]:
         from anysim import hooks
 
         hooks.manager().hook.add_cli(app=app)

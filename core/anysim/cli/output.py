@@ -81,8 +81,12 @@ def counting(what: str, total: int, quiet: bool = False) -> Iterator[Told]:
     )
 
     with Progress(
-        TextColumn(what), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[standing]}"),
-        TimeElapsedColumn(), TimeRemainingColumn(),
-    ) as progress:  # fmt: skip
+        TextColumn(what),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[standing]}"),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    ) as progress:
         bar = progress.add_task(what, total=total, standing="")
         yield lambda line, standing="": progress.update(bar, advance=1, standing=standing)

@@ -8,7 +8,7 @@ import typer
 from anysim.cli.options import AsJson, Engine
 
 if TYPE_CHECKING:
-    from anysim.record.compare import FieldSummary
+    from anysim.record.drift import FieldSummary
     from anysim.record.replay import ReplayResult
 
 
@@ -43,11 +43,15 @@ def replay(
             show(f"{path.name}: {result.drift}{notes}")
     same = sum(result.identical for result in results.values())
     if json:
-        print_json({
-            "replayed": len(results), "identical": same, "same_outcome": sum(map(_same_outcome, results.values())),
-            "drift": [row._asdict() for row in _summary(results)],
-            "trajectories": [_row(path, result) for path, result in results.items()],
-        })  # fmt: skip
+        print_json(
+            {
+                "replayed": len(results),
+                "identical": same,
+                "same_outcome": sum(map(_same_outcome, results.values())),
+                "drift": [row._asdict() for row in _summary(results)],
+                "trajectories": [_row(path, result) for path, result in results.items()],
+            }
+        )
     else:
         _report(results, same)
     if engine is None and same < len(results):
@@ -56,7 +60,7 @@ def replay(
 
 def _found(directories: list[Path]) -> list[Path]:
     from anysim.errors import RecordError
-    from anysim.record.layout import MANIFEST_FILE, trajectories
+    from anysim.record.names import MANIFEST_FILE, trajectories
 
     found: list[Path] = []
     for directory in directories:
@@ -72,19 +76,24 @@ def _same_outcome(result: "ReplayResult") -> bool:
 
 
 def _summary(results: "dict[str, ReplayResult]") -> "list[FieldSummary]":
-    from anysim.record.compare import summarise
+    from anysim.record.drift import summarise
 
     return summarise({Path(path).name: result.drift for path, result in results.items()})
 
 
 def _row(path: str, result: "ReplayResult") -> dict[str, object]:
     return {
-        "trajectory": path, "engine": result.engine, "identical": result.identical,
-        "steps": result.drift.recorded_steps, "first_difference": result.drift.first_step,
+        "trajectory": path,
+        "engine": result.engine,
+        "identical": result.identical,
+        "steps": result.drift.recorded_steps,
+        "first_difference": result.drift.first_step,
         "largest_difference": {name: field.max_abs for name, field in result.drift.fields.items()},
-        "recorded": result.recorded_status, "replayed": result.status, "same_world": result.same_world,
+        "recorded": result.recorded_status,
+        "replayed": result.status,
+        "same_world": result.same_world,
         "same_start": result.same_start,
-    }  # fmt: skip
+    }
 
 
 def _report(results: "dict[str, ReplayResult]", same: int) -> None:
@@ -97,11 +106,17 @@ def _report(results: "dict[str, ReplayResult]", same: int) -> None:
             f"Largest differences, recorded on {first.manifest.engine}, replayed on {first.engine}",
             ("state", "identical", "from step", "median", "worst", "in"),
             [
-                (row.name, f"{row.identical} of {total}", row.first_step, f"{row.median:.3g}", f"{row.worst:.3g}",
-                 row.worst_replay)
+                (
+                    row.name,
+                    f"{row.identical} of {total}",
+                    row.first_step,
+                    f"{row.median:.3g}",
+                    f"{row.worst:.3g}",
+                    row.worst_replay,
+                )
                 for row in _summary(results)
             ],
-        )  # fmt: skip
+        )
         other = {path: result for path, result in results.items() if not _same_outcome(result)}
         if other:
             rows = [(Path(path).name, result.recorded_status, result.status) for path, result in other.items()]

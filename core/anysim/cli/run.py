@@ -106,12 +106,18 @@ def _report(results: "list[EpisodeResult]", directory: Path, as_json: bool) -> N
     if as_json:
         episodes = [
             {
-                "env": r.env, "episode": r.episode, "episode_seed": r.episode_seed, "status": r.status,
-                "steps": r.steps, "total_reward": r.total_reward, "outcome": r.outcome,
-                "path": str(r.path) if r.path else None, "resumed": r.resumed,
+                "env": r.env,
+                "episode": r.episode,
+                "episode_seed": r.episode_seed,
+                "status": r.status,
+                "steps": r.steps,
+                "total_reward": r.total_reward,
+                "outcome": r.outcome,
+                "path": str(r.path) if r.path else None,
+                "resumed": r.resumed,
             }
             for r in results
-        ]  # fmt: skip
+        ]
         print_json({"out": str(directory), "attempts": total, "successes": good, "episodes": episodes})
         return
     print_table(

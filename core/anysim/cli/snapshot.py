@@ -22,14 +22,20 @@ def show(
 ) -> None:
     """Check a file against its hashes, and print what it belongs to and what it holds."""
     from anysim.cli.output import print_json, print_table
-    from anysim.engine.container import made_with, read
+    from anysim.engine.snapshot_file import made_with, read
 
     content = read(file)
     if json:
-        print_json({
-            "kind": content.kind, "bytes": content.size, "sha256": content.sha256, "stamp": content.stamp,
-            "made_with": content.made_with, "arrays": content.arrays,
-        })  # fmt: skip
+        print_json(
+            {
+                "kind": content.kind,
+                "bytes": content.size,
+                "sha256": content.sha256,
+                "stamp": content.stamp,
+                "made_with": content.made_with,
+                "arrays": content.arrays,
+            }
+        )
         return
     here = made_with()
     rows = [("kind", content.kind), *((k.replace("_", " "), _text(v)) for k, v in content.stamp.items())]

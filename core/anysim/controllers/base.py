@@ -10,7 +10,7 @@ import numpy as np
 from anysim.controllers.robot import ControlledRobot
 from anysim.conventions import Array
 from anysim.errors import TaskError
-from anysim.world.model import Channel, ControlMode, World
+from anysim.model.world import Channel, ControlMode, World
 
 DEFAULT_CONTROLLER = "default"
 """In a world: the first of the controllers that the catalogue gives the channel."""
@@ -50,12 +50,20 @@ class ChannelView:
             None if v is None else np.array(v[: len(drives)], dtype=float) for v in (channel.opened, channel.closed)
         ]
         return cls(
-            channel.name, drives, columns,
-            np.array([j.lower for j in joints]), np.array([j.upper for j in joints]),
-            np.array([j.velocity_limit for j in joints]), np.array([a.effort_limit for a in actuators]),
-            np.array([a.kp for a in actuators]), np.array([a.kd for a in actuators]), ends[0], ends[1],
-            robot, np.array([a.joint for a in actuators], dtype=int) - (robot.joints[0] if len(robot.joints) else 0),
-        )  # fmt: skip
+            channel.name,
+            drives,
+            columns,
+            np.array([j.lower for j in joints]),
+            np.array([j.upper for j in joints]),
+            np.array([j.velocity_limit for j in joints]),
+            np.array([a.effort_limit for a in actuators]),
+            np.array([a.kp for a in actuators]),
+            np.array([a.kd for a in actuators]),
+            ends[0],
+            ends[1],
+            robot,
+            np.array([a.joint for a in actuators], dtype=int) - (robot.joints[0] if len(robot.joints) else 0),
+        )
 
     def __len__(self) -> int:
         """The number of drives K."""

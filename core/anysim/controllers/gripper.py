@@ -45,14 +45,18 @@ class GripperContinuous(Controller):
     labels = ("opening",)
 
     def __init__(
-        self, channel: ChannelView, num_envs: int, *,
-        range: Annotated[
-            tuple[float, float], Field(description="the action of the closed and of the open gripper")
-        ] = (0.0, 1.0),
+        self,
+        channel: ChannelView,
+        num_envs: int,
+        *,
+        range: Annotated[tuple[float, float], Field(description="the action of the closed and of the open gripper")] = (
+            0.0,
+            1.0,
+        ),
         speed: Annotated[
             float | None, Field(gt=0, description="[1/s] of the whole way; the drives' own where not given")
         ] = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         super().__init__(channel, num_envs)
         self._opened, self._closed = _ends(channel, "gripper_continuous")
         if not range[0] < range[1]:

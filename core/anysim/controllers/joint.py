@@ -32,9 +32,12 @@ class JointDeltaPosition(Controller):
     """
 
     def __init__(
-        self, channel: ChannelView, num_envs: int, *,
+        self,
+        channel: ChannelView,
+        num_envs: int,
+        *,
         scale: Annotated[float, Field(gt=0, description="largest change in one control step [rad, m]")] = 0.05,
-    ) -> None:  # fmt: skip
+    ) -> None:
         super().__init__(channel, num_envs)
         self.dim = len(channel.actuators)
         self.low, self.high = -np.ones(self.dim), np.ones(self.dim)

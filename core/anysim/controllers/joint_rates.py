@@ -8,7 +8,7 @@ from pydantic import Field
 from anysim.controllers.base import ChannelView, Command, Controller
 from anysim.conventions import Array
 from anysim.errors import TaskError
-from anysim.world.model import ControlMode
+from anysim.model.world import ControlMode
 
 
 class JointVelocity(Controller):
@@ -20,11 +20,14 @@ class JointVelocity(Controller):
     mode = ControlMode.VELOCITY
 
     def __init__(
-        self, channel: ChannelView, num_envs: int, *,
+        self,
+        channel: ChannelView,
+        num_envs: int,
+        *,
         limit: Annotated[
             float | None, Field(gt=0, description="largest velocity [rad/s, m/s]; the joints' own where not given")
         ] = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         super().__init__(channel, num_envs)
         self.dim = len(channel)
         self.high = _bounds(channel, channel.velocity_limit, limit, "velocity")
@@ -46,11 +49,14 @@ class JointEffort(Controller):
     mode = ControlMode.EFFORT
 
     def __init__(
-        self, channel: ChannelView, num_envs: int, *,
+        self,
+        channel: ChannelView,
+        num_envs: int,
+        *,
         limit: Annotated[
             float | None, Field(gt=0, description="largest effort [N m, N]; the drives' own where not given")
         ] = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         super().__init__(channel, num_envs)
         self.dim = len(channel)
         self.high = _bounds(channel, channel.effort_limit, limit, "effort")

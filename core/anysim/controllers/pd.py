@@ -14,7 +14,7 @@ from pydantic import Field
 from anysim.controllers.base import ChannelView, Command, Controller
 from anysim.conventions import Array
 from anysim.errors import TaskError, listing, suggest
-from anysim.world.model import ControlMode
+from anysim.model.world import ControlMode
 
 ControlType = Literal["P", "V", "T"]
 _MODES = {"P": ControlMode.POSITION, "V": ControlMode.VELOCITY, "T": ControlMode.EFFORT}
@@ -27,7 +27,10 @@ class Pd(Controller):
     """
 
     def __init__(
-        self, channel: ChannelView, num_envs: int, *,
+        self,
+        channel: ChannelView,
+        num_envs: int,
+        *,
         control_type: Annotated[
             ControlType | dict[str, ControlType],
             Field(description="P, V or T; or one by joint name, `*` matches any part, a later one wins"),
@@ -41,7 +44,7 @@ class Pd(Controller):
             dict[str, float],
             Field(description="position targets of an action of 0 by joint name, where they differ from home"),
         ] = {},  # noqa: B006  (never written to)
-    ) -> None:  # fmt: skip
+    ) -> None:
         super().__init__(channel, num_envs)
         robot = channel.robot
         self.joints = tuple(robot.world.actuators[a].name.removeprefix(f"{robot.name}.") for a in channel.actuators)

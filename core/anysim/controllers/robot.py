@@ -4,14 +4,14 @@ from functools import cached_property
 
 import numpy as np
 
+from anysim.assets.vehicles import PLANAR_JOINTS
 from anysim.conventions import Array
-from anysim.engine.index import Index
 from anysim.engine.state import State
 from anysim.errors import NameLookupError, TaskError, listing, suggest
-from anysim.kinematics.model import RobotModel
+from anysim.kinematics.pinocchio_model import RobotModel
 from anysim.math import pose as P
-from anysim.world.model import BodyKind, Robot, World
-from anysim.world.vehicles import PLANAR_JOINTS
+from anysim.model.index import Index
+from anysim.model.world import BodyKind, Robot, World
 from anysim_schemas.robot_model import RobotModelSpec
 
 

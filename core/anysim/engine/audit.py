@@ -11,11 +11,11 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
+from anysim.kinematics import inertia
 from anysim.math import pose as P
-from anysim.world import inertia
-from anysim.world.audit import AuditRow, world_rows
-from anysim.world.kinematics import forward_kinematics
-from anysim.world.model import BodyKind, Inertial, JointType, World
+from anysim.model.forward_kinematics import forward_kinematics
+from anysim.model.shapes import is_ground
+from anysim.model.world import Body, BodyKind, Entity, Inertial, JointType, World
 
 CONFIGURATIONS = 20
 INERTIALS = ("body.mass", "body.com", "body.inertia")
@@ -25,6 +25,14 @@ FRAME_TOLERANCE = 1e-5
 """[m] and [rad], largest difference of a body frame over all configurations; of an axis, in its components."""
 PROBE = 0.1
 """[rad or m] by which a joint is moved to see what moves with it."""
+
+
+class AuditRow(NamedTuple):
+    """One number (or a few) about one thing; the key of a comparison is (subject, quantity)."""
+
+    subject: str
+    quantity: str
+    value: tuple[float, ...]
 
 
 class AuditLine(NamedTuple):
@@ -66,6 +74,39 @@ def audit(engine: SimEngine) -> list[AuditLine]:
     return list(lines.values())
 
 
+def world_rows(world: World) -> list[AuditRow]:
+    """Masses, principal moments, joint limits and constants, volumes of collision geoms, entity totals."""
+    rows: list[AuditRow] = []
+    for entity in world.entities:
+        mass = sum(b.inertial.mass for b in moving_bodies(world, entity))
+        rows.append(AuditRow(entity.name, "total mass", (mass,)))
+    for body in world.bodies:
+        if body.kind is BodyKind.STATIC:
+            continue
+        moments = np.sort(np.linalg.eigvalsh(inertia.tensor(body.inertial)))
+        rows.append(AuditRow(body.name, "mass", (body.inertial.mass,)))
+        rows.append(AuditRow(body.name, "centre of mass", body.inertial.com))
+        rows.append(AuditRow(body.name, "principal moments", tuple(float(m) for m in moments)))
+    for joint in world.joints:
+        rows.append(AuditRow(joint.name, "limits", (joint.lower, joint.upper)))
+        rows.append(AuditRow(joint.name, "damping", (joint.damping,)))
+        rows.append(AuditRow(joint.name, "friction", (joint.friction,)))
+        rows.append(AuditRow(joint.name, "armature", (joint.armature,)))
+    for actuator in world.actuators:
+        rows.append(AuditRow(actuator.name, "effort limit", (actuator.effort_limit,)))
+    meshes = {mesh.name: mesh for mesh in world.meshes}
+    for geom in world.geoms:
+        if geom.collides and not is_ground(geom.shape):
+            rows.append(AuditRow(geom.name, "volume", (inertia.volume(geom.shape, meshes),)))
+            rows.append(AuditRow(geom.name, "friction", (geom.surface.friction,)))
+    return rows
+
+
+def moving_bodies(world: World, entity: Entity) -> list[Body]:
+    """The bodies of an entity whose masses count: engines drop the mass of what cannot move."""
+    return [b for b in world.bodies[entity.body_start : entity.body_stop] if b.kind is not BodyKind.STATIC]
+
+
 def _present(world: World, number: int) -> Array:
     """(E,) bool: what is always there, and of each slot the entity of this number or its last one."""
     present = world.initial_presence.copy()
@@ -97,7 +138,7 @@ def _line(engine: SimEngine, row: AuditRow, value: tuple[float, ...]) -> AuditLi
 
 
 def engine_rows(engine: SimEngine) -> list[AuditRow]:
-    """What the engine says, in the rows of `anysim.world.audit`; quantities it does not report are left out."""
+    """What the engine says, in the rows of `world_rows`; quantities it does not report are left out."""
     world = engine.world
     rows: list[AuditRow] = []
 

@@ -13,28 +13,21 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine import carrying, checks, saving, writing
-from anysim.engine.actuation import check_drives
-from anysim.engine.allowance import Allowance
+from anysim.engine import arguments, world_state_io, write
 from anysim.engine.cameras import CameraRig
-from anysim.engine.capability import Capabilities, Capability, Need, check
-from anysim.engine.commands import CommandBuffer, Control
-from anysim.engine.diagnosis import Finding
-from anysim.engine.index import Index
-from anysim.engine.needs import needs_of
+from anysim.engine.capability import Allowance, Capabilities, Capability, Need, check
+from anysim.engine.control import CommandBuffer, Control
+from anysim.engine.doctor import Finding
+from anysim.engine.drive_checks import check_drives
 from anysim.engine.presence import Lifecycle, Presence
 from anysim.engine.primitives import Primitives
-from anysim.engine.state import (
-    Availability,
-    ContactPoints,
-    RayHits,
-    Snapshot,
-    SnapshotLevel,
-    State,
-)  # fmt: skip
+from anysim.engine.requirements import needs_of
+from anysim.engine.snapshot import put_back, refuse_foreign, take as take_snapshot
+from anysim.engine.state import Availability, ContactPoints, RayHits, Snapshot, SnapshotLevel, State
 from anysim.engine.world_state import Carried, Missing, WorldState
 from anysim.errors import CapabilityError, EngineError, listing
-from anysim.world.model import ControlMode, World
+from anysim.model.index import Index
+from anysim.model.world import ControlMode, World
 
 EnvIds = Sequence[int] | Array | None
 """Which envs: None for all, else unique indices."""
@@ -59,7 +52,7 @@ class SimEngine(Primitives):
 
     def __init__(self, **options: Any) -> None:
         """Options are those of `options_model`; a wrong one raises EngineError with what exists."""
-        self.options = checks.validated_options(self.name, self.options_model(), options)
+        self.options = arguments.validated_options(self.name, self.options_model(), options)
         self._lock = threading.RLock()
         self._world: World | None = None
         self._destroyed = False
@@ -274,7 +267,7 @@ class SimEngine(Primitives):
         """Write joint positions and velocities (E, K); mimic joints follow their leaders. Commands stay."""
         with self._lock:
             self._require_world()
-            writing.write_joints(self, position, velocity, self._ids(env_ids), joints)
+            write.write_joints(self, position, velocity, self._ids(env_ids), joints)
 
     def set_body_state(
         self, pose: Any = None, twist: Any = None, env_ids: EnvIds = None, bodies: Indices = None
@@ -285,12 +278,16 @@ class SimEngine(Primitives):
         """
         with self._lock:
             self._require_world()
-            writing.write_bodies(self, pose, twist, self._ids(env_ids), bodies)
+            write.write_bodies(self, pose, twist, self._ids(env_ids), bodies)
 
     def set_control(
-        self, position: Any = None, velocity: Any = None, effort: Any = None, env_ids: EnvIds = None,
+        self,
+        position: Any = None,
+        velocity: Any = None,
+        effort: Any = None,
+        env_ids: EnvIds = None,
         actuators: Indices = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Write drive targets (E, K): position [rad, m], velocity [rad/s, m/s], feed-forward effort [N m, N]."""
         with self._lock:
             self._require_world()
@@ -300,7 +297,7 @@ class SimEngine(Primitives):
 
     @property
     def control(self) -> Control:
-        """Copies of the commands in force: targets (N, A) and modes, indices into `anysim.engine.commands.MODES`."""
+        """Copies of the commands in force: targets (N, A) and modes, indices into `anysim.engine.control.MODES`."""
         with self._lock:
             self._require_world()
             return Control(*(array.copy() for array in self._commands.control))
@@ -321,7 +318,7 @@ class SimEngine(Primitives):
         with self._lock:
             self._require_world()
             self._require(Capability.WRENCHES)
-            writing.push(self, wrench, bodies, self._ids(env_ids))
+            write.push(self, wrench, bodies, self._ids(env_ids))
 
     # ------------------------------------------------------------------ parameters
 
@@ -329,7 +326,7 @@ class SimEngine(Primitives):
         """Values (E, K, ...) of a neutral parameter such as `body.mass`, as the engine has them."""
         with self._lock:
             self._require_world()
-            return writing.read_parameter(self, name, env_ids, indices)
+            return write.read_parameter(self, name, env_ids, indices)
 
     def set_parameters(self, name: str, values: Any, env_ids: EnvIds = None, indices: Indices = None) -> None:
         """Change a neutral parameter per env, values (E, K, ...); what the engine took is read back and compared.
@@ -340,13 +337,13 @@ class SimEngine(Primitives):
         """
         with self._lock:
             self._require_world()
-            writing.write_parameter(self, name, values, env_ids, indices)
+            write.write_parameter(self, name, values, env_ids, indices)
 
     def built_parameters(self, name: str) -> Array:
         """Values (K, ...) of a parameter that the World gives, whatever they are now."""
         with self._lock:
             self._require_world()
-            return writing.built_parameter(self, name)
+            return write.built_parameter(self, name)
 
     # ------------------------------------------------------------------ snapshots
 
@@ -356,7 +353,7 @@ class SimEngine(Primitives):
             self._require_world()
             level = SnapshotLevel(level)
             self._require(Capability(f"snapshot: {level}"))
-            return saving.take(self, self._ids(env_ids), level)
+            return take_snapshot(self, self._ids(env_ids), level)
 
     def restore(self, snapshot: Snapshot, env_ids: EnvIds = None) -> None:
         """Put snapshot rows into envs (as many as it holds, in order).
@@ -367,15 +364,15 @@ class SimEngine(Primitives):
         with self._lock:
             self._require_world()
             ids = self._ids(env_ids)
-            checks.same_stamp(snapshot, self.name, self.version, self.world.hash, len(ids))
-            saving.refuse_foreign(self, snapshot)
-            saving.put_back(self, ids, snapshot)
+            arguments.same_stamp(snapshot, self.name, self.version, self.world.hash, len(ids))
+            refuse_foreign(self, snapshot)
+            put_back(self, ids, snapshot)
 
     def world_state(self, env_ids: EnvIds = None) -> WorldState:
         """Where everything is, by name, in a form for any engine; close and not exact, unlike a snapshot."""
         with self._lock:
             self._require_world()
-            return carrying.read(self, self._ids(env_ids))
+            return world_state_io.read(self, self._ids(env_ids))
 
     def set_world_state(self, state: WorldState, env_ids: EnvIds = None, missing: Missing = "refuse") -> Carried:
         """Put envs into a state, from whatever engine and world, as if they had just been reset into it.
@@ -387,14 +384,18 @@ class SimEngine(Primitives):
         """
         with self._lock:
             self._require_world()
-            return carrying.write(self, state, self._ids(env_ids), missing)
+            return world_state_io.write(self, state, self._ids(env_ids), missing)
 
     # ------------------------------------------------------------------ sensing
 
     def render(
-        self, camera_name: str = "default", width: int | None = None, height: int | None = None,
-        env_ids: EnvIds = None, channels: Sequence[str] = ("rgb",),
-    ) -> dict[str, Array]:  # fmt: skip
+        self,
+        camera_name: str = "default",
+        width: int | None = None,
+        height: int | None = None,
+        env_ids: EnvIds = None,
+        channels: Sequence[str] = ("rgb",),
+    ) -> dict[str, Array]:
         """Images of one camera, by channel.
 
         `rgb` (E, H, W, 3) uint8; `depth` (E, H, W) float32 [m] along the optical axis, inf beyond the far plane;
@@ -423,7 +424,7 @@ class SimEngine(Primitives):
         with self._lock:
             self._require_world()
             ids = self._ids(env_ids)
-            self._rig.poses[ids, self.index.camera(camera_name)] = checks.poses("pose", pose, (len(ids), 7))
+            self._rig.poses[ids, self.index.camera(camera_name)] = arguments.poses("pose", pose, (len(ids), 7))
 
     def camera_mounts(self, camera_name: str, env_ids: EnvIds = None) -> Array:
         """Poses (E, 7) of a camera's optical frame in the frame of its body, or of the world where it has none."""
@@ -442,7 +443,7 @@ class SimEngine(Primitives):
         with self._lock:
             self._require_world()
             ids = self._ids(env_ids)
-            rows = checks.rows("fov", fov, (len(ids),))
+            rows = arguments.rows("fov", fov, (len(ids),))
             if rows.size and not (rows.min() > 1 and rows.max() < 170):
                 raise EngineError(
                     f"a field of view lies between 1 and 170 degrees, got {rows.min():g} to {rows.max():g}"
@@ -455,8 +456,8 @@ class SimEngine(Primitives):
             self._require_world()
             self._require(Capability.RAYCAST)
             ids = self._ids(env_ids)
-            start = checks.rows("origins", origins, (len(ids), None, 3))
-            along = checks.rows("directions", directions, start.shape)
+            start = arguments.rows("origins", origins, (len(ids), None, 3))
+            along = arguments.rows("directions", directions, start.shape)
             length = np.linalg.norm(along, axis=-1, keepdims=True)
             if start.size and length.min() < 1e-12:
                 raise EngineError("a ray needs a direction that is not zero")
@@ -473,21 +474,21 @@ class SimEngine(Primitives):
 
     def add_robot(self, name: str, robot: str, **placement: Any) -> None:
         """Add a robot of the catalogue to every env: `add_robot("left", "franka_panda", position=(0, 0.4, 0))`."""
-        from anysim.world.edit import with_robot
+        from anysim.compile.edit import with_robot
 
         with self._lock:
             self._rebuild(with_robot(self.world, name, robot, placement))
 
     def add_object(self, name: str, source: Any, **spec: Any) -> None:
         """Add an object to every env: `add_object("ball", {"sphere": 0.03}, mass=0.1, position=(0.5, 0, 0.5))`."""
-        from anysim.world.edit import with_object
+        from anysim.compile.edit import with_object
 
         with self._lock:
             self._rebuild(with_object(self.world, name, {"source": source, **spec}))
 
     def remove_robot(self, name: str) -> None:
         """Remove a robot; the rest goes on as it was."""
-        from anysim.world.edit import without_entity
+        from anysim.compile.edit import without_entity
 
         with self._lock:
             self.index.robot(name)
@@ -495,7 +496,7 @@ class SimEngine(Primitives):
 
     def remove_object(self, name: str) -> None:
         """Remove an object; the rest goes on as it was."""
-        from anysim.world.edit import without_entity
+        from anysim.compile.edit import without_entity
 
         with self._lock:
             if name not in [e.name for e in self.index.objects]:
@@ -506,7 +507,7 @@ class SimEngine(Primitives):
 
     def add_camera(self, name: str, **spec: Any) -> None:
         """Add a camera, with the fields of a world's `cameras` entry."""
-        from anysim.world.edit import with_camera
+        from anysim.compile.edit import with_camera
 
         with self._lock:
             world = with_camera(self.world, name, spec)
@@ -516,7 +517,7 @@ class SimEngine(Primitives):
 
     def _rebuild(self, world: World) -> None:
         """Replace the world, carrying by name all that both worlds have. On failure the old world is untouched."""
-        from anysim.engine.carry import carry_over
+        from anysim.engine.rebuild import carry_over
 
         needs = self._check(world)
         carry_over(self, world)
@@ -538,7 +539,7 @@ class SimEngine(Primitives):
 
         `joint_pos`, `joint_vel` (N, J), `<tool>_pose` (N, 7), and `images/<camera>` of all cameras unless skipped.
         """
-        from anysim.engine.surface import observation
+        from anysim.engine.named_access import observation
 
         with self._lock:
             return observation(self, robot_name, skip_images)
@@ -547,7 +548,7 @@ class SimEngine(Primitives):
         self, action: Mapping[str, float] | Any, robot_name: str | None = None, n_substeps: int = 1
     ) -> None:
         """Set position targets (by joint name, or (N, A) for all of the robot's drives) and step."""
-        from anysim.engine.surface import send
+        from anysim.engine.named_access import send
 
         with self._lock:
             send(self, action, robot_name)
@@ -567,7 +568,7 @@ class SimEngine(Primitives):
             )
 
     def _ids(self, env_ids: EnvIds) -> Array:
-        return self._all if env_ids is None else checks.indices(env_ids, self.num_envs, "env")
+        return self._all if env_ids is None else arguments.indices(env_ids, self.num_envs, "env")
 
     def _which(self, indices: Indices, size: int, kind: str) -> Array:
-        return np.arange(size) if indices is None else checks.indices(indices, size, kind)
+        return np.arange(size) if indices is None else arguments.indices(indices, size, kind)

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.index import Index
 from anysim.engine.state import State
 from anysim.errors import EngineError
 from anysim.math import pose as P
-from anysim.world.model import Camera, World
+from anysim.model.index import Index
+from anysim.model.world import Camera, World
 
 
 @dataclass(frozen=True)

@@ -89,9 +89,12 @@ class Need:
 
 
 def check(
-    engine: str, capabilities: Capabilities, needs: Sequence[Need], source: str = "this world",
+    engine: str,
+    capabilities: Capabilities,
+    needs: Sequence[Need],
+    source: str = "this world",
     refusals: Sequence[str] = (),
-) -> list[Need]:  # fmt: skip
+) -> list[Need]:
     """Raise one CapabilityError that lists every absent need; return the needs met only approximately.
 
     `refusals` are the engine's own reasons against this world in particular, see `SimEngine.refusals`.
@@ -137,3 +140,13 @@ def matrix(engines: Mapping[str, Capabilities], lifecycles: Mapping[str, str] | 
         if capability is Capability.VARYING_ENTITIES and lifecycles is not None:
             rows.append(("lifecycle of entities", *(lifecycles[name] for name in engines)))
     return Matrix(tuple(engines), tuple(rows), tuple(notes))
+
+
+class Allowance(NamedTuple):
+    """What an engine declares of a number that it cannot take over exactly.
+
+    By how much a quantity of the audit may differ from the World's, relative to it, and why.
+    """
+
+    relative: float
+    reason: str

@@ -74,8 +74,8 @@ def create_simulation(
         raise EngineError(f"engine '{chosen}' cannot run here: {'; '.join(here.missing)}. {here.remedy}")
     simulation = engine_class(chosen)
     if shards != 1:
-        from anysim.engine.sharded import TIMEOUT_S, sharded
-        from anysim.engine.shards.blocks import shard_count
+        from anysim.engine.sharded.blocks import shard_count
+        from anysim.engine.sharded.engine import TIMEOUT_S, sharded
 
         count = shard_count(shards, simulation)
         if count != 1:

@@ -7,7 +7,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import EngineError, listing
-from anysim.world.model import BodyKind, World
+from anysim.model.world import BodyKind, World
 
 
 class Parameter(NamedTuple):
@@ -45,7 +45,7 @@ _ALL = (
     Parameter("actuator.kd", "actuators", (), "N m s/rad or N s/m", 0.0),
     Parameter("actuator.effort_limit", "actuators", (), "N m or N", 0.0),
     Parameter("world.gravity", "world", (3,), "m/s^2"),
-    # lights and surroundings: see anysim.engine.looks
+    # lights and surroundings: see anysim.engine.lighting
     Parameter("light.direction", "lights", (3,), "where it shines to, world axes"),
     Parameter("light.position", "lights", (3,), "m, of point lights"),
     Parameter("light.color", "lights", (3,), "red green blue", 0.0),

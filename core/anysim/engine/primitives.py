@@ -11,10 +11,10 @@ from typing import Any, ClassVar
 from anysim.conventions import Array
 from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Capability
-from anysim.engine.commands import Control
+from anysim.engine.control import Control
 from anysim.engine.state import ContactPoints, RayHits, SnapshotLevel
 from anysim.errors import CapabilityError
-from anysim.world.model import World
+from anysim.model.world import World
 
 
 class Primitives(ABC):

@@ -38,13 +38,13 @@ class Snapshot:
 
     def rows(self, rows: Sequence[int] | Array) -> "Snapshot":
         """Some of its envs, in this order; one may come several times."""
-        from anysim.engine.saving import chosen_rows
+        from anysim.engine.snapshot import chosen_rows
 
         return chosen_rows(self, rows)
 
     def save(self, path: str | Path) -> Path:
         """Write a file that `load` reads in any process; an existing one is replaced."""
-        from anysim.engine.saving import save
+        from anysim.engine.snapshot import save
 
         return save(self, path)
 
@@ -55,7 +55,7 @@ class Snapshot:
         Raises:
             SnapshotError: the file is damaged, of a newer format, or was made with other versions.
         """
-        from anysim.engine.saving import load
+        from anysim.engine.snapshot import load
 
         return load(path)
 

@@ -13,9 +13,9 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine import container
+from anysim.engine import snapshot_file
 from anysim.engine.exact_json import decode
-from anysim.engine.saving import row_numbers
+from anysim.engine.snapshot import row_numbers
 from anysim.errors import SnapshotError
 
 JSON_FORMAT = "anysim-world-state-1"
@@ -92,7 +92,7 @@ class WorldState:
     def save(self, path: str | Path) -> Path:
         """Write a file that `load` reads, on any machine with any engines."""
         stamp = {"envs": self.num_envs, "bodies": len(self.bodies), "joints": len(self.joints)}
-        return container.write(path, container.WORLD, stamp, self._tree())
+        return snapshot_file.write(path, snapshot_file.WORLD, stamp, self._tree())
 
     @classmethod
     def load(cls, path: str | Path) -> "WorldState":
@@ -101,8 +101,8 @@ class WorldState:
         Raises:
             SnapshotError: the file is damaged, of a newer format, or holds something else.
         """
-        content = container.read(path)
-        container.same_kind(content, container.WORLD, path)
+        content = snapshot_file.read(path)
+        snapshot_file.same_kind(content, snapshot_file.WORLD, path)
         return cls._of(content.data)
 
     def to_json(self) -> str:
@@ -148,9 +148,13 @@ class WorldState:
         given: dict[str, Any] = {f.name: tree[f.name] for f in fields(cls)} | {"parameters": parameters}
         given |= {name: tuple(value) for name, value in given.items() if isinstance(value, list)}
         state = cls(**given)
-        shapes = {"present": (len(state.entities),), "body_pose": (len(state.bodies), 7),
-                  "body_twist": (len(state.bodies), 6), "joint_pos": (len(state.joints),),
-                  "joint_vel": (len(state.joints),)}  # fmt: skip
+        shapes = {
+            "present": (len(state.entities),),
+            "body_pose": (len(state.bodies), 7),
+            "body_twist": (len(state.bodies), 6),
+            "joint_pos": (len(state.joints),),
+            "joint_vel": (len(state.joints),),
+        }
         for name, shape in shapes.items():
             array: Array = getattr(state, name)
             if array.shape != (state.num_envs, *shape) and array.size:

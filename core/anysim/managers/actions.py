@@ -13,11 +13,11 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.errors import SpecError, SpecIssue, TaskError, listing, suggest
 from anysim.managers.action_space import ActionSpaces, ChannelSpace, component_labels
-from anysim.managers.noise import DelayLine, longest_delay, noise_rows, note_noise
-from anysim.managers.streams import Streams
-from anysim.managers.values import draw_rows
-from anysim.signatures import options_model
-from anysim.world.model import ControlMode, World
+from anysim.model.world import ControlMode, World
+from anysim.plugin_parameters import options_model
+from anysim.randomization.draw import draw_rows
+from anysim.randomization.noise import DelayLine, longest_delay, noise_rows, note_noise
+from anysim.randomization.streams import Streams
 from anysim_schemas.robots import ActionSpec, RobotSpec
 
 
@@ -169,8 +169,10 @@ class Actions:
         """Note what a controller wants of its drives."""
         channel = self.slices[number].controller.channel
         for buffer, values in (
-            (self._position, command.position), (self._velocity, command.velocity), (self._effort, command.effort),
-        ):  # fmt: skip
+            (self._position, command.position),
+            (self._velocity, command.velocity),
+            (self._effort, command.effort),
+        ):
             if values is not None:
                 _put(buffer, values, env_ids, channel.columns, channel.actuators)
         if command.robot_effort is not None:

@@ -16,16 +16,26 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.errors import TaskError
 from anysim.managers.board import Board
-from anysim.managers.streams import Streams
-from anysim.world.model import World
+from anysim.model.world import World
+from anysim.randomization.streams import Streams
 from anysim_schemas.run import RunSpec
 
 if TYPE_CHECKING:
     from anysim.managers.overrides import Overridable
 
 RESET_ORDER = (
-    "terrain", "population", "layout", "scene", "joints", "physics", "robot", "light", "camera", "capture", "task",
-)  # fmt: skip
+    "terrain",
+    "population",
+    "layout",
+    "scene",
+    "joints",
+    "physics",
+    "robot",
+    "light",
+    "camera",
+    "capture",
+    "task",
+)
 """The ground first, then who is there, where it is, what it is like, how its joints stand and what pulls at it, then
 who moves, what shines and who looks, and the task last, on the settled scene."""
 

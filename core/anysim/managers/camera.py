@@ -11,10 +11,10 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.managers.base import Manager
 from anysim.managers.overrides import WORLD, Overridable, random_fields
-from anysim.managers.values import draw_rows, is_random
 from anysim.math import pose as P
-from anysim.world.lookup import find_frame
-from anysim.world.slots import ABSENT, active_entity, single
+from anysim.model.frames import find_frame
+from anysim.model.slots import ABSENT, active_entity, single
+from anysim.randomization.draw import draw_rows, is_random
 from anysim_schemas.cameras import CameraSpec
 
 _POSE = ("from_", "look_at_offset", "position", "roll_pitch_yaw")

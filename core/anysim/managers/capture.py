@@ -11,8 +11,8 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.errors import SpecError, SpecIssue, listing, suggest
 from anysim.managers.base import Manager
-from anysim.managers.values import draw_rows
-from anysim.world.model import World
+from anysim.model.world import World
+from anysim.randomization.draw import draw_rows
 from anysim_schemas.cameras import CameraSpec
 
 
@@ -71,9 +71,12 @@ class CaptureManager(Manager):
         for name, spec in self._specs.items():
             for field, kept in (("exposure", self._exposure), ("noise", self._noise)):
                 kept[name][env_ids] = draw_rows(
-                    getattr(spec, field), f"capture/{name}/{field}", self.streams, env_ids,
+                    getattr(spec, field),
+                    f"capture/{name}/{field}",
+                    self.streams,
+                    env_ids,
                     source=f"world.cameras.{name}.{field}",
-                )  # fmt: skip
+                )
 
     def after_step(self, env_ids: Array | None) -> None:
         if env_ids is None:

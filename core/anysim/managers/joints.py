@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from anysim.compile.joints import Asked, asked_of, opened_to
 from anysim.conventions import Array
 from anysim.managers.base import Manager
-from anysim.managers.values import draw_rows, is_random
-from anysim.world.compile_joints import Asked, asked_of, opened_to
-from anysim.world.model import World
+from anysim.model.world import World
+from anysim.randomization.draw import draw_rows, is_random
 
 _PARAMETERS = {"friction": "joint.friction", "damping": "joint.damping"}
 
@@ -62,9 +62,12 @@ class JointManager(Manager):
             if not len(ids):
                 continue
             drawn = draw_rows(
-                item.asked.value, f"joints/{item.thing}/{item.local}/{item.field}", self.streams, ids,
+                item.asked.value,
+                f"joints/{item.thing}/{item.local}/{item.field}",
+                self.streams,
+                ids,
                 source=f"world.objects.{item.object}.joints.{item.asked.key}.{item.field}",
-            )  # fmt: skip
+            )
             if item.field in _PARAMETERS:
                 self.engine.set_parameters(_PARAMETERS[item.field], drawn[:, None], ids, [item.joint])
                 continue

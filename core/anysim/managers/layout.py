@@ -8,20 +8,20 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.errors import TaskError
-from anysim.layout.conditions import Settled
-from anysim.layout.contact import Contact
-from anysim.layout.solve import NoPlace, Refused, Search, Task, is_constant
+from anysim.geometry.convex_parts import Solid, row_of
 from anysim.managers.base import Manager
-from anysim.managers.layout_desk import Desk
-from anysim.managers.layout_dice import Dice, Middle
+from anysim.managers.layout_proposals import Desk
+from anysim.managers.layout_sampler import Dice, Middle
 from anysim.managers.overrides import WORLD, Overridable, drawn
 from anysim.math import pose as P
-from anysim.world.items import Item, entry_of
-from anysim.world.model import BodyKind, World
-from anysim.world.placement import initially_placed, nominal_place, placement_order, roots_at
-from anysim.world.placing import Candidate
-from anysim.world.scenery import Scenery
-from anysim.world.solid import Solid, row_of
+from anysim.model.world import BodyKind, World
+from anysim.placement.candidate import Candidate
+from anysim.placement.clearance import Contact
+from anysim.placement.constraints import Settled
+from anysim.placement.nominal import initially_placed, nominal_place, placement_order, roots_at
+from anysim.placement.order import Item, entry_of
+from anysim.placement.scenery import Scenery
+from anysim.placement.search import NoPlace, Refused, Search, Task, is_constant
 from anysim_schemas.layout import PlaceFields, RepairSpec
 
 IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -53,10 +53,16 @@ class LayoutManager(Manager):
         self._others = [item for item in self._scenery.items if item.name not in order]
         self._entries = {name: entry_of(content.layout, items[name]) or "" for name in order}
         self._still = {
-            entity: Settled(initially_placed(self._scenery, entity), self._solid(entity).fixed, True,
-                            self._solid(entity).collides, False)
-            for item in self._others for entity in item.entities
-        }  # fmt: skip
+            entity: Settled(
+                initially_placed(self._scenery, entity),
+                self._solid(entity).fixed,
+                True,
+                self._solid(entity).collides,
+                False,
+            )
+            for item in self._others
+            for entity in item.entities
+        }
         self._columns()
 
     def _solid(self, entity: int) -> Solid:

@@ -9,8 +9,8 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.managers.base import Manager
 from anysim.managers.overrides import WORLD, Overridable, random_fields
-from anysim.managers.values import draw, is_random
-from anysim.world.colors import rgb
+from anysim.model.colors import rgb
+from anysim.randomization.draw import draw, is_random
 
 FIELDS = ("direction", "position", "color", "intensity")
 SCENERY = ("background", "ambient", "shadows")

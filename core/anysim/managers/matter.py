@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from anysim.compile.appearance import by_name, material_name, texture_name, tint
+from anysim.compile.variants import INSTANCER
 from anysim.conventions import Array
-from anysim.world.colors import rgb
-from anysim.world.compile_looks import by_name, material_name, texture_name, tint
-from anysim.world.forms import INSTANCER
-from anysim.world.model import BodyKind, World
-from anysim.world.nominal import nominal
+from anysim.model.colors import rgb
+from anysim.model.world import BodyKind, World
+from anysim.randomization.distributions import nominal
 from anysim_schemas.objects import ObjectSpec
 
 Drawn = Mapping[str, Sequence[Any]]

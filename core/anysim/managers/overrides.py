@@ -1,9 +1,9 @@
 """Counterfactuals: the values of a spec that may be set for one episode, and how a manager writes them.
 
 A path is the dotted path of a value in the spec, as a user wrote it: `objects.cube.friction` (`world.` in front may be
-left out). What is drawn through `anysim.managers.values.draw` needs no code of its own: where a path is overridden, the
-draw gives that value instead, and no other draw moves. A manager lists such paths with `drawn`. What can change in the
-middle of an episode it lists with `written`, and writes it in `Manager.override` the way its draws are written.
+left out). What is drawn through `anysim.randomization.draw.draw` needs no code of its own: where a path is overridden,
+the draw gives that value instead, and no other draw moves. A manager lists such paths with `drawn`. What can change in
+the middle of an episode it lists with `written`, and writes it in `Manager.override` the way its draws are written.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -16,7 +16,7 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.parameters import PARAMETERS
 from anysim.errors import CapabilityError, TaskError, listing, suggest
-from anysim.managers.values import is_random
+from anysim.randomization.draw import is_random
 
 WORLD = "world."
 

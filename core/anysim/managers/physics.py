@@ -8,7 +8,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.managers.base import Manager
 from anysim.managers.overrides import Overridable, revert, written
-from anysim.managers.values import draw_rows, is_random
+from anysim.randomization.draw import draw_rows, is_random
 
 
 class PhysicsManager(Manager):

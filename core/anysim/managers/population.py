@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from anysim.compile.variants import INSTANCER, Options, counts, drawn_sources, sizes, source_text
 from anysim.conventions import Array
 from anysim.managers.base import Manager
-from anysim.managers.values import draw
-from anysim.world.forms import INSTANCER, Options, counts, drawn_sources, sizes, source_text
-from anysim.world.model import World
+from anysim.model.world import World
+from anysim.randomization.draw import draw
 from anysim_schemas.object_source import SourceChoice
 from anysim_schemas.objects import ObjectSpec
 

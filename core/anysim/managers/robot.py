@@ -12,10 +12,10 @@ from anysim.managers.actions import Actions, ActionSlice
 from anysim.managers.base import Manager
 from anysim.managers.overrides import WORLD, Overridable, drawn, random_fields
 from anysim.managers.robot_dynamics import RobotDynamics
-from anysim.managers.streams import Origin
-from anysim.managers.values import draw_rows, is_random
 from anysim.math import pose as P
-from anysim.world.model import BodyKind, World
+from anysim.model.world import BodyKind, World
+from anysim.randomization.draw import draw_rows, is_random
+from anysim.randomization.streams import Origin
 from anysim_schemas.robots import RobotSpec
 
 
@@ -39,9 +39,7 @@ class RobotManager(Manager):
         super().bind(engine)
         self._actions.bind(engine)
         self.slices, self.spaces = self._actions.slices, self._actions.spaces
-        self.action_dim, self.action_low, self.action_high = (
-            self._actions.dim, self._actions.low, self._actions.high,
-        )  # fmt: skip
+        self.action_dim, self.action_low, self.action_high = (self._actions.dim, self._actions.low, self._actions.high)
         self._initial = np.array([self._world.joints[a.joint].initial for a in self._world.actuators], dtype=float)
 
     def reset(self, env_ids: Array) -> None:
@@ -59,9 +57,12 @@ class RobotManager(Manager):
             for column, joint in enumerate(joints):
                 self._draw_start(robot.name, spec, int(joint), position[:, column], velocity[:, column], env_ids)
             deviation = draw_rows(
-                spec.home_noise, f"robot/{robot.name}/home_noise_std", self.streams, env_ids,
+                spec.home_noise,
+                f"robot/{robot.name}/home_noise_std",
+                self.streams,
+                env_ids,
                 source=f"world.robots.{robot.name}.home_noise",
-            )  # fmt: skip
+            )
             if deviation.any():
                 for column, joint in enumerate(joints):
                     self._add_noise(position, column, int(joint), robot.name, deviation, env_ids)
@@ -89,9 +90,7 @@ class RobotManager(Manager):
         if not (is_random(spec.position) or is_random(spec.yaw) or origin.any()):
             return  # the World has it there
         path = f"world.robots.{robot}"
-        place = draw_rows(
-            spec.position, f"robot/{robot}/position", self.streams, env_ids, source=f"{path}.position"
-        )  # fmt: skip
+        place = draw_rows(spec.position, f"robot/{robot}/position", self.streams, env_ids, source=f"{path}.position")
         yaw = draw_rows(spec.yaw, f"robot/{robot}/yaw", self.streams, env_ids, source=f"{path}.yaw")
         turn = P.from_roll_pitch_yaw(np.stack([np.zeros_like(yaw), np.zeros_like(yaw), yaw], axis=1))
         entry = self.engine.index.robot(robot).entry
@@ -114,9 +113,12 @@ class RobotManager(Manager):
             position[:] = np.clip(drawn, found.lower, found.upper)
         if name in spec.home_velocity:
             velocity[:] = draw_rows(
-                spec.home_velocity[name], f"robot/{robot}/home_velocity/{name}", self.streams, env_ids,
+                spec.home_velocity[name],
+                f"robot/{robot}/home_velocity/{name}",
+                self.streams,
+                env_ids,
                 source=f"{path}.home_velocity.{name}",
-            )  # fmt: skip
+            )
 
     def _add_noise(
         self, position: Array, column: int, joint: int, robot: str, deviation: Array, env_ids: Array
@@ -125,9 +127,11 @@ class RobotManager(Manager):
         found = self._world.joints[joint]
         arm = any(
             joint in channel.joints
-            for owner in self._world.robots if owner.name == robot
-            for name, channel in owner.channels.items() if channel.opened is None
-        )  # fmt: skip
+            for owner in self._world.robots
+            if owner.name == robot
+            for name, channel in owner.channels.items()
+            if channel.opened is None
+        )
         if not arm:
             return
         for row, env in enumerate(env_ids):

@@ -4,12 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from anysim.conventions import Array
-from anysim.engine.base import SimEngine
-from anysim.managers.streams import Streams
-from anysim.managers.values import draw_rows, is_random
-from anysim.world import inertia
-from anysim.world.compile_dynamics import (
+from anysim.compile.dynamics import (
     ADJUSTMENTS,
     Adjustment,
     adjusted_indices,
@@ -18,9 +13,14 @@ from anysim.world.compile_dynamics import (
     loaded,
     moving_links,
     touching_geoms,
-)  # fmt: skip
-from anysim.world.model import World
-from anysim.world.nominal import nominal
+)
+from anysim.conventions import Array
+from anysim.engine.base import SimEngine
+from anysim.kinematics import inertia
+from anysim.model.world import World
+from anysim.randomization.distributions import nominal
+from anysim.randomization.draw import draw_rows, is_random
+from anysim.randomization.streams import Streams
 from anysim_schemas.dynamics import RobotDynamicsSpec
 
 
@@ -88,9 +88,12 @@ class RobotDynamics:
         masses = np.zeros(len(env_ids))
         if spec is not None:
             masses = draw_rows(
-                spec.mass, f"robot/{self._name}/payload", self._streams, env_ids,
+                spec.mass,
+                f"robot/{self._name}/payload",
+                self._streams,
+                env_ids,
                 source=f"world.robots.{self._name}.dynamics.payload.mass",
-            )  # fmt: skip
+            )
         point = None if place is None else place.point
         plain = [self._world.bodies[b].inertial for b in bodies]
         carrier = bodies.index(place.body) if place is not None else -1

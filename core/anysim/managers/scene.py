@@ -9,8 +9,8 @@ from anysim.conventions import Array
 from anysim.managers.base import Manager
 from anysim.managers.matter import RULES, Part, Rule, field_of, owner_of
 from anysim.managers.overrides import WORLD, Overridable, revert
-from anysim.managers.values import draw, is_random
-from anysim.world.model import World
+from anysim.model.world import World
+from anysim.randomization.draw import draw, is_random
 from anysim_schemas.objects import ObjectSpec
 
 FIELDS = tuple(dict.fromkeys(field for rule in RULES for field in rule.fields))
@@ -79,13 +79,17 @@ class SceneManager(Manager):
         return {
             field: [
                 draw(
-                    value, f"scene/{thing.name}/{field}", self.streams, int(env),
+                    value,
+                    f"scene/{thing.name}/{field}",
+                    self.streams,
+                    int(env),
                     source=f"{WORLD}objects.{thing.category}.{field}",
                 )
                 for env in env_ids
             ]
-            for field, value in thing.values.items() if field in read
-        }  # fmt: skip
+            for field, value in thing.values.items()
+            if field in read
+        }
 
     # ------------------------------------------------------------------ counterfactuals
 

@@ -13,9 +13,9 @@ from anysim.managers.physics import PhysicsManager
 from anysim.managers.population import PopulationManager
 from anysim.managers.robot import RobotManager
 from anysim.managers.scene import SceneManager
-from anysim.managers.streams import Streams
 from anysim.managers.terrain import TerrainManager
-from anysim.world.model import World
+from anysim.model.world import World
+from anysim.randomization.streams import Streams
 from anysim_schemas.run import RunSpec
 
 

@@ -10,15 +10,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from anysim.compile.room import MAIN, ROOM, furniture_names
 from anysim.conventions import GROUND, WORLD, Array
 from anysim.engine.base import SimEngine
 from anysim.errors import TaskError
 from anysim.managers.base import Manager
-from anysim.managers.streams import Origin
-from anysim.managers.values import draw, is_random
-from anysim.world.colors import rgb
-from anysim.world.compile_room import MAIN, ROOM, furniture_names
-from anysim.world.model import World
+from anysim.model.colors import rgb
+from anysim.model.world import World
+from anysim.randomization.draw import draw, is_random
+from anysim.randomization.streams import Origin
 from anysim_schemas.run import WorldSpec
 from anysim_schemas.values import Choice
 
@@ -50,9 +50,10 @@ def _looks(spec: WorldSpec, world: World) -> list[Look]:
         parts.append((spec.room.wall_color, "terrain/room/wall_color", "world.room.wall_color", walls))
         for name in furniture_names(spec.room):
             main = [
-                i for i, g in enumerate(world.geoms)
+                i
+                for i, g in enumerate(world.geoms)
                 if owner.get(g.body) == name and g.name.partition(".")[2].startswith(MAIN)
-            ]  # fmt: skip
+            ]
             stream = f"terrain/{name}/color"
             parts.append((spec.room.furniture_color, stream, "world.room.furniture_color", main))
     return [Look(c, s, p, np.array(g)) for c, s, p, g in parts if is_random(c) and g]
@@ -154,9 +155,11 @@ class TerrainManager(Manager):
 
     def snapshot(self, env_ids: Array) -> dict[str, Array]:
         return {
-            "level": self.level[env_ids], "column": self.column[env_ids], "change": self._change[env_ids],
+            "level": self.level[env_ids],
+            "column": self.column[env_ids],
+            "change": self._change[env_ids],
             "origin": self.board.origin[env_ids],
-        }  # fmt: skip
+        }
 
     def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
         self.level[env_ids], self.column[env_ids] = data["level"], data["column"]

@@ -12,10 +12,11 @@ _NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 _TURNS = tuple(
     (np.array(order), np.array(signs))
     for order, signs in (
-        ((3, 2, 1, 0), (1.0, -1.0, 1.0, -1.0)), ((2, 3, 0, 1), (1.0, 1.0, -1.0, -1.0)),
+        ((3, 2, 1, 0), (1.0, -1.0, 1.0, -1.0)),
+        ((2, 3, 0, 1), (1.0, 1.0, -1.0, -1.0)),
         ((1, 0, 3, 2), (-1.0, 1.0, 1.0, -1.0)),
     )
-)  # fmt: skip
+)
 """Of the second factor's components, what each component of the first but w is multiplied with."""
 
 

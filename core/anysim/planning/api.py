@@ -12,7 +12,7 @@ import numpy as np
 from anysim import registry
 from anysim.conventions import Array
 from anysim.errors import AnysimError
-from anysim.planning.chain import Chain
+from anysim.kinematics.chain import Chain
 
 ALL_AXES = (1.0, 1.0, 1.0)
 

@@ -73,10 +73,16 @@ def run_header(env: TaskEnv, seed: int) -> RunHeader:
     example = {group: np.zeros(size, np.float32) for group, size in env.observation_sizes.items()}
     world = env.engine.world
     return RunHeader(
-        task=env.name, seed=seed, engine=env.engine.name, engine_version=env.engine.version, world_hash=world.hash,
-        control_dt=world.physics.control_dt, layout=state_layout(world, STATE_FIELDS, action, example),
-        spec=env.spec.to_dict(), packages=package_versions(),
-    )  # fmt: skip
+        task=env.name,
+        seed=seed,
+        engine=env.engine.name,
+        engine_version=env.engine.version,
+        world_hash=world.hash,
+        control_dt=world.physics.control_dt,
+        layout=state_layout(world, STATE_FIELDS, action, example),
+        spec=env.spec.to_dict(),
+        packages=package_versions(),
+    )
 
 
 class Collector:
@@ -144,14 +150,18 @@ class Collector:
             pose, fov = env.engine.camera_mounts(name, [i])[0], float(env.engine.camera_fov(name, [i])[0])
             cameras[name] = camera_info(env.engine.world, camera, self._capture.every, pose, fov)
         return EpisodeHeader(
-            env=i, episode=int(self._episode[i]), episode_seed=int(env.streams.episode_seed[i]),
-            drawn=env.streams.draws[i], overridden=env.streams.overridden[i],
-            instruction=env.spec.task.description, cameras=cameras,
-        )  # fmt: skip
+            env=i,
+            episode=int(self._episode[i]),
+            episode_seed=int(env.streams.episode_seed[i]),
+            drawn=env.streams.draws[i],
+            overridden=env.streams.overridden[i],
+            instruction=env.spec.task.description,
+            cameras=cameras,
+        )
 
     def _resumed(self, env: int, episode: int) -> EpisodeResult:
-        from anysim.record.layout import EPISODES, trajectory_name
         from anysim.record.manifest import read_manifest
+        from anysim.record.names import EPISODES, trajectory_name
 
         path = self.recorder.out / EPISODES / trajectory_name(env, episode)
         m = read_manifest(path)
@@ -186,18 +196,21 @@ class Collector:
             step = int(env.scene.elapsed[i])
             gained = 0.0 if reward is None else float(reward[i])
             self._total[i] += gained
-            self.recorder.append(i, Frame(
-                step=step,
-                time=float(state.time[i]),
-                action=None if step == 0 else env.scene.last_action[i],
-                state=state_rows(state, i, STATE_FIELDS, control),
-                reward=gained,
-                status=str(status[i]),
-                obs={group: rows[i] for group, rows in obs.items()},
-                annotations=self.policy.describe(i),
-                language=env.spec.task.description if env.spec.task else "",
-                images=images.get(i, {}),
-            ))  # fmt: skip
+            self.recorder.append(
+                i,
+                Frame(
+                    step=step,
+                    time=float(state.time[i]),
+                    action=None if step == 0 else env.scene.last_action[i],
+                    state=state_rows(state, i, STATE_FIELDS, control),
+                    reward=gained,
+                    status=str(status[i]),
+                    obs={group: rows[i] for group, rows in obs.items()},
+                    annotations=self.policy.describe(i),
+                    language=env.spec.task.description if env.spec.task else "",
+                    images=images.get(i, {}),
+                ),
+            )
 
     def _images(self, ids: Array) -> dict[int, dict[str, Array]]:
         due = self._capture.due(ids)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.commands import Control
+from anysim.engine.control import Control
 from anysim.engine.state import State
 from anysim.errors import RecordError
 

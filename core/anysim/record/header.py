@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import Field, field_validator
 
 from anysim.conventions import Array
-from anysim.world.model import Camera, World
+from anysim.model.world import Camera, World
 from anysim_schemas.base import Name, Positive, Spec
 
 MAX_VALUES = 1 << 20

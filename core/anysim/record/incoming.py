@@ -9,8 +9,8 @@ import shutil
 from itertools import count
 from pathlib import Path
 
-from anysim.record.layout import INCOMING, STARTUP_LOCK, attempt_name, owner_of
 from anysim.record.lock import FileLock
+from anysim.record.names import INCOMING, STARTUP_LOCK, attempt_name, owner_of
 
 
 class Incoming:

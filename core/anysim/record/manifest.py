@@ -8,8 +8,8 @@ from pydantic import Field, ValidationError, model_validator
 
 from anysim.errors import RecordError
 from anysim.record.header import CameraInfo, Count, EpisodeHeader, Header, Label, RunHeader
-from anysim.record.layout import MANIFEST_FILE, RUN_FILE, checked_file_name
-from anysim.record.plain import load_json
+from anysim.record.json import load_json
+from anysim.record.names import MANIFEST_FILE, RUN_FILE, checked_file_name
 from anysim_schemas.base import Name, Spec
 
 TRAJECTORY_FORMAT = "anysim-trajectory-1"

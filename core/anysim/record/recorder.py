@@ -16,7 +16,9 @@ from anysim.record.episode import Episode
 from anysim.record.frame import Frame
 from anysim.record.header import EpisodeHeader, Header, RunHeader
 from anysim.record.incoming import Incoming, remove
-from anysim.record.layout import (
+from anysim.record.json import dump_json, plain
+from anysim.record.manifest import CameraEntry, Manifest, RunRecord, read_run
+from anysim.record.names import (
     EPISODES,
     MANIFEST_FILE,
     RUN_FILE,
@@ -24,9 +26,7 @@ from anysim.record.layout import (
     parse_trajectory,
     trajectories,
     trajectory_name,
-)  # fmt: skip
-from anysim.record.manifest import CameraEntry, Manifest, RunRecord, read_run
-from anysim.record.plain import dump_json, plain
+)
 from anysim.record.writer import TrajectoryWriter, WrittenFile
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.record.compare import Drift, compare_states
+from anysim.record.drift import Drift, compare_states
 from anysim.record.frame import state_digest, state_rows
 from anysim.record.manifest import Manifest
 from anysim.record.reader import TrajectoryReader, open_trajectory
@@ -73,10 +73,13 @@ def replay(directory: str | Path, engine: str | None = None, base: Path | None =
         recorded = reader.initial_state
         same_start = not recorded or state_digest(start) == state_digest(recorded)
         return ReplayResult(
-            reader.manifest, f"{env.engine.name} {env.engine.version}",
-            env.engine.world.hash == reader.manifest.world_hash, same_start, compare_states(reader.states, states),
+            reader.manifest,
+            f"{env.engine.name} {env.engine.version}",
+            env.engine.world.hash == reader.manifest.world_hash,
+            same_start,
+            compare_states(reader.states, states),
             str(env.status[0]),
-        )  # fmt: skip
+        )
 
 
 def begin(env: TaskEnv, manifest: Manifest) -> None:

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from anysim.engine.commands import Control
+from anysim.engine.control import Control
 from anysim.engine.world_state import WorldState
 from anysim.errors import RecordError, listing
 from anysim.record.reader import TrajectoryReader
@@ -38,7 +38,15 @@ def world_state(reader: TrajectoryReader, step: int) -> WorldState:
         commands["control_mode"] = np.full((1, len(layout.actuators)), "position")
     time = 0.0 if step == 0 else float(reader.times[step - 1])
     return WorldState(
-        time=np.array([time]), entities=(), present=np.zeros((1, 0), dtype=bool), bodies=layout.bodies,
-        body_pose=rows["body_pose"], body_twist=rows["body_twist"], joints=layout.joints, joint_pos=rows["joint_pos"],
-        joint_vel=rows["joint_vel"], actuators=layout.actuators if commands else (), **commands,
-    )  # fmt: skip
+        time=np.array([time]),
+        entities=(),
+        present=np.zeros((1, 0), dtype=bool),
+        bodies=layout.bodies,
+        body_pose=rows["body_pose"],
+        body_twist=rows["body_twist"],
+        joints=layout.joints,
+        joint_pos=rows["joint_pos"],
+        joint_vel=rows["joint_vel"],
+        actuators=layout.actuators if commands else (),
+        **commands,
+    )

@@ -4,8 +4,8 @@ from pathlib import Path
 
 from anysim.errors import PluginError, RecordError, listing
 from anysim.record.commit import describe
-from anysim.record.layout import EPISODES, MANIFEST_FILE, parse_trajectory, trajectories
 from anysim.record.manifest import Manifest, read_manifest
+from anysim.record.names import EPISODES, MANIFEST_FILE, parse_trajectory, trajectories
 from anysim.record.reader import open_trajectory
 
 

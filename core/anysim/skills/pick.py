@@ -10,12 +10,12 @@ import numpy as np
 from pydantic import Field
 
 from anysim.conventions import Array
+from anysim.kinematics.chain import Chain
 from anysim.math import pose as P
 from anysim.planning.api import inverse_kinematics
-from anysim.planning.chain import Chain
 from anysim.skills.base import OUTCOMES, Outcome, Skill
 from anysim.task.env import TaskEnv
-from anysim.task.view import Frame, ObjectView, RobotView
+from anysim.task.scene import Frame, ObjectView, RobotView
 
 APPROACH, DESCEND, CLOSE, CARRY, BACK_OFF = range(5)
 ARRIVED = 0.004
@@ -38,10 +38,20 @@ class Pick(Skill):
     phases: ClassVar[tuple[str, ...]] = ("approach", "descend", "close", "carry", "back off")
 
     def __init__(
-        self, env: TaskEnv, *, robot: RobotView, object: ObjectView, goal: Frame, tool: str = "tool",
-        solver: str = "numba_ik", hover: Metres = 0.1, speed: Metres = 0.4, descend_speed: Metres = 0.2,
-        max_attempts: Annotated[int, Field(ge=1)] = 3, phase_steps: Annotated[int, Field(ge=1)] = 150,
-    ) -> None:  # fmt: skip
+        self,
+        env: TaskEnv,
+        *,
+        robot: RobotView,
+        object: ObjectView,
+        goal: Frame,
+        tool: str = "tool",
+        solver: str = "numba_ik",
+        hover: Metres = 0.1,
+        speed: Metres = 0.4,
+        descend_speed: Metres = 0.2,
+        max_attempts: Annotated[int, Field(ge=1)] = 3,
+        phase_steps: Annotated[int, Field(ge=1)] = 150,
+    ) -> None:
         """`hover` [m] is the height of the approach; speeds [m/s] are of the tool; `phase_steps` bounds each move."""
         super().__init__(env)
         assert env.robots is not None

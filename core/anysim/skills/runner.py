@@ -7,10 +7,10 @@ import numpy as np
 from anysim import registry
 from anysim.conventions import Array
 from anysim.errors import AnysimError, SpecError, SpecIssue, TaskError
-from anysim.signatures import options_model, parameters, reference_kind
+from anysim.plugin_parameters import options_model, parameters, reference_kind
 from anysim.skills.base import OUTCOMES, Outcome, Skill
 from anysim.task.env import TaskEnv
-from anysim.task.library import resolve
+from anysim.task.term_registry import resolve
 from anysim_schemas.task import ExpertSpec
 
 

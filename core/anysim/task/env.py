@@ -7,28 +7,20 @@ import numpy as np
 
 from anysim import hooks
 from anysim.conventions import Array
-from anysim.engine import checks
+from anysim.engine import arguments
 from anysim.engine.base import SimEngine
 from anysim.errors import TaskError
 from anysim.managers.action_space import ActionSpaces
 from anysim.managers.base import RESET_ORDER, Manager
 from anysim.managers.capture import CaptureManager
 from anysim.managers.robot import RobotManager
-from anysim.managers.streams import Streams
 from anysim.managers.terrain import TerrainManager
-from anysim.task.contract import (
-    FAILED,
-    RUNNING,
-    STATUS_NAMES,
-    SUCCESS,
-    TRUNCATED,
-    Obs,
-    StepResult,
-)  # fmt: skip
-from anysim.task.counterfactual import Counterfactuals
-from anysim.task.mdp import Mdp
+from anysim.randomization.streams import Streams
+from anysim.task.contract import FAILED, RUNNING, STATUS_NAMES, SUCCESS, TRUNCATED, Obs, StepResult
+from anysim.task.overrides import Counterfactuals
+from anysim.task.scene import SceneView
 from anysim.task.snapshot import EnvSnapshot, refuse_foreign, spec_hash
-from anysim.task.view import SceneView
+from anysim.task.terms_runtime import Mdp
 from anysim_schemas.run import RunSpec
 
 Overriding = Mapping[str, Any] | Sequence[Mapping[str, Any]] | None
@@ -116,9 +108,13 @@ class TaskEnv:
     # ------------------------------------------------------------------ reset
 
     def reset(
-        self, *, seed: int | Sequence[int] | None = None, mask: Array | None = None,
-        episode_seeds: Sequence[int] | Array | None = None, overrides: Overriding = None,
-    ) -> tuple[Obs, dict[str, Array]]:  # fmt: skip
+        self,
+        *,
+        seed: int | Sequence[int] | None = None,
+        mask: Array | None = None,
+        episode_seeds: Sequence[int] | Array | None = None,
+        overrides: Overriding = None,
+    ) -> tuple[Obs, dict[str, Array]]:
         """Start new episodes in all envs, or where `mask` (N,) is true.
 
         Args:
@@ -304,9 +300,12 @@ class TaskEnv:
         """The rows of all managers and of the task."""
         managers: dict[str, Mapping[str, Array]] = {m.name: m.snapshot(ids) for m in self.managers}
         managers["task"] = self.mdp.snapshot(ids) | {
-            "elapsed": self.scene.elapsed[ids], "last_action": self.scene.last_action[ids],
-            "code": self._code[ids], "fault": self._fault[ids], "success": self._success[ids],
-        }  # fmt: skip
+            "elapsed": self.scene.elapsed[ids],
+            "last_action": self.scene.last_action[ids],
+            "code": self._code[ids],
+            "fault": self._fault[ids],
+            "success": self._success[ids],
+        }
         return managers
 
     def reset_to(
@@ -326,7 +325,7 @@ class TaskEnv:
         """
         engine = self.engine
         ids = np.arange(self.num_envs) if env_ids is None else np.asarray(env_ids, dtype=int)
-        checks.same_stamp(snapshot.engine, engine.name, engine.version, engine.world.hash, len(ids))
+        arguments.same_stamp(snapshot.engine, engine.name, engine.version, engine.world.hash, len(ids))
         refuse_foreign(snapshot, self.name, spec_hash(self.spec), self._managed(np.array([0])))
         plan = self.counterfactuals.checked(overrides, len(ids), midway=True)
         engine.restore(snapshot.engine, ids)

@@ -4,11 +4,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from anysim.compile.joints import ends
 from anysim.conventions import Array
 from anysim.errors import NameLookupError, listing, suggest
-from anysim.task.view import SceneView
-from anysim.world.compile_joints import ends
-from anysim.world.model import World
+from anysim.model.world import World
+from anysim.task.scene import SceneView
 
 
 class JointView:

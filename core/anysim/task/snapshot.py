@@ -1,6 +1,6 @@
 """Envs at one moment, in memory and in files: what a snapshot holds, what it belongs to, and how rows are put together.
 
-A file is one container of arrays and JSON (`anysim.engine.container`): no code is stored or run.
+A file is one container of arrays and JSON (`anysim.engine.snapshot_file`): no code is stored or run.
 """
 
 import hashlib
@@ -14,7 +14,8 @@ from typing import Any, Self
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine import container, saving
+from anysim.engine import snapshot_file
+from anysim.engine.snapshot import joined, joined_rows, row_numbers, stamp_of, stamped
 from anysim.engine.state import Snapshot
 from anysim.errors import SnapshotError, listing
 from anysim_schemas.run import RunSpec
@@ -63,7 +64,7 @@ class EnvSnapshot:
         Raises:
             SnapshotError: a row is not in it.
         """
-        which = saving.row_numbers(rows, self.num_envs)
+        which = row_numbers(rows, self.num_envs)
         managers = {
             owner: {name: array[which] for name, array in data.items()} for owner, data in self.managers.items()
         }
@@ -86,9 +87,9 @@ class EnvSnapshot:
                 raise SnapshotError(
                     f"snapshots of '{first.task}' and '{other.task}' cannot be joined: their specs differ"
                 )
-        managers = {owner: saving.joined_rows([part.managers[owner] for part in parts]) for owner in first.managers}
+        managers = {owner: joined_rows([part.managers[owner] for part in parts]) for owner in first.managers}
         streams = {name: [value for part in parts for value in part.streams[name]] for name in first.streams}
-        engine = saving.joined([part.engine for part in parts])
+        engine = joined([part.engine for part in parts])
         return cls(engine, managers, streams, first.task, first.spec_hash)
 
     def save(self, path: str | Path) -> Path:
@@ -100,11 +101,11 @@ class EnvSnapshot:
         seeds = [int(seed) for seed in self.streams["episode_seed"]]
         steps = [int(n) for n in self.managers["task"]["elapsed"]]
         stamp = {
-            "task": self.task, "spec_hash": self.spec_hash, **saving.stamp_of(self.engine),
+            "task": self.task, "spec_hash": self.spec_hash, **stamp_of(self.engine),
             "episode_seeds": seeds, "elapsed_steps": steps,
         }  # fmt: skip
         data = {"engine": self.engine.data, "managers": self.managers, "streams": self.streams}
-        return container.write(path, container.ENV, stamp, data)
+        return snapshot_file.write(path, snapshot_file.ENV, stamp, data)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -113,9 +114,9 @@ class EnvSnapshot:
         Raises:
             SnapshotError: the file is damaged, of a newer format, or was made with other versions.
         """
-        content = container.read(path)
-        data, stamp = container.expect(content, container.ENV, path), content.stamp
-        engine = saving.stamped(stamp, data["engine"])
+        content = snapshot_file.read(path)
+        data, stamp = snapshot_file.expect(content, snapshot_file.ENV, path), content.stamp
+        engine = stamped(stamp, data["engine"])
         return cls(engine, data["managers"], data["streams"], stamp["task"], stamp["spec_hash"])
 
 

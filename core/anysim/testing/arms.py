@@ -8,7 +8,7 @@ import numpy as np
 
 from anysim.conventions import IDENTITY_QUATERNION
 from anysim.math import pose as P
-from anysim.world.model import (
+from anysim.model.world import (
     ORIGIN,
     Body,
     BodyKind,
@@ -23,7 +23,7 @@ from anysim.world.model import (
     Site,
     Vec3,
     World,
-)  # fmt: skip
+)
 
 
 class Link(NamedTuple):

@@ -7,7 +7,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
-from anysim.world.model import World
+from anysim.model.world import World
 
 FIELDS = ("body_pose", "body_twist", "joint_pos", "joint_vel", "joint_effort", "contact_force", "fault")
 MOTION = FIELDS[:4]

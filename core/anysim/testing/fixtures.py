@@ -8,11 +8,11 @@ import pytest
 
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capability
-from anysim.engine.needs import needs_of
-from anysim.engine.shards.spares import keeping_workers
+from anysim.engine.requirements import needs_of
+from anysim.engine.sharded.pool_cache import keeping_workers
 from anysim.errors import EngineError
+from anysim.model.world import World
 from anysim.testing import plugin
-from anysim.world.model import World
 
 DRAWING = (Capability.RENDER_RGB, Capability.RENDER_DEPTH, Capability.RENDER_SEGMENTATION)
 

@@ -24,9 +24,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("anysim", "the contract suite of anysim's physics engines (--pyargs anysim.testing)")
     group.addoption("--engine", metavar="NAME", help="the engine under test: an installed name, or module:Class")
     group.addoption(
-        "--engine-option", metavar="KEY=VALUE", action="append", default=[],
+        "--engine-option",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
         help="an option of the engine, may be repeated; the value is read as JSON, else as text",
-    )  # fmt: skip
+    )
     group.addoption(
         "--shards", metavar="N", type=int, default=0, help="run the engine in N worker processes, fewer for fewer envs"
     )
@@ -81,7 +84,7 @@ def engine_class(config: pytest.Config) -> Any:
     engine = load_engine(str(config.getoption("engine")))
     if not (shards := config.getoption("shards")):
         return engine
-    from anysim.engine.sharded import sharded
+    from anysim.engine.sharded.engine import sharded
 
     return sharded(engine, shards)
 

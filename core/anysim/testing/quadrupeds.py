@@ -10,12 +10,17 @@ from anysim.math import pose as P
 from anysim.task.env import TaskEnv
 
 QUADRUPEDS = (
-    "unitree_go1", "unitree_a1", "unitree_go2", "unitree_b1", "laikago", "anymal_b", "anymal_c", "hyq", "solo12",
-)  # fmt: skip
-WITH_ARM = {
-    "b1_z1": {"arm": "joint_position", "eef": "gripper_binary"},
-    "anymal_kinova": {"arm": "joint_position"},
-}
+    "unitree_go1",
+    "unitree_a1",
+    "unitree_go2",
+    "unitree_b1",
+    "laikago",
+    "anymal_b",
+    "anymal_c",
+    "hyq",
+    "solo12",
+)
+WITH_ARM = {"b1_z1": {"arm": "joint_position", "eef": "gripper_binary"}, "anymal_kinova": {"arm": "joint_position"}}
 """Quadrupeds with an arm, and what drives the rest of them while they walk."""
 TILT = np.deg2rad(60.0)
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from anysim.engine.capability import Capability as C
+from anysim.model.world import Actuation, ControlMode
 from anysim.testing import tolerances, worlds
 from anysim.testing.compare import assert_close, assert_ratio, assert_same, read, tape
 from anysim.testing.fixtures import needs
-from anysim.world.model import Actuation, ControlMode
 
 
 def test_position_drive_reaches_its_target(build):

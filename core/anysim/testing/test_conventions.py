@@ -6,10 +6,10 @@ import pytest
 from anysim.conventions import IDENTITY_QUATERNION
 from anysim.engine.capability import Capability as C
 from anysim.math import pose as P
+from anysim.model.forward_kinematics import forward_kinematics
 from anysim.testing import tolerances, worlds
 from anysim.testing.compare import assert_close, quaternions_apart, read
 from anysim.testing.fixtures import needs
-from anysim.world.kinematics import forward_kinematics
 
 COM = (0.1, -0.05, 0.2)
 QUARTER = 0.5**0.5

@@ -8,11 +8,11 @@ import pytest
 
 from anysim.conventions import WORLD
 from anysim.engine.capability import Capability as C
+from anysim.model.sketch import Sketch, inertial
+from anysim.model.world import Box, Capsule, Geom, JointType, Sphere
 from anysim.testing import tolerances
 from anysim.testing.compare import assert_close
 from anysim.testing.fixtures import needs
-from anysim.testing.sketch import Sketch, inertial
-from anysim.world.model import Box, Capsule, Geom, JointType, Sphere
 
 pytestmark = needs(C.DYNAMICS, C.CONTACTS)
 RADIUS = 0.05
@@ -24,8 +24,14 @@ def _landings():
     s.ground()
     table = s.fixed("table", Box((0.3, 0.3, 0.05)), (0.0, 0.0, 0.45))
     arm = s.robot("arm", (2.0, 0.0, 0.45))
-    paddle = s.link("paddle", arm, JointType.PRISMATIC, (0.0, 0.0, 1.0), inertial(Box((0.3, 0.3, 0.05)), 5.0),
-                    gravity_compensation=True)  # fmt: skip
+    paddle = s.link(
+        "paddle",
+        arm,
+        JointType.PRISMATIC,
+        (0.0, 0.0, 1.0),
+        inertial(Box((0.3, 0.3, 0.05)), 5.0),
+        gravity_compensation=True,
+    )
     s.shape(paddle, Box((0.3, 0.3, 0.05)))
     s.drive(paddle, kp=50000.0, kd=2000.0)
     balls = {}
@@ -91,9 +97,14 @@ def _arm():
     bar = inertial(Capsule(0.03, 0.12), 0.5, (0.15, 0.0, 0.0))
     for i in range(3):
         link = s.link(
-            f"link{i}", link, JointType.REVOLUTE, (0.0, -1.0, 0.0), bar, position=(0.3 if i else 0.0, 0.0, 0.0),
+            f"link{i}",
+            link,
+            JointType.REVOLUTE,
+            (0.0, -1.0, 0.0),
+            bar,
+            position=(0.3 if i else 0.0, 0.0, 0.0),
             armature=0.01,
-        )  # fmt: skip
+        )
         turn = (0.0, float(np.sqrt(0.5)), 0.0, float(np.sqrt(0.5)))  # the capsule's z along the link's x
         s.geoms.append(Geom(f"bar{i}", link, Capsule(0.03, 0.12), (0.15, 0.0, 0.0), turn))
         links.append(link)

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from anysim.engine.capability import Capabilities, Capability
-from anysim.engine.needs import needs_of
 from anysim.engine.parameters import PARAMETERS
+from anysim.engine.requirements import needs_of
 from anysim.engine.state import Availability
 from anysim.errors import CapabilityError, EngineError
+from anysim.model.world import World
 from anysim.testing import plugin, tolerances, worlds
 from anysim.testing.compare import assert_close, assert_same, play, quaternions_apart, read, spread, tape
-from anysim.world.model import World
 
 
 def test_availability_is_a_plain_answer(engine_class):
@@ -69,8 +69,8 @@ def test_create_world_returns_the_engine(new_engine):
 def test_worlds_in_which_nothing_moves(build, world):
     """A world without bodies, or without any that move, can be built, stepped and read."""
     if world.name == "tables":
-        from anysim.testing.sketch import Sketch
-        from anysim.world.model import Box
+        from anysim.model.sketch import Sketch
+        from anysim.model.world import Box
 
         sketch = Sketch("tables")
         sketch.fixed("table", Box((0.1, 0.1, 0.1)), (0.0, 0.0, 0.5))

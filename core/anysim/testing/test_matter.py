@@ -8,11 +8,11 @@ import pytest
 
 from anysim.engine.capability import Capability as C
 from anysim.errors import EngineError
+from anysim.model.sketch import Sketch
+from anysim.model.world import Box, Camera, ContactSensor, Solver, Sphere, Surface
 from anysim.testing import looks, tolerances, worlds
 from anysim.testing.compare import assert_close, assert_ratio, assert_same, read
 from anysim.testing.fixtures import needs, skip_without_parameter
-from anysim.testing.sketch import Sketch
-from anysim.world.model import Box, Camera, ContactSensor, Solver, Sphere, Surface
 
 RATES = np.array([0.0, 0.5, 2.0, 400.0])
 """[1/s]; with the last one all speed is gone within a few steps, and none must come back."""
@@ -156,8 +156,11 @@ def test_a_centre_of_mass_moves_under_way(build, engine_class):
 def test_snapshots_continue_exactly_with_changed_matter(build, engine_class):
     """What was changed is part of a snapshot: continuing from it is the uninterrupted run, bit for bit."""
     names = {
-        "body.com": [0.0, 0.01, 0.02], "body.linear_damping": 0.7, "body.angular_damping": 0.3, "geom.restitution": 0.5,
-    }  # fmt: skip
+        "body.com": [0.0, 0.01, 0.02],
+        "body.linear_damping": 0.7,
+        "body.angular_damping": 0.3,
+        "geom.restitution": 0.5,
+    }
     names = {name: value for name, value in names.items() if name in engine_class.parameters}
     engine, other = (build(worlds.bouncing_ball(0.2), 2) for _ in range(2))
     for name, value in names.items():
@@ -207,9 +210,7 @@ def _painted(texture="", color=(1.0, 1.0, 1.0, 1.0), material="", shape=CUBE):
     sketch.cameras.append(Camera("front", -1, (0.0, -2.0, 0.0), (-(0.5**0.5), 0.0, 0.0, 0.5**0.5), 30.0, 48, 48))
     sketch.more = {"textures": looks.TEXTURES, "materials": looks.MATERIALS}
     world = sketch.world()
-    return replace(
-        world, geoms=(replace(world.geoms[0], texture=texture, color=color, material=material),)
-    )  # fmt: skip
+    return replace(world, geoms=(replace(world.geoms[0], texture=texture, color=color, material=material),))
 
 
 def _hue(pixels):

@@ -9,10 +9,10 @@ import pytest
 from anysim.engine.capability import Capability as C
 from anysim.engine.parameters import PARAMETERS, count, nominal
 from anysim.errors import CapabilityError, EngineError
+from anysim.model.world import Box, ControlMode
 from anysim.testing import looks, tolerances, worlds
 from anysim.testing.compare import assert_close, assert_ratio, assert_same, play, read, tape
 from anysim.testing.fixtures import needs, skip_without_parameter
-from anysim.world.model import Box, ControlMode
 
 NAMES = sorted(PARAMETERS)
 

@@ -5,11 +5,11 @@ import numpy as np
 from anysim.conventions import WORLD
 from anysim.engine.capability import Capability as C
 from anysim.math import pose as P
+from anysim.model.sketch import Sketch
+from anysim.model.world import Box, ContactSensor, Sphere
 from anysim.testing import tolerances, worlds
 from anysim.testing.compare import assert_close, assert_ratio, assert_same, play, read, tape
 from anysim.testing.fixtures import needs
-from anysim.testing.sketch import Sketch
-from anysim.world.model import Box, ContactSensor, Sphere
 
 G = 9.81
 
@@ -21,9 +21,11 @@ def _stack():
     box = s.free("box", Box((0.2, 0.2, 0.1)), (0.0, 0.0, 0.1), 2.0)
     ball = s.free("ball", Sphere(0.1), (0.0, 0.0, 0.3), 0.5)
     s.sensors += [
-        ContactSensor("all", (box,)), ContactSensor("ball", (box,), (ball,)), ContactSensor("ground", (box,), (WORLD,)),
+        ContactSensor("all", (box,)),
+        ContactSensor("ball", (box,), (ball,)),
+        ContactSensor("ground", (box,), (WORLD,)),
         ContactSensor("both", (box, ball)),
-    ]  # fmt: skip
+    ]
     return s.world()
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from anysim.engine.capability import Capability as C
-from anysim.engine.saving import joined
+from anysim.engine.snapshot import joined
 from anysim.engine.state import SnapshotLevel
 from anysim.errors import CapabilityError, SnapshotError
 from anysim.testing import tolerances, worlds

@@ -19,7 +19,7 @@ from anysim.testing.compare import (
     run_elsewhere,
     spread,
     tape,
-)  # fmt: skip
+)
 from anysim.testing.fixtures import needs
 
 

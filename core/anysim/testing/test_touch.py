@@ -8,11 +8,11 @@ import numpy as np
 from anysim.conventions import WORLD
 from anysim.engine.capability import Capability as C
 from anysim.engine.state import SnapshotLevel
+from anysim.model.sketch import Sketch, inertial
+from anysim.model.world import Box, ContactSensor, JointType, Surface
 from anysim.testing import tolerances, worlds
 from anysim.testing.compare import assert_close, read
 from anysim.testing.fixtures import needs
-from anysim.testing.sketch import Sketch, inertial
-from anysim.world.model import Box, ContactSensor, JointType, Surface
 
 pytestmark = needs(C.DYNAMICS, C.CONTACT_SENSORS)
 G = 9.81
@@ -32,9 +32,7 @@ def _felt(world, **sensors):
 
 def test_a_block_on_a_slope_reads_its_weight(build):
     """At rest on a slope the normal force and the friction add up to the weight; a fixed slab feels the reaction."""
-    world = _felt(
-        worlds.slope(radians(20), 0.8), box=((1,),), slab=((0,),), pair=((1,), (0,)), none=((1,), (WORLD,))
-    )  # fmt: skip
+    world = _felt(worlds.slope(radians(20), 0.8), box=((1,),), slab=((0,),), pair=((1,), (0,)), none=((1,), (WORLD,)))
     engine = build(world, 2)
     engine.step(600)
     weight, got = np.array([0.0, 0.0, G]), _forces(engine, 1)
@@ -80,17 +78,28 @@ def _grip():
     part, pads = inertial(Box((0.01, 0.02, 0.02)), CARRIAGE), Surface(softness=0.004, impedance=(0.99, 0.999))
     fingers: list[int] = []
     for name, side in (("left", 1.0), ("right", -1.0)):
-        finger = s.link(name, hand, JointType.PRISMATIC, (0.0, -side, 0.0), part, position=(0.0, 0.03 * side, 0.0),
-                        gravity_compensation=True, armature=0.1)  # fmt: skip
+        finger = s.link(
+            name,
+            hand,
+            JointType.PRISMATIC,
+            (0.0, -side, 0.0),
+            part,
+            position=(0.0, 0.03 * side, 0.0),
+            gravity_compensation=True,
+            armature=0.1,
+        )
         s.shape(finger, Box((0.02, 0.01, 0.02)), surface=pads)
         fingers.append(finger)
     for finger in fingers:
         s.drive(finger, limit=GRIP)
     cube = s.free("cube", Box((0.02, 0.02, 0.02)), (0.0, 0.0, 0.5), CUBE, surface=pads)
     s.sensors += [
-        ContactSensor("cube", (cube,)), ContactSensor("left", (fingers[0],)), ContactSensor("right", (fingers[1],)),
-        ContactSensor("pair", (cube,), (fingers[0],)), ContactSensor("both", tuple(fingers), (cube,)),
-    ]  # fmt: skip
+        ContactSensor("cube", (cube,)),
+        ContactSensor("left", (fingers[0],)),
+        ContactSensor("right", (fingers[1],)),
+        ContactSensor("pair", (cube,), (fingers[0],)),
+        ContactSensor("both", tuple(fingers), (cube,)),
+    ]
     return s.world()
 
 

@@ -125,9 +125,11 @@ def test_what_is_there_moves_as_if_the_rest_were_not_in_the_world(build, engine_
         got, wanted = engine.get_state().body_pose[:, ours], alone.get_state().body_pose[:, theirs]
         assert_close(got, wanted, tolerances.ABSENT, f"poses with {names or 'nothing of the slots'} there")
         assert_close(
-            engine.get_state().contact_force[:, 0], alone.get_state().contact_force[:, 0], tolerances.ABSENT_FORCE,
+            engine.get_state().contact_force[:, 0],
+            alone.get_state().contact_force[:, 0],
+            tolerances.ABSENT_FORCE,
             "the force on the box",
-        )  # fmt: skip
+        )
 
 
 @needs(C.VARYING_ENTITIES, C.DYNAMICS, C.CONTACTS, C.CONTACT_POINTS)

@@ -6,15 +6,15 @@ from multiprocessing import get_context
 import numpy as np
 import pytest
 
+from anysim.compile.edit import without_entity
 from anysim.engine.capability import Capability as C
 from anysim.engine.parameters import PARAMETERS
+from anysim.model.sketch import Sketch
+from anysim.model.world import Box, Sphere
 from anysim.testing import plugin, tolerances
 from anysim.testing.compare import MOTION, assert_close, assert_same, play, read, tape
 from anysim.testing.fixtures import needs, skip_without_parameter
-from anysim.testing.sketch import Sketch
 from anysim.testing.varying import FULL, having, varied, with_slots
-from anysim.world.edit import without_entity
-from anysim.world.model import Box, Sphere
 
 varies = needs(C.VARYING_ENTITIES)
 IDENTITY = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
@@ -125,10 +125,19 @@ def _other_values(world, name, values):
 @pytest.mark.parametrize(
     "name",
     [
-        "body.mass", "body.com", "body.inertia", "body.linear_damping", "body.angular_damping", "geom.friction",
-        "geom.restitution", "geom.color", "joint.damping", "joint.friction", "joint.armature",
+        "body.mass",
+        "body.com",
+        "body.inertia",
+        "body.linear_damping",
+        "body.angular_damping",
+        "geom.friction",
+        "geom.restitution",
+        "geom.color",
+        "joint.damping",
+        "joint.friction",
+        "joint.armature",
     ],
-)  # fmt: skip
+)
 def test_parameters_of_what_is_absent_wait_for_it(build, engine_class, name):
     """What is written while an entity is absent is read back then, and acts when it comes, like one written there."""
     skip_without_parameter(engine_class, name)

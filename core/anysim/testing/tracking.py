@@ -9,15 +9,15 @@ import numpy as np
 
 from anysim import registry
 from anysim.api import make
+from anysim.compile.world import compile_world
 from anysim.controllers.base import ChannelView, Command, Controller
 from anysim.controllers.robot import ControlledRobot
 from anysim.conventions import Array
 from anysim.engine.state import State
 from anysim.math import pose as P
+from anysim.model.forward_kinematics import forward_kinematics
+from anysim.model.world import BodyKind, World
 from anysim.task.env import TaskEnv
-from anysim.world.compile import compile_world
-from anysim.world.kinematics import forward_kinematics
-from anysim.world.model import BodyKind, World
 from anysim_schemas.engine import PhysicsSpec
 from anysim_schemas.run import WorldSpec
 
@@ -64,9 +64,11 @@ class Puppet:
                 self.joint_pos[:, index] = joint.mimic.multiplier * leader + joint.mimic.offset
         body_pose = forward_kinematics(self.world, self.roots, self.joint_pos)
         seen = SimpleNamespace(
-            joint_pos=self.joint_pos, joint_vel=np.zeros_like(self.joint_pos), body_pose=body_pose,
+            joint_pos=self.joint_pos,
+            joint_vel=np.zeros_like(self.joint_pos),
+            body_pose=body_pose,
             body_twist=np.zeros((*body_pose.shape[:2], 6)),
-        )  # fmt: skip
+        )
         self.robot.see(cast(State, seen))
 
     def reset(self) -> Self:

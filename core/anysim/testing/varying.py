@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from anysim.compile.edit import without_entity
 from anysim.conventions import WORLD, Array
 from anysim.engine.capability import Capabilities
-from anysim.engine.needs import needs_of
+from anysim.engine.requirements import needs_of
 from anysim.math import pose as P
-from anysim.testing.sketch import Sketch, inertial
-from anysim.world.edit import without_entity
-from anysim.world.model import (
+from anysim.model.sketch import Sketch, inertial
+from anysim.model.world import (
     Box,
     Camera,
     ContactSensor,
@@ -22,14 +22,9 @@ from anysim.world.model import (
     Sphere,
     Vec3,
     World,
-)  # fmt: skip
+)
 
-CHOICES = {
-    "mug": ("mug~0", "mug~1", "mug~2"),
-    "chest": ("chest~0", "chest~1"),
-    "post": ("post",),
-    "lid": ("lid",),
-}
+CHOICES = {"mug": ("mug~0", "mug~1", "mug~2"), "chest": ("chest~0", "chest~1"), "post": ("post",), "lid": ("lid",)}
 """Slots of `varied` and the entities that each can be."""
 
 FULL = ("mug~1", "chest~0", "post", "lid")
@@ -97,9 +92,15 @@ def _swinging(s: Sketch, name: str, position: Vec3) -> list[str]:
     cube, bar = Box((0.05, 0.05, 0.05)), Box((0.005, 0.03, 0.005))
     root = s.free(name, cube, position, 0.5)
     link = s.link(
-        "handle", root, JointType.REVOLUTE, (1.0, 0.0, 0.0), inertial(bar, 0.05, (0.0, 0.03, 0.0)),
-        position=(0.0, 0.055, 0.02), damping=0.01, initial=0.4,
-    )  # fmt: skip
+        "handle",
+        root,
+        JointType.REVOLUTE,
+        (1.0, 0.0, 0.0),
+        inertial(bar, 0.05, (0.0, 0.03, 0.0)),
+        position=(0.0, 0.055, 0.02),
+        damping=0.01,
+        initial=0.4,
+    )
     s.shape(link, bar, (0.0, 0.03, 0.0))
     return [name]
 
@@ -110,14 +111,28 @@ def _cabinet(s: Sketch, name: str, position: Vec3) -> list[str]:
     s.shape(base, Box((0.2, 0.02, 0.2)), (0.0, 0.15, 0.0))
     tray, flap = Box((0.12, 0.12, 0.04)), Box((0.1, 0.005, 0.05))
     drawer = s.link(
-        "drawer", base, JointType.PRISMATIC, (0.0, -1.0, 0.0), inertial(tray, 1.0), lower=0.0, upper=0.2, friction=1.0,
-        damping=1.0, initial=0.05,
-    )  # fmt: skip
+        "drawer",
+        base,
+        JointType.PRISMATIC,
+        (0.0, -1.0, 0.0),
+        inertial(tray, 1.0),
+        lower=0.0,
+        upper=0.2,
+        friction=1.0,
+        damping=1.0,
+        initial=0.05,
+    )
     s.shape(drawer, tray)
     follower = s.link(
-        "flap", base, JointType.PRISMATIC, (0.0, 0.0, 1.0), inertial(flap, 0.2), position=(0.0, 0.15, 0.3),
-        mimic=Mimic(len(s.joints) - 1, 0.5, 0.01), initial=0.035,
-    )  # fmt: skip
+        "flap",
+        base,
+        JointType.PRISMATIC,
+        (0.0, 0.0, 1.0),
+        inertial(flap, 0.2),
+        position=(0.0, 0.15, 0.3),
+        mimic=Mimic(len(s.joints) - 1, 0.5, 0.01),
+        initial=0.035,
+    )
     s.shape(follower, flap)
     return [name]
 

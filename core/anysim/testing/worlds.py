@@ -8,10 +8,10 @@ import numpy as np
 
 from anysim.conventions import WORLD
 from anysim.engine.capability import Capabilities
-from anysim.engine.needs import needs_of
+from anysim.engine.requirements import needs_of
 from anysim.math import pose as P
-from anysim.testing.sketch import ORIGIN, Sketch, inertial
-from anysim.world.model import (
+from anysim.model.sketch import ORIGIN, Sketch, inertial
+from anysim.model.world import (
     Actuation,
     Box,
     Camera,
@@ -34,7 +34,7 @@ from anysim.world.model import (
     Surface,
     Vec3,
     World,
-)  # fmt: skip
+)
 
 REVOLUTE, PRISMATIC = JointType.REVOLUTE, JointType.PRISMATIC
 X: Vec3 = (1.0, 0.0, 0.0)
@@ -287,10 +287,19 @@ def tree(gravity: Vec3 = WEIGHTLESS) -> World:
 
 
 def slider(
-    mode: ControlMode = ControlMode.EFFORT, kp: float = 0.0, kd: float = 0.0, limit: float = inf, *, mass: float = 2.0,
-    dt: float = 0.002, gravity: Vec3 = WEIGHTLESS, axis: Vec3 = X, compensated: bool = False, drive: bool = True,
+    mode: ControlMode = ControlMode.EFFORT,
+    kp: float = 0.0,
+    kd: float = 0.0,
+    limit: float = inf,
+    *,
+    mass: float = 2.0,
+    dt: float = 0.002,
+    gravity: Vec3 = WEIGHTLESS,
+    axis: Vec3 = X,
+    compensated: bool = False,
+    drive: bool = True,
     **joint: Any,
-) -> World:  # fmt: skip
+) -> World:
     """One driven carriage on a rail: m a = u - d v, the simplest place to see a drive's law."""
     s = Sketch("slider", dt, gravity)
     base = s.robot("rail")

@@ -38,9 +38,17 @@ class HumanoidBalance(Controller):
     period: float = 0.01
 
     def __init__(
-        self, channel: ChannelView, num_envs: int, *, height: tuple[float, float] = (-0.25, 0.02), lean: float = 0.05,
-        tilt: float = 0.3, response: float = 3.0, gain: float = 3.0, margin: float = 0.005,
-    ) -> None:  # fmt: skip
+        self,
+        channel: ChannelView,
+        num_envs: int,
+        *,
+        height: tuple[float, float] = (-0.25, 0.02),
+        lean: float = 0.05,
+        tilt: float = 0.3,
+        response: float = 3.0,
+        gain: float = 3.0,
+        margin: float = 0.005,
+    ) -> None:
         super().__init__(channel, num_envs)
         if gain <= 1.0:
             raise TaskError(f"humanoid_balance: gain must be above 1 to balance, got {gain:g}")
@@ -79,9 +87,11 @@ class HumanoidBalance(Controller):
             seen = model.q(positions[row], bases[row]), model.v(rates[row], bases[row], twists[row])
             orders.append(self.tracker.follow(int(env), self._targets(int(env)), (True, True), seen))
         return Command(
-            np.array([o.position for o in orders]), np.array([o.velocity for o in orders]), None,
+            np.array([o.position for o in orders]),
+            np.array([o.velocity for o in orders]),
+            None,
             np.array([o.effort for o in orders]),
-        )  # fmt: skip
+        )
 
     def _targets(self, env: int) -> Targets:
         tick, w = self.tracker.tick, self._response

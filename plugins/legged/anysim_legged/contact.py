@@ -4,7 +4,7 @@ import numpy as np
 
 from anysim.controllers.robot import ControlledRobot
 from anysim.conventions import Array
-from anysim.kinematics.model import pinocchio, se3
+from anysim.kinematics.pinocchio_model import pinocchio, se3
 from anysim_legged.wholebody import WholeBody
 
 

@@ -209,10 +209,17 @@ class Footsteps:
 
     def _arrays(self) -> dict[str, Array]:
         return {
-            "mode": self._mode, "stance": self._stance, "time": self._time, "double": self._double,
-            "places": self._feet, "target": self._target, "from": self._from, "next": self._next,
-            "path": self._path, "lead": self._lead,
-        }  # fmt: skip
+            "mode": self._mode,
+            "stance": self._stance,
+            "time": self._time,
+            "double": self._double,
+            "places": self._feet,
+            "target": self._target,
+            "from": self._from,
+            "next": self._next,
+            "path": self._path,
+            "lead": self._lead,
+        }
 
     def snapshot(self, env_ids: Array) -> dict[str, Array]:
         """Copies of the plans."""

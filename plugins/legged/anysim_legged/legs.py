@@ -77,9 +77,16 @@ class Legs:
                         f"expected along {letter} of the base (hip about x, thigh and knee about y)"
                     )
         made = cls(
-            tuple(legs), points, axes, np.sign(signs), np.ones(len(legs)), model.initial[columns],
-            model.lower[columns], model.upper[columns], columns,
-        )  # fmt: skip
+            tuple(legs),
+            points,
+            axes,
+            np.sign(signs),
+            np.ones(len(legs)),
+            model.initial[columns],
+            model.lower[columns],
+            model.upper[columns],
+            columns,
+        )
         knee = made.signs[:, 2] * made.home[:, 2] + made._angles[1] - made._angles[0]
         bend = np.where(np.sin(knee) >= 0.0, 1.0, -1.0)
         return replace(made, bend=bend)

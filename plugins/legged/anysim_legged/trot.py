@@ -29,7 +29,10 @@ class TrotController(Controller):
     labels = ("forward", "left", "turn")
 
     def __init__(
-        self, channel: ChannelView, num_envs: int, *,
+        self,
+        channel: ChannelView,
+        num_envs: int,
+        *,
         frequency: Annotated[float, Field(gt=0, description="strides a second [1/s]")] | None = None,
         clearance: Annotated[float, Field(gt=0, description="height of a swinging foot's path [m]")] | None = None,
         limits: Annotated[Limits, Field(description="largest velocities [m/s, m/s, rad/s]")] | None = None,
@@ -40,7 +43,7 @@ class TrotController(Controller):
         ramp: Annotated[float, Field(gt=0, description="time from zero to a limit [s]")] = 0.5,
         in_place: Annotated[bool, Field(description="go on stepping at zero velocity")] = False,
         period: Annotated[float, Field(gt=0, description="time between commands [s]; a control step")] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         super().__init__(channel, num_envs)
         if frequency is None or clearance is None or limits is None:
             lack = [

@@ -41,10 +41,20 @@ class LipmWalk(Controller):
     period: float = 0.01
 
     def __init__(
-        self, channel: ChannelView, num_envs: int, *, forward: float = 0.3, sideways: float = 0.1,
-        turning: float = 0.3, double: float = 0.2, single: float = 0.5, clearance: float = 0.05,
-        acceleration: float = 0.7, gain: float = 2.0, margin: float = 0.005,
-    ) -> None:  # fmt: skip
+        self,
+        channel: ChannelView,
+        num_envs: int,
+        *,
+        forward: float = 0.3,
+        sideways: float = 0.1,
+        turning: float = 0.3,
+        double: float = 0.2,
+        single: float = 0.5,
+        clearance: float = 0.05,
+        acceleration: float = 0.7,
+        gain: float = 2.0,
+        margin: float = 0.005,
+    ) -> None:
         super().__init__(channel, num_envs)
         if gain <= 1.0 or min(double, single) <= 0.0:
             raise TaskError(
@@ -99,9 +109,11 @@ class LipmWalk(Controller):
             targets, standing = self._targets(int(env))
             orders.append(self.tracker.follow(int(env), targets, standing, seen))
         return Command(
-            np.array([o.position for o in orders]), np.array([o.velocity for o in orders]), None,
+            np.array([o.position for o in orders]),
+            np.array([o.velocity for o in orders]),
+            None,
             np.array([o.effort for o in orders]),
-        )  # fmt: skip
+        )
 
     def _targets(self, env: int) -> tuple[Targets, tuple[bool, bool]]:
         slew = self._slew * self.tracker.tick

@@ -12,7 +12,7 @@ import numpy as np
 from anysim.controllers.base import ChannelView
 from anysim.conventions import Array
 from anysim.errors import TaskError
-from anysim.kinematics.model import RobotModel, from_se3, pinocchio, se3
+from anysim.kinematics.pinocchio_model import RobotModel, from_se3, pinocchio, se3
 from anysim_legged.support import sole_corners, turned, wrapped
 
 FEET = (20.0, 10.0)
@@ -159,9 +159,7 @@ class WholeBody:
                 turn = about_z(heading + self.yaws[k])
                 wanted = np.array([x, y, targets.lift[k] + self.sole_heights[k]])
                 rows += [FEET[0] * jacobian[:3], FEET[1] * jacobian[3:]]
-                errors += [
-                    FEET[0] * (wanted - placed.translation), FEET[1] * _rotation_error(turn, placed.rotation)
-                ]  # fmt: skip
+                errors += [FEET[0] * (wanted - placed.translation), FEET[1] * _rotation_error(turn, placed.rotation)]
             com = pin.jacobianCenterOfMass(model, data, q, False)[:2, self._picked]
             rows.append(COM * com)
             errors.append(COM * (targets.com - data.com[0][:2]))

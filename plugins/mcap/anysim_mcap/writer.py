@@ -10,7 +10,7 @@ import anysim_mcap
 from anysim.errors import RecordError
 from anysim.record.frame import Frame
 from anysim.record.header import Header
-from anysim.record.plain import dump_json, plain
+from anysim.record.json import dump_json, plain
 from anysim.record.writer import TrajectoryWriter, WrittenFile
 from anysim_mcap import messages as m
 from anysim_mcap.video import VideoWriter, frame_rate

@@ -10,8 +10,8 @@ from anysim import registry
 from anysim.controllers.base import ChannelView, Command, Controller
 from anysim.conventions import Array
 from anysim.errors import TaskError
-from anysim.signatures import options_model, parameters
-from anysim.world.model import ControlMode
+from anysim.model.world import ControlMode
+from anysim.plugin_parameters import options_model, parameters
 from anysim_policy.layout import Layout
 from anysim_policy.spec import PolicySpec
 
@@ -37,10 +37,13 @@ class Policy(Controller):
     """
 
     def __init__(
-        self, channel: ChannelView, num_envs: int, *,
+        self,
+        channel: ChannelView,
+        num_envs: int,
+        *,
         policy: Annotated[str, Field(description="an installed kind of policy, as in `anysim list policies`")] = "file",
         options: Annotated[dict[str, Any], Field(description="its parameters, as `{file: package:NAME/walk.yaml}`")],
-    ) -> None:  # fmt: skip
+    ) -> None:
         super().__init__(channel, num_envs)
         made = registry.load("policies", policy)
         given = options_model(made).model_validate(options)

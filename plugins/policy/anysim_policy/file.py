@@ -5,10 +5,10 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
+from anysim.assets.uri import locate
 from anysim.controllers.base import ChannelView
 from anysim.conventions import Array
 from anysim.errors import AssetError, SpecError, TaskError, listing
-from anysim.world.assets import locate
 from anysim_policy.layout import Layout
 from anysim_policy.runtimes import load_model
 from anysim_policy.spec import PolicySpec
@@ -23,9 +23,11 @@ class FilePolicy:
     """
 
     def __init__(
-        self, channel: ChannelView, *,
+        self,
+        channel: ChannelView,
+        *,
         file: Annotated[str, Field(description="the policy's YAML: `package:NAME/walk.yaml` or an absolute path")],
-    ) -> None:  # fmt: skip
+    ) -> None:
         from anysim_schemas.load import load
 
         try:

@@ -10,7 +10,7 @@ import pytest
 
 from anysim.engine.base import SimEngine
 from anysim.engine.factory import create_simulation
-from anysim.world.model import (
+from anysim.model.world import (
     Actuator,
     Body,
     BodyKind,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from anysim.errors import EngineError
-from anysim.world.model import (
+from anysim.model.world import (
     Body,
     BodyKind,
     Box,

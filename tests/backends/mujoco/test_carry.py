@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from anysim.world.model import Body, BodyKind, Box, Geom
+from anysim.model.world import Body, BodyKind, Box, Geom
 
 HALF = (0.1, 0.1, 0.1)
 

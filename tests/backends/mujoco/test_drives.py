@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from anysim.world.model import ControlMode
+from anysim.model.world import ControlMode
 
 
 def test_a_free_joint_follows_the_solution(worlds, make):
@@ -146,7 +146,7 @@ def test_gravity_compensation_holds_an_undriven_link(make, worlds):
     """No drift without any gain."""
     from dataclasses import replace
 
-    from anysim.world.model import Physics
+    from anysim.model.world import Physics
 
     world = worlds.hinge(0.1, mode="effort")
     arm = replace(

@@ -8,13 +8,13 @@ import mujoco
 import numpy as np
 import pytest
 
+from anysim.assets.model import ImportedModel
+from anysim.compile.builder import WorldBuilder
 from anysim.engine.base import SimEngine
 from anysim.errors import AssetError
 from anysim.math import pose as P
-from anysim.world.builder import WorldBuilder
-from anysim.world.imported import ImportedModel
-from anysim.world.kinematics import forward_kinematics
-from anysim.world.model import (
+from anysim.model.forward_kinematics import forward_kinematics
+from anysim.model.world import (
     Actuator,
     BodyKind,
     Box,
@@ -25,7 +25,7 @@ from anysim.world.model import (
     MeshShape,
     World,
 )
-from anysim_mujoco.mjcf import import_mjcf
+from anysim_mujoco.mjcf.load import import_mjcf
 
 ARM = """
 <mujoco model="arm">
@@ -319,7 +319,7 @@ def test_a_file_may_be_called_mjcf_and_have_parts(tmp_path):
 
 def test_it_is_the_installed_importer(load, tmp_path):
     """A path that ends in .xml comes here, through the entry point."""
-    from anysim.world.importers import import_asset
+    from anysim.assets.load import import_asset
 
     load(ARM)
     assert [j.name for j in import_asset(f"file:{Path(tmp_path / 'model.xml')}").joints] == ["shoulder", "lift", "turn"]

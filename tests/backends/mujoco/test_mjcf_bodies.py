@@ -6,13 +6,13 @@ import mujoco
 import numpy as np
 import pytest
 
+from anysim.assets.load import import_asset, model_file
+from anysim.compile.builder import WorldBuilder
 from anysim.errors import AssetError
 from anysim.math import pose as P
-from anysim.qualify.run import Durations, qualify
-from anysim.world.builder import WorldBuilder
-from anysim.world.importers import import_asset, model_file
-from anysim.world.kinematics import forward_kinematics
-from anysim.world.model import BodyKind, ControlMode, EntityKind, World
+from anysim.model.forward_kinematics import forward_kinematics
+from anysim.model.world import BodyKind, ControlMode, EntityKind, World
+from anysim_robots.qualify.run import Durations, qualify
 
 CELL = """
 <mujoco model="cell">
@@ -127,7 +127,7 @@ def test_what_tied_it_to_others_is_said(cell: Path) -> None:
         "left: tendons between it and other bodies of the file are left out (1) (dropped)",
     }
     assert {str(note) for note in import_asset(f"{cell}#table").report} == {
-        "table: tendons between it and other bodies of the file are left out (1) (dropped)",
+        "table: tendons between it and other bodies of the file are left out (1) (dropped)"
     }
 
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from anysim_mujoco.mjcf import import_mjcf
+from anysim_mujoco.mjcf.load import import_mjcf
 
 
 def test_a_mesh_that_collides_is_drawn_as_it_is(tmp_path: Path) -> None:

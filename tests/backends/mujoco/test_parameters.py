@@ -7,7 +7,7 @@ import pytest
 
 from anysim.conventions import xyzw_from_wxyz
 from anysim.errors import EngineError
-from anysim.world.model import Body, BodyKind, Geom, Inertial, Sphere, World
+from anysim.model.world import Body, BodyKind, Geom, Inertial, Sphere, World
 from anysim_mujoco.inertia import full, principal
 
 

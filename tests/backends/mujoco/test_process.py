@@ -31,7 +31,7 @@ def _run(code: str, cwd: Path, **env: str) -> subprocess.CompletedProcess[str]:
 DIVERGE = """
     import numpy as np, os
     from anysim.engine.factory import create_simulation
-    from anysim.world.model import Body, BodyKind, Entity, EntityKind, Geom, Inertial, Plane, Sphere, World
+    from anysim.model.world import Body, BodyKind, Entity, EntityKind, Geom, Inertial, Plane, Sphere, World
     inertial = Inertial(1.0, inertia=(0.1, 0.1, 0.1, 0, 0, 0))
     ball = Body("ball", BodyKind.FREE, position=(0.0, 0.0, 1.0), inertial=inertial)
     world = World(bodies=(ball,), geoms=(Geom("g", -1, Plane()), Geom("b", 0, Sphere(0.1))),
@@ -42,11 +42,15 @@ DIVERGE = """
 
 def test_a_fault_writes_no_log_and_no_word(tmp_path):
     """MuJoCo would write MUJOCO_LOG.TXT into the working directory and warn on the terminal."""
-    done = _run(DIVERGE + """
+    done = _run(
+        DIVERGE
+        + """
     engine.set_body_state(twist=np.full((2, 1, 6), 1e12))
     engine.step(20)
     assert engine.get_state().fault.all()
-    """, tmp_path)  # fmt: skip
+    """,
+        tmp_path,
+    )
     assert done.returncode == 0, done.stderr
     assert done.stdout == ""
     assert done.stderr == ""
@@ -56,7 +60,9 @@ def test_a_fault_writes_no_log_and_no_word(tmp_path):
 @pytest.mark.parametrize("ending", ["", "engine.destroy()", "os._exit is None", "raise SystemExit(0)"])
 def test_drawing_leaves_the_environment_and_the_exit_clean(tmp_path, ending):
     """No environment variable is set, and no traceback comes out of a destructor at exit."""
-    done = _run(DIVERGE + f"""
+    done = _run(
+        DIVERGE
+        + f"""
     before = dict(os.environ)
     from anysim.errors import EngineError
     try:
@@ -65,7 +71,9 @@ def test_drawing_leaves_the_environment_and_the_exit_clean(tmp_path, ending):
         assert "cannot draw here" in str(error)
     assert dict(os.environ) == before
     {ending}
-    """, tmp_path)  # fmt: skip
+    """,
+        tmp_path,
+    )
     assert done.returncode == 0, done.stderr
     assert done.stdout == ""
     assert done.stderr == ""
@@ -74,7 +82,9 @@ def test_drawing_leaves_the_environment_and_the_exit_clean(tmp_path, ending):
 
 def test_a_machine_without_opengl_says_what_to_install(tmp_path):
     """Both backends fail; each says why, and the remedy follows."""
-    done = _run(DIVERGE + """
+    done = _run(
+        DIVERGE
+        + """
     import sys
     class Blocked:
         def find_spec(self, name, path=None, target=None):
@@ -88,7 +98,9 @@ def test_a_machine_without_opengl_says_what_to_install(tmp_path):
         except EngineError as error:
             print(error)
     engine.step(5)
-    """, tmp_path)  # fmt: skip
+    """,
+        tmp_path,
+    )
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     assert len(lines) == 2
@@ -106,7 +118,7 @@ def test_a_machine_without_opengl_says_what_to_install(tmp_path):
         ("glfw", "auto", ("egl", "osmesa")),
         ("osmesa", "egl", ("egl",)),
     ],
-)  # fmt: skip
+)
 def test_mujoco_gl_is_respected(monkeypatch, variable, option, tried):
     """A user's MUJOCO_GL names the one backend to try, unless the option does; glfw needs a screen."""
     from anysim_mujoco.gl import _order
@@ -117,20 +129,29 @@ def test_mujoco_gl_is_respected(monkeypatch, variable, option, tried):
 
 def test_the_package_and_availability_import_nothing_heavy(tmp_path):
     """The declarations do not need MuJoCo."""
-    done = _run("""
+    done = _run(
+        """
     import sys
     import anysim_mujoco, anysim_mujoco.declared
     assert anysim_mujoco.declared.availability().available
     assert not {"mujoco", "OpenGL"} & set(sys.modules)
-    """, tmp_path)  # fmt: skip
+    """,
+        tmp_path,
+    )
     assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize(
     ("version", "available", "word"),
-    [("", False, "not installed"), ("3.16.2", False, "mujoco.batch"), ("4.0.0", False, "sparse solver"),
-     ("3.17.0", True, ""), ("4.0.1", True, ""), ("4.1", True, "")],
-)  # fmt: skip
+    [
+        ("", False, "not installed"),
+        ("3.16.2", False, "mujoco.batch"),
+        ("4.0.0", False, "sparse solver"),
+        ("3.17.0", True, ""),
+        ("4.0.1", True, ""),
+        ("4.1", True, ""),
+    ],
+)
 def test_availability_by_version(monkeypatch, version, available, word):
     """Known-bad and too old versions come with the remedy."""
     from anysim_mujoco import declared

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from anysim.world.model import Body, BodyKind, Box, Geom
+from anysim.model.world import Body, BodyKind, Box, Geom
 
 
 def test_rays_hit_the_nearest_and_name_it(worlds, make):

@@ -8,7 +8,7 @@ import pytest
 
 from anysim.errors import EngineError
 from anysim.math import pose as P
-from anysim.world.model import Body, BodyKind, Box, Camera, Geom, Light, Plane, World
+from anysim.model.world import Body, BodyKind, Box, Camera, Geom, Light, Plane, World
 
 
 def _gl_reason() -> str:
@@ -32,7 +32,7 @@ def _looking_down(height: float = 2.0) -> tuple[float, float, float, float]:
 def two_boxes(**camera) -> World:
     """A red and a green box of 0.2 m beside each other on the ground, seen from 2 m above; the image's up is +y."""
     bodies, geoms = [], [Geom("ground", -1, Plane(), color=(0.5, 0.5, 0.5, 1.0))]
-    from anysim.world.model import Entity, EntityKind
+    from anysim.model.world import Entity, EntityKind
 
     entities = []
     for i, (name, x, color) in enumerate((("red", -0.3, (1.0, 0.0, 0.0, 1.0)), ("green", 0.3, (0.0, 1.0, 0.0, 1.0)))):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from anysim.math import pose as P
-from anysim.world.kinematics import forward_kinematics
+from anysim.model.forward_kinematics import forward_kinematics
 
 
 def test_kinematics_are_the_reference_ones(worlds, make, shake):
@@ -131,7 +131,7 @@ def test_a_finite_but_huge_velocity_is_seen_before_it_is_nan(worlds, make):
 def test_too_little_memory_for_contacts_is_a_fault(worlds, make):
     """Contacts that are dropped in silence would be a wrong answer."""
     world = worlds.scene()
-    from anysim.world.model import Body, BodyKind, Box, Geom
+    from anysim.model.world import Body, BodyKind, Box, Geom
 
     for i in range(30):
         half = (0.2, 0.2, 0.05)

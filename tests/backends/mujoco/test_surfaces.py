@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anysim.world.model import Body, BodyKind, Box, Geom, Inertial, Plane, Surface, World
+from anysim.model.world import Body, BodyKind, Box, Geom, Inertial, Plane, Surface, World
 from anysim_mujoco.surfaces import damping_ratio, rebound
 
 

@@ -9,8 +9,8 @@ import pytest
 
 from anysim.engine.base import SimEngine
 from anysim.engine.factory import create_simulation
-from anysim.testing.sketch import Sketch, inertial
-from anysim.world.model import (
+from anysim.model.sketch import Sketch, inertial
+from anysim.model.world import (
     Body as WorldBody,
     BodyKind,
     Box,
@@ -52,14 +52,30 @@ def skew_arm(free: bool = False, gravity: tuple[float, float, float] = (0.0, 0.0
     two = Inertial(0.7, (0.0, 0.05, 0.1), (0.01, 0.012, 0.008, 0.001, 0.0, 0.002))
     three = Inertial(0.4, (0.03, 0.0, 0.08), (0.004, 0.005, 0.003, 0.0, 0.001, 0.0))
     a = s.link(
-        "a", base, JointType.REVOLUTE, (0.0, 0.6, 0.8), one, position=(0.0, 0.0, 0.2), quaternion=turn,
-        anchor=(0.05, -0.02, 0.01), initial=0.3, **joint,
-    )  # fmt: skip
+        "a",
+        base,
+        JointType.REVOLUTE,
+        (0.0, 0.6, 0.8),
+        one,
+        position=(0.0, 0.0, 0.2),
+        quaternion=turn,
+        anchor=(0.05, -0.02, 0.01),
+        initial=0.3,
+        **joint,
+    )
     b = s.link("b", a, JointType.PRISMATIC, (1.0, 0.0, 0.0), two, position=(0.3, 0.0, 0.1), initial=0.05, **joint)
     c = s.link(
-        "c", b, JointType.REVOLUTE, (0.0, 1.0, 0.0), three, position=(0.0, 0.1, 0.1), anchor=(0.0, 0.03, 0.0),
-        quaternion=turn, initial=-0.5, **joint,
-    )  # fmt: skip
+        "c",
+        b,
+        JointType.REVOLUTE,
+        (0.0, 1.0, 0.0),
+        three,
+        position=(0.0, 0.1, 0.1),
+        anchor=(0.0, 0.03, 0.0),
+        quaternion=turn,
+        initial=-0.5,
+        **joint,
+    )
     for link in (a, b, c):
         s.drive(link, ControlMode.POSITION, 60.0, 6.0, 30.0)
     return s.world()

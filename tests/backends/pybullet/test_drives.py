@@ -7,9 +7,9 @@ import pytest
 
 from anysim.engine.factory import create_simulation
 from anysim.math import pose as P
+from anysim.model.sketch import Sketch, inertial
+from anysim.model.world import Box, ControlMode, JointType
 from anysim.testing import tolerances
-from anysim.testing.sketch import Sketch, inertial
-from anysim.world.model import Box, ControlMode, JointType
 from anysim_pybullet import kernels as K
 from anysim_pybullet.bullet import bullet
 
@@ -24,9 +24,18 @@ def _dynamics(engine, tree_number=0):
     motion = np.stack([state.joint_pos[0, tree.joints], state.joint_vel[0, tree.joints]])
     mass, bias, known = np.empty((tree.size, tree.size)), np.empty(tree.size), np.empty(tree.size)
     K.dynamics(
-        tree.joint_ints, tree.joint_floats, envs.laws.bodies[0, tree.bodies], np.zeros((len(tree.bodies), 6)),
-        envs.laws.gravity[0], root, motion, tree.first, mass, bias, known,
-    )  # fmt: skip
+        tree.joint_ints,
+        tree.joint_floats,
+        envs.laws.bodies[0, tree.bodies],
+        np.zeros((len(tree.bodies), 6)),
+        envs.laws.gravity[0],
+        root,
+        motion,
+        tree.first,
+        mass,
+        bias,
+        known,
+    )
     return mass, bias, known
 
 

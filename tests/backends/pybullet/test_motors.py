@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from anysim.errors import EngineError
+from anysim.model.world import Actuation, ControlMode, World
 from anysim.testing import worlds
 from anysim.testing.compare import assert_same, read
-from anysim.world.model import Actuation, ControlMode, World
 from tests.parity.pressing import panda
 
 

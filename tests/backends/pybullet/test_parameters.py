@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from anysim.errors import EngineError
+from anysim.model.sketch import Sketch
+from anysim.model.world import Box, Sphere, Surface
 from anysim.testing import worlds
-from anysim.testing.sketch import Sketch
-from anysim.world.model import Box, Sphere, Surface
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.engine import PybulletEngine
 from anysim_pybullet.urdf import roll_pitch_yaw
@@ -133,8 +133,8 @@ def test_an_audit_finds_the_world(build, own):
 def test_an_audit_of_a_robot_that_does_not_move_its_base(build):
     """The mass of a fixed base counts; limits at 0 are limits."""
     from anysim.api import compile_world
-    from anysim.benchmark import panda_and_boxes
     from anysim.engine.audit import audit
+    from anysim_bench.step import panda_and_boxes
 
     lines = audit(build(compile_world(panda_and_boxes())))
     assert [line for line in lines if line.ok is False] == []

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from anysim.api import compile_world
+from anysim.c_output import quiet
 from anysim.engine.factory import create_simulation
 from anysim.errors import EngineError
-from anysim.quiet import quiet
+from anysim.model.world import Plane
 from anysim.testing import worlds
-from anysim.world.model import Plane
 from anysim_pybullet import declared
 from anysim_pybullet.options import PybulletOptions, sweeps
 

@@ -8,10 +8,10 @@ import pytest
 
 import anysim_pybullet
 from anysim.math import pose as P
+from anysim.model.sketch import Sketch
+from anysim.model.world import Box, Geom, HeightField, HeightFieldShape, MeshShape, Sphere
 from anysim.testing import worlds
 from anysim.testing.compare import assert_same, play, read, spread, tape
-from anysim.testing.sketch import Sketch
-from anysim.world.model import Box, Geom, HeightField, HeightFieldShape, MeshShape, Sphere
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.urdf import roll_pitch_yaw
 
@@ -170,7 +170,7 @@ def test_bodies_do_not_slow_down(build):
 
 def test_cylinders_are_round(build):
     """URDF cylinders become prisms unless URDF_USE_IMPLICIT_CYLINDER is set: a ray sees the facets."""
-    from anysim.world.model import Cylinder
+    from anysim.model.world import Cylinder
 
     engine = build(worlds.resting(Cylinder(0.5, 0.1), 0.1))
     angle = np.linspace(0, 0.3, 40)
@@ -186,8 +186,8 @@ def test_links_of_one_robot_collide(build):
     def chain(excluded=()):
         s = Sketch("chain", gravity=(0.0, 0.0, 0.0))
         base = s.robot("r")
-        from anysim.testing.sketch import inertial
-        from anysim.world.model import JointType
+        from anysim.model.sketch import inertial
+        from anysim.model.world import JointType
 
         ball = inertial(Sphere(0.1), 1.0)
         a = s.link("a", base, JointType.PRISMATIC, (1.0, 0.0, 0.0), ball)
@@ -221,7 +221,7 @@ def test_states_with_several_shapes_continue_exactly(build, own):
 def test_a_robot_with_boxes_continues_exactly(build):
     """The same with drives, a mimic joint and contacts of a robot's own links."""
     from anysim.api import compile_world
-    from anysim.benchmark import panda_and_boxes
+    from anysim_bench.step import panda_and_boxes
 
     world = compile_world(panda_and_boxes())
     engine, other = build(world), build(world)

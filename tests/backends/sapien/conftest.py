@@ -7,7 +7,7 @@ import pytest
 
 from anysim.engine.base import SimEngine
 from anysim.engine.factory import create_simulation
-from anysim.world.model import World
+from anysim.model.world import World
 
 
 @pytest.fixture

@@ -8,9 +8,9 @@ import textwrap
 import numpy as np
 import pytest
 
+from anysim.compile.world import compile_world
 from anysim.errors import EngineError
 from anysim.testing import worlds
-from anysim.world.compile import compile_world
 from anysim_sapien import diagnosis, vulkan
 from anysim_sapien.engine import SapienEngine
 from anysim_sapien.options import OWN_SCENERY
@@ -23,9 +23,13 @@ NOTHING = "/no/such/driver.json"
 def run(code, **env):
     """A program in a process without any Vulkan driver."""
     return subprocess.run(
-        [sys.executable, "-W", "error", "-c", textwrap.dedent(code)], env={**os.environ, **env}, text=True,
-        capture_output=True, timeout=120, check=False,
-    )  # fmt: skip
+        [sys.executable, "-W", "error", "-c", textwrap.dedent(code)],
+        env={**os.environ, **env},
+        text=True,
+        capture_output=True,
+        timeout=120,
+        check=False,
+    )
 
 
 def test_physics_without_a_vulkan_device():

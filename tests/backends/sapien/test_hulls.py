@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from anysim.world import inertia
-from anysim.world.hull import convex_hull
-from anysim.world.model import Mesh, MeshShape
+from anysim.geometry.hull import convex_hull
+from anysim.kinematics import inertia
+from anysim.model.world import Mesh, MeshShape
 from anysim_sapien.declared import AUDIT_ALLOWANCES
 from anysim_sapien.hulls import UNIT_SCALE, convex, volume
 from anysim_sapien.library import physx

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from anysim.compile.world import compile_world
 from anysim.errors import SnapshotError
 from anysim.testing import worlds
 from anysim.testing.compare import assert_same, play, read, spread, tape
-from anysim.world.compile import compile_world
 from anysim_schemas.run import WorldSpec
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from anysim.testing.sketch import Sketch, inertial
-from anysim.world.model import Box, ContactSensor, JointType, Sphere, Surface
+from anysim.model.sketch import Sketch, inertial
+from anysim.model.world import Box, ContactSensor, JointType, Sphere, Surface
 
 G, FRICTION = 9.81, 0.5
 
@@ -54,8 +54,9 @@ def test_a_floating_robot_stands_on_its_feet(make):
     for name, x in (("front", 0.2), ("back", -0.2)):
         for side, y in (("left", 0.1), ("right", -0.1)):
             axis = (0.0, 0.0, 1.0)
-            foot = s.link(f"{name}_{side}", body, JointType.PRISMATIC, axis, inertial(Sphere(0.03), 0.1),
-                          position=(x, y, -0.27))  # fmt: skip
+            foot = s.link(
+                f"{name}_{side}", body, JointType.PRISMATIC, axis, inertial(Sphere(0.03), 0.1), position=(x, y, -0.27)
+            )
             s.shape(foot, Sphere(0.03))
             s.drive(foot, kp=2000.0, kd=50.0)
             feet.append(foot)

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from anysim.compare.kinematics import random_positions
+from anysim.compile.world import compile_world
 from anysim.math import pose as P
+from anysim.model.forward_kinematics import forward_kinematics
 from anysim.testing import worlds
 from anysim.testing.compare import play, read, spread, tape
-from anysim.world.compile import compile_world
-from anysim.world.kinematics import forward_kinematics
+from anysim_parity.kinematics import random_positions
 from anysim_schemas.run import WorldSpec
 
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anysim.engine.sharded import sharded
+from anysim.engine.sharded.engine import sharded
 from anysim.errors import CapabilityError, EngineError
-from anysim.testing.sketch import Sketch, inertial
+from anysim.model.sketch import Sketch, inertial
+from anysim.model.world import Body, BodyKind, Box, JointType, Sphere, Surface, World
 from anysim.testing.varying import having, with_slots
-from anysim.world.model import Body, BodyKind, Box, JointType, Sphere, Surface, World
 from anysim_sapien.engine import SapienEngine
 from anysim_sapien.exclusions import Group, apart_of
 from anysim_sapien.layout import Layout
@@ -93,8 +93,9 @@ def test_a_slide_has_the_larger_friction(make, frictions):
 
 
 def _world(count, pairs, chained=False):
-    bodies = [Body(f"b{i}", BodyKind.LINK if chained and i else BodyKind.FREE, i - 1 if chained else -1)
-              for i in range(count)]  # fmt: skip
+    bodies = [
+        Body(f"b{i}", BodyKind.LINK if chained and i else BodyKind.FREE, i - 1 if chained else -1) for i in range(count)
+    ]
     return World(bodies=tuple(bodies), excluded_pairs=frozenset(pairs))
 
 

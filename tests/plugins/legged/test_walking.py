@@ -5,10 +5,10 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from anysim.compile.world import compile_world
 from anysim.controllers.base import ChannelView
 from anysim.controllers.robot import ControlledRobot
 from anysim.errors import TaskError
-from anysim.world.compile import compile_world
 from anysim_legged.balance import HumanoidBalance
 from anysim_legged.contact import Pushes, pressure, share_of, shifted
 from anysim_legged.footsteps import Footsteps, Gait
@@ -154,8 +154,13 @@ def test_a_swinging_leg_and_a_sway_move_the_pressure_as_inverse_dynamics_says(wh
 
     def pressed(feet: np.ndarray, moved: np.ndarray) -> np.ndarray:
         """Where the ground presses while the feet and the centre of mass begin to move with these accelerations."""
-        targets = Targets(places + np.pad(feet, ((0, 0), (0, 1))) * 1e-4, np.zeros(2), com[:2] + moved * 1e-4,
-                          float(whole.home[2]), whole.upright)  # fmt: skip
+        targets = Targets(
+            places + np.pad(feet, ((0, 0), (0, 1))) * 1e-4,
+            np.zeros(2),
+            com[:2] + moved * 1e-4,
+            float(whole.home[2]),
+            whole.upright,
+        )
         there = whole.solve(whole.home, targets, posture, iterations=4)
         _, force, torque = pushes.required(whole.home, still, whole.difference(whole.home, there) / 1e-4)
         return np.array([-torque[1], torque[0]]) / force[2]

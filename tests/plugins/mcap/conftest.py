@@ -19,11 +19,15 @@ LAYOUT = StateLayout(
     actuators=("panda.j1",),
     action=("panda.j1",),
     state={
-        "joint_pos": (2,), "joint_vel": (2,), "body_pose": (3, 7), "body_twist": (3, 6), "control_position": (1,),
+        "joint_pos": (2,),
+        "joint_vel": (2,),
+        "body_pose": (3, 7),
+        "body_twist": (3, 6),
+        "control_position": (1,),
         "contact_force": (0, 3),
     },
     obs={"policy": ArrayLayout(shape=(4,), dtype="float32"), "privileged": ArrayLayout(shape=(2, 2))},
-)  # fmt: skip
+)
 CAMERAS = {
     "front": CameraInfo(width=64, height=48, every=2),
     "wrist": CameraInfo(width=31, height=17, every=1, fov=90.0, parent="panda.hand", pose=(0, 0, 0.1, 0, 0, 0, 1)),

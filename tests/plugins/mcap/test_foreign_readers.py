@@ -25,9 +25,16 @@ def test_topics_schemas_and_counts(reader):
     summary = reader.get_summary()
     counts = {summary.channels[i].topic: n for i, n in summary.statistics.channel_message_counts.items()}
     assert counts == {
-        "/action": 8, "/state": 9, "/collect": 9, "/tf": 9, "/annotation": 2, "/language": 2, "/tf_static": 1,
-        "/camera/front/calibration": 1, "/camera/wrist/calibration": 1,
-    }  # fmt: skip
+        "/action": 8,
+        "/state": 9,
+        "/collect": 9,
+        "/tf": 9,
+        "/annotation": 2,
+        "/language": 2,
+        "/tf_static": 1,
+        "/camera/front/calibration": 1,
+        "/camera/wrist/calibration": 1,
+    }
     schemas = {c.topic: (summary.schemas[c.schema_id].name, c.message_encoding) for c in summary.channels.values()}
     assert schemas["/state"] == ("anysim.State", "protobuf")
     assert schemas["/tf"] == schemas["/tf_static"] == ("foxglove.FrameTransforms", "protobuf")

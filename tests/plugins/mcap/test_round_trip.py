@@ -74,9 +74,7 @@ loose = hnp.arrays(np.float32, (6, 2), elements=st.floats(width=32, allow_nan=Fa
 @given(values=finite, obs=loose, seed=st.integers(0, 1 << 80))
 def test_every_finite_float_comes_back_bit_for_bit(tmp_path_factory, values, obs, seed):
     layout = StateLayout(action=("u",), state={"x": (5,)}, obs={"o": ArrayLayout(shape=(2,), dtype="float32")})
-    run = RunHeader(
-        task="t", seed=0, engine="e", engine_version="1", world_hash="w", control_dt=0.01, layout=layout
-    )  # fmt: skip
+    run = RunHeader(task="t", seed=0, engine="e", engine_version="1", world_hash="w", control_dt=0.01, layout=layout)
     with Recorder(tmp_path_factory.mktemp("run"), writer_factory("mcap", {}), run) as recorder:
         recorder.start(EpisodeHeader(env=0, episode=0, episode_seed=seed))
         for i, row in enumerate(values):

@@ -48,10 +48,12 @@ def net(path: Path, size: int = SIZE, outputs: int = 2, inputs: int = 1) -> Path
         helper.make_node("Add", ["h3", "b"], ["y"]),
     ]  # fmt: skip
     graph = helper.make_graph(
-        nodes, "net", [helper.make_tensor_value_info(f"x{i}", TensorProto.FLOAT, ["n", size]) for i in range(inputs)],
+        nodes,
+        "net",
+        [helper.make_tensor_value_info(f"x{i}", TensorProto.FLOAT, ["n", size]) for i in range(inputs)],
         [helper.make_tensor_value_info("y", TensorProto.FLOAT, ["n", outputs])],
         [numpy_helper.from_array(w, n) for n, w in zip(names, weights(size, outputs), strict=True)],
-    )  # fmt: skip
+    )
     onnx.save(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8), path)
     return path
 

@@ -6,11 +6,5 @@ Kinds, by the module they are in: observations `(scene) -> (n, k)`, rewards `(sc
 
 from anysim.task.terms import commands, events, observations, predicates, rewards
 
-TERMS = {
-    "observation": observations,
-    "reward": rewards,
-    "predicate": predicates,
-    "command": commands,
-    "event": events,
-}
+TERMS = {"observation": observations, "reward": rewards, "predicate": predicates, "command": commands, "event": events}
 """A library of terms maps each kind to the module or object that has its functions."""

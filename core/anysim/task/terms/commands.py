@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.task.view import Frame, ObjectView, SceneView
-from anysim.world.geometry import EntityShape
+from anysim.geometry.bounds import EntityShape
+from anysim.task.scene import Frame, ObjectView, SceneView
 from anysim_schemas.values import FloatValue, Vec3Value
 
 __all__ = ["goal_above", "goal_at"]

@@ -10,7 +10,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.errors import TaskError
 from anysim.math.pose import norm
-from anysim.task.view import Frame, ObjectView, SceneView
+from anysim.task.scene import Frame, ObjectView, SceneView
 from anysim_schemas.base import NonNegative
 from anysim_schemas.values import NonNegativeValue, Vec3Value
 

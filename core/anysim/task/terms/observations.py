@@ -5,7 +5,8 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.joints import RangedJointView
-from anysim.task.logical import CategoryView
+from anysim.task.scene import Frame, ObjectView, RobotView, SceneView
+from anysim.task.slot_frames import CategoryView
 from anysim.task.terms.robots import (
     base_ang_vel,
     base_lin_vel,
@@ -18,7 +19,6 @@ from anysim.task.terms.robots import (
     tool_pose,
     tool_twist,
 )
-from anysim.task.view import Frame, ObjectView, RobotView, SceneView
 from anysim_schemas.base import Number, Positive
 
 __all__ = [
@@ -111,9 +111,15 @@ def category_offset(scene: SceneView, *, frame: Frame, category: CategoryView) -
 
 
 def height_scan(
-    scene: SceneView, *, frame: Frame, length: Positive = 1.6, width: Positive = 1.0, spacing: Positive = 0.1,
-    offset: Number = 0.0, limit: Positive = 1.0,
-) -> Array:  # fmt: skip
+    scene: SceneView,
+    *,
+    frame: Frame,
+    length: Positive = 1.6,
+    width: Positive = 1.0,
+    spacing: Positive = 0.1,
+    offset: Number = 0.0,
+    limit: Positive = 1.0,
+) -> Array:
     """How far the ground lies below a frame [m], on a grid around it that turns with its yaw.
 
     From the world's own geometry, so the same on every engine. The grid is `length` along the frame's heading times

@@ -8,7 +8,7 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.joints import JointView, RangedJointView
-from anysim.task.view import Frame, ObjectView, RobotView, SceneView
+from anysim.task.scene import Frame, ObjectView, RobotView, SceneView
 
 __all__ = [
     "at_rest", "below", "closed", "further_than", "joint_above", "joint_below", "joint_still", "near", "opened",
@@ -16,26 +16,21 @@ __all__ = [
 ]  # fmt: skip
 
 
-def near(
-    scene: SceneView, *, a: Frame, b: Frame,
-    tolerance: Annotated[float, Field(gt=0, description="[m]")],
-) -> Array:  # fmt: skip
+def near(scene: SceneView, *, a: Frame, b: Frame, tolerance: Annotated[float, Field(gt=0, description="[m]")]) -> Array:
     """The origins of two frames are at most `tolerance` apart."""
     return P.norm(b.position - a.position) <= tolerance
 
 
 def further_than(
-    scene: SceneView, *, a: Frame, b: Frame,
-    distance: Annotated[float, Field(gt=0, description="[m]")],
-) -> Array:  # fmt: skip
+    scene: SceneView, *, a: Frame, b: Frame, distance: Annotated[float, Field(gt=0, description="[m]")]
+) -> Array:
     """The origins of two frames are more than `distance` apart."""
     return P.norm(b.position - a.position) > distance
 
 
 def at_rest(
-    scene: SceneView, *, robot: RobotView,
-    speed: Annotated[float, Field(gt=0, description="[rad/s, m/s]")] = 0.2,
-) -> Array:  # fmt: skip
+    scene: SceneView, *, robot: RobotView, speed: Annotated[float, Field(gt=0, description="[rad/s, m/s]")] = 0.2
+) -> Array:
     """No joint of the robot outside its grippers moves faster than `speed`."""
     return robot.arm_speed <= speed
 
@@ -46,17 +41,21 @@ def below(scene: SceneView, *, frame: Frame, height: float) -> Array:
 
 
 def opened(
-    scene: SceneView, *, joint: RangedJointView,
+    scene: SceneView,
+    *,
+    joint: RangedJointView,
     share: Annotated[float, Field(ge=0, le=1, description="of the range")] = 0.75,
-) -> Array:  # fmt: skip
+) -> Array:
     """A joint is open by at least a share of its range: a drawer, a door, a lid, a tap."""
     return joint.opening >= share
 
 
 def closed(
-    scene: SceneView, *, joint: RangedJointView,
+    scene: SceneView,
+    *,
+    joint: RangedJointView,
     share: Annotated[float, Field(ge=0, le=1, description="of the range")] = 0.05,
-) -> Array:  # fmt: skip
+) -> Array:
     """A joint is open by at most a share of its range."""
     return joint.opening <= share
 
@@ -72,9 +71,8 @@ def joint_below(scene: SceneView, *, joint: JointView, position: float) -> Array
 
 
 def joint_still(
-    scene: SceneView, *, joint: JointView,
-    speed: Annotated[float, Field(gt=0, description="[rad/s, m/s]")] = 0.05,
-) -> Array:  # fmt: skip
+    scene: SceneView, *, joint: JointView, speed: Annotated[float, Field(gt=0, description="[rad/s, m/s]")] = 0.05
+) -> Array:
     """A joint moves no faster than `speed`."""
     return np.abs(joint.velocity) <= speed
 

@@ -8,7 +8,7 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.joints import RangedJointView
-from anysim.task.view import Frame, SceneView
+from anysim.task.scene import Frame, SceneView
 
 __all__ = ["action_rate", "distance", "joint_progress", "tanh_distance"]
 
@@ -19,17 +19,22 @@ def distance(scene: SceneView, *, a: Frame, b: Frame) -> Array:
 
 
 def tanh_distance(
-    scene: SceneView, *, a: Frame, b: Frame,
+    scene: SceneView,
+    *,
+    a: Frame,
+    b: Frame,
     scale: Annotated[float, Field(gt=0, description="distance at which the reward has dropped to 0.24 [m]")] = 0.1,
-) -> Array:  # fmt: skip
+) -> Array:
     """1 - tanh(distance / scale): 1 when the frames coincide, 0 far away."""
     return 1.0 - np.tanh(P.norm(b.position - a.position) / scale)
 
 
 def joint_progress(
-    scene: SceneView, *, joint: RangedJointView,
+    scene: SceneView,
+    *,
+    joint: RangedJointView,
     target: Annotated[float, Field(ge=0, le=1, description="share of the range; 0 is closed")] = 1.0,
-) -> Array:  # fmt: skip
+) -> Array:
     """1 - |opening - target|: 1 where the joint is open as far as wanted, 0 where it is the whole range away."""
     return 1.0 - np.abs(joint.opening - target)
 

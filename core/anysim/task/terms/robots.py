@@ -7,7 +7,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.errors import TaskError, listing
 from anysim.math import pose as P
-from anysim.task.view import RobotView, SceneView
+from anysim.task.scene import RobotView, SceneView
 
 _DOWN = np.array([0.0, 0.0, -1.0])
 

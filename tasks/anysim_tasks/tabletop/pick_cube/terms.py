@@ -7,13 +7,12 @@ from pydantic import Field
 
 from anysim.conventions import Array
 from anysim.math.pose import norm
-from anysim.task.view import Frame, ObjectView, SceneView
+from anysim.task.scene import Frame, ObjectView, SceneView
 
 
 def lifted_toward(
-    scene: SceneView, *, object: ObjectView, goal: Frame,
-    scale: Annotated[float, Field(gt=0, description="[m]")] = 0.3,
-) -> Array:  # fmt: skip
+    scene: SceneView, *, object: ObjectView, goal: Frame, scale: Annotated[float, Field(gt=0, description="[m]")] = 0.3
+) -> Array:
     """1 - tanh(distance of the object to the goal / scale), counted only while the object moves with the goal's height.
 
     The share of the goal's height that is reached multiplies it, so that pushing along the table earns nothing.

@@ -9,9 +9,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capabilities, Capability
-from anysim.engine.commands import Control
+from anysim.engine.control import Control
 from anysim.engine.state import Availability, SnapshotLevel
-from anysim.world.model import BodyKind, World
+from anysim.model.world import BodyKind, World
 from anysim_ballistic import __version__
 from anysim_ballistic.motion import Constants, advance
 from anysim_ballistic.parameters import Parameters

@@ -52,10 +52,7 @@ def advance(
 
     # back from the centre of mass to the frame's origin, which is what anysim calls a body's pose and velocity
     arm = P.rotate(turn, body.com)
-    return (
-        np.concatenate([centre - arm, turn], axis=-1),
-        np.concatenate([speed - P.cross(rate, arm), rate], axis=-1),
-    )
+    return (np.concatenate([centre - arm, turn], axis=-1), np.concatenate([speed - P.cross(rate, arm), rate], axis=-1))
 
 
 def _rate(turn: Array, momentum: Array, body: Constants) -> Array:

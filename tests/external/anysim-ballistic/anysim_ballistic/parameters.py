@@ -7,7 +7,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import EngineError
-from anysim.world.model import World
+from anysim.model.world import World
 from anysim_ballistic.motion import Constants
 
 _TENSOR = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])

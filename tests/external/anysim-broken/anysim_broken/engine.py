@@ -2,7 +2,7 @@
 
 from importlib import import_module
 
-from anysim.engine.null import NullEngine
+from anysim.engine.kinematic import NullEngine
 
 solver = import_module("warp_drive_solver")
 

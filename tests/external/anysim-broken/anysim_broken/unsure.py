@@ -1,6 +1,6 @@
 """An engine that breaks the rule that `availability` never raises."""
 
-from anysim.engine.null import NullEngine
+from anysim.engine.kinematic import NullEngine
 from anysim.engine.state import Availability
 
 

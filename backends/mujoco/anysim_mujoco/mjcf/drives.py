@@ -1,0 +1,50 @@
+"""The drives that an MJCF file declares, as neutral ones."""
+
+from collections.abc import Callable, Mapping
+from math import inf
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from anysim.assets.model import ActuatorHint
+from anysim.model.world import ControlMode
+
+
+def drive_hint(
+    model: Any, a: int, number: Mapping[int, int], unit: Callable[[int], float]
+) -> tuple[ActuatorHint | None, str]:
+    """The neutral drive that acts like MuJoCo actuator `a`, or None and why there is none.
+
+    `number` maps MuJoCo joints to neutral ones; `unit` gives what lengths along a joint are scaled with. With a gear g
+    the actuator's length is g q and its force acts g-fold, so gains grow with its square.
+    """
+    joint_drives = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+    joint = int(model.actuator_trnid[a, 0])
+    if int(model.actuator_trntype[a]) not in joint_drives or joint not in number:
+        return None, "does not drive a single hinge or slide"
+    if (
+        model.actuator_dyntype[a] != mujoco.mjtDyn.mjDYN_NONE
+        or model.actuator_gaintype[a] != mujoco.mjtGain.mjGAIN_FIXED
+    ):
+        return None, "has dynamics or a gain of its own; the neutral drive is a proportional-derivative one"
+    gear, gain = float(model.actuator_gear[a, 0]), float(model.actuator_gainprm[a, 0])
+    affine = model.actuator_biastype[a] == mujoco.mjtBias.mjBIAS_AFFINE
+    _, stiffness, damping = (-float(v) for v in model.actuator_biasprm[a, :3]) if affine else (0.0, 0.0, 0.0)
+    if stiffness > 0 and abs(stiffness - gain) < 1e-9 * gain:
+        mode = ControlMode.POSITION
+    elif stiffness == 0 and damping > 0 and abs(damping - gain) < 1e-9 * gain:
+        mode = ControlMode.VELOCITY
+    elif stiffness == 0 and damping == 0:
+        mode = ControlMode.EFFORT
+    else:
+        return None, "has a feedback that is no position or velocity error"
+    limits = [inf]
+    if model.actuator_forcelimited[a]:
+        limits.append(float(np.abs(model.actuator_forcerange[a]).max() * abs(gear)))
+    if mode is ControlMode.EFFORT and model.actuator_ctrllimited[a]:
+        limits.append(float(np.abs(model.actuator_ctrlrange[a]).max() * abs(gear * gain)))
+    if model.jnt_actfrclimited[joint]:
+        limits.append(float(np.abs(model.jnt_actfrcrange[joint]).max()))
+    factor = gear * gear / unit(joint)
+    return ActuatorHint(number[joint], mode, stiffness * factor, damping * factor, min(limits)), ""

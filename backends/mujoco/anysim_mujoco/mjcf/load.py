@@ -1,0 +1,296 @@
+"""MJCF to the parts of a World, from MuJoCo's own compiled reading of the file.
+
+Rules where the neutral model is narrower; each use is a note in the report:
+- One kinematic tree, of several the one that is asked for: geoms of the world beside it, cameras, lights and sensors
+  stay behind. A tree whose first body has hinges or slides gets a fixed base at the file's origin.
+- Bodies without a joint are lumped into their parent; the frame survives as a site, the inertia is composed exactly.
+- A body with several joints becomes a chain, whose extra links weigh a gram.
+- Joint positions keep the file's zero, whatever its `ref`. A keyframe `home` gives the initial ones.
+- Joint equalities become mimics (the linear term). Tendons, joint springs and drives that are no position, velocity or
+  motor drive of one joint are dropped. Ball joints, connect and weld equalities and flexes are refused.
+"""
+
+from dataclasses import replace
+from math import inf
+from pathlib import Path
+from typing import Any, Literal
+
+import mujoco
+import numpy as np
+
+from anysim import cache
+from anysim.assets.model import ActuatorHint, ImportedModel, ImportNote
+from anysim.conventions import Array
+from anysim.errors import AssetError, listing
+from anysim.kinematics import inertia
+from anysim.math import pose as P
+from anysim.model.rounding import split, tidy
+from anysim.model.world import Body, BodyKind, Inertial, Joint, JointType, Mimic, Site
+from anysim_mujoco.inertia import full
+from anysim_mujoco.mjcf.drives import drive_hint
+from anysim_mujoco.mjcf.file import compiled
+from anysim_mujoco.mjcf.geoms import GeomReader, pose_of
+
+VIRTUAL_MASS = 0.001  # [kg] of the extra links of a body with several joints
+_IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+_HINGE, _SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
+
+
+def import_mjcf(path: Path, *, root: Path, scale: float = 1.0, body: str = "") -> ImportedModel:
+    """Read an MJCF file; see `anysim.assets.model.Importer` for the arguments.
+
+    Raises:
+        AssetError: a missing or damaged file, a reference that leaves `root`, something the neutral model cannot say.
+    """
+    notes: list[ImportNote] = []
+    return _MjcfImport(compiled(path, root, body, notes), path, scale, notes).run()
+
+
+class _MjcfImport:
+    """One import: walks MuJoCo's bodies, which are depth first with children in source order."""
+
+    def __init__(self, model: Any, path: Path, scale: float, notes: list[ImportNote]) -> None:
+        self.model, self.path, self.scale, self.notes = model, path, scale, notes
+        self.links = [model.body(i).name or f"body{i}" for i in range(model.nbody)]
+        self.bodies: list[Body] = []
+        self.inertials: list[list[Inertial]] = []
+        self.joints: list[Joint] = []
+        self.sites: list[Site] = []
+        self.place: dict[str, int] = {}
+        self.frames: dict[int, tuple[int, Array]] = {}  # MuJoCo body: neutral body, pose in it
+        self.number: dict[int, int] = {}  # MuJoCo joint: neutral joint
+        source = cache.digest(path.read_bytes(), model.mesh_vert.tobytes(), model.mesh_face.tobytes())
+        self.geometry = GeomReader(model, source, scale, self.notes)
+
+    def run(self) -> ImportedModel:
+        self._refuse_the_unsayable()
+        top = self._top()
+        for number in range(top, self.model.nbody):
+            self._body(number, top)
+        self._sites()
+        self._mimics()
+        self._inertials()
+        geometry = self.geometry
+        return ImportedModel(
+            name=self.path.stem,
+            bodies=tuple(self.bodies),
+            joints=tuple(self.joints),
+            geoms=tuple(geometry.geoms),
+            geom_links=tuple(geometry.geom_links),
+            sites=tuple(self.sites),
+            meshes=tuple(geometry.meshes.values()),
+            heightfields=tuple(geometry.heightfields.values()),
+            links=self.place,
+            actuator_hints=self._hints(),
+            excluded_pairs=self._excluded(),
+            report=tuple(self.notes),
+        )
+
+    # ------------------------------------------------------------------ the tree
+
+    def _refuse_the_unsayable(self) -> None:
+        model = self.model
+        for j in range(model.njnt):
+            if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_BALL:
+                raise AssetError(
+                    f"{self._joint_name(j)} of {self.path} is a ball joint; the neutral model has hinges and slides"
+                )
+        for e in range(model.neq):
+            kind = mujoco.mjtEq(int(model.eq_type[e]))
+            if model.eq_active0[e] and kind in (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD):
+                word = kind.name.removeprefix("mjEQ_").lower()
+                raise AssetError(
+                    f"{self.path}: the equality '{model.eq(e).name or e}' is a {word}; closed loops are not supported"
+                )
+        if model.nflex:
+            raise AssetError(f"{self.path}: holds {model.nflex} flexes; the neutral model has rigid bodies")
+        if model.ntendon:
+            self._note("dropped", "tendons", f"{model.ntendon} of them are left out, with what they drive and couple")
+
+    def _top(self) -> int:
+        model = self.model
+        tops = [i for i in range(1, model.nbody) if model.body_parentid[i] == 0]
+        if len(tops) != 1:
+            names = listing([self.links[i] for i in tops], 6)
+            say = f"; name the one that is meant: {self.path.name}#{self.links[tops[0]]}" if tops else ""
+            raise AssetError(f"{self.path}: an asset has exactly one body in its world; this one has {names}{say}")
+        if model.body_geomnum[0]:
+            self._note("dropped", "world", f"{model.body_geomnum[0]} geoms of the world beside the model are left out")
+        return tops[0]
+
+    def _body(self, number: int, top: int) -> None:
+        model, link = self.model, self.links[number]
+        joints = range(model.body_jntadr[number], model.body_jntadr[number] + model.body_jntnum[number])
+        floating = any(model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE for j in joints)
+        rest = pose_of(model.body_pos[number], model.body_quat[number], self.scale)
+        if number == top and (floating or not joints):
+            kind = BodyKind.FREE if floating else BodyKind.STATIC
+            self._add_body(Body(link, kind, gravity_compensation=floating and self._compensated(number)))
+            self.frames[number] = 0, _IDENTITY
+        else:
+            if number == top:
+                self._note("info", link, "moves against the world; it gets a fixed base at the file's origin")
+                self._add_body(Body("base" if "base" not in self.links else f"{link}_base", BodyKind.STATIC))
+            parent, frame = self.frames.get(model.body_parentid[number], (0, _IDENTITY))
+            self.frames[number] = self._attach(link, joints, parent, P.compose(frame, rest))
+        body, pose = self.frames[number]
+        self.place[link] = body
+        mass, com = float(model.body_mass[number]), tidy(np.asarray(model.body_ipos[number]) * self.scale)
+        tensor = full(model.body_inertia[number], model.body_iquat[number]) * self.scale**5
+        local = Inertial(mass * self.scale**3, com, tuple(float(v) for v in tensor))  # type: ignore[arg-type]
+        self.inertials[body].append(inertia.moved(local, pose))
+        self.geometry.read(link, number, body, pose)
+
+    def _attach(self, link: str, joints: range, parent: int, rest: Array) -> tuple[int, Array]:
+        """Put a link onto a body: rigidly without joints, else through one body per joint. Returns body and pose."""
+        if not joints:
+            self.sites.append(Site(link, parent, *split(rest)))
+            return parent, rest
+        for j in joints:
+            last = j == joints[-1]
+            name = link if last else f"{link}.{self._joint_name(j)}"
+            rest = P.compose(rest, self._motion(j, -float(self.model.qpos0[self.model.jnt_qposadr[j]])))
+            compensated = self._compensated(int(self.model.jnt_bodyid[j]))
+            body = self._add_body(Body(name, BodyKind.LINK, parent, *split(rest), gravity_compensation=compensated))
+            if not last:
+                ball, _ = inertia.repaired(Inertial(VIRTUAL_MASS))
+                self.inertials[body].append(ball)
+                self._note(
+                    "repaired", name, f"stands for one of the joints of '{link}' and weighs {VIRTUAL_MASS * 1000:g} g"
+                )
+            self.number[j] = len(self.joints)
+            self.joints.append(self._joint(j, body))
+            parent, rest = body, _IDENTITY
+        return parent, _IDENTITY
+
+    def _compensated(self, number: int) -> bool:
+        """Gravity compensation is all or nothing in the neutral model."""
+        share = float(self.model.body_gravcomp[number])
+        if share not in (0.0, 1.0):
+            self._note("repaired", self.links[number], f"is relieved of {share:g} of its weight, now {round(share)}")
+        return share >= 0.5
+
+    def _add_body(self, body: Body) -> int:
+        self.bodies.append(body)
+        self.inertials.append([])
+        return len(self.bodies) - 1
+
+    def _inertials(self) -> None:
+        for i, body in enumerate(self.bodies):
+            total = inertia.composed([part for part in self.inertials[i] if part.mass > 0])
+            if body.kind is not BodyKind.STATIC:
+                total, text = inertia.repaired(total)
+                if text is not None:
+                    self._note("repaired", body.name, text)
+                total = inertia.moving(total)
+            self.bodies[i] = replace(body, inertial=total)
+
+    def _sites(self) -> None:
+        model, taken = self.model, {site.name for site in self.sites}
+        for s in range(model.nsite):
+            number, name = int(model.site_bodyid[s]), model.site(s).name or f"site{s}"
+            if number == 0:
+                continue
+            body, frame = self.frames[number]
+            name = name if name not in taken else f"{self.links[number]}.{name}"
+            taken.add(name)
+            pose = P.compose(frame, pose_of(model.site_pos[s], model.site_quat[s], self.scale))
+            self.sites.append(Site(name, body, *split(pose)))
+
+    # ------------------------------------------------------------------ joints
+
+    def _joint_name(self, j: int) -> str:
+        return self.model.joint(j).name or f"joint{j}"
+
+    def _unit(self, j: int) -> float:
+        return self.scale if self.model.jnt_type[j] == _SLIDE else 1.0
+
+    def _motion(self, j: int, position: float) -> Array:
+        """The pose (7,) that a joint adds after its body's rest frame; lengths in `position` are the file's."""
+        axis, anchor = np.asarray(self.model.jnt_axis[j]), np.asarray(self.model.jnt_pos[j]) * self.scale
+        if self.model.jnt_type[j] == _SLIDE:
+            return np.array([*(axis * position * self.scale), 0.0, 0.0, 0.0, 1.0])
+        turn = P.from_axis_angle(axis, np.array(position))
+        return np.concatenate([anchor - P.rotate(turn, anchor), turn])
+
+    def _joint(self, j: int, body: int) -> Joint:
+        model, unit = self.model, self._unit(j)
+        dof, name = int(model.jnt_dofadr[j]), self._joint_name(j)
+        lower, upper = (float(v) * unit for v in model.jnt_range[j]) if model.jnt_limited[j] else (-inf, inf)
+        if model.jnt_stiffness[j]:
+            self._note("dropped", name, f"has a spring of {model.jnt_stiffness[j]:g}, which is left out")
+        home = [k for k in range(model.nkey) if model.key(k).name == "home"]
+        start = model.key_qpos[home[0]] if home else model.qpos0
+        initial = float(start[model.jnt_qposadr[j]]) * unit
+        softness = float(model.jnt_solref[j, 0])
+        return Joint(
+            name=name,
+            body=body,
+            type=JointType.REVOLUTE if model.jnt_type[j] == _HINGE else JointType.PRISMATIC,
+            axis=tidy(model.jnt_axis[j]),
+            anchor=tidy(np.asarray(model.jnt_pos[j]) * self.scale),
+            lower=lower,
+            upper=upper,
+            effort_limit=float(np.abs(model.jnt_actfrcrange[j]).max()) if model.jnt_actfrclimited[j] else inf,
+            damping=float(model.dof_damping[dof]),
+            friction=float(model.dof_frictionloss[dof]),
+            armature=float(model.dof_armature[dof]),
+            initial=min(max(initial, lower), upper),
+            limit_softness=softness if softness > 0 and abs(softness - 0.02) > 1e-9 else 0.0,
+        )
+
+    def _mimics(self) -> None:
+        model = self.model
+        for e in range(model.neq):
+            if model.eq_type[e] != mujoco.mjtEq.mjEQ_JOINT or not model.eq_active0[e]:
+                continue
+            follower, leader = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
+            name = self._joint_name(follower)
+            if leader < 0:
+                raise AssetError(f"{self.path}: an equality holds joint '{name}' still; leave the joint out instead")
+            a0, a1, *curved = (float(v) for v in model.eq_data[e, :5])
+            if any(curved):
+                self._note(
+                    "dropped", name, f"follows '{self._joint_name(leader)}' by a polynomial; its linear part is kept"
+                )
+            q0 = [float(model.qpos0[model.jnt_qposadr[j]]) for j in (follower, leader)]
+            multiplier = a1 * self._unit(follower) / self._unit(leader)
+            offset = (a0 + q0[0] - a1 * q0[1]) * self._unit(follower)
+            target, own = self.number[leader], self.number[follower]
+            start = multiplier * self.joints[target].initial + offset
+            self.joints[own] = replace(self.joints[own], mimic=Mimic(target, multiplier, offset), initial=start)
+
+    # ------------------------------------------------------------------ drives and collisions
+
+    def _hints(self) -> tuple[ActuatorHint, ...]:
+        hints = []
+        for a in range(self.model.nu):
+            hint, why = drive_hint(self.model, a, self.number, self._unit)
+            if hint is not None:
+                hints.append(hint)
+            else:
+                self._note("dropped", f"actuator '{self.model.actuator(a).name or a}'", why)
+        return tuple(hints)
+
+    def _excluded(self) -> frozenset[tuple[int, int]]:
+        """Pairs that the file excludes, or whose collision masks never meet."""
+        model, pairs = self.model, set()
+        for signature in model.exclude_signature:
+            ends = [self.frames.get(int(n)) for n in (signature >> 16, signature & 0xFFFF)]
+            if ends[0] is not None and ends[1] is not None:
+                pairs.add((ends[0][0], ends[1][0]))
+        touching: dict[int, list[int]] = {}
+        for geom, number in zip(self.geometry.geoms, self.geometry.numbers, strict=True):
+            if geom.collides:
+                touching.setdefault(geom.body, []).append(number)
+        types, affinities = model.geom_contype, model.geom_conaffinity
+        for low, ours in touching.items():
+            for high, theirs in touching.items():
+                meets = any(types[i] & affinities[k] or types[k] & affinities[i] for i in ours for k in theirs)
+                if low < high and not meets:
+                    pairs.add((low, high))
+        related = {(body.parent, i) for i, body in enumerate(self.bodies)}
+        return frozenset((min(p), max(p)) for p in pairs if p[0] != p[1]) - frozenset(related)
+
+    def _note(self, kind: Literal["repaired", "dropped", "info"], where: str, message: str) -> None:
+        self.notes.append(ImportNote(kind, where, message))

@@ -1,0 +1,1 @@
+"""Assets: files and builders, read into one imported model."""

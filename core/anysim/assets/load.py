@@ -1,0 +1,78 @@
+"""Asset files by format.
+
+| URI | what is read |
+|---|---|
+| `…/arm.urdf`, `…/arm.xml` | the one robot or object that the file holds |
+| `…/scene.xml#left_arm` | of an MJCF file with several, the one whose first body is `left_arm` |
+"""
+
+import re
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+from anysim import registry
+from anysim.assets.model import ImportedModel
+from anysim.assets.procedural import from_uri
+from anysim.assets.urdf import import_urdf
+from anysim.assets.uri import locate
+from anysim.errors import AssetError
+from anysim_schemas.object_source import PROCEDURAL
+
+_FORMATS: dict[str, Literal["urdf", "mjcf"]] = {".urdf": "urdf", ".xml": "mjcf", ".mjcf": "mjcf"}
+_WITH_BODY = re.compile(r"(robot_descriptions:\w+|.*\.(?:urdf|xml|mjcf))#(.+)", re.IGNORECASE | re.DOTALL)
+"""A `#` inside of a path is none that names a body."""
+
+
+class ModelFile(NamedTuple):
+    """A file that holds a model, the folder that no reference in it may leave, its format, and the body that is meant.
+
+    `body` is empty where the whole file is meant, and always is for a URDF.
+    """
+
+    path: Path
+    root: Path
+    kind: Literal["urdf", "mjcf"]
+    body: str
+
+
+def import_asset(uri: str, *, base: Path | None = None, scale: float = 1.0) -> ImportedModel:
+    """The model behind a URI. `.urdf` is read here; `.xml` and `.mjcf` by the installed importer named `mjcf`.
+
+    `procedural:NAME` is built by the installed builder, with its default parameters.
+
+    Raises:
+        AssetError: see `model_file` and the importers.
+        PluginError: no importer for the format is installed.
+    """
+    if uri.startswith(PROCEDURAL):
+        return from_uri(uri, scale=scale)
+    file = model_file(uri, base=base)
+    if file.kind == "urdf":
+        return import_urdf(file.path, root=file.root, scale=scale)
+    return registry.load("importers", file.kind)(file.path, root=file.root, scale=scale, body=file.body)
+
+
+def split_body(uri: str) -> tuple[str, str]:
+    """A URI without the body that it names, and that body; empty where it names none."""
+    named = _WITH_BODY.fullmatch(uri)
+    return (named[1], named[2]) if named else (uri, "")
+
+
+def model_file(uri: str, *, base: Path | None = None) -> ModelFile:
+    """The file that a URI stands for, and the body in it.
+
+    Raises:
+        AssetError: see `anysim.assets.uri.locate`; no format of models; a body of a URDF, which has one tree.
+    """
+    whole, body = split_body(uri)
+    file = locate(whole, base=base)
+    kind = _FORMATS.get(file.path.suffix.lower())
+    if kind is None:
+        raise AssetError(
+            f"asset '{uri}': '{file.path.suffix}' is no format of robots and assets ({', '.join(_FORMATS)})"
+        )
+    if kind == "mjcf" and file.path.read_bytes()[:4096].lstrip().find(b"<robot") >= 0:
+        kind = "urdf"  # a URDF that is called .xml
+    if body and kind == "urdf":
+        raise AssetError(f"asset '{uri}': a URDF is one tree; '#' chooses among the bodies of an MJCF file's world")
+    return ModelFile(file.path, file.root, kind, body)

@@ -1,0 +1,255 @@
+"""Mesh files to what engines take: convex hulls of few vertices to collide, light triangles in few colours to look at.
+
+Processing is deterministic and cached; `Mesh.hash` is the digest of the source bytes, the processing version and its
+parameters, never of the result, so that it is equal on all machines.
+"""
+
+import re
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from anysim import cache
+from anysim.conventions import Array
+from anysim.errors import AssetError
+from anysim.geometry.hull import convex_hull
+from anysim.model.world import Mesh, Vec3
+
+FORMATS = (".stl", ".obj", ".dae", ".glb", ".ply")
+HULL_VERTICES = 64  # what PhysX takes in a convex mesh with margin; enough for grasping at millimetres
+VISUAL_FACES = 2500  # of one visual: a software renderer draws a robot of ten in milliseconds
+VISUAL_COLORS = 6
+_VERSION = "anysim-mesh-3"  # change with anything that changes the result
+_ONE: Vec3 = (1.0, 1.0, 1.0)
+Color = tuple[float, float, float, float]
+
+
+class VisualPart(NamedTuple):
+    """The triangles of one colour; `color` is None where the file says none."""
+
+    mesh: Mesh
+    color: Color | None
+
+
+class _Piece(NamedTuple):
+    vertices: Array
+    faces: Array
+    color: Color | None
+
+
+def collision_mesh(path: Path, scale: Vec3 = _ONE, *, upright: bool = False) -> Mesh:
+    """The convex hull of a mesh file, at most `HULL_VERTICES` vertices. See `visual_parts` for the arguments."""
+    key = _key(path, "hull", scale, upright, HULL_VERTICES)
+
+    def make() -> dict[str, Array]:
+        points = np.concatenate([piece.vertices for piece in _load(path, scale, upright)])
+        vertices, faces = convex_hull(points, HULL_VERTICES)
+        return {"vertices": vertices, "faces": faces}
+
+    return _mesh(path.stem, key, cache.load_or_make("meshes", key, make))
+
+
+def whole_mesh(path: Path, scale: Vec3 = _ONE, *, upright: bool = False) -> Mesh:
+    """All triangles of a mesh file, with equal vertices joined. See `visual_parts` for the arguments."""
+    key = _key(path, "whole", scale, upright)
+
+    def make() -> dict[str, Array]:
+        pieces = _load(path, scale, upright)
+        starts = np.cumsum([0, *(len(piece.vertices) for piece in pieces[:-1])])
+        faces = np.concatenate([piece.faces + start for piece, start in zip(pieces, starts, strict=True)])
+        vertices = np.concatenate([piece.vertices for piece in pieces])
+        joined = _decimate(vertices, faces, len(faces))
+        return {"vertices": joined[0], "faces": joined[1]}
+
+    return _mesh(path.stem, key, cache.load_or_make("meshes", key, make))
+
+
+def hull_of(name: str, vertices: Array, source: str) -> Mesh:
+    """The convex hull of vertices (V, 3) that some parser has read; `source` is a digest of where they come from."""
+    key = cache.digest(_VERSION, "hull of", source, str(HULL_VERTICES))
+
+    def make() -> dict[str, Array]:
+        hull = convex_hull(np.asarray(vertices, dtype=float), HULL_VERTICES)
+        return {"vertices": hull[0], "faces": hull[1]}
+
+    return _mesh(name, key, cache.load_or_make("meshes", key, make))
+
+
+def light_mesh(name: str, vertices: Array, faces: Array, source: str) -> Mesh:
+    """Triangles (V, 3), (F, 3) that some parser has read, decimated to `VISUAL_FACES`; `source` as in `hull_of`."""
+    key = cache.digest(_VERSION, "visual of", source, str(VISUAL_FACES))
+
+    def make() -> dict[str, Array]:
+        light = _decimate(np.asarray(vertices, dtype=float), np.asarray(faces), VISUAL_FACES)
+        return {"vertices": light[0], "faces": light[1]}
+
+    return _mesh(name, key, cache.load_or_make("meshes", key, make))
+
+
+def visual_parts(path: Path, scale: Vec3 = _ONE, *, upright: bool = False) -> tuple[VisualPart, ...]:
+    """What a mesh file looks like: one mesh for each of its colours, together about `VISUAL_FACES` faces.
+
+    Args:
+        path: one of `FORMATS`. The unit that a .dae declares is applied.
+        scale: component-wise; a negative one mirrors.
+        upright: turn files whose up axis is y (.glb, and .dae that say so) to z up. References in a URDF do not want
+            that: there the axes are taken as they are, whatever the file declares.
+
+    Raises:
+        AssetError: an unknown format, a damaged file, no triangles.
+    """
+    key = _key(path, "visual", scale, upright, VISUAL_FACES, VISUAL_COLORS)
+
+    def make() -> dict[str, Array]:
+        arrays: dict[str, Array] = {}
+        groups = _by_color(_load(path, scale, upright))
+        total = sum(len(piece.faces) for piece in groups)
+        for i, (vertices, faces, color) in enumerate(groups):
+            share = max(60, VISUAL_FACES * len(faces) // total)
+            arrays[f"{i}/vertices"], arrays[f"{i}/faces"] = _decimate(vertices, faces, share)
+            arrays[f"{i}/color"] = np.array(color if color is not None else (), dtype=float)
+        return arrays
+
+    stored = cache.load_or_make("meshes", key, make)
+    parts: list[VisualPart] = []
+    for i in range(len(stored) // 3):
+        arrays = {name: stored[f"{i}/{name}"] for name in ("vertices", "faces")}
+        color = stored[f"{i}/color"]
+        mesh = _mesh(path.stem if i == 0 else f"{path.stem}_{i}", cache.digest(key, str(i)), arrays)
+        rgba = (float(color[0]), float(color[1]), float(color[2]), float(color[3])) if len(color) else None
+        parts.append(VisualPart(mesh, rgba))
+    return tuple(parts)
+
+
+def _mesh(name: str, key: str, arrays: dict[str, Array]) -> Mesh:
+    vertices = np.ascontiguousarray(arrays["vertices"], dtype=np.float64)
+    faces = np.ascontiguousarray(arrays["faces"], dtype=np.int32)
+    vertices.setflags(write=False)
+    faces.setflags(write=False)
+    return Mesh(name, vertices, faces, key)
+
+
+def _key(path: Path, *parameters: object) -> str:
+    """Of the file, the material file it names, and the processing."""
+    if path.suffix.lower() not in FORMATS:
+        raise AssetError(f"{path}: mesh files are {', '.join(FORMATS)}; '{path.suffix}' is not known")
+    try:
+        data = path.read_bytes()
+        materials = b"".join(file.read_bytes() for file in _material_files(path, data))
+    except OSError as error:
+        raise AssetError(f"{path}: cannot be read: {error}") from error
+    return cache.digest(_VERSION, path.suffix.lower(), data, materials, *(repr(p) for p in parameters))
+
+
+def _material_files(path: Path, data: bytes) -> list[Path]:
+    """The .mtl files of an .obj that lie in its own folder."""
+    if path.suffix.lower() != ".obj":
+        return []
+    names = [m.decode(errors="replace").strip() for m in re.findall(rb"^mtllib\s+(.+)$", data, re.MULTILINE)]
+    files = [path.parent / Path(name).name for name in names]
+    return [file for file in dict.fromkeys(files) if file.is_file()]
+
+
+def _load(path: Path, scale: Vec3, upright: bool) -> list[_Piece]:
+    """The triangles of a file in metres, in its own axes or upright."""
+    import trimesh
+    from trimesh.resolvers import FilePathResolver
+
+    class MaterialsOnly(FilePathResolver):
+        """Serves the .mtl of the mesh's own folder: textures are not used, and nothing else is anybody's business."""
+
+        def get(self, name: str) -> bytes:
+            file = path.parent / Path(str(name)).name
+            if file.suffix.lower() != ".mtl":
+                raise ValueError(f"'{name}' is not read")
+            return file.read_bytes()
+
+    data = path.read_bytes()
+    kind = path.suffix.lower()
+    if kind == ".dae" and b"<!ENTITY" in data:
+        raise AssetError(f"{path}: declares XML entities, which are not read")
+    try:
+        with path.open("rb") as file:
+            scene: Any = trimesh.load_scene(file, file_type=kind[1:], resolver=MaterialsOnly(str(path)))
+        has_color = kind != ".obj" or bool(_material_files(path, data))
+        pieces: list[_Piece] = []
+        for node in scene.graph.nodes_geometry:
+            matrix, name = scene.graph[node]
+            geometry = scene.geometry[name]
+            faces = np.asarray(getattr(geometry, "faces", ()), dtype=np.int64)
+            if len(faces):
+                vertices = np.asarray(geometry.vertices, dtype=float) @ matrix[:3, :3].T + matrix[:3, 3]
+                mirrored = np.linalg.det(matrix[:3, :3]) < 0
+                pieces.append(
+                    _Piece(vertices, faces[:, ::-1] if mirrored else faces, _color(geometry) if has_color else None)
+                )
+    except Exception as error:  # parsers of six formats raise what they like
+        raise AssetError(f"{path}: cannot be read as a mesh: {type(error).__name__}: {error}") from error
+    if not pieces:
+        raise AssetError(f"{path}: holds no triangles")
+    if not all(np.isfinite(piece.vertices).all() for piece in pieces):
+        raise AssetError(f"{path}: holds vertices that are not finite")
+    turn = np.array(scale)[:, None] * (_upright(kind, data) if upright else np.eye(3)) * _unit(kind, data)
+    flip = np.linalg.det(turn) < 0
+    return [_Piece(v @ turn.T, f[:, ::-1] if flip else f, color) for v, f, color in pieces]
+
+
+def _unit(kind: str, data: bytes) -> float:
+    found = re.search(rb'<unit[^>]*\bmeter="([^"]+)"', data) if kind == ".dae" else None
+    return float(found.group(1)) if found else 1.0
+
+
+def _upright(kind: str, data: bytes) -> Array:
+    axis = re.search(rb"<up_axis>\s*([XYZ])_UP", data) if kind == ".dae" else None
+    up = axis.group(1) if axis else b"Y" if kind in (".dae", ".glb") else b"Z"
+    if up == b"Y":
+        return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    if up == b"X":
+        return np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
+    return np.eye(3)
+
+
+def _color(geometry: Any) -> Color | None:
+    visual = geometry.visual
+    if not getattr(visual, "defined", False):
+        return None
+    material = getattr(visual, "material", None)
+    rgba = np.asarray(visual.main_color if material is None else material.main_color, dtype=float) / 255.0
+    return (float(rgba[0]), float(rgba[1]), float(rgba[2]), float(rgba[3]) if len(rgba) > 3 else 1.0)
+
+
+def _by_color(pieces: list[_Piece]) -> list[_Piece]:
+    """One piece a colour; of more than `VISUAL_COLORS`, the ones with fewest faces join the nearest of the others."""
+    groups: dict[Color | None, list[_Piece]] = {}
+    for piece in pieces:
+        groups.setdefault(piece.color, []).append(piece)
+    # an order of its own: that of the file is not kept by every parser
+    ranked = sorted(groups, key=lambda c: (-sum(len(p.faces) for p in groups[c]), c or ()))
+    kept = ranked[:VISUAL_COLORS]
+    for color in ranked[VISUAL_COLORS:]:
+        grey = np.array(color or (0.7, 0.7, 0.7, 1.0))
+        nearest = min(kept, key=lambda c: float(np.abs(np.array(c or (0.7, 0.7, 0.7, 1.0)) - grey).sum()))
+        groups[nearest] += groups.pop(color)
+    merged: list[_Piece] = []
+    for color in kept:
+        members = groups[color]
+        starts = np.cumsum([0, *(len(p.vertices) for p in members[:-1])])
+        faces = np.concatenate([p.faces + start for p, start in zip(members, starts, strict=True)])
+        merged.append(_Piece(np.concatenate([p.vertices for p in members]), faces, color))
+    return merged
+
+
+def _decimate(vertices: Array, faces: Array, budget: int) -> tuple[Array, Array]:
+    """Quadric decimation to about `budget` faces, after vertices at one place became one."""
+    import trimesh
+
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    mesh.update_faces(mesh.nondegenerate_faces())
+    if len(mesh.faces) == 0:
+        return vertices, faces
+    if len(mesh.faces) > budget:
+        mesh = mesh.simplify_quadric_decimation(face_count=budget)
+    mesh.remove_unreferenced_vertices()
+    return np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int32)

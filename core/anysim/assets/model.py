@@ -1,0 +1,76 @@
+"""What an importer makes of a file: parts of a World with local names and local indices.
+
+Every importer (URDF here, MJCF in the package that has a parser for it) returns an `ImportedModel`; `compile_world`
+puts it into a World under an entity's name. Importers of other formats are entry points of the group
+`anysim.importers`, functions with the signature of `Importer`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, NamedTuple, Protocol
+
+from anysim.model.world import Body, ControlMode, Geom, HeightField, Joint, Material, Mesh, Site, Texture
+
+
+class ImportNote(NamedTuple):
+    """What a user of a file should know: `repaired` values were changed, `dropped` ones left out, `info` is neither."""
+
+    kind: Literal["repaired", "dropped", "info"]
+    where: str  # a link, joint or element of the source
+    message: str
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.message} ({self.kind})"
+
+
+class ActuatorHint(NamedTuple):
+    """A drive that the source itself declares, used where no catalogue entry says otherwise; `joint` is local."""
+
+    joint: int
+    mode: ControlMode
+    kp: float
+    kd: float
+    effort_limit: float
+
+
+@dataclass(frozen=True)
+class ImportedModel:
+    """One kinematic tree. Names are local (`panda_hand`), indices are into the tuples of this model.
+
+    - `bodies[0]` is the root, with parent -1 and its own frame at the identity; its kind is what the source says: FREE
+      where it floats, else STATIC (whoever places it may change that). All other bodies are links, depth first,
+      children in source order, each with exactly one joint; `joints[i]` moves `bodies[i + 1]`.
+    - What a source joins rigidly is lumped: masses, centres and inertias are composed, geoms moved along, and the frame
+      of the lumped link is a Site with the link's name. `links` maps every link name of the source, lumped or not, to
+      its body, and `geom_links` tells for each geom the link it was on in the source.
+    - Collision geoms have `collides` set; visual ones have `visible` set and do not collide. A mesh that collides holds
+      its convex hull. `meshes` have a `hash` of source bytes and processing, names unique within the model.
+    - `mimic` inside joints, `excluded_pairs` and hints use local indices.
+    """
+
+    name: str
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...] = ()
+    geoms: tuple[Geom, ...] = ()
+    geom_links: tuple[str, ...] = ()
+    sites: tuple[Site, ...] = ()
+    meshes: tuple[Mesh, ...] = ()
+    heightfields: tuple[HeightField, ...] = ()
+    textures: tuple[Texture, ...] = ()
+    materials: tuple[Material, ...] = ()
+    links: Mapping[str, int] = field(default_factory=dict)
+    actuator_hints: tuple[ActuatorHint, ...] = ()
+    excluded_pairs: frozenset[tuple[int, int]] = frozenset()
+    report: tuple[ImportNote, ...] = ()
+
+
+class Importer(Protocol):
+    """Reads one file. `root` is the folder that no reference in the file may leave; `scale` multiplies all lengths.
+
+    `body` names one of several trees in the file, all others and what refers to them stay behind; empty: there is one.
+    Masses scale with the cube of `scale` and inertias with its fifth power (the density stays). Raises AssetError for a
+    file that is missing or holds what the neutral model cannot say, naming the file and the element.
+    """
+
+    def __call__(self, path: Path, *, root: Path, scale: float = 1.0, body: str = "") -> ImportedModel: ...

@@ -1,0 +1,151 @@
+"""Links made of solids: what a builder adds up to a model, with masses and inertias that follow from the solids."""
+
+from collections.abc import Sequence
+from math import inf
+
+import numpy as np
+
+from anysim.assets.model import ImportedModel
+from anysim.conventions import IDENTITY_QUATERNION
+from anysim.kinematics import inertia
+from anysim.math import pose as P
+from anysim.model.colors import rgb
+from anysim.model.rounding import split, tidy
+from anysim.model.world import (
+    ORIGIN,
+    Body,
+    BodyKind,
+    Box,
+    Geom,
+    Inertial,
+    Joint,
+    JointType,
+    Quat,
+    Shape,
+    Site,
+    Surface,
+    Vec3,
+)
+
+Colour = str | Sequence[float]
+
+
+class Assembly:
+    """A tree of links in the making. The root is link 0, named `base`; every other link has a joint of its own name."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self._bodies: list[Body] = [Body("base", BodyKind.FREE)]
+        self._joints: list[Joint] = []
+        self._geoms: list[Geom] = []
+        self._sites: list[Site] = []
+        self._masses: list[list[Inertial]] = [[]]
+
+    def link(
+        self,
+        name: str,
+        position: Vec3,
+        type: JointType,
+        axis: Vec3,
+        *,
+        lower: float = -inf,
+        upper: float = inf,
+        friction: float = 0.0,
+        damping: float = 0.0,
+        velocity_limit: float = inf,
+        effort_limit: float = inf,
+        parent: int = 0,
+    ) -> int:
+        """A link on the root or on `parent`, its frame at `position` and parallel to that one's at joint zero.
+
+        What is on a link comes right after it: bodies are depth first.
+        """
+        self._bodies.append(Body(name, BodyKind.LINK, parent, tidy(np.array(position))))
+        self._masses.append([])
+        body = len(self._bodies) - 1
+        start = min(max(0.0, lower), upper)
+        self._joints.append(
+            Joint(
+                name,
+                body,
+                type,
+                axis,
+                lower=lower,
+                upper=upper,
+                velocity_limit=velocity_limit,
+                effort_limit=effort_limit,
+                damping=damping,
+                friction=friction,
+                initial=start,
+            )
+        )
+        return body
+
+    def solid(
+        self,
+        body: int,
+        name: str,
+        shape: Shape,
+        position: Vec3,
+        density: float,
+        color: Colour,
+        quaternion: Quat = IDENTITY_QUATERNION,
+        *,
+        filled: Shape | None = None,
+        collides: bool = True,
+    ) -> None:
+        """A homogeneous solid [kg/m^3] on a link, which has the mass of `filled` where that is given.
+
+        One that does not collide is there for its mass and its looks.
+
+        Solids of one link should not overlap but where `filled` says which part of one counts.
+        """
+        place, turn = split(np.array([*position, *quaternion]))
+        owner = self._bodies[body].name
+        self._geoms.append(
+            Geom(f"{owner}.{name}", body, shape, place, turn, color=(*rgb(color), 1.0), collides=collides)
+        )
+        heavy = filled or shape
+        own = inertia.of_shape(heavy, density * inertia.volume(heavy, {}), {})
+        self._masses[body].append(inertia.moved(own, np.array([*place, *turn])))
+
+    def contact(self, body: int, name: str, shape: Shape, position: Vec3, surface: Surface) -> None:
+        """A shape on a link that has neither mass nor looks: what touches in place of a solid that does not."""
+        owner = self._bodies[body].name
+        self._geoms.append(
+            Geom(f"{owner}.{name}", body, shape, tidy(np.array(position)), surface=surface, visible=False)
+        )
+
+    def board(
+        self, body: int, name: str, low: Vec3, high: Vec3, density: float, color: Colour, origin: Vec3 = ORIGIN
+    ) -> None:
+        """A box between two corners, given in axes parallel to the link's from a point `origin` of the same axes."""
+        corners = np.array([low, high]) - np.array(origin)
+        half, middle = 0.5 * (corners[1] - corners[0]), 0.5 * (corners[0] + corners[1])
+        self.solid(body, name, Box(tidy(half)), tidy(middle), density, color)
+
+    def site(self, body: int, name: str, position: Vec3, quaternion: Quat = IDENTITY_QUATERNION) -> None:
+        """A named frame on a link."""
+        self._sites.append(Site(name, body, *split(np.array([*position, *quaternion]))))
+
+    def model(self) -> ImportedModel:
+        """What has been put together."""
+        bodies = tuple(
+            Body(b.name, b.kind, b.parent, b.position, b.quaternion, inertia.moving(inertia.composed(parts)))
+            for b, parts in zip(self._bodies, self._masses, strict=True)
+        )
+        return ImportedModel(
+            self.name,
+            bodies,
+            tuple(self._joints),
+            tuple(self._geoms),
+            tuple(bodies[g.body].name for g in self._geoms),
+            tuple(self._sites),
+            links={body.name: i for i, body in enumerate(bodies)},
+        )
+
+
+def turned(axis: Vec3, angle: float) -> Quat:
+    """The quaternion of a turn by `angle` [rad] about `axis`."""
+    x, y, z, w = P.from_axis_angle(np.array(axis), np.array(angle)).tolist()
+    return (x, y, z, w)

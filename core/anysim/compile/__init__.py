@@ -1,0 +1,1 @@
+"""Compilation of a spec into a World, and editing of a World."""

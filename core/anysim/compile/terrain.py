@@ -1,0 +1,85 @@
+"""The ground of a spec into a World under construction."""
+
+from pathlib import Path
+
+import numpy as np
+
+from anysim.assets.meshes import FORMATS
+from anysim.assets.uri import locate
+from anysim.compile.builder import WorldBuilder
+from anysim.conventions import GROUND, WORLD, Array
+from anysim.errors import AssetError
+from anysim.issues import Issues
+from anysim.model.colors import Rgb, nominal_rgb
+from anysim.model.world import ORIGIN, Geom, HeightField, HeightFieldShape, MeshShape, Plane, Shape, Surface, Vec3
+from anysim.terrain.files import heights_of_mesh, read_heights, read_mesh
+from anysim.terrain.generators import generate
+from anysim.terrain.tiling import tile
+from anysim_schemas.terrain import GENERATED, TerrainSpec
+
+DIFFICULTY = 0.5
+"""Of generated ground that says none."""
+
+_GREY: Rgb = (0.45, 0.47, 0.5)
+
+
+def add_terrain(builder: WorldBuilder, spec: TerrainSpec, issues: Issues, base: Path | None = None) -> None:
+    """The ground as a geom of the world; what is wrong goes to `issues`, whose path is that of the terrain.
+
+    Generated ground lies so that the platform that robots start on is at the world's origin; of tiles, the first one's.
+    """
+    try:
+        if spec.kind == "plane":
+            _add(builder, spec, Plane(), issues)
+        elif spec.kind == "trimesh":
+            assert spec.file is not None  # the spec has been checked
+            mesh = read_mesh(locate(spec.file, base=base).path, spec.scale or 1.0)
+            _add(builder, spec, MeshShape(builder.add_mesh(mesh), concave=True), issues)
+        elif spec.kind == "tiles":
+            _add_tiles(builder, spec, issues)
+        elif spec.kind in GENERATED:
+            difficulty = DIFFICULTY if spec.difficulty is None else spec.difficulty
+            piece = generate(spec.kind, spec.parameters(spec.kind), difficulty, spec.size, spec.cell, (spec.seed,))
+            _add_field(builder, spec, piece.heights, spec.size, (0.0, 0.0, -piece.top), issues)
+        elif spec.kind == "heightfield":
+            _add_given(builder, spec, issues, base)
+    except AssetError as error:
+        issues.asset("file", error)
+    except ValueError as error:
+        path, colon, message = str(error).rpartition(": ") if spec.kind == "tiles" else ("", "", str(error))
+        issues.add(f"tiles.{path}" if colon else path, message)
+
+
+def _add_tiles(builder: WorldBuilder, spec: TerrainSpec, issues: Issues) -> None:
+    made = tile(spec, spec.tiling)
+    _add_field(builder, spec, made.heights, made.size, made.middle, issues)
+    builder.tiles = made.tiles
+
+
+def _add_given(builder: WorldBuilder, spec: TerrainSpec, issues: Issues, base: Path | None) -> None:
+    """Heights as they are written, or as a file has them."""
+    size, position = spec.size, ORIGIN
+    if spec.file is None:
+        heights = np.array(spec.heights, dtype=np.float64)
+    else:
+        path = locate(spec.file, base=base).path
+        if path.suffix.lower() in FORMATS:
+            heights, size, middle = heights_of_mesh(read_mesh(path, spec.scale or 1.0), spec.cell)
+            position = (*middle, 0.0)
+        else:
+            heights = read_heights(path, spec.height_range)
+    _add_field(builder, spec, heights, size, position, issues)
+
+
+def _add_field(
+    builder: WorldBuilder, spec: TerrainSpec, heights: Array, size: tuple[float, float], position: Vec3, issues: Issues
+) -> None:
+    heights.setflags(write=False)
+    builder.add_heightfields([HeightField(GROUND, heights, size)])
+    _add(builder, spec, HeightFieldShape(GROUND), issues, position)
+
+
+def _add(builder: WorldBuilder, spec: TerrainSpec, shape: Shape, issues: Issues, position: Vec3 = ORIGIN) -> None:
+    touch = Surface(friction=spec.friction, restitution=spec.restitution)
+    color = (*nominal_rgb(spec.color, _GREY, issues), 1.0)
+    builder.geoms.append(Geom(GROUND, WORLD, shape, position, color=color, surface=touch))

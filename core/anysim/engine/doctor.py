@@ -1,0 +1,117 @@
+"""Diagnosis of engines: what is installed, imports, falls, draws, and the remedy for what does not.
+
+Each engine is tried in a process of its own (`anysim.engine.doctor_trial`), so that one that crashes, hangs or prints
+costs nothing but its own findings.
+"""
+
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Iterable
+from enum import StrEnum
+from typing import NamedTuple
+
+from anysim import registry
+from anysim.errors import AnysimError
+
+TIMEOUT_S = 180.0
+"""Longest time [s] of a trial. SAPIEN's first image takes half a minute with some drivers in software."""
+
+
+class Health(StrEnum):
+    """How a thing is."""
+
+    OK = "ok"
+    NOTE = "note"  # good to know, nothing to repair
+    ABSENT = "absent"  # this engine does not have it, by design
+    MISSING = "missing"  # not installed
+    UNAVAILABLE = "unavailable"  # installed, but not for this machine, or a version that must not be used
+    WRONG = "wrong"  # it runs and gives a wrong answer
+    BROKEN = "broken"  # it does not run
+
+
+class Finding(NamedTuple):
+    """One line of a diagnosis: what was looked at, how it is, what was found, and the remedy where one is needed."""
+
+    what: str
+    state: Health
+    found: str
+    remedy: str = ""
+
+
+class Examination(NamedTuple):
+    """The findings of one engine, and whether it steps a world with dynamics as physics says."""
+
+    findings: tuple[Finding, ...]
+    works: bool
+
+
+def examine(name: str, timeout: float = TIMEOUT_S) -> Examination:
+    """Try an installed engine. Never raises because of the engine."""
+    head = f"engine: {name}"
+    try:
+        engine = registry.load("engines", name)
+        here = engine.availability()
+    except AnysimError as error:
+        return _failed(head, Health.BROKEN, str(error), f"reinstall {_package(name)}")
+    except Exception as error:  # noqa: BLE001  whatever a stranger's engine does here belongs into its row
+        return _failed(head, Health.BROKEN, f"availability() raised {type(error).__name__}: {error}", "report it")
+    if not here.available:
+        return _failed(head, Health.UNAVAILABLE, "; ".join(here.missing), here.remedy)
+    installed = Finding(head, Health.OK, f"{here.version}, of {_package(name)}")
+    tried = _try_apart(name, timeout)
+    return Examination((installed, *tried.findings), tried.works)
+
+
+def _failed(what: str, state: Health, found: str, remedy: str) -> Examination:
+    return Examination((Finding(what, state, found, remedy),), False)
+
+
+def _package(name: str) -> str:
+    try:
+        return registry.distribution("engines", name)
+    except AnysimError:
+        return "the package it comes from"
+
+
+def _try_apart(name: str, timeout: float) -> Examination:
+    """The trial in its own process; its death or silence is a finding."""
+    what = f"{name}: physics"
+    command = (sys.executable, "-m", "anysim.engine.doctor_trial", name)
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=False)
+    except subprocess.TimeoutExpired:
+        return _failed(what, Health.BROKEN, f"no answer within {timeout:g} s", "reinstall it, or look at its driver")
+    findings, works = _read(done.stdout.splitlines())
+    if done.returncode != 0:
+        words = "; ".join(done.stderr.strip().splitlines()[-3:])[-300:]
+        died = Finding(
+            what if not findings else f"{name}: rendering",
+            Health.BROKEN,
+            f"{_end(done.returncode)}: {words}",
+            f"reinstall {_package(name)}" if not findings else "look at the graphics driver; physics does not need it",
+        )
+        findings = (*findings, died)
+    return Examination(findings, works)
+
+
+def _read(lines: Iterable[str]) -> tuple[tuple[Finding, ...], bool]:
+    """What a trial printed: a JSON document in each line. Lines that the engine's libraries print are passed over."""
+    findings: list[Finding] = []
+    works = False
+    for line in lines:
+        try:
+            document = json.loads(line)
+        except json.JSONDecodeError:
+            continue
+        if isinstance(document, dict) and document.keys() >= {"what", "state", "found", "remedy", "works"}:
+            works |= bool(document.pop("works"))
+            findings.append(Finding(document["what"], Health(document["state"]), document["found"], document["remedy"]))
+    return tuple(findings), works
+
+
+def _end(code: int) -> str:
+    if code < 0:
+        return f"the process died of {signal.Signals(-code).name}"
+    return f"the process ended with code {code}"

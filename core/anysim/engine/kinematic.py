@@ -1,0 +1,238 @@
+"""The kinematic engine: bodies and joints move by their velocities alone. It is for tests of everything but physics.
+
+There is no gravity, no contact and no force. A free body's pose integrates its twist. A joint integrates its velocity
+and stops at its limits. A position drive brings its joint towards the target by at most the joint's velocity limit, so
+that without one the joint is there after one step; a velocity drive gives its joint the velocity at once; an effort
+drive does nothing. Parameters are stored and read back, and change nothing else. All arithmetic is elementwise, so an
+env's result is the same bits whatever the number of envs.
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from anysim import __version__
+from anysim.conventions import Array
+from anysim.engine.base import SimEngine
+from anysim.engine.capability import Capabilities, Capability as C
+from anysim.engine.control import MODES, Control
+from anysim.engine.lighting import LIGHTS, SURROUNDINGS, Looks
+from anysim.engine.parameters import PARAMETERS, nominal
+from anysim.engine.presence import Lifecycle
+from anysim.engine.state import Availability, SnapshotLevel
+from anysim.math import pose as P
+from anysim.model.forward_kinematics import forward_kinematics
+from anysim.model.world import BodyKind, ControlMode, JointType, Scenery, World
+
+_UNSEEN = Scenery(background=(0.0, 0.0, 0.0), ambient=(0.0, 0.0, 0.0), shadows=False)
+"""What nobody draws here."""
+
+_IGNORED = "ignored: kinematic engine"
+_POSITION, _VELOCITY = MODES.index(ControlMode.POSITION), MODES.index(ControlMode.VELOCITY)
+
+
+class NullEngine(SimEngine):
+    """See the module's docstring."""
+
+    name = "null"
+    capabilities = Capabilities.of(
+        C.RIGID_BODIES,
+        C.ARTICULATIONS,
+        C.MIMIC_JOINTS,
+        C.JOINT_LIMITS,
+        C.SNAPSHOT_STATE,
+        C.SNAPSHOT_TRAJECTORY,
+        C.VARYING_ENTITIES,
+        C.PARAMETERS_PER_ENV,
+        approximate={
+            C.CONTROL_POSITION: "the joint moves to its target at its velocity limit, whatever the gains",
+            C.CONTROL_VELOCITY: "the joint has its target velocity at once, whatever the gains",
+            C.CONTROL_EFFORT: _IGNORED,
+            C.VELOCITY_LIMITS: "position drives alone heed them, and always",
+            C.CONTACT_SENSORS: "read zero: kinematic engine",
+            **dict.fromkeys(
+                (
+                    C.CONTACTS,
+                    C.TERRAIN_PLANE,
+                    C.TERRAIN_HEIGHTFIELD,
+                    C.TERRAIN_TRIMESH,
+                    C.SHAPE_MESH,
+                    C.JOINT_FRICTION,
+                    C.ARMATURE,
+                    C.EFFORT_LIMITS,
+                    C.ACTUATION_EXPLICIT,
+                    C.ACTUATION_NATIVE,
+                    C.GRAVITY_COMPENSATION,
+                    C.RESTITUTION,
+                    C.TORSIONAL_FRICTION,
+                    C.BODY_DAMPING,
+                    C.CONTACT_OFFSET,
+                    C.SOLVER_SETTINGS,
+                ),
+                _IGNORED,
+            ),
+        },
+    )
+    lifecycle: ClassVar[Lifecycle] = Lifecycle.P2
+    parameters: ClassVar[frozenset[str]] = frozenset(PARAMETERS)
+
+    @classmethod
+    def availability(cls) -> Availability:
+        """It needs nothing but numpy, so it always runs."""
+        return Availability(True, __version__)
+
+    # ------------------------------------------------------------------ lifecycle
+
+    def _build(self, world: World, num_envs: int) -> None:
+        n, bodies, joints = num_envs, len(world.bodies), len(world.joints)
+        self._roots = np.zeros((n, bodies, 7))
+        self._twists = np.zeros((n, bodies, 6))
+        self._position = np.zeros((n, joints))
+        self._velocity = np.zeros((n, joints))
+        self._lower = np.array([j.lower for j in world.joints])
+        self._upper = np.array([j.upper for j in world.joints])
+        self._speed_limit = np.array([j.velocity_limit for j in world.joints])
+        self._driven = np.array([a.joint for a in world.actuators], dtype=int)
+        self._followers = [(i, j.mimic) for i, j in enumerate(world.joints) if j.mimic is not None]
+        self._control: Control | None = None
+        self._defaults = {name: _default(world, name) for name in PARAMETERS}
+        self._values = {name: np.repeat(v[None], n, axis=0) for name, v in self._defaults.items()}
+
+    def _free(self) -> None:
+        del self._roots, self._twists, self._position, self._velocity, self._values, self._control
+
+    def _reset(self, ids: Array) -> None:
+        self._roots[ids] = self.world.initial_body_pose
+        self._twists[ids] = 0.0
+        self._position[ids] = [j.initial for j in self.world.joints]
+        self._velocity[ids] = 0.0
+
+    def _populate(self, ids: Array) -> None:
+        """Nothing touches or sees anything here, so nobody has to leave: what is absent moves unseen."""
+
+    # ------------------------------------------------------------------ stepping
+
+    def _step(self, n_steps: int, ids: Array | None) -> None:
+        rows = np.arange(self.num_envs) if ids is None else ids
+        dt = self.world.physics.dt
+        for _ in range(n_steps):
+            self._move_bodies(rows, dt)
+            self._move_joints(rows, dt)
+
+    def _move_bodies(self, rows: Array, dt: float) -> None:
+        twist = self._twists[rows]
+        pose = self._roots[rows]
+        moving = (twist != 0.0).any(axis=-1)  # a body at rest keeps its bits
+        rate = P.norm(twist[..., 3:])
+        axis = twist[..., 3:] / np.where(rate == 0.0, 1.0, rate)[..., None]
+        turned = P.normalize(P.multiply(P.from_axis_angle(axis, rate * dt), pose[..., 3:]))
+        moved = np.concatenate([pose[..., :3] + twist[..., :3] * dt, turned], axis=-1)
+        self._roots[rows] = np.where(moving[..., None], moved, pose)
+
+    def _move_joints(self, rows: Array, dt: float) -> None:
+        position, velocity = self._position[rows], self._velocity[rows]
+        goal = position + velocity * dt
+        if len(self._driven):
+            assert self._control is not None
+            mode, target, reach = (
+                self._control.mode[rows],
+                self._control.position[rows],
+                self._speed_limit[self._driven],
+            )
+            here = position[:, self._driven]
+            way = (target - here) / dt
+            rate = np.where(mode == _VELOCITY, self._control.velocity[rows], velocity[:, self._driven])
+            rate = np.where(mode == _POSITION, way, rate)
+            velocity[:, self._driven] = np.clip(rate, -reach, reach)
+            # a joint that arrives gets the target's own bits, which a sum would round
+            arrives = (mode == _POSITION) & (np.abs(way) <= reach)
+            goal[:, self._driven] = np.where(arrives, target, here + velocity[:, self._driven] * dt)
+        velocity[(goal < self._lower) | (goal > self._upper)] = 0.0
+        goal = np.clip(goal, self._lower, self._upper)
+        for joint, mimic in self._followers:
+            goal[:, joint] = mimic.multiplier * goal[:, mimic.joint] + mimic.offset
+            velocity[:, joint] = mimic.multiplier * velocity[:, mimic.joint]
+        self._position[rows], self._velocity[rows] = goal, velocity
+
+    # ------------------------------------------------------------------ reading and writing
+
+    def _read(self, name: str) -> Array:
+        n = self.num_envs
+        if name == "body_pose":
+            return forward_kinematics(self.world, self._roots, self._position)
+        if name == "body_twist":
+            return self._forward_twists()
+        if name == "joint_pos":
+            return self._position.copy()
+        if name == "joint_vel":
+            return self._velocity.copy()
+        if name == "joint_effort":
+            return np.zeros_like(self._position)
+        if name == "contact_force":
+            return np.zeros((n, len(self.world.contact_sensors), 3))
+        state = (self._roots, self._twists, self._position, self._velocity)
+        return np.array([not all(np.isfinite(part[i]).all() for part in state) for i in range(n)], dtype=bool)
+
+    def _forward_twists(self) -> Array:
+        """World twists (N, B, 6): a link's is its parent's, carried to its origin, plus what its joint adds."""
+        world = self.world
+        poses = forward_kinematics(world, self._roots, self._position)
+        twists = self._twists.copy()
+        for i, body in enumerate(world.bodies):
+            if body.kind is not BodyKind.LINK:
+                continue
+            joint = world.joints[world.body_joint[i]]
+            parent, rate = twists[:, body.parent], self._velocity[:, world.body_joint[i], None]
+            linear = parent[:, :3] + P.cross(parent[:, 3:], poses[:, i, :3] - poses[:, body.parent, :3])
+            axis = P.rotate(poses[:, i, 3:], np.broadcast_to(joint.axis, (len(poses), 3)))
+            if joint.type is JointType.PRISMATIC:
+                twists[:, i] = np.concatenate([linear + axis * rate, parent[:, 3:]], axis=-1)
+            else:
+                arm = P.rotate(poses[:, i, 3:], np.broadcast_to(joint.anchor, (len(poses), 3)))
+                turning = P.cross(axis * rate, -arm)
+                twists[:, i] = np.concatenate([linear + turning, parent[:, 3:] + axis * rate], axis=-1)
+        return twists
+
+    def _write_joints(self, ids: Array, joints: Array, position: Array | None, velocity: Array | None) -> None:
+        if position is not None:
+            self._position[np.ix_(ids, joints)] = position
+        if velocity is not None:
+            self._velocity[np.ix_(ids, joints)] = velocity
+
+    def _write_bodies(self, ids: Array, bodies: Array, pose: Array | None, twist: Array | None) -> None:
+        if pose is not None:
+            self._roots[np.ix_(ids, bodies)] = pose
+        if twist is not None:
+            self._twists[np.ix_(ids, bodies)] = twist
+
+    def _apply_control(self, control: Control) -> None:
+        self._control = Control(*(part.copy() for part in control))
+
+    # ------------------------------------------------------------------ parameters and snapshots
+
+    def _get_parameter(self, name: str) -> Array:
+        return self._values[name]
+
+    def _set_parameter(self, name: str, values: Array, ids: Array, indices: Array) -> None:
+        self._values[name][np.ix_(ids, indices)] = values
+
+    def _default_parameter(self, name: str) -> Array:
+        return self._defaults[name]
+
+    def _snapshot(self, ids: Array, level: SnapshotLevel) -> dict[str, Array]:
+        return {
+            "roots": self._roots[ids],
+            "twists": self._twists[ids],
+            "position": self._position[ids],
+            "velocity": self._velocity[ids],
+        }
+
+    def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:
+        self._roots[ids], self._twists[ids] = data["roots"], data["twists"]
+        self._position[ids], self._velocity[ids] = data["position"], data["velocity"]
+
+
+def _default(world: World, name: str) -> Array:
+    """The values (K, ...) of a parameter before anything changes it."""
+    return Looks(world, 1, _UNSEEN).default(name) if name in (*LIGHTS, *SURROUNDINGS) else nominal(name, world)

@@ -1,0 +1,168 @@
+"""The parent's side of one worker process: start, ask, answer, end.
+
+A worker is started as a program of its own, not through multiprocessing's `spawn`: that would run the user's main
+module again, which a script without a `__main__` guard does not survive. Messages are tuples of plain values, arrays
+and the frozen World, over a socket pair that no other process can reach.
+"""
+
+import json
+import os
+import select
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import time
+from multiprocessing.connection import Connection
+from multiprocessing.spawn import get_executable
+from typing import Any
+
+from anysim import errors
+from anysim.engine.sharded.parent_watch import Lifeline
+from anysim.errors import AnysimError, EngineError
+
+_PROGRAM = (
+    "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
+    "from anysim.engine.sharded.worker import main; main(int(sys.argv[2]), int(sys.argv[3]))"
+)
+GRACE_S = 10.0
+"""How long a worker may take to free its engine and end by itself [s]."""
+
+
+class WorkerLost(Exception):
+    """A worker that ended or does not answer; the text says how."""
+
+
+class Worker:
+    """One worker process. Every message is answered; an answer that nobody waited for is dropped before the next."""
+
+    def __init__(self, environment: dict[str, str], timeout_s: float) -> None:
+        self._timeout = timeout_s
+        self._owed = 0
+        own, theirs = socket.socketpair()
+        lifeline = Lifeline()
+        try:
+            self._process = subprocess.Popen(
+                [
+                    get_executable(),
+                    "-P",
+                    "-c",
+                    _PROGRAM,
+                    json.dumps(sys.path),
+                    str(theirs.fileno()),
+                    str(lifeline.worker_end),
+                ],
+                pass_fds=(theirs.fileno(), lifeline.worker_end),
+                stdin=subprocess.DEVNULL,
+                env=environment,
+            )
+        except BaseException:
+            own.close()
+            lifeline.cut()
+            raise
+        finally:
+            theirs.close()
+            lifeline.handed_over()
+        self._lifeline, self._socket = lifeline, own
+        # a message larger than the socket's buffer must not wait for ever for a worker that stopped reading it
+        limit = struct.pack("ll", int(timeout_s), int(timeout_s % 1 * 1e6))
+        own.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, limit)
+        own.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, limit)
+        self._connection = Connection(os.dup(own.fileno()))
+        self._arrival = select.poll()  # once: Connection.poll makes a selector for each call
+        self._arrival.register(own, select.POLLIN)
+
+    @property
+    def pid(self) -> int:
+        """The process id."""
+        return self._process.pid
+
+    def post(self, message: tuple[Any, ...], descriptor: int | None = None) -> None:
+        """Send a message, with a file descriptor if there is one.
+
+        Raises:
+            WorkerLost: it is gone.
+        """
+        while self._owed:  # of a call that was interrupted
+            self._receive(time.perf_counter() + self._timeout)
+        try:
+            self._connection.send(message)
+            if descriptor is not None:
+                socket.send_fds(self._socket, [b"+"], [descriptor])
+        except BlockingIOError:
+            raise WorkerLost(self._hangs(self._timeout)) from None
+        except OSError:
+            raise WorkerLost(self._how_it_ended()) from None
+        self._owed += 1
+
+    def answer(self, deadline: float, limit: float) -> Any:
+        """The answer to the last message, by a time of `time.perf_counter()`; `limit` [s] is for the message.
+
+        Raises:
+            WorkerLost: it is gone, or too late and was killed.
+            AnysimError: what the engine raised in the worker.
+        """
+        kind, *content = self._receive(deadline, limit)
+        if kind == "error":
+            raise _raised(*content)
+        return content[0]
+
+    def _receive(self, deadline: float, limit: float | None = None) -> tuple[Any, ...]:
+        try:
+            if not self._arrival.poll(max(0.0, deadline - time.perf_counter()) * 1e3):
+                raise WorkerLost(self._hangs(self._timeout if limit is None else limit))
+            answer = self._connection.recv()
+        except BlockingIOError:
+            raise WorkerLost(self._hangs(self._timeout)) from None
+        except (EOFError, OSError, ValueError):  # ValueError: closed here, when it was lost before
+            raise WorkerLost(self._how_it_ended()) from None
+        self._owed -= 1
+        return answer
+
+    def _hangs(self, limit: float) -> str:
+        self.kill()
+        return f"did not answer within {limit:g} s and was killed"
+
+    def _how_it_ended(self) -> str:
+        try:
+            code = self._process.wait(1.0)
+        except subprocess.TimeoutExpired:
+            self.kill()
+            return "closed its connection and was killed"
+        if code >= 0:
+            return f"ended with exit code {code}"
+        name = signal.Signals(-code).name if -code in set(signal.Signals) else "unknown"
+        return f"was ended by signal {-code} ({name})"
+
+    def part(self) -> None:
+        """Ask it to end, without waiting."""
+        try:
+            self._socket.settimeout(0.0)
+            self._connection.send(("stop", None))
+        except OSError:
+            pass
+
+    def close(self, grace_s: float = GRACE_S) -> None:
+        """Wait until it has ended after `part`, kill it if it does not, and release what belonged to it."""
+        try:
+            self._process.wait(grace_s)
+        except subprocess.TimeoutExpired:
+            pass
+        finally:
+            self.kill()
+
+    def kill(self) -> None:
+        """End it now, if it is still there, and release what belonged to it."""
+        if self._process.poll() is None:
+            self._process.kill()
+            self._process.wait()
+        self._lifeline.cut()
+        self._connection.close()
+        self._socket.close()
+
+
+def _raised(name: str, message: str) -> AnysimError:
+    """The error of the worker, of the same type where a message makes one."""
+    kind = getattr(errors, name, EngineError)
+    return EngineError(message) if kind is errors.SpecError else kind(message)

@@ -1,0 +1,1 @@
+"""Shapes of the neutral model: bounds, convex parts, hulls, triangles and polygons."""

@@ -1,0 +1,157 @@
+"""Masses and inertias: composing rigidly joined bodies, repairing impossible ones, and those of shapes.
+
+Validity is judged on the second moments S = tr(I)/2 - I, which are the mass integrals of r r^T: a mass distribution
+exists exactly where S is positive semidefinite, and that is the same as I being positive with the triangle inequality.
+"""
+
+from collections.abc import Mapping, Sequence
+from math import pi
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.math import pose as P
+from anysim.model.rounding import tidy
+from anysim.model.world import Box, Capsule, Cylinder, Inertial, Mesh, MeshShape, Shape, Sphere
+
+BALL_RADIUS = 0.01  # [m] of the solid ball that stands for a body with mass and without any inertia
+_FLOOR = 1e-6  # smallest second moment of a moving body, relative to their sum: engines reject exact equality
+_NOISE = 1e-12
+
+
+def tensor(inertial: Inertial) -> Array:
+    """The inertia about the centre of mass as a matrix (3, 3), body axes."""
+    xx, yy, zz, xy, xz, yz = inertial.inertia
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def make(mass: float, com: Array, matrix: Array) -> Inertial:
+    """An Inertial from arrays; what is only rounding noise becomes zero, so that hashes do not depend on it."""
+    noise = _NOISE * max(float(np.trace(matrix)), 0.0)
+    moments = (matrix[0, 0], matrix[1, 1], matrix[2, 2], matrix[0, 1], matrix[0, 2], matrix[1, 2])
+    xx, yy, zz, xy, xz, yz = (float(m) if abs(m) > noise else 0.0 for m in moments)
+    return Inertial(float(mass), tidy(com), (xx, yy, zz, xy, xz, yz))
+
+
+def moved(inertial: Inertial, pose: Array) -> Inertial:
+    """The same body seen from a frame in which its own has the pose (7,)."""
+    rotation = P.to_matrix(pose[3:])
+    com = pose[:3] + rotation @ np.array(inertial.com)
+    return make(inertial.mass, com, rotation @ tensor(inertial) @ rotation.T)
+
+
+def composed(parts: Sequence[Inertial]) -> Inertial:
+    """Bodies of one frame as one rigid body (parallel axes, exact)."""
+    mass = sum(part.mass for part in parts)
+    if len(parts) == 1 or mass <= 0:
+        return parts[0] if len(parts) == 1 else Inertial(0.0)
+    com = sum((part.mass * np.array(part.com) for part in parts), np.zeros(3)) / mass
+    total = np.zeros((3, 3))
+    for part in parts:
+        d = np.array(part.com) - com
+        total += tensor(part) + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
+    return make(mass, com, total)
+
+
+def repaired(inertial: Inertial) -> tuple[Inertial, str | None]:
+    """The nearest inertial that a body can have, and what was changed; None where nothing was.
+
+    Negative second moments are set to zero (the nearest positive semidefinite matrix in the Frobenius norm). A body
+    with mass and no inertia at all becomes a solid ball of `BALL_RADIUS`.
+    """
+    if inertial.mass <= 0:
+        return Inertial(0.0), None if not any(inertial.inertia) else "has inertia and no mass; the inertia is dropped"
+    moments, axes = np.linalg.eigh(_second_moments(tensor(inertial)))
+    total = float(moments.sum())
+    if total <= 0:
+        value = 0.4 * inertial.mass * BALL_RADIUS**2
+        return (
+            Inertial(inertial.mass, inertial.com, (value, value, value, 0.0, 0.0, 0.0)),
+            f"has a mass of {inertial.mass:g} kg and no inertia; taken as a ball of {BALL_RADIUS * 100:g} cm radius",
+        )
+    if moments[0] >= -_NOISE * total:
+        return inertial, None
+    clipped = axes * np.maximum(moments, 0.0) @ axes.T
+    fixed = make(inertial.mass, np.array(inertial.com), np.trace(clipped) * np.eye(3) - clipped)
+    change = float(np.linalg.norm(tensor(fixed) - tensor(inertial)) / np.linalg.norm(tensor(inertial)))
+    return fixed, f"has an inertia that no body can have; the nearest possible one differs by {100 * change:.2g} %"
+
+
+def moving(inertial: Inertial) -> Inertial:
+    """An inertial that engines accept for a moving body: every second moment at least `_FLOOR` of their sum."""
+    moments, axes = np.linalg.eigh(_second_moments(tensor(inertial)))
+    floor = _FLOOR * float(moments.sum())
+    if moments[0] >= floor:
+        return inertial
+    raised = axes * np.maximum(moments, floor) @ axes.T
+    return make(inertial.mass, np.array(inertial.com), np.trace(raised) * np.eye(3) - raised)
+
+
+def _second_moments(matrix: Array) -> Array:
+    return 0.5 * np.trace(matrix) * np.eye(3) - matrix
+
+
+def scaled(inertial: Inertial, factor: float) -> Inertial:
+    """The same body with `factor` times the mass."""
+    return make(inertial.mass * factor, np.array(inertial.com), tensor(inertial) * factor)
+
+
+def volume(shape: Shape, meshes: Mapping[str, Mesh]) -> float:
+    """[m^3]; 0 for shapes without one (planes, height fields)."""
+    match shape:
+        case Box((x, y, z)):
+            return 8 * x * y * z
+        case Sphere(r):
+            return 4 / 3 * pi * r**3
+        case Cylinder(r, h):
+            return pi * r * r * 2 * h
+        case Capsule(r, h):
+            return pi * r * r * 2 * h + 4 / 3 * pi * r**3
+        case MeshShape(name):
+            return _solid(meshes[name])[0]
+        case _:
+            return 0.0
+
+
+def of_shape(shape: Shape, mass: float, meshes: Mapping[str, Mesh]) -> Inertial:
+    """The inertial of a homogeneous solid of this shape, in the shape's frame; a mesh counts as its closed surface.
+
+    Raises:
+        ValueError: the shape has no volume.
+    """
+    match shape:
+        case Box((x, y, z)):
+            third = mass / 3
+            xx, yy, zz = third * (y * y + z * z), third * (x * x + z * z), third * (x * x + y * y)
+        case Sphere(r):
+            xx = yy = zz = 0.4 * mass * r * r
+        case Cylinder(r, h):
+            xx = yy = mass * (3 * r * r + 4 * h * h) / 12
+            zz = 0.5 * mass * r * r
+        case Capsule(r, h):
+            tube = mass * (2 * h) / (2 * h + 4 / 3 * r)
+            caps = mass - tube
+            xx = yy = tube * (3 * r * r + 4 * h * h) / 12 + caps * (0.4 * r * r + h * h + 0.75 * r * h)
+            zz = 0.5 * tube * r * r + 0.4 * caps * r * r
+        case MeshShape(name):
+            size, com, inertia = _solid(meshes[name])
+            if size <= 0:
+                raise ValueError(f"the mesh '{name}' encloses no volume")
+            return make(mass, com, inertia * (mass / size))
+        case _:
+            raise ValueError(f"a {type(shape).__name__} has no mass of its own")
+    return Inertial(mass, (0.0, 0.0, 0.0), (xx, yy, zz, 0.0, 0.0, 0.0))
+
+
+def _solid(mesh: Mesh) -> tuple[float, Array, Array]:
+    """Volume, centroid and inertia about it at density 1 of a closed surface, summed over tetrahedra to the origin."""
+    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
+    six = (a * np.cross(b, c)).sum(axis=1)
+    size = float(six.sum() / 6)
+    if abs(size) < 1e-18:
+        return 0.0, np.zeros(3), np.zeros((3, 3))
+    total = a + b + c
+    com = (six[:, None] * total).sum(axis=0) / 24 / size
+    outer = sum(np.einsum("f,fi,fj->ij", six, v, v) for v in (a, b, c, total)) / 120
+    centred = outer - size * np.outer(com, com)
+    return size, com, np.trace(centred) * np.eye(3) - centred

@@ -1,0 +1,150 @@
+"""Where proposals come in: asked for once an episode, noted in its record, and set aside where they cannot be kept.
+
+A recorded episode is replayed from the poses in its record; neither file nor proposer is needed then.
+"""
+
+from collections.abc import Mapping, Sequence
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from anysim import registry
+from anysim.geometry.convex_parts import IDENTITY, Pose, pose_of
+from anysim.placement.constraints import Settled
+from anysim.placement.proposals import Proposer, Request, Support, Thing, faults, parsed, read_file
+from anysim.placement.scenery import Scenery
+from anysim.placement.search import Refused, Task
+from anysim.placement.support_surfaces import HEADROOM
+from anysim.randomization.streams import Origin, Streams
+from anysim_schemas.layout import LayoutSourceSpec, RepairSpec
+from anysim_schemas.proposals import Proposal
+
+STREAM = "layout/proposal"
+"""The name of what was proposed in the record of an episode, and of the stream that chooses among several."""
+
+REFUSED = "layout/proposal_refused"
+
+
+class Desk:
+    """Takes proposals for all envs."""
+
+    path = "world.layout_source"
+
+    def __init__(self, source: LayoutSourceSpec | None, given: Any) -> None:
+        """`given` is a path, a proposer, or what a proposer gives; where None, `source` says who is asked."""
+        self.bounds = RepairSpec() if source is None else source.repair
+        self.falls_back = source is not None and source.on_refusal == "layout"
+        self._from = source.proposal if given is None and source is not None else given
+        self._ready: tuple[Proposal, ...] | Proposer | None = None
+        self._recalled: dict[int, Any] = {}
+        if isinstance(self._from, Path) and self._from.is_file():
+            self._ready = read_file(self._from, f"{self.path}.proposal")
+
+    def recall(self, env: int, drawn: Mapping[str, Any]) -> None:
+        """The next reset of this env takes what a record holds."""
+        if STREAM in drawn:
+            self._recalled[env] = drawn[STREAM]
+
+    def propose(
+        self, env: int, streams: Streams, scenery: Scenery, tasks: Sequence[Task], settled: Mapping[str, Settled]
+    ) -> None:
+        """Give the tasks the poses that are proposed for them.
+
+        Raises:
+            Refused: names that do not exist, or numbers that are no pose; a sentence for each.
+        """
+        if env in self._recalled:
+            chosen = parsed(self._recalled.pop(env), "the record", self.path)[0]
+        else:
+            seed = int(streams.generator(env, STREAM).integers(0, 2**31))
+            offers = self._offers(lambda: _request(scenery, tasks, settled, seed))
+            chosen = offers[seed % len(offers)]
+        data = chosen.model_dump(mode="json", exclude_defaults=True)
+        streams.note(env, STREAM, data, Origin(STREAM, self.path))
+        wrong = faults(chosen, [task.item.name for task in tasks])
+        if wrong:
+            raise Refused("; ".join(wrong.values()))
+        for task in tasks:
+            task.proposed = chosen.poses.get(task.item.name)
+
+    def dismiss(self, env: int, streams: Streams, why: str, tasks: Sequence[Task]) -> None:
+        """Go on without what was proposed, and say so in the record."""
+        streams.note(env, REFUSED, why, Origin(STREAM, self.path))
+        for task in tasks:
+            task.proposed = None
+            task.tick = 0
+
+    def _offers(self, request: Any) -> tuple[Proposal, ...]:
+        if self._ready is None:
+            self._ready = self._found()
+        if isinstance(self._ready, tuple):
+            return self._ready
+        return parsed(self._ready(request()), f"what '{_name(self._ready)}' gives", self.path)
+
+    def _found(self) -> tuple[Proposal, ...] | Proposer:
+        source = self._from
+        if isinstance(source, str) and source.lstrip()[:1] in ("{", "["):
+            return parsed(source, "what was given to make()", self.path)
+        if isinstance(source, str) and not source.endswith(".json"):
+            source = registry.load("layouts", source)
+        if callable(source):
+            return source
+        if isinstance(source, str | Path):
+            return read_file(Path(source), f"{self.path}.proposal")
+        return parsed(source, "what was given to make()", self.path)
+
+
+def _name(proposer: Proposer) -> str:
+    return getattr(proposer, "__qualname__", type(proposer).__name__)
+
+
+def _request(scenery: Scenery, tasks: Sequence[Task], settled: Mapping[str, Settled], seed: int) -> Request:
+    """What a proposer is told: sizes, nominal supports and what the layout says. Plain data."""
+    world = scenery.world
+    things, supports = [], []
+    for task in tasks:
+        box = task.solid.at(Pose((0.0, 0.0, 0.0), IDENTITY))
+        x, y, z = (round(h - w, 9) for w, h in zip(box.low, box.high, strict=True))
+        entity = next(e for e in world.entities if e.name == task.solid.name)
+        things.append(
+            Thing(
+                task.item.name,
+                task.item.category,
+                entity.label,
+                (x, y, z),
+                round(-box.low[2], 9),
+                task.place.model_dump(mode="json", by_alias=True, exclude_defaults=True),
+            )
+        )
+    initial = {task.item.name: task.solid.at(_initial(scenery, task.solid.name)) for task in tasks}
+    initial |= {name: one.placed for name, one in settled.items() if name not in {r.name for r in world.robots}}
+    still = [p for name, p in initial.items() if name in settled or scenery.solid(p.name).fixed]
+    for name, placed in initial.items():
+        if not scenery.solid(placed.name).fixed:
+            continue
+        x, y, z = placed.pose.position
+        for surface in scenery.surfaces_of(placed):
+            height = z + surface.height
+            taken = [
+                (p.low[0], p.low[1], p.high[0], p.high[1])
+                for p in still
+                if p is not placed and p.low[2] < height + HEADROOM and p.high[2] > height + 1e-6
+            ]
+            outline = [(x + px, y + py) for px, py in surface.polygon]
+            headroom = 1e3 if surface.headroom == inf else surface.headroom
+            supports.append(Support(f"{name}.{surface.name}", height, headroom, outline, taken))
+    robots = {
+        robot.name: [float(v) for v in np.array(world.bodies[e.root].position)]
+        for robot in world.robots
+        for e in world.entities
+        if e.name == robot.name
+    }
+    return Request(world.name, seed, things, supports, robots)
+
+
+def _initial(scenery: Scenery, name: str) -> Pose:
+    entity = next(e for e in scenery.world.entities if e.name == name)
+    body = scenery.world.bodies[entity.root]
+    return pose_of((*body.position, *body.quaternion))

@@ -1,0 +1,1 @@
+"""Placement: where objects go, nominally and in each episode."""

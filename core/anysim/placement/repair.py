@@ -1,0 +1,76 @@
+"""A proposed pose as a possible one: dropped onto its support, turned upright, pushed out of others, within bounds."""
+
+from collections.abc import Callable
+from math import acos
+
+from anysim.geometry import polygon as G
+from anysim.geometry.convex_parts import Pose, Quaternion, Solid, heading, matrix_of, turn_about_z
+from anysim.placement.candidate import Candidate
+from anysim.placement.context import Around, Impossible
+from anysim.placement.packing import shifted
+from anysim.placement.proposals import nudges
+from anysim.placement.standing_areas import footings_of, region_of
+from anysim_schemas.layout import PlaceFields, RepairSpec
+from anysim_schemas.proposals import ProposedPose
+
+SNUG = 1e-6
+"""[m] and [rad] of repair that is none."""
+
+
+def start(
+    solid: Solid, proposed: ProposedPose, place: PlaceFields, bounds: RepairSpec, around: Around
+) -> Candidate | str:
+    """The pose as proposed, upright and on its support within the bounds; else why not, in words after its name."""
+    quaternion = _orientation(proposed, bounds)
+    x, y, z = (a + b for a, b in zip(proposed.position, around.origin, strict=True))
+    pose = Pose((x, y, z), matrix_of(quaternion))
+    found = Candidate(pose, quaternion, solid.at(pose), None, region_of(place, around), "proposal")
+    reference, inside = (place.in_, True) if place.in_ is not None else (place.on, False)
+    if place.position is not None:
+        return found
+    if reference is None or reference == "terrain":
+        low, high = found.placed.low, found.placed.high
+        height, owner = around.ground(low[:2], high[:2]), None
+    else:
+        surfaces = footings_of(reference, inside, around)
+        if isinstance(surfaces, Impossible):
+            return f"cannot be placed: {surfaces.reason}"
+        under = [f for f in surfaces if not f.area or G.holds(f.area, x, y)]
+        if not under:
+            (x0, y0), (x1, y1) = G.bounds(tuple(p for f in surfaces for p in f.area))
+            return (
+                f"is proposed at x {x:.3g}, y {y:.3g}, which is not above '{reference}' "
+                f"(x {x0:.3g} to {x1:.3g}, y {y0:.3g} to {y1:.3g})"
+            )
+        nearest = min(under, key=lambda f: abs(f.height - found.placed.low[2]))
+        height, owner = nearest.height, nearest.owner
+    drop = height - found.placed.low[2]
+    if abs(drop) > bounds.drop + SNUG:
+        way = "above" if drop < 0 else "below"
+        return f"is proposed {abs(drop):.3g} m {way} its support, more than the {bounds.drop:g} m that it may be moved"
+    return shifted(found, 0.0, 0.0, drop)._replace(support=owner)
+
+
+def repaired(found: Candidate, bounds: RepairSpec, objection: Callable[[Candidate], str | None]) -> Candidate | str:
+    """The nearest place beside the proposed one to which nothing objects; else the objection to the proposed one."""
+    first: str | None = None
+    for dx, dy in nudges(bounds.distance):
+        moved = shifted(found, dx, dy) if dx or dy else found
+        wrong = objection(moved)
+        if wrong is None:
+            return moved
+        first = first or wrong
+    return first or ""
+
+
+def _orientation(proposed: ProposedPose, bounds: RepairSpec) -> Quaternion:
+    """As proposed; a tilt that is within the bounds is taken for a slip, and the thing set upright."""
+    if proposed.quaternion is None:
+        return turn_about_z(proposed.yaw)
+    length = sum(c * c for c in proposed.quaternion) ** 0.5
+    x, y, z, w = (c / length for c in proposed.quaternion)
+    rotation = matrix_of((x, y, z, w))
+    tilt = acos(max(-1.0, min(1.0, rotation[2][2])))
+    if tilt > bounds.angle:
+        return (x, y, z, w)
+    return turn_about_z(heading(rotation))

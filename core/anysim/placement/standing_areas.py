@@ -1,0 +1,117 @@
+"""Level surfaces and regions in the world: where something may stand."""
+
+from collections.abc import Callable, Sequence
+from math import inf
+from typing import NamedTuple
+
+from anysim.conventions import GROUND
+from anysim.errors import listing
+from anysim.geometry import polygon as G
+from anysim.geometry.convex_parts import Placed, heading
+from anysim.placement.context import Around, Impossible
+from anysim.placement.support_surfaces import SupportSurface, choose
+from anysim_schemas.layout import PlaceFields
+from anysim_schemas.regions import RegionSpec
+from anysim_schemas.relations import SIDES
+
+
+class Footing(NamedTuple):
+    """A level surface in the world on which something may go: its height, outline, and owner."""
+
+    height: float
+    area: G.Area
+    owner: Placed
+    surface: SupportSurface
+
+
+def footings_of(reference: str, inside: bool, around: Around) -> list[Footing] | Impossible:
+    """The level surfaces that a reference to a support means, in the world."""
+    name, _, part = reference.partition(".")
+    owner = around.find(name)
+    if owner is None:
+        return Impossible(f"'{name}' is not there in this env", hopeless=True)
+    found = around.surfaces_of(owner)
+    if part or not inside:
+        chosen = choose(found, part, inside)
+        kept = [] if chosen is None else [chosen]
+    else:
+        kept = [s for s in found if s.inner or s.headroom < inf]
+    if not kept and (part or inside):
+        names = listing([s.name for s in found]) if found else "none"
+        what = f"no surface '{part}'" if part else "no inside with a level floor"
+        return Impossible(f"'{name}' has {what} (surfaces: {names})", hopeless=True)
+    yaw = heading(owner.pose.rotation) if _upright(owner) else 0.0
+    x, y, z = owner.pose.position
+    return [Footing(s.height + z, G.moved((s.polygon,), x, y, yaw), owner, s) for s in kept] or [
+        Footing(owner.high[2], (), owner, SupportSurface("", -1, "", owner.high[2] - z, (), inf, False))
+    ]
+
+
+def _upright(placed: Placed) -> bool:
+    return placed.pose.rotation[2][2] > 1.0 - 1e-9
+
+
+def standing_places(place: PlaceFields, around: Around) -> list[Footing] | Impossible | None:
+    """Where it may stand; None for the ground."""
+    reference, inside = place.on, False
+    if place.in_ is not None:
+        reference, inside = place.in_, True
+    if reference is None and place.under is None:
+        for field in ("near", *SIDES):
+            relation = getattr(place, field)
+            if relation is None:
+                continue
+            found = around.support_of(relation.of)
+            if found is None:
+                return Impossible(
+                    f"it is not known what '{relation.of}' rests on, so say what this rests on, with `on`",
+                    hopeless=True,
+                )
+            reference, inside = found
+            break
+    if reference is None or reference == GROUND or around.find(reference.partition(".")[0]) is None:
+        return None  # what it would rest on is not there in this env
+    return footings_of(reference, inside, around)
+
+
+def height_under(footings: Sequence[Footing], spot: G.Point) -> float:
+    """The height under a point: of the surface there, else of the owner's highest point."""
+    heights = [f.height for f in footings if f.area and G.holds(f.area, *spot)]
+    return max(heights) if heights else footings[0].owner.high[2]
+
+
+def region_area(spec: RegionSpec, around: Around) -> G.Area:
+    """A region in the world."""
+    if spec.rectangle is not None:
+        area: G.Area = (G.rectangle(*spec.rectangle),)
+    elif spec.circle is not None:
+        area = (G.disc(spec.circle.center, spec.circle.radius),)
+    else:
+        assert spec.polygon is not None
+        area = G.convex_parts(spec.polygon)
+    if spec.of is None:
+        return G.moved(area, around.origin[0], around.origin[1], 0.0)
+    owner = around.find(spec.of)
+    if owner is None:
+        return ()
+    x, y, _ = owner.pose.position
+    return G.moved(area, x, y, heading(owner.pose.rotation))
+
+
+def region_of(place: PlaceFields, around: Around) -> G.Area | None:
+    """The region of a place in the world; None where it has none."""
+    if place.region is None:
+        return None
+    return region_area(place.region if isinstance(place.region, RegionSpec) else around.region(place.region), around)
+
+
+def below_area(place: PlaceFields, around: Around, reach: Callable[[float, float], float]) -> G.Area | None:
+    """Below the box around the other object, wholly where there is the room."""
+    if place.under is None:
+        return None
+    other = around.find(place.under)
+    if other is None:
+        return ()
+    outline = G.rectangle(other.low[:2], other.high[:2])
+    inner = G.eroded(outline, reach)
+    return (inner or outline,)

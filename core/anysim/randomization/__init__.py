@@ -1,0 +1,1 @@
+"""Random streams, distributions, draws and noise."""

@@ -1,0 +1,80 @@
+"""Term functions by name, and their binding to a scene."""
+
+from collections.abc import Callable, Mapping
+from types import ModuleType
+from typing import Any
+
+from anysim import registry
+from anysim.errors import AnysimError, PluginError, SpecError, SpecIssue, listing, suggest
+from anysim.plugin_parameters import options_model, parameters, reference_kind
+from anysim.task.joints import JointView, RangedJointView
+from anysim.task.scene import Frame, ObjectView, RobotView, SceneView
+from anysim.task.slot_frames import CategoryView
+from anysim_schemas.task import TermSpec
+
+BUILTIN = "anysim"
+
+
+def _functions(library: str, kind: str) -> Mapping[str, Callable[..., Any]]:
+    """The terms of one kind in a library: entry point `anysim.terms`, attribute TERMS[kind], a module or a mapping."""
+    tables = getattr(registry.load("terms", library), "TERMS", None)
+    if not isinstance(tables, Mapping):
+        raise PluginError(
+            f"the term library '{library}' of {registry.distribution('terms', library)} has no TERMS mapping"
+        )
+    table = tables.get(kind, {})
+    return {name: getattr(table, name) for name in table.__all__} if isinstance(table, ModuleType) else table
+
+
+def find(kind: str, name: str) -> Callable[..., Any]:
+    """The function of a term: `near` is built in, `library.near` is of an installed library.
+
+    Raises:
+        PluginError: there is none; lists what exists.
+    """
+    library, _, bare = name.rpartition(".")
+    functions = _functions(library or BUILTIN, kind)
+    if bare not in functions:
+        others = [lib for lib in registry.names("terms") if lib != BUILTIN and bare in _functions(lib, kind)]
+        hint = f"; did you mean '{others[0]}.{bare}'?" if others else suggest(bare, list(functions))
+        raise PluginError(f"no {kind} term is named '{name}'{hint} ({kind} terms: {listing(functions, 30)})")
+    return functions[bare]
+
+
+def term_names(library: str) -> list[str]:
+    """The terms of a library, as `kind name`, in order."""
+    tables = registry.load("terms", library).TERMS
+    return [f"{kind} {name}" for kind in tables for name in sorted(_functions(library, kind))]
+
+
+def bind(kind: str, spec: TermSpec, scene: SceneView, path: str) -> Callable[..., Any]:
+    """The term as a function of its positional arguments after `scene`, with parameters checked and names resolved.
+
+    Raises:
+        SpecError: at `path`, a parameter names nothing in this world.
+    """
+    function = find(kind, spec.term)
+    values = options_model(function).model_validate(spec.params)
+    keywords: dict[str, Any] = {}
+    for name, parameter in parameters(function).items():
+        value = getattr(values, name)
+        handle = reference_kind(parameter.annotation)
+        if handle is not None:
+            try:
+                value = resolve(handle, value, scene)
+            except AnysimError as error:
+                raise SpecError([SpecIssue("", f"{path}.{name}", str(error))]) from None
+        keywords[name] = value
+    return lambda *arguments: function(scene, *arguments, **keywords)
+
+
+def resolve(kind: str, name: str | None, scene: SceneView) -> Frame | RobotView | ObjectView | JointView | CategoryView:
+    """The handle that a reference in a YAML file stands for."""
+    if kind == "robot":
+        return scene.robot(scene.index.robot(name).name)
+    assert name is not None
+    if kind in ("joint", "ranged joint"):
+        return (JointView if kind == "joint" else RangedJointView)(scene, name)
+    if kind == "category":
+        return scene.category(name)
+    return ObjectView(scene, name) if kind == "object" else scene.frame(name)

@@ -1,0 +1,168 @@
+"""The task's terms, bound to a scene: commands, observations, rewards, success, failure, events."""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.errors import AnysimError, SpecError, SpecIssue, TaskError
+from anysim.managers.overrides import Overridable
+from anysim.plugin_parameters import options_model
+from anysim.randomization.draw import draw_rows, is_random
+from anysim.randomization.streams import Streams
+from anysim.task.contract import Obs
+from anysim.task.observation_noise import Sensed
+from anysim.task.scene import SceneView
+from anysim.task.term_registry import bind, find
+from anysim_schemas.task import EventTermSpec, TaskSpec
+
+Term = Callable[..., Any]
+
+
+class Mdp:
+    """Evaluates a TaskSpec on a SceneView. Holds one slice of state: the goals, and how long success has held."""
+
+    def __init__(self, spec: TaskSpec, scene: SceneView, streams: Streams) -> None:
+        self.spec, self.scene, self.streams = spec, scene, streams
+        n = scene.engine.num_envs
+        for name in spec.command:
+            scene.goals[name] = np.tile(np.array([0, 0, 0, 0, 0, 0, 1.0]), (n, 1))
+        self.held = np.zeros(n, dtype=np.int64)
+        """Consecutive control steps for which all success terms were true (N,)."""
+        issues: list[SpecIssue] = []
+
+        def terms(kind: str, specs: Mapping[str, Any], section: str) -> dict[str, Term]:
+            bound: dict[str, Term] = {}
+            for name, term in specs.items():
+                try:
+                    bound[name] = bind(kind, term, scene, f"task.{section}.{name}")
+                except SpecError as error:
+                    issues.extend(error.issues)
+                except AnysimError as error:
+                    issues.append(SpecIssue("", f"task.{section}.{name}", str(error)))
+            return bound
+
+        self._commands = terms("command", spec.command, "command")
+        self._rewards = terms("reward", spec.rewards, "rewards")
+        self._success = terms("predicate", spec.success, "success")
+        self._failure = terms("predicate", spec.failure, "failure")
+        self._events = terms("event", spec.events, "events")
+        self._groups: dict[str, list[Term]] = {}
+        for group, entries in spec.observations.items():
+            bound = terms("observation", {str(i): t for i, t in enumerate(entries)}, f"observations.{group}")
+            self._groups[group] = [self._sensed(group, int(i), term) for i, term in bound.items()]
+        if issues:
+            raise SpecError(issues)
+
+    def _sensed(self, group: str, place: int, term: Term) -> Term:
+        """The term with what its spec says of noise, bias and delay; the term itself where that is nothing."""
+        entries = self.spec.observations[group]
+        spec = entries[place]
+        if not Sensed.alters(spec):
+            return term
+        before = sum(entry.term == spec.term for entry in entries[:place])  # terms of one name are told apart by order
+        name = f"task/observations.{group}/{spec.term}{f'~{before}' if before else ''}"
+        return Sensed(term, spec, name, f"task.observations.{group}.{place}", self.scene, self.streams)
+
+    @property
+    def _altered(self) -> list[Sensed]:
+        return [term for terms in self._groups.values() for term in terms if isinstance(term, Sensed)]
+
+    def reset(self, env_ids: Array) -> None:
+        """Reset events, then new goals; the scene must be looking at these rows."""
+        self.held[env_ids] = 0
+        self._run_events("reset", 0)
+        for name, term in self._commands.items():
+            self.scene.goals[name][env_ids] = term(partial(self._draw, f"command/{name}", 0))
+        self.scene.moment += 1  # goals have moved
+        for term in self._altered:
+            term.reset(env_ids)
+
+    def interval_events(self) -> None:
+        """Events of the kind `when: step`, for the rows at hand."""
+        self._run_events("step", self.scene.elapsed[self.scene.rows])
+
+    def _run_events(self, when: str, tick: Any) -> None:
+        for name, term in self._events.items():
+            if self.spec.events[name].when == when:
+                term(partial(self._draw, f"event/{name}", tick))
+
+    def _draw(self, stream: str, tick: Any, name: str, value: Any, where: Array | None = None) -> Array:
+        """Draw for the rows at hand, or for those of them where `where` (n,) is true."""
+        env_ids = self.scene.env_ids
+        if where is not None:
+            env_ids, tick = env_ids[where], np.broadcast_to(tick, len(env_ids))[where]
+        section, _, term = stream.partition("/")
+        source = f"task.{'events' if section == 'event' else section}.{term}.{name}"
+        return draw_rows(value, f"task/{stream}/{name}", self.streams, env_ids, tick, source=source)
+
+    def observe(self) -> Obs:
+        """All groups for the rows at hand, float32 (n, D)."""
+        return {
+            group: np.concatenate([term() for term in terms], axis=1, dtype=np.float32, casting="same_kind")
+            for group, terms in self._groups.items()
+        }
+
+    def reward(self, faulted: Array) -> Array:
+        """The weighted sum of the reward terms for the rows at hand, float32 (n,); NaN for faulted envs.
+
+        Raises:
+            TaskError: a term is not finite for an env whose state is.
+        """
+        total = np.zeros(len(faulted))
+        for name, term in self._rewards.items():
+            value = term()
+            if value.shape != total.shape:
+                raise TaskError(f"reward term '{name}' returned shape {value.shape}, expected {total.shape}")
+            total = total + self.spec.rewards[name].weight * value
+        bad = ~np.isfinite(total)
+        if bad.any():
+            wrong = np.flatnonzero(bad & ~faulted)
+            if len(wrong):
+                raise TaskError(f"the reward of envs {wrong.tolist()} is not finite although their state is")
+        total[faulted] = np.nan
+        return total.astype(np.float32)
+
+    def judge(self) -> tuple[Array, Array]:
+        """(success, failure) (n,) bool for the rows at hand; counts how long success has held."""
+        rows = self.scene.rows
+        n = len(self.held[rows])
+        success = np.full(n, bool(self._success))
+        for term in self._success.values():
+            success &= term()
+        self.held[rows] = np.where(success, self.held[rows] + 1, 0)
+        failure = np.zeros(n, dtype=bool)
+        for term in self._failure.values():
+            failure |= term()
+        return self.held[rows] >= self.spec.hold, failure
+
+    def overridable(self) -> list[Overridable]:
+        """The parameters of commands and events that are drawn; those of events in steps may change midway."""
+        entries: list[Overridable] = []
+        for kind, section, terms in (("command", "command", self.spec.command), ("event", "events", self.spec.events)):
+            for name, term in terms.items():
+                midway = isinstance(term, EventTermSpec) and term.when == "step"
+                values = options_model(find(kind, term.term)).model_validate(term.params)
+                entries += [
+                    Overridable(f"task.{section}.{name}.{key}", values, key, midway=midway)
+                    for key in type(values).model_fields
+                    if is_random(getattr(values, key))
+                ]
+        return entries
+
+    def snapshot(self, env_ids: Array) -> dict[str, Array]:
+        """Copies of the goals and counters."""
+        data = {"held": self.held[env_ids]} | {f"goal.{name}": g[env_ids] for name, g in self.scene.goals.items()}
+        for term in self._altered:
+            data |= term.snapshot(env_ids)
+        return data
+
+    def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
+        """Write what `snapshot` returned."""
+        self.held[env_ids] = data["held"]
+        for name, goal in self.scene.goals.items():
+            goal[env_ids] = data[f"goal.{name}"]
+        for term in self._altered:
+            term.restore(env_ids, data)

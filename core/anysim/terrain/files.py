@@ -1,0 +1,97 @@
+"""Heights and meshes from files. Nothing here unpickles anything."""
+
+import zipfile
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from anysim.assets import meshes
+from anysim.conventions import Array
+from anysim.errors import AssetError
+from anysim.model.ground import MeshGround
+from anysim.model.world import Mesh
+
+ARRAYS = (".npy", ".npz")
+IMAGES = (".png", ".tif", ".tiff", ".bmp", ".pgm", ".jpg", ".jpeg")
+
+
+def read_heights(path: Path, height_range: tuple[float, float] | None) -> Array:
+    """Heights (rows, cols) [m], first row at the lowest y: of an array as it is, of an image as seen from above.
+
+    The top of an image has the highest y; black is the first of `height_range`, white the second.
+
+    Raises:
+        AssetError: not a file of heights; says why.
+    """
+    kind = path.suffix.lower()
+    if kind in IMAGES:
+        if height_range is None:
+            raise AssetError(f"{path}: an image needs `height_range`, the heights of black and white [m]")
+        grey = _image(path)
+        return height_range[0] + (height_range[1] - height_range[0]) * grey[::-1]
+    if kind not in ARRAYS:
+        known = ", ".join((*ARRAYS, *IMAGES, *meshes.FORMATS))
+        raise AssetError(f"{path}: '{path.suffix}' holds no heights ({known})")
+    heights = _array(path)
+    if heights.ndim != 2 or min(heights.shape) < 2 or heights.dtype.kind not in "fiu":
+        shape = f"{heights.dtype} of shape {heights.shape}"
+        raise AssetError(f"{path}: expected at least two rows of at least two numbers, it holds {shape}")
+    heights = heights.astype(np.float64)
+    if not np.isfinite(heights).all():
+        raise AssetError(f"{path}: holds heights that are not finite")
+    return heights
+
+
+def _array(path: Path) -> Array:
+    try:
+        with path.open("rb") as file:
+            loaded: Any = np.load(file, allow_pickle=False)
+            if not isinstance(loaded, np.ndarray):
+                names = list(loaded.files)
+                if len(names) != 1 and "heights" not in names:
+                    raise AssetError(f"{path}: expected one array, or one called heights; it has {', '.join(names)}")
+                loaded = loaded["heights" if "heights" in names else names[0]]
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise AssetError(f"{path}: cannot be read as an array: {error}") from error
+    return cast("Array", loaded)
+
+
+def _image(path: Path) -> Array:
+    """Grey values (rows, cols) in [0, 1], the top row first."""
+    from PIL import Image
+
+    try:
+        with Image.open(path) as image:
+            deep = image.mode.startswith(("I", "F"))
+            values = np.asarray(image if deep else image.convert("L"), dtype=np.float64)
+            whole = float(np.iinfo(np.uint16).max) if image.mode.startswith("I") else 1.0 if deep else 255.0
+    except (OSError, ValueError, SyntaxError) as error:
+        raise AssetError(f"{path}: cannot be read as an image: {error}") from error
+    if values.ndim != 2 or min(values.shape) < 2:
+        raise AssetError(f"{path}: expected an image of at least 2 by 2 pixels, it has the shape {values.shape}")
+    return np.clip(values / whole, 0.0, 1.0)
+
+
+def read_mesh(path: Path, scale: float) -> Mesh:
+    """All triangles of a mesh file, as they are, in metres with z up.
+
+    Raises:
+        AssetError: it cannot be read.
+    """
+    return meshes.whole_mesh(path, (scale, scale, scale), upright=True)
+
+
+def heights_of_mesh(mesh: Mesh, cell: float) -> tuple[Array, tuple[float, float], tuple[float, float]]:
+    """What a mesh looks like from above: heights (rows, cols) about `cell` [m] apart, their extent, and its middle.
+
+    Places that the mesh does not cover get its lowest height.
+    """
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    counts = [max(1, round(float(e) / cell)) for e in (high - low)[:2]]
+    x, y = (np.linspace(low[k], high[k], counts[k] + 1) for k in (0, 1))
+    grid = np.stack(np.meshgrid(x, y), axis=-1)
+    heights = MeshGround(np.asarray(mesh.vertices), np.asarray(mesh.faces)).heights_at(grid)
+    heights = np.where(np.isfinite(heights), heights, low[2])
+    extent, middle = (high - low)[:2], (high + low)[:2] / 2
+    return heights, (float(extent[0]), float(extent[1])), (float(middle[0]), float(middle[1]))

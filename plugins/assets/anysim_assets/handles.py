@@ -1,0 +1,87 @@
+"""Handles on fronts and lids."""
+
+from math import pi
+
+from anysim.assets.procedural_assembly import Assembly, Colour, turned
+from anysim.model.world import Capsule, Cylinder, Vec3
+from anysim_assets.parameters import Handle
+from anysim_schemas.errors import KeyFault
+
+_ALONG_X = turned((0.0, 1.0, 0.0), pi / 2)
+_ALONG_Y = turned((1.0, 0.0, 0.0), -pi / 2)
+_POST = 0.6  # radius of a post or stem, in radii of the bar
+_KNOB = 2.0  # radius of a knob's disc, in radii of the handle
+
+
+def add_handle(
+    assembly: Assembly,
+    body: int,
+    handle: Handle,
+    at: Vec3,
+    room: tuple[float, float],
+    color: Colour,
+    *,
+    upright: bool,
+    link: str,
+) -> None:
+    """A handle on a face whose outward normal is the link's +x, around the point `at` of the link.
+
+    The frame `LINK.handle` lies in the middle of the bar or disc: x points away from the face, z along the bar.
+
+    Args:
+        assembly: what it is added to.
+        body: the link that carries it.
+        handle: what it is like.
+        at: the middle of where it is mounted, in the link's frame [m].
+        room: what there is for it along the link's y and z [m].
+        color: of all its parts.
+        upright: whether a bar whose direction is `auto` stands upright.
+        link: the name of the link.
+
+    Raises:
+        KeyFault: it is larger than the room.
+    """
+    if handle.style == "none":
+        return
+    vertical = handle.direction == "vertical" or (handle.direction == "auto" and upright)
+    knob = handle.style == "knob"
+    across = 2 * handle.radius * (_KNOB if knob else 1.0)
+    along = across if knob else handle.length + 2 * handle.radius
+    needed = (across, along) if vertical else (along, across)
+    for have, want, word in zip(room, needed, ("wide", "high"), strict=True):
+        if want > have:
+            raise KeyFault(
+                f"the handle of {link} is {want:g} m {word}, and there are {have:g} m for it; give a smaller one, or "
+                "`style: none`",
+                "handle",
+            )
+    if handle.standoff <= handle.radius:
+        raise KeyFault(
+            f"a handle of radius {handle.radius:g} m needs a larger standoff than {handle.standoff:g} m",
+            "handle",
+            "standoff",
+        )
+    x, y, z = at
+    stem = handle.standoff - handle.radius  # posts end where the bar begins: no mass is counted twice
+
+    def post(name: str, dy: float, dz: float) -> None:
+        shape = Cylinder(_POST * handle.radius, stem / 2)
+        assembly.solid(body, name, shape, (x + stem / 2, y + dy, z + dz), handle.density, color, _ALONG_X)
+
+    middle = (x + handle.standoff, y, z)
+    along_z = vertical or knob
+    if knob:
+        post("stem", 0.0, 0.0)
+        disc = Cylinder(_KNOB * handle.radius, handle.radius)
+        assembly.solid(body, "knob", disc, middle, handle.density, color, _ALONG_X)
+    else:
+        reach = handle.length / 2 - _POST * handle.radius
+        if reach <= 0:
+            raise KeyFault(f"a bar of {handle.length:g} m is too short for its posts", "handle", "length")
+        post("post_low", *((0.0, -reach) if vertical else (-reach, 0.0)))
+        post("post_high", *((0.0, reach) if vertical else (reach, 0.0)))
+        bar = Capsule(handle.radius, handle.length / 2)
+        assembly.solid(
+            body, "bar", bar, middle, handle.density, color, turned((0.0, 0.0, 1.0), 0.0) if vertical else _ALONG_Y
+        )
+    assembly.site(body, f"{link}.handle", middle, turned((1.0, 0.0, 0.0), 0.0) if along_z else _ALONG_Y)

@@ -1,0 +1,1 @@
+"""Benchmarks of the command line: the cost of anysim on top of the engine."""

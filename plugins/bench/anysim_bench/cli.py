@@ -1,0 +1,199 @@
+"""`anysim bench`: what anysim costs."""
+
+from typing import Annotated, Any
+
+import typer
+
+from anysim.cli.options import AsJson
+
+app = typer.Typer(help="Measure what anysim costs, as ratios in one run.", no_args_is_help=True)
+
+
+@app.callback()
+def _group() -> None:
+    pass
+
+
+@app.command("step")
+def step(
+    engine: Annotated[
+        str, typer.Option("--engine", "-e", help="Engines, separated by commas; `all` are those with a raw loop.")
+    ] = "all",
+    num_envs: Annotated[
+        str, typer.Option("--num-envs", "-n", help="Numbers of envs, separated by commas.")
+    ] = "1,16,64",
+    task: Annotated[str, typer.Option(help="The task of the last rows; an empty name leaves them out.")] = "pick_cube",
+    rounds: Annotated[int, typer.Option(min=1, help="Interleaved rounds; the best of each side counts.")] = 7,
+    json: AsJson = False,
+) -> None:
+    """Step through SimEngine and through a whole task, each against the engine's own loop doing the same.
+
+    First a Panda with five boxes: commands written and joint positions, velocities, body poses and twists read every
+    control step, with the engine's own drives (`native`) and with the drive law (`implicit_pd`); the raw loop has the
+    engine's own. Then the task, with observations, rewards and status.
+    """
+    from anysim.cli.output import print_json, print_table
+    from anysim.errors import EngineError
+    from anysim.model.world import Actuation
+    from anysim_bench.step import engine_cost, engines_with_raw_loop, env_cost
+
+    try:
+        sizes = [int(n) for n in num_envs.split(",")]
+    except ValueError:
+        raise EngineError(f"--num-envs takes whole numbers separated by commas, got '{num_envs}'") from None
+    names = engines_with_raw_loop() if engine == "all" else [name.strip() for name in engine.split(",")]
+    costs = []
+    for name in names:
+        for n in sizes:
+            typer.echo(f"measuring {n} envs on {name}…", err=True)
+            costs += [engine_cost(name, n, rounds, mode) for mode in (Actuation.NATIVE, Actuation.IMPLICIT_PD)]
+            costs += [env_cost(name, n, task, rounds)] if task else []
+    if json:
+        print_json([c._asdict() for c in costs])
+        return
+    print_table(
+        "Physics steps per second, all envs together",
+        ("engine", "loop", "drives", "envs", "anysim", "raw", "ratio (wall)", "ratio (cpu)"),
+        [
+            (
+                c.engine,
+                c.what if c.what == "engine" else task,
+                c.actuation,
+                c.num_envs,
+                f"{c.ours:,.0f}",
+                f"{c.raw:,.0f}",
+                f"{c.ratio:.3f}",
+                f"{c.cpu_ratio:.3f}",
+            )
+            for c in costs
+        ],
+    )
+
+
+@app.command("shards")
+def shards(
+    engine: Annotated[str | None, typer.Option("--engine", "-e", help="An installed engine.")] = None,
+    num_envs: Annotated[int, typer.Option("--num-envs", "-n", min=1, help="Envs of all shards together.")] = 16,
+    counts: Annotated[str, typer.Option("--shards", help="Numbers of shards, separated by commas.")] = "1,2",
+    rounds: Annotated[int, typer.Option(min=1, help="Interleaved rounds; the best of each side counts.")] = 7,
+    json: AsJson = False,
+) -> None:
+    """Step a Panda with five boxes in one process and in several, and compare with the first number of shards."""
+    from anysim.cli.output import print_json, print_table
+    from anysim.engine.factory import default_engine
+    from anysim.errors import EngineError
+    from anysim_bench.shards import shard_gains
+
+    try:
+        numbers = list(dict.fromkeys(int(n) for n in counts.split(",")))
+    except ValueError:
+        raise EngineError(f"--shards takes whole numbers separated by commas, got '{counts}'") from None
+    name = engine or default_engine()
+    gains = shard_gains(name, num_envs, numbers, rounds)
+    if json:
+        print_json([gain._asdict() for gain in gains])
+        return
+    print_table(
+        f"Physics steps per second on {name}, {num_envs} envs together",
+        ("shards", "steps/s", f"ratio to {numbers[0]} (wall)", "ratio (cpu)"),
+        [(g.shards, f"{g.rate:,.0f}", f"{g.ratio:.3f}", f"{g.cpu_ratio:.3f}") for g in gains],
+    )
+
+
+@app.command("managers")
+def managers(
+    engine: Annotated[
+        str, typer.Option("--engine", "-e", help="Engines, separated by commas; `all` are those with a raw loop.")
+    ] = "all",
+    num_envs: Annotated[int, typer.Option("--num-envs", "-n", min=1, help="Envs.")] = 16,
+    task: Annotated[str, typer.Option(help="The task.")] = "pick_cube",
+    rounds: Annotated[int, typer.Option(min=1, help="Control steps and, a tenth as many, resets.")] = 300,
+    json: AsJson = False,
+) -> None:
+    """What managers, terms and streams cost: their share of a control step, and milliseconds of a reset.
+
+    Each part's own time is told from that of the engine at its calls. The budget of a reset is without the engine: what
+    it takes to write a friction, or to build a scene anew, is its own.
+    """
+    from anysim.cli.output import print_json, print_table
+    from anysim_bench.managers import RESET_BUDGET_MS, STEP_BUDGET, reset_costs, step_costs, task_env
+    from anysim_bench.step import engines_with_raw_loop
+
+    names = engines_with_raw_loop() if engine == "all" else [name.strip() for name in engine.split(",")]
+    steps, resets = [], []
+    for name in names:
+        typer.echo(f"measuring {num_envs} envs on {name}…", err=True)
+        with task_env(name, num_envs, task) as env:
+            steps += step_costs(env, rounds)
+            resets += reset_costs(env, max(1, rounds // 10))
+    if json:
+        print_json({"steps": [s._asdict() for s in steps], "resets": [r._asdict() for r in resets]})
+        return
+    print_table(
+        f"A control step of {task} of {num_envs} envs [ms]; budget {STEP_BUDGET:.0%} for what is not the engine's",
+        ("engine", "part", "own", "engine at its calls", "share"),
+        [(c.engine, c.part, f"{c.own_ms:.3f}", f"{c.engine_ms:.3f}", f"{c.share:.1%}") for c in steps],
+    )
+    print_table(
+        f"A reset of {task} [ms for each env]; budget {RESET_BUDGET_MS:g} for all that is not the engine's",
+        ("engine", "part", "own", "engine at its calls"),
+        [(c.engine, c.part, f"{c.own_ms:.3f}", f"{c.engine_ms:.3f}") for c in resets],
+    )
+
+
+@app.command("resets")
+def resets(
+    engine: Annotated[
+        str, typer.Option("--engine", "-e", help="Engines, separated by commas; `all` are those whose entities vary.")
+    ] = "all",
+    count: Annotated[int, typer.Option("--resets", "-r", min=20, help="Partial resets, each with other entities.")] = (
+        10_000
+    ),
+    num_envs: Annotated[
+        int, typer.Option("--num-envs", "-n", min=1, help="Envs, of which each reset changes one.")
+    ] = 4,
+    json: AsJson = False,
+) -> None:
+    """Change who is there in thousands of partial resets, and see whether anything accumulates.
+
+    A Panda, a table and ten things, each a box, a ball, a can or nothing. Memory, open files, threads and what the
+    engine holds of its library are printed on the way; the exit code is 1 where something grew.
+    """
+    from anysim.cli.output import print_json, print_table
+    from anysim_bench.resets import Sample, engines_that_vary, reset_cost
+
+    def tell(sample: Sample) -> None:
+        typer.echo(f"  {sample.resets} resets: {_held(sample)}", err=True)
+
+    names = engines_that_vary() if engine == "all" else [name.strip() for name in engine.split(",")]
+    costs = []
+    for name in names:
+        typer.echo(f"resetting {name} {count:,} times…", err=True)
+        costs.append(reset_cost(name, count, num_envs, tell))
+    if json:
+        print_json([cost._asdict() | {"samples": [s._asdict() for s in cost.samples]} for cost in costs])
+    else:
+        print_table(
+            f"{count:,} partial resets with other entities, {num_envs} envs; processor time of one reset",
+            ("engine", "lifecycle", "first [ms]", "last [ms]", "same entities [ms]", "early", "late", "growth"),
+            [
+                (
+                    c.engine,
+                    c.lifecycle,
+                    f"{c.first_ms:.2f}",
+                    f"{c.last_ms:.2f}",
+                    f"{c.same_ms:.2f}",
+                    _held(c.samples[len(c.samples) // 5]),
+                    _held(c.samples[-1]),
+                    "; ".join(c.grown) or "none",
+                )
+                for c in costs
+            ],
+        )
+    if any(cost.grown for cost in costs):
+        raise typer.Exit(1)
+
+
+def _held(sample: Any) -> str:
+    handles = "".join(f", {number} {name}" for name, number in sample.handles.items())
+    return f"{sample.memory_mib:.0f} MiB, {sample.descriptors} files, {sample.threads} threads{handles}"

@@ -1,0 +1,1 @@
+"""Batched inverse kinematics, compiled with numba or in plain numpy."""

@@ -1,0 +1,141 @@
+"""A gimbal: three joints that keep a camera level and turn it where it is to look."""
+
+from collections.abc import Mapping
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from anysim.controllers.base import ChannelView, Command, Controller
+from anysim.conventions import Array
+from anysim.errors import NameLookupError, TaskError
+from anysim.math import pose as P
+from anysim.model.frames import find_frame
+from anysim.model.world import JointType
+from anysim_control.camera.easing import brake_speed, room_speeds, wrapped
+from anysim_schemas.base import Vec3
+
+_AXES = ("yaw about z", (0.0, 0.0, 1.0)), ("pitch about y", (0.0, 1.0, 0.0)), ("roll about x", (1.0, 0.0, 0.0))
+
+
+class CameraGimbal(Controller):
+    """Keeps the horizon level in the world, however its carrier is tilted, and looks at a place or in a direction.
+
+    The action is yaw and pitch [rad], positive pitch down: added to where `look_at` is, else from the heading of the
+    robot's base and the horizon. Each joint follows with a limited rate and acceleration and with the speed of what is
+    looked at fed forward, so that it does not trail behind.
+    """
+
+    labels = ("yaw", "pitch")
+
+    def __init__(
+        self,
+        channel: ChannelView,
+        num_envs: int,
+        *,
+        look_at: Annotated[
+            Vec3 | str | None, Field(description="a point of the world [m], or a frame, as `cube` or `panda.tool`")
+        ] = None,
+        rate: Annotated[float, Field(gt=0, description="largest rate of a joint [rad/s]")] = 3.0,
+        acceleration: Annotated[float, Field(gt=0, description="largest acceleration of a joint [rad/s^2]")] = 12.0,
+        response: Annotated[float, Field(gt=0, le=50, description="how fast it settles [1/s]")] = 8.0,
+    ) -> None:
+        super().__init__(channel, num_envs)
+        world = channel.robot.world
+        joints = [world.joints[world.actuators[a].joint] for a in channel.actuators]
+        fitting = len(joints) == 3 and all(
+            joint.type is JointType.REVOLUTE and np.allclose(joint.axis, axis)
+            for joint, (_, axis) in zip(joints, _AXES, strict=True)
+        )
+        if not fitting:
+            raise TaskError(
+                f"camera_gimbal needs three turning joints, {', '.join(name for name, _ in _AXES)}, one on the other; "
+                f"'{channel.robot.name}.{channel.name}' has others"
+            )
+        self._carrier, self._eye = world.bodies[joints[0].body].parent, joints[2].body
+        self._target = None if look_at is None else self._found(look_at)
+        self.dim = 2
+        self.low, self.high = np.array([-np.pi, -np.pi / 2]), np.array([np.pi, np.pi / 2])
+        self.period = self._dt = channel.robot.dt
+        self._rate, self._acceleration, self._response = rate, acceleration, response
+        self._rows = {name: np.zeros((num_envs, 3)) for name in ("position", "velocity", "wanted")}
+        self._rows["asked"] = np.zeros((num_envs, 2))
+        self._rows["fresh"] = np.ones((num_envs, 1))
+
+    def _found(self, look_at: Vec3 | str) -> tuple[int, Array]:
+        """The body, or -1 for the world, and the point in its frame."""
+        if not isinstance(look_at, str):
+            return -1, np.array(look_at, dtype=float)
+        try:
+            frame = find_frame(self.robot.world, look_at)
+        except NameLookupError as error:
+            raise TaskError(f"look_at: {error}") from None
+        return frame.body, np.array(frame.position, dtype=float)
+
+    def reset(self, env_ids: Array, targets: Array) -> None:
+        self._rows["position"][env_ids] = targets
+        self._rows["wanted"][env_ids] = targets
+        self._rows["velocity"][env_ids] = 0.0
+        self._rows["asked"][env_ids] = 0.0
+        self._rows["fresh"][env_ids] = 1.0
+
+    def apply(self, action: Array, env_ids: Array | None) -> Command:
+        self._rows["asked"][slice(None) if env_ids is None else env_ids] = action
+        return self.update(env_ids)
+
+    def update(self, env_ids: Array | None) -> Command:
+        rows = slice(None) if env_ids is None else env_ids
+        position, velocity = self._rows["position"][rows], self._rows["velocity"][rows]
+        angles = self._angles(rows, env_ids)
+        wanted = position + wrapped(angles - position)
+        wanted = np.minimum(np.maximum(wanted, self.channel.lower), self.channel.upper)
+        before, fresh = self._rows["wanted"][rows], self._rows["fresh"][rows] > 0
+        drift = np.where(fresh, 0.0, wrapped(wanted - before) / self._dt)
+        drift = np.minimum(np.maximum(drift, -self._rate), self._rate)
+        way = wanted - position
+        pace = drift + np.sign(way) * brake_speed(np.abs(way), self._acceleration, self._response)
+        pace = np.minimum(np.maximum(pace, -self._rate), self._rate)
+        low, high = room_speeds(position, self.channel.lower, self.channel.upper, self._acceleration, self._dt)
+        pace = np.minimum(np.maximum(pace, -low), high)
+        change = self._acceleration * self._dt
+        velocity = velocity + np.minimum(np.maximum(pace - velocity, -change), change)
+        there = position + velocity * self._dt
+        kept = np.minimum(np.maximum(there, self.channel.lower), self.channel.upper)
+        velocity = np.where(kept == there, velocity, 0.0)
+        self._rows["position"][rows], self._rows["velocity"][rows] = kept, velocity
+        self._rows["wanted"][rows], self._rows["fresh"][rows] = wanted, 0.0
+        return Command(position=kept, velocity=velocity)
+
+    def _angles(self, rows: slice | Array, env_ids: Array | None) -> Array:
+        """Joint angles (E, 3) with which the camera is level and looks where it should."""
+        asked, poses = self._rows["asked"][rows], self.robot.state.body_pose
+        if self._target is None:
+            turn = self.robot.base_pose(env_ids)[:, 3:]
+            ahead = P.rotate(turn, np.broadcast_to(np.array([1.0, 0.0, 0.0]), (len(turn), 3)))
+            yaw, pitch = np.arctan2(ahead[:, 1], ahead[:, 0]), np.zeros(len(turn))
+        else:
+            body, point = self._target
+            eye = poses[rows, self._eye, :3]
+            place = np.broadcast_to(point, eye.shape)
+            if body >= 0:
+                place = poses[rows, body, :3] + P.rotate(poses[rows, body, 3:], place)
+            way = place - eye
+            yaw = np.arctan2(way[:, 1], way[:, 0])
+            pitch = -np.arctan2(way[:, 2], np.sqrt(way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1]))
+        level = P.from_roll_pitch_yaw(np.stack([np.zeros_like(yaw), pitch + asked[:, 1], yaw + asked[:, 0]], axis=1))
+        x, y, z, w = np.moveaxis(P.multiply(P.conjugate(poses[rows, self._carrier, 3:]), level), -1, 0)
+        return np.stack(
+            [
+                np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+                np.arcsin(np.minimum(np.maximum(2.0 * (w * y - z * x), -1.0), 1.0)),
+                np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+            ],
+            axis=1,
+        )
+
+    def snapshot(self, env_ids: Array) -> dict[str, Array]:
+        return {name: rows[env_ids] for name, rows in self._rows.items()}
+
+    def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
+        for name, rows in self._rows.items():
+            rows[env_ids] = data[name]

@@ -1,0 +1,1 @@
+"""Controllers of tools: inverse kinematics, operational space and their parts."""

@@ -1,0 +1,20 @@
+"""`mink_ik`: tools, posture and centre of mass weighed against each other in one quadratic program a control step."""
+
+from collections.abc import Mapping
+
+from anysim.conventions import Array
+from anysim_control.tools.frames import ToolFrames
+from anysim_control.tools.program import Program, ToolProgram
+
+
+class MinkIk(ToolProgram):
+    """Mink's frame tasks for all tools of the channel: both arms of a robot and its waist are one problem.
+
+    Limits of positions and velocities are constraints, so they hold whatever the tasks ask for. Joints that follow
+    others (mimic) stay coupled, and joints of other channels stand still at what is measured, as equality constraints.
+    """
+
+    def _made(self, frames: ToolFrames, max_step: Array, costs: Mapping[str, float]) -> Program:
+        from anysim_control.tools.mink_problem import MinkProblem
+
+        return MinkProblem(frames, max_step, **costs)

@@ -1,0 +1,20 @@
+"""`pink_ik`: tools, posture and centre of mass weighed against each other in one quadratic program a control step."""
+
+from collections.abc import Mapping
+
+from anysim.conventions import Array
+from anysim_control.tools.frames import ToolFrames
+from anysim_control.tools.program import Program, ToolProgram
+
+
+class PinkIk(ToolProgram):
+    """Pink's frame tasks for all tools of the channel: both arms of a robot and its waist are one problem.
+
+    Limits of positions and velocities are constraints, so they hold whatever the tasks ask for. Joints that follow
+    others (mimic) stay coupled, and joints of other channels stand still at what is measured, as equality constraints.
+    """
+
+    def _made(self, frames: ToolFrames, max_step: Array, costs: Mapping[str, float]) -> Program:
+        from anysim_control.tools.pink_problem import PinkProblem
+
+        return PinkProblem(frames, max_step, **costs)

@@ -1,1 +1,0 @@
-"""Batched inverse kinematics for anysim, compiled with numba."""

@@ -1,1 +1,0 @@
-"""Inverse kinematics for anysim with mink: quadratic programs over MuJoCo's kinematics."""

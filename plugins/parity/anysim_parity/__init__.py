@@ -1,0 +1,1 @@
+"""Comparison of engines: layers, probes with known answers, and the page that shows them."""

@@ -1,0 +1,103 @@
+"""What a world looks like: its first episodes, drawn by each engine, side by side."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from anysim.api import load, make
+from anysim.cli.montage import montage
+from anysim.conventions import Array
+from anysim.errors import AnysimError, NameLookupError, listing, suggest
+from anysim_schemas.load import Loaded, LoadedRun
+
+WATCHING: Mapping[str, Any] = {"task": {"observations": {"policy": ["last_action"]}}}
+"""The task of a file that has none: nothing is asked of anybody."""
+
+
+class Pictures(NamedTuple):
+    """By engine its images (N, H, W, 3) uint8, one for each env, or why there are none."""
+
+    images: dict[str, Array]
+    refused: dict[str, str]
+
+
+def pictures(
+    source: str | Path | LoadedRun | Mapping[str, Any],
+    engines: Sequence[str],
+    *,
+    num_envs: int = 4,
+    seed: int = 0,
+    camera: str | None = None,
+    size: tuple[int, int] | None = None,
+    seconds: float = 0.0,
+    overrides: Sequence[str] = (),
+) -> Pictures:
+    """Start the episodes of a seed on each engine, let them run for a while without action, and draw them.
+
+    Args:
+        source: a task or a world: an installed task by name, a YAML file, or what `load` returned.
+        engines: installed engines by name.
+        num_envs: how many envs, each with its own episode.
+        seed: what the episodes are drawn from.
+        camera: one of the world's; its first where not given, or an overview where it has none.
+        size: width and height [px]; the camera's own where not given.
+        seconds: simulated time before the image is taken.
+        overrides: dotted overrides, as `-o` on the command line.
+
+    Raises:
+        SpecError: the file, with line and column.
+        NameLookupError: the world has no such camera.
+    """
+    loaded = source if isinstance(source, Loaded) else load(source, overrides=overrides)
+    cameras = list(loaded.spec.world.cameras)
+    if camera is not None and camera not in [*cameras, "default"]:
+        raise NameLookupError(
+            f"the world has no camera '{camera}'{suggest(camera, cameras)} (cameras: {listing(cameras)}, and `default`)"
+        )
+    if loaded.spec.task is None:
+        loaded = replace(load(WATCHING, loaded.data), files=loaded.files)
+    chosen = camera or (cameras[0] if cameras else "default")
+    found = Pictures({}, {})
+    for name in engines:
+        try:
+            found.images[name] = _drawn(loaded, name, num_envs, seed, chosen, size or (None, None), seconds)
+        except AnysimError as error:
+            found.refused[name] = str(error)
+    return found
+
+
+def _drawn(
+    loaded: LoadedRun,
+    engine: str,
+    num_envs: int,
+    seed: int,
+    camera: str,
+    size: tuple[int | None, int | None],
+    seconds: float,
+) -> Array:
+    with make(loaded, engine=engine, num_envs=num_envs) as env:
+        env.reset(seed=seed)
+        if seconds > 0:
+            env.engine.step(max(1, round(seconds / env.engine.world.physics.dt)))
+        return env.engine.render(camera, *size)["rgb"]
+
+
+def sheet(found: Pictures, columns: int | None = None) -> Any:
+    """A matplotlib Figure: for each engine its name and a montage of its images.
+
+    Raises:
+        AnysimError: no engine has drawn anything; says why of each.
+    """
+    if not found.images:
+        raise AnysimError("; ".join(f"{name}: {why}" for name, why in found.refused.items()) or "no engine was named")
+    from matplotlib.figure import Figure
+
+    sheets = {name: montage(images, columns) for name, images in found.images.items()}
+    height, width = next(iter(sheets.values())).shape[:2]
+    figure = Figure(figsize=(4.0 * len(sheets), 4.0 * height / width + 0.3), layout="constrained")
+    for axis, (name, image) in zip(figure.subplots(1, len(sheets), squeeze=False)[0], sheets.items(), strict=True):
+        axis.imshow(image)
+        axis.set_title(name, fontsize=9, loc="left")
+        axis.set_axis_off()
+    return figure

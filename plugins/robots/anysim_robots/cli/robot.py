@@ -1,0 +1,143 @@
+"""`anysim robot`: what a robot of the catalogue is, whether it holds what it says, and a draft of a new one."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from anysim.cli.options import AsJson
+
+
+class _ShowsByDefault(TyperGroup):
+    """`anysim robot NAME` is `anysim robot show NAME`."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that is named, else `show` with all words as they are."""
+        if args and not args[0].startswith("-") and args[0] not in self.commands:
+            args = ["show", *args]
+        return super().resolve_command(ctx, args)
+
+
+app = typer.Typer(
+    cls=_ShowsByDefault,
+    no_args_is_help=True,
+    help="""What a robot is (`anysim robot NAME`), and a draft of a new one (`anysim robot import FILE`).
+
+    Examples:
+      anysim robot franka_panda
+      anysim robot franka_panda --check --engine all
+      anysim robot import my_arm.urdf --out my_arm.yaml
+    """,
+    subcommand_metavar="NAME|import",
+)
+
+Checked = Annotated[bool, typer.Option("--check", help="Qualify it: kinematics, holding, random actions, replay.")]
+
+
+@app.command("show")
+def show(
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="As in `anysim list robots`, or the YAML file of an entry.")
+    ],
+    picture: Annotated[
+        Path | None, typer.Option("--picture", help="Write a PNG of it, as each engine draws it, side by side.")
+    ] = None,
+    check: Checked = False,
+    engine: Annotated[
+        str | None,
+        typer.Option(
+            "--engine", "-e", help="Engines, separated by commas, or `all` (default all) for checks and picture."
+        ),
+    ] = None,
+    hold: Annotated[float, typer.Option(min=0.02, help="Simulated time that it has to hold still [s].")] = 5.0,
+    random: Annotated[float, typer.Option(min=0.02, help="Simulated time of random actions [s].")] = 10.0,
+    json: AsJson = False,
+) -> None:
+    """Show a robot: joints with limits, gains and channels, tools, sensors, licence.
+
+    With --check it is qualified on the engines, which takes about ten seconds each: the world is built and read back,
+    link frames are compared with another loader of its file, its default controllers have to hold the home position and
+    to bear random actions, and the same actions again must give the same bytes. Exit code 1 if a check fails.
+
+    Examples:
+      anysim robot franka_panda
+      anysim robot franka_panda --picture panda.png --engine mujoco
+      anysim robot my_arm.yaml --check --engine all --hold 1
+    """
+    from anysim.assets.catalogue import load_robot
+    from anysim.cli.output import print_json
+    from anysim_robots.cli.robot_tables import document, tell, tell_checks
+    from anysim_robots.cli.robot_work import draw, qualified
+    from anysim_robots.qualify.result import as_data
+    from anysim_robots.qualify.run import Durations
+
+    entry = load_robot(name)
+    shown = document(entry)
+    found = qualified(name, _engines(engine), Durations(hold, random), quiet=json) if check else []
+    if picture is not None:
+        shown["picture"] = draw(entry, _engines(engine), picture)
+    if json:
+        print_json(shown | ({"checks": [as_data(one) for one in found]} if check else {}))
+    else:
+        tell(shown)
+        tell_checks(found)
+    if any(one.status in ("failed", "refused") for one in found):
+        raise typer.Exit(1)
+
+
+def _engines(text: str | None) -> list[str]:
+    from anysim_robots.qualify.stage import engines
+
+    if text is None or text == "all":
+        return engines()
+    return [part.strip() for part in text.split(",") if part.strip()]
+
+
+@app.command("import")
+def import_(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="A URDF or MJCF file; FILE.xml#BODY for one of several bodies.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option("--out", help="The YAML file to write; default NAME.yaml beside the model.")
+    ] = None,
+    name: Annotated[
+        str | None, typer.Option("--name", help="Its name in the catalogue; default that of the file.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
+    json: AsJson = False,
+) -> None:
+    """Write a draft of a catalogue entry for a URDF or MJCF file, and read it back from the engines.
+
+    Base, channels, tools, legs and gains are guessed from names, the tree and the inertias; what could not be inferred
+    stands in the draft as comments that begin with TODO, above all the licence. The draft loads and builds as it is:
+    look at it with `anysim robot DRAFT.yaml --picture draft.png`, and qualify it with `--check`.
+
+    Examples:
+      anysim robot import my_arm.urdf
+      anysim robot import robot.xml --out my_robot.yaml --name my_robot
+    """
+    from anysim.assets.catalogue import load_robot
+    from anysim.cli.output import print_json
+    from anysim.errors import AnysimError
+    from anysim_robots.cli.robot_work import audited
+    from anysim_robots.drafting.draft import draft
+
+    made = draft(file, name)
+    target = out or file.with_name(f"{made.name}.yaml")
+    if target.exists() and not force:
+        raise AnysimError(f"there is a file {target} already; give another --out, or --force to replace it")
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(made.text(target.parent), encoding="utf-8")
+    lines = audited(load_robot(str(target)), _engines(None))
+    if json:
+        print_json({"file": str(target), "open": made.open, "notes": made.notes, "audit": lines})
+        return
+    typer.echo(str(target))
+    for words in made.notes:
+        typer.echo(f"  importer: {words}")
+    for words in made.open:
+        typer.echo(f"  TODO {words}")
+    for engine, words in lines.items():
+        typer.echo(f"  audit on {engine}: {words}")

@@ -1,0 +1,206 @@
+"""A draft of a catalogue entry as YAML that loads and builds, with comments where a person has to decide."""
+
+import re
+from math import isinf
+from pathlib import Path
+from typing import NamedTuple
+
+from anysim.assets.load import import_asset, split_body
+from anysim.assets.model import ImportedModel
+from anysim.errors import AssetError
+from anysim_robots.drafting.gains import BANDWIDTH, ROTOR, SETTLING, STANDING, Gains, gains
+from anysim_robots.drafting.guess import Guess, guess, home_of
+
+NO_LICENCE = "LicenseRef-TODO"
+
+
+class Draft(NamedTuple):
+    """What is known of a model. `open` is what nobody but a person can say; `notes` are the importer's."""
+
+    name: str
+    file: Path
+    model: ImportedModel
+    guess: Guess
+    gains: dict[str, Gains]
+    open: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    def text(self, folder: Path) -> str:
+        """The YAML, for a file in this folder."""
+        return "\n".join([*self._head(folder), *self._channels(), *self._rest(), ""])
+
+    # ------------------------------------------------------------------ parts of the file
+
+    def _head(self, folder: Path) -> list[str]:
+        g, source = self.guess, _source(self.file, folder)
+        lines = [f"# Draft of {self.file.name}, made by `anysim robot import`. What begins with TODO needs a person."]
+        lines += [f"# TODO {words}" for words in self.open]
+        lines += [f"# Importer: {' '.join(words.split())}" for words in self.notes]
+        return [
+            *lines,
+            f"name: {self.name}",
+            f"description: {len(self.model.joints)} joints, from {self.file.name}  # TODO one line for people",
+            f"source: {_quoted(source)}",
+            f"license: {NO_LICENCE}",
+            "license_source: TODO",
+            f"category: {g.category}",
+            *(f"# Guessed: {reason}" for reason in g.reasons),
+            f"base: {'floating' if g.floating else 'fixed'}",
+            *([f"base_height: {g.base_height}  # lowest shape at the initial joint positions"] if g.floating else []),
+        ]
+
+    def _channels(self) -> list[str]:
+        g = self.guess
+        legs = tuple(dict.fromkeys(joint for leg in g.legs for joint in leg.joints))
+        base = legs + tuple(wheel for wheel in g.wheels if wheel not in legs)
+        channels = {"base": base, "arm": g.arm, "eef": g.eef}
+        if not any(channels.values()):
+            return ["channels: {}"]
+        lines = [
+            f"# Gains: critically damped at {BANDWIDTH:g} Hz with the inertia that each joint sees at home; armature",
+            f"# is {100 * ROTOR:g} % of that" + (
+                f"; legs: kp at least {STANDING:g} m times the weight, kd {SETTLING:g} s times kp." if legs else "."
+            ),
+            "channels:",
+        ]  # fmt: skip
+        for name, joints in channels.items():
+            if not joints:
+                continue
+            lines += [f"  {name}:", f"    joints: [{', '.join(map(_quoted, joints))}]", "    joint_gains:"]
+            if set(joints) <= set(g.wheels):
+                lines.insert(-1, "    mode: velocity")
+            for joint in joints:
+                own = self.gains[joint]
+                kp = 0.0 if joint in g.wheels else own.kp
+                values = f"kp: {kp:g}, kd: {own.kd:g}, armature: {own.armature:g}"
+                effort = self._effort(joint)
+                lines.append(f"      {_quoted(joint)}: {{{values}{effort}}}")
+            lines += self._controllers(name, joints)
+        return lines
+
+    def _effort(self, joint: str) -> str:
+        """A limit where the source has none or nothing that moves."""
+        found = next(j for j in self.model.joints if j.name == joint)
+        if found.effort_limit > 0 and not isinf(found.effort_limit):
+            return ""
+        return f", effort_limit: {float(f'{max(1.0, self.gains[joint].kp):.2g}'):g}"
+
+    def _controllers(self, name: str, joints: tuple[str, ...]) -> list[str]:
+        if name == "eef":
+            ends = [self._ends(joint) for joint in joints]
+            if all(end is not None for end in ends):
+                opened = ", ".join(f"{end[0]:g}" for end in ends if end is not None)
+                closed = ", ".join(f"{end[1]:g}" for end in ends if end is not None)
+                return [
+                    f"    opened: [{opened}]  # the limit that is farther from zero",
+                    f"    closed: [{closed}]",
+                    "    controllers: {gripper_binary: {}, joint_position: {}}",
+                ]
+        if set(joints) <= set(self.guess.wheels):
+            return []
+        return ["    controllers: {joint_position: {}, joint_delta_position: {}}"]
+
+    def _ends(self, joint: str) -> tuple[float, float] | None:
+        """Open and closed position of a finger."""
+        found = next(j for j in self.model.joints if j.name == joint)
+        if isinf(found.lower) or isinf(found.upper):
+            return None
+        ends = sorted((round(found.lower, 6), round(found.upper, 6)), key=abs)
+        return ends[1], ends[0]
+
+    def _rest(self) -> list[str]:
+        g, lines = self.guess, []
+        home = home_of(self.model)
+        if home:
+            lines += ["home:", *(f"  {_quoted(joint)}: {value:g}" for joint, value in home.items())]
+        if g.tool is not None:
+            lines += [
+                "tools:",
+                f"  tool: {{link: {_quoted(g.tool)}}}  # z should point out of the hand, y along the opening",
+            ]
+        if g.legs:
+            lines += ["legs:"]
+            for leg in g.legs:
+                joints = ", ".join(map(_quoted, leg.joints))
+                lines.append(f"  {leg.name}: {{joints: [{joints}], foot: {_quoted(leg.foot)}}}")
+        lines += ["self_collision: false", f"gravity_compensation: {'false' if g.floating else 'true'}"]
+        return lines
+
+
+def draft(file: Path, name: str | None = None) -> Draft:
+    """Look at a model file.
+
+    Args:
+        file: URDF or MJCF; `FILE.xml#BODY` for one of several bodies.
+        name: in the catalogue; that of the body or the file where not given.
+
+    Raises:
+        AssetError: there is no such file, or it cannot be imported.
+    """
+    whole, body = split_body(str(file))
+    if not Path(whole).is_file():
+        raise AssetError(f"there is no file {whole}; `anysim robot import` takes a URDF or MJCF file")
+    path = file.resolve()
+    model = import_asset(str(path))
+    found = guess(model)
+    legs = frozenset(joint for leg in found.legs for joint in leg.joints)
+    chosen = re.sub(r"\W+", "_", name or body or path.stem).strip("_").lower()
+    if not chosen or not chosen[0].isalpha():
+        chosen = f"robot_{chosen}".rstrip("_")
+    notes = tuple(str(note) for note in model.report)
+    return Draft(chosen, path, model, found, gains(model, found.floating, legs), tuple(_open(model, found)), notes)
+
+
+def _open(model: ImportedModel, found: Guess) -> list[str]:
+    """What could not be inferred."""
+    asked = [
+        "license: the SPDX expression of the files, and where it is stated; a robot without one is nobody's to use",
+        "gains and armature: guessed from inertia; take the maker's, or identify them",
+    ]
+    followers = [joint.name for joint in model.joints if joint.mimic is not None]
+    if followers:
+        asked.append(
+            f"mimic: {', '.join(followers)} follow other joints and are in no channel; drive them if the robot does"
+        )
+    if found.legs:
+        asked.append(
+            "home: a pose in which it stands, with bent knees, and base_height for it; legs: radius or sole of the feet"
+        )
+    if found.floating and not found.legs and not found.wheels:
+        asked.append("base: it floats in the file, and neither legs nor wheels were recognised")
+    if found.wheels:
+        asked.append("controllers of base: the drive model of the wheels, with their radius and distances")
+    if found.eef:
+        asked.append("eef: opened and closed are limits of the joints; try `anysim robot FILE --picture`")
+    if found.tool is None:
+        asked.append("tools: no frame that tasks could refer to was recognised")
+    else:
+        asked.append(f"tools: '{found.tool}' was chosen by its name or place; check the direction of its axes")
+    unlimited = [j.name for j in model.joints if j.mimic is None and (isinf(j.effort_limit) or j.effort_limit <= 0)]
+    if unlimited:
+        asked.append(f"effort limits: the source has none for {', '.join(unlimited[:6])}{'…' * (len(unlimited) > 6)}")
+    if not any(geom.collides for geom in model.geoms):
+        asked.append("collision shapes: the source has none; the robot passes through everything")
+    asked.append("sensors, surfaces and self_collision are not in the file")
+    return asked
+
+
+def _source(file: Path, folder: Path) -> str:
+    """The file as the entry names it: relative where all that it refers to is below, else absolute."""
+    folder = folder.resolve()
+    if file.is_relative_to(folder):
+        relative = str(file.relative_to(folder))
+        try:
+            import_asset(relative, base=folder)
+        except AssetError:
+            return str(file)
+        return relative
+    return str(file)
+
+
+def _quoted(word: str) -> str:
+    """A YAML scalar."""
+    return word if re.fullmatch(r"[A-Za-z_/.][\w./-]*", word) and word.lower() not in _WORDS else f'"{word}"'
+
+
+_WORDS = frozenset({"true", "false", "yes", "no", "on", "off", "null", "y", "n", "."})

@@ -1,0 +1,185 @@
+"""Mesh files: units, axes, colours, hulls, budgets, and hashes that do not depend on the cache."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from anysim import cache
+from anysim.assets import meshes
+from anysim.errors import AssetError
+from anysim.geometry.hull import convex_hull
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv(cache.CACHE_ENV, str(tmp_path / "cache"))
+    return tmp_path
+
+
+def write(path: Path, mesh: trimesh.Trimesh) -> Path:
+    mesh.export(str(path))
+    return path
+
+
+@pytest.mark.parametrize("ending", meshes.FORMATS)
+def test_every_format_gives_the_same_box(folder: Path, ending: str) -> None:
+    path = write(folder / f"box{ending}", trimesh.creation.box((0.2, 0.4, 0.6)))
+    hull = meshes.collision_mesh(path)
+    np.testing.assert_allclose(np.ptp(hull.vertices, axis=0), (0.2, 0.4, 0.6), atol=1e-6)
+    assert hull.vertices.shape == (8, 3)
+    assert hull.faces.shape == (12, 3)
+    (part,) = meshes.visual_parts(path)
+    np.testing.assert_allclose(part.mesh.vertices.min(axis=0), (-0.1, -0.2, -0.3), atol=1e-6)
+
+
+def test_scale_may_mirror_and_faces_stay_outward(folder: Path) -> None:
+    path = write(
+        folder / "wedge.stl",
+        trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]),
+    )
+    (part,) = meshes.visual_parts(path, (-0.1, 0.1, 0.1))
+    np.testing.assert_allclose(part.mesh.vertices.min(axis=0), (-0.1, 0, 0), atol=1e-7)
+    solid = trimesh.Trimesh(part.mesh.vertices, part.mesh.faces)
+    assert solid.volume == pytest.approx(1e-3, rel=1e-5)
+
+
+def dae(folder: Path, *, unit: str = "1", up: str = "Z_UP") -> Path:
+    path = write(folder / "box.dae", trimesh.creation.box((2, 4, 6)))
+    text = path.read_text()
+    start, stop = text.index("<asset>"), text.index("</asset>")
+    asset = f'<asset><unit name="u" meter="{unit}"/><up_axis>{up}</up_axis>'
+    path.write_text(text[:start] + asset + text[stop:])
+    return path
+
+
+def test_the_unit_of_a_dae_is_applied(folder: Path) -> None:
+    hull = meshes.collision_mesh(dae(folder, unit="0.01"))
+    np.testing.assert_allclose(np.ptp(hull.vertices, axis=0), (0.02, 0.04, 0.06), atol=1e-7)
+
+
+@pytest.mark.parametrize(("up", "size"), [("Z_UP", (2, 4, 6)), ("Y_UP", (2, 6, 4)), ("X_UP", (4, 6, 2))])
+def test_the_up_axis_counts_for_objects_and_not_in_urdfs(folder: Path, up: str, size: tuple[float, ...]) -> None:
+    path = dae(folder, up=up)
+    np.testing.assert_allclose(np.ptp(meshes.collision_mesh(path).vertices, axis=0), (2, 4, 6), atol=1e-6)
+    upright = meshes.collision_mesh(path, upright=True)
+    np.testing.assert_allclose(np.ptp(upright.vertices, axis=0), size, atol=1e-6)
+
+
+def test_entities_in_a_dae_are_refused(folder: Path) -> None:
+    path = dae(folder)
+    path.write_text(path.read_text().replace("<asset>", "<!-- <!ENTITY a 'b'> --><asset>"))
+    with pytest.raises(AssetError, match="entities"):
+        meshes.collision_mesh(path)
+
+
+def test_colours_are_kept_apart_and_merged_when_many(folder: Path) -> None:
+    lines, materials = ["mtllib many.mtl"], []
+    for i in range(9):
+        materials.append(f"newmtl m{i}\nKd {i / 10} 0 0")
+        x = i * 1.0
+        lines += [f"v {x} 0 0", f"v {x + 0.5} 0 0", f"v {x} 1 0", f"v {x} 0 1", f"usemtl m{i}"]
+        b = 4 * i
+        faces = [f"f {b + 1} {b + 3} {b + 2}", f"f {b + 1} {b + 2} {b + 4}", f"f {b + 1} {b + 4} {b + 3}"]
+        lines += faces if i < 6 else faces[:2]
+    (folder / "many.obj").write_text("\n".join(lines))
+    (folder / "many.mtl").write_text("\n".join(materials))
+    parts = meshes.visual_parts(folder / "many.obj")
+    assert len(parts) == meshes.VISUAL_COLORS
+    reds = [part.color[0] for part in parts if part.color is not None]
+    np.testing.assert_allclose(reds, np.arange(6) / 10, atol=1 / 255)
+    assert sum(len(part.mesh.faces) for part in parts) == 24
+    assert len(parts[-1].mesh.faces) == 3 + 2 * 3  # the three rarest colours joined the nearest
+
+
+def test_the_material_file_is_part_of_the_hash(folder: Path) -> None:
+    (folder / "a.obj").write_text("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nusemtl m\nf 1 3 2\nf 1 2 4\n")
+    hashes = []
+    for red in (0.1, 0.9):
+        (folder / "a.mtl").write_text(f"newmtl m\nKd {red} 0 0\n")
+        (part,) = meshes.visual_parts(folder / "a.obj")
+        assert part.color is not None
+        assert part.color[0] == pytest.approx(red, abs=1 / 255)
+        hashes.append(part.mesh.hash)
+    assert hashes[0] != hashes[1]
+
+
+def test_budgets_hold_and_results_repeat(folder: Path) -> None:
+    path = write(folder / "ball.stl", trimesh.creation.icosphere(5))
+    hull = meshes.collision_mesh(path)
+    assert len(hull.vertices) == meshes.HULL_VERTICES
+    ball = trimesh.Trimesh(hull.vertices, hull.faces)
+    assert ball.is_watertight
+    assert ball.volume == pytest.approx(4.19, rel=0.1)
+    (part,) = meshes.visual_parts(path)
+    assert len(part.mesh.faces) <= meshes.VISUAL_FACES
+    assert part.color is None
+    for name in ("again", "cached"):
+        if name == "again":
+            for file in cache.cache_folder().rglob("*.npz"):
+                file.unlink()
+        other = meshes.collision_mesh(path)
+        np.testing.assert_array_equal(other.vertices, hull.vertices)
+        np.testing.assert_array_equal(meshes.visual_parts(path)[0].mesh.vertices, part.mesh.vertices)
+        assert other.hash == hull.hash
+
+
+def test_the_hash_is_of_source_and_processing(folder: Path) -> None:
+    path = write(folder / "a.stl", trimesh.creation.box((1, 1, 1)))
+    (folder / "sub").mkdir()
+    same = folder / "sub" / "b.stl"
+    same.write_bytes(path.read_bytes())
+    first = meshes.collision_mesh(path)
+    assert meshes.collision_mesh(same).hash == first.hash
+    assert meshes.collision_mesh(path, (2.0, 1.0, 1.0)).hash != first.hash
+    assert meshes.visual_parts(path)[0].mesh.hash != first.hash
+
+
+def test_arrays_are_read_only(folder: Path) -> None:
+    hull = meshes.collision_mesh(write(folder / "a.stl", trimesh.creation.box((1, 1, 1))))
+    with pytest.raises(ValueError, match="read-only"):
+        hull.vertices[0] = 0
+
+
+def test_flat_meshes_are_thickened_and_lines_refused() -> None:
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0]], dtype=float)
+    vertices, faces = convex_hull(square, 64)
+    assert np.ptp(vertices[:, 2]) == pytest.approx(1e-3)
+    assert trimesh.Trimesh(vertices, faces).is_watertight
+    with pytest.raises(AssetError, match="in one line"):
+        convex_hull(np.array([[0, 0, 0], [1, 1, 1], [2, 2, 2]], dtype=float), 64)
+    with pytest.raises(AssetError, match="at least three"):
+        convex_hull(np.zeros((5, 3)), 64)
+
+
+def test_a_small_hull_lies_inside_and_near() -> None:
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(3000, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    vertices, faces = convex_hull(points, 64)
+    assert len(vertices) == 64
+    corners = vertices[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    depth = (corners[:, 0] * normals).sum(axis=1)
+    assert (depth > 0).all()
+    outside = (points @ normals.T - depth).max()
+    assert 0 < outside < 0.12
+    assert {tuple(v) for v in vertices} <= {tuple(p) for p in points}
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.wrl", b"x", "mesh files are .stl"),
+        ("a.stl", b"solid a\nendsolid a\n", "no triangles"),
+        ("a.dae", b"<COLLADA", "cannot be read as a mesh"),
+        ("a.ply", b"ply\nrubbish", "cannot be read as a mesh"),
+    ],
+)
+def test_bad_files_are_named(folder: Path, name: str, content: bytes, message: str) -> None:
+    (folder / name).write_bytes(content)
+    with pytest.raises(AssetError, match=message) as caught:
+        meshes.visual_parts(folder / name)
+    assert str(folder / name) in str(caught.value)
