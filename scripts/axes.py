@@ -1,4 +1,4 @@
-"""What can differ between episodes, and what an engine must be able to change for it."""
+"""Axes of variation between episodes, and what an engine must be able to change for each."""
 
 from collections.abc import Mapping
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""What every spec has in common: frozen, closed, in SI units, and written in one way."""
+"""The base of every spec: frozen, closed, in SI units, and written in one form."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, cast

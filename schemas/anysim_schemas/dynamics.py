@@ -1,4 +1,4 @@
-"""How a robot of a world differs from its catalogue entry: drives, joints, masses, surfaces, a payload."""
+"""Differences of a robot from its catalogue entry: drives, joints, masses, surfaces, a payload."""
 
 from pydantic import Field
 

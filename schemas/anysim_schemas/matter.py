@@ -1,4 +1,4 @@
-"""What an object is like beyond its shape: how it looks, how the air slows it, how hard its solver works."""
+"""Properties of an object beyond its shape: looks, drag, solver settings."""
 
 from typing import Annotated, Any, ClassVar, Literal
 

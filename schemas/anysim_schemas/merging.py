@@ -1,4 +1,4 @@
-"""How several files become one: mappings are merged, everything else is replaced, null removes."""
+"""Merging of several files: mappings are merged, everything else is replaced, null removes."""
 
 from collections.abc import Iterable
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What an object is made of, and how many of it there are: one source, a list or a folder to draw from, a count."""
+"""Sources of an object and their number: one source, a list or a folder to draw from, a count."""
 
 from typing import Annotated, Any, ClassVar
 

@@ -1,4 +1,4 @@
-"""What a spec expects at a place: walks the type annotations of pydantic models along the keys of a file.
+"""Types that a spec expects at a place: the annotations of pydantic models along the keys of a file.
 
 One fact, read off the models, serves the merging of files, the slots of plugins and the sentences of errors.
 """

@@ -1,4 +1,4 @@
-"""How a robot drives: its wheels, or the joints that move it over a plane.
+"""Vehicles: the wheels of a robot, or the joints that move it over a plane.
 
 The frame of the base has x forward, y to the left and z up. A wheel's joint turns about y: positive rolls forward; a
 steering joint turns about z. What is said here is compared with the model when a world is compiled.

@@ -1,4 +1,4 @@
-"""What does not belong in a repository: large and generated files."""
+"""Files that do not belong in a repository: large and generated ones."""
 
 from collections.abc import Iterator
 from pathlib import Path

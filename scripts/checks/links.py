@@ -1,4 +1,4 @@
-"""What the documents name exists: files that they link to, targets of make that they tell the reader to call."""
+"""Links and make targets in the documents: they exist."""
 
 import re
 from collections.abc import Iterator

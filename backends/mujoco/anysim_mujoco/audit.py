@@ -1,4 +1,4 @@
-"""What the compiled model says of itself, for an audit against the World."""
+"""Read-back of the compiled model, for an audit against the World."""
 
 from math import pi
 from typing import Any

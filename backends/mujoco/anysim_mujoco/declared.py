@@ -1,4 +1,4 @@
-"""What the engine declares without importing MuJoCo: capabilities, with measured errors, and availability."""
+"""Declarations that need no MuJoCo: capabilities, with measured errors, and availability."""
 
 from collections.abc import Mapping
 from functools import cache

@@ -1,4 +1,4 @@
-"""Where the things of a World are in a MuJoCo model. Index arrays, made once at build."""
+"""Places of a World's parts in a MuJoCo model: index arrays, made once at build."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple

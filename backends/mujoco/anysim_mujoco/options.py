@@ -1,4 +1,4 @@
-"""What can be chosen about MuJoCo and means nothing to another engine."""
+"""Options of MuJoCo, which mean nothing to another engine."""
 
 import os
 from typing import Literal

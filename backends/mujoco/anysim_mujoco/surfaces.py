@@ -1,4 +1,4 @@
-"""How neutral surfaces and constraints become MuJoCo's solref and solimp.
+"""Neutral surfaces and constraints as MuJoCo's solref and solimp.
 
 MuJoCo blends the parameters of two geoms by their `solmix` weights; a bouncy geom gets so large a weight that it
 decides the pair, and the bouncier of two outweighs the other, which is the pair rule of `anysim.conventions`.

@@ -1,4 +1,4 @@
-"""What Bullet says of an env, for an audit against the World."""
+"""Read-back of an env from Bullet, for an audit against the World."""
 
 from collections.abc import Sequence
 from math import pi

@@ -1,4 +1,4 @@
-"""Who is there in an env, as index arrays that are made once for each set of entities."""
+"""Entities present in an env, as index arrays that are made once for each set of them."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""What touches what, and what a ray hits, in the neutral model's words."""
+"""Contacts and ray hits in the names of the neutral model."""
 
 from collections.abc import Sequence
 from typing import Any

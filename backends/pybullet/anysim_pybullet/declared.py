@@ -1,4 +1,4 @@
-"""What the engine declares without importing PyBullet: capabilities, with measured errors, and availability."""
+"""Declarations that need no PyBullet: capabilities, with measured errors, and availability."""
 
 from functools import cache
 from importlib import metadata

@@ -1,4 +1,4 @@
-"""What can be chosen about PyBullet and means nothing to another engine."""
+"""Options of PyBullet, which mean nothing to another engine."""
 
 from pydantic import BaseModel, ConfigDict, Field
 

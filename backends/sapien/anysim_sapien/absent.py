@@ -1,4 +1,4 @@
-"""What stands in for a body that is not there, so that reads of all bodies need not ask."""
+"""Stand-ins for absent bodies, so that reads of all bodies need not ask."""
 
 from typing import NamedTuple
 

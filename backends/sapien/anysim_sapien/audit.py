@@ -1,4 +1,4 @@
-"""What PhysX says of itself, for an audit against the World."""
+"""Read-back from PhysX, for an audit against the World."""
 
 from math import pi
 from typing import Any

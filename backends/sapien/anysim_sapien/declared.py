@@ -1,4 +1,4 @@
-"""What the engine declares without importing SAPIEN: capabilities, with measured errors, and availability."""
+"""Declarations that need no SAPIEN: capabilities, with measured errors, and availability."""
 
 import platform
 import sys

@@ -1,4 +1,4 @@
-"""What `anysim doctor` says of SAPIEN beyond its trial: which Vulkan drivers are here, and how to choose one."""
+"""Findings of `anysim doctor` about SAPIEN beyond its trial: Vulkan drivers that are here, and how to choose one."""
 
 import os
 from pathlib import Path

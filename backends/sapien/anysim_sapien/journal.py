@@ -1,4 +1,4 @@
-"""What was done to a scene since it was built.
+"""Journal of a scene: everything done to it since it was built.
 
 PhysX keeps contact memory that nothing reads out, but the same scene built again and treated alike comes to the same
 bits, in any process.

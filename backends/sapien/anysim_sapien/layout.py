@@ -1,4 +1,4 @@
-"""Where the things of a World go in SAPIEN: articulations, single bodies, and indices made once at build."""
+"""Places of a World's parts in SAPIEN: articulations, single bodies, and indices made once at build."""
 
 from dataclasses import dataclass
 

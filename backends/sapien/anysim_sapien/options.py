@@ -1,4 +1,4 @@
-"""What can be chosen about SAPIEN and means nothing to another engine."""
+"""Options of SAPIEN, which mean nothing to another engine."""
 
 from typing import Literal
 

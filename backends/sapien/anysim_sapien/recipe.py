@@ -1,4 +1,4 @@
-"""What all envs of a world are built from: everything about the World that is worked out once."""
+"""The recipe that all envs of a world are built from: everything about the World that is worked out once."""
 
 from functools import lru_cache
 from typing import Any, NamedTuple

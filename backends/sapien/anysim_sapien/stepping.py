@@ -1,4 +1,4 @@
-"""How an env moves on: in a run, and in the same way when its journal is played again."""
+"""Steps of an env: in a run, and in the same way when its journal is played again."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

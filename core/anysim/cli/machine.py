@@ -1,4 +1,4 @@
-"""What `anysim doctor` says of the machine itself."""
+"""Findings of `anysim doctor` about the machine itself."""
 
 import os
 import platform

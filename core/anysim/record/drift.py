@@ -1,4 +1,4 @@
-"""How far a replay came out: recorded against replayed states."""
+"""Drift of a replay: recorded against replayed states."""
 
 from collections.abc import Mapping
 from typing import NamedTuple

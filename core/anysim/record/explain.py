@@ -1,4 +1,4 @@
-"""What an episode drew: every value, its stream, and the line of YAML that asks for it."""
+"""Draws of an episode: every value, its stream, and the line of YAML that asks for it."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What is known before the first frame: of a run, and of one of its trajectories. All of it goes to disk as it is."""
+"""Headers: all that is known of a run or a trajectory before its first frame. They go to disk as they are."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, Literal, NamedTuple

@@ -1,4 +1,4 @@
-"""Who is alive: a file that its owner keeps locked, and that the kernel unlocks when the owner dies.
+"""Locks of live owners: a file that its owner keeps locked, and that the kernel unlocks when the owner dies.
 
 A process number says less: it is used again, and means nothing on another machine that shares the directory.
 """

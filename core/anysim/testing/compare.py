@@ -1,4 +1,4 @@
-"""How the contract suite takes an engine's state apart and compares it."""
+"""Comparison of engine states in the contract suite."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

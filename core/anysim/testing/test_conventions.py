@@ -1,4 +1,4 @@
-"""What the numbers mean: shapes, types, order, frames, axes."""
+"""Meaning of the numbers: shapes, types, order, frames, axes."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What passes through what: excluded pairs of every kind, self-collision, and that everything else collides."""
+"""Collision filters: excluded pairs of every kind, self-collision, and that everything else collides."""
 
 from dataclasses import replace
 from itertools import product

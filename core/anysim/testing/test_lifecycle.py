@@ -1,4 +1,4 @@
-"""From nothing to a world, back to its initial state, and to nothing again."""
+"""Lifecycle: build a world, reset it to its initial state, destroy it."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a thing is like: damping, bounce, where its mass is, how it looks. Answers known by hand, per env."""
+"""Physical and visual properties: damping, bounce, centre of mass, looks. Answers known by hand, per env."""
 
 from dataclasses import replace
 from math import exp

@@ -1,4 +1,4 @@
-"""Who is there in snapshots, parameters and live editing."""
+"""Presence in snapshots, parameters and live editing."""
 
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context

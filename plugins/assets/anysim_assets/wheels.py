@@ -1,4 +1,4 @@
-"""What wheeled bases are made of: wheels, castors, and the body between them."""
+"""Parts of wheeled bases: wheels, castors, and the body between them."""
 
 from dataclasses import replace
 from itertools import combinations

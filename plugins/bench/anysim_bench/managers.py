@@ -1,4 +1,4 @@
-"""What managers, terms and streams cost: their share of a control step, and milliseconds of a reset.
+"""Cost of managers, terms and streams: their share of a control step, and milliseconds of a reset.
 
 Both are timed from within: a clock runs for whoever is at work, each manager, the task's terms, or the engine below
 them, and stops while somebody it called is at work. So reading a state or writing a friction is the engine's time,

@@ -1,4 +1,4 @@
-"""Whether anything accumulates: thousands of partial resets that change who is there, with the process looked at."""
+"""Growth over thousands of partial resets that change the entities present, with the process looked at."""
 
 import gc
 import os

@@ -1,4 +1,4 @@
-"""What worker processes gain: the same world with several numbers of shards, in one run, in interleaved rounds."""
+"""Gain of worker processes: the same world with several numbers of shards, in one run, in interleaved rounds."""
 
 import time
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""What the drives must give: inverse dynamics of the whole body with the ground's forces shared by the feet."""
+"""Efforts of the drives: inverse dynamics of the whole body with the ground's forces shared by the feet."""
 
 import numpy as np
 

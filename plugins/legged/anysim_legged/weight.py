@@ -1,4 +1,4 @@
-"""Who carries the weight: shares of the standing feet, and where the centre of mass is."""
+"""Weight of the body: shares of the standing feet, and the place of the centre of mass."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Where the joints must be: damped least squares over feet, centre of mass, pelvis and posture.
+"""Whole-body inverse kinematics: damped least squares over feet, centre of mass, pelvis and posture.
 
 One model of the robot, its two flat feet, and the joints that the controller may move; the others (arms that somebody
 else moves) are where they are. The base is free in the problem: its pose follows from the feet.

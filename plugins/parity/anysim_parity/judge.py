@@ -1,4 +1,4 @@
-"""What a measure says: which engine is nearest to the answer, whether they agree, and how far apart they are."""
+"""Judgement of a measure: the engine nearest to the answer, agreement, and distances."""
 
 from anysim_parity.result import Measure
 

@@ -1,4 +1,4 @@
-"""What a comparison finds: measures by engine, with the analytic answer where there is one, plots and pictures."""
+"""Results of a comparison: measures by engine, with the analytic answer where there is one, plots and pictures."""
 
 from collections.abc import Mapping
 from typing import NamedTuple

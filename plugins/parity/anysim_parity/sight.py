@@ -1,4 +1,4 @@
-"""What a pinhole camera sees of the neutral geometry, ray by ray: the answer that rendered images are held against.
+"""View of a pinhole camera on the neutral geometry, ray by ray: the answer for rendered images.
 
 A pixel's ray goes through its centre: the pixel in column u and row v of a W x H image looks along
 ((u + 1/2 - W/2) / f, (v + 1/2 - H/2) / f, 1) in the optical frame, f = H / (2 tan(fov / 2)). Boxes, spheres, planes,

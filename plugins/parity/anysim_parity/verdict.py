@@ -1,4 +1,4 @@
-"""What the numbers of a layer say: who agrees with whom, who is near the analytic answer, and what is furthest off."""
+"""Verdict on a layer: which engines agree, which are near the analytic answer, and what is furthest off."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import combinations

@@ -1,4 +1,4 @@
-"""What a world looks like: its first episodes, drawn by each engine, side by side."""
+"""Pictures of a world: its first episodes, drawn by each engine, side by side."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What a policy observes, measured from its robot and put in its order."""
+"""Observation of a policy, measured from its robot and put in its order."""
 
 import numpy as np
 

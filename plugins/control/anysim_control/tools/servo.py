@@ -1,4 +1,4 @@
-"""From targets of tools to commands of drives: the part that all inverse kinematics controllers have in common.
+"""Commands of drives that follow targets of tools: the part that all inverse kinematics controllers share.
 
 The reference is a joint configuration that only the solver moves; drives follow it. It starts where the drives are
 asked to be, so an arm that sags under a load does not creep, and what is asked for can be reached exactly.

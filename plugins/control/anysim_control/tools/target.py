@@ -1,4 +1,4 @@
-"""What an action asks of tools: absolute poses or positions, steps, or speeds, and the targets that follow from it."""
+"""Targets of tools: absolute poses or positions, steps, or speeds, as an action asks for them."""
 
 from collections.abc import Mapping
 from typing import Annotated, Literal

@@ -1,4 +1,4 @@
-"""What the controllers of vehicles have in common: which drives are whose, and limits of acceleration."""
+"""Parts that the controllers of vehicles share: their drives by role, and limits of acceleration."""
 
 from collections.abc import Mapping, Sequence
 from typing import TypeVar

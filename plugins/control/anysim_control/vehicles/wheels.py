@@ -1,4 +1,4 @@
-"""From the velocity of a base to its wheels and back, for wheels that roll without slipping on a plane.
+"""Wheel kinematics: the velocity of a base to its wheels and back, for wheels that roll on a plane without slipping.
 
 A twist is (vx, vy, omega) of the base's frame in its own axes [m/s, rad/s]: x forward, y to the left, omega to the
 left. All functions work row by row on batches: a leading axis E, then what the docstrings say.

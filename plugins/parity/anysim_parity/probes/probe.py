@@ -1,4 +1,4 @@
-"""What a probe is, and how its world is run: every step recorded, nothing written but what the probe says."""
+"""The contract of a probe, and the run of its world: every step recorded, only what the probe asks for written."""
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple

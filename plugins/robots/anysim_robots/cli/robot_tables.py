@@ -1,4 +1,4 @@
-"""What `anysim robot NAME` prints."""
+"""Tables that `anysim robot NAME` prints."""
 
 from collections.abc import Sequence
 from math import isinf

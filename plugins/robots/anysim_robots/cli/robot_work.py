@@ -1,4 +1,4 @@
-"""What `anysim robot` has done on engines."""
+"""Work of `anysim robot` on engines."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a qualification found, as plain data."""
+"""Results of a qualification, as plain data."""
 
 from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple
