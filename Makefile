@@ -63,6 +63,7 @@ check-schema:
 check-tables:
 	$(BIN)/python scripts/capability_table.py --check
 	$(BIN)/python scripts/axes_table.py --check
+	$(BIN)/python scripts/term_table.py --check
 	$(BIN)/python scripts/robot_table.py --check
 check-types:
 	$(BIN)/pyright
@@ -80,6 +81,7 @@ schema: $(STAMP)  ## write the JSON Schemas that editors complete YAML from
 docs: schema  ## write what is generated and run the examples of docs/
 	$(BIN)/python scripts/capability_table.py
 	$(BIN)/python scripts/axes_table.py
+	$(BIN)/python scripts/term_table.py
 	$(BIN)/python scripts/robot_table.py
 	$(BIN)/python -m pytest tests/docs $(ARGS)
 

@@ -17,7 +17,7 @@ BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 EXCERPT = re.compile(r"^```(\w+) (\S+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FENCE = re.compile(r"^```(\w+)$", re.MULTILINE)
 EXTERNAL = ROOT / "tests" / "external"
-SOURCES = (EXTERNAL / "anysim-ballistic", EXTERNAL / "anysim-thirdarm", EXTERNAL, ROOT)
+SOURCES = (*(EXTERNAL / f"anysim-{name}" for name in ("ballistic", "thirdarm", "starter")), EXTERNAL, ROOT)
 """Where the file at the head of an excerpt is looked for."""
 
 

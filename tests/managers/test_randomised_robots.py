@@ -352,8 +352,9 @@ def test_a_record_says_what_was_drawn_and_is_replayed_to_the_bit(engine: str, tm
 
 
 def test_every_axis_names_parameters_that_exist() -> None:
+    from axes import AXES, can
+
     from anysim.engine.parameters import PARAMETERS
-    from scripts.axes import AXES, can
 
     assert {name for axis in AXES for name in axis.parameters} <= PARAMETERS.keys()
     payload = next(axis for axis in AXES if "body.com" in axis.parameters)

@@ -1,38 +1,19 @@
 """A robot of somebody else: one YAML file, one URDF and an entry point, and everything works."""
 
 import json
-import os
-import shutil
-import subprocess
-import sys
-import tomllib
 from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).parents[1] / "external" / "anysim-thirdarm"
+from tests.external_packages import EXTERNAL, install, run
+
+PACKAGE = EXTERNAL / "anysim-thirdarm"
 
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder on the path, as an installer leaves it: the package, and its metadata with the entry points."""
-    folder = tmp_path_factory.mktemp("site")
-    shutil.copytree(PACKAGE / "anysim_thirdarm", folder / "anysim_thirdarm")
-    project = tomllib.loads((PACKAGE / "pyproject.toml").read_text())["project"]
-    info = folder / f"anysim_thirdarm-{project['version']}.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n")
-    lines = [
-        f"[{group}]\n" + "".join(f"{k} = {v}\n" for k, v in e.items()) for group, e in project["entry-points"].items()
-    ]
-    (info / "entry_points.txt").write_text("\n".join(lines))
-    return folder
-
-
-def run(installed: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    environment = {**os.environ, "PYTHONPATH": str(installed)}
-    command = [sys.executable, *words]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment, check=False)
+    return install("anysim-thirdarm", tmp_path_factory.mktemp("site"))
 
 
 def test_there_is_no_python_in_it() -> None:

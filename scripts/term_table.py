@@ -1,0 +1,94 @@
+"""The reference of the built-in terms, from their signatures, into docs/terms.md.
+
+    python scripts/term_table.py [--check]
+
+`--check` writes nothing and exits with 1 if the page has drifted from the code.
+"""
+
+import inspect
+import re
+import sys
+from collections.abc import Callable, Iterator
+from types import ModuleType
+from typing import Any, get_args, get_origin
+
+from generated import main
+from pydantic.fields import FieldInfo
+
+from anysim.plugin_parameters import parameters, reference_kind
+from anysim.task.terms import TERMS
+
+TITLES = {
+    "observation": "Observations: `(n, k)`",
+    "reward": "Rewards: `(n,)`",
+    "predicate": "Predicates of success and failure: `(n,)` bool",
+    "command": "Commands: goal poses `(n, 7)`",
+    "event": "Events",
+}
+
+
+def functions(module: ModuleType) -> Iterator[tuple[str, Callable[..., Any]]]:
+    """The terms of a kind, by name."""
+    yield from ((name, getattr(module, name)) for name in sorted(module.__all__))
+
+
+def typed(annotation: Any) -> tuple[str, str]:
+    """What a parameter is written as in YAML, and what its annotation says about it."""
+    said, metadata = "", getattr(annotation, "__metadata__", ())
+    for extra in metadata:
+        if isinstance(extra, FieldInfo):
+            bounds = [f"{SIGNS[type(b).__name__]} {next(iter(vars_of(b).values()))}" for b in extra.metadata]
+            said = ", ".join([*bounds, *([extra.description] if extra.description else [])])
+    bare = get_args(annotation)[0] if metadata else annotation
+    if kind := reference_kind(bare):
+        return f"name of {'an' if kind[0] in 'aeiou' else 'a'} {kind}", said
+    return spelled(bare), said
+
+
+SIGNS = {"Gt": ">", "Ge": "≥", "Lt": "<", "Le": "≤", "MinLen": "at least", "MaxLen": "at most"}
+
+
+def vars_of(bound: Any) -> dict[str, Any]:
+    """The fields of one of pydantic's bounds."""
+    return {name: getattr(bound, name) for name in bound.__slots__}
+
+
+def spelled(annotation: Any) -> str:
+    """A type in the words of a YAML file."""
+    text = annotation.__name__ if isinstance(annotation, type) and get_origin(annotation) is None else str(annotation)
+    if get_origin(annotation) is not None and str(annotation).startswith("typing.Literal"):
+        return " or ".join(f"`{value}`" for value in get_args(annotation))
+    if "Range" in text or "Choice" in text:
+        return "3 values, each may be drawn" if "tuple" in text else "a value, may be drawn"
+    words = {"float": "number", "int": "whole number", "str": "word", "bool": "true or false"}
+    return words.get(text, re.sub(r"[\w.]+\.(\w+)", r"\1", text))
+
+
+def row(name: str, function: Callable[..., Any]) -> str:
+    """One term as a row of a table."""
+    given: list[str] = []
+    for key, parameter in parameters(function).items():
+        kind, said = typed(parameter.annotation)
+        words = [kind, *([said] if said else [])]
+        if kind == "name of a robot":
+            words.append("may be left out where there is one")
+        if parameter.default is not inspect.Parameter.empty:
+            words.append(f"default {parameter.default!r}")
+        given.append(f"`{key}`: {', '.join(words)}")
+    what = " ".join((function.__doc__ or "").split("\n\n")[0].split())
+    cells = (cell.replace("|", "\\|") for cell in (f"`{name}`", what, "<br>".join(given)))
+    return f"| {' | '.join(cells)} |"
+
+
+def reference() -> str:
+    """A table for each kind of term."""
+    lines: list[str] = []
+    for kind, module in TERMS.items():
+        lines += [f"## {TITLES[kind]}", "", "| term | what it is | parameters |", "|---|---|---|"]
+        lines += [row(name, function) for name, function in functions(module)]
+        lines.append("")
+    return "\n".join(lines).rstrip()
+
+
+if __name__ == "__main__":
+    sys.exit(main(__doc__, "terms", "term_table.py", ("docs/terms.md",), reference))

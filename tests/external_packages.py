@@ -1,0 +1,34 @@
+"""Packages of strangers on the path, as an installer leaves them: without building a wheel."""
+
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+EXTERNAL = Path(__file__).parent / "external"
+
+
+def install(name: str, folder: Path) -> Path:
+    """Put the distribution `tests/external/NAME` into a folder, with its metadata and entry points."""
+    source = EXTERNAL / name
+    project = tomllib.loads((source / "pyproject.toml").read_text())["project"]
+    package = name.replace("-", "_")
+    shutil.copytree(source / package, folder / package, ignore=shutil.ignore_patterns("__pycache__"))
+    info = folder / f"{package}-{project['version']}.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {project['version']}\n")
+    groups = [
+        f"[{group}]\n" + "".join(f"{key} = {value}\n" for key, value in entries.items())
+        for group, entries in project["entry-points"].items()
+    ]
+    (info / "entry_points.txt").write_text("\n".join(groups))
+    return folder
+
+
+def run(folder: Path, *words: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run Python with the folder on its path."""
+    environment = {**os.environ, "PYTHONPATH": str(folder)}
+    command = [sys.executable, *words]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment, cwd=cwd, check=False)
