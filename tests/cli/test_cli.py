@@ -170,6 +170,8 @@ def test_bench_gives_a_ratio_for_each_loop() -> None:
         ("mujoco", "env", "implicit_pd"),
     ]
     assert all(row["ratio"] > 0 for row in rows)
+    assert [row["budget"] for row in rows] == [0.90, 0.90, None]
+    assert [row["missed"] for row in rows[:2]] == [row["ratio"] < 0.90 for row in rows[:2]]
 
 
 def test_overrides_are_checked_like_files() -> None:

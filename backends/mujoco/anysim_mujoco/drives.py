@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from anysim.conventions import Array
 from anysim.engine.control import MODES, Control
 from anysim.engine.drive_checks import speed_bound
 from anysim.model.world import ControlMode, World
@@ -55,6 +56,13 @@ class Drives:
         np.multiply(control.position, self._stiffness, out=self._input)
         self._input += control.effort
         self._input += control.velocity * self._damping
+
+    def input_for(self, control: Control) -> Array:
+        """A copy of the control input (N, A) of the next substep; these are the commands from now on."""
+        self.apply(control)
+        if self.limited:
+            self.limit()
+        return self._input.copy()
 
     def limit(self) -> None:
         """Write the control input of all envs for the next substep, the velocity that it asks for limited."""

@@ -11,7 +11,7 @@ from anysim.conventions import Array, wxyz_from_xyzw, xyzw_from_wxyz
 from anysim.engine.base import SimEngine
 from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Capabilities
-from anysim.engine.control import Control
+from anysim.engine.control import Control, alternating
 from anysim.engine.doctor import Finding, Health
 from anysim.engine.lighting import Looks
 from anysim.engine.presence import Lifecycle
@@ -253,7 +253,9 @@ class MujocoEngine(SimEngine):
             self._require_world()
             self._parameters.settle()
             self._flush_control()
-            return raw_loop(self._batch)
+            first, second = alternating(self._commands.control)
+            inputs = [self._drives.input_for(control) for control in (second, first)]
+            return raw_loop(self._batch, inputs[::-1])
 
     # ------------------------------------------------------------------ sensing
 

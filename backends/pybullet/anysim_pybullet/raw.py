@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import cycle
 from weakref import finalize
 
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.control import Control
+from anysim.engine.control import Control, alternating
 from anysim.engine.state import SnapshotLevel
 from anysim.model.world import Actuation
 from anysim_pybullet.bullet import bullet
@@ -17,7 +18,8 @@ from anysim_pybullet.envs import Envs
 def raw_loop(envs: Envs, control: Control) -> Callable[[int], None]:
     """A function of the number of physics steps: set targets, step private clients, copy the state out into arrays.
 
-    As one would write it for Bullet alone: its own motors, told once in a call; the torques that carry a gravity
+    As one would write it for Bullet alone: its own motors, told once in a call (gains are arguments of Bullet's call,
+    so that they are told with each target); the torques that carry a gravity
     compensated robot in every step, as Bullet wants them, but not worked out anew; positions and velocities of joints,
     and poses and velocities of centres of mass, as Bullet gives them.
 
@@ -30,14 +32,8 @@ def raw_loop(envs: Envs, control: Control) -> Callable[[int], None]:
     state: Mapping[str, Array] = envs.snapshot(ids, SnapshotLevel.TRAJECTORY)
     copy.restore(ids, state, SnapshotLevel.TRAJECTORY)
     laws = copy.laws
+    turns = cycle([_orders(copy, commands) for commands in alternating(control)])
     laws.apply(control)
-    orders: list[list[tuple[int, list[int], dict[str, list[float]]]]] = [[] for _ in ids]
-    number_of = {env.id: i for i, env in enumerate(copy.clients)}
-    if laws.motors is not None:
-        damping, armature = laws.damping_and_armature()
-        told = laws.motors.orders(control, laws.kp, laws.kd, laws.limit, damping, armature, copy.clients)
-        for client, uid, links, terms in told:
-            orders[number_of[client]].append((uid, links, terms))
     copy.step(1, None)
     lifted = [
         [
@@ -53,6 +49,7 @@ def raw_loop(envs: Envs, control: Control) -> Callable[[int], None]:
     pose, twist = np.zeros((n, bodies, 7)), np.zeros((n, bodies, 6))
 
     def loop(steps: int) -> None:
+        orders = next(turns)
         for i, env in enumerate(copy.clients):
             client = env.id
             for uid, links, terms in orders[i]:
@@ -79,3 +76,15 @@ def raw_loop(envs: Envs, control: Control) -> Callable[[int], None]:
 
     finalize(loop, copy.close)
     return loop
+
+
+def _orders(envs: Envs, control: Control) -> list[list[tuple[int, list[int], dict[str, list[float]]]]]:
+    """What Bullet's motors are told, env by env: body, links, targets and gains of each articulation."""
+    laws, orders = envs.laws, [[] for _ in envs.clients]
+    number_of = {env.id: i for i, env in enumerate(envs.clients)}
+    if laws.motors is not None:
+        damping, armature = laws.damping_and_armature()
+        told = laws.motors.orders(control, laws.kp, laws.kd, laws.limit, damping, armature, envs.clients)
+        for client, uid, links, terms in told:
+            orders[number_of[client]].append((uid, links, terms))
+    return orders

@@ -2,11 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import cycle
+from typing import Any
 
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.control import Control
+from anysim.engine.control import Control, alternating
 from anysim.model.world import Actuation, World
 from anysim_sapien.drives import Drives
 from anysim_sapien.motion import Motion, put_motion
@@ -28,7 +30,8 @@ def raw_loop(
     """A function of the number of physics steps: set targets, step private scenes, copy the state out into arrays.
 
     As one would write it for SAPIEN alone: PhysX' own drives, whose gains were set before; all targets are set in each
-    call, and joint positions and velocities, poses and velocities of bodies copied as SAPIEN gives them.
+    call, two commands in turn, and joint positions and velocities, poses and velocities of bodies copied as SAPIEN
+    gives them.
     """
     native = replace(world, physics=replace(world.physics, actuation=Actuation.NATIVE))
     recipes = Recipes(native, options)
@@ -40,16 +43,23 @@ def raw_loop(
         put_motion(scene, motion)
         own.begin(env, scene)
     driven = [a.joint for a in world.actuators]
-    targets = [
-        [(scene.joints[j], *own.target(env, j)) for j in driven if scene.layout.joint_there[j]]
-        for env, scene in enumerate(scenes)
-    ]
+    written: list[list[list[tuple[Any, float, float]]]] = []
+    for commands in alternating(control):
+        own.apply(commands)
+        written.append(
+            [
+                [(scene.joints[j], *own.target(env, j)) for j in driven if scene.layout.joint_there[j]]
+                for env, scene in enumerate(scenes)
+            ]
+        )
+    turns = cycle(written)
     moving = [i for i in range(len(world.bodies)) if not recipes.layout.fixed[i]]
     position = np.zeros((len(scenes), len(world.joints)))
     velocity, twist = np.zeros_like(position), np.zeros((len(scenes), len(world.bodies), 6))
     poses = [np.zeros((len(scene.scene.entities), 7)) for scene in scenes]
 
     def loop(steps: int) -> None:
+        targets = next(turns)
         for env, scene in enumerate(scenes):
             for joint, place, speed in targets[env]:
                 joint.set_drive_target(place)

@@ -22,6 +22,19 @@ class Control(NamedTuple):
     mode: Array
 
 
+NUDGE = 1e-3
+"""[rad, m] between the two position targets of a benchmark's loops."""
+
+
+def alternating(control: Control) -> tuple[Control, Control]:
+    """The commands that a benchmark writes in turn: these, and the same with all positions moved by `NUDGE`.
+
+    Both loops write them, anysim's and the engine's own (`raw_loop`): what passes over commands that did not change
+    would gain nothing in use.
+    """
+    return control, control._replace(position=control.position + NUDGE)
+
+
 class CommandBuffer:
     """The commands of all envs. `control_changed` says that the engine has not seen the latest ones."""
 

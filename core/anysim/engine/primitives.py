@@ -132,8 +132,9 @@ class Primitives(ABC):
     def raw_loop(self) -> Callable[[int], None] | None:
         """The engine's own loop without anysim, for benchmarks: a function of the number of physics steps.
 
-        Each call writes the drives' present commands, steps a private copy of the present state, and copies out the
-        arrays from which joint positions and velocities, body poses and twists are made. None where an engine has none.
+        Each call writes the drives' commands, in turn those of `anysim.engine.control.alternating`, steps a private
+        copy of the present state, and copies out the arrays from which joint positions and velocities, body poses and
+        twists are made. None where an engine has none.
         """
         return None
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from anysim.engine.base import SimEngine
 from anysim.engine.sharded.engine import ShardedEngine
 from anysim.errors import EngineError
-from anysim_bench.step import panda_and_boxes
+from anysim_bench.step import control_loop, panda_and_boxes
 
 CHUNK_STEPS = 4000
 """Physics steps of one timed chunk over all envs together, at least ten control steps."""
@@ -80,16 +80,3 @@ def _timed(engine: SimEngine, loop: Callable[[], None], calls: int) -> tuple[flo
 
 def _processor_times(engine: SimEngine) -> tuple[float, ...]:
     return engine.processor_times() if isinstance(engine, ShardedEngine) else (0.0,)
-
-
-def control_loop(engine: SimEngine, substeps: int) -> Callable[[], None]:
-    """One control step: commands in, physics, joints and bodies out."""
-    targets = engine.control.position
-
-    def step() -> None:
-        engine.set_control(position=targets)
-        engine.step(substeps)
-        state = engine.get_state()
-        _ = state.joint_pos, state.joint_vel, state.body_pose, state.body_twist
-
-    return step

@@ -3,12 +3,17 @@
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import cycle
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from anysim.errors import EngineError
+from anysim.conventions import Array
+from anysim.engine.base import SimEngine
+from anysim.engine.control import Control, alternating
+from anysim.errors import EngineError, TaskError
 from anysim.model.world import Actuation
+from anysim.task.env import TaskEnv
 
 BOXES = 5
 CHUNK_STEPS = 4000
@@ -27,6 +32,7 @@ class StepCost(NamedTuple):
         raw: the engine's own loop [steps/s, wall].
         ratio: ours / raw, of wall time.
         cpu_ratio: the same of processor time, which other load on the machine disturbs less.
+        budget: the least `ratio` that is good enough; None where there is no budget.
     """
 
     engine: str
@@ -37,6 +43,50 @@ class StepCost(NamedTuple):
     raw: float
     ratio: float
     cpu_ratio: float
+    budget: float | None
+
+    @property
+    def missed(self) -> bool:
+        """Whether the ratio is below its budget."""
+        return self.budget is not None and self.ratio < self.budget
+
+
+class _Floor(NamedTuple):
+    engine: str
+    what: str
+    ratio: float
+    fewest: int
+    most: int
+    actuation: Actuation | None = None
+
+
+_BUDGET_TASK = "pick_cube"
+_ANY = 1 << 30
+_FLOORS = (
+    _Floor("mujoco", "engine", 0.90, 1, 1),
+    _Floor("pybullet", "engine", 0.88, 1, 1, Actuation.NATIVE),
+    _Floor("sapien", "engine", 0.85, 1, 1, Actuation.NATIVE),
+    _Floor("sapien", "engine", 0.92, 16, 64, Actuation.IMPLICIT_PD),
+    _Floor("mujoco", "env", 0.82, 16, 16),
+    _Floor("pybullet", "env", 0.88, 16, 16),
+    _Floor("sapien", "env", 0.82, 16, 16),
+    _Floor("", "engine", 0.65, 1, 15),
+    _Floor("", "engine", 0.90, 16, _ANY),
+)
+"""The first that fits is the budget; those without a name are for any engine's loop, also a stranger's."""
+
+
+def budget(engine: str, what: str, actuation: str, num_envs: int) -> float | None:
+    """The least ratio to the raw loop that is good enough; None where there is no budget."""
+    fits = (
+        floor.ratio
+        for floor in _FLOORS
+        if floor.engine in ("", engine)
+        and floor.what == what
+        and floor.fewest <= num_envs <= floor.most
+        and floor.actuation in (None, actuation)
+    )
+    return next(fits, None)
 
 
 def panda_and_boxes() -> dict[str, Any]:
@@ -78,20 +128,29 @@ def engine_cost(
     with create_simulation(engine_name) as engine:
         engine.create_world(world, num_envs)
         substeps = world.physics.substeps
-        targets = engine.control.position
         engine.step(100)
-
-        def ours() -> None:
-            engine.set_control(position=targets)
-            engine.step(substeps)
-            state = engine.get_state()
-            _ = state.joint_pos, state.joint_vel, state.body_pose, state.body_twist
-
-        return _compare("engine", num_envs, ours, engine, substeps, rounds)
+        return _compare("engine", control_loop(engine, substeps), engine, rounds)
 
 
-def env_cost(engine_name: str, num_envs: int, task: str = "pick_cube", rounds: int = 7) -> StepCost:
-    """A whole task step (action, physics, status, reward, observation) against the raw loop of its world."""
+def control_loop(engine: SimEngine, substeps: int) -> Callable[[], None]:
+    """One control step: commands in, other ones than before, physics, joints and bodies out."""
+    turns = cycle([control.position for control in alternating(engine.control)])
+
+    def step() -> None:
+        engine.set_control(position=next(turns))
+        engine.step(substeps)
+        state = engine.get_state()
+        _ = state.joint_pos, state.joint_vel, state.body_pose, state.body_twist
+
+    return step
+
+
+def env_cost(engine_name: str, num_envs: int, task: str = _BUDGET_TASK, rounds: int = 7) -> StepCost:
+    """A whole task step (action, physics, status, reward, observation) against the raw loop of its world.
+
+    Actions are in turn those for the two commands that the raw loop writes; where a controller takes no joint
+    positions, its action is zero.
+    """
     from anysim.api import make
 
     with make(task, engine=engine_name, num_envs=num_envs, overrides=["task.horizon=1000000000"]) as env:
@@ -99,11 +158,28 @@ def env_cost(engine_name: str, num_envs: int, task: str = "pick_cube", rounds: i
         still = np.zeros((num_envs, env.action_dim))
         for _ in range(20):
             env.step(still)
-        return _compare("env", num_envs, lambda: env.step(still), env.engine, env.engine.world.physics.substeps, rounds)
+        actions: list[Array] = []
+        for control in alternating(env.engine.control)[::-1]:  # deltas: each action is for where the last one led
+            actions.append(_action_for(env, control))
+            env.step(actions[-1])
+        turns = cycle(actions)
+        cost = _compare("env", lambda: env.step(next(turns)), env.engine, rounds)
+        return cost if task == _BUDGET_TASK else cost._replace(budget=None)
 
 
-def _compare(what: str, num_envs: int, ours: Callable[[], Any], engine: Any, substeps: int, rounds: int) -> StepCost:
-    raw_loop = engine.raw_loop()
+def _action_for(env: TaskEnv, control: Control) -> Array:
+    action, ids = np.zeros((env.num_envs, env.action_dim)), np.arange(env.num_envs)
+    for part in () if env.robots is None else env.robots.slices:
+        targets = control.position[:, part.controller.channel.columns]
+        try:
+            action[:, part.start : part.stop] = part.controller.action_for(targets, ids)
+        except TaskError:
+            continue
+    return action
+
+
+def _compare(what: str, ours: Callable[[], Any], engine: SimEngine, rounds: int) -> StepCost:
+    num_envs, substeps, raw_loop = engine.num_envs, engine.world.physics.substeps, engine.raw_loop()
     if raw_loop is None:
         raise EngineError(f"engine '{engine.name}' offers no raw loop to compare with")
     calls = max(10, CHUNK_STEPS // (num_envs * substeps))
@@ -127,4 +203,5 @@ def _compare(what: str, num_envs: int, ours: Callable[[], Any], engine: Any, sub
         steps / raw_wall,
         raw_wall / our_wall,
         raw_cpu / our_cpu,
+        budget(engine.name, what, actuation, num_envs),
     )

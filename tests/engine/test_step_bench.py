@@ -1,0 +1,63 @@
+"""The benchmark of steps: its budgets, and that its loops write commands that change."""
+
+import numpy as np
+import pytest
+
+from anysim import api
+from anysim.engine.base import SimEngine
+from anysim.engine.control import NUDGE
+from anysim.engine.factory import create_simulation
+from anysim_bench import step
+
+
+@pytest.mark.parametrize(
+    ("engine", "what", "actuation", "num_envs", "least"),
+    [
+        ("mujoco", "engine", "implicit_pd", 1, 0.90),
+        ("pybullet", "engine", "native", 1, 0.88),
+        ("pybullet", "engine", "implicit_pd", 1, 0.65),
+        ("sapien", "engine", "implicit_pd", 64, 0.92),
+        ("pybullet", "env", "implicit_pd", 16, 0.88),
+        ("pybullet", "env", "implicit_pd", 1, None),
+        ("a strangers", "engine", "native", 4, 0.65),
+        ("a strangers", "engine", "native", 128, 0.90),
+        ("a strangers", "env", "native", 16, None),
+    ],
+)
+def test_budgets(engine, what, actuation, num_envs, least):
+    assert step.budget(engine, what, actuation, num_envs) == least
+
+
+def test_a_ratio_below_its_budget_is_missed():
+    cost = step.StepCost("mujoco", "engine", "native", 1, 89.0, 100.0, 0.89, 0.95, 0.90)
+    assert cost.missed
+    assert not cost._replace(ratio=0.90).missed
+    assert not cost._replace(budget=None).missed
+
+
+def test_commands_change_from_control_step_to_control_step():
+    with create_simulation("mujoco") as engine:
+        engine.create_world(api.compile_world(step.panda_and_boxes()))
+        step = step.control_loop(engine, 1)
+        seen = []
+        for _ in range(4):
+            step()
+            seen.append(engine.control.position)
+    assert np.array_equal(seen[0], seen[2])
+    assert np.array_equal(seen[1], seen[3])
+    assert (seen[0] != seen[1]).all()
+
+
+def test_in_a_task_the_targets_of_the_arm_alternate_too(monkeypatch):
+    monkeypatch.setattr(step, "CHUNK_STEPS", 1)
+    seen, write = [], SimEngine.set_control
+
+    def spy(engine, *values, **keywords):
+        write(engine, *values, **keywords)
+        seen.append(engine.control.position[:, :7])
+
+    monkeypatch.setattr(SimEngine, "set_control", spy)
+    assert step.env_cost("mujoco", 1, rounds=1).ratio > 0
+    last, before, earlier = seen[-1], seen[-2], seen[-3]
+    assert np.allclose(last, earlier, rtol=0, atol=1e-12)
+    assert np.allclose(np.abs(last - before), NUDGE)
