@@ -23,7 +23,7 @@ class Cast:
     linked: list[tuple[int, Array]]  # number and joints of each tree that has some
     links: Array
     moving: Array
-    is_root: Array  # (moving,) bool
+    jointed: Array  # the joints of `linked`, one after the other
 
     @classmethod
     def of(cls, world: World, trees: list[Tree], shape_geoms: Array, present: Array) -> "Cast":
@@ -44,5 +44,5 @@ class Cast:
             linked=[(t.number, t.joints) for t in there if len(t.joints)],
             links=links,
             moving=moving,
-            is_root=np.arange(len(moving)) < len(free),
+            jointed=np.concatenate([np.zeros(0, dtype=int), *(t.joints for t in there)]),
         )

@@ -97,6 +97,7 @@ class Envs:
             bullet().removeState(self._begin[index], physicsClientId=self.clients[index].id)
             self.clients[index].rebuild(cast, self.parameters.shifted_com(index))
         self.mirror.fault[index] = False
+        self.laws.refresh()
         self._settle(index)
         self.parameters.renew(index)
 

@@ -404,19 +404,107 @@ def drive_law(
 
 
 @compiled
-def frames(rows: Array, local: Array, is_root: Array, pose: Array, twist: Array) -> None:
+def weight(
+    joint_ints: Array,
+    joint_floats: Array,
+    bodies: Array,
+    numbers: Array,
+    gravity: Array,
+    root: Array,
+    position: Array,
+    joints: Array,
+    first: int,
+    torque: Array,
+) -> bool:
+    """Torques that cancel the weight of compensated bodies of an articulation.
+
+    Args:
+        bodies: (B, 11) of the env, of which the articulation has `numbers` (n + 1,).
+        gravity: (3,) [m/s^2].
+        root: (7,) the pose of the root's frame.
+        position: (J,) of the env, of which the articulation has `joints` (n,).
+        first: 6 with a free root, else 0.
+        torque: (J,) [N m, N], written at `joints`.
+
+    Returns:
+        False where the state is not finite; nothing is written then.
+    """
+    n = len(joints)
+    size = first + n
+    motion, place, known = np.zeros((2, n)), np.zeros(13), np.empty(size)
+    for i in range(n):
+        motion[0, i] = position[joints[i]]
+    for k in range(7):
+        place[k] = root[k]
+    dynamics(
+        joint_ints,
+        joint_floats,
+        bodies[numbers],
+        np.zeros((n + 1, 6)),
+        gravity,
+        place,
+        motion,
+        first,
+        np.empty((size, size)),
+        np.empty(size),
+        known,
+    )
+    for v in range(size):
+        if not math.isfinite(known[v]):
+            return False
+    for i in range(n):
+        torque[joints[i]] = known[first + i]
+    return True
+
+
+@compiled
+def motor_targets(
+    position: Array,
+    velocity: Array,
+    effort: Array,
+    stiffness: Array,
+    drag: Array,
+    whole: Array,
+    place: Array,
+    speed: Array,
+) -> None:
+    """What Bullet's motors are told for commands; all are (N, A), see `anysim_pybullet.motors`.
+
+    Args:
+        position, velocity, effort: the commands.
+        stiffness, drag: of the drives in their modes.
+        whole: drag and the joints' own damping.
+        place, speed: the motors' targets, written.
+    """
+    for env in range(position.shape[0]):
+        for a in range(position.shape[1]):
+            stiff = stiffness[env, a] > 0.0
+            place[env, a] = position[env, a] + (effort[env, a] / stiffness[env, a] if stiff else 0.0)
+            push = drag[env, a] * velocity[env, a] + (0.0 if stiff else effort[env, a])
+            speed[env, a] = push / whole[env, a] if whole[env, a] > 0.0 else 0.0
+
+
+ROW = 16
+"""Numbers of a body in `frames`: its centre of mass (3), a quaternion (4), linear and angular velocity of the centre of
+mass (6), and the origin of the link's frame (3). The quaternion is a root's inertial frame's, or a link's frame's."""
+
+UNUSED = (0.0,) * 3
+"""In place of the origin of a link's frame, which a root has not."""
+
+
+@compiled
+def frames(rows: Array, local: Array, roots: int, pose: Array, twist: Array) -> None:
     """Frames of bodies from what Bullet says of their centres of mass.
 
     Args:
-        rows: (K, 20): position and quaternion of the inertial frame, of the link's frame (unused for roots), linear
-            and angular velocity of the centre of mass.
+        rows: (K, ROW), roots first.
         local: (K, 10): the inertial frame in the link's frame (7), and the link's origin in the body's frame (3).
-        is_root: (K,) bool.
+        roots: how many.
         pose, twist: (K, 7), (K, 6), written.
     """
     turn, arm, tmp = np.empty((3, 3)), np.empty(3), np.empty(3)
     for b in range(rows.shape[0]):
-        if is_root[b]:
+        if b < roots:
             x, y, z, w = rows[b, 3], rows[b, 4], rows[b, 5], rows[b, 6]
             a, c, d, e = -local[b, 3], -local[b, 4], -local[b, 5], local[b, 6]
             pose[b, 3] = w * a + x * e + y * d - z * c
@@ -431,15 +519,72 @@ def frames(rows: Array, local: Array, is_root: Array, pose: Array, twist: Array)
                 pose[b, k] = rows[b, k] + arm[k]
         else:
             for k in range(4):
-                pose[b, 3 + k] = rows[b, 10 + k]
+                pose[b, 3 + k] = rows[b, 3 + k]
             rotation(pose[b, 3], pose[b, 4], pose[b, 5], pose[b, 6], turn)
             for k in range(3):
                 tmp[k] = -local[b, 7 + k]
             _times(turn, tmp, arm)
             for k in range(3):
-                pose[b, k] = rows[b, 7 + k] + arm[k]
+                pose[b, k] = rows[b, 13 + k] + arm[k]
         for k in range(3):
             arm[k] = pose[b, k] - rows[b, k]
-            twist[b, k] = rows[b, 14 + k]
-            twist[b, 3 + k] = rows[b, 17 + k]
+            twist[b, k] = rows[b, 7 + k]
+            twist[b, 3 + k] = rows[b, 10 + k]
         _add_cross(twist[b, 3:], arm, 1.0, twist[b, :3])
+
+
+@compiled
+def take(
+    numbers: Array,
+    local: Array,
+    bodies: Array,
+    roots: int,
+    joints: Array,
+    running: Array,
+    pose: Array,
+    twist: Array,
+    position: Array,
+    velocity: Array,
+    motor: Array,
+    effort: Array,
+) -> None:
+    """Write what Bullet says into the rows of an env: pose (B, 7), twist (B, 6), of joints (J,).
+
+    Args:
+        numbers: rows of `frames` one after the other, roots first; then positions, velocities and torques of motors.
+        local: (B, 10), see `frames`.
+        bodies, joints: (K,) whose they are.
+        roots: how many of the bodies.
+        running: (J,) bool, the joints that motors move: their torques are the efforts. Not where no joints were read.
+    """
+    count = len(bodies)
+    here, moves = np.empty((count, 7)), np.empty((count, 6))
+    frames(numbers[: ROW * count].reshape(count, ROW), local[bodies], roots, here, moves)
+    for b in range(count):
+        pose[bodies[b], :] = here[b]
+        twist[bodies[b], :] = moves[b]
+    start, n = ROW * count, len(joints)
+    for k in range(n):
+        position[joints[k]] = numbers[start + k]
+        velocity[joints[k]] = numbers[start + n + k]
+        motor[joints[k]] = numbers[start + 2 * n + k]
+    if n > 0:
+        for j in range(len(running)):
+            if running[j]:
+                effort[j] = motor[j]
+
+
+@compiled
+def within(far: float, fast: float, pose: Array, twist: Array, velocity: Array) -> bool:
+    """Whether all of an env's bodies and joints are within bounds [m; m/s, rad/s]. What is not a number is not."""
+    for b in range(pose.shape[0]):
+        for k in range(3):
+            if not abs(pose[b, k]) < far:
+                return False
+        for k in range(6):
+            if not abs(twist[b, k]) < fast:
+                return False
+    for j in range(len(velocity)):
+        if not abs(velocity[j]) < fast:
+            return False
+    return True

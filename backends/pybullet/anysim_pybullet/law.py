@@ -53,6 +53,8 @@ class Laws:
             self.drives[:, tree.joints, K.MULTIPLIER] = tree.multiplier
         self.rubs = False
         """Whether there is dry friction, or was."""
+        self._feeds = False
+        """Whether a drive is in effort mode."""
         self.acting = self.drives
         """What the law uses: `drives`, or a copy in which the joints that motors move have none."""
         self.bodies = np.zeros((n, len(bodies), 11))
@@ -77,7 +79,13 @@ class Laws:
         return 1 + tree.size * (2 + tree.size) if len(tree.joints) else 0
 
     def refresh(self) -> None:
-        """Find the articulations that need the law, after a change of parameters."""
+        """Forget what is kept of parameters and clients: after a change of them, also after an env was built anew."""
+        if self.motors is not None:
+            self.motors.forget()
+        self._sort_trees()
+
+    def _sort_trees(self) -> None:
+        """Find the articulations that need the law, and those whose weight is carried beside motors."""
         law = np.zeros(len(self._world.joints), dtype=bool)
         law[self._driven] = True
         law |= np.any(self.drives[:, :, [K.DAMPING, K.ARMATURE]] != 0, axis=(0, 2))
@@ -115,14 +123,19 @@ class Laws:
 
     def _apply_natively(self, control: Control, motors: Motors) -> None:
         """Targets for the motors, and for the law what the drives in effort mode do."""
-        before = motors.running.copy()
-        motors.apply(control, self.kp, self.kd, self.limit, *self.damping_and_armature(), self._envs)
-        self.acting = self.drives.copy()
-        self.acting[:, self._driven, K.FEED], self.acting[:, self._driven, K.LIMIT] = feed(control), self.limit
-        self.acting[motors.running] *= _ONLY_COUPLED
-        if not np.array_equal(before, motors.running):
-            self.forget(np.arange(len(self._envs)))
-            self.refresh()
+        if not motors.know(control.mode):
+            before = motors.running.copy()
+            motors.prepare(control.mode, self.kp, self.kd, self.limit, *self.damping_and_armature(), self._envs)
+            self.acting = self.drives.copy()
+            self.acting[:, self._driven, K.LIMIT] = self.limit
+            self.acting[motors.running] *= _ONLY_COUPLED
+            self._feeds = bool((control.mode == _EFFORT).any())
+            if not np.array_equal(before, motors.running):
+                self.forget(np.arange(len(self._envs)))
+                self._sort_trees()
+        motors.apply(control)
+        if self._feeds:
+            self.acting[:, self._driven, K.FEED] = feed(control)
 
     def damping_and_armature(self) -> tuple[Array, Array]:
         """Those of the joints (N, J), views."""
@@ -136,7 +149,7 @@ class Laws:
             for tree in env.cast.trees:
                 self.share_friction(env, index, tree, acts=False)
         lifter = self._lifters.get(index)
-        if lifter is None or lifter.client != env.id or lifter.cast is not env.cast:
+        if lifter is None:
             lifter = Lifter(env, index, self, [t for t in env.cast.trees if self.lifts[t.number]])
             self._lifters[index] = lifter
         return lifter
@@ -286,9 +299,9 @@ class Pusher:
             p.applyExternalTorque(uid, -1, torque.tolist(), p.WORLD_FRAME, physicsClientId=client)
 
     def _free_root(self, tree: Tree, place: Any, turn: Any, velocity: Any, root: Array) -> None:
-        row, pose, twist = np.zeros((1, 20)), np.zeros((1, 7)), np.zeros((1, 6))
-        row[0, :3], row[0, 3:7], row[0, 14:17], row[0, 17:] = place, turn, velocity[0], velocity[1]
-        K.frames(row, self._env.local[tree.bodies[:1]], _ROOT, pose, twist)
+        pose, twist = np.zeros((1, 7)), np.zeros((1, 6))
+        row = np.array([[*place, *turn, *velocity[0], *velocity[1], *K.UNUSED]])
+        K.frames(row, self._env.local[tree.bodies[:1]], 1, pose, twist)
         root[:7], root[7:] = pose[0], twist[0]
 
 
@@ -311,6 +324,3 @@ class Brake(NamedTuple):
     def wrench(self, turn: Array, velocity: Array, rate: Array) -> Array:
         """(6,) at the centre of mass; Bullet's frame of a body has its principal axes."""
         return drag(self.gains, self.mass, self.moments, turn, velocity, rate)
-
-
-_ROOT = np.array([True])

@@ -37,7 +37,7 @@ class Lifter:
     """Applies the torques to some articulations of one env."""
 
     def __init__(self, env: "Env", index: int, laws: "Laws", trees: list[Tree]) -> None:
-        self.client, self.cast = env.id, env.cast
+        self._client = env.id
         self._index, self._laws, self._lift = index, laws, laws.lift
         self._trees = [(tree, env.root_ids[tree.number], env.tree_links[tree.number]) for tree in trees]
 
@@ -46,7 +46,7 @@ class Lifter:
 
         `position` holds the joint positions (J,) that Bullet has now, where somebody knows them.
         """
-        client, ages = self.client, self._lift.age
+        client, ages = self._client, self._lift.age
         if not self._trees:
             for _ in range(steps):
                 p.stepSimulation(physicsClientId=client)
@@ -76,36 +76,31 @@ class Lifter:
             return False
         ages[self._index] = (ages[self._index] + 1) % EVERY
         for uid, links, forces in self._held():
-            p.setJointMotorControlArray(uid, links, p.TORQUE_CONTROL, forces=forces, physicsClientId=self.client)
+            p.setJointMotorControlArray(uid, links, p.TORQUE_CONTROL, forces=forces, physicsClientId=self._client)
         return True
 
     def _renew(self, p: Any, position: Array | None) -> bool:
         laws, index = self._laws, self._index
         for tree, uid, links in self._trees:
-            n, size = len(tree.joints), tree.size
-            motion, root = np.zeros((2, n)), np.zeros(13)
             if position is None:
-                motion[0] = [s[0] for s in p.getJointStates(uid, links, physicsClientId=self.client)]
+                known = np.zeros(len(self._lift.torque[index]))
+                known[tree.joints] = [s[0] for s in p.getJointStates(uid, links, physicsClientId=self._client)]
             else:
-                motion[0] = position[tree.joints]
-            root[:7] = laws.roots[index, tree.bodies[0]]
-            known = np.empty(size)
-            K.dynamics(
+                known = position
+            good = K.weight(
                 tree.joint_ints,
                 tree.joint_floats,
-                laws.bodies[index, tree.bodies],
-                np.zeros((n + 1, 6)),
+                laws.bodies[index],
+                tree.bodies,
                 laws.gravity[index],
-                root,
-                motion,
-                tree.first,
-                np.empty((size, size)),
-                np.empty(size),
+                laws.roots[index, tree.bodies[0]],
                 known,
+                tree.joints,
+                tree.first,
+                self._lift.torque[index],
             )
-            if not np.isfinite(known).all():
+            if not good:
                 return False
-            self._lift.torque[index, tree.joints] = known[tree.first :]
         return True
 
     def _held(self) -> list[tuple[int, list[int], list[float]]]:

@@ -8,6 +8,7 @@ Feed-forward moves the target. Drives in effort mode have no motor and stay with
 """
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from anysim.engine.control import MODES, Control
 from anysim.errors import EngineError
 from anysim.kinematics.jacobians import mass_matrix
 from anysim.model.world import ControlMode, World
+from anysim_pybullet import kernels as K
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.client import Env
 from anysim_pybullet.tree import Tree
@@ -44,49 +46,96 @@ class Motors:
         self._inertia = (diagonal - armature)[self._driven]
         self.running = np.zeros((num_envs, len(world.joints)), dtype=bool)
         """Which joints (N, J) a motor moves."""
+        self._gains: _Gains | None = None
+        self._modes = b""
         self._rows: list[tuple[int, Array, list[int]]] = []  # per tree with drives: number, actuators, joints
         for tree in trees:
             chosen = [a for a, joint in enumerate(self._driven.tolist()) if joint in tree.joints]
             if chosen:
                 self._rows.append((tree.number, np.array(chosen), self._driven[chosen].tolist()))
 
-    def apply(
-        self, control: Control, kp: Array, kd: Array, limit: Array, damping: Array, armature: Array, envs: list[Env]
-    ) -> None:
-        """Give Bullet the targets and gains of all envs; gains and limits are (N, A), the others (N, J)."""
+    def know(self, mode: Array) -> bool:
+        """Whether gains are kept for these modes (N, A); else `prepare` makes them."""
+        return self._gains is not None and mode.tobytes() == self._modes
+
+    def forget(self) -> None:
+        """Gains were changed, or an env was built anew."""
+        self._gains = None
+
+    def apply(self, control: Control) -> None:
+        """Give Bullet the targets and the kept gains of all envs."""
         p = bullet()
-        for client, uid, links, terms in self.orders(control, kp, kd, limit, damping, armature, envs):
+        for client, uid, links, terms in self.orders(control):
             p.setJointMotorControlArray(uid, links, p.POSITION_CONTROL, **terms, physicsClientId=client)
 
-    def orders(
-        self, control: Control, kp: Array, kd: Array, limit: Array, damping: Array, armature: Array, envs: list[Env]
-    ) -> Iterator[tuple[int, int, list[int], dict[str, list[float]]]]:
-        """As `apply`, but what Bullet is to be told: client, body, links, targets and gains, for each articulation."""
+    def orders(self, control: Control) -> Iterator[tuple[int, int, list[int], dict[str, list[float]]]]:
+        """What Bullet is to be told: client, body, links, targets and gains, for each articulation."""
+        gains = self._gains
+        assert gains is not None
+        position, velocity = np.empty_like(control.position), np.empty_like(control.position)
+        K.motor_targets(
+            control.position,
+            control.velocity,
+            control.effort,
+            gains.stiffness,
+            gains.drag,
+            gains.whole,
+            position,
+            velocity,
+        )
+        places, speeds = position.tolist(), velocity.tolist()
+        for order in gains.orders:
+            place, speed = places[order.env], speeds[order.env]
+            if order.actuators is not None:
+                place, speed = [place[a] for a in order.actuators], [speed[a] for a in order.actuators]
+            terms = {"targetPositions": place, "targetVelocities": speed, **order.terms}
+            yield order.client, order.uid, order.links, terms
+
+    def prepare(
+        self, mode: Array, kp: Array, kd: Array, limit: Array, damping: Array, armature: Array, envs: list[Env]
+    ) -> None:
+        """Keep all that does not depend on targets; gains and limits are (N, A), the others (N, J)."""
         dt = self._dt
-        motor = control.mode != _EFFORT
-        stiffness, drag = kp * (control.mode == _POSITION), kd * motor
+        motor = mode != _EFFORT
+        stiffness, drag = kp * (mode == _POSITION), kd * motor
         motor &= (stiffness > 0) | (drag > 0)
         whole = drag + damping[:, self._driven]
         inertia = self._inertia + armature[:, self._driven] + dt * whole
-        position, push = control.position.copy(), drag * control.velocity
-        shifted = stiffness > 0
-        np.add(position, np.divide(control.effort, stiffness, where=shifted, out=np.zeros_like(push)), out=position)
-        push += np.where(shifted, 0.0, control.effort)
-        velocity = np.divide(push, whole, where=whole > 0, out=np.zeros_like(push))
-        gains, brakes = dt * dt * stiffness / inertia, dt * whole / inertia
-        force = np.where(motor, np.minimum(limit, ENDLESS), 0.0)
         self.running[:, self._driven] = motor
         told = {
-            "targetPositions": position, "targetVelocities": velocity, "forces": force, "positionGains": gains,
-            "velocityGains": brakes,
-        }  # fmt: skip
+            "forces": np.where(motor, np.minimum(limit, ENDLESS), 0.0),
+            "positionGains": dt * dt * stiffness / inertia,
+            "velocityGains": dt * whole / inertia,
+        }
+        orders: list[_Order] = []
         for number, chosen, joints in self._rows:
-            lists = [values[:, chosen].tolist() for values in told.values()]
-            for env, *rows in zip(envs, *lists, strict=True):
-                if env.root_ids[number] < 0:
-                    continue
-                links = [env.joint_link[j] for j in joints]
-                yield env.id, env.root_ids[number], links, dict(zip(told, rows, strict=True))
+            some = None if len(chosen) == len(self._driven) else chosen.tolist()
+            for index, env in enumerate(envs):
+                if env.root_ids[number] >= 0:
+                    terms = {name: values[index, chosen].tolist() for name, values in told.items()}
+                    links = [env.joint_link[j] for j in joints]
+                    orders.append(_Order(index, env.id, env.root_ids[number], links, some, terms))
+        self._gains, self._modes = _Gains(stiffness, drag, whole, orders), mode.tobytes()
+
+
+class _Order(NamedTuple):
+    """What Bullet is told of an articulation besides targets; `actuators` None stands for all, in order."""
+
+    env: int
+    client: int
+    uid: int
+    links: list[int]
+    actuators: list[int] | None
+    terms: dict[str, list[float]]
+
+
+class _Gains(NamedTuple):
+    """Gains of the drives in their modes (N, A), their damping with that of their joints, and the orders made of it."""
+
+    stiffness: Array
+    drag: Array
+    whole: Array
+    orders: list[_Order]
 
 
 def refuse_dry_friction(world: World, joint: int, friction: float) -> None:

@@ -73,7 +73,7 @@ class Parameters:
             self._laws.bodies[ids, :, K.COM : K.COM + 3] = self.com[ids] - anchor
         else:
             self._array(name)[at] = values
-            if name in ("body.linear_damping", "body.angular_damping"):
+            if name.startswith(("actuator.", "body.linear_damping", "body.angular_damping")):
                 self._laws.refresh()
         for index in ids.tolist():
             self._touched[index][name] = None

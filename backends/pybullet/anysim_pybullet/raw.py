@@ -32,8 +32,8 @@ def raw_loop(envs: Envs, control: Control) -> Callable[[int], None]:
     state: Mapping[str, Array] = envs.snapshot(ids, SnapshotLevel.TRAJECTORY)
     copy.restore(ids, state, SnapshotLevel.TRAJECTORY)
     laws = copy.laws
-    turns = cycle([_orders(copy, commands) for commands in alternating(control)])
     laws.apply(control)
+    turns = cycle([_orders(copy, commands) for commands in alternating(control)])
     copy.step(1, None)
     lifted = [
         [
@@ -83,8 +83,6 @@ def _orders(envs: Envs, control: Control) -> list[list[tuple[int, list[int], dic
     laws, orders = envs.laws, [[] for _ in envs.clients]
     number_of = {env.id: i for i, env in enumerate(envs.clients)}
     if laws.motors is not None:
-        damping, armature = laws.damping_and_armature()
-        told = laws.motors.orders(control, laws.kp, laws.kd, laws.limit, damping, armature, envs.clients)
-        for client, uid, links, terms in told:
+        for client, uid, links, terms in laws.motors.orders(control):
             orders[number_of[client]].append((uid, links, terms))
     return orders

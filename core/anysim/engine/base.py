@@ -136,6 +136,7 @@ class SimEngine(Primitives):
     def _install(self, world: World) -> None:
         """Everything the base class keeps about a world."""
         self._world = world
+        self._dt = world.physics.dt
         self.index = Index(world)
         self._all = np.arange(self.num_envs)
         self._ticks = np.zeros(self.num_envs, dtype=np.int64)
@@ -244,7 +245,8 @@ class SimEngine(Primitives):
         """The state of all envs now: read lazily, cached until the engine moves on."""
         with self._lock:
             if self._state is None:
-                self._state = State(self._read_locked, self._ticks * self.world.physics.dt)
+                self._require_world()
+                self._state = State(self._read_locked, self._ticks * self._dt)
             return self._state
 
     def _read_locked(self, name: str) -> Array:

@@ -115,7 +115,7 @@ def test_poses_are_not_those_of_centres_of_mass(build):
     env = _client(engine)
     place = bullet().getBasePositionAndOrientation(env.root_ids[0], physicsClientId=env.id)[0]
     assert np.linalg.norm(np.array(place) - wanted[:3]) == pytest.approx(np.linalg.norm([0.1, 0.05, 0.2]))
-    engine._envs.mirror._stale[:] = 2  # read from Bullet, not from what was written
+    engine._envs.mirror.stepped(0, sound=True)  # read from Bullet, not from what was written
     assert np.allclose(engine.get_state().body_pose[0, 0], wanted, atol=1e-12)
 
 
