@@ -457,33 +457,6 @@ def weight(
     return True
 
 
-@compiled
-def motor_targets(
-    position: Array,
-    velocity: Array,
-    effort: Array,
-    stiffness: Array,
-    drag: Array,
-    whole: Array,
-    place: Array,
-    speed: Array,
-) -> None:
-    """What Bullet's motors are told for commands; all are (N, A), see `anysim_pybullet.motors`.
-
-    Args:
-        position, velocity, effort: the commands.
-        stiffness, drag: of the drives in their modes.
-        whole: drag and the joints' own damping.
-        place, speed: the motors' targets, written.
-    """
-    for env in range(position.shape[0]):
-        for a in range(position.shape[1]):
-            stiff = stiffness[env, a] > 0.0
-            place[env, a] = position[env, a] + (effort[env, a] / stiffness[env, a] if stiff else 0.0)
-            push = drag[env, a] * velocity[env, a] + (0.0 if stiff else effort[env, a])
-            speed[env, a] = push / whole[env, a] if whole[env, a] > 0.0 else 0.0
-
-
 ROW = 16
 """Numbers of a body in `frames`: its centre of mass (3), a quaternion (4), linear and angular velocity of the centre of
 mass (6), and the origin of the link's frame (3). The quaternion is a root's inertial frame's, or a link's frame's."""

@@ -17,9 +17,9 @@ from anysim.engine.control import MODES, Control
 from anysim.errors import EngineError
 from anysim.kinematics.jacobians import mass_matrix
 from anysim.model.world import ControlMode, World
-from anysim_pybullet import kernels as K
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.client import Env
+from anysim_pybullet.kernels import compiled
 from anysim_pybullet.tree import Tree
 
 _POSITION, _EFFORT = MODES.index(ControlMode.POSITION), MODES.index(ControlMode.EFFORT)
@@ -73,7 +73,7 @@ class Motors:
         gains = self._gains
         assert gains is not None
         position, velocity = np.empty_like(control.position), np.empty_like(control.position)
-        K.motor_targets(
+        targets(
             control.position,
             control.velocity,
             control.effort,
@@ -136,6 +136,33 @@ class _Gains(NamedTuple):
     drag: Array
     whole: Array
     orders: list[_Order]
+
+
+@compiled
+def targets(
+    position: Array,
+    velocity: Array,
+    effort: Array,
+    stiffness: Array,
+    drag: Array,
+    whole: Array,
+    place: Array,
+    speed: Array,
+) -> None:
+    """What Bullet's motors are told for commands; all are (N, A).
+
+    Args:
+        position, velocity, effort: the commands.
+        stiffness, drag: of the drives in their modes.
+        whole: drag and the joints' own damping.
+        place, speed: the motors' targets, written.
+    """
+    for env in range(position.shape[0]):
+        for a in range(position.shape[1]):
+            stiff = stiffness[env, a] > 0.0
+            place[env, a] = position[env, a] + (effort[env, a] / stiffness[env, a] if stiff else 0.0)
+            push = drag[env, a] * velocity[env, a] + (0.0 if stiff else effort[env, a])
+            speed[env, a] = push / whole[env, a] if whole[env, a] > 0.0 else 0.0
 
 
 def refuse_dry_friction(world: World, joint: int, friction: float) -> None:

@@ -49,3 +49,42 @@ def test_a_snapshot_continues_exactly(build):
     engine.restore(saved, [1])
     engine.step(50, [1])
     assert_same(read(engine, [1]), wanted, "continued in env 1")
+
+
+@pytest.mark.parametrize(
+    "name", ["actuator.kp", "actuator.kd", "actuator.effort_limit", "joint.damping", "joint.armature", "body.com"]
+)
+def test_gains_that_are_kept_between_steps_follow_parameters_and_new_clients(build, name):
+    """What was changed after some steps acts as if it had been changed before all of them."""
+    early, late = build(native(panda()), num_envs=2), build(native(panda()), num_envs=2)
+    home = early.control.position
+    for step in range(3):
+        late.set_control(position=home + 0.01 * step)
+        late.step(10)
+    for engine in (early, late):
+        values = engine.get_parameters(name, [1])
+        engine.set_parameters(name, values + 0.01 if name == "body.com" else 0.5 * values + 0.1, [1])
+        engine.reset()
+        for step in range(4):
+            engine.set_control(position=home + 0.05 * step)
+            engine.step(10)
+    state = late.get_state()
+    assert_same(read(late), read(early), f"{name} changed late and early")
+    assert not np.array_equal(state.joint_vel[0], state.joint_vel[1]), "the change has no effect"
+
+
+def test_gains_that_are_kept_between_steps_follow_modes(build):
+    """A drive that was switched to effort and back moves as one that was not."""
+    plain, switched = build(native(panda())), build(native(panda()))
+    for engine in (plain, switched):
+        engine.step(10)
+    switched.set_control_mode(ControlMode.EFFORT, actuators=[3])
+    switched.step(10)
+    assert not np.array_equal(switched.get_state().joint_pos, plain.get_state().joint_pos)
+    switched.set_control_mode(ControlMode.POSITION, actuators=[3])
+    switched.step(1)
+    for engine in (plain, switched):
+        engine.reset()
+        engine.set_control(position=engine.control.position + 0.05)
+        engine.step(30)
+    assert_same(read(switched), read(plain), "a drive switched to effort and back")
