@@ -38,10 +38,10 @@ def test_a_ratio_below_its_budget_is_missed():
 def test_commands_change_from_control_step_to_control_step():
     with create_simulation("mujoco") as engine:
         engine.create_world(api.compile_world(step.panda_and_boxes()))
-        step = step.control_loop(engine, 1)
+        one_step = step.control_loop(engine, 1)
         seen = []
         for _ in range(4):
-            step()
+            one_step()
             seen.append(engine.control.position)
     assert np.array_equal(seen[0], seen[2])
     assert np.array_equal(seen[1], seen[3])
