@@ -9,7 +9,7 @@ from anysim.assets.catalogue import CatalogueEntry, load_robot
 from anysim.compile import robot
 from anysim.compile.world import compile_world
 from anysim.errors import AssetError, SpecError
-from anysim.placement.nominal import placement_order
+from anysim.placement.order import placement_order
 from anysim_schemas.layout import PlacementSpec
 from anysim_schemas.robot_model import RobotModelSpec
 from anysim_schemas.run import RunSpec, WorldSpec

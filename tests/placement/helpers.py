@@ -9,8 +9,8 @@ from anysim.api import compile_world, load
 from anysim.engine.kinematic import NullEngine
 from anysim.geometry.convex_parts import pose_of
 from anysim.managers.standard import standard_managers
-from anysim.placement.clearance import Contact
-from anysim.placement.scenery import Scenery
+from anysim.placement.clearance import ClearanceQuery
+from anysim.placement.context import PlacementContext
 
 TABLE = {"table": {"source": {"box": [0.8, 1.0, 0.4]}, "fixed": True}}
 ON_TABLE = {"table": {"position": [0.0, 0.0, 0.2]}}
@@ -52,7 +52,7 @@ class Layouts:
 
     def gaps(self, pose: Mapping[str, np.ndarray], env: int) -> dict[tuple[str, str], float]:
         """The distance of every pair [m], up to 1 m."""
-        scenery, contact = Scenery(self.world, {}), Contact(self.world)
+        context, clearance = PlacementContext(self.world), ClearanceQuery(self.world)
         names = list(pose)
-        placed = {name: scenery.solid(name).at(pose_of(pose[name][env])) for name in names}
-        return {(a, b): contact.gap(placed[a], placed[b], 1.0) for k, a in enumerate(names) for b in names[k + 1 :]}
+        placed = {name: context.solid(name).at(pose_of(pose[name][env])) for name in names}
+        return {(a, b): clearance.gap(placed[a], placed[b], 1.0) for k, a in enumerate(names) for b in names[k + 1 :]}

@@ -7,7 +7,7 @@ import pytest
 
 from anysim.errors import TaskError
 from anysim.geometry.convex_parts import IDENTITY, Pose
-from anysim.placement.scenery import Scenery
+from anysim.placement.context import PlacementContext
 from tests.placement.helpers import Layouts
 
 BALL = {"source": {"sphere": 0.02}}
@@ -100,8 +100,8 @@ def test_shelves_by_name(cabinet: dict) -> None:
     assert np.allclose(pose["high"][:, 2], 0.27 + 0.02)
     assert np.allclose(pose["top"][:, 2], 0.52 + 0.02)
     assert set(np.round(pose["somewhere"][:, 2], 6)) == {0.04, 0.29}
-    scenery = Scenery(layouts.world, {})
-    found = scenery.surfaces_of(scenery.solid("cabinet").at(Pose((0.0, 0.0, 0.0), IDENTITY)))
+    context = PlacementContext(layouts.world)
+    found = context.surfaces_of(context.solid("cabinet").at(Pose((0.0, 0.0, 0.0), IDENTITY)))
     rooms = {s.name: s.headroom for s in found}
     assert rooms["shelf_1"] == pytest.approx(0.23)
     assert rooms["shelf_2"] == pytest.approx(0.23)

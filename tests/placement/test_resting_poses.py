@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from anysim.math import pose as P
-from anysim.placement.scenery import Scenery
+from anysim.placement.context import PlacementContext
 from tests.placement.helpers import Layouts
 
 
@@ -20,7 +20,7 @@ def test_poses_of_a_hull_are_those_of_trimesh(seed: int, tmp_path: Path) -> None
     hull = trimesh.convex.convex_hull(points)
     hull.export(tmp_path / "hull.ply")
     world = Layouts({"a": {"source": {"mesh": str(tmp_path / "hull.ply")}}}, {"a": {"on": "table"}}, 1).world
-    own = Scenery(world, {}).resting("a")
+    own = PlacementContext(world).resting("a")
     transforms, shares = compute_stable_poses(hull, sigma=0.0, threshold=0.0)
     theirs = {tuple(np.round(-t[2, :3], 3)): share for t, share in zip(transforms, shares, strict=True)}
     down = [P.rotate_inverse(np.array(pose.quaternion), np.array([0.0, 0.0, -1.0])) for pose in own]
@@ -39,8 +39,8 @@ def test_a_cylinder_stands_and_a_capsule_lies() -> None:
         {"a": {"on": "table"}, "b": {"on": "table"}},
         1,
     ).world
-    scenery = Scenery(world, {})
-    up = [P.rotate(np.array(p.quaternion), np.array([0.0, 0.0, 1.0]))[2] for p in scenery.resting("a")]
+    context = PlacementContext(world)
+    up = [P.rotate(np.array(p.quaternion), np.array([0.0, 0.0, 1.0]))[2] for p in context.resting("a")]
     assert np.allclose(np.abs(up), 1.0)
-    (lying,) = scenery.resting("b")
+    (lying,) = context.resting("b")
     assert abs(P.rotate(np.array(lying.quaternion), np.array([0.0, 0.0, 1.0]))[2]) < 1e-9

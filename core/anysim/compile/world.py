@@ -23,7 +23,8 @@ from anysim.compile.variants import instances
 from anysim.conventions import GROUND
 from anysim.issues import Issues
 from anysim.model.world import Actuation, Physics, Slot, World
-from anysim.placement.nominal import check_layout, place_nominally
+from anysim.placement.nominal import place_nominally
+from anysim.placement.order import check_layout
 from anysim.randomization.distributions import nominal
 from anysim_schemas.engine import PhysicsSpec
 from anysim_schemas.run import RunSpec, WorldSpec

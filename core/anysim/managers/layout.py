@@ -10,18 +10,19 @@ from anysim.engine.base import SimEngine
 from anysim.errors import TaskError
 from anysim.geometry.convex_parts import Solid, row_of
 from anysim.managers.base import Manager
-from anysim.managers.layout_proposals import Desk
-from anysim.managers.layout_sampler import Dice, Middle
+from anysim.managers.layout_proposals import ProposalSource
 from anysim.managers.overrides import WORLD, Overridable, drawn
 from anysim.math import pose as P
-from anysim.model.world import BodyKind, World
+from anysim.model.slots import is_robot
+from anysim.model.world import BodyKind, Slot, World
 from anysim.placement.candidate import Candidate
-from anysim.placement.clearance import Contact
-from anysim.placement.constraints import Settled
-from anysim.placement.nominal import initially_placed, nominal_place, placement_order, roots_at
-from anysim.placement.order import Item, entry_of
-from anysim.placement.scenery import Scenery
-from anysim.placement.search import NoPlace, Refused, Search, Task, is_constant
+from anysim.placement.clearance import ClearanceQuery
+from anysim.placement.constraints import PlacementTask
+from anysim.placement.context import PlacementContext, Settled
+from anysim.placement.nominal import nominal_place, roots_at
+from anysim.placement.order import entry_of, placement_order
+from anysim.placement.sampler import EpisodeSampler, NominalSampler, PlacementSampler
+from anysim.placement.search import NoPlace, Refused, Search, is_constant
 from anysim_schemas.layout import PlaceFields, RepairSpec
 
 IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -37,24 +38,26 @@ class LayoutManager(Manager):
         self._proposals = proposals
 
     def recall(self, env: int, drawn: Mapping[str, Any]) -> None:
-        if self._desk is not None:
-            self._desk.recall(env, drawn)
+        if self._source is not None:
+            self._source.recall(env, drawn)
 
     def build(self, world: World) -> None:
         self._world = world
         source = self.spec.world.layout_source
-        self._desk = Desk(source, self._proposals) if source is not None or self._proposals is not None else None
+        self._source = (
+            ProposalSource(source, self._proposals) if source is not None or self._proposals is not None else None
+        )
         content = self.spec.world
-        self._scenery = Scenery(world, content.regions)
-        self._contact = Contact(world)
-        items = {item.name: item for item in self._scenery.items}
-        order, _ = placement_order(content.layout, self._scenery.items)
+        self._context = PlacementContext(world, content.regions)
+        self._clearance = ClearanceQuery(world)
+        items = {item.name: item for item in self._context.items}
+        order, _ = placement_order(content.layout, self._context.items)
         self._listed = [items[name] for name in order]
-        self._others = [item for item in self._scenery.items if item.name not in order]
+        self._others = [item for item in self._context.items if item.name not in order]
         self._entries = {name: entry_of(content.layout, items[name]) or "" for name in order}
         self._still = {
             entity: Settled(
-                initially_placed(self._scenery, entity),
+                self._context.initial(self._world.entities[entity].name),
                 self._solid(entity).fixed,
                 True,
                 self._solid(entity).collides,
@@ -66,12 +69,12 @@ class LayoutManager(Manager):
         self._columns()
 
     def _solid(self, entity: int) -> Solid:
-        return self._scenery.solid(self._world.entities[entity].name)
+        return self._context.solid(self._world.entities[entity].name)
 
     def _columns(self) -> None:
         """The bodies whose poses are written, free ones before fixed ones, and the column of each entity's first."""
         roots: list[tuple[bool, int, int, Array]] = []
-        for item in (*self._listed, *(i for i in self._others if not i.robot)):
+        for item in (*self._listed, *(i for i in self._others if not is_robot(self._world, i))):
             for entity in item.entities:
                 first = self._world.bodies[self._world.entities[entity].root]
                 fixed = first.kind is BodyKind.STATIC
@@ -111,7 +114,7 @@ class LayoutManager(Manager):
     def _rows(self, env: int, presence: Array) -> Array:
         """The poses (K, 7) of the bodies that are written, in one env."""
         origin = self.board.origin[env]
-        there = {item.name: next((e for e in item.entities if presence[e]), None) for item in self._scenery.items}
+        there = {item.name: next((e for e in item.entities if presence[e]), None) for item in self._context.items}
         try:
             found = self._plan(env, there)
         except NoPlace as error:
@@ -134,8 +137,8 @@ class LayoutManager(Manager):
         """A place for each listed item that is there."""
         x, y, z = (float(v) for v in self.board.origin[env])
         origin = (x, y, z)
-        tasks: list[Task] = []
-        middles: dict[str, Middle] = {}
+        tasks: list[PlacementTask] = []
+        middles: dict[str, NominalSampler] = {}
         for item in self._listed:
             entity = there[item.name]
             if entity is not None:
@@ -146,23 +149,23 @@ class LayoutManager(Manager):
             if entity is not None:
                 settled[item.name] = self._shifted(entity, origin)
 
-        def dice(task: Task, tick: int) -> Dice | Middle:
-            return middles.get(task.item.name) or self._dice(env, task, tick)
+        def sampler(task: PlacementTask, tick: int) -> PlacementSampler:
+            return middles.get(task.item.name) or self._sampler(env, task, tick)
 
         def search() -> Search:
-            present = lambda item: there[item.name] is not None  # noqa: E731
-            bounds = RepairSpec() if self._desk is None else self._desk.bounds
-            return Search(self._scenery, self._contact, dice, origin, present, bounds, dict(settled))
+            context = self._context.in_env(origin, lambda item: there[item.name] is not None, settled)
+            bounds = RepairSpec() if self._source is None else self._source.bounds
+            return Search(context, self._clearance, sampler, bounds)
 
-        if self._desk is None:
+        if self._source is None:
             return search().solve(tasks)
         try:
-            self._desk.propose(env, self.streams, self._scenery, tasks, settled)
+            self._source.propose(env, self.streams, self._context, tasks, settled)
             return search().solve(tasks)
         except Refused as error:
-            if not self._desk.falls_back:
-                raise NoPlace(f"the proposal is refused: {error}; see {self._desk.path}") from None
-            self._desk.dismiss(env, self.streams, str(error), tasks)
+            if not self._source.falls_back:
+                raise NoPlace(f"the proposal is refused: {error}; see {self._source.path}") from None
+            self._source.dismiss(env, self.streams, str(error), tasks)
             return search().solve(tasks)
 
     def _shifted(self, entity: int, origin: Sequence[float]) -> Settled:
@@ -175,32 +178,32 @@ class LayoutManager(Manager):
 
     # ------------------------------------------------------------------ what an entry says in this episode
 
-    def _task(self, env: int, item: Item, solid: Solid, middles: dict[str, Middle]) -> Task:
+    def _task(self, env: int, item: Slot, solid: Solid, middles: dict[str, NominalSampler]) -> PlacementTask:
         """The place that an item's entry says in this episode: gated, and one of its alternatives."""
         name = self._entries[item.name]
         entry, path = self.spec.world.layout[name], f"world.layout.{name}"
         if entry.ratio < 1.0:
-            dice = Dice(self.streams, env, item.name, path, 0)
-            holds = dice.uniform("ratio", 1)[0] < entry.ratio
-            dice.keep()
+            sampler = EpisodeSampler(self.streams, env, item.name, path, 0)
+            holds = sampler.uniform("ratio", 1)[0] < entry.ratio
+            sampler.keep()
             if not holds and entry.otherwise is None:
-                middles[item.name] = Middle(item.instance)
-                return Task(item, solid, nominal_place(entry), path, True)
+                middles[item.name] = NominalSampler(item.instance)
+                return PlacementTask(item, solid, nominal_place(entry), path, True)
             if not holds:
                 assert entry.otherwise is not None
-                return Task(item, solid, entry.otherwise, f"{path}.otherwise", is_constant(entry.otherwise))
+                return PlacementTask(item, solid, entry.otherwise, f"{path}.otherwise", is_constant(entry.otherwise))
         if not entry.any_of:
-            return Task(item, solid, entry, path, is_constant(entry))
-        dice = Dice(self.streams, env, item.name, path, 0)
-        number = dice.pick("any_of", [one.weight for one in entry.any_of])
-        dice.keep()
+            return PlacementTask(item, solid, entry, path, is_constant(entry))
+        sampler = EpisodeSampler(self.streams, env, item.name, path, 0)
+        number = sampler.pick("any_of", [one.weight for one in entry.any_of])
+        sampler.keep()
         place = entry.chosen(number)
-        return Task(item, solid, place, f"{path}.any_of.{number}", is_constant(place))
+        return PlacementTask(item, solid, place, f"{path}.any_of.{number}", is_constant(place))
 
-    def _dice(self, env: int, task: Task, tick: int) -> Dice:
-        return Dice(self.streams, env, task.item.name, task.path, tick, self._inherited(task))
+    def _sampler(self, env: int, task: PlacementTask, tick: int) -> EpisodeSampler:
+        return EpisodeSampler(self.streams, env, task.item.name, task.path, tick, self._inherited(task))
 
-    def _inherited(self, task: Task) -> Mapping[str, str]:
+    def _inherited(self, task: PlacementTask) -> Mapping[str, str]:
         """The fields that an alternative has from its entry, with their paths."""
         base, _, number = task.path.partition(".any_of.")
         if not number:

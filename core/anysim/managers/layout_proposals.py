@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from anysim import registry
-from anysim.geometry.convex_parts import IDENTITY, Pose, pose_of
-from anysim.placement.constraints import Settled
+from anysim.geometry.convex_parts import IDENTITY, Pose
+from anysim.placement.constraints import PlacementTask
+from anysim.placement.context import PlacementContext, Settled
 from anysim.placement.proposals import Proposer, Request, Support, Thing, faults, parsed, read_file
-from anysim.placement.scenery import Scenery
-from anysim.placement.search import Refused, Task
+from anysim.placement.search import Refused
 from anysim.placement.support_surfaces import HEADROOM
 from anysim.randomization.streams import Origin, Streams
 from anysim_schemas.layout import LayoutSourceSpec, RepairSpec
@@ -27,7 +27,7 @@ STREAM = "layout/proposal"
 REFUSED = "layout/proposal_refused"
 
 
-class Desk:
+class ProposalSource:
     """Takes proposals for all envs."""
 
     path = "world.layout_source"
@@ -48,7 +48,12 @@ class Desk:
             self._recalled[env] = drawn[STREAM]
 
     def propose(
-        self, env: int, streams: Streams, scenery: Scenery, tasks: Sequence[Task], settled: Mapping[str, Settled]
+        self,
+        env: int,
+        streams: Streams,
+        context: PlacementContext,
+        tasks: Sequence[PlacementTask],
+        settled: Mapping[str, Settled],
     ) -> None:
         """Give the tasks the poses that are proposed for them.
 
@@ -59,7 +64,7 @@ class Desk:
             chosen = parsed(self._recalled.pop(env), "the record", self.path)[0]
         else:
             seed = int(streams.generator(env, STREAM).integers(0, 2**31))
-            offers = self._offers(lambda: _request(scenery, tasks, settled, seed))
+            offers = self._offers(lambda: _request(context, tasks, settled, seed))
             chosen = offers[seed % len(offers)]
         data = chosen.model_dump(mode="json", exclude_defaults=True)
         streams.note(env, STREAM, data, Origin(STREAM, self.path))
@@ -69,7 +74,7 @@ class Desk:
         for task in tasks:
             task.proposed = chosen.poses.get(task.item.name)
 
-    def dismiss(self, env: int, streams: Streams, why: str, tasks: Sequence[Task]) -> None:
+    def dismiss(self, env: int, streams: Streams, why: str, tasks: Sequence[PlacementTask]) -> None:
         """Go on without what was proposed, and say so in the record."""
         streams.note(env, REFUSED, why, Origin(STREAM, self.path))
         for task in tasks:
@@ -100,9 +105,11 @@ def _name(proposer: Proposer) -> str:
     return getattr(proposer, "__qualname__", type(proposer).__name__)
 
 
-def _request(scenery: Scenery, tasks: Sequence[Task], settled: Mapping[str, Settled], seed: int) -> Request:
+def _request(
+    context: PlacementContext, tasks: Sequence[PlacementTask], settled: Mapping[str, Settled], seed: int
+) -> Request:
     """What a proposer is told: sizes, nominal supports and what the layout says. Plain data."""
-    world = scenery.world
+    world = context.world
     things, supports = [], []
     for task in tasks:
         box = task.solid.at(Pose((0.0, 0.0, 0.0), IDENTITY))
@@ -118,14 +125,14 @@ def _request(scenery: Scenery, tasks: Sequence[Task], settled: Mapping[str, Sett
                 task.place.model_dump(mode="json", by_alias=True, exclude_defaults=True),
             )
         )
-    initial = {task.item.name: task.solid.at(_initial(scenery, task.solid.name)) for task in tasks}
+    initial = {task.item.name: context.initial(task.solid.name) for task in tasks}
     initial |= {name: one.placed for name, one in settled.items() if name not in {r.name for r in world.robots}}
-    still = [p for name, p in initial.items() if name in settled or scenery.solid(p.name).fixed]
+    still = [p for name, p in initial.items() if name in settled or context.solid(p.name).fixed]
     for name, placed in initial.items():
-        if not scenery.solid(placed.name).fixed:
+        if not context.solid(placed.name).fixed:
             continue
         x, y, z = placed.pose.position
-        for surface in scenery.surfaces_of(placed):
+        for surface in context.surfaces_of(placed):
             height = z + surface.height
             taken = [
                 (p.low[0], p.low[1], p.high[0], p.high[1])
@@ -142,9 +149,3 @@ def _request(scenery: Scenery, tasks: Sequence[Task], settled: Mapping[str, Sett
         if e.name == robot.name
     }
     return Request(world.name, seed, things, supports, robots)
-
-
-def _initial(scenery: Scenery, name: str) -> Pose:
-    entity = next(e for e in scenery.world.entities if e.name == name)
-    body = scenery.world.bodies[entity.root]
-    return pose_of((*body.position, *body.quaternion))

@@ -51,6 +51,11 @@ def members(world: World, name: str) -> tuple[Slot, ...]:
     return ()
 
 
+def is_robot(world: World, slot: Slot) -> bool:
+    """Whether a logical object is a robot."""
+    return world.entities[slot.entities[0]].kind is EntityKind.ROBOT
+
+
 def single(world: World, name: str) -> Slot:
     """The one logical object that a name stands for.
 

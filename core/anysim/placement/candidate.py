@@ -4,7 +4,7 @@ Used with the middle of all ranges for the World's initial poses, and with drawn
 also checks what is proposed here. Places are in the world frame; what an entry says is relative to the env's origin.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import atan2, cos, hypot, pi, sin
 from typing import NamedTuple
 
@@ -23,9 +23,9 @@ from anysim.geometry.convex_parts import (
     turn_about_z,
     turned,
 )
-from anysim.placement.context import Around, Dice, Impossible
+from anysim.placement.context import Impossible, PlacementContext
 from anysim.placement.relations import spot_of
-from anysim.placement.resting_poses import RestingPose
+from anysim.placement.sampler import PlacementSampler
 from anysim.placement.standing_areas import Footing, below_area, height_under, region_of, standing_places
 from anysim_schemas.layout import PlaceFields
 
@@ -45,16 +45,16 @@ class Candidate(NamedTuple):
 
 
 def candidate(
-    solid: Solid, place: PlaceFields, resting: Callable[[], Sequence[RestingPose]], dice: Dice, around: Around
+    solid: Solid, place: PlaceFields, sampler: PlacementSampler, context: PlacementContext
 ) -> Candidate | Impossible:
     """A pose for a solid, or why there is none."""
-    base, turn = _turn(place, resting, dice, around)
+    base, turn = _turn(solid, place, sampler, context)
     quaternion = times(turn_about_z(turn), base)
     if place.position is not None:
-        x, y, z = (float(v) for v in dice.value("position", place.position))
-        o = around.origin
-        return _finished(solid, place, base, turn, (x + o[0], y + o[1]), z + o[2], None, None, "position", around)
-    footings = standing_places(place, around)
+        x, y, z = (float(v) for v in sampler.value("position", place.position))
+        o = context.origin
+        return _finished(solid, place, base, turn, (x + o[0], y + o[1]), z + o[2], None, None, "position", context)
+    footings = standing_places(place, context)
     if isinstance(footings, Impossible):
         return footings
     rotation = matrix_of(quaternion)
@@ -65,25 +65,25 @@ def candidate(
         own = solid.reach(rotation, (nx, ny, 0.0)) if round_reach is None else round_reach
         return own - place.overhang
 
-    region = region_of(place, around)
-    under = below_area(place, around, reach)
-    spot, drawn_from = spot_of(solid, rotation, place, dice, around)
+    region = region_of(place, context)
+    under = below_area(place, context, reach)
+    spot, drawn_from = spot_of(solid, rotation, place, sampler, context)
     if footings is None:  # on the ground
         area = region if under is None else under if region is None else G.common(region, under)
         if area is not None and not area:
             return Impossible(f"nothing of its region lies under '{place.under}'", hopeless=True)
         if spot is None:
             if area is None:
-                spot, drawn_from = around.origin[:2], "origin"
+                spot, drawn_from = context.origin[:2], "origin"
             else:
-                spot, drawn_from = G.point_in(area, *dice.uniform("place", 3)), "area"
-        return _finished(solid, place, base, turn, spot, None, None, area, drawn_from, around)
+                spot, drawn_from = G.point_in(area, *sampler.uniform("place", 3)), "area"
+        return _finished(solid, place, base, turn, spot, None, None, area, drawn_from, context)
     if spot is None and not any(f.area for f in footings) and region is None and under is None:
         spot, drawn_from = footings[0].owner.pose.position[:2], "point"  # nothing level: over its origin
     if drawn_from == "point":  # x and y are taken as they are, also over an edge
         assert spot is not None
         return _finished(
-            solid, place, base, turn, spot, height_under(footings, spot), footings[0].owner, region, drawn_from, around
+            solid, place, base, turn, spot, height_under(footings, spot), footings[0].owner, region, drawn_from, context
         )
     fitting = [(f, tuple(p for p in (G.eroded(q, reach) for q in f.area) if p)) for f in footings]
     if region is not None:
@@ -93,7 +93,7 @@ def candidate(
     fitting = [(f, area) for f, area in fitting if area]
     if not fitting:
         return _no_room(place, footings, region)
-    u, v, w = dice.uniform("place", 3)
+    u, v, w = sampler.uniform("place", 3)
     sizes = [G.total(area) for _, area in fitting]
     wanted, chosen = u * sum(sizes), 0
     while chosen < len(sizes) - 1 and wanted > sizes[chosen]:
@@ -103,7 +103,7 @@ def candidate(
     if spot is None:
         share = wanted / sizes[chosen] if sizes[chosen] > 0 else 0.0
         spot, drawn_from = G.point_in(area, share, v, w), "area"
-    return _finished(solid, place, base, turn, spot, footing.height, footing.owner, area, drawn_from, around)
+    return _finished(solid, place, base, turn, spot, footing.height, footing.owner, area, drawn_from, context)
 
 
 def _round_reach(solid: Solid, rotation: Matrix) -> float:
@@ -116,18 +116,18 @@ def _round_reach(solid: Solid, rotation: Matrix) -> float:
 
 
 def _turn(
-    place: PlaceFields, resting: Callable[[], Sequence[RestingPose]], dice: Dice, around: Around
+    solid: Solid, place: PlaceFields, sampler: PlacementSampler, context: PlacementContext
 ) -> tuple[Quaternion, float]:
     """How it lies, and its turn about the vertical after that."""
-    yaw = float(dice.value("yaw", place.yaw))
+    yaw = float(sampler.value("yaw", place.yaw))
     if place.aligned is not None:
-        other = around.find(place.aligned.of)
+        other = context.find(place.aligned.of)
         yaw += 0.0 if other is None else heading(other.pose.rotation)
     if place.rest == "given":
-        roll, pitch = float(dice.value("roll", place.roll)), float(dice.value("pitch", place.pitch))
+        roll, pitch = float(sampler.value("roll", place.roll)), float(sampler.value("pitch", place.pitch))
         return quaternion_of(roll, pitch, 0.0), yaw
-    poses = resting()
-    pick, roll = dice.uniform("rest", 2)
+    poses = context.resting(solid.name)
+    pick, roll = sampler.uniform("rest", 2)
     chosen = poses[-1]
     for pose in poses:
         if pick < pose.share:
@@ -152,14 +152,14 @@ def _finished(
     support: Placed | None,
     area: G.Area | None,
     drawn_from: str,
-    around: Around,
+    context: PlacementContext,
 ) -> Candidate:
     """With the alignment, the facing and the height that the place asks for; `height` None is that of the ground."""
     x, y = spot
     if place.aligned is not None and place.aligned.along is not None:
-        x, y, drawn_from = _aligned(place, x, y, drawn_from, around)
+        x, y, drawn_from = _aligned(place, x, y, drawn_from, context)
     if place.facing is not None:
-        target = _faced(place, around)
+        target = _faced(place, context)
         if target is not None and hypot(target[0] - x, target[1] - y) > 1e-9:
             turn += atan2(target[1] - y, target[0] - x)
             drawn_from = "facing" if drawn_from == "area" else drawn_from
@@ -173,17 +173,19 @@ def _finished(
         if height is None:
             left, front = (solid.reach(rotation, (-a, -b, 0.0)) for a, b in ((1.0, 0.0), (0.0, 1.0)))
             right, back = (solid.reach(rotation, (a, b, 0.0)) for a, b in ((1.0, 0.0), (0.0, 1.0)))
-            height = around.ground((x - left, y - front), (x + right, y + back))
+            height = context.ground((x - left, y - front), (x + right, y + back))
         z = height + below
     pose = Pose((x, y, z), rotation)
     return Candidate(pose, quaternion, solid.at(pose), support, area, drawn_from)
 
 
-def _aligned(place: PlaceFields, x: float, y: float, drawn_from: str, around: Around) -> tuple[float, float, str]:
+def _aligned(
+    place: PlaceFields, x: float, y: float, drawn_from: str, context: PlacementContext
+) -> tuple[float, float, str]:
     """Moved onto the line through the other's origin."""
     aligned = place.aligned
     assert aligned is not None
-    other = around.find(aligned.of)
+    other = context.find(aligned.of)
     if other is None:
         return x, y, drawn_from
     axis = turned(about_z(heading(other.pose.rotation)), (1.0, 0.0, 0.0) if aligned.along == "x" else (0.0, 1.0, 0.0))
@@ -193,12 +195,12 @@ def _aligned(place: PlaceFields, x: float, y: float, drawn_from: str, around: Ar
     return ox + along * axis[0], oy + along * axis[1], "aligned"
 
 
-def _faced(place: PlaceFields, around: Around) -> G.Point | None:
+def _faced(place: PlaceFields, context: PlacementContext) -> G.Point | None:
     facing = place.facing
     assert facing is not None
     if facing.point is not None:
-        return facing.point[0] + around.origin[0], facing.point[1] + around.origin[1]
-    other = around.find(facing.of or "")
+        return facing.point[0] + context.origin[0], facing.point[1] + context.origin[1]
+    other = context.find(facing.of or "")
     return None if other is None else (other.center[0], other.center[1])
 
 

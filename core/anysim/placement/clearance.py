@@ -18,7 +18,7 @@ TOUCH = 1e-4
 """[m] that things may start inside of each other: what rests on something touches it."""
 
 
-class Contact:
+class ClearanceQuery:
     """Distances in one World. Shapes are made for Coal once, when they are first near to something."""
 
     def __init__(self, world: World) -> None:

@@ -1,4 +1,4 @@
-"""Whether a candidate can stay: everything that its entry says, and everybody else's room."""
+"""Constraints on a candidate: everything that its entry says, and the room of everything else."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -6,12 +6,14 @@ from typing import NamedTuple
 
 from anysim.geometry import polygon as G
 from anysim.geometry.convex_parts import Placed, Solid
+from anysim.model.world import Slot
 from anysim.placement.candidate import Candidate
-from anysim.placement.clearance import TOUCH, Contact
-from anysim.placement.order import Item, meant
+from anysim.placement.clearance import TOUCH, ClearanceQuery
+from anysim.placement.context import PlacementContext
+from anysim.placement.order import meant
 from anysim.placement.relations import extent, side_direction, sideways
-from anysim.placement.scenery import View
 from anysim_schemas.layout import PlaceFields
+from anysim_schemas.proposals import ProposedPose
 from anysim_schemas.relations import SIDES, SideSpec
 
 EXACT = 1e-6
@@ -19,7 +21,7 @@ EXACT = 1e-6
 
 
 class Objection(NamedTuple):
-    """What is wrong with a candidate, in words that follow 'it', and who is in the way.
+    """What is wrong with a candidate, in words that follow 'it', and the name of what is in the way.
 
     With `absent` there is no candidate, and the words are a sentence of their own.
     """
@@ -29,31 +31,32 @@ class Objection(NamedTuple):
     absent: bool = False
 
 
-class Settled(NamedTuple):
-    """Something that has its place: its shape there, whether it is welded to the world, and whether nothing was drawn.
+@dataclass
+class PlacementTask:
+    """Something to be placed: what is there of an item, and what was said of its place."""
 
-    `listed` says that the layout has put it there: clearances are kept to such things.
-    """
-
-    placed: Placed
-    fixed: bool
+    item: Slot
+    solid: Solid
+    place: PlaceFields
+    path: str
     constant: bool
-    collides: bool
-    listed: bool
+    """Nothing is drawn for its place."""
+    proposed: ProposedPose | None = None
+    """A pose that somebody proposes; nothing else is tried then."""
+    tick: int = 0
 
 
 @dataclass
-class Crowd:
-    """Everything that has its place in an env, by the names of the items."""
+class Constraints:
+    """Checks of candidates in one env."""
 
-    contact: Contact
-    settled: dict[str, Settled]
+    context: PlacementContext
+    clearance: ClearanceQuery
     _supports: dict[str, set[str]] = field(default_factory=dict)
 
-    def objection(
-        self, item: Item, solid: Solid, place: PlaceFields, found: Candidate, view: View, constant: bool
-    ) -> Objection | None:
+    def objection(self, task: PlacementTask, found: Candidate) -> Objection | None:
         """Why a candidate cannot stay; None where it can."""
+        place = task.place
         x, y, _ = found.pose.position
         if (
             found.area is not None
@@ -65,86 +68,83 @@ class Crowd:
         for side in SIDES:
             relation = getattr(place, side)
             if relation is not None and side != found.drawn_from:
-                wrong = _beside(side, relation, found.placed, view)
+                wrong = _beside(side, relation, found.placed, self.context)
                 if wrong is not None:
                     return wrong
         if place.checked:
-            wrong = self._crowding(item, solid, place, found, view, constant)
+            wrong = self._crowding(task, found)
             if wrong is not None:
                 return wrong
         if place.near is not None:
-            other = view.find(place.near.of)
+            other = self.context.find(place.near.of)
             if other is not None:
                 low, high = place.near.distance
-                gap = self.contact.gap(found.placed, other, high + EXACT)
+                gap = self.clearance.gap(found.placed, other, high + EXACT)
                 if not low - EXACT <= gap <= high + EXACT:
                     how = "nearer to" if gap < low else "farther from"
                     return Objection(f"is {how} '{place.near.of}' than {low if gap < low else high:g} m")
         return None
 
-    def _crowding(
-        self, item: Item, solid: Solid, place: PlaceFields, found: Candidate, view: View, constant: bool
-    ) -> Objection | None:
+    def _crowding(self, task: PlacementTask, found: Candidate) -> Objection | None:
+        item, solid, place, constant, context = task.item, task.solid, task.place, task.constant, self.context
         if solid.collides and not (solid.fixed and constant):
-            if not self.contact.above_ground(found.placed):
+            if not self.clearance.above_ground(found.placed):
                 return Objection("would be below the ground")
-            walls = self.contact.walls
-            if walls is not None and self.contact.gap(found.placed, walls, 0.0) < -TOUCH:
+            walls = self.clearance.walls
+            if walls is not None and self.clearance.gap(found.placed, walls, 0.0) < -TOUCH:
                 return Objection("would be inside of the terrain")
-        clear_of = _clear_of(place, view) if place.clear_of else {}
-        for name, other in self.settled.items():
+        clear_of = _clear_of(place, context) if place.clear_of else {}
+        for name, other in context.settled.items():
             if name == item.name or (solid.fixed and other.fixed and constant and other.constant):
                 continue
             wanted = clear_of.get(name, 0.0)
             if other.listed:  # clearances hold both ways, but not against what something rests on
-                theirs = view.places[name]
-                wanted = max(wanted, _clear_of(theirs, view).get(item.name, 0.0) if theirs.clear_of else 0.0)
+                theirs = context.places[name]
+                wanted = max(wanted, _clear_of(theirs, context).get(item.name, 0.0) if theirs.clear_of else 0.0)
                 asked = max(place.clearance, theirs.clearance)
-                if asked > wanted and not self._stacked(item.name, name, view):
+                if asked > wanted and not self._stacked(item.name, name):
                     wanted = asked
             if wanted <= 0 and not (solid.collides and other.collides):
                 continue
-            gap = self.contact.gap(found.placed, other.placed, wanted)
+            gap = self.clearance.gap(found.placed, other.placed, wanted)
             if gap < (wanted - EXACT if wanted > 0 else -TOUCH):
                 if wanted > 0:
                     return Objection(f"cannot keep its clearance of {wanted:g} m from '{name}'", name)
                 return Objection(f"would be inside of '{name}'", name)
         return None
 
-    def _stacked(self, one: str, other: str, view: View) -> bool:
+    def _stacked(self, one: str, other: str) -> bool:
         """Whether one of two things rests on the other, or on what does."""
         for name in (one, other):
             if name not in self._supports:
-                self._supports[name] = _below(view.places[name], view)
+                self._supports[name] = _below(self.context.places[name], self.context)
         return other in self._supports[one] or one in self._supports[other]
 
 
-def _clear_of(place: PlaceFields, view: View) -> Mapping[str, float]:
+def _clear_of(place: PlaceFields, context: PlacementContext) -> Mapping[str, float]:
     """Distances by the names of items: a category stands for all of its instances."""
-    return {
-        item.name: distance for name, distance in place.clear_of.items() for item in meant(name, view.scenery.items)
-    }
+    return {item.name: distance for name, distance in place.clear_of.items() for item in meant(name, context.items)}
 
 
-def _below(place: PlaceFields, view: View) -> set[str]:
+def _below(place: PlaceFields, context: PlacementContext) -> set[str]:
     """What it rests on or under, and what that rests on, and so on: no clearance is kept to these."""
     found: set[str] = set()
     waiting = [name for name in (place.on, place.in_, place.under) if name is not None]
     for relation in (place.near, *(getattr(place, side) for side in SIDES)):
-        support = None if relation is None else view.support_of(relation.of)
+        support = None if relation is None else context.support_of(relation.of)
         if support is not None and not waiting:
             waiting.append(support[0])
     while waiting:
-        item = view.item(waiting.pop().partition(".")[0])
+        item = context.item(waiting.pop().partition(".")[0])
         if item is not None and item.name not in found:
             found.add(item.name)
-            support = view.support_of(item.name)
+            support = context.support_of(item.name)
             waiting += [] if support is None else [support[0]]
     return found
 
 
-def _beside(side: str, relation: SideSpec, placed: Placed, view: View) -> Objection | None:
-    other = view.find(relation.of)
+def _beside(side: str, relation: SideSpec, placed: Placed, context: PlacementContext) -> Objection | None:
+    other = context.find(relation.of)
     if other is None:
         return None
     n = side_direction(side, relation, other)

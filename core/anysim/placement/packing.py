@@ -5,11 +5,11 @@ points of bottom-left packing). They are tried from the lowest y on, then the lo
 """
 
 from collections.abc import Callable, Sequence
-from typing import Protocol
 
 from anysim.geometry import polygon as G
 from anysim.geometry.convex_parts import Placed, PlacedPart, Pose
 from anysim.placement.candidate import Candidate
+from anysim.placement.sampler import PlacementSampler
 
 GAP = 2e-4
 """[m] left between neighbours that may stand as close as they like."""
@@ -18,23 +18,10 @@ MOST = 4000
 """Corners that are tried for one thing."""
 
 
-class Keeps(Protocol):
-    """What was drawn for a candidate, to be kept."""
-
-    def keep(self) -> None: ...
-
-
-class Stands(Protocol):
-    """Something that stands in the area."""
-
-    @property
-    def placed(self) -> Placed: ...
-
-
 def packed(
-    turns: Sequence[tuple[Candidate, Keeps]],
+    turns: Sequence[tuple[Candidate, PlacementSampler]],
     objected: Callable[[Candidate], bool],
-    standing: Sequence[Stands],
+    standing: Sequence[Placed],
     gap: float = GAP,
 ) -> Candidate | None:
     """The first corner at which one of `turns` can stand; None where there is none.
@@ -42,23 +29,23 @@ def packed(
     `turns` are candidates with the orientations that are allowed, each anywhere in the area of its origin; `objected`
     says whether one is in the way of something.
     """
-    for start, dice in turns:
+    for start, sampler in turns:
         area = start.area
         assert area is not None
         for x, y in _corners(start, area, standing, gap)[:MOST]:
             moved = shifted(start, x - start.pose.position[0], y - start.pose.position[1])
             if not objected(moved):
-                dice.keep()
+                sampler.keep()
                 return moved
     return None
 
 
-def _corners(start: Candidate, area: G.Area, standing: Sequence[Stands], gap: float) -> list[G.Point]:
+def _corners(start: Candidate, area: G.Area, standing: Sequence[Placed], gap: float) -> list[G.Point]:
     """Origins of the thing for which its box begins where the area does, or where another's box ends."""
     low, high = start.placed.low, start.placed.high
     left, front = start.pose.position[0] - low[0], start.pose.position[1] - low[1]
     (x0, y0), (x1, y1) = G.bounds(area)
-    level = [s.placed for s in standing if s.placed.low[2] < high[2] and s.placed.high[2] > low[2] + 1e-6]
+    level = [s for s in standing if s.low[2] < high[2] and s.high[2] > low[2] + 1e-6]
     inside = [
         b
         for b in level

@@ -1,14 +1,14 @@
 """Proposals: poses by logical identity, from a language or vision model, a program or a person.
 
 A proposal is JSON: `{"poses": {"mug": {"position": [0.5, 0.1, 0.42], "yaw": 0.3}}, "reason": "…"}`, or a list of such,
-of which each episode draws one. Whoever proposes gets a `Request`. What comes back is data and nothing is believed:
+of which each episode draws one. A proposer gets a `Request`. What comes back is data and nothing is believed:
 names, numbers, regions and collisions are checked, and a pose is moved no farther than the bounds of the spec allow.
 """
 
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from math import cos, hypot, pi, sin
+from math import hypot
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +50,7 @@ class Support:
 
 @dataclass(frozen=True)
 class Request:
-    """What whoever proposes needs to know. `seed` is the episode's: a proposer that draws should draw from it."""
+    """What a proposer needs to know. `seed` is the episode's: a proposer that draws should draw from it."""
 
     scene: str
     seed: int
@@ -118,14 +118,3 @@ def faults(proposal: Proposal, known: Sequence[str]) -> dict[str, str]:
         elif pose.quaternion is not None and pose.yaw:
             found[name] = f"'{name}': give either a quaternion or yaw"
     return found
-
-
-def nudges(distance: float) -> list[tuple[float, float]]:
-    """Sideways shifts to try, the smallest first: rings of growing radius up to `distance` [m]."""
-    found = [(0.0, 0.0)]
-    for ring in (0.1, 0.2, 0.35, 0.5, 0.75, 1.0):
-        count = 8 if ring < 0.5 else 16
-        found += [
-            (ring * distance * cos(2 * pi * k / count), ring * distance * sin(2 * pi * k / count)) for k in range(count)
-        ]
-    return found if distance > 0 else found[:1]

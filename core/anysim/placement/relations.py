@@ -4,9 +4,13 @@ from math import cos, pi, sin
 
 from anysim.geometry import polygon as G
 from anysim.geometry.convex_parts import Matrix, Placed, Solid, Vec, heading
-from anysim.placement.context import SIDE_ANGLE, Around, Dice
+from anysim.placement.context import PlacementContext
+from anysim.placement.sampler import PlacementSampler
 from anysim_schemas.layout import PlaceFields
 from anysim_schemas.relations import SIDES, SideSpec
+
+SIDE_ANGLE = {"in_front_of": 0.0, "left_of": 0.5 * pi, "behind": pi, "right_of": -0.5 * pi}
+"""The direction of each side against the x axis [rad]."""
 
 
 def extent(placed: Placed, n: Vec) -> float:
@@ -35,20 +39,20 @@ def sideways(relation: SideSpec, other: Placed, n: Vec) -> tuple[float, float]:
 
 
 def spot_of(
-    solid: Solid, rotation: Matrix, place: PlaceFields, dice: Dice, around: Around
+    solid: Solid, rotation: Matrix, place: PlaceFields, sampler: PlacementSampler, context: PlacementContext
 ) -> tuple[G.Point | None, str]:
     """The place of the origin where something other than an area says it, and what does."""
     if place.x is not None or place.y is not None:
-        x = 0.0 if place.x is None else float(dice.value("x", place.x))
-        y = 0.0 if place.y is None else float(dice.value("y", place.y))
-        return (x + around.origin[0], y + around.origin[1]), "point"
+        x = 0.0 if place.x is None else float(sampler.value("x", place.x))
+        y = 0.0 if place.y is None else float(sampler.value("y", place.y))
+        return (x + context.origin[0], y + context.origin[1]), "point"
     for side in SIDES:
         relation: SideSpec | None = getattr(place, side)
-        other = None if relation is None else around.find(relation.of)
+        other = None if relation is None else context.find(relation.of)
         if relation is None or other is None:
             continue
         n = side_direction(side, relation, other)
-        u, v = dice.uniform(side, 2)
+        u, v = sampler.uniform(side, 2)
         low, high = relation.distance
         along = extent(other, n) + low + (high - low) * u + solid.reach(rotation, (-n[0], -n[1], 0.0))
         middle, free = sideways(relation, other, n)
@@ -57,9 +61,9 @@ def spot_of(
         across = middle + free * (2 * v - 1) - shift
         return (along * n[0] - across * n[1], along * n[1] + across * n[0]), side
     if place.near is not None:
-        other = around.find(place.near.of)
+        other = context.find(place.near.of)
         if other is not None:
-            u, v = dice.uniform("near", 2)
+            u, v = sampler.uniform("near", 2)
             angle = 2 * pi * u
             n = (cos(angle), sin(angle), 0.0)
             low, high = place.near.distance

@@ -7,19 +7,16 @@ Bounded: each thing is drawn at most `ATTEMPTS` times in a row, earlier things a
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
 
-from anysim.geometry.convex_parts import Solid, Vec
 from anysim.placement import repair
 from anysim.placement.candidate import Candidate, candidate
-from anysim.placement.clearance import Contact
-from anysim.placement.constraints import Crowd, Objection, Settled
-from anysim.placement.context import Dice, Impossible
-from anysim.placement.free_area import free_area
-from anysim.placement.order import Item, meant
+from anysim.placement.clearance import ClearanceQuery
+from anysim.placement.constraints import Constraints, Objection, PlacementTask
+from anysim.placement.context import Impossible, PlacementContext, Settled
+from anysim.placement.order import meant
 from anysim.placement.packing import GAP, packed
-from anysim.placement.scenery import Scenery, View
-from anysim.placement.standing_areas import footings_of
+from anysim.placement.sampler import PlacementSampler
+from anysim.placement.standing_areas import footings_of, free_area
 from anysim_schemas.layout import PlaceFields, RepairSpec
 from anysim_schemas.proposals import ProposedPose
 from anysim_schemas.values import Drawn
@@ -29,32 +26,6 @@ ATTEMPTS = 100
 
 RETREATS = 12
 """How often in an env something that has its place gives it up for something else."""
-
-
-class Notes(Protocol):
-    """Dice that keep what they drew."""
-
-    def value(self, field: str, value: Any) -> Any: ...
-
-    def uniform(self, purpose: str, count: int) -> Sequence[float]: ...
-
-    def keep(self) -> None:
-        """What was drawn is what holds."""
-        ...
-
-
-@dataclass
-class Task:
-    """Something to be placed: what is there of an item, and what was said of its place."""
-
-    item: Item
-    solid: Solid
-    place: PlaceFields
-    path: str
-    constant: bool
-    proposed: ProposedPose | None = None
-    """A pose that somebody proposes; nothing else is tried then."""
-    tick: int = 0
 
 
 class NoPlace(Exception):
@@ -69,29 +40,26 @@ class Refused(NoPlace):
 class Search:
     """One env's layout."""
 
-    scenery: Scenery
-    contact: Contact
-    dice: Callable[[Task, int], Notes]
-    origin: Vec = (0.0, 0.0, 0.0)
-    present: Callable[[Item], bool] = lambda item: True
+    context: PlacementContext
+    """Of the env: robots, and what the layout says nothing of, have their places already and keep them."""
+    clearance: ClearanceQuery
+    sampler: Callable[[PlacementTask, int], PlacementSampler]
+    """The numbers of an attempt."""
     bounds: RepairSpec = field(default_factory=RepairSpec)
     """How far proposed poses may be moved."""
-    settled: dict[str, Settled] = field(default_factory=dict)
-    """What has its place already and keeps it: robots, and what the layout says nothing of."""
 
-    def solve(self, tasks: Sequence[Task]) -> dict[str, Candidate]:
+    def solve(self, tasks: Sequence[PlacementTask]) -> dict[str, Candidate]:
         """A place for each, by the names of the items. `tasks` come in an order in which references come first.
 
         Raises:
             NoPlace: one of them has none.
             Refused: proposed poses cannot be kept; a sentence for each.
         """
-        self.view = View(self.scenery, {n: s.placed for n, s in self.settled.items()}, {}, self.origin, self.present)
-        self.crowd = Crowd(self.contact, self.settled)
+        self._constraints = Constraints(self.context, self.clearance)
         found: dict[str, Candidate] = {}
         order, done = list(tasks), 0
         for task in tasks:
-            self.view.places[task.item.name] = task.place
+            self.context.places[task.item.name] = task.place
         retreats = 0
         refused: list[str] = []
         while done < len(order):
@@ -133,36 +101,36 @@ class Search:
 
     # ------------------------------------------------------------------ one thing
 
-    def _place(self, task: Task) -> tuple[Candidate | None, Counter[Objection]]:
+    def _place(self, task: PlacementTask) -> tuple[Candidate | None, Counter[Objection]]:
         reasons: Counter[Objection] = Counter()
-        self.view.by = task.item
+        self.context.by = task.item
         if task.place.arrange == "pack":
             return self._packed(task, reasons), reasons
         for _ in range(1 if task.constant else ATTEMPTS):
-            dice = self.dice(task, task.tick)
-            proposed = self._candidate(task, dice)
+            sampler = self.sampler(task, task.tick)
+            proposed = candidate(task.solid, task.place, sampler, self.context)
             task.tick += 1
             if isinstance(proposed, Impossible):
                 reasons[Objection(proposed.reason, None, absent=True)] += 1
                 if proposed.hopeless:
                     break
                 continue
-            wrong = self._objection(task, proposed)
+            wrong = self._constraints.objection(task, proposed)
             if wrong is None:
-                dice.keep()
+                sampler.keep()
                 return proposed, reasons
             reasons[wrong] += 1
         return None, reasons
 
-    def _repaired(self, task: Task, proposed: ProposedPose) -> Candidate | str:
+    def _repaired(self, task: PlacementTask, proposed: ProposedPose) -> Candidate | str:
         """The proposed pose within the bounds, or what is wrong with it in words after the name."""
-        self.view.by = task.item
-        first = repair.start(task.solid, proposed, task.place, self.bounds, self.view)
+        self.context.by = task.item
+        first = repair.start(task, proposed, self.bounds, self.context)
         if isinstance(first, str):
             return first
 
         def objection(one: Candidate) -> str | None:
-            wrong = self._objection(task, one)
+            wrong = self._constraints.objection(task, one)
             return None if wrong is None else wrong.reason
 
         found = repair.repaired(first, self.bounds, objection)
@@ -171,28 +139,21 @@ class Search:
             return f"{found}{near}"
         return found
 
-    def _candidate(self, task: Task, dice: Dice) -> Candidate | Impossible:
-        return candidate(task.solid, task.place, lambda: self.scenery.resting(task.solid.name), dice, self.view)
-
-    def _objection(self, task: Task, proposed: Candidate) -> Objection | None:
-        return self.crowd.objection(task.item, task.solid, task.place, proposed, self.view, task.constant)
-
-    def _settle(self, task: Task, chosen: Candidate, found: dict[str, Candidate]) -> None:
+    def _settle(self, task: PlacementTask, chosen: Candidate, found: dict[str, Candidate]) -> None:
         name = task.item.name
         found[name] = chosen
-        self.view.placed[name] = chosen.placed
-        self.settled[name] = Settled(chosen.placed, task.solid.fixed, task.constant, task.solid.collides, True)
+        self.context.settled[name] = Settled(chosen.placed, task.solid.fixed, task.constant, task.solid.collides, True)
 
-    def _remove(self, task: Task, found: dict[str, Candidate]) -> None:
-        name = task.item.name
-        found.pop(name, None)
-        self.view.placed.pop(name, None)
-        self.settled.pop(name, None)
+    def _remove(self, task: PlacementTask, found: dict[str, Candidate]) -> None:
+        found.pop(task.item.name, None)
+        self.context.settled.pop(task.item.name, None)
 
     # ------------------------------------------------------------------ going back
 
-    def _culprit(self, task: Task, before: Sequence[Task], reasons: Mapping[Objection, int]) -> int | None:
-        """Who is most in the way and may go elsewhere; None where nobody is."""
+    def _culprit(
+        self, task: PlacementTask, before: Sequence[PlacementTask], reasons: Mapping[Objection, int]
+    ) -> int | None:
+        """The rank of what is most in the way and may go elsewhere; None where nothing is."""
         ranks = {t.item.name: k for k, t in enumerate(before)}
         needed = self._needs(task, before)
         votes: Counter[int] = Counter()
@@ -203,7 +164,7 @@ class Search:
                     votes[rank] += count
         return max(votes, key=lambda rank: (votes[rank], rank)) if votes else None
 
-    def _needs(self, task: Task, before: Sequence[Task]) -> set[str]:
+    def _needs(self, task: PlacementTask, before: Sequence[PlacementTask]) -> set[str]:
         """The things that a place depends on, and what these depend on."""
         by_name = {t.item.name: t for t in before}
         needed: set[str] = set()
@@ -211,47 +172,45 @@ class Search:
         while waiting:
             one = waiting.pop()
             for _, reference in one.place.references():
-                for item in meant(reference, self.scenery.items, one.item):
+                for item in meant(reference, self.context.items, one.item):
                     if item.name not in needed and item.name in by_name:
                         needed.add(item.name)
                         waiting.append(by_name[item.name])
         return needed
 
-    def _with_dependents(self, task: Task, placed: Sequence[Task]) -> list[Task]:
+    def _with_dependents(self, task: PlacementTask, placed: Sequence[PlacementTask]) -> list[PlacementTask]:
         return [t for t in placed if t is task or task.item.name in self._needs(t, placed)]
 
     # ------------------------------------------------------------------ packing
 
-    def _packed(self, task: Task, reasons: Counter[Objection]) -> Candidate | None:
+    def _packed(self, task: PlacementTask, reasons: Counter[Objection]) -> Candidate | None:
         """The first place in rows, with the drawn turn that takes the least room."""
         return packed(
             self._turns(task),
             lambda proposed: self._objected(task, proposed, reasons),
-            self._standing(),
+            [s.placed for s in self.context.settled.values() if s.listed],  # rows are built against these
             max(GAP, task.place.clearance),
         )
 
-    def _objected(self, task: Task, proposed: Candidate, reasons: Counter[Objection]) -> bool:
-        wrong = self._objection(task, proposed)
+    def _objected(self, task: PlacementTask, proposed: Candidate, reasons: Counter[Objection]) -> bool:
+        wrong = self._constraints.objection(task, proposed)
         if wrong is not None:
             reasons[wrong] += 1
         return wrong is not None
 
-    def _turns(self, task: Task) -> list[tuple[Candidate, Notes]]:
+    def _turns(self, task: PlacementTask) -> list[tuple[Candidate, PlacementSampler]]:
         """Some of the orientations that the entry allows, the slimmest first; each as a candidate somewhere."""
-        found: list[tuple[Candidate, Notes]] = []
+        found: list[tuple[Candidate, PlacementSampler]] = []
         for tick in range(1 if task.constant else 8):
-            dice = self.dice(task, tick)
-            proposed = self._candidate(task, dice)
+            sampler = self.sampler(task, tick)
+            proposed = candidate(task.solid, task.place, sampler, self.context)
             if isinstance(proposed, Candidate) and proposed.area:
-                found.append((proposed, dice))
+                found.append((proposed, sampler))
         return sorted(found, key=lambda pair: round(_footprint(pair[0]), 9))
 
-    def _standing(self) -> list[Settled]:
-        """What the layout has put somewhere, so that rows can be built against it."""
-        return [s for s in self.settled.values() if s.listed]
-
-    def _pack_together(self, task: Task, before: Sequence[Task], found: dict[str, Candidate]) -> Candidate | None:
+    def _pack_together(
+        self, task: PlacementTask, before: Sequence[PlacementTask], found: dict[str, Candidate]
+    ) -> Candidate | None:
         """What goes anywhere on the same support, the largest first, in rows; undone where that fails too."""
         if not _scattered(task):
             return None
@@ -259,31 +218,31 @@ class Search:
             t for t in before if _scattered(t) and _support(t) == _support(task) and t.place.region == task.place.region
         ]
         group = [t for t in group if not any(t.item.name in self._needs(o, before) for o in before)]
-        kept = {t.item.name: (found[t.item.name], self.settled[t.item.name]) for t in group}
+        kept = {t.item.name: (found[t.item.name], self.context.settled[t.item.name]) for t in group}
         for one in group:
             self._remove(one, found)
         sized = [(self._size(one), one) for one in (*group, task)]
         reasons: Counter[Objection] = Counter()
         for _, one in sorted(sized, key=lambda pair: (-pair[0], pair[1].item.name)):
-            self.view.by = one.item
+            self.context.by = one.item
             chosen = self._packed(one, reasons)
             if chosen is None:
                 for t in (*group, task):
                     self._remove(t, found)
-                for name, (candidate_, settled) in kept.items():
-                    found[name], self.settled[name], self.view.placed[name] = candidate_, settled, candidate_.placed
+                for name, before_packing in kept.items():
+                    found[name], self.context.settled[name] = before_packing
                 return None
             self._settle(one, chosen, found)
         return found[task.item.name]
 
-    def _size(self, task: Task) -> float:
-        self.view.by = task.item
+    def _size(self, task: PlacementTask) -> float:
+        self.context.by = task.item
         turns = self._turns(task)
         return round(_footprint(turns[0][0]), 9) if turns else 0.0
 
     # ------------------------------------------------------------------ words
 
-    def _sentence(self, task: Task, reasons: Mapping[Objection, int]) -> str:
+    def _sentence(self, task: PlacementTask, reasons: Mapping[Objection, int]) -> str:
         name = task.item.name
         total = sum(reasons.values())
         if len(reasons) == 1 and next(iter(reasons)).absent:
@@ -304,16 +263,16 @@ class Search:
             remedy += " or lower its clearance"
         return f"{first}{more}{self._free_room(task)}; {remedy}"
 
-    def _free_room(self, task: Task) -> str:
+    def _free_room(self, task: PlacementTask) -> str:
         """How much of its support is free, in words."""
         reference = task.place.in_ or task.place.on
         if reference is None or reference == "terrain":
             return ""
-        self.view.by = task.item
-        footings = footings_of(reference, task.place.in_ is not None, self.view)
+        self.context.by = task.item
+        footings = footings_of(reference, task.place.in_ is not None, self.context)
         if isinstance(footings, Impossible) or not any(f.area for f in footings):
             return ""
-        whole, free = free_area(footings, self.settled)
+        whole, free = free_area(footings, self.context.settled.values())
         return f" (of the {whole:.3g} m^2 of '{reference}' {free:.3g} m^2 are free)"
 
 
@@ -322,11 +281,11 @@ def _footprint(found: Candidate) -> float:
     return (high[0] - low[0]) * (high[1] - low[1])
 
 
-def _support(task: Task) -> tuple[str | None, str | None]:
+def _support(task: PlacementTask) -> tuple[str | None, str | None]:
     return task.place.on, task.place.in_
 
 
-def _scattered(task: Task) -> bool:
+def _scattered(task: PlacementTask) -> bool:
     """Whether it goes anywhere on a support or in a region, without further relations."""
     place = task.place
     related = (place.near, place.left_of, place.right_of, place.in_front_of, place.behind, place.aligned, place.facing)

@@ -1,6 +1,6 @@
 """Level surfaces and regions in the world: where something may stand."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from math import inf
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from anysim.conventions import GROUND
 from anysim.errors import listing
 from anysim.geometry import polygon as G
 from anysim.geometry.convex_parts import Placed, heading
-from anysim.placement.context import Around, Impossible
+from anysim.placement.context import Impossible, PlacementContext, Settled
 from anysim.placement.support_surfaces import SupportSurface, choose
 from anysim_schemas.layout import PlaceFields
 from anysim_schemas.regions import RegionSpec
@@ -24,13 +24,13 @@ class Footing(NamedTuple):
     surface: SupportSurface
 
 
-def footings_of(reference: str, inside: bool, around: Around) -> list[Footing] | Impossible:
+def footings_of(reference: str, inside: bool, context: PlacementContext) -> list[Footing] | Impossible:
     """The level surfaces that a reference to a support means, in the world."""
     name, _, part = reference.partition(".")
-    owner = around.find(name)
+    owner = context.find(name)
     if owner is None:
         return Impossible(f"'{name}' is not there in this env", hopeless=True)
-    found = around.surfaces_of(owner)
+    found = context.surfaces_of(owner)
     if part or not inside:
         chosen = choose(found, part, inside)
         kept = [] if chosen is None else [chosen]
@@ -51,7 +51,7 @@ def _upright(placed: Placed) -> bool:
     return placed.pose.rotation[2][2] > 1.0 - 1e-9
 
 
-def standing_places(place: PlaceFields, around: Around) -> list[Footing] | Impossible | None:
+def standing_places(place: PlaceFields, context: PlacementContext) -> list[Footing] | Impossible | None:
     """Where it may stand; None for the ground."""
     reference, inside = place.on, False
     if place.in_ is not None:
@@ -61,7 +61,7 @@ def standing_places(place: PlaceFields, around: Around) -> list[Footing] | Impos
             relation = getattr(place, field)
             if relation is None:
                 continue
-            found = around.support_of(relation.of)
+            found = context.support_of(relation.of)
             if found is None:
                 return Impossible(
                     f"it is not known what '{relation.of}' rests on, so say what this rests on, with `on`",
@@ -69,9 +69,9 @@ def standing_places(place: PlaceFields, around: Around) -> list[Footing] | Impos
                 )
             reference, inside = found
             break
-    if reference is None or reference == GROUND or around.find(reference.partition(".")[0]) is None:
+    if reference is None or reference == GROUND or context.find(reference.partition(".")[0]) is None:
         return None  # what it would rest on is not there in this env
-    return footings_of(reference, inside, around)
+    return footings_of(reference, inside, context)
 
 
 def height_under(footings: Sequence[Footing], spot: G.Point) -> float:
@@ -80,7 +80,7 @@ def height_under(footings: Sequence[Footing], spot: G.Point) -> float:
     return max(heights) if heights else footings[0].owner.high[2]
 
 
-def region_area(spec: RegionSpec, around: Around) -> G.Area:
+def region_area(spec: RegionSpec, context: PlacementContext) -> G.Area:
     """A region in the world."""
     if spec.rectangle is not None:
         area: G.Area = (G.rectangle(*spec.rectangle),)
@@ -90,28 +90,48 @@ def region_area(spec: RegionSpec, around: Around) -> G.Area:
         assert spec.polygon is not None
         area = G.convex_parts(spec.polygon)
     if spec.of is None:
-        return G.moved(area, around.origin[0], around.origin[1], 0.0)
-    owner = around.find(spec.of)
+        return G.moved(area, context.origin[0], context.origin[1], 0.0)
+    owner = context.find(spec.of)
     if owner is None:
         return ()
     x, y, _ = owner.pose.position
     return G.moved(area, x, y, heading(owner.pose.rotation))
 
 
-def region_of(place: PlaceFields, around: Around) -> G.Area | None:
+def region_of(place: PlaceFields, context: PlacementContext) -> G.Area | None:
     """The region of a place in the world; None where it has none."""
     if place.region is None:
         return None
-    return region_area(place.region if isinstance(place.region, RegionSpec) else around.region(place.region), around)
+    return region_area(place.region if isinstance(place.region, RegionSpec) else context.region(place.region), context)
 
 
-def below_area(place: PlaceFields, around: Around, reach: Callable[[float, float], float]) -> G.Area | None:
+def below_area(place: PlaceFields, context: PlacementContext, reach: Callable[[float, float], float]) -> G.Area | None:
     """Below the box around the other object, wholly where there is the room."""
     if place.under is None:
         return None
-    other = around.find(place.under)
+    other = context.find(place.under)
     if other is None:
         return ()
     outline = G.rectangle(other.low[:2], other.high[:2])
     inner = G.eroded(outline, reach)
     return (inner or outline,)
+
+
+def free_area(footings: Sequence[Footing], settled: Iterable[Settled]) -> tuple[float, float]:
+    """[m^2] of surfaces, and of what has no box of anything else over it, counted on a grid of 32 by 32 points."""
+    placed = [one.placed for one in settled]
+    whole = free = 0.0
+    for footing in footings:
+        own, level = footing.owner.name, footing.height
+        boxes = [p for p in placed if p.name != own and p.low[2] < level + 0.02 and p.high[2] > level]
+        (x0, y0), (x1, y1) = G.bounds(footing.area)
+        points = [
+            (x0 + (i + 0.5) / 32 * (x1 - x0), y0 + (j + 0.5) / 32 * (y1 - y0)) for i in range(32) for j in range(32)
+        ]
+        inside = [p for p in points if G.holds(footing.area, *p)]
+        bare = [
+            p for p in inside if not any(b.low[0] <= p[0] <= b.high[0] and b.low[1] <= p[1] <= b.high[1] for b in boxes)
+        ]
+        size = G.total(footing.area)
+        whole, free = whole + size, free + size * len(bare) / max(1, len(inside))
+    return whole, free
