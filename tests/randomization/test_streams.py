@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from anysim.randomization.draw import draw, draw_one
+from anysim.randomization.distributions import draw_one
+from anysim.randomization.draw import draw
 from anysim.randomization.streams import Streams, stream_key
 from anysim_schemas.values import Choice, LogUniform, Normal, NormalParameters, Range
 

@@ -1,6 +1,6 @@
 """What a spec says about the joints of an object, on top of what its asset says."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from math import isfinite
@@ -10,9 +10,8 @@ from anysim.assets.model import ImportedModel
 from anysim.errors import listing, suggest
 from anysim.issues import Issues
 from anysim.model.world import Joint
-from anysim.randomization.distributions import nominal
+from anysim.randomization.distributions import nominal, written
 from anysim_schemas.joints import ObjectJointSpec
-from anysim_schemas.values import Choice, LogUniform, Range
 
 _FIELDS = ("initial", "opened", "friction", "damping", "limits")
 
@@ -80,7 +79,7 @@ def _joint(model: ImportedModel, joint: Joint, asked: Mapping[str, Asked], issue
             else:
                 joint = replace(joint, initial=opened_to(joint, float(nominal(value))))
         else:
-            for extreme in _extremes(value):
+            for extreme in written(value):
                 if not joint.lower <= extreme <= joint.upper:
                     limits = f"[{joint.lower:g}, {joint.upper:g}]"
                     here.add(field, f"{extreme:g} is outside of the limits {limits} of '{joint.name}'")
@@ -92,18 +91,3 @@ def opened_to(joint: Joint, share: float) -> float:
     """The position where a joint is open by a share of its range."""
     closed, opened = ends(joint)
     return closed + share * (opened - closed)
-
-
-def _extremes(value: Any) -> Iterator[float]:
-    """Values that a draw can have and that have to be possible; a normal is clipped to the limits instead."""
-    if isinstance(value, Range):
-        yield from value.range
-    elif isinstance(value, LogUniform):
-        yield from value.log_uniform
-    elif isinstance(value, Choice):
-        yield from value.choice
-    elif isinstance(value, int | float):
-        yield value
-    otherwise = getattr(value, "otherwise", None)
-    if otherwise is not None:
-        yield otherwise

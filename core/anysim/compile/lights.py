@@ -1,16 +1,15 @@
 """Lights and surroundings of a spec, with the nominal value of what is drawn anew in each episode."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from anysim.issues import Issues
-from anysim.model.colors import Rgb, rgb
+from anysim.model.colors import WHITE, nominal_rgb
 from anysim.model.world import Light, Scenery
 from anysim.randomization.distributions import nominal
 from anysim_schemas.lights import LightSpec, ScenerySpec
-from anysim_schemas.values import Choice, Drawn, LogUniform, Normal, Range
+from anysim_schemas.values import Drawn
 
 DEFAULT_LIGHTS = (
     Light("key", direction=(-0.4, 0.3, -0.87), intensity=0.7),  # from the front right, as a lamp beside the viewer
@@ -31,32 +30,13 @@ def compile_lights(specs: Mapping[str, LightSpec], issues: Issues) -> tuple[Ligh
             continue
         x, y, z = (component / length for component in direction)
         position = None if spec.position is None else nominal(spec.position)
-        color = nominal_color(spec.color, issues, f"{name}.color")
+        color = nominal_rgb(spec.color, WHITE, issues, f"{name}.color")
         lights.append(Light(name, (x, y, z), position, color, nominal(spec.intensity)))
     return tuple(lights) if specs else DEFAULT_LIGHTS
 
 
 def compile_scenery(spec: ScenerySpec, issues: Issues) -> Scenery:
     """Background, ambient light and shadows; None where the engine decides."""
-    background = None if spec.background is None else nominal_color(spec.background, issues, "background")
-    ambient = None if spec.ambient is None else nominal_color(spec.ambient, issues, "ambient")
+    background = None if spec.background is None else nominal_rgb(spec.background, WHITE, issues, "background")
+    ambient = None if spec.ambient is None else nominal_rgb(spec.ambient, WHITE, issues, "ambient")
     return Scenery(background, ambient, None if spec.shadows is None else bool(nominal(spec.shadows)))
-
-
-def nominal_color(value: Any, issues: Issues, path: str) -> Rgb:
-    """The nominal red, green, blue of a value; all colours that may be drawn are checked."""
-    try:
-        for color in _named(value):
-            rgb(color)
-        return rgb(nominal(value))
-    except ValueError as error:
-        issues.add(path, str(error))
-        return (1.0, 1.0, 1.0)
-
-
-def _named(value: Any) -> list[Any]:
-    """Every colour that a value holds as it is written."""
-    found: list[Any] = [] if not isinstance(value, Drawn) or value.otherwise is None else [value.otherwise]
-    if isinstance(value, Choice):
-        return [*found, *value.choice]
-    return found if isinstance(value, Range | LogUniform | Normal) else [value]

@@ -5,16 +5,14 @@ Geometry is fixed at build, so each source in each size is an entity of its own,
 
 from collections.abc import Sequence
 from pathlib import Path
-from statistics import NormalDist
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from anysim.assets.uri import locate_folder
 from anysim.errors import AssetError, listing
+from anysim.randomization.distributions import quantile
 from anysim_schemas.object_source import PROCEDURAL, SHAPES, Count, SourceChoice, SourceFolder, SourceSpec, most
 from anysim_schemas.objects import ObjectSpec
-from anysim_schemas.values import Choice, Drawn, LogUniform, Normal, Range
+from anysim_schemas.values import Choice, Drawn
 
 INSTANCER = "rigid_instancer"
 
@@ -65,21 +63,7 @@ def sizes(spec: ObjectSpec) -> Options:
     if isinstance(value, Choice):
         return options(value.choice, like=value)
     shares = [(k + 0.5) / spec.sizes for k in range(spec.sizes)]
-    return options([_quantile(value, share) for share in shares], spec.sizes // 2, value)
-
-
-def _quantile(value: Any, share: float) -> float:
-    """What a share of the draws of a distribution stays below."""
-    if isinstance(value, Range):
-        low, high = value.range
-        return low + (high - low) * share
-    if isinstance(value, LogUniform):
-        low, high = np.log(value.log_uniform)
-        return float(np.exp(low + (high - low) * share))
-    assert isinstance(value, Normal)
-    drawn = value.normal.mean + value.normal.std * NormalDist().inv_cdf(share)
-    low, high = value.normal.low, value.normal.high
-    return float(np.clip(drawn, -np.inf if low is None else low, np.inf if high is None else high))
+    return options([quantile(value, share) for share in shares], spec.sizes // 2, value)
 
 
 def counts(count: Count) -> Options:

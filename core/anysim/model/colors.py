@@ -5,8 +5,7 @@ from typing import Any
 
 from anysim.errors import listing, suggest
 from anysim.issues import Issues
-from anysim.randomization.distributions import nominal
-from anysim_schemas.values import Choice, Range
+from anysim.randomization.distributions import nominal, written
 
 Rgb = tuple[float, float, float]
 
@@ -20,6 +19,7 @@ _HEX = {
 COLORS: Mapping[str, Rgb] = {
     name: ((value >> 16) / 255, (value >> 8 & 255) / 255, (value & 255) / 255) for name, value in _HEX.items()
 }
+WHITE: Rgb = (1.0, 1.0, 1.0)
 
 
 def rgb(color: str | Sequence[float]) -> Rgb:
@@ -39,15 +39,13 @@ def rgb(color: str | Sequence[float]) -> Rgb:
 
 
 def nominal_rgb(color: Any, otherwise: Rgb, issues: Issues, path: str = "color") -> Rgb:
-    """The nominal colour of a value, `otherwise` where it names none; all that may be drawn are checked."""
+    """The nominal colour of a value, `otherwise` where it is None or at fault; all that may be drawn are checked."""
+    if color is None:
+        return otherwise
     try:
-        if isinstance(color, Choice):
-            first, *_ = [rgb(one) for one in color.choice]
-            return first
-        if isinstance(color, Range):
-            low, high = (rgb(bound) for bound in color.range)
-            return (0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]))
-        return otherwise if color is None else rgb(nominal(color))
+        for one in written(color):
+            rgb(one)
+        return rgb(nominal(color))
     except ValueError as error:
         issues.add(path, str(error))
         return otherwise

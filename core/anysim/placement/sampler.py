@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from anysim.randomization.distributions import nominal
+from anysim.randomization.distributions import nominal, weighted
 from anysim.randomization.draw import draw
 from anysim.randomization.streams import Origin, Streams
 
@@ -74,8 +74,7 @@ class EpisodeSampler(PlacementSampler):
 
     def pick(self, purpose: str, weights: Sequence[float]) -> int:
         """One of several by its weight; what is kept is its number."""
-        edges = np.cumsum(weights) / np.sum(weights)
-        number = min(int(np.searchsorted(edges, self.uniform(purpose, 1)[0], side="right")), len(weights) - 1)
+        number = weighted(weights, self.uniform(purpose, 1)[0])
         stream = f"layout/{self._name}/{purpose}"
         self._aside.note(self._env, stream, number, Origin(stream, f"{self._path}.{purpose}"))
         return number

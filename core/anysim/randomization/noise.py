@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.randomization.distributions import extremes, nominal
-from anysim.randomization.draw import draw_one, is_random
+from anysim.randomization.distributions import draw_one, extremes, nominal
+from anysim.randomization.draw import is_random
 from anysim.randomization.streams import Origin, Streams
 from anysim_schemas.values import Choice
 
