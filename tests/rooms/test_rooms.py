@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from anysim.compile.room import Furnished, room_of
 from anysim.compile.world import compile_world
 from anysim.errors import AnysimError, SpecError
-from anysim.geometry import room_polygon
+from anysim.geometry import polygon as G
 from anysim.issues import Issues
 from anysim.model.world import BodyKind, World
 from anysim.rooms.furnish import FRONT, HOSTS, NoPlace, furnish
@@ -51,24 +51,22 @@ def check(made: Furnished, spec: RoomSpec) -> None:
     plan, placed = made.plan, made.pieces
     assert sorted(one.kind for one in placed) == sorted(k for k, n in spec.pieces.items() for _ in range(n))
     for i, one in enumerate(placed):
-        assert room_polygon.holds(plan.outline, one.footprint), f"{one.name} is in a wall"
+        assert G.encloses(plan.outline, one.footprint), f"{one.name} is in a wall"
         for other in placed[:i]:
-            assert not room_polygon.overlap(one.footprint, other.footprint), f"{one.name} is in {other.name}"
+            assert not G.overlap(one.footprint, other.footprint), f"{one.name} is in {other.name}"
             if one.kind not in HOSTS and other.kind in FRONT:
-                assert not room_polygon.overlap(one.footprint, other.zone(FRONT[other.kind])), (
-                    f"{one.name} bars {other.name}"
-                )
+                assert not G.overlap(one.footprint, other.zone(FRONT[other.kind])), f"{one.name} bars {other.name}"
         for opening in plan.openings:
             if opening.is_door:
-                assert not room_polygon.overlap(one.footprint, plan.approach(opening)), f"{one.name} bars a door"
+                assert not G.overlap(one.footprint, plan.approach(opening)), f"{one.name} bars a door"
     solid = [one.footprint for one in placed]
     grid = Occupancy.of_footprints(solid, plan.outline, 0.05)
     points = grid.free_points(50, 0.25, np.random.default_rng(0))
-    assert room_polygon.inside(points, plan.outline).all()
+    assert G.inside(points, plan.outline).all()
     for polygon in solid:
-        assert room_polygon.distance(points, polygon).min() >= 0.25
+        assert G.distance(points, polygon).min() >= 0.25
     for wall in plan.walls:
-        assert room_polygon.distance(points, np.stack([wall.start, wall.at(wall.length)])).min() >= 0.25
+        assert G.distance(points, np.stack([wall.start, wall.at(wall.length)])).min() >= 0.25
 
 
 @pytest.mark.parametrize("count", [16, pytest.param(200, marks=pytest.mark.slow)])
@@ -163,7 +161,7 @@ def test_free_points_are_even_and_repeatable() -> None:
 
 def test_free_points_can_keep_to_what_is_reached() -> None:
     area = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 2.0], [0.0, 2.0]])
-    wall = room_polygon.rectangle(np.array([2.5, 1.0]), (0.05, 1.2), 0.0)
+    wall = G.oriented_rectangle(np.array([2.5, 1.0]), (0.05, 1.2), 0.0)
     grid = Occupancy.of_footprints([wall], area, 0.05)
     start = np.array([0.5, 0.5])
     points = grid.free_points(200, 0.1, np.random.default_rng(0), connected_to=start)
@@ -187,8 +185,8 @@ def test_outlines_hold_the_shapes_of_geoms() -> None:
         (polygon,) = footprints(world, world.initial_body_pose, (0.0, 2.0), set())
         points = surface_points(shape, rng)
         seen = np.array([0.3, -0.1]) + P.rotate(turn, points)[:, :2]
-        assert room_polygon.distance(seen, polygon).max() < 1e-9
-        covered = room_polygon.area(polygon) / room_polygon.area(hull(seen))
+        assert G.distance(seen, polygon).max() < 1e-9
+        covered = G.size(G.corners_of(polygon)) / G.size(G.corners_of(hull(seen)))
         assert 1.0 - 1e-9 <= covered < 1.05
         assert footprints(world, world.initial_body_pose, (2.0, 3.0), set()) == []
 

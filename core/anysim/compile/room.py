@@ -10,7 +10,7 @@ from anysim import cache
 from anysim.assets.model import ImportedModel
 from anysim.compile.builder import WorldBuilder
 from anysim.conventions import IDENTITY_QUATERNION
-from anysim.geometry import room_polygon
+from anysim.geometry import polygon as G
 from anysim.issues import Issues
 from anysim.model.colors import Rgb, nominal_rgb
 from anysim.model.world import ORIGIN, Body, BodyKind, Box, EntityKind, Geom, Mesh, MeshShape, Quat, Surface
@@ -120,7 +120,7 @@ def _shell(spec: RoomSpec, plan: RoomPlan, issues: Issues) -> ImportedModel:
 def _floor_mesh(plan: RoomPlan) -> Mesh:
     """A slab of the form of the room, widened into the walls below the doors; its top is at height 0."""
     outline, n = plan.outline, len(plan.outline)
-    top = room_polygon.triangles(outline)
+    top = G.triangles(outline)
     corners = np.concatenate([np.column_stack([outline, np.full(n, z)]) for z in (0.0, -FLOOR)])
     i = np.arange(n)
     j = (i + 1) % n
@@ -131,7 +131,7 @@ def _floor_mesh(plan: RoomPlan) -> Mesh:
         if opening.is_door:
             wall = plan.walls[opening.wall]
             middle = wall.at((opening.low + opening.high) / 2, -plan.thickness / 2)
-            rectangle = room_polygon.rectangle(middle, ((opening.high - opening.low) / 2, plan.thickness / 2), wall.yaw)
+            rectangle = G.oriented_rectangle(middle, ((opening.high - opening.low) / 2, plan.thickness / 2), wall.yaw)
             vertices.append(np.column_stack([rectangle, np.zeros(4)]))
             faces.append(np.array([[0, 1, 2], [0, 2, 3]]) + count)
             count += 4

@@ -11,7 +11,7 @@ from math import pi
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.geometry import room_polygon
+from anysim.geometry import polygon as G
 from anysim.rooms.furniture import MAKERS, Piece, piece
 from anysim.rooms.occupancy import Occupancy
 from anysim.rooms.plan import RoomPlan
@@ -51,12 +51,12 @@ class Placed:
     @property
     def footprint(self) -> Array:
         """Corners (4, 2) of what it covers."""
-        return room_polygon.rectangle(self.middle, self.piece.half, self.yaw)
+        return G.oriented_rectangle(self.middle, self.piece.half, self.yaw)
 
     def zone(self, depth: float) -> Array:
         """The rectangle (4, 2) in front of it."""
-        ahead = room_polygon.turned(np.array([0.0, self.piece.half[1] + depth / 2]), self.yaw)
-        return room_polygon.rectangle(self.middle + ahead, (self.piece.half[0], depth / 2), self.yaw)
+        ahead = G.turned(np.array([0.0, self.piece.half[1] + depth / 2]), self.yaw)
+        return G.oriented_rectangle(self.middle + ahead, (self.piece.half[0], depth / 2), self.yaw)
 
 
 def names_of(pieces: Mapping[str, int]) -> list[tuple[str, str]]:
@@ -84,7 +84,7 @@ def furnish(plan: RoomPlan, pieces: Mapping[str, int], walkway: float, seed: int
     worst = max(troubles, key=lambda text: (troubles[text], text))
     raise NoPlace(
         f"{worst}, in {troubles[worst]} of {ARRANGEMENTS} arrangements of {sum(pieces.values())} pieces on "
-        f"{room_polygon.area(plan.outline):.1f} square metres; have fewer, or a larger room"
+        f"{G.size(G.corners_of(plan.outline)):.1f} square metres; have fewer, or a larger room"
     )
 
 
@@ -175,14 +175,14 @@ def _seat(made: Piece, hosts: list[Placed], placed: list[Placed], rng: np.random
         else float(rng.uniform(-0.3, 0.3)) * spread
     )
     direction = side * pi / 2  # 0 is the host's front
-    local = room_polygon.turned(np.array([slot, out + made.half[1] + GAP + float(rng.uniform(0.01, 0.12))]), direction)
-    return host.middle + room_polygon.turned(local, host.yaw), host.yaw + direction + pi
+    local = G.turned(np.array([slot, out + made.half[1] + GAP + float(rng.uniform(0.01, 0.12))]), direction)
+    return host.middle + G.turned(local, host.yaw), host.yaw + direction + pi
 
 
 def _beside(made: Piece, bed: Placed, rng: np.random.Generator) -> tuple[Array, float]:
     side = -1 if rng.random() < 0.5 else 1
     local = np.array([side * (bed.piece.half[0] + made.half[0] + GAP + 0.02), -bed.piece.half[1] + made.half[1]])
-    return bed.middle + room_polygon.turned(local, bed.yaw), bed.yaw
+    return bed.middle + G.turned(local, bed.yaw), bed.yaw
 
 
 # ---------------------------------------------------------------------- rules
@@ -190,32 +190,32 @@ def _beside(made: Piece, bed: Placed, rng: np.random.Generator) -> tuple[Array, 
 
 def _fits(plan: RoomPlan, one: Placed, placed: list[Placed], doors: list[Array]) -> bool:
     own = one.footprint
-    if not room_polygon.holds(plan.outline, own):
+    if not G.encloses(plan.outline, own):
         return False
-    if any(room_polygon.overlap(own, door) for door in doors):
+    if any(G.overlap(own, door) for door in doors):
         return False
     for opening in plan.openings:
         tall = one.piece.height > opening.bottom and not opening.is_door
-        if tall and room_polygon.overlap(own, plan.approach(opening, 0.35)):
+        if tall and G.overlap(own, plan.approach(opening, 0.35)):
             return False
     around = OPEN.get(one.kind, GAP * 0.9)
-    if one.kind in OPEN and not room_polygon.holds(
-        plan.outline, room_polygon.rectangle(one.middle, _grown(one, around), one.yaw)
+    if one.kind in OPEN and not G.encloses(
+        plan.outline, G.oriented_rectangle(one.middle, _grown(one, around), one.yaw)
     ):
         return False
     for other in placed:
         seat = one.kind in HOSTS and other.kind in HOSTS[one.kind]
         gap = GAP * 0.9 if seat else max(around, OPEN.get(other.kind, 0.0) if one.kind not in HOSTS else 0.0)
-        if room_polygon.overlap(own, other.footprint, gap):
+        if G.overlap(own, other.footprint, gap):
             return False
         depth = FRONT.get(other.kind, 0.0)
-        if depth and one.kind not in HOSTS and room_polygon.overlap(own, other.zone(depth)):
+        if depth and one.kind not in HOSTS and G.overlap(own, other.zone(depth)):
             return False
         depth = FRONT.get(one.kind, 0.0)
-        if depth and room_polygon.overlap(one.zone(depth), other.footprint):
+        if depth and G.overlap(one.zone(depth), other.footprint):
             return False
     depth = FRONT.get(one.kind, 0.0)
-    return not depth or room_polygon.holds(plan.outline, one.zone(depth))
+    return not depth or G.encloses(plan.outline, one.zone(depth))
 
 
 def _grown(one: Placed, by: float) -> tuple[float, float]:

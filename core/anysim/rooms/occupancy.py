@@ -12,7 +12,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import AnysimError
-from anysim.geometry import room_polygon
+from anysim.geometry import polygon as G
 from anysim.geometry.bounds import shape_bounds
 from anysim.math import pose as P
 from anysim.model.shapes import is_ground
@@ -43,7 +43,7 @@ class Occupancy:
         centres = np.stack(np.meshgrid(x, y), axis=-1)
         half = resolution * np.sqrt(0.5)
         flat_centres = centres.reshape(-1, 2)
-        beyond = ~room_polygon.inside(flat_centres, area) | (_to_border(flat_centres, area) <= half)
+        beyond = ~G.inside(flat_centres, area) | (_to_border(flat_centres, area) <= half)
         occupied = beyond.reshape(rows, cols)
         for polygon in footprints:
             first = np.floor((polygon.min(axis=0) - half - low) / resolution).astype(int)
@@ -52,7 +52,7 @@ class Occupancy:
             window = (slice(a[1], b[1]), slice(a[0], b[0]))
             near = centres[window].reshape(-1, 2)
             if len(near):
-                occupied[window] |= (room_polygon.distance(near, polygon) <= half).reshape(b[1] - a[1], b[0] - a[0])
+                occupied[window] |= (G.distance(near, polygon) <= half).reshape(b[1] - a[1], b[0] - a[0])
         occupied.setflags(write=False)
         return cls(occupied, low, resolution)
 

@@ -6,7 +6,7 @@ from math import atan2, pi
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.geometry import room_polygon
+from anysim.geometry import polygon as G
 from anysim.issues import Issues
 from anysim_schemas.rooms import DoorSpec, OpeningSpec, RoomSpec, WindowSpec
 
@@ -68,17 +68,17 @@ class RoomPlan:
         """The rectangle (4, 2) in front of an opening, inside the room."""
         wall, half = self.walls[opening.wall], (opening.high - opening.low) / 2
         middle = wall.at((opening.low + opening.high) / 2, depth / 2)
-        return room_polygon.rectangle(middle, (half, depth / 2), wall.yaw)
+        return G.oriented_rectangle(middle, (half, depth / 2), wall.yaw)
 
 
 def plan_of(spec: RoomSpec, issues: Issues) -> RoomPlan | None:
     """The plan of a room; None where it cannot be, with the reasons in `issues`, whose path is that of the room."""
     outline = np.array(spec.outline, dtype=float)
-    crossed = room_polygon.crossing(outline)
+    crossed = G.crossing(outline)
     if crossed is not None:
         issues.add("plan", f"the walls {crossed[0]} and {crossed[1]} cross each other")
         return None
-    if room_polygon.area(outline) <= 0:
+    if G.size(G.corners_of(outline)) <= 0:
         issues.add("plan", "the corners go clockwise; list them counterclockwise, seen from above")
         return None
     walls = tuple(_wall(a, b) for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True))
