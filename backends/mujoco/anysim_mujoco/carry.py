@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.model.index import paired
 from anysim.model.world import World
 from anysim_mujoco.layout import Layout
 from anysim_mujoco.parameters import Parameters
@@ -43,14 +44,6 @@ def carried_rows(batch: Any, layout: Layout, reader: StateReader, parameters: Pa
     )
 
 
-def _pairs(old: Any, new: Any) -> tuple[Array, Array]:
-    """Places (before, after) of things that have the same name in both lists."""
-    places = {thing.name: i for i, thing in enumerate(old)}
-    pairs = [(places[thing.name], i) for i, thing in enumerate(new) if thing.name in places]
-    table = np.array(pairs, dtype=int).reshape(-1, 2)
-    return table[:, 0], table[:, 1]
-
-
 def _shared_rows(before: Array, after: Array, old_rows: Array, new_rows: Array) -> tuple[Array, Array]:
     """Of the bodies in both worlds, the rows of those of one kind in both."""
     old, new = old_rows[before], new_rows[after]
@@ -71,8 +64,8 @@ def take_rows(
     """Write what `carried_rows` of the old build copied to where it is now."""
     names = ("qpos", "qvel", "qacc_warmstart")
     batch.bind("time")[:] = carried.time
-    bodies = _pairs(old.bodies, new.bodies)
-    before, after = _pairs(old.joints, new.joints)
+    bodies = paired(old, new, "bodies")
+    before, after = paired(old, new, "joints")
     effort = np.zeros((batch.nsim, len(new.joints)))
     effort[:, after] = carried.effort[:, before]
     for name, values in zip(names, carried.joints, strict=True):
@@ -85,7 +78,7 @@ def take_rows(
     before, after = _shared_rows(*bodies, old_layout.static_row, layout.static_row)
     batch.bind("mocap_pos")[:, layout.mocap[after]] = carried.mocap[:, before, :3]
     batch.bind("mocap_quat")[:, layout.mocap[after]] = carried.mocap[:, before, 3:]
-    before, after = _pairs(old.contact_sensors, new.contact_sensors)
+    before, after = paired(old, new, "contact_sensors")
     contact = np.zeros((batch.nsim, len(new.contact_sensors), 3))
     contact[:, after] = carried.contact[:, before]
     everyone = np.arange(batch.nsim)

@@ -11,6 +11,7 @@ from anysim.engine.lighting import Looks
 from anysim.engine.state import SnapshotLevel
 from anysim.errors import EngineError
 from anysim.math import pose as P
+from anysim.model.index import paired
 from anysim.model.world import BodyKind, World
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.cast import Cast
@@ -281,9 +282,7 @@ class Envs:
             ("joints", ("position", "velocity", "effort")),
             ("contact_sensors", ("contact",)),
         ):
-            places = {thing.name: i for i, thing in enumerate(getattr(old, kind))}
-            pairs = [(places[t.name], i) for i, t in enumerate(getattr(self.world, kind)) if t.name in places]
-            before, after = np.array(pairs, dtype=int).reshape(-1, 2).T
+            before, after = paired(old, self.world, kind)
             for index in range(len(self.clients)):
                 self.mirror.refresh(index)
             for name in names:

@@ -15,10 +15,11 @@ from anysim.engine.lighting import Looks
 from anysim.engine.presence import Lifecycle
 from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
 from anysim.errors import EngineError
+from anysim.model.index import paired
 from anysim.model.world import World
 from anysim_sapien import declared
 from anysim_sapien.audit import geom_volumes, joint_limits
-from anysim_sapien.carry import Carried, shared
+from anysim_sapien.carry import Carried
 from anysim_sapien.contacts import contact_points
 from anysim_sapien.meeting import refusals
 from anysim_sapien.momentum import Momentum
@@ -269,9 +270,9 @@ class SapienEngine(SimEngine):
 
     def _take_rows(self, carried: Any, old: World) -> None:
         new = self.world
-        before, after = shared(old.bodies, new.bodies)
-        joints_before, joints_after = shared(old.joints, new.joints)
-        sensors_before, sensors_after = shared(old.contact_sensors, new.contact_sensors)
+        before, after = paired(old, new, "bodies")
+        joints_before, joints_after = paired(old, new, "joints")
+        sensors_before, sensors_after = paired(old, new, "contact_sensors")
         for env in range(self.num_envs):
             self._reader.hold_motion(env, after, carried.pose[env, before], carried.twist[env, before])
             self._drives.effort[env, joints_after] = carried.effort[env, joints_before]

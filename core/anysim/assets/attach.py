@@ -80,13 +80,11 @@ class _Attachment:
 
     def _frame(self, link: str) -> tuple[int, Array]:
         """The body that carries a link or frame, and where that is in the body."""
-        for site in self.model.sites:
-            if site.name == link:
-                return site.body, P.pose(site.position, site.quaternion)
-        if link in self.model.links:
-            return self.model.links[link], _IDENTITY
-        frames = list(dict.fromkeys([*self.model.links, *(site.name for site in self.model.sites)]))
-        known = f"{suggest(link, frames)} (links: {listing(frames, 20)})"
+        frames = self.model.frames
+        if link in frames:
+            found = frames[link]
+            return found.body, P.pose(found.position, found.quaternion)
+        known = f"{suggest(link, list(frames))} (links: {listing(frames, 20)})"
         raise AssetError(f"'{self.model.name}' has no link '{link}' to carry '{self.part.name}'{known}")
 
     def _check_names(self) -> None:

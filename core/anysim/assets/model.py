@@ -1,4 +1,4 @@
-"""What an importer makes of a file: parts of a World with local names and local indices.
+"""The imported model: parts of a World with local names and local indices, as an importer makes them of a file.
 
 Every importer (URDF here, MJCF in the package that has a parser for it) returns an `ImportedModel`; `compile_world`
 puts it into a World under an entity's name. Importers of other formats are entry points of the group
@@ -10,7 +10,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, NamedTuple, Protocol
 
-from anysim.model.world import Body, ControlMode, Geom, HeightField, Joint, Material, Mesh, Site, Texture
+from anysim.conventions import IDENTITY_QUATERNION
+from anysim.model.frames import Frame
+from anysim.model.world import ORIGIN, Body, ControlMode, Geom, HeightField, Joint, Material, Mesh, Site, Texture
 
 
 class ImportNote(NamedTuple):
@@ -39,7 +41,7 @@ class ImportedModel:
     """One kinematic tree. Names are local (`panda_hand`), indices are into the tuples of this model.
 
     - `bodies[0]` is the root, with parent -1 and its own frame at the identity; its kind is what the source says: FREE
-      where it floats, else STATIC (whoever places it may change that). All other bodies are links, depth first,
+      where it floats, else STATIC (its placement may change that). All other bodies are links, depth first,
       children in source order, each with exactly one joint; `joints[i]` moves `bodies[i + 1]`.
     - What a source joins rigidly is lumped: masses, centres and inertias are composed, geoms moved along, and the frame
       of the lumped link is a Site with the link's name. `links` maps every link name of the source, lumped or not, to
@@ -63,6 +65,12 @@ class ImportedModel:
     actuator_hints: tuple[ActuatorHint, ...] = ()
     excluded_pairs: frozenset[tuple[int, int]] = frozenset()
     report: tuple[ImportNote, ...] = ()
+
+    @property
+    def frames(self) -> Mapping[str, Frame]:
+        """The links and sites by name, each fixed to a body; a site wins over a link that is called the same."""
+        links = {name: Frame(body, ORIGIN, IDENTITY_QUATERNION) for name, body in self.links.items()}
+        return links | {site.name: Frame(site.body, site.position, site.quaternion) for site in self.sites}
 
 
 class Importer(Protocol):

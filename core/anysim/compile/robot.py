@@ -284,9 +284,7 @@ class _Assembly:
         self, builder: WorldBuilder, entity: Entity, kind: str, name: str, spec: ToolSpec | SensorSpec
     ) -> int | None:
         """Add the site of a tool or sensor; None where its link is not there or its name is taken."""
-        frames = {site.name: (site.body, P.pose(site.position, site.quaternion)) for site in self.model.sites}
-        for link, body in self.model.links.items():
-            frames.setdefault(link, (body, P.pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))))
+        frames = self.model.frames
         if spec.link not in frames:
             known = f"{suggest(spec.link, list(frames))} (links: {listing(frames, 20)})"
             self.own.add(f"{kind}.{name}.link", f"there is no link '{spec.link}'{known}")
@@ -294,10 +292,10 @@ class _Assembly:
         if name in frames:
             self.own.add(f"{kind}.{name}", f"there is a link named '{name}' already; give the {kind[:-1]} another name")
             return None
-        body, frame = frames[spec.link]
+        carrier = frames[spec.link]
         local = P.pose(spec.position, P.from_roll_pitch_yaw(np.array(spec.roll_pitch_yaw)))
-        position, quaternion = split(P.compose(frame, local))
-        builder.sites.append(Site(f"{self.name}.{name}", entity.body_start + body, position, quaternion))
+        position, quaternion = split(P.compose(P.pose(carrier.position, carrier.quaternion), local))
+        builder.sites.append(Site(f"{self.name}.{name}", entity.body_start + carrier.body, position, quaternion))
         return len(builder.sites) - 1
 
     def _geoms(self) -> tuple[Geom, ...]:

@@ -7,9 +7,10 @@ import numpy as np
 from anysim.assets.vehicles import PLANAR_JOINTS
 from anysim.conventions import Array
 from anysim.engine.state import State
-from anysim.errors import NameLookupError, TaskError, listing, suggest
+from anysim.errors import NameLookupError, TaskError
 from anysim.kinematics.pinocchio_model import RobotModel
 from anysim.math import pose as P
+from anysim.model.frames import find_frame
 from anysim.model.index import Index
 from anysim.model.world import BodyKind, Robot, World
 from anysim_schemas.robot_model import RobotModelSpec
@@ -92,29 +93,8 @@ class ControlledRobot:
         Raises:
             NameLookupError: lists the frames that exist.
         """
-        body, local = self._frame(name)
-        return P.compose(self.state.body_pose[_rows(env_ids), body], local)
-
-    def _frame(self, name: str) -> tuple[int, Array]:
-        sites = {site.name.removeprefix(f"{self.name}."): site for site in self.world.sites if self._mine(site.body)}
-        if name in sites:
-            site = sites[name]
-            return site.body, P.pose(site.position, site.quaternion)
-        bodies = {self.world.bodies[b].name.removeprefix(f"{self.name}."): b for b in self._bodies}
-        if name not in bodies:
-            known = [*self.robot.tools, *bodies]
-            raise NameLookupError(
-                f"robot '{self.name}' has no frame '{name}'{suggest(name, known)} (frames: {listing(known, 20)})"
-            )
-        return bodies[name], P.pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-
-    @cached_property
-    def _bodies(self) -> range:
-        entity = Index(self.world).entity(self.name)
-        return range(entity.body_start, entity.body_stop)
-
-    def _mine(self, body: int) -> bool:
-        return body in self._bodies
+        frame = find_frame(self.world, f"{self.name}.{name}")
+        return P.compose(self.state.body_pose[_rows(env_ids), frame.body], P.pose(frame.position, frame.quaternion))
 
 
 def _base_of(world: World, robot: Robot, root: int) -> int:

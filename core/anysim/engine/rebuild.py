@@ -4,23 +4,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from anysim.conventions import Array
 from anysim.engine.parameters import PARAMETERS, count
 from anysim.engine.write import put_bodies, put_joints
+from anysim.model.index import paired
 from anysim.model.world import BodyKind, World
 
 if TYPE_CHECKING:
     from anysim.engine.base import SimEngine
-
-
-def _shared(old: World, new: World, target: str) -> tuple[Array, Array]:
-    """Index pairs (old, new) of things of one kind that have the same name in both worlds."""
-    if target == "world":
-        return np.array([0]), np.array([0])
-    places = {thing.name: i for i, thing in enumerate(getattr(old, target))}
-    pairs = [(places[t.name], i) for i, t in enumerate(getattr(new, target)) if t.name in places]
-    table = np.array(pairs, dtype=int).reshape(-1, 2)
-    return table[:, 0], table[:, 1]
 
 
 def carry_over(engine: "SimEngine", world: World) -> None:
@@ -38,7 +28,7 @@ def carry_over(engine: "SimEngine", world: World) -> None:
         engine._retire_state()  # noqa: SLF001
         engine._free()  # noqa: SLF001
         engine._install(target)  # noqa: SLF001
-        before, after = _shared(old, target, "entities")
+        before, after = paired(old, target, "entities")
         rows = engine._presence.entities.copy()  # noqa: SLF001
         rows[:, after] = present[:, before]
         engine._presence.write(all_envs, rows)  # noqa: SLF001
@@ -47,24 +37,24 @@ def carry_over(engine: "SimEngine", world: World) -> None:
             engine._populate(all_envs)  # noqa: SLF001
         engine._reset_rows(all_envs)  # noqa: SLF001
         for name, values in changed.items():
-            before, after = _shared(old, target, PARAMETERS[name].target)
+            before, after = paired(old, target, PARAMETERS[name].target)
             if count(PARAMETERS[name], target) and len(after):
                 engine._set_parameter(name, values[:, before], all_envs, after)  # noqa: SLF001
                 engine._changed[name] = None  # noqa: SLF001
-        before, after = _shared(old, target, "bodies")
+        before, after = paired(old, target, "bodies")
         kinds = [target.bodies[i].kind for i in after]
         for kind in (BodyKind.STATIC, BodyKind.FREE):
             chosen = np.array([k is kind for k in kinds], dtype=bool)
             if chosen.any():
                 twist = body_twist[:, before[chosen]] if kind is BodyKind.FREE else None
                 put_bodies(engine, all_envs, after[chosen], body_pose[:, before[chosen]], twist)
-        before, after = _shared(old, target, "joints")
+        before, after = paired(old, target, "joints")
         if len(after):
             put_joints(engine, all_envs, after, joint_pos[:, before], joint_vel[:, before])
-        before, after = _shared(old, target, "actuators")
+        before, after = paired(old, target, "actuators")
         for theirs, ours in zip(control, engine._commands.control, strict=True):  # noqa: SLF001
             ours[:, after] = theirs[:, before]
-        before, after = _shared(old, target, "cameras")
+        before, after = paired(old, target, "cameras")
         engine._rig.poses[:, after] = rig.poses[:, before]  # noqa: SLF001
         engine._rig.fov[:, after] = rig.fov[:, before]  # noqa: SLF001
         engine._ticks[:] = ticks  # noqa: SLF001

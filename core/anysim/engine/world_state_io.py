@@ -1,6 +1,6 @@
 """Reading a WorldState from an engine, and writing it into one that may be another engine with another world."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +10,7 @@ from anysim.engine.control import MODES
 from anysim.engine.parameters import PARAMETERS
 from anysim.engine.world_state import Carried, Missing, NamedRows, WorldState
 from anysim.errors import SnapshotError, listing
+from anysim.model.index import names_of, paired_names
 from anysim.model.world import BodyKind, World
 
 if TYPE_CHECKING:
@@ -24,26 +25,26 @@ def read(engine: "SimEngine", ids: Array) -> WorldState:
     """The state of envs by name."""
     state, control, world = engine.get_state(), engine.control, engine.world
     parameters = {
-        name: NamedRows(_names(world, PARAMETERS[name].target), engine.get_parameters(name, ids))
+        name: NamedRows(names_of(world, PARAMETERS[name].target), engine.get_parameters(name, ids))
         for name in PARAMETERS
         if name in engine._changed
     }
     return WorldState(
         time=state.time[ids].copy(),
-        entities=_names(world, "entities"),
+        entities=names_of(world, "entities"),
         present=engine.presence[ids],
-        bodies=_names(world, "bodies"),
+        bodies=names_of(world, "bodies"),
         body_pose=state.body_pose[ids],
         body_twist=state.body_twist[ids],
-        joints=_names(world, "joints"),
+        joints=names_of(world, "joints"),
         joint_pos=state.joint_pos[ids],
         joint_vel=state.joint_vel[ids],
-        actuators=_names(world, "actuators"),
+        actuators=names_of(world, "actuators"),
         control_position=control.position[ids],
         control_velocity=control.velocity[ids],
         control_effort=control.effort[ids],
         control_mode=_WORDS[control.mode[ids]],
-        cameras=_names(world, "cameras"),
+        cameras=names_of(world, "cameras"),
         camera_pose=engine._rig.poses[ids].copy(),
         parameters=parameters,
     )
@@ -92,7 +93,7 @@ def _compared(engine: "SimEngine", state: WorldState) -> Carried:
     kept: list[str] = []
     world = engine.world
     for kind, theirs in (("body", state.bodies), ("joint", state.joints), ("actuator", state.actuators)):
-        ours = _names(world, {"body": "bodies"}.get(kind, f"{kind}s"))
+        ours = names_of(world, {"body": "bodies"}.get(kind, f"{kind}s"))
         dropped += [f"{kind} {name}" for name in theirs if name not in set(ours)]
         kept += [f"{kind} {name}" for name in ours if name not in set(theirs)] if theirs or kind != "actuator" else []
     dropped += [f"parameter {name}" for name in state.parameters if name not in engine.parameters]
@@ -108,7 +109,7 @@ def _write_parameters(engine: "SimEngine", state: WorldState, ids: Array) -> Non
     for name, parameter in PARAMETERS.items():
         if name not in engine.parameters or not (name in state.parameters or name in engine._changed):
             continue
-        ours = _names(world, parameter.target)
+        ours = names_of(world, parameter.target)
         known = _known(world, parameter.target, state)
         rows = engine.get_parameters(name, ids)
         rows[:, known] = engine.built_parameters(name)[known]
@@ -127,7 +128,7 @@ def _known(world: World, target: str, state: WorldState) -> Array:
     if target == "geoms":
         return np.array([g.body < 0 or world.bodies[g.body].name in bodies for g in world.geoms], dtype=bool)
     names = {"bodies": bodies, "joints": set(state.joints), "actuators": set(state.actuators)}[target]
-    return np.array([name in names for name in _names(world, target)], dtype=bool)
+    return np.array([name in names for name in names_of(world, target)], dtype=bool)
 
 
 def _write_commands(engine: "SimEngine", here: WorldState, state: WorldState, ids: Array) -> None:
@@ -149,16 +150,10 @@ def _write_commands(engine: "SimEngine", here: WorldState, state: WorldState, id
     engine.set_control(merged("control_position"), merged("control_velocity"), merged("control_effort"), ids)
 
 
-def _names(world: World, target: str) -> tuple[str, ...]:
-    """The names of the things of a kind, in their order."""
-    return ("world",) if target == "world" else tuple(thing.name for thing in getattr(world, target))
-
-
 def _merged(ours: Sequence[str], here: Array, theirs: Sequence[str], values: Array) -> Array:
     """Our rows (E, K, ...), with theirs where they have a thing of the same name."""
-    places: Mapping[str, int] = {name: i for i, name in enumerate(theirs)}
-    pairs = np.array([(i, places[n]) for i, n in enumerate(ours) if n in places], dtype=int).reshape(-1, 2)
     merged = np.array(here)
-    if len(pairs):
-        merged[:, pairs[:, 0]] = values[:, pairs[:, 1]]
+    source, target = paired_names(theirs, ours)
+    if len(target):
+        merged[:, target] = values[:, source]
     return merged

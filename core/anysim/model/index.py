@@ -1,23 +1,34 @@
 """Names to indices, once, at build."""
 
 from collections.abc import Sequence
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
-from anysim.conventions import GROUND, IDENTITY_QUATERNION, WORLD
+import numpy as np
+
+from anysim.conventions import GROUND, IDENTITY_QUATERNION, WORLD, Array
 from anysim.errors import NameLookupError, listing, suggest
+from anysim.model.frames import Frame, find_frame
 from anysim.model.slots import members
-from anysim.model.world import Entity, EntityKind, Quat, Robot, Vec3, World
+from anysim.model.world import ORIGIN, Entity, EntityKind, Robot, World
 
 T = TypeVar("T")
 
 
-class FrameIndex(NamedTuple):
-    """A frame fixed to a body: body index (-1: the world), and its pose in the body's frame."""
+def names_of(world: World, kind: str) -> tuple[str, ...]:
+    """The names of things of a kind (`bodies`, `joints`, …), in their order; `world` is the World itself."""
+    return ("world",) if kind == "world" else tuple(thing.name for thing in getattr(world, kind))
 
-    name: str
-    body: int
-    position: Vec3
-    quaternion: Quat
+
+def paired_names(before: Sequence[str], after: Sequence[str]) -> tuple[Array, Array]:
+    """Indices (K,), (K,) of the names that are in both lists, in the order of the second."""
+    places = {name: i for i, name in enumerate(before)}
+    pairs = np.array([(places[name], i) for i, name in enumerate(after) if name in places], dtype=int).reshape(-1, 2)
+    return pairs[:, 0], pairs[:, 1]
+
+
+def paired(before: World, after: World, kind: str) -> tuple[Array, Array]:
+    """Indices (K,), (K,) of the things of a kind that have the same name in both Worlds."""
+    return paired_names(names_of(before, kind), names_of(after, kind))
 
 
 class Index:
@@ -109,28 +120,9 @@ class Index:
         """The geoms on an entity's bodies."""
         return [i for i, g in enumerate(self.world.geoms) if entity.body_start <= g.body < entity.body_stop]
 
-    def frame(self, name: str) -> FrameIndex:
-        """A frame by reference: an entity, a body (`panda.panda_hand`), a site, or a robot's tool (`panda.tool`)."""
-        owner, _, part = name.partition(".")
-        robot = self._robots.get(owner)
-        site = robot.tools.get(part) if robot is not None else None
-        if site is None:
-            site = self._sites.get(name)
-        if site is not None:
-            s = self.world.sites[site]
-            return FrameIndex(name, s.body, s.position, s.quaternion)
-        if name == GROUND:
-            return FrameIndex(name, WORLD, (0.0, 0.0, 0.0), IDENTITY_QUATERNION)
-        if name in self._bodies or name in self._entities:
-            return FrameIndex(name, self.body(name), (0.0, 0.0, 0.0), IDENTITY_QUATERNION)
-        if members(self.world, owner) and owner not in self._entities:
-            self._entity(owner)  # it stands for several: the error says which
-        tools = [f"{r.name}.{t}" for r in self._robots.values() for t in r.tools]
-        known = list(dict.fromkeys([*self._entities, *tools, *self._bodies, *self._sites]))
-        raise NameLookupError(
-            f"the world '{self.world.name}' has no frame named '{name}'{suggest(name, known)} "
-            f"(frames: {listing(known, 20)})"
-        )
+    def frame(self, name: str) -> Frame:
+        """A frame by reference: an entity, a body (`panda.panda_hand`), a site, a robot's tool, or the ground."""
+        return Frame(WORLD, ORIGIN, IDENTITY_QUATERNION) if name == GROUND else find_frame(self.world, name)
 
     @property
     def objects(self) -> list[Entity]:

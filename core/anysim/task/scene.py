@@ -16,7 +16,7 @@ from anysim.engine.state import State
 from anysim.errors import NameLookupError, TaskError, listing, suggest
 from anysim.managers.terrain import TerrainManager
 from anysim.math import pose as P
-from anysim.model.index import FrameIndex
+from anysim.model import frames
 from anysim.model.slots import members, single
 from anysim.model.world import BodyKind, Channel, Entity
 from anysim.task.slot_frames import CategoryView, Column, Follower, columns_of, varies
@@ -93,11 +93,12 @@ class SceneView:
     def _frame_of(self, name: str) -> "Frame":
         world, (owner, dot, part) = self.engine.world, name.partition(".")
         if not members(world, owner):
-            return BodyFrame(self, self.index.frame(name))
+            return BodyFrame(self, name, self.index.frame(name))
         slot = single(world, owner)
         if varies(world, slot):
             return SlotFrame(self, name, columns_of(world, name)[0])
-        return BodyFrame(self, self.index.frame(f"{slot.name}{dot}{part}"))
+        whole = f"{slot.name}{dot}{part}"
+        return BodyFrame(self, whole, self.index.frame(whole))
 
     def category(self, name: str) -> CategoryView:
         """The handle of all instances of a category."""
@@ -162,8 +163,8 @@ class GoalFrame(Frame):
 class BodyFrame(Frame):
     """A frame fixed to a body."""
 
-    def __init__(self, scene: SceneView, frame: FrameIndex) -> None:
-        super().__init__(scene, frame.name)
+    def __init__(self, scene: SceneView, name: str, frame: frames.Frame) -> None:
+        super().__init__(scene, name)
         self.index = frame
         local = np.array([*frame.position, *frame.quaternion])
         self._local = None if (local == [0, 0, 0, 0, 0, 0, 1]).all() else local[None]
