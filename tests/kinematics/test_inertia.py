@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from anysim.errors import EngineError
 from anysim.kinematics import inertia
 from anysim.math import pose as P
-from anysim.model.world import Box, Capsule, Cylinder, Inertial, Mesh, MeshShape, Plane, Sphere
+from anysim.model.sketch import inertial
+from anysim.model.world import Box, Capsule, Cylinder, Inertial, Mesh, MeshShape, Plane, Shape, Sphere
 
 
 def cloud(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -115,6 +117,36 @@ def test_shapes_against_sampled_points(shape: Box) -> None:
     square = (chosen**2).mean(axis=0) * 2.0
     expected = square.sum() - square
     np.testing.assert_allclose(found.inertia[:3], expected, rtol=0.03)
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda s: type(s).__name__)
+def test_worlds_made_by_hand_have_the_inertia_of_their_solids(shape: Shape) -> None:
+    """A capsule with its caps, too."""
+    assert inertial(shape, 2.0) == inertia.of_shape(shape, 2.0, {})
+
+
+@given(st.integers(0, 2**32 - 1), st.booleans())
+@settings(max_examples=50, deadline=None)
+def test_principal_axes_give_the_tensor_back(seed: int, descending: bool) -> None:
+    tensor = np.array(of_points(*cloud(np.random.default_rng(seed), 5)).inertia)
+    moments, frame = inertia.principal(tensor, descending=descending)
+    assert np.array_equal(moments, np.sort(moments)[:: -1 if descending else 1])
+    inertia.check_physical("b", moments)
+    np.testing.assert_allclose(inertia.from_principal(moments, frame), tensor, atol=1e-12 * moments.max())
+    axes = P.to_matrix(frame)
+    assert all(axes[np.argmax(np.abs(axes[:, k])), k] > 0 for k in range(2))
+
+
+def test_a_diagonal_tensor_keeps_its_axes() -> None:
+    found = inertia.principal((3.0, 1.0, 2.0, 0.0, 0.0, 0.0), descending=True)
+    assert found.moments.tolist() == [3.0, 1.0, 2.0]
+    assert found.frame.tolist() == [0.0, 0.0, 0.0, 1.0]
+
+
+@pytest.mark.parametrize("moments", [(1.0, 1.0, 2.1), (0.0, 1.0, 1.0), (-1.0, 2.0, 2.0)])
+def test_moments_of_no_body_are_refused(moments: tuple[float, ...]) -> None:
+    with pytest.raises(EngineError, match="the inertia of body 'b' belongs to no rigid body"):
+        inertia.check_physical("b", np.array(moments))
 
 
 def test_a_mesh_box_equals_the_box() -> None:

@@ -8,11 +8,12 @@ import numpy as np
 from anysim.conventions import WORLD, Array, wxyz_from_xyzw
 from anysim.engine.control import MODES
 from anysim.errors import EngineError
+from anysim.kinematics.inertia import check_physical
 from anysim.model.world import Actuation, Body, BodyKind, ContactSensor, Joint, JointType, World
 from anysim_mujoco.audit import UNLIMITED
 from anysim_mujoco.drives import feedback
 from anysim_mujoco.geoms import add_assets, add_geom, add_look
-from anysim_mujoco.inertia import check_physical, principal
+from anysim_mujoco.inertia import principal
 from anysim_mujoco.layout import Handles, Layout
 from anysim_mujoco.options import MujocoOptions
 from anysim_mujoco.surfaces import DRY_IMPEDANCE, STIFF_IMPEDANCE, constraint_solref

@@ -11,10 +11,11 @@ from anysim.conventions import Array
 from anysim.engine.lighting import LIGHTS, SURROUNDINGS, Looks
 from anysim.engine.parameters import nominal
 from anysim.errors import EngineError
+from anysim.kinematics.inertia import check_physical
 from anysim.model.world import World
 from anysim_mujoco.dampers import Dampers
 from anysim_mujoco.drives import Drives
-from anysim_mujoco.inertia import check_physical, full, principal
+from anysim_mujoco.inertia import full, principal
 from anysim_mujoco.layout import Layout
 from anysim_mujoco.skins import Skins
 from anysim_mujoco.surfaces import contact_parameters, restitution_of

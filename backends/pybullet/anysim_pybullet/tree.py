@@ -11,7 +11,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.kinematics import inertia
 from anysim.math import pose as P
-from anysim.model.world import BodyKind, Inertial, JointType, World
+from anysim.model.world import BodyKind, JointType, World
 
 Inertia6 = tuple[float, float, float, float, float, float]
 
@@ -52,7 +52,7 @@ def frames_of(world: World) -> Frames:
             anchor[joint.body] = joint.anchor
     moments, inertial = np.zeros((len(world.bodies), 3)), np.zeros((len(world.bodies), 7))
     for i, body in enumerate(world.bodies):
-        moments[i], axes = principal(body.inertial)
+        moments[i], axes = inertia.principal(body.inertial.inertia)
         inertial[i] = [*(np.array(body.inertial.com) - anchor[i]), *axes]
     return Frames(anchor, moments, inertial)
 
@@ -62,19 +62,6 @@ def shifted(frames: Frames, com: Array) -> Frames:
     inertial = frames.inertial.copy()
     inertial[:, :3] = com - frames.anchor
     return replace(frames, inertial=inertial)
-
-
-def principal(inertial: Inertial) -> tuple[Array, Array]:
-    """Principal moments (3,) and the quaternion (4,) of their axes. A diagonal tensor keeps its axes."""
-    matrix = inertia.tensor(inertial)
-    if not any(inertial.inertia[3:]):
-        return np.diag(matrix).copy(), np.array([0.0, 0.0, 0.0, 1.0])
-    moments, axes = np.linalg.eigh(matrix)
-    for column in range(2):  # equal tensors give equal bits: the largest component of an axis is positive
-        if axes[np.argmax(np.abs(axes[:, column])), column] < 0:
-            axes[:, column] *= -1
-    axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
-    return moments, P.from_matrix(axes)
 
 
 def trees_of(world: World, frames: Frames) -> list[Tree]:

@@ -9,9 +9,9 @@ from anysim.conventions import Array, xyzw_from_wxyz
 from anysim.engine.damping import gain
 from anysim.engine.lighting import LIGHTS, SURROUNDINGS, Looks
 from anysim.engine.parameters import nominal
+from anysim.kinematics.inertia import check_physical, from_principal, principal
 from anysim.model.world import World
 from anysim_sapien.drives import Drives
-from anysim_sapien.inertia import full, principal
 from anysim_sapien.layout import Layout
 from anysim_sapien.recipe import Values
 from anysim_sapien.scene import EnvScene
@@ -118,7 +118,7 @@ class Parameters:
                 elif name == "body.com":
                     row[body] = frame.p
                 else:
-                    row[body] = full(component.inertia, xyzw_from_wxyz(np.asarray(frame.q, dtype=float)))
+                    row[body] = from_principal(component.inertia, xyzw_from_wxyz(np.asarray(frame.q, dtype=float)))
         elif name == "joint.armature":
             for index in np.flatnonzero(scene.layout.joint_there):
                 row[index] = scene.joints[index].armature[0]
@@ -158,7 +158,7 @@ class Parameters:
             for row in values:
                 for index, tensor in zip(indices, row, strict=True):
                     if not self._layout.fixed[index]:
-                        principal(self._world.bodies[index].name, tensor)
+                        check_physical(self._world.bodies[index].name, principal(tensor).moments)
         before = self._wanted[name][ids]
         self._wanted[name][at] = values
         try:

@@ -8,10 +8,10 @@ import numpy as np
 from anysim.conventions import WORLD, Array
 from anysim.engine.presence import bodies_there
 from anysim.errors import EngineError
+from anysim.kinematics.inertia import Principal, check_physical, principal
 from anysim.math import pose as P
 from anysim.model.shapes import is_ground
 from anysim.model.world import BodyKind, Joint, World
-from anysim_sapien.inertia import Principal, principal
 from anysim_sapien.layout import Layout
 from anysim_sapien.meeting import Meeting
 from anysim_sapien.options import SapienOptions
@@ -59,7 +59,9 @@ class Recipes:
         return self._principal(body, np.asarray(inertia, dtype=float).tobytes())
 
     def _make_principal(self, body: int, inertia: bytes) -> Principal:
-        return principal(self.world.bodies[body].name, np.frombuffer(inertia))
+        found = principal(np.frombuffer(inertia))
+        check_physical(self.world.bodies[body].name, found.moments)
+        return found
 
 
 class Recipe:

@@ -1,4 +1,4 @@
-"""Masses and inertias: composing rigidly joined bodies, repairing impossible ones, and those of shapes.
+"""Masses and inertias: of shapes and rigidly joined bodies, their principal axes, and the repair of impossible ones.
 
 Validity is judged on the second moments S = tr(I)/2 - I, which are the mass integrals of r r^T: a mass distribution
 exists exactly where S is positive semidefinite, and that is the same as I being positive with the triangle inequality.
@@ -6,12 +6,15 @@ exists exactly where S is positive semidefinite, and that is the same as I being
 
 from collections.abc import Mapping, Sequence
 from math import pi
+from typing import NamedTuple
 
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.errors import EngineError
 from anysim.math import pose as P
 from anysim.model.rounding import tidy
+from anysim.model.shapes import solid_moments
 from anysim.model.world import Box, Capsule, Cylinder, Inertial, Mesh, MeshShape, Shape, Sphere
 
 BALL_RADIUS = 0.01  # [m] of the solid ball that stands for a body with mass and without any inertia
@@ -119,28 +122,57 @@ def of_shape(shape: Shape, mass: float, meshes: Mapping[str, Mesh]) -> Inertial:
     Raises:
         ValueError: the shape has no volume.
     """
-    match shape:
-        case Box((x, y, z)):
-            third = mass / 3
-            xx, yy, zz = third * (y * y + z * z), third * (x * x + z * z), third * (x * x + y * y)
-        case Sphere(r):
-            xx = yy = zz = 0.4 * mass * r * r
-        case Cylinder(r, h):
-            xx = yy = mass * (3 * r * r + 4 * h * h) / 12
-            zz = 0.5 * mass * r * r
-        case Capsule(r, h):
-            tube = mass * (2 * h) / (2 * h + 4 / 3 * r)
-            caps = mass - tube
-            xx = yy = tube * (3 * r * r + 4 * h * h) / 12 + caps * (0.4 * r * r + h * h + 0.75 * r * h)
-            zz = 0.5 * tube * r * r + 0.4 * caps * r * r
-        case MeshShape(name):
-            size, com, inertia = _solid(meshes[name])
-            if size <= 0:
-                raise ValueError(f"the mesh '{name}' encloses no volume")
-            return make(mass, com, inertia * (mass / size))
-        case _:
-            raise ValueError(f"a {type(shape).__name__} has no mass of its own")
-    return Inertial(mass, (0.0, 0.0, 0.0), (xx, yy, zz, 0.0, 0.0, 0.0))
+    if isinstance(shape, MeshShape):
+        size, com, inertia = _solid(meshes[shape.mesh])
+        if size <= 0:
+            raise ValueError(f"the mesh '{shape.mesh}' encloses no volume")
+        return make(mass, com, inertia * (mass / size))
+    return Inertial(mass, (0.0, 0.0, 0.0), (*solid_moments(shape, mass), 0.0, 0.0, 0.0))
+
+
+class Principal(NamedTuple):
+    """Principal moments (3,) [kg m^2] and the orientation (4,) xyzw of their axes in the body."""
+
+    moments: Array
+    frame: Array
+
+
+def principal(moments: Sequence[float] | Array, *, descending: bool = False) -> Principal:
+    """The principal axes of a tensor (xx, yy, zz, xy, xz, yz) [kg m^2].
+
+    A diagonal tensor keeps its axes. Otherwise the moments ascend (or descend) and the axes are right-handed, the first
+    two with their largest component positive, so that equal tensors give equal bits.
+    """
+    xx, yy, zz, xy, xz, yz = (float(v) for v in moments)
+    if xy == 0.0 and xz == 0.0 and yz == 0.0:
+        return Principal(np.array([xx, yy, zz]), np.array([0.0, 0.0, 0.0, 1.0]))
+    values, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    if descending:
+        values, axes = values[::-1].copy(), axes[:, ::-1].copy()
+    for column in range(2):
+        if axes[np.argmax(np.abs(axes[:, column])), column] < 0:
+            axes[:, column] *= -1
+    axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
+    return Principal(values, P.from_matrix(axes))
+
+
+def from_principal(moments: Array, frame: Array) -> Array:
+    """Tensors (..., 6) of principal moments (..., 3) whose axes have the orientation (..., 4) xyzw."""
+    axes = P.to_matrix(np.asarray(frame, dtype=float))
+    moments = np.asarray(moments, dtype=float)
+    pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+    terms = [sum(axes[..., i, k] * moments[..., k] * axes[..., j, k] for k in range(3)) for i, j in pairs]
+    return np.stack(terms, axis=-1)
+
+
+def check_physical(name: str, moments: Array) -> None:
+    """Raise EngineError unless the moments (3,) are those of a body with mass in space (positive, A + B >= C)."""
+    low, middle, high = sorted(float(m) for m in moments)
+    if low <= 0 or low + middle < high * (1 - 1e-9):
+        raise EngineError(
+            f"the inertia of body '{name}' belongs to no rigid body: its principal moments are {low:.4g}, {middle:.4g} "
+            f"and {high:.4g} kg m^2; each must be positive and no larger than the sum of the other two"
+        )
 
 
 def _solid(mesh: Mesh) -> tuple[float, Array, Array]:

@@ -70,6 +70,31 @@ def is_ground(shape: Shape) -> bool:
     return isinstance(shape, Plane | HeightFieldShape) or (isinstance(shape, MeshShape) and shape.concave)
 
 
+def solid_moments(shape: Shape, mass: float) -> Vec3:
+    """Moments of inertia [kg m^2] of a homogeneous solid about its centre, along the shape's axes, which are principal.
+
+    Raises:
+        ValueError: the shape is no solid, or a mesh, whose moments do not follow from its size.
+    """
+    match shape:
+        case Box((x, y, z)):
+            third = mass / 3
+            return third * (y * y + z * z), third * (x * x + z * z), third * (x * x + y * y)
+        case Sphere(r):
+            moment = 0.4 * mass * r * r
+            return moment, moment, moment
+        case Cylinder(r, h):
+            across = mass * (3 * r * r + 4 * h * h) / 12
+            return across, across, 0.5 * mass * r * r
+        case Capsule(r, h):
+            tube = mass * (2 * h) / (2 * h + 4 / 3 * r)
+            caps = mass - tube
+            across = tube * (3 * r * r + 4 * h * h) / 12 + caps * (0.4 * r * r + h * h + 0.75 * r * h)
+            return across, across, 0.5 * tube * r * r + 0.4 * caps * r * r
+        case _:
+            raise ValueError(f"a {type(shape).__name__} has no mass of its own")
+
+
 @dataclass(frozen=True, slots=True)
 class Surface:
     """How a geom touches. The pair rule is in `anysim.conventions`.

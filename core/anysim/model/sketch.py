@@ -5,17 +5,15 @@ from math import inf
 from typing import Any
 
 from anysim.conventions import IDENTITY_QUATERNION, WORLD
+from anysim.model.shapes import solid_moments
 from anysim.model.world import (
     Actuator,
     Body,
     BodyKind,
-    Box,
     Camera,
-    Capsule,
     Channel,
     ContactSensor,
     ControlMode,
-    Cylinder,
     Entity,
     EntityKind,
     Geom,
@@ -28,7 +26,6 @@ from anysim.model.world import (
     Robot,
     Shape,
     Site,
-    Sphere,
     Surface,
     Vec3,
     World,
@@ -39,16 +36,7 @@ ORIGIN: Vec3 = (0.0, 0.0, 0.0)
 
 def inertial(shape: Shape, mass: float, com: Vec3 = ORIGIN) -> Inertial:
     """Of a solid of even density; the inertia is about the centre of mass, wherever that is put."""
-    if isinstance(shape, Sphere):
-        i = 0.4 * mass * shape.radius**2
-        return Inertial(mass, com, (i, i, i, 0.0, 0.0, 0.0))
-    if isinstance(shape, Box):
-        x, y, z = (h * h * mass / 3.0 for h in shape.half_size)
-        return Inertial(mass, com, (y + z, x + z, x + y, 0.0, 0.0, 0.0))
-    if isinstance(shape, Cylinder | Capsule):  # a capsule's caps are left out: these worlds need no more
-        across = mass * (3.0 * shape.radius**2 + 4.0 * shape.half_length**2) / 12.0
-        return Inertial(mass, com, (across, across, 0.5 * mass * shape.radius**2, 0.0, 0.0, 0.0))
-    raise TypeError(f"no inertia is known for {type(shape).__name__}")
+    return Inertial(mass, com, (*solid_moments(shape, mass), 0.0, 0.0, 0.0))
 
 
 class Sketch:
