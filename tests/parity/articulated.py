@@ -7,7 +7,7 @@ import numpy as np
 
 from anysim.compile.world import compile_world
 from anysim.conventions import Array
-from anysim.kinematics.jacobians import frame_jacobians
+from anysim.kinematics.dynamics import frame_jacobians
 from anysim.math import pose as P
 from anysim.model.world import Inertial, Joint, World
 from anysim_schemas.engine import PhysicsSpec

@@ -15,7 +15,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.engine.control import MODES, Control
 from anysim.errors import EngineError
-from anysim.kinematics.jacobians import mass_matrix
+from anysim.kinematics.dynamics import mass_matrix
 from anysim.model.world import ControlMode, World
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.client import Env

@@ -6,7 +6,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import EngineError
-from anysim.kinematics.jacobians import coupling, mass_matrix
+from anysim.kinematics.dynamics import coupling, mass_matrix
 from anysim.model.world import Actuation, ControlMode, World
 
 

@@ -1,8 +1,8 @@
-"""Rigid-body dynamics of a World's joints, engine-free: the reference that engines are compared with.
+"""Rigid-body dynamics of a World, engine-free: the reference that engines are compared with.
 
-All quantities are spatial vectors about the world's origin (angular part first), as in Featherstone's *Rigid Body
-Dynamics Algorithms* (2008): what passes the origin adds along a chain, so sums over bodies are matrix products.
-Every joint counts as a degree of freedom of its own, also one that follows another. Free roots are held where they are.
+The generalised velocity of a World is (its J joint rates, then for each free body the velocity of its frame's origin
+and its angular rate, world axes). Every joint counts as a degree of freedom of its own, also one that follows another.
+Everything is written for clarity and used at build or in comparisons, not in a step.
 """
 
 from typing import NamedTuple
@@ -16,9 +16,75 @@ from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.world import BodyKind, JointType, World
 
 
-def mass_matrix(world: World, q: Array) -> Array:
-    """The joint-space inertia (J, J) [kg m^2, kg m, kg] at joint positions q (J,), armature included."""
-    return Mechanism(world).equations(q, np.zeros(len(q))).mass
+def velocity_size(world: World) -> int:
+    """V, the length of the generalised velocity."""
+    return len(world.joints) + 6 * sum(body.kind is BodyKind.FREE for body in world.bodies)
+
+
+def frame_jacobians(world: World, poses: Array) -> Array:
+    """(B, 6, V): linear velocity of each body's frame origin, and its angular rate, per generalised velocity.
+
+    Args:
+        poses: (B, 7) of all bodies, as `forward_kinematics` and `State.body_pose` give them.
+    """
+    jacobian = np.zeros((len(world.bodies), 6, velocity_size(world)))
+    column = len(world.joints)
+    for b, body in enumerate(world.bodies):
+        if body.kind is BodyKind.FREE:
+            jacobian[b, :, column : column + 6] = np.eye(6)
+            column += 6
+        if body.kind is not BodyKind.LINK:
+            continue
+        parent = jacobian[body.parent]
+        jacobian[b, 3:] = parent[3:]
+        jacobian[b, :3] = parent[:3] + np.cross(parent[3:], poses[b, :3] - poses[body.parent, :3], axis=0)
+        j = world.body_joint[b]
+        joint = world.joints[j]
+        axis = P.rotate(poses[b, 3:], np.array(joint.axis))
+        if joint.type is JointType.PRISMATIC:
+            jacobian[b, :3, j] += axis
+        else:
+            jacobian[b, :3, j] += np.cross(axis, -P.rotate(poses[b, 3:], np.array(joint.anchor)))
+            jacobian[b, 3:, j] += axis
+    return jacobian
+
+
+def point_jacobian(world: World, poses: Array, body: int, point: Array) -> Array:
+    """(3, V): velocity of the point of `body` that is at `point` (3,) [m] in the world now."""
+    frame = frame_jacobians(world, poses)[body]
+    return frame[:3] + np.cross(frame[3:], point - poses[body, :3], axis=0)
+
+
+def mass_matrix(world: World, poses: Array) -> Array:
+    """(V, V) [kg m^2, kg m, kg]: with armature, and before any coupling of joints that follow others.
+
+    Args:
+        poses: (B, 7) of all bodies.
+    """
+    matrix = np.zeros((velocity_size(world),) * 2)
+    for body, pose, jacobian in zip(world.bodies, poses, frame_jacobians(world, poses), strict=True):
+        if body.kind is BodyKind.STATIC:
+            continue
+        turn = P.to_matrix(pose[3:])
+        linear = jacobian[:3] + np.cross(jacobian[3:], turn @ np.array(body.inertial.com), axis=0)
+        matrix += body.inertial.mass * linear.T @ linear
+        matrix += jacobian[3:].T @ turn @ tensor(body.inertial) @ turn.T @ jacobian[3:]
+    armature = [joint.armature for joint in world.joints]
+    matrix[range(len(armature)), range(len(armature))] += armature
+    return matrix
+
+
+def coupling(world: World) -> Array:
+    """(V, U): generalised velocities by the U that are independent; a joint that follows another moves with it."""
+    size, joints = velocity_size(world), world.joints
+    independent = [v for v in range(size) if v >= len(joints) or joints[v].mimic is None]
+    matrix = np.zeros((size, len(independent)))
+    for v in range(size):
+        factor, leader = 1.0, v
+        while leader < len(joints) and (mimic := joints[leader].mimic) is not None:
+            factor, leader = factor * mimic.multiplier, mimic.joint
+        matrix[v, independent.index(leader)] = factor
+    return matrix
 
 
 class Equations(NamedTuple):
@@ -33,7 +99,11 @@ class Equations(NamedTuple):
 
 
 class Mechanism:
-    """The constants of a World's links and joints, made once."""
+    """The constants of a World's links and joints, made once, for many configurations; free roots are held.
+
+    All quantities are spatial vectors about the world's origin (angular part first), as in Featherstone's *Rigid Body
+    Dynamics Algorithms* (2008): what passes the origin adds along a chain, so sums over bodies are matrix products.
+    """
 
     def __init__(self, world: World) -> None:
         bodies, joints = world.bodies, world.joints
@@ -61,12 +131,6 @@ class Mechanism:
         return np.concatenate(
             [axis * self._turns, P.cross(anchor, axis) * self._turns + axis * (1.0 - self._turns)], axis=1
         )
-
-    def jacobians(self, poses: Array) -> Array:
-        """(B, 6, J) twists [linear of the frame's origin, angular] of the bodies for unit joint velocities."""
-        motion = self.motions(poses)[None] * self.moved_by[:, :, None]  # (B, J, 6)
-        linear = motion[..., 3:] + P.cross(motion[..., :3], poses[:, None, :3])
-        return np.concatenate([linear, motion[..., :3]], axis=-1).transpose(0, 2, 1)
 
     def equations(self, q: Array, v: Array) -> Equations:
         """The equations of motion at joint positions q (J,) and velocities v (J,)."""

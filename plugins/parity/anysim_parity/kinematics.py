@@ -11,7 +11,7 @@ import numpy as np
 from anysim.compile.edit import unseen
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
-from anysim.kinematics.dynamics import Mechanism
+from anysim.kinematics.dynamics import Mechanism, coupling, frame_jacobians
 from anysim.math import pose as P
 from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.world import World
@@ -128,25 +128,13 @@ def _places(engine: SimEngine, q: Array) -> Places:
 def _truth(world: World, q: Array) -> Places:
     roots = np.repeat(world.initial_body_pose[None], len(q), axis=0)
     poses = forward_kinematics(world, roots, q)
-    mechanism, coupling = Mechanism(world), _coupling(world)
-    return Places(poses, q, np.array([mechanism.jacobians(pose) @ coupling for pose in poses]))
+    joints = len(world.joints)
+    together = coupling(world)[:joints, : len(_leaders(world))]
+    return Places(poses, q, np.array([frame_jacobians(world, pose)[..., :joints] @ together for pose in poses]))
 
 
 def _leaders(world: World) -> Array:
     return np.array([i for i, joint in enumerate(world.joints) if joint.mimic is None], dtype=int)
-
-
-def _coupling(world: World) -> Array:
-    """(J, L) how fast each joint is for a unit velocity of each that follows no other."""
-    leaders = _leaders(world).tolist()
-    table = np.zeros((len(world.joints), len(leaders)))
-    for i in range(len(world.joints)):
-        leader, factor = i, 1.0
-        while (mimic := world.joints[leader].mimic) is not None:
-            factor *= mimic.multiplier
-            leader = mimic.joint
-        table[i, leaders.index(leader)] = factor
-    return table
 
 
 # ---------------------------------------------------------------------------------------------------------- comparisons
