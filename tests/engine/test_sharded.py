@@ -173,7 +173,7 @@ def test_more_shards_than_envs_are_not_started():
 
 def test_auto(monkeypatch):
     """One per usable core, at most one per env; none where the engine is parallel by itself."""
-    from anysim.engine.sharded.engine import blocks as module
+    from anysim.engine.sharded import blocks as module
 
     monkeypatch.setattr(module, "usable_cores", lambda: 6)
     parallel = type("Parallel", (NullEngine,), {"parallel": True})

@@ -248,7 +248,7 @@ class SapienEngine(SimEngine):
         return data | {"effort": self._drives.effort[ids]} | self._reader.rows(ids) | self._parameters.rows(ids)
 
     @classmethod
-    def _refuse_rows(cls, data: Mapping[str, Array], level: SnapshotLevel) -> None:
+    def refuse_rows(cls, data: Mapping[str, Array], level: SnapshotLevel) -> None:
         if level is SnapshotLevel.TRAJECTORY:
             refuse_pasts(data)
 

@@ -1,4 +1,4 @@
-"""Cameras are engine-neutral: the contract turns mounts and per-env poses into world poses; an engine only draws."""
+"""Cameras of all envs: the contract turns mounts and poses into world poses, and an engine only draws."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from anysim.conventions import Array
 from anysim.engine.state import State
 from anysim.errors import EngineError
 from anysim.math import pose as P
-from anysim.model.index import Index
+from anysim.model.index import Index, paired
 from anysim.model.world import Camera, World
 
 
@@ -34,30 +34,29 @@ class CameraRig:
     """
 
     def __init__(self, world: World, num_envs: int) -> None:
-        self._world = world
+        self.world = world
         mounts = [[*c.position, *c.quaternion] for c in world.cameras]
         self.poses = np.tile(np.array(mounts, dtype=float).reshape(1, -1, 7), (num_envs, 1, 1))
         self.fov = np.tile(np.array([c.fov for c in world.cameras], dtype=float), (num_envs, 1))
 
-    def extended(self, world: World) -> "CameraRig":
-        """The rig of a world with more cameras (after the present ones), keeping what these have."""
-        rig = CameraRig(world, len(self.poses))
-        rig.poses[:, : self.poses.shape[1]] = self.poses
-        rig.fov[:, : self.fov.shape[1]] = self.fov
-        return rig
+    def carry(self, old: "CameraRig") -> None:
+        """Take over poses and fields of view of the cameras that another rig has by name."""
+        before, after = paired(old.world, self.world, "cameras")
+        self.poses[:, after] = old.poses[:, before]
+        self.fov[:, after] = old.fov[:, before]
 
     def view(
         self, name: str, index: Index, state: State, ids: Array, width: int | None, height: int | None
     ) -> CameraView:
         """The camera by name, at its pose now; `default` is an overview unless a camera has that name."""
-        names = [c.name for c in self._world.cameras]
+        names = [c.name for c in self.world.cameras]
         if name == "default" and name not in names:
             camera = self._overview()
             local = np.tile([*camera.position, *camera.quaternion], (len(ids), 1))
             fov = np.full(len(ids), camera.fov)
         else:
             number = index.camera(name)
-            camera = self._world.cameras[number]
+            camera = self.world.cameras[number]
             local, fov = self.poses[ids, number], self.fov[ids, number]
         pose = local if camera.body < 0 else P.compose(state.body_pose[ids, camera.body], local)
         size = (width or camera.width, height or camera.height)
@@ -67,7 +66,7 @@ class CameraRig:
 
     def _overview(self) -> Camera:
         """Looks at the middle of all bodies' initial places, from far enough to see them."""
-        places = self._world.initial_body_pose[:, :3] if self._world.bodies else np.zeros((1, 3))
+        places = self.world.initial_body_pose[:, :3] if self.world.bodies else np.zeros((1, 3))
         middle = (places.min(axis=0) + places.max(axis=0)) / 2
         reach = max(1.0, float(np.linalg.norm(places - middle, axis=1).max()) * 2.5)
         eye = middle + reach * np.array([0.75, -0.75, 0.55])

@@ -1,16 +1,17 @@
-"""Who is there: which of a World's entities are present in each env, and how an engine makes them come and go.
+"""Presence of a World's entities in each env, and how an engine makes them come and go.
 
 A World lists everything that may ever be in an env; a slot of it says what is one and the same logical object with
 another asset. Arrays stay dense over all entities, whatever an env has. It changes at a reset alone.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from enum import StrEnum
 
 import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import EngineError
+from anysim.model.index import paired
 from anysim.model.world import World
 
 
@@ -31,7 +32,7 @@ class Presence:
     """The entities of all envs: `entities` (N, E), and `bodies` (N, B) and `joints` (N, J) that follow from them."""
 
     def __init__(self, world: World, num_envs: int) -> None:
-        self._world = world
+        self.world = world
         self.varies = bool(world.slots)
         """Whether anything may be absent at all."""
         body_entity = np.array(world.body_entity, dtype=int)
@@ -51,7 +52,7 @@ class Presence:
         Raises:
             EngineError: another shape or type, or rows that no env can have.
         """
-        rows, world = np.asarray(present), self._world
+        rows, world = np.asarray(present), self.world
         shape = (len(ids), len(world.entities))
         if rows.dtype != bool or rows.shape != shape:
             raise EngineError(f"present must be a bool array of shape {shape}, got {rows.dtype} {rows.shape}")
@@ -69,6 +70,12 @@ class Presence:
     def write(self, ids: Array, rows: Array) -> None:
         """Take over rows (E, entities)."""
         self.entities[ids] = rows
+        self._derive()
+
+    def carry(self, old: "Presence") -> None:
+        """Take over the rows of the entities that another World's presence has by name."""
+        before, after = paired(old.world, self.world, "entities")
+        self.entities[:, after] = old.entities[:, before]
         self._derive()
 
     def changed(self, ids: Array, rows: Array) -> Array:
@@ -99,6 +106,23 @@ def blocks(present: Array) -> Iterator[tuple[Array, Array]]:
     for number, pattern in enumerate(patterns):
         if pattern.any():
             yield np.flatnonzero(which.reshape(-1) == number), np.flatnonzero(pattern)
+
+
+Writer = Callable[[Array, Array, Array | None, Array | None], None]
+"""A primitive that writes two kinds of values (E, K, ...) to things of envs, such as poses and twists of bodies."""
+
+
+def write_present(
+    write: Writer, present: Array, ids: Array, which: Array, first: Array | None, second: Array | None
+) -> None:
+    """Write values of what is there, and nothing of what is not; `present` (N, all) is the mask of bodies or joints."""
+    there = present[np.ix_(ids, which)]
+    if there.all():
+        write(ids, which, first, second)
+        return
+    for rows, columns in blocks(there):
+        at = np.ix_(rows, columns)
+        write(ids[rows], which[columns], *(None if values is None else values[at] for values in (first, second)))
 
 
 def bodies_there(world: World, present: Array) -> Array:

@@ -86,7 +86,7 @@ class Primitives(ABC):
         """
 
     @classmethod
-    def _refuse_rows(cls, data: Mapping[str, Array], level: SnapshotLevel) -> None:
+    def refuse_rows(cls, data: Mapping[str, Array], level: SnapshotLevel) -> None:
         """Raise SnapshotError where `_restore` could not read these rows: they may come from a file."""
 
     @abstractmethod

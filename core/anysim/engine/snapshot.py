@@ -1,4 +1,4 @@
-"""What a snapshot holds beside the engine's own rows, in which order it is put back, and how snapshots are joined."""
+"""Files, rows and joins of an engine's snapshots."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -9,78 +9,11 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine import snapshot_file
-from anysim.engine.control import Control
-from anysim.engine.parameters import PARAMETERS
 from anysim.engine.state import Snapshot, SnapshotLevel
 from anysim.errors import SnapshotError
 
 if TYPE_CHECKING:
-    from anysim.engine.base import SimEngine
-
-# ruff: noqa: SLF001  the two halves of one mechanism, apart so that each can be read at once
-
-
-def take(engine: "SimEngine", ids: Array, level: SnapshotLevel) -> Snapshot:
-    """Copy the rows of envs; see `SimEngine.snapshot`."""
-    data: dict[str, Array] = {
-        "ticks": engine._ticks[ids],
-        "cameras": engine._rig.poses[ids],
-        "fov": engine._rig.fov[ids],
-    }
-    if engine._presence.varies:
-        data["present"] = engine._presence.entities[ids]
-    data |= {f"commands.{name}": rows for name, rows in engine._commands.rows(ids).items()}
-    data |= {f"parameter.{name}": engine._get_parameter(name)[ids] for name in engine._changed}
-    data |= {f"engine.{name}": rows for name, rows in engine._snapshot(ids, level).items()}
-    copies = {name: np.array(rows) for name, rows in data.items()}
-    return Snapshot(engine.name, engine.version, engine.world.hash, level, copies)
-
-
-def refuse_foreign(engine: "SimEngine", snapshot: Snapshot) -> None:
-    """Refuse data that this engine did not make, before anything is changed.
-
-    Raises:
-        SnapshotError: rows are missing, have other shapes, or are in a form that the engine no longer reads.
-    """
-    data, world = snapshot.data, engine.world
-    drives, cameras = (len(world.actuators),), (len(world.cameras), 7)
-    shapes = {"ticks": (), "cameras": cameras} | {f"commands.{name}": drives for name in Control._fields}
-    if engine._presence.varies:
-        shapes["present"] = (len(world.entities),)
-    for name, shape in shapes.items():
-        if name not in data or data[name].shape[1:] != shape:
-            found = "is missing" if name not in data else f"has rows of shape {data[name].shape[1:]}, not {shape}"
-            raise SnapshotError(f"the snapshot is damaged or not of this world: '{name}' {found}; take a new one")
-    if len({len(rows) for rows in data.values()}) > 1:
-        raise SnapshotError("the snapshot is damaged: its arrays hold different numbers of envs; take a new one")
-    engine._refuse_rows(_under("engine.", data), snapshot.level)
-
-
-def put_back(engine: "SimEngine", ids: Array, snapshot: Snapshot) -> None:
-    """Write checked rows: who is there and parameters first, since an engine's state depends on them.
-
-    A parameter that was changed since, but not when the snapshot was taken, gets its built value back.
-    """
-    data = snapshot.data
-    engine._retire_state()
-    if "present" in data:
-        engine._reset(engine._admit(ids, data["present"]))
-    for name in PARAMETERS:
-        rows = data.get(f"parameter.{name}")
-        if rows is None and name in engine._changed:
-            rows = np.repeat(engine._default_parameter(name)[None], len(ids), axis=0)
-        if rows is not None:
-            engine._set_parameter(name, rows, ids, np.arange(int(rows.shape[1])))
-            engine._changed[name] = None
-    engine._commands.restore(ids, _under("commands.", data))
-    engine._rig.poses[ids], engine._rig.fov[ids] = data["cameras"], data["fov"]
-    engine._restore(ids, _under("engine.", data), snapshot.level)
-    engine._ticks[ids] = data["ticks"]
-
-
-def _under(prefix: str, data: Mapping[str, Array]) -> dict[str, Array]:
-    """The entries of a snapshot whose names begin with `prefix`, without it."""
-    return {name[len(prefix) :]: rows for name, rows in data.items() if name.startswith(prefix)}
+    pass
 
 
 def save(snapshot: Snapshot, path: str | Path) -> Path:

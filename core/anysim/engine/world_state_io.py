@@ -1,4 +1,4 @@
-"""Reading a WorldState from an engine, and writing it into one that may be another engine with another world."""
+"""Transfer of a WorldState from an engine into one that may be another engine with another world."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -8,6 +8,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.engine.control import MODES
 from anysim.engine.parameters import PARAMETERS
+from anysim.engine.records import EnvRecords
 from anysim.engine.world_state import Carried, Missing, NamedRows, WorldState
 from anysim.errors import SnapshotError, listing
 from anysim.model.index import names_of, paired_names
@@ -16,18 +17,16 @@ from anysim.model.world import BodyKind, World
 if TYPE_CHECKING:
     from anysim.engine.base import SimEngine
 
-# ruff: noqa: SLF001  a part of SimEngine, apart so that each can be read at once
-
 _WORDS = np.array([str(mode) for mode in MODES])
 
 
-def read(engine: "SimEngine", ids: Array) -> WorldState:
+def read(engine: "SimEngine", records: EnvRecords, ids: Array) -> WorldState:
     """The state of envs by name."""
     state, control, world = engine.get_state(), engine.control, engine.world
     parameters = {
         name: NamedRows(names_of(world, PARAMETERS[name].target), engine.get_parameters(name, ids))
         for name in PARAMETERS
-        if name in engine._changed
+        if name in records.changed
     }
     return WorldState(
         time=state.time[ids].copy(),
@@ -45,12 +44,12 @@ def read(engine: "SimEngine", ids: Array) -> WorldState:
         control_effort=control.effort[ids],
         control_mode=_WORDS[control.mode[ids]],
         cameras=names_of(world, "cameras"),
-        camera_pose=engine._rig.poses[ids].copy(),
+        camera_pose=records.rig.poses[ids].copy(),
         parameters=parameters,
     )
 
 
-def write(engine: "SimEngine", state: WorldState, ids: Array, missing: Missing) -> Carried:
+def write(engine: "SimEngine", records: EnvRecords, state: WorldState, ids: Array, missing: Missing) -> Carried:
     """Put envs into a state, from a reset on, so that nothing is left of what they did before.
 
     Raises:
@@ -65,10 +64,10 @@ def write(engine: "SimEngine", state: WorldState, ids: Array, missing: Missing) 
             f"{listing(carried.dropped)}; the world alone has {listing(carried.kept)}. Nothing was changed; pass "
             f"missing='keep' to carry over what both have and leave the rest as it is"
         )
-    here = read(engine, ids)
+    here = read(engine, records, ids)
     present = _merged(here.entities, here.present, state.entities, state.present)
-    engine.reset(ids, present=present if engine._presence.varies else None)
-    _write_parameters(engine, state, ids)
+    engine.reset(ids, present=present if records.presence.varies else None)
+    _write_parameters(engine, records, state, ids)
     world = engine.world
     pose = _merged(here.bodies, here.body_pose, state.bodies, state.body_pose)
     twist = _merged(here.bodies, here.body_twist, state.bodies, state.body_twist)
@@ -82,9 +81,8 @@ def write(engine: "SimEngine", state: WorldState, ids: Array, missing: Missing) 
         engine.set_joint_state(positions, velocities, ids)
     if world.actuators:
         _write_commands(engine, here, state, ids)
-    engine._rig.poses[ids] = _merged(here.cameras, here.camera_pose, state.cameras, state.camera_pose)
-    engine._retire_state()
-    engine._ticks[ids] = np.rint(state.time / world.physics.dt)
+    records.rig.poses[ids] = _merged(here.cameras, here.camera_pose, state.cameras, state.camera_pose)
+    records.ticks[ids] = np.rint(state.time / world.physics.dt)
     return carried
 
 
@@ -103,11 +101,11 @@ def _compared(engine: "SimEngine", state: WorldState) -> Carried:
     return Carried(tuple(dropped), tuple(kept))
 
 
-def _write_parameters(engine: "SimEngine", state: WorldState, ids: Array) -> None:
+def _write_parameters(engine: "SimEngine", records: EnvRecords, state: WorldState, ids: Array) -> None:
     """Those of the state; others that were changed here get their built values back, where the state knows of them."""
     world = engine.world
     for name, parameter in PARAMETERS.items():
-        if name not in engine.parameters or not (name in state.parameters or name in engine._changed):
+        if name not in engine.parameters or not (name in state.parameters or name in records.changed):
             continue
         ours = names_of(world, parameter.target)
         known = _known(world, parameter.target, state)
@@ -152,8 +150,8 @@ def _write_commands(engine: "SimEngine", here: WorldState, state: WorldState, id
 
 def _merged(ours: Sequence[str], here: Array, theirs: Sequence[str], values: Array) -> Array:
     """Our rows (E, K, ...), with theirs where they have a thing of the same name."""
+    before, after = paired_names(theirs, ours)
     merged = np.array(here)
-    source, target = paired_names(theirs, ours)
-    if len(target):
-        merged[:, target] = values[:, source]
+    if len(after):
+        merged[:, after] = values[:, before]
     return merged

@@ -55,7 +55,7 @@ def test_readers_see_whole_states(build):
             if k == 0:
                 engine.step()
                 continue
-            with engine._lock:  # noqa: SLF001 - a reader that wants several fields of one moment holds the lock
+            with engine.lock:
                 state = engine.get_state()
                 pose, time = state.body_pose, state.time
             assert np.allclose(pose[:, 0, 0], time, rtol=1e-3, atol=1e-6)

@@ -20,10 +20,10 @@ from anysim.engine.base import SimEngine
 from anysim.engine.cameras import CameraView
 from anysim.engine.control import Control
 from anysim.engine.sharded.blocks import Blocks, joined, joined_by_name, joined_contacts, rows_of, usable_cores
+from anysim.engine.sharded.hosted import News
 from anysim.engine.sharded.pool import START_S, Crew, importable_path
 from anysim.engine.sharded.pool_cache import dismiss, hire
 from anysim.engine.sharded.shared_memory import SharedArrays, state_layout
-from anysim.engine.sharded.worker import News
 from anysim.engine.sharded.worker_handle import WorkerLost
 from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
 from anysim.errors import EngineError
@@ -294,8 +294,8 @@ class ShardedEngine(SimEngine):
         return joined_by_name(((p.rows, answers[p.worker]) for p in parts), len(ids))
 
     @classmethod
-    def _refuse_rows(cls, data: Mapping[str, Array], level: SnapshotLevel) -> None:
-        cls.inner._refuse_rows(data, level)  # noqa: SLF001  it stands in for that engine
+    def refuse_rows(cls, data: Mapping[str, Array], level: SnapshotLevel) -> None:
+        cls.inner.refuse_rows(data, level)
 
     def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:
         parts = self._blocks.split(ids)

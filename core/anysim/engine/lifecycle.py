@@ -1,0 +1,319 @@
+"""Lifecycle of an engine: what it declares, its World from build to destruction, resets, steps and states."""
+
+import threading
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.engine import arguments
+from anysim.engine.capability import Allowance, Capabilities, Capability, Need, check
+from anysim.engine.control import CommandBuffer
+from anysim.engine.doctor import Finding
+from anysim.engine.drive_checks import check_drives
+from anysim.engine.presence import Lifecycle, Presence, write_present
+from anysim.engine.primitives import Primitives
+from anysim.engine.rebuild import Kept
+from anysim.engine.records import EnvRecords
+from anysim.engine.requirements import needs_of
+from anysim.engine.state import Availability, State
+from anysim.errors import CapabilityError, EngineError
+from anysim.model.index import Index
+from anysim.model.world import World
+
+EnvIds = Sequence[int] | Array | None
+"""Env indices: None for all, else unique ones."""
+
+Indices = Sequence[int] | Array | None
+"""Indices of joints, bodies, actuators and the like: None for all, else unique ones."""
+
+
+class EngineLifecycle(Primitives):
+    """The part of `SimEngine` that builds, steps and frees; see `anysim.engine.base.SimEngine`."""
+
+    name: ClassVar[str]
+    capabilities: ClassVar[Capabilities]
+    parameters: ClassVar[frozenset[str]] = frozenset()
+    """The names of `anysim.engine.parameters` that the engine can change per env."""
+    lifecycle: ClassVar[Lifecycle] = Lifecycle.P3
+    """What it can do with an entity after the build; all but P3 goes with Capability.VARYING_ENTITIES."""
+    parallel: ClassVar[bool] = False
+    """Whether it steps its envs on several cores by itself, so that more processes (`shards: auto`) gain nothing."""
+    audit_allowances: ClassVar[Mapping[str, Allowance]] = {}
+    """By quantity of the audit what the engine declares to be off; all else is taken over to single precision."""
+
+    def __init__(self, **options: Any) -> None:
+        """Options are those of `options_model`; a wrong one raises EngineError with what exists."""
+        self.options = arguments.validated_options(self.name, self.options_model(), options)
+        self._lock = threading.RLock()
+        self._world: World | None = None
+        self._destroyed = False
+
+    # ------------------------------------------------------------------ what it is
+
+    @classmethod
+    @abstractmethod
+    def availability(cls) -> Availability:
+        """Whether it can run here. Imports nothing heavy and never raises."""
+
+    @classmethod
+    def options_model(cls) -> Any:
+        """The pydantic model of the engine's options, or None if it has none."""
+        return None
+
+    @classmethod
+    def findings(cls) -> Sequence[Finding]:
+        """What else `anysim doctor` should say of the engine on this machine: threads, drivers, versions to avoid."""
+        return ()
+
+    @classmethod
+    def share_of_threads(cls, options: Mapping[str, Any], threads: int) -> dict[str, Any]:
+        """The options of one of several processes that share the machine, each to use about that many threads.
+
+        What the user chose stays. They must not change results.
+        """
+        del threads
+        return dict(options)
+
+    @classmethod
+    def refusals(cls, world: World) -> Sequence[str]:
+        """Why this world in particular cannot be built, beyond capabilities: a reason each. Imports nothing heavy."""
+        return ()
+
+    @property
+    def version(self) -> str:
+        """The version of the physics engine, as it stamps snapshots."""
+        return self.availability().version
+
+    @property
+    def world(self) -> World:
+        """The World it runs."""
+        self._require_world()
+        assert self._world is not None
+        return self._world
+
+    @property
+    def lock(self) -> AbstractContextManager[object]:
+        """The lock of every public method; hold it to read several fields of one moment beside other threads."""
+        return self._lock
+
+    # ------------------------------------------------------------------ building
+
+    def create_world(self, world: World, num_envs: int = 1) -> Self:
+        """Build `num_envs` copies of a World and reset them all.
+
+        Raises:
+            CapabilityError: the world needs what the engine does not have; nothing was built.
+            EngineError: there is a world already, or the engine was destroyed.
+        """
+        with self._lock:
+            if self._destroyed:
+                raise EngineError(f"this {self.name} engine was destroyed; make a new one")
+            if self._world is not None:
+                raise EngineError(f"this {self.name} engine has a world already; destroy() it or make another engine")
+            if num_envs < 1:
+                raise EngineError(f"num_envs must be at least 1, got {num_envs}")
+            self.approximations: list[Need] = self._check(world)
+            check_drives(world)
+            self._install(world, num_envs)
+            try:
+                self._build_envs()
+            except BaseException:
+                self._world = None
+                raise
+            self._reset_rows(self._all)
+            return self
+
+    def _check(self, world: World) -> list[Need]:
+        return check(self.name, self.capabilities, needs_of(world), f"'{world.name}'", self.refusals(world))
+
+    def _install(self, world: World, num_envs: int) -> None:
+        """Everything the base class keeps about a world."""
+        self._world = world
+        self._dt = world.physics.dt
+        self.num_envs = num_envs
+        self.index = Index(world)
+        self._all = np.arange(num_envs)
+        self._state: State | None = None
+        self._records = EnvRecords(world, num_envs)
+
+    def _build_envs(self) -> None:
+        self._build(self.world, self.num_envs)
+        if self._presence.varies:
+            self._populate(self._all)
+
+    def _rebuild(self, world: World) -> None:
+        """Replace the world, carrying by name all that both worlds have. On failure the old one is built again."""
+        needs, state = self._check(world), self.get_state()
+        changed = {name: np.array(self._get_parameter(name)) for name in self._records.changed}
+        kept = Kept.of(self.world, state, self._records, changed, self._carry_rows())
+        try:
+            self._build_from(world, kept)
+        except BaseException:
+            self._build_from(kept.world, kept)
+            raise
+        self.approximations = needs
+
+    def _build_from(self, world: World, kept: Kept) -> None:
+        self._retire_state()
+        self._free()
+        self._install(world, self.num_envs)
+        self._presence.carry(kept.records.presence)
+        self._build_envs()
+        self._reset_rows(self._all)
+        for name, which, values in kept.parameters(world):
+            self._set_parameter(name, values, self._all, which)
+            self._records.changed[name] = None
+        for which, poses, twists in kept.bodies(world):
+            write_present(self._write_bodies, self._presence.bodies, self._all, which, poses, twists)
+        which, positions, velocities = kept.joints(world)
+        if len(which):
+            write_present(self._write_joints, self._presence.joints, self._all, which, positions, velocities)
+        self._records.carry(kept.records)
+        self._take_rows(kept.solver, kept.world)
+
+    def destroy(self) -> None:
+        """Free the world. May be called any number of times."""
+        with self._lock:
+            if self._world is not None:
+                self._retire_state()
+                self._free()
+                self._world = None
+            self._destroyed = True
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.destroy()
+
+    # ------------------------------------------------------------------ resets and presence
+
+    def reset(self, env_ids: EnvIds = None, present: Any = None) -> None:
+        """Put envs into the World's initial state; commands return to holding it. Parameters stay as they are.
+
+        Args:
+            env_ids: which envs.
+            present: (E, entities) bool, what is there from now on; None leaves it as it is. What is in no slot of the
+                World is always there, and of each slot at most one entity.
+
+        Raises:
+            CapabilityError: what is there was to change, and the engine cannot change it.
+            EngineError: rows that no env can have; nothing was changed.
+        """
+        with self._lock:
+            self._require_world()
+            ids = self._ids(env_ids)
+            if present is not None:
+                self._admit(ids, self._presence.checked(present, ids))
+            self._reset_rows(ids)
+
+    def _admit(self, ids: Array, present: Array) -> Array:
+        """Change what is there; returns the envs where that is another than before, which then need a reset."""
+        changed = self._presence.changed(ids, present)
+        if len(changed):
+            self._require(Capability.VARYING_ENTITIES)
+            self._retire_state()
+            before = self._presence.entities[ids]
+            self._presence.write(ids, present)
+            try:
+                self._populate(changed)
+            except BaseException:
+                self._presence.write(ids, before)
+                self._populate(changed)  # of several envs or workers some may have gone on to the new one
+                raise
+        return changed
+
+    @property
+    def presence(self) -> Array:
+        """(N, entities) bool: which of the World's entities are there. Bodies of the others read as the world's frame.
+
+        What is written to them has no effect but for parameters, which wait for them.
+        """
+        with self._lock:
+            self._require_world()
+            return self._presence.entities.copy()
+
+    def _reset_rows(self, ids: Array) -> None:
+        self._retire_state()
+        self._records.reset(ids)
+        self._reset(ids)
+
+    # ------------------------------------------------------------------ stepping and reading
+
+    def step(self, n_steps: int = 1, env_ids: EnvIds = None, *, keep_wrench: bool = False) -> None:
+        """Advance by `n_steps` physics steps of `world.physics.dt`; with `env_ids`, only those envs.
+
+        Commands persist; a wrench lasts for the next call that steps its env, and with `keep_wrench` for the one after
+        it too, where a control step is made in parts. A non-finite env is marked in `State.fault`, the others go on.
+        """
+        with self._lock:
+            self._require_world()
+            if n_steps < 1:
+                raise EngineError(f"n_steps must be at least 1, got {n_steps}")
+            ids = None if env_ids is None else self._ids(env_ids)
+            self._retire_state()
+            records, commands = self._records, self._records.commands
+            if commands.control_changed:
+                self._apply_control(commands.control)
+                commands.control_changed = False
+            if commands.wrench is not None:
+                self._apply_wrench(commands.wrench)
+            self._step(n_steps, ids)
+            if commands.wrench is not None and not keep_wrench:
+                commands.spend_wrench(ids)
+                self._apply_wrench(None)  # what waits for others comes with their step, unless a reset forgets it
+            if ids is None:
+                records.ticks += n_steps
+            else:
+                records.ticks[ids] += n_steps
+
+    def get_state(self) -> State:
+        """The state of all envs now: read lazily, cached until the engine moves on."""
+        with self._lock:
+            if self._state is None:
+                self._require_world()
+                self._state = State(self._read_locked, self._records.ticks * self._dt)
+            return self._state
+
+    def _read_locked(self, name: str) -> Array:
+        with self._lock:
+            array = self._read(name)
+            if self._presence.varies:
+                self._presence.blank(name, array)
+            return array
+
+    def _retire_state(self) -> None:
+        if self._state is not None:
+            self._state.retire()
+            self._state = None
+
+    # ------------------------------------------------------------------ helpers
+
+    @property
+    def _commands(self) -> CommandBuffer:
+        return self._records.commands
+
+    @property
+    def _presence(self) -> Presence:
+        return self._records.presence
+
+    def _require_world(self) -> None:
+        if self._world is None:
+            state = "was destroyed" if self._destroyed else "has no world; call create_world() first"
+            raise EngineError(f"this {self.name} engine {state}")
+
+    def _require(self, capability: Capability) -> None:
+        if capability not in self.capabilities:
+            raise CapabilityError(
+                f"{self.name} does not have '{capability}' (`anysim list engines` shows what each can do)"
+            )
+
+    def _ids(self, env_ids: EnvIds) -> Array:
+        return self._all if env_ids is None else arguments.indices(env_ids, self.num_envs, "env")
+
+    def _which(self, indices: Indices, size: int, kind: str) -> Array:
+        return np.arange(size) if indices is None else arguments.indices(indices, size, kind)

@@ -1,0 +1,93 @@
+"""Records of all envs that the contract keeps itself, whatever the engine: clocks, commands, cameras, presence."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.engine.cameras import CameraRig
+from anysim.engine.control import CommandBuffer, Control
+from anysim.engine.presence import Presence
+from anysim.errors import SnapshotError
+from anysim.model.index import paired
+from anysim.model.world import World
+
+
+class EnvRecords:
+    """Clocks, commands, camera poses, presence and changed parameters of all envs of one World.
+
+    An engine owns one for its world. Its own rows, such as poses and warm starts, are not in it.
+
+    Attributes:
+        ticks: (N,) int64, physics steps since each env's reset.
+        commands: drive targets and waiting wrenches.
+        rig: camera poses and fields of view.
+        presence: which entities are there.
+        changed: the names of parameters that were written since the build, in order.
+    """
+
+    def __init__(self, world: World, num_envs: int) -> None:
+        self.world = world
+        self.ticks = np.zeros(num_envs, dtype=np.int64)
+        self.commands = CommandBuffer(world, num_envs)
+        self.rig = CameraRig(world, num_envs)
+        self.presence = Presence(world, num_envs)
+        self.changed: dict[str, None] = {}
+
+    def reset(self, ids: Array) -> None:
+        """Start the clocks of envs anew, and have their drives hold the initial joint positions."""
+        self.commands.reset(ids)
+        self.ticks[ids] = 0
+
+    def snapshot(self, ids: Array) -> dict[str, Array]:
+        """Rows of envs by name, for a snapshot; changed parameters are the engine's to add."""
+        data: dict[str, Array] = {"ticks": self.ticks[ids], "cameras": self.rig.poses[ids], "fov": self.rig.fov[ids]}
+        if self.presence.varies:
+            data["present"] = self.presence.entities[ids]
+        return data | {f"commands.{name}": rows for name, rows in self.commands.rows(ids).items()}
+
+    def refuse_foreign(self, data: Mapping[str, Array]) -> None:
+        """Refuse the data of a snapshot from which `restore` could not read.
+
+        Raises:
+            SnapshotError: rows are missing, or have other shapes than those of this world.
+        """
+        drives, cameras = (len(self.world.actuators),), (len(self.world.cameras),)
+        shapes = {"ticks": (), "cameras": (*cameras, 7), "fov": cameras}
+        shapes |= {f"commands.{name}": drives for name in Control._fields}
+        if self.presence.varies:
+            shapes["present"] = (len(self.world.entities),)
+        for name, shape in shapes.items():
+            if name not in data or data[name].shape[1:] != shape:
+                found = "is missing" if name not in data else f"has rows of shape {data[name].shape[1:]}, not {shape}"
+                raise SnapshotError(f"the snapshot is damaged or not of this world: '{name}' {found}; take a new one")
+        if len({len(rows) for rows in data.values()}) > 1:
+            raise SnapshotError("the snapshot is damaged: its arrays hold different numbers of envs; take a new one")
+
+    def restore(self, ids: Array, data: Mapping[str, Array]) -> None:
+        """Write what `snapshot` returned, but for presence, which needs the engine."""
+        self.commands.restore(ids, below("commands.", data))
+        self.rig.poses[ids], self.rig.fov[ids] = data["cameras"], data["fov"]
+        self.ticks[ids] = data["ticks"]
+
+    def carry(self, old: "EnvRecords") -> None:
+        """Take over from the records of another World what both have by name: commands, cameras, and the clocks.
+
+        Presence goes before, with `Presence.carry`: an engine builds by it.
+        """
+        before, after = paired(old.world, self.world, "actuators")
+        for theirs, ours in zip(old.commands.control, self.commands.control, strict=True):
+            ours[:, after] = theirs[:, before]
+        self.rig.carry(old.rig)
+        self.ticks[:] = old.ticks
+
+    def add_cameras(self, world: World) -> None:
+        """Go on with the same World with more cameras."""
+        rig = CameraRig(world, len(self.ticks))
+        rig.carry(self.rig)
+        self.world, self.rig = world, rig
+
+
+def below(prefix: str, data: Mapping[str, Array]) -> dict[str, Array]:
+    """The entries of a snapshot whose names begin with `prefix`, without it."""
+    return {name[len(prefix) :]: rows for name, rows in data.items() if name.startswith(prefix)}

@@ -1,0 +1,101 @@
+"""Sensing of an engine: images, cameras, rays and contact points."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.engine import arguments
+from anysim.engine.capability import Capability
+from anysim.engine.lifecycle import EngineLifecycle, EnvIds
+from anysim.engine.state import ContactPoints, RayHits
+from anysim.errors import EngineError
+
+
+class EngineSensing(EngineLifecycle):
+    """The part of `SimEngine` that draws and measures; see `anysim.engine.base.SimEngine`."""
+
+    def render(
+        self,
+        camera_name: str = "default",
+        width: int | None = None,
+        height: int | None = None,
+        env_ids: EnvIds = None,
+        channels: Sequence[str] = ("rgb",),
+    ) -> dict[str, Array]:
+        """Images of one camera, by channel.
+
+        `rgb` (E, H, W, 3) uint8; `depth` (E, H, W) float32 [m] along the optical axis, inf beyond the far plane;
+        `segmentation` (E, H, W) int32 entity ids (`Index.segmentation_id`; 0 elsewhere).
+
+        `default` is an overview of the world where no camera has that name.
+        """
+        with self._lock:
+            self._require_world()
+            for channel in channels:
+                if channel not in ("rgb", "depth", "segmentation"):
+                    raise EngineError(f"there is no channel '{channel}' (channels: rgb, depth, segmentation)")
+                self._require(Capability(f"render: {channel}"))
+            ids = self._ids(env_ids)
+            view = self._records.rig.view(camera_name, self.index, self.get_state(), ids, width, height)
+            return self._render(view, ids, tuple(channels))
+
+    def camera_poses(self, camera_name: str, env_ids: EnvIds = None) -> Array:
+        """World poses (E, 7) of a camera's optical frame now."""
+        with self._lock:
+            self._require_world()
+            return self._records.rig.view(
+                camera_name, self.index, self.get_state(), self._ids(env_ids), None, None
+            ).pose
+
+    def set_camera_pose(self, camera_name: str, pose: Any, env_ids: EnvIds = None) -> None:
+        """Place a camera per env: poses (E, 7) in the frame of its body, or of the world where it has none."""
+        with self._lock:
+            self._require_world()
+            ids = self._ids(env_ids)
+            self._records.rig.poses[ids, self.index.camera(camera_name)] = arguments.poses("pose", pose, (len(ids), 7))
+
+    def camera_mounts(self, camera_name: str, env_ids: EnvIds = None) -> Array:
+        """Poses (E, 7) of a camera's optical frame in the frame of its body, or of the world where it has none."""
+        with self._lock:
+            self._require_world()
+            return self._records.rig.poses[self._ids(env_ids), self.index.camera(camera_name)]
+
+    def camera_fov(self, camera_name: str, env_ids: EnvIds = None) -> Array:
+        """Vertical fields of view (E,) [degrees] of a camera."""
+        with self._lock:
+            self._require_world()
+            return self._records.rig.fov[self._ids(env_ids), self.index.camera(camera_name)]
+
+    def set_camera_fov(self, camera_name: str, fov: Any, env_ids: EnvIds = None) -> None:
+        """Change a camera's vertical field of view per env: (E,) [degrees], between 1 and 170."""
+        with self._lock:
+            self._require_world()
+            ids = self._ids(env_ids)
+            rows = arguments.rows("fov", fov, (len(ids),))
+            if rows.size and not (rows.min() > 1 and rows.max() < 170):
+                raise EngineError(
+                    f"a field of view lies between 1 and 170 degrees, got {rows.min():g} to {rows.max():g}"
+                )
+            self._records.rig.fov[ids, self.index.camera(camera_name)] = rows
+
+    def raycast(self, origins: Any, directions: Any, env_ids: EnvIds = None) -> RayHits:
+        """First hits of rays (E, R, 3) [m], world frame, with collision geometry. Directions need not be unit."""
+        with self._lock:
+            self._require_world()
+            self._require(Capability.RAYCAST)
+            ids = self._ids(env_ids)
+            start = arguments.rows("origins", origins, (len(ids), None, 3))
+            along = arguments.rows("directions", directions, start.shape)
+            length = np.linalg.norm(along, axis=-1, keepdims=True)
+            if start.size and length.min() < 1e-12:
+                raise EngineError("a ray needs a direction that is not zero")
+            return self._raycast(start, along / length, ids)
+
+    def contacts(self, env_ids: EnvIds = None) -> ContactPoints:
+        """All contact points of envs in their current state."""
+        with self._lock:
+            self._require_world()
+            self._require(Capability.CONTACT_POINTS)
+            return self._contacts(self._ids(env_ids))
