@@ -17,10 +17,9 @@ from pathlib import Path
 
 import numpy as np
 
-from anysim import registry
 from anysim.api import compile_world, load
 from anysim.compile.room import furniture_names
-from anysim.engine.factory import create_simulation, engine_class
+from anysim.engine.factory import create_simulation, runnable
 from anysim.managers.standard import standard_managers
 from anysim.math import pose as P
 from anysim_schemas.rooms import RoomSpec
@@ -201,9 +200,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=1.0)
     parser.add_argument("--picture", type=Path, help="draw sixteen of them instead, on the first engine")
     chosen = parser.parse_args()
-    engines = chosen.engine or [
-        name for name in registry.names("engines") if name != "null" and engine_class(name).availability().available
-    ]
+    engines = chosen.engine or [name for name in runnable() if name != "null"]
     with tempfile.TemporaryDirectory() as folder:
         if chosen.picture is not None:
             draw(engines[0], chosen.picture, Path(folder))

@@ -7,8 +7,7 @@ import sys
 
 import pytest
 
-from anysim import registry
-from anysim.errors import PluginError
+from anysim.testing.engines import require_engine
 
 SUMMARY = re.compile(
     r"anysim contract: engine (\S+) (\S+?)(?: in \d+ shards)?: "
@@ -58,7 +57,7 @@ DYNAMIC = {
 
 @pytest.mark.parametrize("name", DYNAMIC)
 def test_an_engine_with_dynamics_passes(name, tmp_path):
-    _runs_here(name)
+    require_engine(name)
     _passes(name, *_summary(_run(tmp_path, "--engine", name)))
 
 
@@ -74,20 +73,10 @@ def test_an_engine_in_worker_processes_passes(tmp_path):
 @pytest.mark.parametrize("name", DYNAMIC)
 def test_an_engine_with_dynamics_lives_in_worker_processes(name, tmp_path):
     """Its own part of the contract that processes could break: life, steps and snapshots."""
-    _runs_here(name)
+    require_engine(name)
     done = _run(tmp_path, "--engine", name, "--shards", "2", "-k", "test_lifecycle or test_stepping or test_snapshots")
     assert " in 2 shards: " in done.stdout
     _passes(name, *_summary(done), least=60)
-
-
-def _runs_here(name):
-    try:
-        engine = registry.load("engines", name)
-    except PluginError as error:
-        pytest.skip(str(error))
-    here = engine.availability()
-    if not here.available:
-        pytest.skip(f"{name} cannot run here: {'; '.join(here.missing)}")
 
 
 def _passes(name, passed, _, why, least=251):

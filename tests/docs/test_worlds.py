@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 import anysim
-from anysim import registry
-from anysim.engine.factory import availability
 from anysim.errors import CapabilityError
+from anysim.testing.engines import require_engine
 
 WORLDS = sorted((Path(__file__).parents[2] / "docs" / "worlds").glob("*.yaml"))
-ENGINES = [name for name in ("mujoco", "pybullet", "sapien") if name in registry.names("engines")]
+ENGINES = ("mujoco", "pybullet", "sapien")
 
 
 def start(world: Path, engine: str, num_envs: int = 2) -> dict[str, np.ndarray]:
@@ -31,8 +30,7 @@ def start(world: Path, engine: str, num_envs: int = 2) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("world", WORLDS, ids=lambda path: path.stem)
 def test_a_world_runs_on_every_engine_that_declares_it_can(world: Path, engine: str) -> None:
-    if not availability(engine).available:
-        pytest.skip(f"{engine} cannot run here")
+    require_engine(engine)
     try:
         found = start(world, engine)
     except CapabilityError as error:

@@ -1,4 +1,4 @@
-"""What the tests of worker processes look at from outside: processes, descriptors, and a program to compare runs."""
+"""Views of worker processes from outside, for tests: processes, descriptors, and a program to compare runs."""
 
 import os
 import time

@@ -3,20 +3,14 @@
 import numpy as np
 import pytest
 
-from anysim import registry
 from anysim.engine.audit import audit, world_rows
-from anysim.errors import PluginError
+from anysim.testing.engines import require_engine
 from anysim.testing.varying import having, varied
 
 
 @pytest.mark.parametrize("name", ["null", "mujoco", "pybullet", "sapien"])
 def test_what_is_absent_now_is_audited_too(name):
-    try:
-        engine_class = registry.load("engines", name)
-    except PluginError as error:
-        pytest.skip(str(error))
-    if not engine_class.availability().available:
-        pytest.skip(f"{name} cannot run here")
+    engine_class = require_engine(name)
     world = varied(engine_class.capabilities)
     with engine_class().create_world(world, 2) as engine:
         engine.reset([0], present=having(world, "mug~1"))

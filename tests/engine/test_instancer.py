@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from anysim import registry
 from anysim.compile.world import compile_world
-from anysim.engine.factory import create_simulation
+from anysim.engine.factory import create_simulation, runnable
 from anysim.model.world import World
 from anysim_schemas.run import WorldSpec
 
@@ -30,10 +29,8 @@ def heap(count: int) -> World:
     )
 
 
-@pytest.mark.parametrize("engine", registry.names("engines"))
+@pytest.mark.parametrize("engine", runnable())
 def test_two_hundred_bodies_are_built_fall_and_lie(engine: str) -> None:
-    if not registry.load("engines", engine).availability().available:
-        pytest.skip(f"{engine} cannot run here")
     world = heap(200)
     with create_simulation(engine) as simulation:
         simulation.create_world(world)

@@ -5,28 +5,17 @@ import warnings
 import numpy as np
 import pytest
 
-from anysim import registry
 from anysim.engine import factory
 from anysim.engine.capability import Capability
 from anysim.engine.kinematic import NullEngine
 from anysim.engine.sharded.blocks import Blocks, joined, shard_count, usable_cores
 from anysim.engine.sharded.engine import ShardedEngine, sharded
-from anysim.errors import EngineError, PluginError, SnapshotError
+from anysim.errors import EngineError, SnapshotError
 from anysim.testing import worlds
 from anysim.testing.compare import assert_same, play, read, spread, tape
+from anysim.testing.engines import require_engine
 from tests.engine.shards_help import children, descriptors, program
 from tests.task.helpers import arm
-
-
-def engine_class(name):
-    """The class of an installed engine that can run here, or a skip."""
-    try:
-        found = registry.load("engines", name)
-    except PluginError as error:
-        pytest.skip(str(error))
-    if not found.availability().available:
-        pytest.skip(f"{name} cannot run here")
-    return found
 
 
 def same_pages(pages, wanted, what):
@@ -49,7 +38,7 @@ def test_results_do_not_depend_on_the_shards(shards):
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("name", ["pybullet", "sapien", "mujoco"])
 def test_results_of_physics_do_not_depend_on_the_shards(name, seed):
-    found = engine_class(name)
+    found = require_engine(name)
     level = "trajectory" if Capability.SNAPSHOT_TRAJECTORY in found.capabilities else "state"
     with found() as alone:
         wanted = program(alone, seed, level=level)
@@ -61,7 +50,7 @@ def test_results_of_physics_do_not_depend_on_the_shards(name, seed):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["pybullet", "sapien", "mujoco"])
 def test_contacts_rays_wrenches_and_images_are_the_same(name):
-    found, world = engine_class(name), worlds.scene(cameras=True)
+    found, world = require_engine(name), worlds.scene(cameras=True)
     have = found.capabilities
     with found() as alone, sharded(found, 2)() as engine:
         for e in (alone, engine):
@@ -146,7 +135,7 @@ def test_it_presents_the_engine():
 
 @pytest.mark.slow
 def test_options_reach_the_workers():
-    found = engine_class("pybullet")
+    found = require_engine("pybullet")
     with sharded(found, 2)(iterations=77) as engine:
         assert engine.version == found(iterations=77).version
         engine.create_world(worlds.drifting(), 2)
@@ -156,7 +145,7 @@ def test_options_reach_the_workers():
 
 
 def test_mujoco_shares_its_threads():
-    found = engine_class("mujoco")
+    found = require_engine("mujoco")
     assert found.parallel
     assert found.share_of_threads({}, 3) == {"threads": 3}
     assert found.share_of_threads({"threads": 0, "solver": "cg"}, 3) == {"threads": 3, "solver": "cg"}

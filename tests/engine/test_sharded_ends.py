@@ -1,4 +1,4 @@
-"""However a program ends, its workers end with it, and no shared memory stays. Programs are plain scripts."""
+"""Ends of programs: their workers end with them, and no shared memory stays. Programs are plain scripts."""
 
 import os
 import signal

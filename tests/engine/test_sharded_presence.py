@@ -1,4 +1,4 @@
-"""Who is there follows the envs to their workers, and comes back with a worker that was lost."""
+"""Presence follows the envs to their workers, and comes back with a worker that was lost."""
 
 import os
 import signal
@@ -6,29 +6,18 @@ import signal
 import numpy as np
 import pytest
 
-from anysim import registry
 from anysim.engine.sharded.engine import WorkerWarning, sharded
-from anysim.errors import PluginError
 from anysim.testing.compare import FIELDS, assert_same, play, read, tape
+from anysim.testing.engines import require_engine
 from anysim.testing.varying import having, random_presence, varied
 
 WITHOUT_FAULTS = [field for field in FIELDS if field != "fault"]
 
 
-def _engine_class(name):
-    try:
-        found = registry.load("engines", name)
-    except PluginError as error:
-        pytest.skip(str(error))
-    if not found.availability().available:
-        pytest.skip(f"{name} cannot run here")
-    return found
-
-
 @pytest.mark.parametrize("name", ["null", "mujoco", "pybullet", "sapien"])
 def test_a_lost_worker_comes_back_with_who_was_there(name):
     """Its envs are as after a reset with their own entities and parameters; the others never notice."""
-    engine_class = _engine_class(name)
+    engine_class = require_engine(name)
     world = varied(engine_class.capabilities)
     rows = random_presence(world, np.random.default_rng(3), 4)
     rows[3] = having(world, "mug~2", "chest~1", "lid")
@@ -55,7 +44,7 @@ def test_a_lost_worker_comes_back_with_who_was_there(name):
 @pytest.mark.parametrize("name", ["null", "pybullet"])
 def test_a_worker_that_is_lost_in_a_reset_takes_over_who_is_wanted(name):
     """A worker dies, and the next call is a reset with other entities: the new worker has them."""
-    engine_class = _engine_class(name)
+    engine_class = require_engine(name)
     world = varied(engine_class.capabilities)
     wanted = having(world, "mug~1", "post").repeat(4, axis=0)
     with engine_class().create_world(world, 4) as alone, sharded(engine_class, 2)().create_world(world, 4) as engine:

@@ -14,6 +14,7 @@ import anysim
 from anysim import registry
 from anysim.compile.edit import with_object
 from anysim.engine.capability import Capability
+from anysim.engine.factory import runnable
 from anysim.engine.kinematic import NullEngine
 from anysim.errors import SpecError
 from anysim.managers.joints import JointManager
@@ -64,11 +65,6 @@ def kitchen(num_envs: int = 1, *overrides: str, engine: str = "null") -> TaskEnv
     return anysim.make(KITCHEN, engine=engine, num_envs=num_envs, overrides=overrides)
 
 
-def engines() -> list[str]:
-    known = ((name, registry.load("engines", name)) for name in registry.names("engines"))
-    return [name for name, kind in known if kind.availability().available]
-
-
 def test_joints_begin_where_the_spec_says() -> None:
     with kitchen(64) as env:
         env.reset(seed=0)
@@ -87,7 +83,7 @@ def test_joints_begin_where_the_spec_says() -> None:
         assert not state.joint_vel.any()
 
 
-@pytest.mark.parametrize("name", engines())
+@pytest.mark.parametrize("name", runnable())
 def test_draws_are_noted_with_their_stream_and_source_and_read_back(name: str) -> None:
     with kitchen(8, engine=name) as env:
         env.reset(seed=3)
@@ -119,7 +115,7 @@ def test_another_draw_moves_none_and_env_i_does_not_depend_on_how_many_there_are
         assert (two.obs["policy"] == five.obs["policy"][:2]).all()
 
 
-@pytest.mark.parametrize("name", engines())
+@pytest.mark.parametrize("name", runnable())
 def test_a_snapshot_goes_on_as_the_uninterrupted_run(name: str) -> None:
     """With joints in motion, friction drawn, and other episodes in between."""
     exact = Capability.SNAPSHOT_TRAJECTORY in registry.load("engines", name).capabilities
@@ -144,7 +140,7 @@ def test_a_snapshot_goes_on_as_the_uninterrupted_run(name: str) -> None:
         assert (env.engine.get_parameters("joint.friction") == friction).all()
 
 
-@pytest.mark.parametrize("name", engines())
+@pytest.mark.parametrize("name", runnable())
 def test_an_episode_goes_alike_in_another_batch(name: str) -> None:
     """Drawn again from its seed, in another row and among more envs: the same bits."""
     rows: list[list[Any]] = []
@@ -173,7 +169,7 @@ print(hashlib.sha256(np.array(rows).tobytes()).hexdigest())
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", engines())
+@pytest.mark.parametrize("name", runnable())
 def test_another_process_sees_the_same_bits(name: str) -> None:
     root = Path(__file__).parents[2]
     command = [sys.executable, "-c", PROGRAM, name]

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import anysim
-from anysim import registry
 from anysim.conventions import Array
+from anysim.engine.factory import engine_class, runnable
 from anysim.engine.presence import Lifecycle
 from anysim.task.env import TaskEnv
 from tests.task.helpers import BLOCKS
@@ -58,10 +58,7 @@ def toys(num_envs: int = 1, *overrides: str, engine: str = "null") -> TaskEnv:
 
 def varying_engines() -> list[str]:
     """The installed engines in which things come and go."""
-    kinds = {name: registry.load("engines", name) for name in registry.names("engines")}
-    return [
-        name for name, kind in kinds.items() if kind.lifecycle is not Lifecycle.P3 and kind.availability().available
-    ]
+    return [name for name in runnable() if engine_class(name).lifecycle is not Lifecycle.P3]
 
 
 def test_every_slot_has_at_most_one_entity_and_the_draws_say_which() -> None:

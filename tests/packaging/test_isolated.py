@@ -12,8 +12,7 @@ from typing import Any
 import pytest
 
 from anysim import registry
-from anysim.engine import factory
-from anysim.errors import PluginError
+from anysim.testing.engines import require_engine
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("wheels")]  # built once, by one worker
 
@@ -37,19 +36,9 @@ def alone(environment: Callable[..., Path]) -> Callable[[str], Path]:
     return make
 
 
-def _require(engine: str) -> None:
-    """Skip where this machine cannot have the engine: there are not wheels of each for every processor."""
-    try:
-        here = factory.availability(engine)
-    except PluginError as error:
-        pytest.skip(str(error))
-    if not here.available:
-        pytest.skip(f"{engine} cannot run here: {'; '.join(here.missing)}")
-
-
 @pytest.mark.parametrize("engine", ["null", *BACKENDS])
 def test_the_suite_passes_without_the_other_engines(engine: str, alone: Any, program: Any, tmp_path: Path) -> None:
-    _require(engine)
+    require_engine(engine)
     python = alone(engine)
     others = [library for name, library in LIBRARIES.items() if name != engine]
     assert program(python, "-c", FIND, *others, cwd=tmp_path).stdout.split() == []
@@ -63,7 +52,7 @@ def test_the_suite_passes_without_the_other_engines(engine: str, alone: Any, pro
 @pytest.mark.parametrize("engine", ["null", *BACKENDS])
 def test_an_absent_engine_costs_its_own_row(engine: str, alone: Any, program: Any, tmp_path: Path) -> None:
     """`list` and `doctor` know what is here and what could be; choosing what is not says where to get it."""
-    _require(engine)
+    require_engine(engine)
     anysim = alone(engine).with_name("anysim")
     rows = json.loads(program(anysim, "list", "engines", "--json", cwd=tmp_path).stdout)
     assert [row["name"] for row in rows] == sorted({engine, "null"})

@@ -8,26 +8,17 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from anysim import registry
 from anysim.conventions import Array
 from anysim.engine.capability import Capability
 from anysim.engine.drive_checks import UnstableGainsWarning
-from anysim.engine.factory import create_simulation
+from anysim.engine.factory import create_simulation, runnable
 from anysim.model.world import Actuation, Actuator, World
 from anysim.testing import tolerances
 from tests.parity.pressing import Press, arm_joint, fingers, panda
 
+ENGINES = runnable(Capability.DYNAMICS)
 
-@cache
-def engines() -> tuple[str, ...]:
-    """The installed engines with dynamics that can run here."""
-    known = ((name, registry.load("engines", name)) for name in registry.names("engines"))
-    return tuple(
-        name for name, kind in known if Capability.DYNAMICS in kind.capabilities and kind.availability().available
-    )
-
-
-pytestmark = pytest.mark.skipif(len(engines()) < 2, reason="fewer than two engines with dynamics are installed")
+pytestmark = pytest.mark.skipif(len(ENGINES) < 2, reason="fewer than two engines with dynamics are installed")
 
 
 # ---------------------------------------------------------------------- free
@@ -65,7 +56,7 @@ def played(engine: str, actuation: Actuation) -> Array:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("pair", list(combinations(engines(), 2)), ids="-".join)
+@pytest.mark.parametrize("pair", list(combinations(ENGINES, 2)), ids="-".join)
 def test_a_free_tape_is_the_same_everywhere(pair: tuple[str, str]) -> None:
     """Within 5e-3 rad on the way and 1e-3 rad at rest, and the arm really moved."""
     first, second = (played(name, Actuation.IMPLICIT_PD) for name in pair)
@@ -78,7 +69,7 @@ def test_a_free_tape_is_the_same_everywhere(pair: tuple[str, str]) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", engines())
+@pytest.mark.parametrize("engine", ENGINES)
 def test_native_drives_stay_near_the_law(engine: str) -> None:
     """As near as each engine declares: 5e-3 rad on the way, 1e-3 at rest, against its own law."""
     gap = np.abs(played(engine, Actuation.NATIVE) - played(engine, Actuation.IMPLICIT_PD))
@@ -113,7 +104,7 @@ def pressed(engine: str, press: Press, share: float, first: float) -> tuple[Arra
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.5, 2.0], ids=["unclipped", "clipped"])
 @pytest.mark.parametrize("joint", range(7))
-@pytest.mark.parametrize("engine", engines())
+@pytest.mark.parametrize("engine", ENGINES)
 def test_a_blocked_joint_exerts_its_torque(engine: str, joint: int, share: float) -> None:
     """Each joint of the arm, pressed against a block: the contact's moment is the commanded, clipped torque."""
     wanted, got = pressed(engine, arm_joint(joint), share, 0.1)
@@ -127,7 +118,7 @@ def test_a_blocked_joint_exerts_its_torque(engine: str, joint: int, share: float
 
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.5, 2.0], ids=["unclipped", "clipped"])
-@pytest.mark.parametrize("engine", engines())
+@pytest.mark.parametrize("engine", ENGINES)
 def test_blocked_fingers_exert_their_force(engine: str, share: float) -> None:
     """Both fingers, each on its side of a block: 20 N as asked for, 40 N where the limit clips 80."""
     wanted, got = pressed(engine, fingers(), share, 0.02)
@@ -154,7 +145,7 @@ def stiff(dt: float, actuation: Actuation = Actuation.IMPLICIT_PD) -> World:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("dt", [0.002, 1 / 240], ids=["2ms", "240Hz"])
-@pytest.mark.parametrize("engine", engines())
+@pytest.mark.parametrize("engine", ENGINES)
 def test_stiff_gains_settle(engine: str, dt: float) -> None:
     """One second after a step of 0.2 rad in every joint the arm is there and still."""
     world = stiff(dt)
@@ -168,7 +159,7 @@ def test_stiff_gains_settle(engine: str, dt: float) -> None:
         assert np.abs(state.joint_vel[0, :7]).max() < 2e-3
 
 
-@pytest.mark.parametrize("engine", engines()[:1])
+@pytest.mark.parametrize("engine", ENGINES[:1])
 def test_explicit_drives_that_are_too_stiff_are_warned_of(engine: str) -> None:
     """The same gains under the explicit law: a warning at the build, with the number and the remedy."""
     with (

@@ -1,15 +1,12 @@
 """Articulated objects on every engine: what drawers, doors, lids and valves do, against answers worked out by hand."""
 
-from functools import cache
-
 import numpy as np
 import pytest
 
-from anysim import registry
 from anysim.engine.audit import audit
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capability
-from anysim.engine.factory import create_simulation
+from anysim.engine.factory import create_simulation, runnable
 from anysim.math import pose as P
 from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.world import JointType, World
@@ -27,17 +24,9 @@ from tests.parity.articulated import (
     under_the_hand,
 )
 
+ENGINES = runnable(Capability.DYNAMICS)
 
-@cache
-def engines() -> tuple[str, ...]:
-    """The installed engines with dynamics that can run here."""
-    known = ((name, registry.load("engines", name)) for name in registry.names("engines"))
-    return tuple(
-        name for name, kind in known if Capability.DYNAMICS in kind.capabilities and kind.availability().available
-    )
-
-
-pytestmark = pytest.mark.parametrize("name", engines())
+pytestmark = pytest.mark.parametrize("name", ENGINES)
 
 FORCES = {JointType.PRISMATIC: 12.0, JointType.REVOLUTE: 1.5}
 """[N] and [N m] that open every drawer and door of the cabinet."""

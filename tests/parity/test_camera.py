@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from anysim import api, registry
+from anysim import api
 from anysim.engine.factory import create_simulation
 from anysim.math import pose as P
 from anysim.model.sketch import Sketch
 from anysim.model.world import Box, Camera, Capsule, Cylinder, Sphere, World
+from anysim.testing.engines import require_engine
 from anysim.testing.fixtures import drawing_trouble
 from anysim_parity.camera import DEPTH, OVERLAP, camera_layer
 from anysim_parity.judge import agreement
@@ -40,9 +41,7 @@ def clutter() -> World:
 @pytest.mark.parametrize("make", [pick_cube, clutter])
 def test_three_engines_see_the_same(make) -> None:
     for name in ENGINES:
-        if name not in registry.names("engines"):
-            pytest.skip(f"{name} is not installed")
-        if trouble := drawing_trouble(registry.load("engines", name)):
+        if trouble := drawing_trouble(require_engine(name)):
             pytest.skip(f"{name} cannot draw here: {trouble}")
     layer = camera_layer(make(), {name: lambda name=name: create_simulation(name) for name in ENGINES}, size=(320, 240))
     assert not layer.refused

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from anysim import registry
 from anysim.api import compile_world
 from anysim.engine.factory import create_simulation
 from anysim.math import pose as P
+from anysim.testing.engines import require_engine
 from anysim_schemas.run import RunSpec
 
 SPEC = {
@@ -27,8 +27,7 @@ WIDTH = 2e-4
 
 @pytest.mark.parametrize("name", ["mujoco", "pybullet", "sapien"])
 def test_a_grip_holds(name):
-    if name not in registry.names("engines") or not registry.load("engines", name).availability().available:
-        pytest.skip(f"{name} is not installed")
+    require_engine(name)
     world = compile_world(RunSpec.model_validate(SPEC))
     robot = world.robots[0]
     gripper, tool = robot.channels["eef"], world.sites[robot.tools["tool"]]

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from anysim import create_simulation, registry
+from anysim import create_simulation
 from anysim.compile.world import compile_world
+from anysim.testing.engines import require_engine
 from anysim_schemas.run import WorldSpec
 
 ROOM = {
@@ -15,8 +16,7 @@ ROOM = {
 
 @pytest.mark.parametrize("name", ["mujoco", "pybullet", "sapien"])
 def test_a_room_carries_and_bounds(name: str) -> None:
-    if name not in registry.names("engines") or not registry.load("engines", name).availability().available:
-        pytest.skip(f"{name} is not installed")
+    require_engine(name)
     world = compile_world(WorldSpec.model_validate(ROOM))
     with create_simulation(name).create_world(world) as engine:
         index = engine.index

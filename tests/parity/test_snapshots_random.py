@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anysim import registry
 from anysim.engine.capability import Capability
 from anysim.testing import tolerances
 from anysim.testing.compare import MOTION
+from anysim.testing.engines import require_engine
 from tests.parity import random_scenes as scenes
 
 SCENES = 100
@@ -21,18 +21,11 @@ BEFORE, LONGEST_FALL, AFTER = 15, 60, 10
 ENGINES = ("null", "mujoco", "pybullet", "sapien")
 
 
-def _available(name: str) -> type:
-    engine = registry.load("engines", name)
-    if not engine.availability().available:
-        pytest.skip(f"{name} is not installed")
-    return engine
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ENGINES)
 def test_snapshots_of_random_scenes(name, tmp_path, capsys):
     """After a wild history, in other envs of a new engine, and in another process; and at the level STATE at once."""
-    exact = Capability.SNAPSHOT_TRAJECTORY in _available(name).capabilities
+    exact = Capability.SNAPSHOT_TRAJECTORY in require_engine(name).capabilities
     wrong: list[str] = []
     touching, worst, taken, wanted = 0, 0.0, {}, {}
     for number in range(SCENES):
@@ -70,7 +63,7 @@ def test_snapshots_of_random_scenes(name, tmp_path, capsys):
         )
     assert not wrong, "\n".join(wrong)
     assert worst <= tolerances.READ_BACK
-    if Capability.CONTACT_POINTS in _available(name).capabilities and name != "null":
+    if Capability.CONTACT_POINTS in require_engine(name).capabilities and name != "null":
         assert touching >= 0.9 * SCENES, "the scenes are to be in touch where they are saved"
 
 

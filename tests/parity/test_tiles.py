@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import anysim
-from anysim import registry
 from anysim.engine.capability import Capability
+from anysim.testing.engines import require_engine
 from anysim.testing.fixtures import drawing_trouble
 
 SPEC = {
@@ -20,8 +20,7 @@ SPEC = {
 
 @pytest.mark.parametrize("name", ["mujoco", "pybullet", "sapien"])
 def test_robots_stand_on_their_tiles(name: str) -> None:
-    if name not in registry.names("engines") or not registry.load("engines", name).availability().available:
-        pytest.skip(f"{name} is not installed")
+    require_engine(name)
     with anysim.make(SPEC, engine=name, num_envs=4, overrides=["world.cameras.fixed.channels=[]"]) as env:
         env.reset(seed=2)
         engine, origin = env.engine, env.scene.origin
@@ -47,9 +46,7 @@ def test_robots_stand_on_their_tiles(name: str) -> None:
 @pytest.mark.parametrize("name", ["mujoco", "pybullet", "sapien"])
 def test_fixed_cameras_see_the_same_scene_on_every_tile(name: str) -> None:
     """What is fixed to the world moves with the tile: the robot is at the same place in all pictures."""
-    if name not in registry.names("engines") or not registry.load("engines", name).availability().available:
-        pytest.skip(f"{name} is not installed")
-    if trouble := drawing_trouble(registry.load("engines", name)):
+    if trouble := drawing_trouble(require_engine(name)):
         pytest.skip(trouble.replace(",", ";"))
     with anysim.make(SPEC, engine=name, num_envs=4) as env:
         env.reset(seed=2)

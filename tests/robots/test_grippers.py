@@ -5,7 +5,6 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from anysim import registry
 from anysim.api import compile_world
 from anysim.assets.catalogue import load_robot, missing_source
 from anysim.engine.base import SimEngine
@@ -14,6 +13,7 @@ from anysim.kinematics.chain import Chain
 from anysim.math import pose as P
 from anysim.model.world import World
 from anysim.planning.api import inverse_kinematics
+from anysim.testing.engines import require_engine
 from anysim.testing.tracking import bolted
 from anysim_schemas.run import RunSpec
 
@@ -72,8 +72,7 @@ SLIP = 0.01
 @pytest.mark.parametrize("engine", ["mujoco", "pybullet", "sapien"])
 @pytest.mark.parametrize("hand", TASKS)
 def test_a_gripper_lifts_a_cube(hand: str, engine: str) -> None:
-    if engine not in registry.names("engines") or not registry.load("engines", engine).availability().available:
-        pytest.skip(f"{engine} is not installed")
+    require_engine(engine)
     robot, task = hand.split()[0], TASKS[hand]
     absent = missing_source(load_robot(robot))
     if absent:

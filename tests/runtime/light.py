@@ -13,9 +13,9 @@ from unittest import mock
 import pytest
 
 import anysim
-from anysim import registry
 from anysim.assets.catalogue import CatalogueEntry
 from anysim.task.env import TaskEnv
+from anysim.testing.engines import require_engine
 from anysim_schemas.load import load
 from anysim_schemas.robot_model import RobotModelSpec
 
@@ -165,9 +165,7 @@ def changed(spec: Mapping[str, Any], *removed: str, **values: Any) -> dict[str, 
 
 def make(engine: str, num_envs: int, spec: Mapping[str, Any] = SLIDE, *, shards: int = 1) -> TaskEnv:
     """An env of a spec on an engine, whose robot need not be installed."""
-    here = registry.load("engines", engine).availability()
-    if not here.available:
-        pytest.skip(f"{engine} is not available: {here.remedy}")
+    require_engine(engine)
     events = spec["task"]["events"]
     if engine == "null" and "shove" in events:  # nothing can be pushed there
         spec = {**spec, "task": spec["task"] | {"events": events | {"shove": _RUB}}}

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from anysim.engine import snapshot_file
-from anysim.engine.exact_json import decode, encode
+from anysim.engine.snapshot_file import decode, encode
 from anysim.engine.state import Snapshot
 from anysim.engine.world_state import WorldState
 from anysim.errors import SnapshotError

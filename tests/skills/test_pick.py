@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from anysim import registry
 from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.runner import SkillPolicy
 from anysim.task.contract import Status
 from anysim.task.env import TaskEnv
+from anysim.testing.engines import require_engine
 from tests.task.helpers import arm
 
 
@@ -25,8 +25,7 @@ def rollout(env: TaskEnv, policy: SkillPolicy, steps: int) -> list[str]:
 
 @pytest.mark.parametrize("engine", ["mujoco", "pybullet", "sapien"])
 def test_it_lifts_the_cube_to_the_goal_in_every_env_on_every_engine(engine: str) -> None:
-    if engine not in registry.names("engines"):
-        pytest.skip(f"{engine} is not installed")
+    require_engine(engine)
     with arm(3, engine=engine) as env:
         env.reset(seed=1)
         assert rollout(env, SkillPolicy(env), 400) == [Status.SUCCESS] * 3

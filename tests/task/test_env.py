@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import anysim
-from anysim import hooks, registry
+from anysim import hooks
 from anysim.errors import SpecError, TaskError
 from anysim.task.contract import Status
+from anysim.testing.engines import require_engine
 from tests.task.helpers import arm, blocks
 
 NOTHING = np.zeros((1, 0))
@@ -130,9 +131,7 @@ def test_an_episode_is_drawn_again_from_its_seed() -> None:
 
 @pytest.mark.parametrize(("engine", "n"), [("null", 1), ("null", 3), ("mujoco", 2), ("pybullet", 2), ("sapien", 2)])
 def test_continuing_from_a_snapshot_equals_the_uninterrupted_run(engine: str, n: int) -> None:
-    here = registry.load("engines", engine).availability()
-    if not here.available:
-        pytest.skip(f"{engine} is not available: {here.remedy}")
+    require_engine(engine)
     rng = np.random.default_rng(0)
     with arm(n, engine=engine) as env:
         env.reset(seed=1)

@@ -1,20 +1,15 @@
-"""Declarations that need no MuJoCo: capabilities, with measured errors, and availability."""
+"""Declarations of the engine that need no import of MuJoCo: capabilities, with measured errors, and availability."""
 
-from collections.abc import Mapping
-from functools import cache
-from importlib import metadata
-
-from anysim.engine.availability import judge
+from anysim.engine.availability import LibraryRequirement
 from anysim.engine.capability import Capabilities, Capability
-from anysim.engine.state import Availability
 
-MINIMUM = (3, 17, 0)
-WRONG: Mapping[tuple[int, ...], str] = {
-    (4, 0, 0): "its sparse solver is wrong where articulated bodies touch each other"
-}
-"""Versions whose results cannot be trusted, and why."""
-
-REMEDY = "pip install 'mujoco>=3.17,!=4.0.0'"
+LIBRARY = LibraryRequirement(
+    "mujoco",
+    minimum=(3, 17, 0),
+    lacks="has no mujoco.batch",
+    remedy="pip install 'mujoco>=3.17,!=4.0.0'",
+    wrong={(4, 0, 0): "its sparse solver is wrong where articulated bodies touch each other"},
+)
 
 _APPROXIMATE = {
     Capability.CONTACTS: (
@@ -45,30 +40,9 @@ _APPROXIMATE = {
     ),
 }
 _ABSENT = (
-    Capability.LIVE_EDIT_NATIVE,
     Capability.SOLVER_SETTINGS,
     Capability.TERRAIN_TRIMESH,  # MuJoCo collides the convex hull of a mesh
 )
 CAPABILITIES = Capabilities.of(
     *(c for c in Capability if c not in _APPROXIMATE and c not in _ABSENT), approximate=_APPROXIMATE
 )
-
-
-def versions() -> str:
-    """Which versions are taken, in words."""
-    refused = "; ".join(f"{'.'.join(map(str, numbers))}: {why}" for numbers, why in WRONG.items())
-    return f"{'.'.join(map(str, MINIMUM))} or newer; refused: {refused}"
-
-
-@cache
-def installed_version() -> str:
-    """The version of the mujoco distribution, or an empty string."""
-    try:
-        return metadata.version("mujoco")
-    except metadata.PackageNotFoundError:
-        return ""
-
-
-def availability() -> Availability:
-    """See `SimEngine.availability`."""
-    return judge("mujoco", installed_version(), MINIMUM, "has no mujoco.batch", WRONG, REMEDY)

@@ -61,7 +61,7 @@ class MujocoEngine(SimEngine):
     @classmethod
     def availability(cls) -> Availability:
         """By the installed version alone; imports nothing."""
-        return declared.availability()
+        return declared.LIBRARY.availability()
 
     @classmethod
     def options_model(cls) -> type[MujocoOptions]:
@@ -75,14 +75,8 @@ class MujocoEngine(SimEngine):
             Finding(
                 "mujoco: threads", Health.NOTE, f"{MujocoOptions().thread_count(1 << 30)} at most: one per env and CPU"
             ),
-            Finding("mujoco: versions", Health.NOTE, declared.versions()),
+            Finding("mujoco: versions", Health.NOTE, str(declared.LIBRARY)),
         )
-
-    @property
-    def version(self) -> str:
-        """MuJoCo's version, with the options that shape trajectories where they are not the defaults."""
-        stamp = self.options.trajectory_stamp()
-        return f"{declared.installed_version()} ({stamp})" if stamp else declared.installed_version()
 
     # ------------------------------------------------------------------ lifecycle
 

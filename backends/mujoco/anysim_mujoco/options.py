@@ -1,15 +1,17 @@
-"""Options of MuJoCo, which mean nothing to another engine."""
+"""Options of MuJoCo that mean nothing to another engine."""
 
 import os
-from typing import Literal
+from typing import ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from anysim.engine.options import EngineOptions
 
 
-class MujocoOptions(BaseModel):
+class MujocoOptions(EngineOptions):
     """Options of the engine `mujoco`, as in `engine: {name: mujoco, options: {threads: 4}}`."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    shaping: ClassVar[tuple[str, ...]] = ("integrator", "solver", "iterations", "tolerance", "jacobian")
 
     threads: int = Field(default=0, ge=0, description="threads that step envs; 0: one per env, at most one per CPU")
     integrator: Literal["implicitfast", "implicit", "euler"] = Field(
@@ -34,12 +36,3 @@ class MujocoOptions(BaseModel):
         """The threads to use for `num_envs` envs."""
         cpus = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         return self.threads or max(1, min(num_envs, cpus))
-
-    def trajectory_stamp(self) -> str:
-        """The options that change trajectories, where they differ from the defaults; else an empty string."""
-        shaping = ("integrator", "solver", "iterations", "tolerance", "jacobian")
-        defaults = type(self)()
-        changed = [
-            f"{name}={getattr(self, name)}" for name in shaping if getattr(self, name) != getattr(defaults, name)
-        ]
-        return ",".join(changed)

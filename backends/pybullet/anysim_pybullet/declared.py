@@ -1,15 +1,15 @@
-"""Declarations that need no PyBullet: capabilities, with measured errors, and availability."""
+"""Declarations of the engine that need no import of PyBullet: capabilities, with measured errors, and availability."""
 
-from functools import cache
-from importlib import metadata
-
-from anysim.engine.availability import judge
+from anysim.engine.availability import LibraryRequirement
 from anysim.engine.capability import Allowance, Capabilities, Capability
 from anysim.engine.lighting import LIGHTS
-from anysim.engine.state import Availability
 
-MINIMUM = (3, 2, 7)
-REMEDY = "pip install 'pybullet>=3.2.7'"
+LIBRARY = LibraryRequirement(
+    "pybullet",
+    minimum=(3, 2, 7),
+    lacks="is not what this backend was measured with",
+    remedy="pip install 'pybullet>=3.2.7'",
+)
 
 _APPROXIMATE = {
     Capability.CONTACTS: (
@@ -44,7 +44,7 @@ _APPROXIMATE = {
     ),
     Capability.CONTROL_VELOCITY: "computed in each step, as position control is",
 }
-_ABSENT = (Capability.LIVE_EDIT_NATIVE, Capability.SOLVER_SETTINGS)
+_ABSENT = (Capability.SOLVER_SETTINGS,)
 CAPABILITIES = Capabilities.of(
     *(c for c in Capability if c not in _APPROXIMATE and c not in _ABSENT), approximate=_APPROXIMATE
 )
@@ -78,17 +78,3 @@ PARAMETERS = frozenset(
 AUDIT_ALLOWANCES = {
     "volume": Allowance(0.001, "Bullet moves the corners of a hull by up to 1e-4 of its size: 0.05 % less volume")
 }
-
-
-@cache
-def installed_version() -> str:
-    """The version of the pybullet distribution, or an empty string."""
-    try:
-        return metadata.version("pybullet")
-    except metadata.PackageNotFoundError:
-        return ""
-
-
-def availability() -> Availability:
-    """See `SimEngine.availability`."""
-    return judge("pybullet", installed_version(), MINIMUM, "is not what this backend was measured with", {}, REMEDY)

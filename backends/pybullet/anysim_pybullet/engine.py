@@ -32,7 +32,7 @@ class PybulletEngine(SimEngine):
     @classmethod
     def availability(cls) -> Availability:
         """By the installed version alone; imports nothing."""
-        return declared.availability()
+        return declared.LIBRARY.availability()
 
     @classmethod
     def options_model(cls) -> type[PybulletOptions]:
@@ -44,12 +44,6 @@ class PybulletEngine(SimEngine):
         """Threads."""
         words = "one per process, it keeps the interpreter's lock: `shards` uses more"
         return (Finding("pybullet: threads", Health.NOTE, words),)
-
-    @property
-    def version(self) -> str:
-        """PyBullet's version, with the options that shape trajectories where they are not the defaults."""
-        stamp = self.options.trajectory_stamp()
-        return f"{declared.installed_version()} ({stamp})" if stamp else declared.installed_version()
 
     # ------------------------------------------------------------------ lifecycle
 

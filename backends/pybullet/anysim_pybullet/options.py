@@ -1,7 +1,10 @@
-"""Options of PyBullet, which mean nothing to another engine."""
+"""Options of PyBullet that mean nothing to another engine."""
 
-from pydantic import BaseModel, ConfigDict, Field
+from typing import ClassVar
 
+from pydantic import Field
+
+from anysim.engine.options import EngineOptions
 from anysim.model.world import Scenery, World
 
 BACKGROUND = (221 / 255, 230 / 255, 240 / 255)
@@ -9,10 +12,10 @@ AMBIENT = 0.35
 """What is drawn where the World says nothing."""
 
 
-class PybulletOptions(BaseModel):
+class PybulletOptions(EngineOptions):
     """Options of the engine `pybullet`, as in `engine: {name: pybullet, options: {iterations: 100}}`."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    shaping: ClassVar[tuple[str, ...]] = ("iterations", "residual", "contact_erp", "joint_erp")
 
     iterations: int | None = Field(
         default=None,
@@ -24,16 +27,6 @@ class PybulletOptions(BaseModel):
     contact_erp: float = Field(default=0.1, ge=0, le=1, description="share of a penetration that a step takes back")
     joint_erp: float = Field(default=0.2, ge=0, le=1, description="share of a limit's error that a step takes back")
     shadows: bool = Field(default=False, description="cast shadows in images; twice the time")
-
-    def trajectory_stamp(self) -> str:
-        """The options that change trajectories, where they differ from the defaults; else an empty string."""
-        defaults = type(self)()
-        changed = [
-            f"{name}={getattr(self, name)}"
-            for name in ("iterations", "residual", "contact_erp", "joint_erp")
-            if getattr(self, name) != getattr(defaults, name)
-        ]
-        return ",".join(changed)
 
 
 def sweeps(options: PybulletOptions, world: World) -> int:

@@ -1,16 +1,15 @@
-"""Declarations that need no SAPIEN: capabilities, with measured errors, and availability."""
+"""Declarations of the engine that need no import of SAPIEN: capabilities, with measured errors, and availability."""
 
-import platform
-import sys
-from functools import cache
-from importlib import metadata
-
-from anysim.engine.availability import judge
+from anysim.engine.availability import LibraryRequirement
 from anysim.engine.capability import Allowance, Capabilities, Capability
-from anysim.engine.state import Availability
 
-MINIMUM = (3, 0, 3)
-REMEDY = "pip install 'sapien>=3.0.3'"
+LIBRARY = LibraryRequirement(
+    "sapien",
+    minimum=(3, 0, 3),
+    lacks="has other joint frames and collision groups",
+    remedy="pip install 'sapien>=3.0.3'",
+    machines=("x86_64", "aarch64"),
+)
 
 _APPROXIMATE = {
     Capability.CONTACTS: "a cylinder is a prism of many sides: it rolls 11 % slower than a round one down 15 degrees",
@@ -39,7 +38,7 @@ _APPROXIMATE = {
     ),
     Capability.CONTACT_POINTS: "the friction of a pair, as sensors have it, is shared as the normal forces are",
 }
-_ABSENT = (Capability.LIVE_EDIT_NATIVE, Capability.RENDER_SHADOWS)
+_ABSENT = (Capability.RENDER_SHADOWS,)
 CAPABILITIES = Capabilities.of(
     *(c for c in Capability if c not in _APPROXIMATE and c not in _ABSENT), approximate=_APPROXIMATE
 )
@@ -51,21 +50,3 @@ AUDIT_ALLOWANCES = {
         "up to 6 % at 3 cm",
     )
 }
-
-
-@cache
-def installed_version() -> str:
-    """The version of the sapien distribution, or an empty string."""
-    try:
-        return metadata.version("sapien")
-    except metadata.PackageNotFoundError:
-        return ""
-
-
-def availability() -> Availability:
-    """See `SimEngine.availability`."""
-    lacks = "has other joint frames and collision groups"
-    here = judge("sapien", installed_version(), MINIMUM, lacks, {}, REMEDY)
-    if not here.version and sys.platform.startswith("linux") and platform.machine() not in ("x86_64", "aarch64"):
-        return here._replace(missing=(f"{here.missing[0]} and has no wheel for {platform.machine()}",))
-    return here

@@ -64,7 +64,7 @@ class SapienEngine(SimEngine):
     @classmethod
     def availability(cls) -> Availability:
         """By the installed version alone; imports nothing."""
-        return declared.availability()
+        return declared.LIBRARY.availability()
 
     @classmethod
     def options_model(cls) -> type[SapienOptions]:
@@ -82,12 +82,6 @@ class SapienEngine(SimEngine):
     def refusals(cls, world: World) -> Sequence[str]:
         """Pairs of surfaces and exclusions that PhysX' filters cannot tell apart."""
         return refusals(world)
-
-    @property
-    def version(self) -> str:
-        """SAPIEN's version, with the options that shape trajectories where they are not the defaults."""
-        stamp = self.options.trajectory_stamp()
-        return f"{declared.installed_version()} ({stamp})" if stamp else declared.installed_version()
 
     # ------------------------------------------------------------------ lifecycle
 

@@ -1,19 +1,27 @@
-"""Options of SAPIEN, which mean nothing to another engine."""
+"""Options of SAPIEN that mean nothing to another engine."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from anysim.engine.options import EngineOptions
 from anysim.model.world import Scenery
 
 OWN_SCENERY = Scenery((0.867, 0.902, 0.941), (0.35, 0.35, 0.35), False)
 """What is drawn where the World says nothing."""
 
 
-class SapienOptions(BaseModel):
+class SapienOptions(EngineOptions):
     """Options of the engine `sapien`, as in `engine: {name: sapien, options: {position_iterations: 30}}`."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    shaping: ClassVar[tuple[str, ...]] = (
+        "position_iterations",
+        "velocity_iterations",
+        "contact_offset",
+        "bounce_threshold",
+        "depenetration_velocity",
+        "rebase_steps",
+    )
 
     position_iterations: int = Field(
         default=30,
@@ -48,14 +56,3 @@ class SapienOptions(BaseModel):
         "default: SAPIEN's own materials, half a minute to the first image without a graphics card; "
         "auto: lit in software, else default",
     )
-
-    def trajectory_stamp(self) -> str:
-        """The options that change trajectories, where they differ from the defaults; else an empty string."""
-        defaults = type(self)()
-        drawing = ("vulkan_icd", "shader")
-        changed = [
-            f"{name}={getattr(self, name)}"
-            for name in type(self).model_fields
-            if name not in drawing and getattr(self, name) != getattr(defaults, name)
-        ]
-        return ",".join(changed)

@@ -80,10 +80,9 @@ def _engines(text: str | None, default: str) -> list[str]:
     if text is None:
         return [default]
     if text == "all":
-        from anysim import registry
-        from anysim.engine.factory import availability
+        from anysim.engine.factory import runnable
 
-        return [name for name in registry.names("engines") if availability(name).available]
+        return list(runnable())
     return [part.strip() for part in text.split(",") if part.strip()]
 
 

@@ -1,36 +1,71 @@
-"""Which versions of a library an engine may run on. By installed metadata alone: nothing heavy is imported."""
+"""Versions of a library that an engine can run on, judged by installed metadata alone: nothing heavy is imported."""
 
+import platform
 import re
+import sys
 from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import metadata
 
 from anysim.engine.state import Availability
 
 Version = tuple[int, ...]
 
 
-def judge(
-    package: str, version: str, minimum: Version, lacks: str, wrong: Mapping[Version, str], remedy: str
-) -> Availability:
-    """Whether the installed `version` (empty: none) of `package` will do.
+@dataclass(frozen=True)
+class LibraryRequirement:
+    """A library that an engine is built on, and the versions of it that will do.
 
-    Args:
+    Attributes:
         package: the distribution, as messages call it.
-        version: as `importlib.metadata.version` gives it.
-        minimum: the oldest that will do.
+        minimum: the oldest version that will do.
         lacks: what older ones are missing, as in `has no mujoco.batch`.
-        wrong: versions whose results cannot be trusted, and why.
         remedy: the command that installs a good one.
+        wrong: versions whose results cannot be trusted, and why.
+        machines: the kinds of machine that it has wheels for on Linux; empty where it can be built on any.
     """
-    if not version:
-        return Availability(False, "", (f"the package {package} is not installed",), remedy)
-    numbers = _numbers(version)
-    if numbers < _numbers(".".join(map(str, minimum))):
-        oldest = ".".join(map(str, minimum))
-        return Availability(False, version, (f"{package} {version} {lacks}: it is older than {oldest}",), remedy)
-    why = wrong.get(numbers)
-    if why is not None:
-        return Availability(False, version, (f"{package} {version} is unusable: {why}",), remedy)
-    return Availability(True, version)
+
+    package: str
+    minimum: Version
+    lacks: str
+    remedy: str
+    wrong: Mapping[Version, str] = field(default_factory=dict[Version, str])
+    machines: tuple[str, ...] = ()
+
+    def availability(self) -> Availability:
+        """Whether the installed version will do."""
+        return self.judge(installed_version(self.package))
+
+    def judge(self, version: str) -> Availability:
+        """Whether a version will do, as `importlib.metadata.version` gives it, or an empty string for none."""
+        if not version:
+            missing = f"the package {self.package} is not installed"
+            if self.machines and sys.platform.startswith("linux") and platform.machine() not in self.machines:
+                missing += f" and has no wheel for {platform.machine()}"
+            return Availability(False, "", (missing,), self.remedy)
+        numbers, oldest = _numbers(version), ".".join(map(str, self.minimum))
+        if numbers < _numbers(oldest):
+            missing = f"{self.package} {version} {self.lacks}: it is older than {oldest}"
+            return Availability(False, version, (missing,), self.remedy)
+        why = self.wrong.get(numbers)
+        if why is not None:
+            return Availability(False, version, (f"{self.package} {version} is unusable: {why}",), self.remedy)
+        return Availability(True, version)
+
+    def __str__(self) -> str:
+        """The versions that are taken, in words."""
+        refused = "; ".join(f"{'.'.join(map(str, numbers))}: {why}" for numbers, why in self.wrong.items())
+        return f"{'.'.join(map(str, self.minimum))} or newer" + (f"; refused: {refused}" if refused else "")
+
+
+@cache
+def installed_version(package: str) -> str:
+    """The version of a distribution, or an empty string."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return ""
 
 
 def _numbers(version: str) -> Version:

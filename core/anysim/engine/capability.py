@@ -1,4 +1,4 @@
-"""What an engine can do, and what a world needs. Negotiation fails closed: a mismatch is an error before the build."""
+"""Capabilities of engines and needs of worlds. Negotiation fails closed: a mismatch is an error before the build."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -50,7 +50,6 @@ class Capability(StrEnum):
     SNAPSHOT_TRAJECTORY = "snapshot: trajectory"
     VARYING_ENTITIES = "entities that vary by env"
     PARAMETERS_PER_ENV = "parameters per env"
-    LIVE_EDIT_NATIVE = "live add and remove without a rebuild"
     DYNAMICS = "dynamics"  # bodies fall; the null engine moves nothing by itself
 
 

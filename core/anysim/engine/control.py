@@ -1,4 +1,4 @@
-"""Commands persist until they are written again; wrenches last for one call. This buffer holds both for all engines."""
+"""Commands of all envs: targets persist until they are written again, wrenches last for one call."""
 
 from collections.abc import Mapping
 from math import isfinite

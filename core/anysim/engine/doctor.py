@@ -5,14 +5,12 @@ costs nothing but its own findings.
 """
 
 import json
-import signal
-import subprocess
-import sys
 from collections.abc import Iterable
 from enum import StrEnum
 from typing import NamedTuple
 
 from anysim import registry
+from anysim.engine.own_process import run_module
 from anysim.errors import AnysimError
 
 TIMEOUT_S = 180.0
@@ -78,18 +76,14 @@ def _package(name: str) -> str:
 def _try_apart(name: str, timeout: float) -> Examination:
     """The trial in its own process; its death or silence is a finding."""
     what = f"{name}: physics"
-    command = (sys.executable, "-m", "anysim.engine.doctor_trial", name)
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=False)
-    except subprocess.TimeoutExpired:
-        return _failed(what, Health.BROKEN, f"no answer within {timeout:g} s", "reinstall it, or look at its driver")
-    findings, works = _read(done.stdout.splitlines())
-    if done.returncode != 0:
-        words = "; ".join(done.stderr.strip().splitlines()[-3:])[-300:]
+    ended = run_module("anysim.engine.doctor_trial", name, limit=timeout)
+    findings, works = _read(ended.out.splitlines())
+    if ended.trouble:
+        words = "; ".join(["the process " + ended.trouble, *ended.err.strip().splitlines()[-3:]])[-300:]
         died = Finding(
             what if not findings else f"{name}: rendering",
             Health.BROKEN,
-            f"{_end(done.returncode)}: {words}",
+            words,
             f"reinstall {_package(name)}" if not findings else "look at the graphics driver; physics does not need it",
         )
         findings = (*findings, died)
@@ -109,9 +103,3 @@ def _read(lines: Iterable[str]) -> tuple[tuple[Finding, ...], bool]:
             works |= bool(document.pop("works"))
             findings.append(Finding(document["what"], Health(document["state"]), document["found"], document["remedy"]))
     return tuple(findings), works
-
-
-def _end(code: int) -> str:
-    if code < 0:
-        return f"the process died of {signal.Signals(-code).name}"
-    return f"the process ended with code {code}"

@@ -1,4 +1,4 @@
-"""`python -m anysim.engine.doctor_trial NAME`: let a ball fall and draw it on one engine, in this process.
+"""Trial of one engine in this process, `python -m anysim.engine.doctor_trial NAME`: a ball falls and is drawn.
 
 Prints one JSON document per finding as soon as it is known: what a crash leaves unprinted is what crashed.
 """

@@ -1,4 +1,4 @@
-"""What can be said about a World's drives before anything is built."""
+"""Checks of a World's drives before anything is built."""
 
 import warnings
 

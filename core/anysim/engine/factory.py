@@ -1,11 +1,12 @@
-"""Engines by name."""
+"""Engines by name: installed ones, those that can run here, and new simulations."""
 
 import os
+from contextlib import suppress
 from typing import Any, Literal
 
 from anysim import registry
 from anysim.engine.base import SimEngine
-from anysim.engine.capability import Capabilities
+from anysim.engine.capability import Capabilities, Capability
 from anysim.engine.state import Availability
 from anysim.errors import EngineError, PluginError
 
@@ -50,6 +51,19 @@ def availability(name: str) -> Availability:
             f"the engine '{name}' of {registry.distribution('engines', name)} does not know whether it can run here: "
             f"{type(error).__name__}: {error}"
         ) from error
+
+
+def runnable(*capabilities: Capability) -> tuple[str, ...]:
+    """The installed engines that can run here and have these capabilities, sorted; one that does not load is left out.
+
+    `anysim list engines` says why an engine is not among them.
+    """
+    found: list[str] = []
+    for name in registry.names("engines"):
+        with suppress(PluginError):
+            if availability(name).available and all(c in engine_class(name).capabilities for c in capabilities):
+                found.append(name)
+    return tuple(found)
 
 
 def create_simulation(

@@ -26,7 +26,7 @@ from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.world import BodyKind, ControlMode, JointType, Scenery, World
 
 _UNSEEN = Scenery(background=(0.0, 0.0, 0.0), ambient=(0.0, 0.0, 0.0), shadows=False)
-"""What nobody draws here."""
+"""Surroundings of an engine that does not draw."""
 
 _IGNORED = "ignored: kinematic engine"
 _POSITION, _VELOCITY = MODES.index(ControlMode.POSITION), MODES.index(ControlMode.VELOCITY)
@@ -109,7 +109,7 @@ class NullEngine(SimEngine):
         self._velocity[ids] = 0.0
 
     def _populate(self, ids: Array) -> None:
-        """Nothing touches or sees anything here, so nobody has to leave: what is absent moves unseen."""
+        """Nothing touches or sees anything here, so nothing has to leave: what is absent moves unseen."""
 
     # ------------------------------------------------------------------ stepping
 

@@ -14,6 +14,7 @@ from anysim.engine.capability import Allowance, Capabilities, Capability, Need, 
 from anysim.engine.control import CommandBuffer
 from anysim.engine.doctor import Finding
 from anysim.engine.drive_checks import check_drives
+from anysim.engine.options import EngineOptions
 from anysim.engine.presence import Lifecycle, Presence, write_present
 from anysim.engine.primitives import Primitives
 from anysim.engine.rebuild import Kept
@@ -85,8 +86,13 @@ class EngineLifecycle(Primitives):
 
     @property
     def version(self) -> str:
-        """The version of the physics engine, as it stamps snapshots."""
-        return self.availability().version
+        """The version of the physics engine, with the options that shape trajectories where they are not the defaults.
+
+        It stamps snapshots.
+        """
+        stamp = self.options.trajectory_stamp() if isinstance(self.options, EngineOptions) else ""
+        version = self.availability().version
+        return f"{version} ({stamp})" if stamp else version
 
     @property
     def world(self) -> World:

@@ -1,4 +1,4 @@
-"""What a backend writes: the primitives behind SimEngine's public methods.
+"""Primitives behind SimEngine's public methods, which a backend writes.
 
 Arguments arrive checked: ids and indices are unique int arrays in range, values are float64, finite and of the right
 shape. The names mean what the public methods of `anysim.engine.base.SimEngine` say.

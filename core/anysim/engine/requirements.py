@@ -1,99 +1,126 @@
-"""What a world needs of an engine, each need with the name that causes it."""
+"""Capabilities that a world needs of an engine, each with the name that causes it."""
 
+from collections.abc import Iterator
 from math import isfinite
 
 from anysim.compile.lights import DEFAULT_LIGHTS
-from anysim.engine.capability import Capability, Need
-from anysim.model.world import Actuation, BodyKind, ControlMode, HeightFieldShape, MeshShape, Plane, World
+from anysim.engine.capability import Capability as C, Need
+from anysim.model.world import (
+    Actuation,
+    Actuator,
+    Body,
+    BodyKind,
+    Camera,
+    ControlMode,
+    Geom,
+    HeightFieldShape,
+    Joint,
+    MeshShape,
+    Plane,
+    World,
+)
+
+Rows = tuple[tuple[C, object, str], ...]
+"""A capability, whether it is needed, and why, in words that follow the name of the thing."""
 
 
 def needs_of(world: World) -> list[Need]:
     """Every capability the world needs, once, with the first thing that needs it."""
-    found: dict[Capability, str] = {}
+    found: dict[C, str] = {}
+    for what, rows in _things(world):
+        for capability, needed, why in rows:
+            if needed:
+                found.setdefault(capability, f"{what} {why}".strip())
+    return [Need(capability, why) for capability, why in found.items()]
 
-    def need(capability: Capability, why: str) -> None:
-        found.setdefault(capability, why)
 
-    for body in world.bodies:
-        if body.kind is BodyKind.FREE:
-            need(Capability.RIGID_BODIES, f"body '{body.name}' is free")
-        elif body.kind is BodyKind.LINK:
-            need(Capability.ARTICULATIONS, f"body '{body.name}' is a link")
-        if body.gravity_compensation:
-            need(Capability.GRAVITY_COMPENSATION, f"body '{body.name}' is gravity compensated")
-        if any(body.damping):
-            need(Capability.BODY_DAMPING, f"body '{body.name}' is damped")
-        if body.solver is not None:
-            need(
-                Capability.SOLVER_SETTINGS,
-                f"body '{body.name}' has `solver` settings of its own; `engine.options` has those of a whole engine",
-            )
-    for joint in world.joints:
-        what = f"joint '{joint.name}'"
-        if joint.mimic is not None:
-            need(Capability.MIMIC_JOINTS, f"{what} follows '{world.joints[joint.mimic.joint].name}'")
-        if joint.friction > 0:
-            need(Capability.JOINT_FRICTION, f"{what} has dry friction")
-        if joint.armature > 0:
-            need(Capability.ARMATURE, f"{what} has armature")
-        if isfinite(joint.lower) or isfinite(joint.upper):
-            need(Capability.JOINT_LIMITS, f"{what} is limited")
-    for actuator in world.actuators:
-        capability = {
-            ControlMode.POSITION: Capability.CONTROL_POSITION,
-            ControlMode.VELOCITY: Capability.CONTROL_VELOCITY,
-            ControlMode.EFFORT: Capability.CONTROL_EFFORT,
-        }[actuator.mode]
-        need(capability, f"drive '{actuator.name}' is {actuator.mode} controlled")
-        if isfinite(actuator.effort_limit):
-            need(Capability.EFFORT_LIMITS, f"drive '{actuator.name}' is limited")
-    needed_by_mode = {
-        Actuation.EXPLICIT_PD: Capability.ACTUATION_EXPLICIT,
-        Actuation.NATIVE: Capability.ACTUATION_NATIVE,
-    }
-    if world.actuators and world.physics.actuation in needed_by_mode:
-        need(needed_by_mode[world.physics.actuation], f"physics.actuation is {world.physics.actuation}")
+def _things(world: World) -> Iterator[tuple[str, Rows]]:
+    """Everything in a world that may need a capability, by its name."""
+    yield from ((f"body '{body.name}'", _of_body(body)) for body in world.bodies)
+    yield from ((f"joint '{joint.name}'", _of_joint(world, joint)) for joint in world.joints)
+    yield from ((f"drive '{actuator.name}'", _of_drive(actuator)) for actuator in world.actuators)
+    if world.actuators:
+        yield "physics.actuation", _of_actuation(world.physics.actuation)
     if world.physics.velocity_limits:
         for actuator in world.actuators:
-            if isfinite(world.joints[actuator.joint].velocity_limit):
-                need(Capability.VELOCITY_LIMITS, f"drive '{actuator.name}' heeds its joint's velocity limit")
-    for geom in world.geoms:
-        what = f"geom '{geom.name}'"
-        if not geom.collides:
-            continue
-        need(Capability.CONTACTS, f"{what} collides")
-        if isinstance(geom.shape, Plane):
-            need(Capability.TERRAIN_PLANE, f"{what} is a plane")
-        elif isinstance(geom.shape, HeightFieldShape):
-            need(Capability.TERRAIN_HEIGHTFIELD, f"{what} is a height field")
-        elif isinstance(geom.shape, MeshShape) and geom.shape.concave:
-            need(
-                Capability.TERRAIN_TRIMESH,
-                f"{what} is a triangle mesh; `kind: heightfield` with the same `file` is its heights seen from above",
-            )
-        elif isinstance(geom.shape, MeshShape):
-            need(Capability.SHAPE_MESH, f"{what} is a mesh")
-        if geom.surface.restitution > 0:
-            need(Capability.RESTITUTION, f"{what} bounces")
-        if geom.surface.contact_offset is not None:
-            need(Capability.CONTACT_OFFSET, f"{what} has a contact offset")
-        if geom.surface.torsional:
-            need(Capability.TORSIONAL_FRICTION, f"{what} has torsional friction")
+            limited = isfinite(world.joints[actuator.joint].velocity_limit)
+            yield f"drive '{actuator.name}'", ((C.VELOCITY_LIMITS, limited, "heeds its joint's velocity limit"),)
+    yield from ((f"geom '{geom.name}'", _of_geom(geom)) for geom in world.geoms if geom.collides)
     for slot in world.slots:
-        need(Capability.VARYING_ENTITIES, f"'{slot.name}' is not the same in every env")
+        yield f"'{slot.name}'", ((C.VARYING_ENTITIES, True, "is not the same in every env"),)
     for sensor in world.contact_sensors:
-        need(Capability.CONTACT_SENSORS, f"contact sensor '{sensor.name}'")
-    shows = [camera.name for camera in world.cameras if "rgb" in camera.channels]
+        yield f"contact sensor '{sensor.name}'", ((C.CONTACT_SENSORS, True, ""),)
+    shows = next((camera.name for camera in world.cameras if "rgb" in camera.channels), None)
+    if shows is not None:
+        yield f"camera '{shows}'", _of_light(world)
+    yield from ((f"camera '{camera.name}'", _of_camera(world, camera)) for camera in world.cameras)
+
+
+def _of_body(body: Body) -> Rows:
+    own = "has `solver` settings of its own; `engine.options` has those of a whole engine"
+    return (
+        (C.RIGID_BODIES, body.kind is BodyKind.FREE, "is free"),
+        (C.ARTICULATIONS, body.kind is BodyKind.LINK, "is a link"),
+        (C.GRAVITY_COMPENSATION, body.gravity_compensation, "is gravity compensated"),
+        (C.BODY_DAMPING, any(body.damping), "is damped"),
+        (C.SOLVER_SETTINGS, body.solver is not None, own),
+    )
+
+
+def _of_joint(world: World, joint: Joint) -> Rows:
+    leader = "" if joint.mimic is None else world.joints[joint.mimic.joint].name
+    return (
+        (C.MIMIC_JOINTS, joint.mimic is not None, f"follows '{leader}'"),
+        (C.JOINT_FRICTION, joint.friction > 0, "has dry friction"),
+        (C.ARMATURE, joint.armature > 0, "has armature"),
+        (C.JOINT_LIMITS, isfinite(joint.lower) or isfinite(joint.upper), "is limited"),
+    )
+
+
+def _of_drive(actuator: Actuator) -> Rows:
+    return (
+        (C.CONTROL_POSITION, actuator.mode is ControlMode.POSITION, "is position controlled"),
+        (C.CONTROL_VELOCITY, actuator.mode is ControlMode.VELOCITY, "is velocity controlled"),
+        (C.CONTROL_EFFORT, actuator.mode is ControlMode.EFFORT, "is effort controlled"),
+        (C.EFFORT_LIMITS, isfinite(actuator.effort_limit), "is limited"),
+    )
+
+
+def _of_actuation(actuation: Actuation) -> Rows:
+    return (
+        (C.ACTUATION_EXPLICIT, actuation is Actuation.EXPLICIT_PD, f"is {actuation}"),
+        (C.ACTUATION_NATIVE, actuation is Actuation.NATIVE, f"is {actuation}"),
+    )
+
+
+def _of_geom(geom: Geom) -> Rows:
+    mesh, surface = isinstance(geom.shape, MeshShape), geom.surface
+    concave = isinstance(geom.shape, MeshShape) and geom.shape.concave
+    instead = "`kind: heightfield` with the same `file` is its heights seen from above"
+    return (
+        (C.CONTACTS, True, "collides"),
+        (C.TERRAIN_PLANE, isinstance(geom.shape, Plane), "is a plane"),
+        (C.TERRAIN_HEIGHTFIELD, isinstance(geom.shape, HeightFieldShape), "is a height field"),
+        (C.TERRAIN_TRIMESH, concave, f"is a triangle mesh; {instead}"),
+        (C.SHAPE_MESH, mesh and not concave, "is a mesh"),
+        (C.RESTITUTION, surface.restitution > 0, "bounces"),
+        (C.CONTACT_OFFSET, surface.contact_offset is not None, "has a contact offset"),
+        (C.TORSIONAL_FRICTION, surface.torsional, "has torsional friction"),
+    )
+
+
+def _of_light(world: World) -> Rows:
     several = len(world.lights) > 1 or any(light.position is not None for light in world.lights)
-    if shows and several and world.lights != DEFAULT_LIGHTS:
-        need(Capability.RENDER_LIGHTS, f"camera '{shows[0]}' shows {len(world.lights)} lights")
-    if shows and world.scenery.shadows:
-        need(Capability.RENDER_SHADOWS, f"camera '{shows[0]}' shows shadows")
-    for camera in world.cameras:
-        for channel in camera.channels:
-            need(Capability(f"render: {channel}"), f"camera '{camera.name}' gives {channel}")
-        if "rgb" in camera.channels and world.textures:
-            need(Capability.TEXTURES, f"camera '{camera.name}' sees the texture '{world.textures[0].name}'")
-        if "rgb" in camera.channels and world.materials:
-            need(Capability.MATERIALS, f"camera '{camera.name}' sees the material '{world.materials[0].name}'")
-    return [Need(capability, why) for capability, why in found.items()]
+    return (
+        (C.RENDER_LIGHTS, several and world.lights != DEFAULT_LIGHTS, f"shows {len(world.lights)} lights"),
+        (C.RENDER_SHADOWS, world.scenery.shadows, "shows shadows"),
+    )
+
+
+def _of_camera(world: World, camera: Camera) -> Rows:
+    rgb, texture, material = ("rgb" in camera.channels, world.textures[:1], world.materials[:1])
+    return (
+        *((C(f"render: {channel}"), True, f"gives {channel}") for channel in camera.channels),
+        (C.TEXTURES, rgb and texture, f"sees the texture '{texture[0].name if texture else ''}'"),
+        (C.MATERIALS, rgb and material, f"sees the material '{material[0].name if material else ''}'"),
+    )

@@ -1,4 +1,4 @@
-"""What flows through an engine: State out, control and snapshots in."""
+"""State, snapshots and measurements that an engine gives out."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

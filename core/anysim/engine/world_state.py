@@ -1,4 +1,4 @@
-"""WorldState: where everything is, by name. It goes between engines, versions and worlds, and is close, not exact.
+"""WorldState: poses, velocities and commands by name. It goes between engines and worlds, and is close, not exact.
 
 A `Snapshot` is exact and belongs to one engine and one world. A `WorldState` holds what every engine can read and
 write: who is there, poses and velocities, joints, commands, camera mounts, and the parameters that were changed.
@@ -14,7 +14,6 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine import snapshot_file
-from anysim.engine.exact_json import decode
 from anysim.engine.snapshot import row_numbers
 from anysim.errors import SnapshotError
 
@@ -132,7 +131,7 @@ class WorldState:
                     tree[f.name] = np.array(tree[f.name], dtype=dtype)
             for entry in tree["parameters"].values():
                 entry["values"] = np.array(entry["values"], dtype=float)
-            return cls._of(decode(tree, {}))
+            return cls._of(snapshot_file.decode(tree, {}))
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise SnapshotError(f"this JSON is no {JSON_FORMAT}: {error}") from error
 

@@ -1,4 +1,4 @@
-"""For tests and benchmarks of controllers of tools: worlds of one robot, a puppet without an engine, circles."""
+"""Worlds of one robot, a puppet without an engine, and circles, for tests and benchmarks of controllers of tools."""
 
 from collections.abc import Mapping
 from dataclasses import replace

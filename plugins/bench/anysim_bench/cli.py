@@ -163,12 +163,15 @@ def resets(
     engine holds of its library are printed on the way; the exit code is 1 where something grew.
     """
     from anysim.cli.output import print_json, print_table
-    from anysim_bench.resets import Sample, engines_that_vary, reset_cost
+    from anysim.engine.capability import Capability
+    from anysim.engine.factory import runnable
+    from anysim_bench.resets import Sample, reset_cost
 
     def tell(sample: Sample) -> None:
         typer.echo(f"  {sample.resets} resets: {_held(sample)}", err=True)
 
-    names = engines_that_vary() if engine == "all" else [name.strip() for name in engine.split(",")]
+    able = runnable(Capability.VARYING_ENTITIES)
+    names = list(able) if engine == "all" else [name.strip() for name in engine.split(",")]
     costs = []
     for name in names:
         typer.echo(f"resetting {name} {count:,} times…", err=True)

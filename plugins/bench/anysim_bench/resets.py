@@ -14,7 +14,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capability
-from anysim.errors import EngineError, PluginError
+from anysim.errors import EngineError
 from anysim.model.world import Slot, World
 
 SLOTS = 10
@@ -70,22 +70,6 @@ class ResetCost(NamedTuple):
     same_ms: float
     samples: tuple[Sample, ...]
     grown: tuple[str, ...]
-
-
-def engines_that_vary() -> list[str]:
-    """The installed engines that run here and whose entities can vary."""
-    from anysim import registry
-    from anysim.engine.factory import engine_class
-
-    found: list[str] = []
-    for name in registry.names("engines"):
-        try:
-            engine = engine_class(name)
-        except PluginError:
-            continue  # `anysim list engines` says why
-        if Capability.VARYING_ENTITIES in engine.capabilities and engine.availability().available:
-            found.append(name)
-    return found
 
 
 def changing_world() -> World:

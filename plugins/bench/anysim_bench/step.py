@@ -105,11 +105,10 @@ def panda_and_boxes() -> dict[str, Any]:
 
 def engines_with_raw_loop() -> list[str]:
     """The installed engines that can run here and have a loop of their own to compare with."""
-    from anysim import registry
     from anysim.engine.base import SimEngine
+    from anysim.engine.factory import engine_class, runnable
 
-    kinds = ((name, registry.load("engines", name)) for name in registry.names("engines"))
-    return [name for name, kind in kinds if kind.raw_loop is not SimEngine.raw_loop and kind.availability().available]
+    return [name for name in runnable() if engine_class(name).raw_loop is not SimEngine.raw_loop]
 
 
 def engine_cost(

@@ -1,7 +1,6 @@
 """The comparison: every layer on every engine, one after the other."""
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -9,8 +8,8 @@ from anysim import registry
 from anysim.api import compile_world
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capability
-from anysim.engine.factory import availability, create_simulation, engine_class
-from anysim.errors import EngineError, PluginError, listing, suggest
+from anysim.engine.factory import create_simulation, runnable
+from anysim.errors import EngineError, listing, suggest
 from anysim.model.world import World
 from anysim_parity.actuation import actuation_layer
 from anysim_parity.asset import asset_layer
@@ -141,13 +140,8 @@ def _measured(plan: _Plan, layer: str) -> Layer:
 
 
 def engines_here() -> tuple[str, ...]:
-    """The installed engines that can run here and have dynamics; one that does not load is none of them."""
-    found = []
-    for name in registry.names("engines"):
-        with suppress(PluginError):
-            if availability(name).available and Capability.DYNAMICS in engine_class(name).capabilities:
-                found.append(name)
-    return tuple(found)
+    """The installed engines that can run here and have dynamics."""
+    return runnable(Capability.DYNAMICS)
 
 
 def _engine(name: str, options: dict[str, Any]) -> SimEngine:

@@ -133,7 +133,7 @@ def test_the_package_and_availability_import_nothing_heavy(tmp_path):
         """
     import sys
     import anysim_mujoco, anysim_mujoco.declared
-    assert anysim_mujoco.declared.availability().available
+    assert anysim_mujoco.declared.LIBRARY.availability().available
     assert not {"mujoco", "OpenGL"} & set(sys.modules)
     """,
         tmp_path,
@@ -156,8 +156,8 @@ def test_availability_by_version(monkeypatch, version, available, word):
     """Known-bad and too old versions come with the remedy."""
     from anysim_mujoco import declared
 
-    monkeypatch.setattr(declared, "installed_version", lambda: version)
-    here = declared.availability()
+    monkeypatch.setattr("anysim.engine.availability.installed_version", lambda _: version)
+    here = declared.LIBRARY.availability()
     assert here.available is available
     assert word in " ".join(here.missing)
     assert ("pip install" in here.remedy) is not available

@@ -107,8 +107,8 @@ def test_quiet_gives_the_streams_back(capfd):
 )
 def test_availability(monkeypatch, version, missing):
     """A version that is missing or too old is said, with the remedy."""
-    monkeypatch.setattr(declared, "installed_version", lambda: version)
-    here = declared.availability()
+    monkeypatch.setattr("anysim.engine.availability.installed_version", lambda _: version)
+    here = declared.LIBRARY.availability()
     assert here.available == (missing is None)
     if missing:
         assert missing in here.missing[0]

@@ -4,9 +4,11 @@ import pytest
 from typer.testing import CliRunner
 
 from anysim.cli.main import app
-from anysim.engine.factory import availability
-from anysim.errors import EngineError, PluginError
-from anysim_bench.resets import Sample, changing_world, engines_that_vary, growth, reset_cost
+from anysim.engine.capability import Capability
+from anysim.engine.factory import runnable
+from anysim.errors import EngineError
+from anysim.testing.engines import require_engine
+from anysim_bench.resets import Sample, changing_world, growth, reset_cost
 
 RESETS = 300
 
@@ -20,12 +22,7 @@ def _sample(resets, **changes):
 @pytest.mark.parametrize("name", ["null", "mujoco", "pybullet", "sapien"])
 def test_nothing_grows(name):
     """Files, threads and handles stay; memory grows by less than the bound, after caches of bounded size are full."""
-    try:
-        here = availability(name)
-    except PluginError as error:
-        pytest.skip(str(error))
-    if not here.available:
-        pytest.skip(f"{name} cannot run here")
+    require_engine(name)
     cost = reset_cost(name, RESETS, 3)
     assert [what for what in cost.grown if not what.startswith("time")] == [], cost.samples
     assert cost.samples[-1].resets == RESETS
@@ -54,7 +51,7 @@ def test_too_few_resets_are_refused():
 
 
 def test_the_command_prints_a_verdict():
-    assert "null" in engines_that_vary()
+    assert "null" in runnable(Capability.VARYING_ENTITIES)
     done = CliRunner().invoke(app, ["bench", "resets", "--engine", "null", "--resets", "40", "-n", "2"])
     assert done.exit_code in (0, 1), done.output  # so few resets say little about time
     assert "P2" in done.output

@@ -6,13 +6,13 @@ from typing import Any
 
 import pytest
 
-from anysim import registry
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capabilities, Capability
 from anysim.engine.factory import create_simulation
 from anysim.engine.kinematic import NullEngine
 from anysim.errors import EngineError
 from anysim.model.world import Surface, World
+from anysim.testing.engines import require_engine
 from anysim_mujoco.engine import MujocoEngine
 from anysim_parity.contact import PROBES, contact_layer
 from anysim_parity.judge import outside
@@ -128,8 +128,7 @@ DECLARED = {
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_real_engine_is_right_or_says_what_it_is_wrong_by(engine: str) -> None:
-    if engine not in registry.names("engines"):
-        pytest.skip(f"{engine} is not installed")
+    require_engine(engine)
     layer = contact_layer({engine: lambda: create_simulation(engine)})
     assert not layer.refused
     assert all(engine in m.values for m in layer.measures)

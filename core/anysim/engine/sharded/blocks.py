@@ -1,4 +1,4 @@
-"""Which worker holds which envs, and how rows of several workers become one array again."""
+"""Blocks of envs by worker, and joins of the rows of several workers into one array."""
 
 import os
 from collections.abc import Iterable, Mapping, Sequence

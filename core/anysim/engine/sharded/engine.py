@@ -1,4 +1,4 @@
-"""Any engine as k worker processes: each steps a contiguous block of the envs, behind the same interface.
+"""Engine of k worker processes, of any kind: each steps a contiguous block of the envs, behind the same interface.
 
 Neither PyBullet nor SAPIEN lets threads step in parallel, so processes do. Commands and states go through shared
 memory, one short message to each worker and back makes a step. An env's results do not depend on the number of workers.

@@ -8,7 +8,6 @@ and the frozen World, over a socket pair that no other process can reach.
 import json
 import os
 import select
-import signal
 import socket
 import struct
 import subprocess
@@ -19,6 +18,7 @@ from multiprocessing.spawn import get_executable
 from typing import Any
 
 from anysim import errors
+from anysim.engine.own_process import how_it_ended
 from anysim.engine.sharded.parent_watch import Lifeline
 from anysim.errors import AnysimError, EngineError
 
@@ -130,10 +130,7 @@ class Worker:
         except subprocess.TimeoutExpired:
             self.kill()
             return "closed its connection and was killed"
-        if code >= 0:
-            return f"ended with exit code {code}"
-        name = signal.Signals(-code).name if -code in set(signal.Signals) else "unknown"
-        return f"was ended by signal {-code} ({name})"
+        return how_it_ended(code) or "ended with exit code 0"
 
     def part(self) -> None:
         """Ask it to end, without waiting."""

@@ -33,23 +33,14 @@ def picture(
       anysim picture pick_cube
       anysim picture my_world.yaml --engines mujoco,sapien -n 16 --seconds 1 --out world.png
     """
-    from anysim import registry
     from anysim.cli.output import working_on
     from anysim.engine.capability import Capability
-    from anysim.engine.factory import availability, engine_class
+    from anysim.engine.factory import runnable
     from anysim_parity.drawing import require_matplotlib
     from anysim_parity.world_pictures import pictures, sheet
 
     require_matplotlib("the picture needs matplotlib")
-    names = (
-        [name.strip() for name in engines.split(",")]
-        if engines
-        else [
-            name
-            for name in registry.names("engines")
-            if availability(name).available and Capability.RENDER_RGB in engine_class(name).capabilities
-        ]
-    )
+    names = [name.strip() for name in engines.split(",")] if engines else list(runnable(Capability.RENDER_RGB))
     file = Path(world)
     with working_on(f"drawing {world}"):
         found = pictures(

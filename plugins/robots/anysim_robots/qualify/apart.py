@@ -1,15 +1,13 @@
 """Qualify in a process of its own, with a time limit: whatever happens there is a row here."""
 
 import json
-import signal
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
 from anysim.assets.catalogue import load_robot, missing_source
 from anysim.engine.factory import availability
+from anysim.engine.own_process import run_module
 from anysim.errors import AnysimError
 from anysim_robots.qualify.result import CHECKS, Check, Qualification, from_data
 from anysim_robots.qualify.run import FULL, Durations
@@ -69,7 +67,7 @@ def qualify_apart(
             ),
             encoding="utf-8",
         )
-        cause, told = _run([sys.executable, "-m", "anysim_robots.qualify.worker", str(job)], limit)
+        cause, told = _run("anysim_robots.qualify.worker", str(job), limit)
         answer = json.loads(out.read_text(encoding="utf-8")) if out.is_file() else {}
     drawn = picture if picture is not None and picture.is_file() and not answer.get("undrawn") else None
     undrawn = "" if picture is None or drawn is not None else answer.get("undrawn") or cause
@@ -84,18 +82,10 @@ def qualify_apart(
     return Apart(Qualification(entry.spec.name, engine, version, "failed", (failed,)), drawn, undrawn)
 
 
-def _run(command: list[str], limit: float) -> tuple[str, list[str]]:
-    """What became of a process, and what it said on its way."""
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        try:
-            out, err = process.communicate(timeout=limit)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            out, _ = process.communicate()
-            return f"took longer than {limit:g} s and was stopped", out.split()
-    if process.returncode == 0:
-        return "", out.split()
-    last = next((line for line in reversed(err.splitlines()) if line.strip()), "")
-    if process.returncode < 0:
-        return f"its process died of {signal.Signals(-process.returncode).name}", out.split()
-    return f"its process ended with {process.returncode}: {last}", out.split()
+def _run(module: str, job: str, limit: float) -> tuple[str, list[str]]:
+    """What became of the process of a job, and what it said on its way."""
+    ended = run_module(module, job, limit=limit)
+    if not ended.trouble:
+        return "", ended.out.split()
+    last = next((f": {line}" for line in reversed(ended.err.splitlines()) if line.strip()), "")
+    return f"its process {ended.trouble}{last}", ended.out.split()

@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Any
 
-from anysim import registry
 from anysim.assets.catalogue import CatalogueEntry
 from anysim.errors import AnysimError
 from anysim_schemas.robot_model import RobotModelSpec
@@ -57,27 +56,9 @@ def reference(entry: CatalogueEntry) -> str:
 def engines() -> list[str]:
     """Installed engines that can run here and move things by forces, sorted."""
     from anysim.engine.capability import Capability
-    from anysim.engine.factory import availability, engine_class
+    from anysim.engine.factory import runnable
 
-    return [
-        name
-        for name in registry.names("engines")
-        if _loads(name)
-        and Capability.DYNAMICS in engine_class(name).capabilities.supported
-        and Capability.ARTICULATIONS in engine_class(name).capabilities.supported
-        and availability(name).available
-    ]
-
-
-def _loads(name: str) -> bool:
-    from anysim.engine.factory import engine_class
-    from anysim.errors import PluginError
-
-    try:
-        engine_class(name)
-    except PluginError:
-        return False
-    return True
+    return list(runnable(Capability.DYNAMICS, Capability.ARTICULATIONS))
 
 
 def is_file(name: str) -> bool:
