@@ -20,7 +20,7 @@ from anysim.api import compile_world, load
 from anysim.assets.catalogue import load_robot
 from anysim.controllers.robot import ControlledRobot
 from anysim.engine.factory import create_simulation
-from anysim.managers.robot import RobotManager
+from anysim.managers.action import ActionManager
 from anysim.managers.standard import standard_managers
 
 SIDE, SPEED, GATHER = 2.0, 0.6, 0.5  # [m], [m/s], [m/s^2]: less than controllers allow
@@ -131,18 +131,18 @@ def drive(robot: str, engine: str, *, side: float = SIDE, sign: float = 1.0, dt:
         simulation.reset()
         for manager in managers:
             manager.reset(envs)
-        robots = next(manager for manager in managers if isinstance(manager, RobotManager))
+        actions = next(manager for manager in managers if isinstance(manager, ActionManager))
         base = ControlledRobot(world, "robot")
         pieces = square(entry.vehicle.kind, 0.02, side, sign)
         action = np.concatenate([piece.action for piece in pieces])
         path = path_of(np.concatenate([piece.twist for piece in pieces]), 0.02)
-        settle = np.zeros((1, robots.action_dim))
+        settle = np.zeros((1, actions.dim))
         measured = []
         for k in range(-25, len(action)):
-            robots.act(settle if k < 0 else action[None, k], None)
-            for part, steps in enumerate(robots.schedule):
+            actions.act(settle if k < 0 else action[None, k], None)
+            for part, steps in enumerate(actions.schedule):
                 if part:
-                    robots.update(part)
+                    actions.update(part)
                 simulation.step(steps)
             if k >= -1:
                 pose = simulation.get_state().body_pose[0, base.root]

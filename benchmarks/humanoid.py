@@ -50,8 +50,7 @@ def row(engine: str) -> str:
     falls = int((np.abs(made.engine.get_state().body_pose[:, root, 2] - start[2]) > 0.1).sum())
     made.close()
     made = env(engine, "lipm_walk")
-    assert made.robots is not None
-    walk: Any = made.robots.slice_of("g1", "base").controller
+    walk: Any = made.actions.slice_of("g1", "base").controller
     planned, begin = walk.planned()[0], centre(walk)
     hold(made, np.array([0.2, 0.0, 0.0]), 10.0)
     end = made.engine.get_state().body_pose[0, root]

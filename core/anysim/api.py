@@ -1,4 +1,4 @@
-"""From a name or a file to a running env: load, compile, create, bind."""
+"""The way from a name or a file to a running env: load, compile, create, bind."""
 
 import json
 import os
@@ -151,8 +151,7 @@ def check_engine(loaded: LoadedRun, world: "World", engine: "type[SimEngine]", s
         SpecError: with file, line and column.
         CapabilityError: lists every need that the engine does not meet.
     """
-    from anysim.managers.requirements import check_run
-    from anysim.managers.standard import standard_managers
+    from anysim.managers.standard import check_run, standard_managers
 
     try:
         managers = standard_managers(loaded.spec, world, 1)
@@ -187,8 +186,7 @@ def _env(
     loaded: LoadedRun, world: "World", simulation: "SimEngine", num_envs: int, name: str, proposals: Any = None
 ) -> "TaskEnv":
     """An env on a fresh engine; the engine is destroyed if anything fails."""
-    from anysim.managers.requirements import check_run
-    from anysim.managers.standard import standard_managers
+    from anysim.managers.standard import check_run, standard_managers
     from anysim.task.env import TaskEnv
 
     try:

@@ -49,7 +49,7 @@ def test_an_effort_accelerates_by_the_mass_matrix(engine: str) -> None:
     """From rest, q(t) = M^-1 u t^2 / 2 for a short time."""
     with made(engine, 1, "joint_effort") as env:
         env.reset(seed=0)
-        robot = env.robots.slices[0].controller.robot  # type: ignore[union-attr]
+        robot = env.actions.slices[0].controller.robot
         u = np.array([0.05, 0.02])
         acceleration = np.linalg.solve(robot.kinematics.mass_matrix(np.zeros(2)), u)
         env.step(u[None])
@@ -174,10 +174,10 @@ def test_what_is_wrong_with_the_parameters_is_said(action: Any, words: str) -> N
 
 def test_pd_targets_go_back_to_actions() -> None:
     with made("null", 1, {"controller": "pd", "params": {"action_scale": 0.5, "offset": {"elbow": 0.2}}}) as env:
-        controller = env.robots.slices[0].controller  # type: ignore[union-attr]
+        controller = env.actions.slices[0].controller
         ids = np.array([0])
         targets = np.array([[0.25, -0.1]])
         assert np.allclose(controller.apply(controller.action_for(targets, ids), ids).position, targets)
     with made("null", 1, {"controller": "pd", "params": {"control_type": "T"}}) as env:
         with pytest.raises(TaskError, match="takes no joint positions"):
-            env.robots.slices[0].controller.action_for(targets, ids)  # type: ignore[union-attr]
+            env.actions.slices[0].controller.action_for(targets, ids)

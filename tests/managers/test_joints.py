@@ -17,7 +17,7 @@ from anysim.engine.capability import Capability
 from anysim.engine.factory import runnable
 from anysim.engine.kinematic import NullEngine
 from anysim.errors import SpecError
-from anysim.managers.joints import JointManager
+from anysim.managers.randomized_parameters import SceneParameterManager
 from anysim.model.world import Slot, World
 from anysim.randomization.streams import Streams
 from anysim.task.env import TaskEnv
@@ -258,7 +258,7 @@ def test_a_slot_has_the_joint_of_what_is_there() -> None:
     streams = Streams(3)
     streams.seed(0, np.arange(3))
     streams.begin(np.arange(3))
-    manager = JointManager().configure(spec, streams)
+    manager = SceneParameterManager().configure(spec, streams)
     manager.build(world)
     manager.bind(engine)
     manager.reset(np.arange(3))

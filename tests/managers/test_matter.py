@@ -10,7 +10,7 @@ import anysim
 from anysim.api import compile_world, load
 from anysim.engine.kinematic import NullEngine
 from anysim.errors import AssetError, SpecError
-from anysim.managers.scene import SceneManager
+from anysim.managers.object_parameters import SceneManager
 from anysim.model.world import Slot
 from anysim.randomization.streams import Streams
 from anysim.record.explain import explain

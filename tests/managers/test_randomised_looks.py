@@ -279,7 +279,7 @@ def test_a_camera_stands_in_the_scene_of_its_env() -> None:
     ) as env:
         env.reset(seed=0)
         before = env.engine.camera_poses("top")
-        env.managers[0].board.origin[1] = [3.0, 0.0, 0.5]
+        env.managers[0].episodes.origin[1] = [3.0, 0.0, 0.5]
         env.reset(seed=0)
         after = env.engine.camera_poses("top")
         assert np.allclose(after[:, :3] - before[:, :3], [[0.0, 0.0, 0.0], [3.0, 0.0, 0.5]])

@@ -71,7 +71,7 @@ def test_places_are_relative_to_the_origin_of_the_env() -> None:
     world, spec = varied()
     managers = standard_managers(spec, world, 2)
     layout = next(manager for manager in managers if manager.name == "layout")
-    layout.board.origin[1] = [5.0, -3.0, 0.0]
+    layout.episodes.origin[1] = [5.0, -3.0, 0.0]
     with NullEngine().create_world(world, 2) as engine:
         for manager in managers:
             manager.bind(engine)

@@ -5,7 +5,7 @@ from anysim.conventions import xyzw_from_wxyz
 from anysim.engine.control import Control
 from anysim.engine.state import State
 from anysim.errors import RecordError
-from anysim.managers.capture import interval
+from anysim.managers.camera import interval
 from anysim.model.world import Actuator, Body, BodyKind, Camera, ControlMode, Joint, JointType, World
 from anysim.record.episode import Episode
 from anysim.record.frame import state_digest, state_rows

@@ -76,8 +76,7 @@ def test_pushes_from_eight_sides_do_not_fell_it(engine: str) -> None:
 @pytest.mark.parametrize("engine", ENGINES)
 def test_it_balances_arms_that_somebody_else_moves(engine: str) -> None:
     made = env(engine, "default", arm="joint_position")
-    assert made.robots is not None
-    arm = made.robots.slice_of("g1", "arm").controller.channel
+    arm = made.actions.slice_of("g1", "arm").controller.channel
     start = pelvis(made)
     home = arm.robot.joint_pos(None)[0, arm.joint_columns]
     action = np.concatenate([np.zeros(6), home])
@@ -104,8 +103,7 @@ def centre(controller: LipmWalk) -> np.ndarray:
 @pytest.mark.parametrize("engine", ENGINES)
 def test_it_walks_where_it_planned(engine: str) -> None:
     made = env(engine, "lipm_walk")
-    assert made.robots is not None
-    controller = made.robots.slice_of("g1", "base").controller
+    controller = made.actions.slice_of("g1", "base").controller
     assert isinstance(controller, LipmWalk)
     start, planned, height = centre(controller), controller.planned()[0], pelvis(made)[0, 2]
     run(made, np.array([0.2, 0.0, 0.0]), 10.0)
@@ -146,8 +144,7 @@ def test_a_snapshot_of_a_step_continues_bit_for_bit() -> None:
 def test_it_reaches_with_both_hands_as_it_stands(engine: str) -> None:
     """`pink_ik` moves both arms as one problem, seen from a trunk that the balance lets lean and sag."""
     made = env(engine, "default", arm="pink_ik")
-    assert made.robots is not None
-    arm = made.robots.slice_of("g1", "arm").controller
+    arm = made.actions.slice_of("g1", "arm").controller
     start, robot = pelvis(made), arm.channel.robot
 
     def hands() -> np.ndarray:

@@ -27,11 +27,10 @@ def team(engine: str, num_envs: int) -> TaskEnv:
 
 def neutral(env: TaskEnv) -> np.ndarray:
     """What asks for nothing: where joints are commanded, the places that they have; else zero."""
-    assert env.robots is not None
     action = np.zeros((env.num_envs, env.action_dim))
     everyone = np.arange(env.num_envs)
     targets = env.engine.control.position
-    for s in env.robots.slices:
+    for s in env.actions.slices:
         try:
             action[:, s.start : s.stop] = s.controller.action_for(targets[:, s.controller.channel.actuators], everyone)
         except TaskError:

@@ -30,8 +30,7 @@ def test_trots_sidesteps_and_turns(robot: str, engine: str) -> None:
 def test_walks_with_an_arm(robot: str) -> None:
     with made(robot, "mujoco", 3) as env:
         walked = walk(env, np.array([[0.3, 0.0, 0.0], [0.0, 0.15, 0.0], [0.0, 0.0, 0.4]]), 5.0)
-        assert env.robots is not None
-        arm = env.robots.slice_of("robot", "arm").controller
+        arm = env.actions.slice_of("robot", "arm").controller
         arm.robot.see(env.engine.get_state())
         held = arm.robot.joint_pos(None)[:, arm.channel.joint_columns]
         assert np.abs(held - stand(env)[:, 3 : 3 + held.shape[1]]).max() < 0.1, "the arm is held"
@@ -59,8 +58,8 @@ def off_home(env, seconds: float) -> float:
     """How far [rad] a joint of the legs came off home."""
     env.reset(seed=0)
     action, worst = stand(env), 0.0
-    robot = env.robots.slices[0].controller.robot
-    legs = env.robots.slices[0].controller.channel.joint_columns
+    robot = env.actions.slices[0].controller.robot
+    legs = env.actions.slices[0].controller.channel.joint_columns
     for _ in range(round(seconds / 0.02)):
         env.step(action)
         joints = env.engine.get_state().joint_pos[0, robot.joints]

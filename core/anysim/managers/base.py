@@ -1,43 +1,97 @@
-"""The lifecycle that every manager has.
+"""The lifecycle that every manager has, and what all managers of an env share.
 
-    configure(spec, streams, board)  ->  build(world)  ->  parameters()  ->  bind(engine)  ->  reset(env_ids)
-                              ->  before_step(...) / after_step()  ->  snapshot(env_ids) / restore(env_ids, data)
+    configure(spec, streams, episodes)  ->  build(world)  ->  parameters()  ->  bind(engine)  ->  reset(env_ids)
+                              ->  snapshot(env_ids) / restore(env_ids, data)
 
 A manager owns its slice of the state and nothing else; managers never call each other. What one of them decides and
-others need stands on the `Board`, on which each thing has one writer. `RESET_ORDER` is the one place that says who
-comes before whom.
+others need stands in `Episodes`, where each array has one writer, or in the engine. `RESET_ORDER` is the one place that
+says which manager comes before which.
 """
 
 from abc import ABC
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
+
+import numpy as np
+from pydantic import BaseModel
 
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
+from anysim.engine.parameters import PARAMETERS
 from anysim.errors import TaskError
-from anysim.managers.board import Board
 from anysim.model.world import World
+from anysim.randomization.draw import is_random
 from anysim.randomization.streams import Streams
 from anysim_schemas.run import RunSpec
 
-if TYPE_CHECKING:
-    from anysim.managers.overrides import Overridable
+WORLD = "world."
 
 RESET_ORDER = (
     "terrain",
     "population",
     "layout",
     "scene",
-    "joints",
-    "physics",
+    "parameters",
     "robot",
+    "action",
     "light",
     "camera",
     "capture",
     "task",
 )
-"""The ground first, then who is there, where it is, what it is like, how its joints stand and what pulls at it, then
-who moves, what shines and who looks, and the task last, on the settled scene."""
+"""The ground first, then what is there, where it is and what it is like, how its joints stand and what pulls at it,
+then the robots and what their drives hold, the lights and the cameras, and the task last, on the settled scene."""
+
+
+class Overridable(NamedTuple):
+    """A value of the spec that may be set for one episode.
+
+    Attributes:
+        source: dotted path in the spec, with `world.` where it is there.
+        holder: the part of the spec that the value belongs to, which also says what values there may be.
+        key: its key in the holder.
+        parameters: what an engine must be able to change for it.
+        midway: whether it can change in the middle of an episode.
+    """
+
+    source: str
+    holder: BaseModel
+    key: str
+    parameters: tuple[str, ...] = ()
+    midway: bool = False
+
+    @property
+    def path(self) -> str:
+        """As users write it: `objects.cube.friction`."""
+        return self.source.removeprefix(WORLD)
+
+
+def drawn(source: str, holder: BaseModel, keys: Iterable[str]) -> list[Overridable]:
+    """Keys of a part of the spec that are drawn at a reset alone, or constants that pass through `draw`.
+
+    They need no code of their own: where a path is overridden, `anysim.randomization.draw.draw` gives that value
+    instead, and no other draw moves.
+    """
+    return [Overridable(f"{source}.{key}", holder, key) for key in keys]
+
+
+def random_fields(source: str, holder: BaseModel, keys: Iterable[str] | None = None) -> list[Overridable]:
+    """Those keys of a part of the spec, or of all of them, that are drawn at a reset."""
+    chosen = type(holder).model_fields if keys is None else keys
+    return drawn(source, holder, [key for key in chosen if is_random(getattr(holder, key))])
+
+
+class Episodes:
+    """The present episodes of all envs, as several managers need to know them.
+
+    Attributes:
+        origin: (N, 3) [m] where an env's scene stands on the ground; the terrain manager writes it.
+        elapsed: (N,) control steps since an env's reset; the env's loop writes it.
+    """
+
+    def __init__(self, num_envs: int) -> None:
+        self.origin = np.zeros((num_envs, 3))
+        self.elapsed = np.zeros(num_envs, dtype=np.int64)
 
 
 class Manager(ABC):
@@ -46,14 +100,14 @@ class Manager(ABC):
     name: ClassVar[str]
     spec: RunSpec
     streams: Streams
-    board: Board
+    episodes: Episodes
     engine: SimEngine
 
-    def configure(self, spec: RunSpec, streams: Streams, board: Board | None = None) -> Self:
-        """Take the spec; check what can be checked without a world. Managers of one env share streams and board."""
+    def configure(self, spec: RunSpec, streams: Streams, episodes: Episodes | None = None) -> Self:
+        """Take the spec; check what can be checked without a world. Managers of one env share streams and episodes."""
         self.spec = spec
         self.streams = streams
-        self.board = Board(streams.num_envs) if board is None else board
+        self.episodes = Episodes(streams.num_envs) if episodes is None else episodes
         return self
 
     def build(self, world: World) -> None:
@@ -75,10 +129,10 @@ class Manager(ABC):
         """Before the reset that replays a recorded episode: what the record holds and no stream can give again."""
 
     def reset(self, env_ids: Array) -> None:
-        """Write the initial state of these envs, from their streams."""
+        """Write the initial state of these envs, from their streams; their `episodes.elapsed` is 0 already."""
 
-    def overridable(self) -> Sequence["Overridable"]:
-        """The values of the spec that may be overridden for an episode: see `anysim.managers.overrides`."""
+    def overridable(self) -> Sequence[Overridable]:
+        """The values of the spec that may be overridden for an episode."""
         return ()
 
     def override(self, path: str, value: Any, env_ids: Array) -> None:
@@ -88,15 +142,18 @@ class Manager(ABC):
     def revert(self, path: str, env_ids: Array) -> None:
         """An episode in which `path` was overridden is over: what `reset` does not write anew is as built again."""
 
-    def before_step(self, env_ids: Array | None) -> None:
-        """Before the physics steps of a control step; `env_ids` None means all envs."""
-
-    def after_step(self, env_ids: Array | None) -> None:
-        """After the physics steps of a control step."""
-
     def snapshot(self, env_ids: Array) -> dict[str, Array]:
         """Copies of the manager's own state, arrays with a leading env axis."""
         return {}
 
     def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
         """Write what `snapshot` returned."""
+
+
+def revert(engine: SimEngine, parameters: Iterable[str], env_ids: Array, indices: Mapping[str, Array]) -> None:
+    """Give parameters the values back that the World gives; `indices` says where, by what a parameter belongs to."""
+    for name in parameters:
+        which = indices[PARAMETERS[name].target]
+        if len(which):
+            rows = engine.built_parameters(name)[which]
+            engine.set_parameters(name, np.broadcast_to(rows, (len(env_ids), *rows.shape)), env_ids, which)

@@ -9,9 +9,8 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.errors import TaskError
 from anysim.geometry.convex_parts import Solid, row_of
-from anysim.managers.base import Manager
-from anysim.managers.layout_proposals import ProposalSource
-from anysim.managers.overrides import WORLD, Overridable, drawn
+from anysim.managers.base import WORLD, Manager, Overridable, drawn
+from anysim.managers.layout_proposals import ProposalSource, Proposed
 from anysim.math import pose as P
 from anysim.model.slots import is_robot
 from anysim.model.world import BodyKind, Slot, World
@@ -33,8 +32,8 @@ class LayoutManager(Manager):
 
     name = "layout"
 
-    def __init__(self, proposals: Any = None) -> None:
-        """`proposals` are poses by somebody else, or who gives them, as in `anysim.make`; they win over the spec's."""
+    def __init__(self, proposals: Proposed | None = None) -> None:
+        """`proposals` are poses by somebody else, as in `anysim.make`; they win over the spec's."""
         self._proposals = proposals
 
     def recall(self, env: int, drawn: Mapping[str, Any]) -> None:
@@ -44,9 +43,8 @@ class LayoutManager(Manager):
     def build(self, world: World) -> None:
         self._world = world
         source = self.spec.world.layout_source
-        self._source = (
-            ProposalSource(source, self._proposals) if source is not None or self._proposals is not None else None
-        )
+        given = self._proposals if self._proposals is not None or source is None else source.proposal
+        self._source = None if given is None else ProposalSource(given, source)
         content = self.spec.world
         self._context = PlacementContext(world, content.regions)
         self._clearance = ClearanceQuery(world)
@@ -113,7 +111,7 @@ class LayoutManager(Manager):
 
     def _rows(self, env: int, presence: Array) -> Array:
         """The poses (K, 7) of the bodies that are written, in one env."""
-        origin = self.board.origin[env]
+        origin = self.episodes.origin[env]
         there = {item.name: next((e for e in item.entities if presence[e]), None) for item in self._context.items}
         try:
             found = self._plan(env, there)
@@ -135,7 +133,7 @@ class LayoutManager(Manager):
 
     def _plan(self, env: int, there: Mapping[str, int | None]) -> dict[str, Candidate]:
         """A place for each listed item that is there."""
-        x, y, z = (float(v) for v in self.board.origin[env])
+        x, y, z = (float(v) for v in self.episodes.origin[env])
         origin = (x, y, z)
         tasks: list[PlacementTask] = []
         middles: dict[str, NominalSampler] = {}

@@ -1,4 +1,4 @@
-"""Where proposals come in: asked for once an episode, noted in its record, and set aside where they cannot be kept.
+"""Proposals of poses: asked for once an episode, noted in its record, and set aside where they cannot be kept.
 
 A recorded episode is replayed from the poses in its record; neither file nor proposer is needed then.
 """
@@ -27,20 +27,25 @@ STREAM = "layout/proposal"
 REFUSED = "layout/proposal_refused"
 
 
+Proposed = Path | str | Proposal | Mapping[str, Any] | list[Any] | Proposer
+"""Poses by somebody else: proposals as data or JSON text, a JSON file, a callable that gives them, or the name of an
+installed one."""
+
+
 class ProposalSource:
     """Takes proposals for all envs."""
 
     path = "world.layout_source"
 
-    def __init__(self, source: LayoutSourceSpec | None, given: Any) -> None:
-        """`given` is a path, a proposer, or what a proposer gives; where None, `source` says who is asked."""
-        self.bounds = RepairSpec() if source is None else source.repair
-        self.falls_back = source is not None and source.on_refusal == "layout"
-        self._from = source.proposal if given is None and source is not None else given
+    def __init__(self, given: Proposed, spec: LayoutSourceSpec | None) -> None:
+        """`given` is not looked at before it is needed, but for a file that is there; `spec` has the bounds."""
+        self.bounds = RepairSpec() if spec is None else spec.repair
+        self.falls_back = spec is not None and spec.on_refusal == "layout"
+        self._given = given
         self._ready: tuple[Proposal, ...] | Proposer | None = None
         self._recalled: dict[int, Any] = {}
-        if isinstance(self._from, Path) and self._from.is_file():
-            self._ready = read_file(self._from, f"{self.path}.proposal")
+        if isinstance(given, Path) and given.is_file():
+            self._ready = read_file(given, f"{self.path}.proposal")
 
     def recall(self, env: int, drawn: Mapping[str, Any]) -> None:
         """The next reset of this env takes what a record holds."""
@@ -89,16 +94,14 @@ class ProposalSource:
         return parsed(self._ready(request()), f"what '{_name(self._ready)}' gives", self.path)
 
     def _found(self) -> tuple[Proposal, ...] | Proposer:
-        source = self._from
-        if isinstance(source, str) and source.lstrip()[:1] in ("{", "["):
-            return parsed(source, "what was given to make()", self.path)
-        if isinstance(source, str) and not source.endswith(".json"):
-            source = registry.load("layouts", source)
-        if callable(source):
-            return source
-        if isinstance(source, str | Path):
-            return read_file(Path(source), f"{self.path}.proposal")
-        return parsed(source, "what was given to make()", self.path)
+        given = self._given
+        if isinstance(given, str) and given.lstrip()[:1] not in ("{", "["):
+            given = Path(given) if given.endswith(".json") else registry.load("layouts", given)
+        if callable(given):
+            return given
+        if isinstance(given, Path):
+            return read_file(given, f"{self.path}.proposal")
+        return parsed(given, "what was given to make()", self.path)
 
 
 def _name(proposer: Proposer) -> str:

@@ -1,32 +1,68 @@
-"""The managers that every env has."""
+"""The managers that every env has, and what they ask of an engine, checked before anything is built."""
 
-from typing import Any
+from collections.abc import Callable, Iterable
 
-from anysim.managers.base import Manager
-from anysim.managers.board import Board
-from anysim.managers.camera import CameraManager
-from anysim.managers.capture import CaptureManager
-from anysim.managers.joints import JointManager
+from anysim.engine.base import SimEngine
+from anysim.engine.capability import Need, check
+from anysim.engine.requirements import needs_of
+from anysim.managers.action import ActionManager
+from anysim.managers.base import Episodes, Manager
+from anysim.managers.camera import CameraManager, CaptureManager
 from anysim.managers.layout import LayoutManager
-from anysim.managers.light import LightManager
-from anysim.managers.physics import PhysicsManager
+from anysim.managers.layout_proposals import Proposed
+from anysim.managers.object_parameters import SceneManager
 from anysim.managers.population import PopulationManager
-from anysim.managers.robot import RobotManager
-from anysim.managers.scene import SceneManager
+from anysim.managers.randomized_parameters import LightManager, SceneParameterManager
+from anysim.managers.robot_reset import RobotResetManager
 from anysim.managers.terrain import TerrainManager
 from anysim.model.world import World
 from anysim.randomization.streams import Streams
 from anysim_schemas.run import RunSpec
 
 
-def standard_managers(spec: RunSpec, world: World, num_envs: int, proposals: Any = None) -> list[Manager]:
+def standard_managers(spec: RunSpec, world: World, num_envs: int, proposals: Proposed | None = None) -> list[Manager]:
     """Configured and built, sharing one set of streams. `proposals` is what `make` takes for poses."""
-    streams, board = Streams(num_envs), Board(num_envs)
+    streams, episodes = Streams(num_envs), Episodes(num_envs)
     managers: list[Manager] = [
-        TerrainManager(), PopulationManager(), LayoutManager(proposals), SceneManager(), JointManager(),
-        PhysicsManager(), RobotManager(), LightManager(), CameraManager(), CaptureManager(),
+        TerrainManager(), PopulationManager(), LayoutManager(proposals), SceneManager(), SceneParameterManager(),
+        RobotResetManager(), ActionManager(), LightManager(), CameraManager(), CaptureManager(),
     ]  # fmt: skip
     for manager in managers:
-        manager.configure(spec, streams, board)
+        manager.configure(spec, streams, episodes)
         manager.build(world)
     return managers
+
+
+def unchangeable(
+    engine: type[SimEngine] | SimEngine, managers: Iterable[Manager], place: Callable[[str], str] = str
+) -> list[str]:
+    """A sentence for each parameter that a manager will change and the engine cannot; managers are built already.
+
+    `place` gives `file:line:column` for a dotted path of the spec, or the path itself where it is not known.
+    """
+    reasons: dict[str, None] = {}
+    for manager in managers:
+        for parameter, path in manager.parameters():
+            if parameter not in engine.parameters:
+                where = place(path)
+                at = f" ({where})" if where and where != path else ""
+                reasons[f"{path}{at} differs between envs, and {engine.name} cannot change '{parameter}' per env"] = (
+                    None
+                )
+    return list(reasons)
+
+
+def check_run(
+    engine: type[SimEngine] | SimEngine,
+    world: World,
+    managers: Iterable[Manager],
+    source: str,
+    place: Callable[[str], str] = str,
+) -> list[Need]:
+    """Refuse a world, and what its managers will do with it, in one error; returns the needs met approximately.
+
+    Raises:
+        CapabilityError: lists every need that the engine does not meet.
+    """
+    refusals = [*engine.refusals(world), *unchangeable(engine, managers, place)]
+    return check(engine.name, engine.capabilities, needs_of(world), source, refusals)

@@ -64,7 +64,7 @@ LEVEL = "terrain/level"
 
 
 class TerrainManager(Manager):
-    """Chooses tiles and writes `board.origin`; draws colours of ground and room. Geometry is part of the World."""
+    """Chooses tiles and writes `episodes.origin`; draws colours of ground and room. Geometry is part of the World."""
 
     name = "terrain"
 
@@ -122,7 +122,7 @@ class TerrainManager(Manager):
         if self.tiled:
             for env in env_ids:
                 self._choose(int(env))
-            self.board.origin[env_ids] = self._origins[self.level[env_ids], self.column[env_ids]]
+            self.episodes.origin[env_ids] = self._origins[self.level[env_ids], self.column[env_ids]]
         for look in self._looks:
             drawn = [draw(look.color, look.stream, self.streams, int(e), source=look.source) for e in env_ids]
             rows = np.array([[[*rgb(color), 1.0]] for color in drawn])
@@ -158,9 +158,9 @@ class TerrainManager(Manager):
             "level": self.level[env_ids],
             "column": self.column[env_ids],
             "change": self._change[env_ids],
-            "origin": self.board.origin[env_ids],
+            "origin": self.episodes.origin[env_ids],
         }
 
     def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
         self.level[env_ids], self.column[env_ids] = data["level"], data["column"]
-        self._change[env_ids], self.board.origin[env_ids] = data["change"], data["origin"]
+        self._change[env_ids], self.episodes.origin[env_ids] = data["change"], data["origin"]

@@ -68,7 +68,6 @@ class EpisodeResult:
 
 def run_header(env: TaskEnv, seed: int) -> RunHeader:
     """What all trajectories of a run of this env have in common."""
-    assert env.robots is not None
     action = list(env.action_spaces.labels)
     example = {group: np.zeros(size, np.float32) for group, size in env.observation_sizes.items()}
     world = env.engine.world
@@ -92,7 +91,6 @@ class Collector:
         """Run `episodes` in all, shared out as evenly as can be: env i runs one of every N."""
         self.env, self.policy, self.seed = env, policy, seed
         record = env.spec.record
-        assert env.capture is not None  # every env that `anysim.make` makes has one
         self.recorder = Recorder(out, writer_factory(record.writer, record.options), run_header(env, seed))
         self._capture = env.capture
         self._share = np.array([len(range(i, episodes, env.num_envs)) for i in range(env.num_envs)])

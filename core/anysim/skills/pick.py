@@ -54,10 +54,9 @@ class Pick(Skill):
     ) -> None:
         """`hover` [m] is the height of the approach; speeds [m/s] are of the tool; `phase_steps` bounds each move."""
         super().__init__(env)
-        assert env.robots is not None
         self._object, self._goal, self._robot = object, goal, robot
         self._tool = robot.tool(tool)
-        self._arm, self._eef = env.robots.slice_of(robot.name, "arm"), env.robots.slice_of(robot.name, "eef")
+        self._arm, self._eef = env.actions.slice_of(robot.name, "arm"), env.actions.slice_of(robot.name, "eef")
         self._chain = Chain.from_world(env.engine.world, robot.name, "arm", tool)
         self._solver = inverse_kinematics(self._chain, solver)
         self._dt = env.engine.world.physics.control_dt

@@ -1,21 +1,20 @@
 """TaskEnv: the loop. No autoreset here; gymnasium's modes and other dialects are views on it."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
 from anysim import hooks
+from anysim.controllers.action_space import ActionSpaces
 from anysim.conventions import Array
 from anysim.engine import arguments
 from anysim.engine.base import SimEngine
 from anysim.errors import TaskError
-from anysim.managers.action_space import ActionSpaces
+from anysim.managers.action import ActionManager
 from anysim.managers.base import RESET_ORDER, Manager
-from anysim.managers.capture import CaptureManager
-from anysim.managers.robot import RobotManager
+from anysim.managers.camera import CaptureManager
 from anysim.managers.terrain import TerrainManager
-from anysim.randomization.streams import Streams
 from anysim.task.contract import FAILED, RUNNING, STATUS_NAMES, SUCCESS, TRUNCATED, Obs, StepResult
 from anysim.task.overrides import Counterfactuals
 from anysim.task.scene import SceneView
@@ -23,6 +22,7 @@ from anysim.task.snapshot import EnvSnapshot, refuse_foreign, spec_hash
 from anysim.task.terms_runtime import Mdp
 from anysim_schemas.run import RunSpec
 
+_Kind = TypeVar("_Kind", bound=Manager)
 Overriding = Mapping[str, Any] | Sequence[Mapping[str, Any]] | None
 """Values by dotted path, for all envs alike or for each."""
 
@@ -40,24 +40,19 @@ class TaskEnv:
             raise TaskError("this file has no `task`; a world alone can be run through `create_simulation`")
         self.spec, self.engine, self.name = spec, engine, name
         self.num_envs = engine.num_envs
-        self.streams = managers[0].streams if managers else Streams(self.num_envs)
-        self.scene = SceneView(engine)
         order = {manager: place for place, manager in enumerate(RESET_ORDER)}
         self.managers = sorted(managers, key=lambda m: order[m.name])
         for manager in self.managers:
             manager.bind(engine)
-        if self.managers:
-            self.scene.origin = self.managers[0].board.origin
-            self.scene.terrain = next((m for m in self.managers if isinstance(m, TerrainManager)), None)
-        self.robots = next((m for m in self.managers if isinstance(m, RobotManager)), None)
-        self.capture = next((m for m in self.managers if isinstance(m, CaptureManager)), None)
-        self.action_dim = 0 if self.robots is None else self.robots.action_dim
+        self.streams, self._episodes = self.managers[0].streams, self.managers[0].episodes
+        self.actions, self.capture = self._manager(ActionManager), self._manager(CaptureManager)
+        self.action_dim = self.actions.dim
+        self.scene = SceneView(engine, self._episodes, self._manager(TerrainManager))
         self.scene.action_columns = {name: slice(s.start, s.stop) for name, s in self.action_spaces.items()}
         self.mdp = Mdp(spec.task, self.scene, self.streams)
         self.scene.last_action = np.zeros((self.num_envs, self.action_dim))
         self.counterfactuals = Counterfactuals(self.managers, self.mdp, engine, self.streams)
         self._task = spec.task
-        self._substeps = engine.world.physics.substeps
         self._code = np.full(self.num_envs, -1, dtype=np.int8)  # -1: never reset
         self._fault = np.zeros(self.num_envs, dtype=bool)
         self._success = np.zeros(self.num_envs, dtype=bool)
@@ -67,23 +62,24 @@ class TaskEnv:
         self.scene.look(None)
         self.observation_sizes = {group: rows.shape[1] for group, rows in self.mdp.observe().items()}
         """Components of each observation group."""
-        self.image_shapes = {} if self.capture is None else self.capture.image_shapes
+        self.image_shapes = self.capture.image_shapes
         """The shape of each observed image, by `images/CAMERA`."""
         self._hooks.after_build(env=self)
+
+    def _manager(self, kind: type[_Kind]) -> _Kind:
+        return next(manager for manager in self.managers if isinstance(manager, kind))
 
     # ------------------------------------------------------------------ facts
 
     @property
     def action_bounds(self) -> tuple[Array, Array]:
         """Lower and upper bounds (A,) of the action."""
-        if self.robots is None:
-            return np.zeros(0), np.zeros(0)
-        return self.robots.action_low.copy(), self.robots.action_high.copy()
+        return self.actions.low.copy(), self.actions.high.copy()
 
     @property
     def action_spaces(self) -> ActionSpaces:
         """What each channel takes, by `robot.channel`, in the order of the flat action."""
-        return ActionSpaces({}) if self.robots is None else self.robots.spaces
+        return self.actions.spaces
 
     @property
     def obs(self) -> Obs:
@@ -137,10 +133,10 @@ class TaskEnv:
         self.streams.begin(ids, episode_seeds)
         self.counterfactuals.begin(ids, plan)
         self.engine.reset(ids)
+        self._episodes.elapsed[ids] = 0
         for manager in self.managers:
             manager.reset(ids)
         self.counterfactuals.settle(ids, plan)
-        self.scene.elapsed[ids] = 0
         self.scene.last_action[ids] = 0.0
         self._code[ids], self._fault[ids], self._success[ids] = RUNNING, False, False
         self.scene.meet()
@@ -168,7 +164,7 @@ class TaskEnv:
     def _observe(self, ids: Array | None) -> Obs:
         """All groups and images of all envs, or of those in `ids`."""
         rows = self.mdp.observe()
-        if self.image_shapes and self.capture is not None:
+        if self.image_shapes:
             rows |= self.capture.observe(np.arange(self.num_envs) if ids is None else ids)
         return rows
 
@@ -202,20 +198,15 @@ class TaskEnv:
         """
         running = self._code == RUNNING
         ids = self._stepped(running, mask)
-        if self.robots is not None:
-            clipped = self.robots.validated(action)
-            self.robots.act(clipped, ids)
-            if ids is None:
-                self.scene.last_action = clipped
-            else:
-                self.scene.last_action[ids] = clipped[ids]
-        for manager in self.managers:
-            manager.before_step(ids)
+        clipped = self.actions.validated(action)
+        self.actions.act(clipped, ids)
+        if ids is None:
+            self.scene.last_action = clipped
+        else:
+            self.scene.last_action[ids] = clipped[ids]
         self._advance(ids)
-        for manager in self.managers:
-            manager.after_step(ids)
         rows = slice(None) if ids is None else ids
-        self.scene.elapsed[rows] += 1
+        self._episodes.elapsed[rows] += 1
         self.scene.look(ids)
         self._evaluate(rows)
         reward = self._reward(ids)
@@ -228,10 +219,10 @@ class TaskEnv:
 
     def _advance(self, ids: Array | None) -> None:
         """The physics of a control step, in as many parts as controllers want."""
-        schedule = (self._substeps,) if self.robots is None else self.robots.schedule
+        schedule = self.actions.schedule
         for part, steps in enumerate(schedule):
-            if part and self.robots is not None:
-                self.robots.update(part)
+            if part:
+                self.actions.update(part)
             self.engine.step(steps, ids, keep_wrench=part + 1 < len(schedule))
 
     def _stepped(self, running: Array, mask: Array | None) -> Array | None:
@@ -252,7 +243,7 @@ class TaskEnv:
         success, failure = self.mdp.judge()
         fault = self.engine.get_state().fault[rows]
         self._fault[rows] = fault
-        late = self.scene.elapsed[rows] >= self._task.horizon
+        late = self._episodes.elapsed[rows] >= self._task.horizon
         code = np.where(late, TRUNCATED, RUNNING)
         code = np.where(failure, FAILED, code)
         if self._task.on_success == "end":
@@ -274,7 +265,7 @@ class TaskEnv:
         return {
             "is_success": self._success.copy(),
             "fault": self._fault.copy(),
-            "elapsed_steps": self.scene.elapsed.copy(),
+            "elapsed_steps": self._episodes.elapsed.copy(),
             "episode_seed": self.streams.episode_seed.copy(),
         }
 
@@ -300,7 +291,7 @@ class TaskEnv:
         """The rows of all managers and of the task."""
         managers: dict[str, Mapping[str, Array]] = {m.name: m.snapshot(ids) for m in self.managers}
         managers["task"] = self.mdp.snapshot(ids) | {
-            "elapsed": self.scene.elapsed[ids],
+            "elapsed": self._episodes.elapsed[ids],
             "last_action": self.scene.last_action[ids],
             "code": self._code[ids],
             "fault": self._fault[ids],
@@ -333,7 +324,7 @@ class TaskEnv:
             manager.restore(ids, snapshot.managers[manager.name])
         task = snapshot.managers["task"]
         self.mdp.restore(ids, task)
-        self.scene.elapsed[ids], self.scene.last_action[ids] = task["elapsed"], task["last_action"]
+        self._episodes.elapsed[ids], self.scene.last_action[ids] = task["elapsed"], task["last_action"]
         self._code[ids], self._fault[ids] = task["code"], task["fault"]
         self._success[ids] = task["success"]
         self.streams.restore(ids, snapshot.streams)

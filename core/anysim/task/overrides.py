@@ -4,11 +4,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
-from anysim.managers.base import Manager
-from anysim.managers.overrides import WORLD, Overridable, Overrides
+from anysim.errors import CapabilityError, TaskError, listing, suggest
+from anysim.managers.base import WORLD, Manager
+from anysim.randomization.draw import is_random
 from anysim.randomization.streams import Streams
 from anysim.task.terms_runtime import Mdp
 
@@ -22,17 +24,59 @@ class Counterfactuals:
     def __init__(self, managers: Sequence[Manager], mdp: Mdp, engine: SimEngine, streams: Streams) -> None:
         owned = [(entry, manager) for manager in managers for entry in manager.overridable()]
         self._owners = {entry.path: manager for entry, manager in owned}
-        self._known = Overrides([*(entry for entry, _ in owned), *mdp.overridable()], engine)
-        self._streams = streams
-
-    @property
-    def paths(self) -> dict[str, Overridable]:
+        self.paths = {entry.path: entry for entry in (*(entry for entry, _ in owned), *mdp.overridable())}
         """All that may be overridden, by path."""
-        return self._known.known
+        self._engine, self._streams = engine, streams
 
-    def checked(self, overrides: Any, count: int, midway: bool) -> Plan:
-        """See `Overrides.checked`."""
-        return self._known.checked(overrides, count, midway)
+    def checked(self, wanted: Any, count: int, midway: bool) -> Plan:
+        """For each of `count` envs what is overridden, by path.
+
+        Args:
+            wanted: a mapping for all of them, or a sequence with one for each.
+            midway: whether the episodes have begun.
+
+        Raises:
+            TaskError: an unknown path, or a value that the spec would not take; nothing was changed.
+            CapabilityError: the engine cannot change it.
+        """
+        each = [wanted] * count if isinstance(wanted, Mapping) else list(wanted or [{}] * count)
+        if len(each) != count or not all(isinstance(one, Mapping) for one in each):
+            raise TaskError(
+                f"overrides must be a mapping from paths to values, or a list of {count} of them, one for each env"
+            )
+        return [{self._path(str(p), midway): self._value(str(p), value) for p, value in one.items()} for one in each]
+
+    def _path(self, path: str, midway: bool) -> str:
+        path = path.removeprefix(WORLD)
+        entry = self.paths.get(path)
+        if entry is None:
+            raise TaskError(
+                f"'{path}' cannot be overridden{suggest(path, list(self.paths))} What can: "
+                f"{listing(self.paths, 40)}. What else a spec says is built into the world: make another env for it"
+            )
+        if midway and not entry.midway:
+            raise TaskError(
+                f"'{path}' is settled when an episode begins and cannot change in the middle of one; begin the same "
+                f"episode again with it: env.reset(episode_seeds=..., overrides=...)"
+            )
+        lacking = [name for name in entry.parameters if name not in self._engine.parameters]
+        if lacking:
+            raise CapabilityError(f"'{path}' cannot be overridden: {self._engine.name} cannot change '{lacking[0]}'")
+        return path
+
+    def _value(self, path: str, value: Any) -> Any:
+        entry = self.paths[path.removeprefix(WORLD)]
+        if isinstance(value, np.ndarray | np.generic):
+            value = value.tolist()
+        fields = {name: getattr(entry.holder, name) for name in entry.holder.model_fields_set} | {entry.key: value}
+        try:
+            taken = getattr(type(entry.holder).model_validate(fields), entry.key)
+        except ValidationError as error:
+            reasons = "; ".join(dict.fromkeys(e["msg"].removeprefix("Value error, ") for e in error.errors()))
+            raise TaskError(f"'{entry.path}' cannot be {value!r}: {reasons}") from None
+        if taken is None or is_random(taken):
+            raise TaskError(f"'{entry.path}' can be overridden with one value, not with {value!r}")
+        return taken
 
     def over(self, env_ids: Array) -> None:
         """The episodes of these envs are over: what no reset writes anew is as the spec says again."""

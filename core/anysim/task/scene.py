@@ -14,6 +14,7 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.state import State
 from anysim.errors import NameLookupError, TaskError, listing, suggest
+from anysim.managers.base import Episodes
 from anysim.managers.terrain import TerrainManager
 from anysim.math import pose as P
 from anysim.model import frames
@@ -25,20 +26,24 @@ from anysim.task.slot_frames import CategoryView, Column, Follower, columns_of, 
 class SceneView:
     """The scene of all envs, restricted to `rows`. Values are computed once per moment however many terms ask."""
 
-    def __init__(self, engine: SimEngine) -> None:
+    def __init__(
+        self, engine: SimEngine, episodes: Episodes | None = None, terrain: TerrainManager | None = None
+    ) -> None:
+        """`episodes` are those of an env's managers, `terrain` the one of them that knows who stands on which tile."""
         self.engine = engine
         self.index = engine.index
+        episodes = Episodes(engine.num_envs) if episodes is None else episodes
         self.goals: dict[str, Array] = {}
         """Goal poses (N, 7) by command name."""
         self.last_action = np.zeros((engine.num_envs, 0))
         """The last action (N, A), clipped."""
         self.action_columns: dict[str, slice] = {}
         """Columns of the action by `robot.channel`."""
-        self.origin = np.zeros((engine.num_envs, 3))
+        self.origin = episodes.origin
         """Where each env's scene stands on the ground (N, 3) [m]."""
-        self.terrain: TerrainManager | None = None
-        """Who stands on which tile, and at which level; None in an env without managers."""
-        self.elapsed = np.zeros(engine.num_envs, dtype=np.int64)
+        self.terrain = terrain
+        """The manager of tiles and levels; None in a scene without managers."""
+        self.elapsed = episodes.elapsed
         """Control steps since each env's reset (N,)."""
         self._rows: Array | slice = slice(None)
         self._frames: dict[str, Frame] = {}

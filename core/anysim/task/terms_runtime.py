@@ -8,7 +8,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import AnysimError, SpecError, SpecIssue, TaskError
-from anysim.managers.overrides import Overridable
+from anysim.managers.base import Overridable
 from anysim.plugin_parameters import options_model
 from anysim.randomization.draw import draw_rows, is_random
 from anysim.randomization.streams import Streams

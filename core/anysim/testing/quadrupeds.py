@@ -40,9 +40,8 @@ def spec(robot: str, engine: str, base: Any = "default", **physics: Any) -> dict
 
 def stand(env: TaskEnv) -> Array:
     """The action (N, A) that asks nothing of the base and holds the rest at home, the gripper open."""
-    assert env.robots is not None
     parts = []
-    for s in env.robots.slices:
+    for s in env.actions.slices:
         channel = s.controller.channel
         home = channel.robot.kinematics.initial[channel.joint_columns]
         if s.channel == "base" and s.controller.dim == 3:
@@ -66,9 +65,8 @@ class Walk(NamedTuple):
 
 def walk(env: TaskEnv, commands: Array, seconds: float) -> Walk:
     """Walk with commands (N, 3) for the base, from a reset on."""
-    assert env.robots is not None
     env.reset(seed=0)
-    robot = env.robots.slices[0].controller.robot
+    robot = env.actions.slices[0].controller.robot
     action = stand(env)
     action[:, :3] = commands
     count = round(seconds / 0.02)

@@ -156,8 +156,7 @@ def follow(robot: str, controller: str, engine: str, circle: Circle, *, seconds:
     """Move the arm's tool along a circle from where it is at home, and see how far off its way it was."""
     with tool_env(robot, controller, engine) as env:
         env.reset(seed=0)
-        assert env.robots is not None
-        controlled, control_dt = env.robots.slices[0].controller.robot, env.engine.world.physics.control_dt
+        controlled, control_dt = env.actions.slices[0].controller.robot, env.engine.world.physics.control_dt
         tool = next(iter(controlled.robot.tools))
 
         def pose() -> Array:

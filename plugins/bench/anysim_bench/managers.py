@@ -117,9 +117,8 @@ def _costs(env: TaskEnv, call: Callable[[], Any], rounds: int, scale: float) -> 
     clock = Clock()
     undo = [clock.watch(env.engine, method, None) for method in _ENGINE]
     for manager in env.managers:
-        undo += [clock.watch(manager, method, manager.name) for method in ("reset", "before_step", "after_step")]
-    if env.robots is not None:
-        undo += [clock.watch(env.robots, method, env.robots.name) for method in ("validated", "act")]
+        undo.append(clock.watch(manager, "reset", manager.name))
+    undo += [clock.watch(env.actions, method, env.actions.name) for method in ("validated", "act", "update")]
     undo += [clock.watch(env.mdp, method, _TASK) for method in _TERMS]
     best: dict[tuple[str, bool], float] = {}
     try:

@@ -38,8 +38,7 @@ def flight(engine: str, n: int = 1, base: Any = "default", arm: Any = "default",
 
 
 def controllers(env: TaskEnv) -> tuple[Any, Any]:
-    assert env.robots is not None
-    return env.robots.slices[0].controller, env.robots.slices[1].controller
+    return env.actions.slices[0].controller, env.actions.slices[1].controller
 
 
 def test_minimum_jerk_is_as_fast_as_the_limits_allow() -> None:

@@ -184,9 +184,8 @@ def test_shares_balance_the_weight() -> None:
 def test_feed_forward_carries_the_weight() -> None:
     with made("unitree_go1", "null", 1) as env:
         env.reset(seed=0)
-        assert env.robots is not None
-        controller = env.robots.slices[0].controller
-        env.robots.act(np.zeros((1, 3)), None)
+        controller = env.actions.slices[0].controller
+        env.actions.act(np.zeros((1, 3)), None)
         command = controller.apply(np.zeros((1, 3)), None)
         assert command.effort is not None
         model, legs = controller.robot.kinematics, Legs.of(controller.robot)
@@ -206,8 +205,7 @@ def test_a_velocity_beyond_the_limits_and_periods_that_do_not_fit() -> None:
         low, high = env.action_bounds
         assert high.tolist() == [0.5, 0.25, 0.8]
         assert (low == -high).all()
-        assert env.robots is not None
-        assert env.robots.schedule == (5, 5)
+        assert env.actions.schedule == (5, 5)
     with pytest.raises(TaskError, match=r"control_dt / period is 1\.66667; expected a whole number"):
         made("solo12", "null", 1, {"controller": "trot", "params": {"period": 0.012}})
 

@@ -83,16 +83,16 @@ def test_the_output_is_that_of_numpy(tmp_path: Path) -> None:
         assert env.action_spaces["arm.arm"].labels == ("left", "right")
         env.reset(seed=3)
         last, rng = np.zeros((2, 2)), np.random.default_rng(0)
-        controller = env.robots.slices[0].controller  # type: ignore[union-attr]
+        controller = env.actions.slices[0].controller
         for tick in range(12):
             command = rng.uniform(-1, 1, (2, 2))
-            env.robots.act(env.robots.validated(command), None)  # type: ignore[union-attr]
+            env.actions.act(env.actions.validated(command), None)
             state = env.engine.get_state()
             for part in range(2):  # every 0.01 s of the 0.02 s
                 if part:
                     env.engine.step(2)
                     state = env.engine.get_state()
-                    env.robots.update(1)  # type: ignore[union-attr]
+                    env.actions.update(1)
                 turns = 2 * np.pi * (2 * tick + part) * 0.01 * 1.5
                 position, rate = state.joint_pos[:, ::-1] - [0.3, 0.0], state.joint_vel[:, ::-1]
                 parts = [
@@ -105,7 +105,7 @@ def test_the_output_is_that_of_numpy(tmp_path: Path) -> None:
                 assert np.allclose(env.engine.control.position, targets, atol=1e-5)
                 last = controller.snapshot(np.arange(2))["last"]
             env.engine.step(2)
-        assert env.robots.schedule == (2, 2)  # type: ignore[union-attr]
+        assert env.actions.schedule == (2, 2)
         assert np.abs(state.joint_vel).max() > 0.05, "it moves"
 
 
@@ -140,7 +140,7 @@ def test_velocities_and_efforts(tmp_path: Path, control_type: str) -> None:
     with made(written(tmp_path, control_type=control_type, period=None)) as env:
         env.reset(seed=0)
         env.step(np.ones((1, 2)))
-        controller = env.robots.slices[0].controller  # type: ignore[union-attr]
+        controller = env.actions.slices[0].controller
         wanted = (controller.snapshot(np.array([0]))["last"] * [0.5, 0.25])[:, ::-1]
         control = env.engine.control
         assert np.array_equal(control.velocity if control_type == "V" else control.effort, wanted)

@@ -7,7 +7,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import TaskError
-from anysim.managers.actions import ActionSlice
+from anysim.managers.action import ActionSlice
 from anysim.math import pose as P
 from anysim.model.world import BodyKind, JointType
 from anysim.task.env import TaskEnv
@@ -42,7 +42,7 @@ def rest_action(env: TaskEnv) -> tuple[Array, list[str]]:
 
 
 def _slices(env: TaskEnv) -> list[ActionSlice]:
-    return [] if env.robots is None else list(env.robots.slices)
+    return list(env.actions.slices)
 
 
 def hold_check(env: TaskEnv, seconds: float) -> Check:

@@ -1,4 +1,4 @@
-"""What the drives, joints and links of a robot are like in this episode, written as parameters of the engine."""
+"""Robot parameters: what the drives, joints and links of a robot are like in this episode."""
 
 from collections.abc import Iterator, Sequence
 
@@ -24,7 +24,7 @@ from anysim.randomization.streams import Streams
 from anysim_schemas.dynamics import RobotDynamicsSpec
 
 
-class RobotDynamics:
+class RobotParameters:
     """One robot. The World has the nominal values; what is drawn replaces them, relative to the catalogue's."""
 
     def __init__(self, world: World, name: str, spec: RobotDynamicsSpec, streams: Streams) -> None:

@@ -1,17 +1,12 @@
-"""RobotManager: where robots stand and how they begin, and the actions of their channels."""
+"""RobotResetManager: where robots stand and how they begin an episode."""
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable
 
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.base import SimEngine
-from anysim.errors import TaskError, listing
-from anysim.managers.actions import Actions, ActionSlice
-from anysim.managers.base import Manager
-from anysim.managers.overrides import WORLD, Overridable, drawn, random_fields
-from anysim.managers.robot_dynamics import RobotDynamics
+from anysim.managers.base import WORLD, Manager, Overridable, drawn, random_fields
+from anysim.managers.robot_parameters import RobotParameters
 from anysim.math import pose as P
 from anysim.model.world import BodyKind, World
 from anysim.randomization.draw import draw_rows, is_random
@@ -19,28 +14,21 @@ from anysim.randomization.streams import Origin
 from anysim_schemas.robots import RobotSpec
 
 
-class RobotManager(Manager):
-    """All robots of an env. The action is one flat vector: robots in order, channels in the order of `actions`."""
+class RobotResetManager(Manager):
+    """Draws and writes what robots are like, where their bases stand and how their joints begin; drives hold that."""
 
     name = "robot"
 
     def build(self, world: World) -> None:
         self._world = world
-        self._actions = Actions(world, self.spec.world.robots, self.streams)
-        self._dynamics = {
-            robot.name: RobotDynamics(world, robot.name, self.spec.world.robots[robot.name].dynamics, self.streams)
+        self._initial = np.array([world.joints[a.joint].initial for a in world.actuators], dtype=float)
+        self._parameters = {
+            robot.name: RobotParameters(world, robot.name, self.spec.world.robots[robot.name].dynamics, self.streams)
             for robot in world.robots
         }
 
     def parameters(self) -> Iterable[tuple[str, str]]:
-        return [change for dynamics in self._dynamics.values() for change in dynamics.parameters()]
-
-    def bind(self, engine: SimEngine) -> None:
-        super().bind(engine)
-        self._actions.bind(engine)
-        self.slices, self.spaces = self._actions.slices, self._actions.spaces
-        self.action_dim, self.action_low, self.action_high = (self._actions.dim, self._actions.low, self._actions.high)
-        self._initial = np.array([self._world.joints[a.joint].initial for a in self._world.actuators], dtype=float)
+        return [change for robot in self._parameters.values() for change in robot.parameters()]
 
     def reset(self, env_ids: Array) -> None:
         """Where bases stand, home positions with the noise of the spec on the arm's joints; drives hold them."""
@@ -48,7 +36,7 @@ class RobotManager(Manager):
         for robot in self._world.robots:
             spec = self.spec.world.robots[robot.name]
             entity = self.engine.index.entity(robot.name)
-            self._dynamics[robot.name].write(self.engine, env_ids)
+            self._parameters[robot.name].write(self.engine, env_ids)
             self._place_base(robot.name, spec, env_ids)
             joints = np.arange(entity.joint_start, entity.joint_stop)
             home = np.array([self._world.joints[j].initial for j in joints])
@@ -72,7 +60,8 @@ class RobotManager(Manager):
             for number, actuator in enumerate(self._world.actuators):
                 if entity.joint_start <= actuator.joint < entity.joint_stop:
                     targets[:, number] = position[:, actuator.joint - entity.joint_start]
-        self._actions.reset(env_ids, targets)
+        if self._world.actuators:
+            self.engine.set_control(position=targets, env_ids=env_ids)
 
     def overridable(self) -> list[Overridable]:
         entries: list[Overridable] = []
@@ -80,13 +69,11 @@ class RobotManager(Manager):
             spec, path = self.spec.world.robots[robot.name], f"{WORLD}robots.{robot.name}"
             entries += drawn(path, spec, ("home_noise",)) + random_fields(path, spec, ("position", "yaw"))
             entries += random_fields(f"{path}.dynamics", spec.dynamics)
-            for channel, action in spec.actions.items():
-                entries += random_fields(f"{path}.actions.{channel}", action, ("delay",))
         return entries
 
     def _place_base(self, robot: str, spec: RobotSpec, env_ids: Array) -> None:
         """Put a robot's base where this episode wants it: as drawn, on the ground of its env."""
-        origin = self.board.origin[env_ids]
+        origin = self.episodes.origin[env_ids]
         if not (is_random(spec.position) or is_random(spec.yaw) or origin.any()):
             return  # the World has it there
         path = f"world.robots.{robot}"
@@ -139,55 +126,3 @@ class RobotManager(Manager):
             noise = deviation[row] * self.streams.generator(int(env), stream).standard_normal()
             self.streams.note(int(env), stream, noise, Origin(stream, f"world.robots.{robot}.home_noise"))
             position[row, column] = min(max(position[row, column] + noise, found.lower), found.upper)
-
-    @property
-    def schedule(self) -> tuple[int, ...]:
-        """Physics steps of a control step, in the parts between which `update` is to be called."""
-        return self._actions.schedule
-
-    def act(self, action: Array, env_ids: Array | None) -> None:
-        """Turn actions (N, A) into commands of all envs, or of `env_ids`; the others keep their commands."""
-        self._actions.act(action, env_ids)
-
-    def update(self, part: int) -> None:
-        """Before part 1, 2, … of `schedule`: the controllers that are due command again."""
-        self._actions.update(part)
-
-    def slice_of(self, robot: str, channel: str) -> ActionSlice:
-        """The part of the action that belongs to a robot's channel.
-
-        Raises:
-            TaskError: the world gives that channel no controller.
-        """
-        for s in self.slices:
-            if (s.robot, s.channel) == (robot, channel):
-                return s
-        known = [f"{s.robot}.{s.channel}" for s in self.slices]
-        raise TaskError(
-            f"'{robot}.{channel}' has no controller; add world.robots.{robot}.actions.{channel} "
-            f"(channels with one: {listing(known)})"
-        )
-
-    def validated(self, action: Any) -> Array:
-        """The action, flat (N, A) or by channel, as float64 (N, A), clipped to the channels' bounds.
-
-        Raises:
-            TaskError: another shape, a channel that is unknown or missing, or a value that is not finite.
-        """
-        if isinstance(action, Mapping):
-            action = self.spaces.flatten(action, self.engine.num_envs)
-        array = np.asarray(action, dtype=np.float64)
-        if array.shape != (self.engine.num_envs, self.action_dim):
-            raise TaskError(
-                f"the action must have shape ({self.engine.num_envs}, {self.action_dim}), got {array.shape}"
-            )
-        clipped = np.minimum(np.maximum(array, self.action_low), self.action_high)
-        if not np.isfinite(clipped).all() or np.isnan(array).any():
-            raise TaskError("the action holds a value that is not a number")
-        return clipped
-
-    def snapshot(self, env_ids: Array) -> dict[str, Array]:
-        return self._actions.snapshot(env_ids)
-
-    def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
-        self._actions.restore(env_ids, data)

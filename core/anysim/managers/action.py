@@ -1,4 +1,4 @@
-"""Actions: the slices of the action vector, the controllers behind them, and what they command of the drives."""
+"""ActionManager: the slices of the action vector, the controllers behind them, and what they command of the drives."""
 
 from collections.abc import Mapping
 from math import gcd
@@ -7,18 +7,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anysim import registry
+from anysim.controllers.action_space import ActionSpaces, ChannelSpace, component_labels
 from anysim.controllers.base import DEFAULT_CONTROLLER, ChannelView, Command, Controller
 from anysim.controllers.robot import ControlledRobot
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.errors import SpecError, SpecIssue, TaskError, listing, suggest
-from anysim.managers.action_space import ActionSpaces, ChannelSpace, component_labels
+from anysim.managers.base import WORLD, Manager, Overridable, random_fields
 from anysim.model.world import ControlMode, World
 from anysim.plugin_parameters import options_model
 from anysim.randomization.draw import draw_rows
 from anysim.randomization.noise import DelayLine, longest_delay, noise_rows, note_noise
-from anysim.randomization.streams import Streams
-from anysim_schemas.robots import ActionSpec, RobotSpec
+from anysim_schemas.robots import ActionSpec
 
 
 class ActionSlice(NamedTuple):
@@ -36,18 +36,27 @@ class ActionSlice(NamedTuple):
     """Physics steps between two updates of the controller; None for none within a control step."""
 
 
-class Actions:
-    """The controllers of all robots of an env. The action is one flat vector: robots in order, then their channels."""
+class ActionManager(Manager):
+    """The controllers of all robots of an env. The action is one flat vector: robots in order, then their channels.
 
-    def __init__(self, world: World, robots: Mapping[str, RobotSpec], streams: Streams) -> None:
-        self._world, self._specs, self._streams = world, robots, streams
+    Attributes:
+        slices: which columns belong to which channel, and its controller.
+        spaces: what each channel takes, by `robot.channel`.
+        dim, low, high: the number of components, and their bounds (A,).
+        schedule: physics steps of a control step, in the parts between which `update` is called.
+    """
+
+    name = "action"
+
+    def build(self, world: World) -> None:
+        self._world = world
         self._views: list[ChannelView] = []
         self._robots: list[ControlledRobot] = []
         issues: list[SpecIssue] = []
         for robot in world.robots:
             controlled = ControlledRobot(world, robot.name)
             self._robots.append(controlled)
-            for name in robots[robot.name].actions:
+            for name in self.spec.world.robots[robot.name].actions:
                 channel = robot.channels.get(name)
                 if channel is None:
                     hint = suggest(name, list(robot.channels))
@@ -59,14 +68,14 @@ class Actions:
             raise SpecError(issues)
 
     def bind(self, engine: SimEngine) -> None:
-        """The engine is live: make the controllers."""
-        self._engine = engine
+        """Make the controllers."""
+        super().bind(engine)
         n, physics = engine.num_envs, self._world.physics
         self.slices: list[ActionSlice] = []
         start = 0
         for view in self._views:
             robot = view.robot.name
-            action = self._specs[robot].actions[view.name]
+            action = self.spec.world.robots[robot].actions[view.name]
             controller = _make(view, action, n)
             longest = longest_delay(action.delay)
             line = DelayLine(n, controller.dim, longest) if longest else None
@@ -82,16 +91,12 @@ class Actions:
         tick = gcd(physics.substeps, *(s.steps for s in self.slices if s.steps is not None))
         self._tick = tick if any(s.steps is not None for s in self.slices) else physics.substeps
         self.schedule = (self._tick,) * (physics.substeps // self._tick)
-        """Physics steps of a control step, in the parts between which `update` is called."""
         drives = len(self._world.actuators)
-        initial = [self._world.joints[a.joint].initial for a in self._world.actuators]
-        self._position = np.tile(np.array(initial, dtype=float), (n, 1))
+        self._position = engine.control.position
         self._velocity, self._effort = np.zeros((n, drives)), np.zeros((n, drives))
         self._support = np.zeros((len(self.slices), n, drives))
         self._feeds = False
         """Whether any controller ever commanded more than positions."""
-        self._ticks = np.zeros(n, dtype=np.int64)
-        """Control steps since the reset (N,)."""
         self._obeying: list[Array | None] = [None] * len(self.slices)
 
     def _space(self, s: ActionSlice) -> ChannelSpace:
@@ -99,11 +104,42 @@ class Actions:
         labels = component_labels(s.controller, names)
         return ChannelSpace(s.controller.low.copy(), s.controller.high.copy(), labels, s.start, s.stop)
 
+    def slice_of(self, robot: str, channel: str) -> ActionSlice:
+        """The part of the action that belongs to a robot's channel.
+
+        Raises:
+            TaskError: the world gives that channel no controller.
+        """
+        for s in self.slices:
+            if (s.robot, s.channel) == (robot, channel):
+                return s
+        known = [f"{s.robot}.{s.channel}" for s in self.slices]
+        raise TaskError(
+            f"'{robot}.{channel}' has no controller; add world.robots.{robot}.actions.{channel} "
+            f"(channels with one: {listing(known)})"
+        )
+
+    def validated(self, action: Any) -> Array:
+        """The action, flat (N, A) or by channel, as float64 (N, A), clipped to the channels' bounds.
+
+        Raises:
+            TaskError: another shape, a channel that is unknown or missing, or a value that is not finite.
+        """
+        if isinstance(action, Mapping):
+            action = self.spaces.flatten(action, self.engine.num_envs)
+        array = np.asarray(action, dtype=np.float64)
+        if array.shape != (self.engine.num_envs, self.dim):
+            raise TaskError(f"the action must have shape ({self.engine.num_envs}, {self.dim}), got {array.shape}")
+        clipped = np.minimum(np.maximum(array, self.low), self.high)
+        if not np.isfinite(clipped).all() or np.isnan(array).any():
+            raise TaskError("the action holds a value that is not a number")
+        return clipped
+
     # ------------------------------------------------------------------ reset
 
-    def reset(self, env_ids: Array, targets: Array) -> None:
-        """All drives of these envs hold `targets` (E, A) and have the modes of their controllers."""
-        self._ticks[env_ids] = 0
+    def reset(self, env_ids: Array) -> None:
+        """All drives hold what they are commanded now, where the robots begin, in the modes of their controllers."""
+        targets = self.engine.control.position[env_ids]
         self._position[env_ids] = targets
         self._velocity[env_ids] = 0.0
         self._effort[env_ids] = 0.0
@@ -115,21 +151,29 @@ class Actions:
             s.controller.reset(env_ids, targets[:, s.controller.channel.actuators])
         self._write(env_ids)
 
+    def overridable(self) -> list[Overridable]:
+        return [
+            entry
+            for robot, spec in self.spec.world.robots.items()
+            for channel, action in spec.actions.items()
+            for entry in random_fields(f"{WORLD}robots.{robot}.actions.{channel}", action, ("delay",))
+        ]
+
     def _set_modes(self, controller: Controller, env_ids: Array) -> None:
         drives, mode = controller.channel.actuators, controller.mode
         modes = (mode,) * len(drives) if isinstance(mode, ControlMode) else mode
         for wanted in dict.fromkeys(modes):
             own = [int(d) for d, m in zip(drives, modes, strict=True) if m is wanted]
             if any(self._world.actuators[d].mode is not wanted for d in own):
-                self._engine.set_control_mode(wanted, env_ids, own)
+                self.engine.set_control_mode(wanted, env_ids, own)
 
     def _reset_imperfections(self, s: ActionSlice, env_ids: Array) -> None:
         """Draw the delay of a channel, and say that it has noise."""
         stream, path = f"robot/{s.robot}/{s.channel}", f"world.robots.{s.robot}.actions.{s.channel}"
         if s.line is not None:
-            delay = draw_rows(s.spec.delay, f"{stream}/delay", self._streams, env_ids, source=f"{path}.delay")
+            delay = draw_rows(s.spec.delay, f"{stream}/delay", self.streams, env_ids, source=f"{path}.delay")
             s.line.reset(env_ids, delay.astype(np.int64))
-        note_noise(s.spec.noise, f"{stream}/noise", self._streams, env_ids, f"{path}.noise")
+        note_noise(s.spec.noise, f"{stream}/noise", self.streams, env_ids, f"{path}.noise")
 
     # ------------------------------------------------------------------ acting
 
@@ -143,10 +187,6 @@ class Actions:
             if obeying is not None and len(obeying) == 0:
                 continue
             self._take(number, s.controller.apply(rows, obeying), obeying)
-        if env_ids is None:
-            self._ticks += 1
-        else:
-            self._ticks[env_ids] += 1
         if self.slices:
             self._write(None)
 
@@ -161,7 +201,7 @@ class Actions:
         self._write(None)
 
     def _see(self) -> None:
-        state = self._engine.get_state()
+        state = self.engine.get_state()
         for robot in self._robots:
             robot.see(state)
 
@@ -184,24 +224,26 @@ class Actions:
         """Give the engine the commands."""
         rows = slice(None) if env_ids is None else env_ids
         if not self._feeds:
-            self._engine.set_control(position=self._position[rows], env_ids=env_ids)
+            self.engine.set_control(position=self._position[rows], env_ids=env_ids)
             return
         effort = self._effort[rows] + self._support[:, rows].sum(axis=0)
-        self._engine.set_control(self._position[rows], self._velocity[rows], effort, env_ids)
+        self.engine.set_control(self._position[rows], self._velocity[rows], effort, env_ids)
 
     def _imperfect(self, s: ActionSlice, rows: Array, env_ids: Array | None) -> tuple[Array, Array | None]:
         """What reaches the controller of what was asked for, and the envs for which anything does by now."""
         if s.line is None and s.spec.noise is None:
             return rows, env_ids
-        ids = np.arange(self._engine.num_envs) if env_ids is None else env_ids
+        ids = np.arange(self.engine.num_envs) if env_ids is None else env_ids
         if s.line is not None:
-            s.line.write(ids, self._ticks[ids], rows)
-            there = s.line.arrived(ids, self._ticks[ids])
-            rows = s.line.read(ids, self._ticks[ids])[there]
+            ticks = self.episodes.elapsed[ids]
+            s.line.write(ids, ticks, rows)
+            there = s.line.arrived(ids, ticks)
+            rows = s.line.read(ids, ticks)[there]
             ids, env_ids = ids[there], env_ids if there.all() else ids[there]
         if s.spec.noise is not None:
             name = f"robot/{s.robot}/{s.channel}/noise"
-            noisy = rows + noise_rows(s.spec.noise, name, self._streams, ids, self._ticks[ids], rows.shape[1])
+            ticks = self.episodes.elapsed[ids]
+            noisy = rows + noise_rows(s.spec.noise, name, self.streams, ids, ticks, rows.shape[1])
             rows = np.clip(noisy, s.controller.low, s.controller.high)
         return rows, env_ids
 
@@ -212,7 +254,6 @@ class Actions:
         data = {
             "targets": self._position[env_ids], "velocities": self._velocity[env_ids],
             "efforts": self._effort[env_ids], "support": self._support[:, env_ids].swapaxes(0, 1).copy(),
-            "ticks": self._ticks[env_ids],
         }  # fmt: skip
         for s in self.slices:
             if s.line is not None:
@@ -223,7 +264,7 @@ class Actions:
 
     def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
         """Write what `snapshot` returned."""
-        self._position[env_ids], self._ticks[env_ids] = data["targets"], data["ticks"]
+        self._position[env_ids] = data["targets"]
         self._velocity[env_ids], self._effort[env_ids] = data["velocities"], data["efforts"]
         self._support[:, env_ids] = data["support"].swapaxes(0, 1)
         self._feeds |= any(data[key].any() for key in ("velocities", "efforts", "support"))
