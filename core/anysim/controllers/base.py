@@ -16,6 +16,12 @@ DEFAULT_CONTROLLER = "default"
 """In a world: the first of the controllers that the catalogue gives the channel."""
 
 
+def columns(indices: Array) -> slice | Array:
+    """What addresses these columns of an array: a slice where they are contiguous, for which nothing is copied."""
+    contiguous = len(indices) > 0 and (np.diff(indices) == 1).all()
+    return slice(int(indices[0]), int(indices[-1]) + 1) if contiguous else indices
+
+
 @dataclass(frozen=True)
 class ChannelView:
     """What a controller knows of its channel. Arrays have one entry for each drive (K,).
@@ -44,15 +50,13 @@ class ChannelView:
         drives = np.array(channel.actuators, dtype=int)
         actuators = [world.actuators[a] for a in channel.actuators]
         joints = [world.joints[a.joint] for a in actuators]
-        contiguous = len(drives) > 0 and (np.diff(drives) == 1).all()
-        columns = slice(int(drives[0]), int(drives[-1]) + 1) if contiguous else drives
         ends = [
             None if v is None else np.array(v[: len(drives)], dtype=float) for v in (channel.opened, channel.closed)
         ]
         return cls(
             channel.name,
             drives,
-            columns,
+            columns(drives),
             np.array([j.lower for j in joints]),
             np.array([j.upper for j in joints]),
             np.array([j.velocity_limit for j in joints]),

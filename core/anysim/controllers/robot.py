@@ -1,4 +1,4 @@
-"""What a controller knows of its robot: the model, its place in the World, and its state now."""
+"""The robot as its controllers know it: the model, its place in the World, and its state now."""
 
 from functools import cached_property
 
@@ -43,6 +43,7 @@ class ControlledRobot:
         self.drive_columns = np.array([world.actuators[i].joint - entity.joint_start for i in owned], dtype=int)
         self.dt, self.control_dt = world.physics.dt, world.physics.control_dt
         self._state: State | None = None
+        self._frames: dict[str, tuple[int, Array]] = {}
 
     @cached_property
     def kinematics(self) -> RobotModel:
@@ -93,8 +94,11 @@ class ControlledRobot:
         Raises:
             NameLookupError: lists the frames that exist.
         """
-        frame = find_frame(self.world, f"{self.name}.{name}")
-        return P.compose(self.state.body_pose[_rows(env_ids), frame.body], P.pose(frame.position, frame.quaternion))
+        if name not in self._frames:
+            frame = find_frame(self.world, f"{self.name}.{name}")
+            self._frames[name] = (frame.body, P.pose(frame.position, frame.quaternion))
+        body, local = self._frames[name]
+        return P.compose(self.state.body_pose[_rows(env_ids), body], local)
 
 
 def _base_of(world: World, robot: Robot, root: int) -> int:

@@ -279,6 +279,8 @@ class EngineLifecycle(Primitives):
 
     def get_state(self) -> State:
         """The state of all envs now: read lazily, cached until the engine moves on."""
+        if (state := self._state) is not None:  # one reference, read at once: nothing to lock
+            return state
         with self._lock:
             if self._state is None:
                 self._require_world()

@@ -9,28 +9,42 @@ import numpy as np
 from anysim.conventions import Array
 
 _NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
-_TURNS = tuple(
-    (np.array(order), np.array(signs))
-    for order, signs in (
-        ((3, 2, 1, 0), (1.0, -1.0, 1.0, -1.0)),
-        ((2, 3, 0, 1), (1.0, 1.0, -1.0, -1.0)),
-        ((1, 0, 3, 2), (-1.0, 1.0, 1.0, -1.0)),
-    )
-)
-"""Of the second factor's components, what each component of the first but w is multiplied with."""
+_INVERSE = np.array([-1.0, -1.0, -1.0, 1.0])
+_FIRST = np.array([3, 0, 1, 2])
+_SECOND = np.array([[0, 1, 2, 3], [3, 2, 1, 0], [2, 3, 0, 1], [1, 0, 3, 2]])
+_SIGNS = np.array([[1.0, 1.0, 1.0, 1.0], [1.0, -1.0, 1.0, -1.0], [1.0, 1.0, -1.0, -1.0], [-1.0, 1.0, 1.0, -1.0]])
+"""A quaternion product is the sum of four rows: the components `_FIRST` of the first factor times signed ones of the
+second."""
+
+_FEW = 512
+"""Numbers up to which the calls take the time, and one call for all is best; beyond, it is the numbers."""
+
+
+def _summed(terms: Array) -> Array:
+    """The sum along the last axis, in index order."""
+    if terms.size <= _FEW:
+        return np.add.accumulate(terms, axis=-1)[..., -1]  # in order by its definition, as no other sum of numpy's is
+    total = terms[..., 0]
+    for i in range(1, terms.shape[-1]):
+        total = total + terms[..., i]
+    return total
 
 
 def multiply(a: Array, b: Array) -> Array:
     """Quaternion product a*b: the rotation b first, then a. Shapes (..., 4)."""
+    if a.size + b.size <= _FEW:
+        rows = a.take(_FIRST, axis=-1)[..., None] * (b.take(_SECOND, axis=-1) * _SIGNS)
+        return np.add.accumulate(rows, axis=-2)[..., -1, :]
     product = a[..., 3:4] * b
-    for component, (order, signs) in enumerate(_TURNS):
-        product = product + a[..., component : component + 1] * (b.take(order, axis=-1) * signs)
+    for component in (0, 1, 2):
+        turned = b.take(_SECOND[component + 1], axis=-1) * _SIGNS[component + 1]
+        product = product + a[..., component : component + 1] * turned
     return product
 
 
 def conjugate(q: Array) -> Array:
     """The inverse of a unit quaternion. Shape (..., 4)."""
-    return np.stack([-q[..., 0], -q[..., 1], -q[..., 2], q[..., 3]], axis=-1)
+    return q * _INVERSE
 
 
 def normalize(q: Array) -> Array:
@@ -40,18 +54,12 @@ def normalize(q: Array) -> Array:
 
 def norm(v: Array) -> Array:
     """Euclidean length along the last axis, summed in index order."""
-    total = v[..., 0] * v[..., 0]
-    for i in range(1, v.shape[-1]):
-        total = total + v[..., i] * v[..., i]
-    return np.sqrt(total)
+    return np.sqrt(_summed(v * v))
 
 
 def dot(a: Array, b: Array) -> Array:
     """Inner product along the last axis, summed in index order."""
-    total = a[..., 0] * b[..., 0]
-    for i in range(1, a.shape[-1]):
-        total = total + a[..., i] * b[..., i]
-    return total
+    return _summed(a * b)
 
 
 def cross(a: Array, b: Array) -> Array:
@@ -62,9 +70,9 @@ def cross(a: Array, b: Array) -> Array:
 
 def rotate(q: Array, v: Array) -> Array:
     """Rotate vectors v (..., 3) by unit quaternions q (..., 4)."""
-    u, w = q[..., :3], q[..., 3:4]
-    t = 2.0 * cross(u, v)
-    return v + w * t + cross(u, t)
+    after, before = q.take(_NEXT, axis=-1), q.take(_LAST, axis=-1)
+    t = 2.0 * (after * v.take(_LAST, axis=-1) - before * v.take(_NEXT, axis=-1))
+    return v + q[..., 3:4] * t + (after * t.take(_LAST, axis=-1) - before * t.take(_NEXT, axis=-1))
 
 
 def rotate_inverse(q: Array, v: Array) -> Array:
@@ -75,17 +83,21 @@ def rotate_inverse(q: Array, v: Array) -> Array:
 def compose(a: Array, b: Array) -> Array:
     """The pose b expressed in the frame a, seen from a's parent: a∘b. Shapes (..., 7)."""
     turn = a[..., 3:]
-    quaternion = multiply(turn, b[..., 3:])
-    composed = np.empty((*quaternion.shape[:-1], 7))
-    composed[..., :3] = a[..., :3] + rotate(turn, b[..., :3])
-    composed[..., 3:] = quaternion
-    return composed
+    return np.concatenate([a[..., :3] + rotate(turn, b[..., :3]), multiply(turn, b[..., 3:])], axis=-1)
 
 
 def inverse(pose: Array) -> Array:
     """The inverse pose. Shape (..., 7)."""
     q = conjugate(pose[..., 3:])
     return np.concatenate([-rotate(q, pose[..., :3]), q], axis=-1)
+
+
+def unsigned(pose: Array) -> Array:
+    """The same poses (..., 7), as copies whose quaternions have no negative scalar part."""
+    same = pose.copy()
+    turn = same[..., 3:]
+    np.negative(turn, out=turn, where=pose[..., 6:] < 0)
+    return same
 
 
 def pose(position: Array | tuple[float, ...], quaternion: Array | tuple[float, ...]) -> Array:

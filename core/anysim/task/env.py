@@ -227,6 +227,8 @@ class TaskEnv:
 
     def _stepped(self, running: Array, mask: Array | None) -> Array | None:
         """The envs to step: None for all of them."""
+        if mask is None and np.count_nonzero(running) == self.num_envs:
+            return None
         wanted = self._chosen(mask)
         ended = wanted[~running[wanted]]
         if len(ended) == 0 and len(wanted) == self.num_envs:
@@ -243,13 +245,14 @@ class TaskEnv:
         success, failure = self.mdp.judge()
         fault = self.engine.get_state().fault[rows]
         self._fault[rows] = fault
-        late = self._episodes.elapsed[rows] >= self._task.horizon
-        code = np.where(late, TRUNCATED, RUNNING)
-        code = np.where(failure, FAILED, code)
-        if self._task.on_success == "end":
-            code = np.where(success, SUCCESS, code)
         self._success[rows] = success & ~fault
-        self._code[rows] = np.where(fault, FAILED, code)
+        late = self._episodes.elapsed[rows] >= self._task.horizon
+        code = np.where(late, np.int8(TRUNCATED), np.int8(RUNNING))
+        code[failure] = FAILED
+        if self._task.on_success == "end":
+            code[success] = SUCCESS
+        code[fault] = FAILED
+        self._code[rows] = code
 
     def _reward(self, ids: Array | None) -> Array:
         if ids is None:
@@ -270,13 +273,15 @@ class TaskEnv:
         }
 
     def _announce(self, result: StepResult, ids: Array | None) -> None:
-        stepped = np.arange(self.num_envs) if ids is None else ids
-        self._hooks.after_step(env=self, result=result)
-        if self._fault[stepped].any():
-            self._hooks.on_fault(env=self, env_ids=stepped[self._fault[stepped]])
-        ended = stepped[self._code[stepped] != RUNNING]
-        if len(ended):
-            self._hooks.after_episode(env=self, env_ids=ended)
+        """Call the observers; a call that nobody hears takes longer than to ask."""
+        after_step, on_fault, after_episode = self._hooks.after_step, self._hooks.on_fault, self._hooks.after_episode
+        if after_step.get_hookimpls():
+            after_step(env=self, result=result)
+        for hook, which in ((on_fault, self._fault), (after_episode, self._code != RUNNING)):
+            if hook.get_hookimpls():
+                concerned = np.flatnonzero(which) if ids is None else ids[which[ids]]
+                if len(concerned):
+                    hook(env=self, env_ids=concerned)
 
     # ------------------------------------------------------------------ snapshots, images, end
 

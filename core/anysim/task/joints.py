@@ -5,6 +5,7 @@ from typing import ClassVar
 import numpy as np
 
 from anysim.compile.joints import ends
+from anysim.controllers.base import columns
 from anysim.conventions import Array
 from anysim.errors import NameLookupError, listing, suggest
 from anysim.model.world import World
@@ -23,8 +24,9 @@ class JointView:
     def __init__(self, scene: SceneView, name: str) -> None:
         self.scene, self.name = scene, name
         world = scene.engine.world
-        self._joints, self._entities = _find(world, name)
-        self.found = tuple(world.joints[j] for j in self._joints)
+        joints, self._entities = _find(world, name)
+        self._joints = columns(np.array(joints))
+        self.found = tuple(world.joints[j] for j in joints)
         """The joint; several only where the reference names a slot."""
 
     @property
@@ -39,7 +41,7 @@ class JointView:
 
     def _pick(self, values: Array) -> Array:
         """Of values (n, K) that of the entity that is there (n,)."""
-        if len(self._joints) == 1:
+        if len(self.found) == 1:
             return values[:, 0]
         present = self.scene.engine.presence[self.scene.rows][:, self._entities]
         return values[np.arange(len(values)), np.argmax(present, axis=1)]

@@ -1,4 +1,4 @@
-"""What terms see: handles that read the engine's state for the rows at hand.
+"""The scene as terms see it: handles that read the engine's state for the rows at hand.
 
 A term declares what it refers to by annotation (`a: Frame`, `robot: RobotView`); names become handles once, when the
 env is built. A handle returns arrays for `scene.rows` only: all envs in a step, the reset ones in a reset.
@@ -6,10 +6,11 @@ env is built. A handle returns arrays for `scene.rows` only: all envs in a step,
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from anysim.controllers.base import columns
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.state import State
@@ -46,6 +47,8 @@ class SceneView:
         self.elapsed = episodes.elapsed
         """Control steps since each env's reset (N,)."""
         self._rows: Array | slice = slice(None)
+        self._everyone = self._env_ids = np.arange(engine.num_envs)
+        self._everyone.setflags(write=False)
         self._frames: dict[str, Frame] = {}
         self._robots: dict[str, RobotView] = {}
         self.moment = 0
@@ -62,7 +65,7 @@ class SceneView:
 
     def look(self, rows: Array | None) -> None:
         """Start a new moment: all envs (None), or these."""
-        self._rows = slice(None) if rows is None else rows
+        self._rows, self._env_ids = (slice(None), self._everyone) if rows is None else (rows, self._everyone[rows])
         self.moment += 1
 
     @property
@@ -73,7 +76,7 @@ class SceneView:
     @property
     def env_ids(self) -> Array:
         """The envs at hand (n,)."""
-        return np.arange(self.engine.num_envs)[self._rows]
+        return self._env_ids
 
     @property
     def state(self) -> State:
@@ -125,23 +128,31 @@ class Frame(ABC):
     def __init__(self, scene: SceneView, name: str) -> None:
         self.scene, self.name = scene, name
         self._moment, self._pose = -1, np.zeros((0, 7))
+        self._position, self._quaternion = self._pose[:, :3], self._pose[:, 3:]
+
+    def _see(self) -> None:
+        """Work the pose out, once a moment."""
+        if self._moment != self.scene.moment:
+            self._pose, self._moment = self._compute(), self.scene.moment
+            self._position, self._quaternion = self._pose[:, :3], self._pose[:, 3:]
 
     @property
     def pose(self) -> Array:
         """(n, 7) in the world frame."""
-        if self._moment != self.scene.moment:
-            self._pose, self._moment = self._compute(), self.scene.moment
+        self._see()
         return self._pose
 
     @property
     def position(self) -> Array:
         """(n, 3) [m]."""
-        return self.pose[:, :3]
+        self._see()
+        return self._position
 
     @property
     def quaternion(self) -> Array:
         """(n, 4) xyzw."""
-        return self.pose[:, 3:]
+        self._see()
+        return self._quaternion
 
     @property
     def twist(self) -> Array:
@@ -179,7 +190,7 @@ class BodyFrame(Frame):
             fixed = np.array([[0, 0, 0, 0, 0, 0, 1.0]]) if self._local is None else self._local
             return np.repeat(fixed, len(self.scene.env_ids), axis=0)
         body = self.scene.state.body_pose[self.scene.rows, self.index.body]
-        return body if self._local is None else P.compose(body, np.broadcast_to(self._local, body.shape))
+        return body if self._local is None else P.compose(body, self._local)
 
     @property
     def twist(self) -> Array:
@@ -246,7 +257,8 @@ class ObjectView(Jointed):
         """All that it can be."""
         self.root = scene.frame(name)
         self.movable = all(world.bodies[entity.root].kind is BodyKind.FREE for entity in self.entities)
-        self._nominal = world.initial_body_pose[[entity.root for entity in self.entities]]
+        self._initial = world.initial_body_pose[[entity.root for entity in self.entities]]
+        self._nominal, self._population = np.zeros((0, 7)), -1
 
     @property
     def entity(self) -> Entity:
@@ -267,9 +279,10 @@ class ObjectView(Jointed):
     @property
     def nominal_pose(self) -> Array:
         """(n, 7) where the World has it before anything is drawn, as what it is in each env."""
-        choice = np.array(self.slot.entities)
-        there = self.scene.presence[self.scene.env_ids[:, None], choice]
-        return self._nominal[there.argmax(axis=1)]
+        if self._population != self.scene.population:
+            there = self.scene.presence[:, self.slot.entities]
+            self._nominal, self._population = self._initial[there.argmax(axis=1)], self.scene.population
+        return self._nominal[self.scene.rows]
 
     def by_entity(self, env_ids: Array) -> Iterator[tuple[Entity, Array]]:
         """What it is in these envs: each entity with those of the envs in which it is there."""
@@ -298,6 +311,8 @@ class RobotView(Jointed):
         arm = [j for c in self.model.channels.values() if c.opened is None for j in c.joints]
         self.arm_joints = np.array(sorted(arm), dtype=int)
         """World indices of the joints of all channels that are no grippers."""
+        self._arm = columns(self.arm_joints)
+        self._channels: dict[str, ChannelColumns] = {}
         self.lower = np.array([j.lower for j in world.joints[self._joints]])
         self.upper = np.array([j.upper for j in world.joints[self._joints]])
 
@@ -309,8 +324,8 @@ class RobotView(Jointed):
     @property
     def arm_speed(self) -> Array:
         """(n,) the largest absolute joint velocity outside the grippers."""
-        velocity = self.scene.state.joint_vel[self.scene.rows]
-        return np.abs(velocity[:, self.arm_joints]).max(axis=1)
+        velocity = self.scene.state.joint_vel[self.scene.rows][:, self._arm]
+        return np.maximum.reduce(np.abs(velocity), axis=1)
 
     def tool(self, name: str = "tool") -> Frame:
         """The frame of one of its tools."""
@@ -333,3 +348,21 @@ class RobotView(Jointed):
                 f"robot '{self.name}' has no channel '{name}'{suggest(name, known)} (channels: {listing(known)})"
             )
         return self.model.channels[name]
+
+    def channel_columns(self, name: str) -> "ChannelColumns":
+        """What addresses the joints and drives of one of its channels; looked up once."""
+        found = self._channels.get(name)
+        if found is None:
+            channel, world = self.channel(name), self.scene.engine.world
+            joints, drives = np.array(channel.joints, dtype=int), np.array(channel.actuators, dtype=int)
+            home = np.array([world.joints[j].initial for j in channel.joints], dtype=float)
+            found = self._channels[name] = ChannelColumns(columns(joints), columns(drives), home)
+        return found
+
+
+class ChannelColumns(NamedTuple):
+    """Columns of a channel's joints and drives among the world's, and the nominal home (K,) of the joints [rad, m]."""
+
+    joints: slice | Array
+    drives: slice | Array
+    home: Array

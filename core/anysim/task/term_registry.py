@@ -1,6 +1,7 @@
 """Term functions by name, and their binding to a scene."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from types import ModuleType
 from typing import Any
 
@@ -65,7 +66,7 @@ def bind(kind: str, spec: TermSpec, scene: SceneView, path: str) -> Callable[...
             except AnysimError as error:
                 raise SpecError([SpecIssue("", f"{path}.{name}", str(error))]) from None
         keywords[name] = value
-    return lambda *arguments: function(scene, *arguments, **keywords)
+    return partial(function, scene, **keywords)
 
 
 def resolve(kind: str, name: str | None, scene: SceneView) -> Frame | RobotView | ObjectView | JointView | CategoryView:

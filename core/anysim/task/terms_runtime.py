@@ -45,16 +45,21 @@ class Mdp:
             return bound
 
         self._commands = terms("command", spec.command, "command")
-        self._rewards = terms("reward", spec.rewards, "rewards")
+        rewards = terms("reward", spec.rewards, "rewards")
         self._success = terms("predicate", spec.success, "success")
         self._failure = terms("predicate", spec.failure, "failure")
-        self._events = terms("event", spec.events, "events")
+        events = terms("event", spec.events, "events")
         self._groups: dict[str, list[Term]] = {}
         for group, entries in spec.observations.items():
             bound = terms("observation", {str(i): t for i, t in enumerate(entries)}, f"observations.{group}")
             self._groups[group] = [self._sensed(group, int(i), term) for i, term in bound.items()]
         if issues:
             raise SpecError(issues)
+        self._weighted = [(name, spec.rewards[name].weight, term) for name, term in rewards.items()]
+        self._due = {
+            when: {name: term for name, term in events.items() if spec.events[name].when == when}
+            for when in ("reset", "step")
+        }
 
     def _sensed(self, group: str, place: int, term: Term) -> Term:
         """The term with what its spec says of noise, bias and delay; the term itself where that is nothing."""
@@ -82,12 +87,12 @@ class Mdp:
 
     def interval_events(self) -> None:
         """Events of the kind `when: step`, for the rows at hand."""
-        self._run_events("step", self.scene.elapsed[self.scene.rows])
+        if self._due["step"]:
+            self._run_events("step", self.scene.elapsed[self.scene.rows])
 
     def _run_events(self, when: str, tick: Any) -> None:
-        for name, term in self._events.items():
-            if self.spec.events[name].when == when:
-                term(partial(self._draw, f"event/{name}", tick))
+        for name, term in self._due[when].items():
+            term(partial(self._draw, f"event/{name}", tick))
 
     def _draw(self, stream: str, tick: Any, name: str, value: Any, where: Array | None = None) -> Array:
         """Draw for the rows at hand, or for those of them where `where` (n,) is true."""
@@ -112,31 +117,31 @@ class Mdp:
             TaskError: a term is not finite for an env whose state is.
         """
         total = np.zeros(len(faulted))
-        for name, term in self._rewards.items():
+        for name, weight, term in self._weighted:
             value = term()
             if value.shape != total.shape:
                 raise TaskError(f"reward term '{name}' returned shape {value.shape}, expected {total.shape}")
-            total = total + self.spec.rewards[name].weight * value
-        bad = ~np.isfinite(total)
-        if bad.any():
-            wrong = np.flatnonzero(bad & ~faulted)
-            if len(wrong):
-                raise TaskError(f"the reward of envs {wrong.tolist()} is not finite although their state is")
-        total[faulted] = np.nan
+            total = total + weight * value
+        wrong = ~(np.isfinite(total) | faulted)
+        if np.count_nonzero(wrong):
+            envs = np.flatnonzero(wrong).tolist()
+            raise TaskError(f"the reward of envs {envs} is not finite although their state is")
+        if np.count_nonzero(faulted):
+            total[faulted] = np.nan
         return total.astype(np.float32)
 
     def judge(self) -> tuple[Array, Array]:
         """(success, failure) (n,) bool for the rows at hand; counts how long success has held."""
         rows = self.scene.rows
-        n = len(self.held[rows])
-        success = np.full(n, bool(self._success))
+        held = self.held[rows]
+        success = np.full(held.shape, bool(self._success))
         for term in self._success.values():
             success &= term()
-        self.held[rows] = np.where(success, self.held[rows] + 1, 0)
-        failure = np.zeros(n, dtype=bool)
+        self.held[rows] = held = (held + 1) * success
+        failure = np.zeros(held.shape, dtype=bool)
         for term in self._failure.values():
             failure |= term()
-        return self.held[rows] >= self.spec.hold, failure
+        return held >= self.spec.hold, failure
 
     def overridable(self) -> list[Overridable]:
         """The parameters of commands and events that are drawn; those of events in steps may change midway."""

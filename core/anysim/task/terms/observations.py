@@ -56,11 +56,7 @@ def joint_opening(scene: SceneView, *, joint: RangedJointView) -> Array:
 
 def frame_pose(scene: SceneView, *, frame: Frame) -> Array:
     """Pose of a frame in the world [m, xyzw]; the quaternion's scalar part is never negative."""
-    return _unsigned(frame.pose)
-
-
-def _unsigned(pose: Array) -> Array:
-    return np.concatenate([pose[..., :3], np.where(pose[..., 6:] < 0, -pose[..., 3:], pose[..., 3:])], axis=-1)
+    return P.unsigned(frame.pose)
 
 
 def _flat(rows: Array) -> Array:
@@ -95,7 +91,7 @@ def category_present(scene: SceneView, *, category: CategoryView) -> Array:
 
 def category_pose(scene: SceneView, *, category: CategoryView) -> Array:
     """Poses of all instances of a category, one after the other [m, xyzw]; absent ones have the world's own frame."""
-    return _flat(_unsigned(category.poses))
+    return _flat(P.unsigned(category.poses))
 
 
 def category_twist(scene: SceneView, *, category: CategoryView) -> Array:

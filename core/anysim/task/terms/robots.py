@@ -14,7 +14,7 @@ _DOWN = np.array([0.0, 0.0, -1.0])
 
 def base_pose(scene: SceneView, *, robot: RobotView) -> Array:
     """Pose of the base's frame in the world [m, xyzw]; the quaternion's scalar part is never negative."""
-    return _unsigned(robot.base.pose)
+    return P.unsigned(robot.base.pose)
 
 
 def base_lin_vel(scene: SceneView, *, robot: RobotView) -> Array:
@@ -38,7 +38,7 @@ def tool_pose(
 ) -> Array:
     """Pose of a tool in the world or in the base's frame [m, xyzw]; the quaternion's scalar part is never negative."""
     pose = robot.tool(tool).pose
-    return _unsigned(pose if frame == "world" else P.compose(P.inverse(robot.base.pose), pose))
+    return P.unsigned(pose if frame == "world" else P.compose(P.inverse(robot.base.pose), pose))
 
 
 def tool_twist(
@@ -60,16 +60,14 @@ def channel_joint_pos(
     scene: SceneView, *, robot: RobotView, channel: str = "arm", relative: Literal["home", "zero"] = "home"
 ) -> Array:
     """Joint positions of a channel [rad, m], less the nominal home or as they are."""
-    joints = np.array(robot.channel(channel).joints, dtype=int)
-    position = scene.state.joint_pos[scene.rows][:, joints]
-    if relative == "zero":
-        return position
-    return position - np.array([scene.engine.world.joints[j].initial for j in joints])
+    own = robot.channel_columns(channel)
+    position = scene.state.joint_pos[scene.rows][:, own.joints]
+    return position if relative == "zero" else position - own.home
 
 
 def channel_joint_vel(scene: SceneView, *, robot: RobotView, channel: str = "arm") -> Array:
     """Joint velocities of a channel [rad/s, m/s]."""
-    return scene.state.joint_vel[scene.rows][:, np.array(robot.channel(channel).joints, dtype=int)]
+    return scene.state.joint_vel[scene.rows][:, robot.channel_columns(channel).joints]
 
 
 def channel_action(scene: SceneView, *, robot: RobotView, channel: str = "arm") -> Array:
@@ -86,9 +84,4 @@ def channel_action(scene: SceneView, *, robot: RobotView, channel: str = "arm") 
 
 def commanded_velocity(scene: SceneView, *, robot: RobotView, channel: str = "base") -> Array:
     """The velocities that the drives of a channel are commanded now [rad/s, m/s]; 0 where only positions are."""
-    drives = np.array(robot.channel(channel).actuators, dtype=int)
-    return scene.engine.control.velocity[scene.rows][:, drives]
-
-
-def _unsigned(pose: Array) -> Array:
-    return np.concatenate([pose[:, :3], np.where(pose[:, 6:] < 0, -pose[:, 3:], pose[:, 3:])], axis=1)
+    return scene.engine.control.velocity[scene.rows][:, robot.channel_columns(channel).drives]

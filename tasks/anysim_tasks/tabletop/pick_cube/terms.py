@@ -19,7 +19,8 @@ def lifted_toward(
     """
     position = object.root.position
     rest = object.nominal_pose[:, 2]
-    share = np.clip((position[:, 2] - rest) / np.maximum(goal.position[:, 2] - rest, 1e-6), 0.0, 1.0)
+    risen = (position[:, 2] - rest) / np.maximum(goal.position[:, 2] - rest, 1e-6)
+    share = np.minimum(np.maximum(risen, 0.0), 1.0)
     return share * (1.0 - np.tanh(norm(goal.position - position) / scale))
 
 
