@@ -123,7 +123,7 @@ class SapienEngine(SimEngine):
             self._renew(int(env))
             self._reader.hold_contact(int(env), 0.0)
             self._reader.written(int(env))
-            self._drives.effort[env] = 0.0
+            self._drives.hold_effort(int(env), 0.0)
 
     def _renew(self, env: int) -> None:
         """A new scene for an env, in the initial state: a used one would remember contacts."""
@@ -146,12 +146,8 @@ class SapienEngine(SimEngine):
     # ------------------------------------------------------------------ stepping
 
     def _step(self, n_steps: int, ids: Array | None) -> None:
-        stepped = range(self.num_envs) if ids is None else [int(env) for env in ids]
-        for env in stepped:
+        for env in range(self.num_envs) if ids is None else ids.tolist():
             self._step_env(env, n_steps)
-        if self.world.joints and len(stepped):
-            scenes = self._scenes if ids is None else [self._scenes[env] for env in stepped]
-            self._drives.note(slice(None) if ids is None else ids, scenes)
 
     def _step_env(self, env: int, n_steps: int) -> None:
         pushes = None if self._wrench is None else wrenches(self._wrench[env], self._layout.fixed)
@@ -199,7 +195,7 @@ class SapienEngine(SimEngine):
                     # the origin keeps its velocity; PhysX would keep that of the centre of mass
                     rows = np.zeros((len(bodies), 6))
                     if moved.any():
-                        rows[moved] = twists_of([scene], bodies[moved].tolist(), turn[None, moved])[0]
+                        rows[moved] = twists_of(scene, bodies[moved], turn[moved])
                 for body, place in zip(bodies, pose[row], strict=True):
                     scene.place_body(int(body), place)
                 turn = scene.poses()[bodies, 3:]
@@ -239,7 +235,7 @@ class SapienEngine(SimEngine):
     def _snapshot(self, ids: Array, level: SnapshotLevel) -> dict[str, Array]:
         scenes = [self._scenes[env] for env in ids]
         data = pasts_of(scenes) if level is SnapshotLevel.TRAJECTORY else motions_of(scenes)
-        return data | {"effort": self._drives.effort[ids]} | self._reader.rows(ids) | self._parameters.rows(ids)
+        return data | {"effort": self._drives.effort()[ids]} | self._reader.rows(ids) | self._parameters.rows(ids)
 
     @classmethod
     def refuse_rows(cls, data: Mapping[str, Array], level: SnapshotLevel) -> None:
@@ -256,7 +252,7 @@ class SapienEngine(SimEngine):
             else:
                 self._place(env, Motion(*(data[name][row] for name in Motion._fields)))
             self._reader.put_rows(env, data, row)
-            self._drives.effort[env] = data["effort"][row]
+            self._drives.hold_effort(env, data["effort"][row])
 
     def _carry_rows(self) -> Any:
         reader = self._reader
@@ -269,7 +265,7 @@ class SapienEngine(SimEngine):
         sensors_before, sensors_after = paired(old, new, "contact_sensors")
         for env in range(self.num_envs):
             self._reader.hold_motion(env, after, carried.pose[env, before], carried.twist[env, before])
-            self._drives.effort[env, joints_after] = carried.effort[env, joints_before]
+            self._drives.hold_effort(env, carried.effort[env, joints_before], joints_after)
             contact = np.zeros((len(new.contact_sensors), 3))
             contact[sensors_after] = carried.contact[env, sensors_before]
             self._reader.hold_contact(env, contact)

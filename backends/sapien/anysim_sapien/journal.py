@@ -19,7 +19,7 @@ FORMAT = 1
 """Of the entries, in a snapshot: a new number for each change of what an entry means, or of what is done for it."""
 
 _HEAD = struct.Struct("=dd")
-_COUNT = struct.Struct("=d")
+_STEPS = struct.Struct("=ddd")
 
 
 class Op(IntEnum):
@@ -77,8 +77,7 @@ class Journal:
         """Add an entry; `numbers` are the bytes of 64-bit floats."""
         if self._waiting:
             self.flush()
-        self._bytes += _HEAD.pack(op, len(numbers) // 8)
-        self._bytes += numbers
+        self._bytes += _HEAD.pack(op, len(numbers) // 8) + numbers
         if op in _WRITES:
             self.writes += 1
 
@@ -94,7 +93,7 @@ class Journal:
     def flush(self) -> None:
         """Steps from here on are another entry."""
         if self._waiting:
-            self._bytes += _HEAD.pack(Op.STEP, 1) + _COUNT.pack(self._waiting)
+            self._bytes += _STEPS.pack(Op.STEP, 1, self._waiting)
             self._waiting = 0
 
     def base(self) -> None:

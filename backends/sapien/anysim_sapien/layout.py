@@ -29,6 +29,8 @@ class Layout:
     """(B,) bool: bodies that are there and that nothing moves."""
     free: Array
     """(B,) bool: free bodies that are there."""
+    links: Array
+    """(L,) links, without roots, that are there."""
     geom_fixed: Array
     """(G,) bool: geoms of the world and of static bodies."""
     geom_entity: Array
@@ -60,6 +62,7 @@ class Layout:
             joint_there=there[np.array([joint.body for joint in world.joints], dtype=int)],
             fixed=fixed & there,
             free=np.array([b.kind is BodyKind.FREE for b in world.bodies], dtype=bool) & there,
+            links=np.array([i for i, b in enumerate(world.bodies) if b.kind is BodyKind.LINK and there[i]], dtype=int),
             geom_fixed=np.array([g.body == WORLD or fixed[g.body] for g in world.geoms], dtype=bool),
             geom_entity=entity[[g.body for g in world.geoms]] if world.geoms else np.zeros(0, dtype=int),
             body_entity=entity,

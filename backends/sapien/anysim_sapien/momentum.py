@@ -5,6 +5,7 @@ That is exact for a free body. For a link it takes PhysX' forces of its joints. 
 dry friction, whose reaction PhysX tells wrong: by the friction of a sliding joint, by that of a turning one over 0.3 m.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from anysim.conventions import Array, xyzw_from_wxyz
 from anysim.math import pose as P
 from anysim.model.world import BodyKind, JointType, World
+from anysim_sapien.packing import Packing
 from anysim_sapien.recipe import Recipes
 from anysim_sapien.scene import EnvScene
 
@@ -34,10 +36,13 @@ class Balance(NamedTuple):
 class _Noted(NamedTuple):
     """What a substep did to an env: as read, since most steps are never asked about."""
 
-    before: Array
-    after: Array
-    poses: Array
-    exerted: tuple[Array, ...]
+    packing: Packing
+    before: bytes
+    links_before: list[Array]
+    after: bytes
+    links_after: Callable[[], list[Array]]
+    links: Array
+    exerted: list[Array]
     order: list[Array]
     mass: Array
     friction: Array
@@ -77,20 +82,22 @@ class Momentum:
 
     def before(self, scene: EnvScene) -> None:
         """Right before the last substep: note velocities and orientations."""
-        self._velocity, self._poses = self._velocities(scene), scene.poses()
+        self._before = scene.pack(), scene.velocities_of_links()
 
     def after(self, env: int, scene: EnvScene, pushes: Array | None) -> None:
-        """Right after the last substep, with `pushes` (K, 7): bodies and the wrenches that were on them."""
+        """After the last substep, with `pushes` (K, 7): bodies and the wrenches that were on them."""
         self._balance[env] = None
         self._noted[env] = _Noted(
-            self._velocity,
-            self._velocities(scene),
-            self._poses,
-            tuple(np.array(tree.handle.link_incoming_joint_forces) for tree in scene.trees),
+            scene.packing,
+            *self._before,
+            scene.packed(),
+            scene.link_velocities,
+            scene.layout.links,
+            [tree.handle.link_incoming_joint_forces for tree in scene.trees],
             scene.link_order(),
-            scene.mass.copy(),
-            scene.rubbing.copy(),
-            scene.slowing[:, 0].copy(),
+            scene.mass,
+            scene.rubbing,
+            scene.slowing,
             scene.gravity,
             pushes,
         )
@@ -102,21 +109,24 @@ class Momentum:
             found = self._balance[env] = self._solve(self._noted[env])
         return found
 
-    def _velocities(self, scene: EnvScene) -> Array:
+    def _velocities(self, noted: _Noted, packed: bytes, links: list[Array]) -> Array:
         """(M, 3) of the centres of mass of the bodies that move."""
-        bodies = scene.bodies
-        return np.array([bodies[body].linear_velocity for body in self._moving]).reshape(-1, 3)
+        velocity = np.frombuffer(packed, dtype=np.float32).take(noted.packing.velocity[:, :3]).astype(float)
+        if links:
+            velocity[noted.links] = links
+        return velocity[self._moving]
 
     def _solve(self, noted: _Noted | None) -> Balance:
         force, doubt = np.zeros((len(self._parent), 3)), np.full(len(self._parent), np.inf)
         if noted is None:
             return Balance(force, doubt)
         moving, mass = self._moving, noted.mass[self._moving]
-        gained = noted.after.astype(float) - noted.before.astype(float)
+        before = self._velocities(noted, noted.before, noted.links_before)
+        gained = self._velocities(noted, noted.after, noted.links_after()) - before
         force[moving] = gained * (mass[:, None] / self._world.physics.dt)
         force[moving] -= np.outer(mass * self._weighs[moving], noted.gravity)
-        if noted.slowing.any():
-            force[moving] += self._dragged(noted)
+        if noted.slowing[:, 0].any():
+            force[moving] += self._dragged(noted, before)
         if noted.pushes is not None:
             force[noted.pushes[:, 0].astype(int)] -= noted.pushes[:, 1:4]
         if len(self._links):
@@ -126,7 +136,7 @@ class Momentum:
         doubt[moving] = (noted.friction @ self._doubts)[moving]
         return Balance(force, doubt)
 
-    def _dragged(self, noted: _Noted) -> Array:
+    def _dragged(self, noted: _Noted, before: Array) -> Array:
         """(M, 3) [N] what damping takes: PhysX damps the speed that gravity and pushes have added to already."""
         moving, dt = self._moving, self._world.physics.dt
         pushed = np.zeros((len(self._parent), 3))
@@ -135,7 +145,7 @@ class Momentum:
         mass = noted.mass[moving, None]
         pulled = np.divide(pushed[moving], mass, out=np.zeros((len(mass), 3)), where=mass > 0)  # 0 of what is absent
         gained = np.outer(self._weighs[moving], noted.gravity) + pulled
-        return noted.slowing[moving, None] * mass * (noted.before.astype(float) + dt * gained)
+        return noted.slowing[moving, :1] * mass * (before + dt * gained)
 
     def _exerted(self, noted: _Noted) -> Array:
         """(B, 3) [N] what each link's joint exerts on it."""
@@ -143,7 +153,8 @@ class Momentum:
         for order, rows in zip(noted.order, noted.exerted, strict=True):
             forces[order] = rows[:, :3]
         # PhysX gives them in the axes of the joint, in the substep's first pose
-        turn = P.multiply(noted.poses[links, 3:], self._turn[links])
+        orientation = np.frombuffer(noted.before, dtype=np.float32).take(noted.packing.pose[links, 3:]).astype(float)
+        turn = P.multiply(orientation, self._turn[links])
         exerted = np.zeros_like(forces)
         exerted[links] = P.rotate(turn, forces[links])
         return exerted

@@ -1,7 +1,7 @@
 """Poses and velocities of root bodies and joints, in and out of a scene."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,11 +26,8 @@ def motion_of(scene: EnvScene) -> Motion:
     """Copy it out; what is not there is 0."""
     layout = scene.layout
     roots = (layout.free | layout.fixed)[:, None]
-    velocity = np.zeros((len(scene.bodies), 6))
-    for body in np.flatnonzero(layout.free):
-        component = scene.bodies[body]
-        velocity[body] = [*component.linear_velocity, *component.angular_velocity]
-    return Motion(np.where(roots, scene.poses(), 0.0), velocity, scene.joint_positions(), scene.joint_velocities())
+    pose = np.where(roots, scene.poses(), 0.0)
+    return Motion(pose, scene.velocities(), scene.joint_positions(), scene.joint_velocities())
 
 
 def motions_of(scenes: Sequence[EnvScene]) -> dict[str, Array]:
@@ -49,23 +46,16 @@ def put_motion(scene: EnvScene, motion: Motion) -> None:
     scene.place_joints(motion.joint_pos, motion.joint_vel)
 
 
-def twists_of(scenes: Sequence[EnvScene], bodies: Sequence[int], turn: Array) -> Array:
-    """Velocities of free roots' frame origins and their rates (N, K, 6), world axes; `turn` (N, K, 4) is how they lie.
+def twists_of(scene: EnvScene, bodies: Array, turn: Array) -> Array:
+    """Velocities of free roots' frame origins and their rates (K, 6), world axes; `turn` (K, 4) is how they lie.
 
     PhysX gives the velocity of the centre of mass; the origin's differs by the rate x the arm.
     """
-    components = [[scene.bodies[body] for body in bodies] for scene in scenes]
-    linear = np.array([[part.linear_velocity for part in row] for row in components], dtype=float)
-    rate = np.array([[part.angular_velocity for part in row] for row in components], dtype=float)
-    return np.concatenate([linear - P.cross(rate, _arms(components, turn)), rate], axis=-1)
-
-
-def _arms(components: Sequence[Sequence[Any]], turn: Array) -> Array:
-    """From the frames' origins to the centres of mass (N, K, 3), in world axes."""
-    return P.rotate(turn, np.array([[part.cmass_local_pose.p for part in row] for row in components], dtype=float))
+    velocity = scene.velocities()[bodies]
+    rate = velocity[:, 3:]
+    return np.concatenate([velocity[:, :3] - P.cross(rate, P.rotate(turn, scene.com[bodies])), rate], axis=-1)
 
 
 def put_twist(scene: EnvScene, body: int, twist: Array, turn: Array) -> None:
     """Write a root's twist (6,), as `twists_of` returns it, at its orientation (4,)."""
-    arm = _arms([[scene.bodies[body]]], turn[None, None])[0, 0]
-    scene.push_body(body, twist[:3] + P.cross(twist[3:], arm), twist[3:])
+    scene.push_body(body, twist[:3] + P.cross(twist[3:], P.rotate(turn, scene.com[body])), twist[3:])

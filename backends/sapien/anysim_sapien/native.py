@@ -4,17 +4,12 @@ Gains, targets and limits are given once, not in each substep. Feed-forward move
 bounds it as well; a joint's own damping is part of its drive, with a target that leaves the law as it is.
 """
 
-from collections.abc import Sequence
-from typing import Any
-
 import numpy as np
 
 from anysim.conventions import Array
 from anysim.model.world import Actuation, World
 from anysim_sapien.drives import Drives
-from anysim_sapien.scene import UNBOUNDED, EnvScene, positions_of, velocities_of
-
-_GAINS = slice(2, 5)  # in `wanted`: position and velocity target, stiffness, damping, limit, force
+from anysim_sapien.scene import UNBOUNDED, EnvScene
 
 
 class NativeDrives(Drives):
@@ -23,29 +18,15 @@ class NativeDrives(Drives):
     each_substep = False
 
     def __init__(self, world: World, num_envs: int) -> None:
-        super().__init__(world, num_envs)
+        # position and velocity target, stiffness, damping, limit, force
         self._wanted = np.zeros((num_envs, len(world.joints), 6))
         self._known = np.full_like(self._wanted, np.nan)
+        super().__init__(world, num_envs)
 
     def _update(self) -> None:
         """Make PhysX' terms from those of the law."""
         super()._update()
-        stiff = self._stiffness > 0
-        whole = self._damping + self.passive
-        shift = np.divide(self._feed, self._stiffness, out=np.zeros_like(whole), where=stiff)
-        position, velocity = np.zeros_like(whole), np.zeros_like(whole)
-        if self._control is not None:
-            position[:, self._joint] = self._control.position
-            velocity[:, self._joint] = self._control.velocity
-        braked = ~stiff & (self._damping > 0)
-        push = self._damping * velocity + np.where(braked, self._feed, 0.0)
-        wanted = self._wanted
-        wanted[..., 0] = np.where(stiff, position + shift, 0.0)
-        wanted[..., 1] = np.divide(push, whole, out=np.zeros_like(whole), where=whole > 0)
-        wanted[..., 2], wanted[..., 3] = self._stiffness, whole
-        # a drive in effort mode exerts a force, and its joint's damping has no limit
-        wanted[..., 4] = np.where(stiff | braked, np.minimum(self._bound, UNBOUNDED), UNBOUNDED)
-        wanted[..., 5] = np.where(stiff | braked, 0.0, np.clip(self._feed, -self._bound, self._bound))
+        self._kernels.native_orders(self._control, self._actuator, self._law, UNBOUNDED, self._wanted)
 
     def target(self, env: int, joint: int) -> tuple[float, float]:
         """The position and velocity targets that PhysX gets for a joint."""
@@ -66,27 +47,23 @@ class NativeDrives(Drives):
 
     def begin(self, env: int, scene: EnvScene) -> None:
         """Tell PhysX what changed."""
-        wanted, told = self._wanted[env], self._known[env]
-        changed = (wanted != told) & scene.layout.joint_there[:, None]
-        if not changed.any():
+        kernels, there = self._kernels, scene.layout.joint_there
+        count = kernels.changes(self._wanted, self._known, env, there, self._news)
+        if not count:
             return
-        joints, rows = scene.joints, wanted.tolist()
-        for j in np.flatnonzero(changed[:, _GAINS].any(axis=1)).tolist():
-            joints[j].set_drive_properties(*rows[j][_GAINS], "force")
-        for j in np.flatnonzero(changed[:, 0]).tolist():
-            joints[j].set_drive_target(rows[j][0])
-        for j in np.flatnonzero(changed[:, 1]).tolist():
-            joints[j].set_drive_velocity_target(rows[j][1])
-        if changed[:, 5].any():
+        joints, rows, forced = scene.joints, self._wanted[env].tolist(), False
+        for j, what in self._news[:count].tolist():
+            position, velocity, stiffness, damping, limit, _ = rows[j]
+            if what & kernels.GAINS:
+                joints[j].set_drive_properties(stiffness, damping, limit, "force")
+            if what & kernels.TARGET:
+                joints[j].set_drive_target(position)
+            if what & kernels.SPEED:
+                joints[j].set_drive_velocity_target(velocity)
+            forced |= bool(what & kernels.FORCE)
+        if forced:
             for tree in scene.trees:
-                tree.handle.set_qf(wanted[tree.joints, 5].astype(np.float32))
-        told[...] = wanted
-
-    def note(self, envs: Any, scenes: Sequence[EnvScene]) -> None:
-        """What the drives exerted, by their law at the end of the substep."""
-        law = self._push[envs] + self._feed[envs] - self._stiffness[envs] * positions_of(scenes)
-        law -= self._damping[envs] * velocities_of(scenes)
-        self.effort[envs] = np.clip(law, -self._bound[envs], self._bound[envs])
+                tree.handle.set_qf(self._wanted[env, tree.joints, 5].astype(np.float32))
 
 
 def drives_of(world: World, num_envs: int) -> Drives:

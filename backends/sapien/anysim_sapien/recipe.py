@@ -15,6 +15,7 @@ from anysim.model.world import BodyKind, Joint, World
 from anysim_sapien.layout import Layout
 from anysim_sapien.meeting import Meeting
 from anysim_sapien.options import SapienOptions
+from anysim_sapien.packing import Packing
 from anysim_sapien.shapes import to_pose
 from anysim_sapien.surfaces import Copy
 
@@ -75,6 +76,8 @@ class Recipe:
         self.geoms_on: dict[int, list[int]] = {}
         for i in self._meeting.solid.tolist():
             self.geoms_on.setdefault(self.world.geoms[i].body, []).append(i)
+        self.packing: Packing | None = None
+        """Where things are in the packed state of its scenes; that of the first one is looked at."""
         self._copies = lru_cache(maxsize=64)(self._make_copies)
 
     def copies(self, friction: Array, restitution: Array) -> dict[int, list[Copy]]:

@@ -5,7 +5,6 @@ and for parameters that PhysX reads once. Nothing here knows of rendering, so no
 """
 
 import threading
-from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple
 from weakref import WeakSet
 
@@ -14,10 +13,10 @@ import numpy as np
 from anysim.conventions import WORLD, Array, wxyz_from_xyzw
 from anysim.engine.damping import gain
 from anysim.model.world import Body, BodyKind, JointType, Solver
-from anysim_sapien.absent import NOBODY, NOWHERE
 from anysim_sapien.exclusions import Group
 from anysim_sapien.journal import Journal, Op
 from anysim_sapien.library import physx, sapien
+from anysim_sapien.packing import Packing, pack
 from anysim_sapien.recipe import Recipe, Values, tendon_of
 from anysim_sapien.shapes import make_shape, to_pose
 
@@ -32,9 +31,6 @@ COUPLING = 1e6
 
 UNBOUNDED = 3.4e38
 
-_FROM_PACKED = np.array([4, 5, 6, 1, 2, 3, 0])
-"""Columns of SAPIEN's packed poses, which are a quaternion wxyz and then the position, in our order."""
-
 _configuring = threading.Lock()
 """PhysX takes the configuration of a scene from a global, at the moment the scene is made."""
 
@@ -45,6 +41,8 @@ class Tree(NamedTuple):
     handle: Any
     bodies: tuple[int, ...]
     joints: Array
+    force: Array
+    """(n,) float32, for what joints are given in a substep."""
 
 
 class EnvScene:
@@ -61,9 +59,12 @@ class EnvScene:
         """The parameters that it was built with."""
         self.journal = Journal()
         """What was done to it since it was built."""
-        # as PhysX has them: what a snapshot says of them is what was read from PhysX
+        # as PhysX has them: what a snapshot says of them is what was read from PhysX. None is changed in place, so that
+        # what a substep found can be kept without a copy
         self.mass, self.rubbing = np.zeros(len(world.bodies)), np.zeros(len(world.joints))
         """Masses (B,) [kg] and dry friction (J,) [N m] or [N] as they are now."""
+        self.com = np.zeros((len(world.bodies), 3))
+        """(B, 3) [m] centres of mass in the bodies' frames, as they are now."""
         self.slowing = np.zeros((len(world.bodies), 2))
         """(B, 2) [1/s] what PhysX takes off velocities and rates in a step, over the step."""
         self.gravity = _single(self.values.gravity)
@@ -71,7 +72,7 @@ class EnvScene:
         self.system = _system(recipe, values.gravity)
         self.scene: Any = sapien.Scene([self.system])
         self.layout = recipe.layout
-        self.bodies: list[Any] = [NOBODY] * len(world.bodies)
+        self.bodies: list[Any] = [None] * len(world.bodies)
         self.entities: list[Any] = [None] * len(world.bodies)
         self.shapes: list[list[Any]] = [[] for _ in world.geoms]
         self.dry: dict[int, Any] = {}
@@ -79,19 +80,23 @@ class EnvScene:
         """What the shapes of each geom that collides must be."""
         self.body_of: dict[Any, int] = {}
         """World body of each PhysX component, -1 for the world's own geoms."""
+        self._packed: bytes | None = None
+        self._link_velocities: list[Array] | None = []
         if WORLD in recipe.geoms_on:
             self._enter(WORLD, physx.PhysxRigidStaticComponent(), sapien.Pose())
         for body in recipe.layout.actors:
             self._actor(body)
         self.trees = [self._tree(members) for members in recipe.layout.trees]
+        self._links = [self.bodies[body] for body in recipe.layout.links]
         self._order: list[Array] | None = None
         self.joints = self._joints()
         for index in np.flatnonzero((values.joint_friction > 0) & self.layout.joint_there):
             self.set_dry(int(index), float(values.joint_friction[index]))
         self.place_joints(recipe.common.initial, np.zeros(len(world.joints)))
-        order = {entity: row for row, entity in enumerate(self.scene.entities)}
-        self._rows = np.array([order[entity] for entity in self.entities if entity is not None], dtype=int)
-        self._whole = bool(recipe.layout.there.all())
+        if recipe.packing is None:
+            recipe.packing = Packing.of(world, recipe.layout, self)
+        self.packing = recipe.packing
+        """Where things are in `packed`."""
         self._number = {shape: i for i, shape in enumerate(s for shapes in self.shapes for s in shapes)}
         self.journal.clear()
 
@@ -177,7 +182,7 @@ class EnvScene:
         # PhysX sorts the degrees of freedom in its own way: only names tell
         order = np.array([int(joint.name) for joint in handle.active_joints], dtype=int)
         self._tendons(handle, order)
-        return Tree(handle, members, order)
+        return Tree(handle, members, order, np.zeros(len(order), dtype=np.float32))
 
     def _join(self, body: int) -> None:
         """Say where a link's joint is, which must follow what moves centres of mass.
@@ -214,9 +219,20 @@ class EnvScene:
 
     # ------------------------------------------------------------------ changing
 
+    def _note(self, op: Op, *numbers: Array | float) -> None:
+        """Have the journal know of a change that is about to be made."""
+        self.link_velocities()
+        self._packed = None
+        self.journal.note(op, *numbers)
+
+    def stepped(self, n: int) -> None:
+        """Have the journal know of steps that were made."""
+        self._packed = self._link_velocities = None
+        self.journal.stepped(n)
+
     def set_inertial(self, body: int, mass: float, com: Array, inertia: Array) -> None:
         """Mass [kg], centre of mass [m] and inertia about it (6,) [kg m^2], in the body's frame."""
-        self.journal.note(Op.INERTIAL, body, mass, com, inertia)
+        self._note(Op.INERTIAL, body, mass, com, inertia)
         component = self.bodies[body]
         if self._recipe.layout.fixed[body]:
             # the root of a fixed articulation: it cannot move, and PhysX wants positive numbers
@@ -226,26 +242,28 @@ class EnvScene:
             return
         moments, frame = self._recipe.common.principal(body, inertia)
         component.set_mass(float(mass))
-        self.mass[body] = component.mass  # PhysX keeps its inverse, in single precision
+        self.mass = _with(self.mass, body, component.mass)  # PhysX keeps its inverse, in single precision
         component.set_inertia(moments.tolist())
         component.set_cmass_local_pose(sapien.Pose(com, wxyz_from_xyzw(frame)))
+        self.com = _with(self.com, body, component.cmass_local_pose.p)
 
     def set_damping(self, body: int, rates: Array) -> None:
         """Rates (2,) [1/s] at which a free body slows down.
 
         PhysX takes a share of `damping dt` in each step; this share is that of an exponential.
         """
-        self.journal.note(Op.DAMPING, body, rates)
+        self._note(Op.DAMPING, body, rates)
         linear, angular = gain(rates, self._recipe.world.physics.dt).tolist()
         self.bodies[body].set_linear_damping(linear)
         self.bodies[body].set_angular_damping(angular)
-        self.slowing[body] = self.bodies[body].linear_damping, self.bodies[body].angular_damping
+        damping = self.bodies[body].linear_damping, self.bodies[body].angular_damping
+        self.slowing = _with(self.slowing, body, damping)
 
     def set_dry(self, index: int, friction: float) -> None:
         """Dry friction [N m] or [N] of a joint: a drive to standstill that may exert this much and no more."""
         world = self._recipe.world
         spec = world.joints[index]
-        self.journal.note(Op.DRY, index, friction)
+        self._note(Op.DRY, index, friction)
         drive = self.dry.get(index)
         if drive is None:
             if friction == 0.0:
@@ -259,7 +277,7 @@ class EnvScene:
             self.dry[index] = drive
         # PhysX bounds the impulse of these drives, not the force
         bound = friction * world.physics.dt
-        self.rubbing[index] = float(np.float32(bound)) / world.physics.dt
+        self.rubbing = _with(self.rubbing, index, float(np.float32(bound)) / world.physics.dt)
         if spec.type is JointType.PRISMATIC:
             drive.set_drive_property_x(0.0, STICKING, bound, "force")
         else:
@@ -276,17 +294,17 @@ class EnvScene:
 
     def set_armature(self, index: int, armature: float) -> None:
         """Armature [kg m^2] or [kg] of a joint."""
-        self.journal.note(Op.ARMATURE, index, armature)
+        self._note(Op.ARMATURE, index, armature)
         self.joints[index].set_armature(np.array([armature], dtype=np.float32))
 
     def place_body(self, body: int, pose: Array) -> None:
         """Write the pose (7,) of a root body's frame."""
-        self.journal.note(Op.POSE, body, pose)
+        self._note(Op.POSE, body, pose)
         self.entities[body].set_pose(to_pose(pose))
 
     def push_body(self, body: int, linear: Array, rate: Array) -> None:
         """Write the velocity of a free root's centre of mass [m/s], and its angular rate [rad/s], world axes."""
-        self.journal.note(Op.VELOCITY, body, linear, rate)
+        self._note(Op.VELOCITY, body, linear, rate)
         tree = self._recipe.layout.tree_of[body]
         if tree >= 0:
             self.trees[tree].handle.set_root_linear_velocity(linear)
@@ -298,7 +316,7 @@ class EnvScene:
     def place_joints(self, position: Array | None, velocity: Array | None) -> None:
         """Write all joint positions and velocities (J,)."""
         nothing = np.zeros(len(self._recipe.world.joints))
-        self.journal.note(
+        self._note(
             Op.JOINTS,
             position is not None,
             velocity is not None,
@@ -321,54 +339,50 @@ class EnvScene:
         """PhysX' contacts of the last step, by the numbers of their shapes: its own order is that of addresses."""
         return sorted(self.system.get_contacts(), key=lambda c: [self._number[shape] for shape in c.shapes])
 
-    def packed_poses(self) -> Array:
-        """(B, 7) float32 of the bodies' frames, in PhysX' order of columns."""
-        packed = np.frombuffer(self.scene.pack_poses(), dtype=np.float32).reshape(-1, 7)[self._rows]
-        if self._whole:
-            return packed
-        rows = np.tile(NOWHERE, (len(self.bodies), 1))
-        rows[self.layout.there] = packed
-        return rows
+    def pack(self) -> bytes:
+        """The state at this moment, also between the substeps of a call."""
+        return pack(self.system, self.scene)
+
+    def packed(self) -> bytes:
+        """The state, which is read from PhysX once until something is done to the scene."""
+        if self._packed is None:
+            self._packed = self.pack()
+        return self._packed
+
+    def link_velocities(self) -> list[Array]:
+        """Of the centres of mass of `layout.links`, as the last substep left them, whatever was written since."""
+        if self._link_velocities is None:
+            self._link_velocities = self.velocities_of_links()
+        return self._link_velocities
+
+    def velocities_of_links(self) -> list[Array]:
+        """Of the centres of mass of `layout.links`, at this moment."""
+        return [link.linear_velocity for link in self._links]
 
     def poses(self) -> Array:
         """Poses (B, 7) of the bodies' frames, xyzw, float64."""
-        return self.packed_poses()[:, _FROM_PACKED].astype(float)
+        return self._taken(self.packing.pose)
+
+    def velocities(self) -> Array:
+        """(B, 6) of free bodies' centres of mass, and their rates, float64; 0 of other bodies."""
+        return self._taken(self.packing.velocity)
 
     def joint_positions(self) -> Array:
         """(J,) float64."""
-        return self._gather("get_qpos")
+        return self._taken(self.packing.joint_pos)
 
     def joint_velocities(self) -> Array:
         """(J,) float64."""
-        return self._gather("get_qvel")
+        return self._taken(self.packing.joint_vel)
 
-    def _gather(self, name: str) -> Array:
-        values = np.zeros(len(self.joints))
-        for tree in self.trees:
-            values[tree.joints] = getattr(tree.handle, name)()
-        return values
+    def _taken(self, places: Array) -> Array:
+        return np.frombuffer(self.packed(), dtype=np.float32).take(places).astype(float)
 
 
-def poses_of(scenes: Sequence[EnvScene]) -> Array:
-    """Poses (N, B, 7) of all envs, xyzw, float64."""
-    return np.array([scene.packed_poses() for scene in scenes])[..., _FROM_PACKED].astype(float, order="C")
-
-
-def positions_of(scenes: Sequence[EnvScene]) -> Array:
-    """Joint positions (N, J) of all envs, float64."""
-    values = np.zeros((len(scenes), len(scenes[0].joints)))
-    for row, scene in zip(values, scenes, strict=True):
-        for tree in scene.trees:
-            row[tree.joints] = tree.handle.get_qpos()
-    return values
-
-
-def velocities_of(scenes: Sequence[EnvScene]) -> Array:
-    """Joint velocities (N, J) of all envs, float64."""
-    values = np.zeros((len(scenes), len(scenes[0].joints)))
-    for row, scene in zip(values, scenes, strict=True):
-        for tree in scene.trees:
-            row[tree.joints] = tree.handle.get_qvel()
+def _with(values: Array, row: int, value: Any) -> Array:
+    """A copy with another row."""
+    values = values.copy()
+    values[row] = value
     return values
 
 

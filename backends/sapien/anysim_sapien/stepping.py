@@ -38,8 +38,10 @@ def advance(scene: EnvScene, drives: Drives, momentum: Momentum, row: int, pushe
         for component, force, torque in pushed:
             component.add_force_torque(force, torque)
         system.step()
+    scene.stepped(n_steps)
     momentum.after(row, scene, pushes)
-    journal.stepped(n_steps)
+    if driven:
+        drives.note(row, scene)
     if pushed:
         journal.flush()
 

@@ -1,45 +1,57 @@
-"""Twists of links from joint velocities: sums over the joints between a link and its root, in one product."""
+"""Twists of all bodies from what SAPIEN packs: those of links are sums over the joints between a link and its root.
+
+PhysX' own velocities of links belong to the poses before the step.
+"""
 
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.math import pose as P
 from anysim.model.world import BodyKind, JointType, World
+from anysim_sapien.packing import Batch
 
 
-class LinkVelocities:
-    """The constants of a World's links, made once."""
+class Twists:
+    """The constants of a World, made once."""
 
     def __init__(self, world: World) -> None:
+        from anysim_sapien import kernels  # numba, where a world is built
+
+        self._kernel = kernels.twists
+        self._bodies = len(world.bodies)
+        self._free = np.array([i for i, b in enumerate(world.bodies) if b.kind is BodyKind.FREE], dtype=int)
         self._links = np.array([i for i, b in enumerate(world.bodies) if b.kind is BodyKind.LINK], dtype=int)
         self._body = np.array([j.body for j in world.joints], dtype=int)
         self._axis = np.array([j.axis for j in world.joints], dtype=float).reshape(-1, 3)
         self._anchor = np.array([j.anchor for j in world.joints], dtype=float).reshape(-1, 3)
-        self._turns = np.array([j.type is JointType.REVOLUTE for j in world.joints], dtype=float)[:, None]
-        root = list(range(len(world.bodies)))
-        moved_by = np.zeros((len(world.bodies), len(world.joints)))
-        for i, body in enumerate(world.bodies):
-            if body.kind is BodyKind.LINK:
-                root[i] = root[body.parent]
-                moved_by[i] = moved_by[body.parent]
-                moved_by[i, world.body_joint[i]] = 1.0
+        self._turns = np.array([j.type is JointType.REVOLUTE for j in world.joints], dtype=float)
+        root, chains = list(range(len(world.bodies))), [list[int]() for _ in world.bodies]
+        for i in self._links.tolist():
+            parent = world.bodies[i].parent
+            root[i], chains[i] = root[parent], [*chains[parent], world.body_joint[i]]
         self._root = np.array(root, dtype=int)[self._links]
-        self._moved_by = moved_by[self._links]
+        # sums run up the joints' numbers
+        ordered = [sorted(chains[i]) for i in self._links.tolist()]
+        self._first = np.cumsum([0, *(len(chain) for chain in ordered)])
+        self._chain = np.array([joint for chain in ordered for joint in chain], dtype=int)
 
-    def fill(self, twists: Array, poses: Array, joint_vel: Array) -> None:
-        """Write the rows of the links into twists (..., B, 6), whose root rows are there.
-
-        Poses are (..., B, 7), joint_vel (..., J). A rigid motion is its angular rate and the velocity of whatever
-        passes the world's origin; both add along a chain of joints.
-        """
-        turn = poses[..., self._body, 3:]
-        axis = P.rotate(turn, np.broadcast_to(self._axis, (*turn.shape[:-1], 3))) * joint_vel[..., None]
-        anchor = poses[..., self._body, :3] + P.rotate(turn, np.broadcast_to(self._anchor, (*turn.shape[:-1], 3)))
-        rate = axis * self._turns
-        motion = np.concatenate([P.cross(anchor, rate) + axis * (1.0 - self._turns), rate], axis=-1)
-        total = self._moved_by @ motion
-        root = twists[..., self._root, :]
-        total[..., :3] += root[..., :3] - P.cross(root[..., 3:], poses[..., self._root, :3])
-        total[..., 3:] += root[..., 3:]
-        twists[..., self._links, :3] = total[..., :3] + P.cross(total[..., 3:], poses[..., self._links, :3])
-        twists[..., self._links, 3:] = total[..., 3:]
+    def of(self, packed: Array, batch: Batch, com: Array) -> Array:
+        """(N, B, 6) from packed states (L,), with centres of mass (N, B, 3) in the bodies' frames."""
+        twists = np.zeros((len(com), self._bodies, 6))
+        self._kernel(
+            packed,
+            batch.pose,
+            batch.velocity,
+            batch.joint_vel,
+            com,
+            self._free,
+            self._body,
+            self._axis,
+            self._anchor,
+            self._turns,
+            self._links,
+            self._root,
+            self._first,
+            self._chain,
+            twists,
+        )
+        return twists
