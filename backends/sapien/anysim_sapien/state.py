@@ -82,11 +82,10 @@ class StateReader:
 
     def _read(self) -> tuple[Array, Batch]:
         """What all scenes say now, one after the other, and where it is."""
-        blobs = [scene.packed() for scene in self._scenes]
+        blobs, packings = [scene.packed() for scene in self._scenes], [scene.packing for scene in self._scenes]
+        if packings != self._batch.packings:
+            self._batch, self._blobs = Batch(packings), []  # the same bytes may be of other bodies
         if blobs != self._blobs:
-            packings = [scene.packing for scene in self._scenes]
-            if packings != self._batch.packings:
-                self._batch = Batch(packings)
             self._packed = np.frombuffer(b"".join(blobs), dtype=np.float32).astype(float)
             assert self._packed.size == self._batch.start[-1], "a scene has other parts than its recipe says"
             self._blobs = blobs

@@ -99,6 +99,17 @@ def test_links_move_in_an_env_beside_one_without_them(make):
     assert not engine.get_state().body_twist[0, arm].any()
 
 
+def test_what_takes_another_things_place_is_read_as_itself(make):
+    """Two boxes that lie alike are the same numbers in SAPIEN, of another body."""
+    s = Sketch("alike")
+    first, second = (s.free(name, Box((0.1, 0.1, 0.1)), (0.3, 0.0, 0.5), 1.0) for name in ("first", "second"))
+    world = with_slots(s.world(), {"box": ("first", "second")})
+    engine = make(world, 2)
+    for name, body in (("first", first), ("second", second)):
+        engine.reset(present=np.repeat(having(world, name), 2, axis=0))
+        assert engine.get_state().body_pose[:, body, 0] == pytest.approx(0.3)
+
+
 @pytest.mark.parametrize("actuation", list(Actuation))
 def test_efforts_may_be_asked_for_late(make, actuation):
     """After commands, gains, writes, renewals and steps of other envs they are those of an env's own last step."""
