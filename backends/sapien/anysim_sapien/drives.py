@@ -134,9 +134,9 @@ class Drives:
 
     def substep(self, env: int, scene: EnvScene) -> None:
         """Give PhysX the law's terms at the present state."""
-        count = 0
+        count, kernel = 0, self._kernels.substep
         for handle, _, joints, force in scene.trees:
-            count = self._kernels.substep(
+            count = kernel(
                 self._law,
                 env,
                 joints,

@@ -5,7 +5,6 @@ That is exact for a free body. For a link it takes PhysX' forces of its joints. 
 dry friction, whose reaction PhysX tells wrong: by the friction of a sliding joint, by that of a turning one over 0.3 m.
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +12,6 @@ import numpy as np
 from anysim.conventions import Array, xyzw_from_wxyz
 from anysim.math import pose as P
 from anysim.model.world import BodyKind, JointType, World
-from anysim_sapien.packing import Packing
 from anysim_sapien.recipe import Recipes
 from anysim_sapien.scene import EnvScene
 
@@ -36,18 +34,13 @@ class Balance(NamedTuple):
 class _Noted(NamedTuple):
     """What a substep did to an env: as read, since most steps are never asked about."""
 
-    packing: Packing
+    scene: EnvScene
     before: bytes
     links_before: list[Array]
     after: bytes
-    links_after: Callable[[], list[Array]]
-    links: Array
-    exerted: list[Array]
-    order: list[Array]
     mass: Array
     friction: Array
     slowing: Array
-    gravity: Array
     pushes: Array | None
 
 
@@ -82,24 +75,13 @@ class Momentum:
 
     def before(self, scene: EnvScene) -> None:
         """Right before the last substep: note velocities and orientations."""
-        self._before = scene.pack(), scene.velocities_of_links()
+        self._before = scene.pack(), scene.link_velocities()
 
     def after(self, env: int, scene: EnvScene, pushes: Array | None) -> None:
         """After the last substep, with `pushes` (K, 7): bodies and the wrenches that were on them."""
         self._balance[env] = None
         self._noted[env] = _Noted(
-            scene.packing,
-            *self._before,
-            scene.packed(),
-            scene.link_velocities,
-            scene.layout.links,
-            [tree.handle.link_incoming_joint_forces for tree in scene.trees],
-            scene.link_order(),
-            scene.mass,
-            scene.rubbing,
-            scene.slowing,
-            scene.gravity,
-            pushes,
+            scene, *self._before, scene.packed(), scene.mass, scene.rubbing, scene.slowing, pushes
         )
 
     def balance(self, env: int) -> Balance:
@@ -109,11 +91,11 @@ class Momentum:
             found = self._balance[env] = self._solve(self._noted[env])
         return found
 
-    def _velocities(self, noted: _Noted, packed: bytes, links: list[Array]) -> Array:
+    def _velocities(self, scene: EnvScene, packed: bytes, links: list[Array]) -> Array:
         """(M, 3) of the centres of mass of the bodies that move."""
-        velocity = np.frombuffer(packed, dtype=np.float32).take(noted.packing.velocity[:, :3]).astype(float)
+        velocity = np.frombuffer(packed, dtype=np.float32).take(scene.packing.velocity[:, :3]).astype(float)
         if links:
-            velocity[noted.links] = links
+            velocity[scene.layout.links] = links
         return velocity[self._moving]
 
     def _solve(self, noted: _Noted | None) -> Balance:
@@ -121,10 +103,10 @@ class Momentum:
         if noted is None:
             return Balance(force, doubt)
         moving, mass = self._moving, noted.mass[self._moving]
-        before = self._velocities(noted, noted.before, noted.links_before)
-        gained = self._velocities(noted, noted.after, noted.links_after()) - before
+        before = self._velocities(noted.scene, noted.before, noted.links_before)
+        gained = self._velocities(noted.scene, noted.after, noted.scene.left().velocities) - before
         force[moving] = gained * (mass[:, None] / self._world.physics.dt)
-        force[moving] -= np.outer(mass * self._weighs[moving], noted.gravity)
+        force[moving] -= np.outer(mass * self._weighs[moving], noted.scene.gravity)
         if noted.slowing[:, 0].any():
             force[moving] += self._dragged(noted, before)
         if noted.pushes is not None:
@@ -144,16 +126,18 @@ class Momentum:
             pushed[noted.pushes[:, 0].astype(int)] = noted.pushes[:, 1:4]
         mass = noted.mass[moving, None]
         pulled = np.divide(pushed[moving], mass, out=np.zeros((len(mass), 3)), where=mass > 0)  # 0 of what is absent
-        gained = np.outer(self._weighs[moving], noted.gravity) + pulled
+        gained = np.outer(self._weighs[moving], noted.scene.gravity) + pulled
         return noted.slowing[moving, :1] * mass * (before + dt * gained)
 
     def _exerted(self, noted: _Noted) -> Array:
         """(B, 3) [N] what each link's joint exerts on it."""
         forces, links = np.zeros((len(self._parent), 3)), self._links
-        for order, rows in zip(noted.order, noted.exerted, strict=True):
+        for order, rows in zip(noted.scene.link_order(), noted.scene.left().forces, strict=True):
             forces[order] = rows[:, :3]
         # PhysX gives them in the axes of the joint, in the substep's first pose
-        orientation = np.frombuffer(noted.before, dtype=np.float32).take(noted.packing.pose[links, 3:]).astype(float)
+        orientation = (
+            np.frombuffer(noted.before, dtype=np.float32).take(noted.scene.packing.pose[links, 3:]).astype(float)
+        )
         turn = P.multiply(orientation, self._turn[links])
         exerted = np.zeros_like(forces)
         exerted[links] = P.rotate(turn, forces[links])

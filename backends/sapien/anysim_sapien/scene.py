@@ -45,6 +45,15 @@ class Tree(NamedTuple):
     """(n,) float32, for what joints are given in a substep."""
 
 
+class Left(NamedTuple):
+    """What a substep left in an env's links."""
+
+    velocities: list[Array]
+    """Of the centres of mass of `layout.links` [m/s]."""
+    forces: list[Array]
+    """Per articulation those of the joints (n, 6) [N, N m]."""
+
+
 class EnvScene:
     """A scene, and its parts in the World's order."""
 
@@ -81,7 +90,7 @@ class EnvScene:
         self.body_of: dict[Any, int] = {}
         """World body of each PhysX component, -1 for the world's own geoms."""
         self._packed: bytes | None = None
-        self._link_velocities: list[Array] | None = []
+        self._left: Left | None = Left([], [])
         if WORLD in recipe.geoms_on:
             self._enter(WORLD, physx.PhysxRigidStaticComponent(), sapien.Pose())
         for body in recipe.layout.actors:
@@ -221,13 +230,13 @@ class EnvScene:
 
     def _note(self, op: Op, *numbers: Array | float) -> None:
         """Have the journal know of a change that is about to be made."""
-        self.link_velocities()
+        self.left()
         self._packed = None
         self.journal.note(op, *numbers)
 
     def stepped(self, n: int) -> None:
         """Have the journal know of steps that were made."""
-        self._packed = self._link_velocities = None
+        self._packed = self._left = None
         self.journal.stepped(n)
 
     def set_inertial(self, body: int, mass: float, com: Array, inertia: Array) -> None:
@@ -349,13 +358,14 @@ class EnvScene:
             self._packed = self.pack()
         return self._packed
 
-    def link_velocities(self) -> list[Array]:
-        """Of the centres of mass of `layout.links`, as the last substep left them, whatever was written since."""
-        if self._link_velocities is None:
-            self._link_velocities = self.velocities_of_links()
-        return self._link_velocities
+    def left(self) -> Left:
+        """What the last substep left in the links, whatever was written since."""
+        if self._left is None:
+            forces = [tree.handle.link_incoming_joint_forces for tree in self.trees]
+            self._left = Left(self.link_velocities(), forces)
+        return self._left
 
-    def velocities_of_links(self) -> list[Array]:
+    def link_velocities(self) -> list[Array]:
         """Of the centres of mass of `layout.links`, at this moment."""
         return [link.linear_velocity for link in self._links]
 
