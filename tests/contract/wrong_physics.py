@@ -238,3 +238,24 @@ class Ghosts(Right):
 
     def _populate(self, ids):
         return
+
+
+class DrawsThePresent(Right):
+    """Draws bodies where they are, whatever poses it is given."""
+
+    caught_by = ("test_filming.py::test_recorded_poses_give_the_pictures_of_then",)
+
+    def _render(self, view, ids, channels):
+        return super()._render(replace(view, body_pose=self.get_state().body_pose[ids]), ids, channels)
+
+
+class MovesToDraw(Right):
+    """Writes the poses that it is to draw into its state."""
+
+    caught_by = ("test_filming.py::test_drawing_an_earlier_moment_leaves_the_state_alone",)
+
+    def _render(self, view, ids, channels):
+        free = np.array([i for i, body in enumerate(self.world.bodies) if body.kind == "free"])
+        self._retire_state()
+        self._write_bodies(ids, free, view.body_pose[:, free], None)
+        return super()._render(view, ids, channels)

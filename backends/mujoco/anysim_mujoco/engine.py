@@ -254,14 +254,16 @@ class MujocoEngine(SimEngine):
     # ------------------------------------------------------------------ sensing
 
     def renderer_name(self) -> str:
-        """The OpenGL backend and driver, such as `egl: llvmpipe (LLVM 15.0.6, 256 bits), in software`."""
-        from anysim_mujoco.gl import SOFTWARE, gl_thread
+        """Backend, driver and antialiasing: `egl: llvmpipe (LLVM 15.0.6, 256 bits), in software, no antialiasing`."""
+        from anysim_mujoco.gl import gl_thread
 
         thread = gl_thread()
         thread.open(self.options.gl)
-        driver = thread.driver()
-        where = "in software" if driver.lower().startswith(SOFTWARE) else "on the GPU"
-        return f"{thread.backend}: {driver}, {where}"
+        software = thread.in_software()
+        samples = self.options.samples(software)
+        where = "in software" if software else "on the GPU"
+        quality = f"{samples} samples per pixel" if samples else "no antialiasing"
+        return f"{thread.backend}: {thread.driver()}, {where}, {quality}"
 
     def _raycast(self, origins: Array, directions: Array, ids: Array) -> RayHits:
         self._parameters.settle()

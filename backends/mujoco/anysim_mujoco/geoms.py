@@ -80,9 +80,7 @@ def add_look(spec: Any, world: World, options: MujocoOptions) -> None:
     head = spec.visual.headlight
     # the viewer's own lamp only fills in where the world brings its lights
     head.ambient, head.diffuse, head.specular = [AMBIENT] * 3, [0.08 if world.lights else 0.25] * 3, [0.1] * 3
-    quality = spec.visual.quality
-    quality.shadowsize = 1024
-    quality.offsamples = options.antialiasing
+    spec.visual.quality.shadowsize = 1024
     for light in world.lights or (Light("default", (-0.35, 0.25, -1.0), intensity=0.45),):
         _add_light(spec, light, world)
 

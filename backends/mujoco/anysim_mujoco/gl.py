@@ -19,8 +19,8 @@ from anysim.errors import EngineError
 
 T = TypeVar("T")
 BACKENDS = ("egl", "osmesa")
-SOFTWARE = ("llvmpipe", "softpipe", "swrast", "software rasterizer")
-"""How the names of drivers begin that need no graphics card."""
+SOFTWARE = ("llvmpipe", "softpipe", "swiftshader", "swrast", "software rasterizer")
+"""Words in the names of drivers that need no graphics card."""
 
 REMEDY = "install a software renderer, e.g. apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri (or libosmesa6)"
 
@@ -62,6 +62,11 @@ class GlThread:
             return name.decode()
 
         return self.call(ask)
+
+    def in_software(self) -> bool:
+        """Whether no graphics card draws; needs an open context."""
+        driver = self.driver().lower()
+        return any(word in driver for word in SOFTWARE)
 
     def close(self) -> None:
         """Free the context and end the thread."""

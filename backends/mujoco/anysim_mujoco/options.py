@@ -1,11 +1,14 @@
 """Options of MuJoCo that mean nothing to another engine."""
 
 import os
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
 from anysim.engine.options import EngineOptions
+
+SAMPLES = 4
+"""Of each pixel, by default, where a graphics card draws."""
 
 
 class MujocoOptions(EngineOptions):
@@ -30,9 +33,18 @@ class MujocoOptions(EngineOptions):
         default="auto", description="how images are drawn; auto: what MUJOCO_GL says, else EGL, else OSMesa"
     )
     shadows: bool = Field(default=False, description="cast shadows; several times slower without a GPU")
-    antialiasing: int = Field(default=4, ge=0, le=16, description="samples per pixel; 0 is fastest")
+    antialiasing: Literal["auto"] | Annotated[int, Field(ge=0, le=16)] = Field(
+        default="auto",
+        description=f"samples per pixel; auto: {SAMPLES} on a graphics card, 0 without one, where they cost 2.4 times",
+    )
 
     def thread_count(self, num_envs: int) -> int:
         """The threads to use for `num_envs` envs."""
         cpus = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         return self.threads or max(1, min(num_envs, cpus))
+
+    def samples(self, in_software: bool) -> int:
+        """The samples per pixel to draw with."""
+        if self.antialiasing == "auto":
+            return 0 if in_software else SAMPLES
+        return self.antialiasing

@@ -17,7 +17,8 @@ class Queries:
 
     def __init__(self, batch: Any, layout: Layout, parameters: Parameters) -> None:
         self._batch, self._layout, self._parameters = batch, layout, parameters
-        self._scratch: tuple[Any, Any] | None = None
+        self._model: Any = None
+        self._data: Any = None
         groups = np.zeros(mujoco.mjNGROUP, dtype=np.uint8)
         groups[list(COLLIDING_GROUPS)] = 1
         self._groups = groups
@@ -30,15 +31,20 @@ class Queries:
         back = np.argsort(order)
         return RayHits(np.where(geom < 0, np.inf, distance)[back], entity[back])
 
+    def model(self, index: int) -> Any:
+        """The model of one env, until the next call."""
+        if self._model is None:
+            self._model = self._batch.get_model(0)
+        if self._parameters.per_env:
+            self._batch.get_model(index, self._model)
+        return self._model
+
     def env(self, index: int) -> tuple[Any, Any]:
         """Model and data of one env; the data holds the state and nothing derived."""
-        if self._scratch is None:
-            self._scratch = self._batch.get_model(0), mujoco.MjData(self._batch.model)
-        model, data = self._scratch
-        if self._parameters.per_env:
-            self._batch.get_model(index, model)
-        self._batch.get_data(index, data)
-        return model, data
+        if self._data is None:
+            self._data = mujoco.MjData(self._batch.model)
+        self._batch.get_data(index, self._data)
+        return self.model(index), self._data
 
     def contacts(self, ids: Array) -> ContactPoints:
         """Contacts that exert force, with the force the solver finds for the present controls."""

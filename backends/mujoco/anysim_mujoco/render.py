@@ -6,7 +6,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from anysim.conventions import Array
+from anysim.conventions import Array, wxyz_from_xyzw
 from anysim.engine.cameras import CameraView
 from anysim.engine.lighting import Look, Looks
 from anysim.math import pose as P
@@ -35,6 +35,8 @@ class Painter:
         self._free_camera = mujoco.MjvCamera()
         self._size = (64, 64)
         model.vis.global_.offwidth, model.vis.global_.offheight = self._size
+        model.vis.quality.offsamples = options.samples(self._thread.in_software())
+        self._frames = Frames(model, layout)
         self._context: Any = self._thread.call(lambda: _make_context(model))
 
     def close(self) -> None:
@@ -80,10 +82,8 @@ class Painter:
 
     def _compose(self, index: int, view: CameraView, row: int, axes: Array) -> None:
         """Put the geoms and lights of an env and the camera into the scene."""
-        model, data = self._queries.env(index)
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        mujoco.mj_camlight(model, data)
+        model = self._queries.model(index)
+        data = self._frames.placed(model, view.body_pose[row])
         everything = mujoco.mjtCatBit.mjCAT_ALL.value
         mujoco.mjv_updateScene(model, data, self._options, None, self._free_camera, everything, self._scene)
         self._shine(self._looks.of(index))
@@ -123,6 +123,35 @@ class Painter:
                     entities[geom.segid + 1] = self._layout.geom_entity[geom.objid]
             code = colors[::-1].astype(np.int32)
             images["segmentation"][row] = entities[code[..., 0] + 256 * code[..., 1] + 65536 * code[..., 2]]
+
+
+class Frames:
+    """Geoms and lights where given body poses put them. Nothing follows from joints, so any moment can be drawn."""
+
+    def __init__(self, model: Any, layout: Layout) -> None:
+        self._data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, self._data)  # the frame of the world, which no pose is of
+        self._bodies = layout.bodies
+        self._drawn = np.flatnonzero(np.isin(model.geom_group, DRAWN_GROUPS)).tolist()
+
+    def placed(self, model: Any, poses: Array) -> Any:
+        """The data of an env whose bodies have these poses (B, 7), as far as it is drawn; good until the next call.
+
+        The sums are those of `mj_kinematics`, so recorded poses give the pixels that the state gave.
+        """
+        data, bodies = self._data, self._bodies
+        data.xpos[bodies], data.xquat[bodies] = poses[:, :3], wxyz_from_xyzw(poses[:, 3:])
+        xmat, xquat = data.xmat, data.xquat
+        for body in bodies.tolist():
+            mujoco.mju_quat2Mat(xmat[body], xquat[body])
+        xpos, turn, owner, aligned = data.geom_xpos, data.geom_xmat, model.geom_bodyid, model.geom_sameframe
+        place, quat = model.geom_pos, model.geom_quat
+        for geom in self._drawn:
+            mujoco.mj_local2Global(
+                data, xpos[geom], turn[geom], place[geom], quat[geom], int(owner[geom]), aligned[geom]
+            )
+        mujoco.mj_camlight(model, data)
+        return data
 
 
 class Sky:

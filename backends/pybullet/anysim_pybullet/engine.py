@@ -159,7 +159,5 @@ class PybulletEngine(SimEngine):
 
         if self._painter is None:
             self._painter = Painter(self.world, self._envs.parameters.looks)
-        for index in ids.tolist():
-            self._envs.mirror.refresh(index)
         there, looks = self._presence.bodies, self._envs.parameters
-        return self._painter.draw(view, self._envs.mirror.pose, looks.color, looks.texture, there, ids, channels)
+        return self._painter.draw(view, looks.color, looks.texture, there, ids, channels)

@@ -80,16 +80,9 @@ class Painter:
         disconnect(self._client)
 
     def draw(
-        self,
-        view: CameraView,
-        poses: Array,
-        colors: Array,
-        textures: Array,
-        there: Array,
-        ids: Array,
-        channels: tuple[str, ...],
+        self, view: CameraView, colors: Array, textures: Array, there: Array, ids: Array, channels: tuple[str, ...]
     ) -> dict[str, Array]:
-        """See `SimEngine.render`: `poses` (N, B, 7), `colors` (N, G, 4), `textures` (N, G) and who is there (N, B)."""
+        """See `SimEngine.render`: `colors` (N, G, 4), `textures` (N, G) and who is there (N, B)."""
         size = (len(ids), view.height, view.width)
         shapes: dict[str, tuple[tuple[int, ...], Any]] = {
             "rgb": ((*size, 3), np.uint8),
@@ -99,7 +92,7 @@ class Painter:
         images = {name: np.empty(*shapes[name]) for name in channels}
         for row, index in enumerate(ids.tolist()):
             painted = textures[index, self._geoms].astype(int)
-            self._arrange(poses[index], colors[index, self._geoms], painted, there[index])
+            self._arrange(view.body_pose[row], colors[index, self._geoms], painted, there[index])
             look = self._looks.of(index)
             rgba, raw, owner = self._shoot(view, row, look)
             near, far = view.near, view.far

@@ -314,6 +314,6 @@ class SapienEngine(SimEngine):
 
         if self._painter is None:
             self._painter = Painter(self.world, self._layout, self._looks, self.options)
-        poses, there = self.get_state().body_pose[ids], self._presence.bodies[ids]
+        there = self._presence.bodies[ids]
         skins = tuple(self._parameters.get(f"geom.{name}")[ids] for name in SKINS)
-        return self._painter.draw(view, ids, poses, skins, there, channels)
+        return self._painter.draw(view, ids, skins, there, channels)

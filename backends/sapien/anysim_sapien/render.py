@@ -97,16 +97,10 @@ class Painter:
         self._names[int(entity.per_scene_id)] = entity_id
 
     def draw(
-        self,
-        view: CameraView,
-        ids: Array,
-        poses: Array,
-        skins: tuple[Array, ...],
-        there: Array,
-        channels: tuple[str, ...],
+        self, view: CameraView, ids: Array, skins: tuple[Array, ...], there: Array, channels: tuple[str, ...]
     ) -> dict[str, Array]:
-        """See `SimEngine.render`. Poses (E, B, 7) and presence (E, B) of bodies; colour, texture, material of geoms."""
-        size = (len(poses), view.height, view.width)
+        """See `SimEngine.render`. Colour, texture and material (E, G) of geoms, and which bodies are there (E, B)."""
+        size = (len(ids), view.height, view.width)
         images: dict[str, Array] = {}
         for name in channels:
             shape, kind = {"rgb": ((*size, 3), np.uint8), "depth": (size, np.float32)}.get(name, (size, np.int32))
@@ -115,7 +109,7 @@ class Painter:
             camera, mount = self._camera(view)
             for row, index in enumerate(ids.tolist()):
                 look = self._looks.of(index)
-                self._compose(poses[row], tuple(part[row] for part in skins), there[row], look)
+                self._compose(view.body_pose[row], tuple(part[row] for part in skins), there[row], look)
                 camera.set_fovy(radians(view.fov[row]), compute_x=True)
                 eye = np.concatenate([view.pose[row, :3], P.multiply(view.pose[row, 3:], FROM_OPTICAL)])
                 mount.set_pose(to_pose(eye))

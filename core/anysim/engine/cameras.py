@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.state import State
 from anysim.errors import EngineError
 from anysim.math import pose as P
 from anysim.model.index import Index, paired
@@ -14,11 +13,21 @@ from anysim.model.world import Camera, World
 
 @dataclass(frozen=True)
 class CameraView:
-    """What an engine needs to draw: world poses (E, 7) of the optical frame, vertical fields of view (E,), size."""
+    """What an engine needs to draw.
+
+    Attributes:
+        name: of the camera.
+        pose: (E, 7) world poses of the optical frame.
+        fov: (E,) vertical fields of view [degrees].
+        body_pose: (E, B, 7) where all bodies are drawn: as they are now, or as they once were.
+        width, height: of the image [px].
+        near, far: what is nearer or farther is not seen [m].
+    """
 
     name: str
     pose: Array
     fov: Array
+    body_pose: Array
     width: int
     height: int
     near: float
@@ -46,9 +55,12 @@ class CameraRig:
         self.fov[:, after] = old.fov[:, before]
 
     def view(
-        self, name: str, index: Index, state: State, ids: Array, width: int | None, height: int | None
+        self, name: str, index: Index, body_pose: Array, ids: Array, width: int | None, height: int | None
     ) -> CameraView:
-        """The camera by name, at its pose now; `default` is an overview unless a camera has that name."""
+        """The camera by name where bodies have the poses (E, B, 7) in the envs `ids`.
+
+        `default` is an overview unless a camera has that name.
+        """
         names = [c.name for c in self.world.cameras]
         if name == "default" and name not in names:
             camera = self._overview()
@@ -58,11 +70,11 @@ class CameraRig:
             number = index.camera(name)
             camera = self.world.cameras[number]
             local, fov = self.poses[ids, number], self.fov[ids, number]
-        pose = local if camera.body < 0 else P.compose(state.body_pose[ids, camera.body], local)
+        pose = local if camera.body < 0 else P.compose(body_pose[:, camera.body], local)
         size = (width or camera.width, height or camera.height)
         if min(size) < 1 or max(size) > 8192:
             raise EngineError(f"an image of {size[0]} x {size[1]} pixels cannot be drawn; 1 to 8192 expected")
-        return CameraView(name, pose, fov, *size, camera.near, camera.far)
+        return CameraView(name, pose, fov, body_pose, *size, camera.near, camera.far)
 
     def _overview(self) -> Camera:
         """Looks at the middle of all bodies' initial places, from far enough to see them."""

@@ -101,7 +101,10 @@ class Primitives(ABC):
         """Take over by name what `_carry_rows` of the old build returned (warm starts and the like)."""
 
     def _render(self, view: CameraView, ids: Array, channels: tuple[str, ...]) -> dict[str, Array]:
-        """Images of one camera for the envs in `ids`, as `render` documents."""
+        """Images of one camera for the envs in `ids`, as `render` documents, bodies drawn at `view.body_pose`.
+
+        Those poses need not be the present ones, and drawing must not change the state.
+        """
         raise self._absent(Capability.RENDER_RGB)
 
     def _raycast(self, origins: Array, directions: Array, ids: Array) -> RayHits:

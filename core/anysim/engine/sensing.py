@@ -23,6 +23,7 @@ class EngineSensing(EngineLifecycle):
         height: int | None = None,
         env_ids: EnvIds = None,
         channels: Sequence[str] = ("rgb",),
+        body_pose: Any = None,
     ) -> dict[str, Array]:
         """Images of one camera, by channel.
 
@@ -30,6 +31,9 @@ class EngineSensing(EngineLifecycle):
         `segmentation` (E, H, W) int32 entity ids (`Index.segmentation_id`; 0 elsewhere).
 
         `default` is an overview of the world where no camera has that name.
+
+        With `body_pose` (E, B, 7), as `State.body_pose` once gave them, bodies are drawn there, and cameras that ride
+        on them; what is there, its colours, lights and lenses are those of now. The state is not touched.
         """
         with self._lock:
             self._require_world()
@@ -38,16 +42,23 @@ class EngineSensing(EngineLifecycle):
                     raise EngineError(f"there is no channel '{channel}' (channels: rgb, depth, segmentation)")
                 self._require(Capability(f"render: {channel}"))
             ids = self._ids(env_ids)
-            view = self._records.rig.view(camera_name, self.index, self.get_state(), ids, width, height)
+            poses = self.get_state().body_pose[ids] if body_pose is None else self._recorded(body_pose, ids)
+            view = self._records.rig.view(camera_name, self.index, poses, ids, width, height)
             return self._render(view, ids, tuple(channels))
+
+    def _recorded(self, body_pose: Any, ids: Array) -> Array:
+        """Poses as they were given, to the bit: no quaternion is normalised, so that the same pixels come of them."""
+        shape = (len(ids), len(self.world.bodies), 7)
+        arguments.poses("body_pose", body_pose, shape)
+        return arguments.rows("body_pose", body_pose, shape)
 
     def camera_poses(self, camera_name: str, env_ids: EnvIds = None) -> Array:
         """World poses (E, 7) of a camera's optical frame now."""
         with self._lock:
             self._require_world()
-            return self._records.rig.view(
-                camera_name, self.index, self.get_state(), self._ids(env_ids), None, None
-            ).pose
+            ids = self._ids(env_ids)
+            poses = self.get_state().body_pose[ids]
+            return self._records.rig.view(camera_name, self.index, poses, ids, None, None).pose
 
     def set_camera_pose(self, camera_name: str, pose: Any, env_ids: EnvIds = None) -> None:
         """Place a camera per env: poses (E, 7) in the frame of its body, or of the world where it has none."""

@@ -16,7 +16,6 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.cameras import CameraRig, CameraView
 from anysim.engine.capability import Capability
-from anysim.engine.state import State
 from anysim.errors import AnysimError, EngineError, listing
 from anysim.math import pose as P
 from anysim.model.forward_kinematics import forward_kinematics
@@ -151,9 +150,8 @@ def _pose(world: World, name: str, joints: Array, roots: Array) -> Pose:
 
 def _view(world: World, index: Index, pose: Pose, name: str, size: tuple[int, int] | None) -> CameraView:
     """The camera as the contract places it, bodies where the neutral model has them."""
-    state = State(lambda field: {"body_pose": pose.bodies[None].copy()}[field], np.zeros(1))
     width, height = size or (None, None)
-    return CameraRig(world, 1).view(name, index, state, np.array([0]), width, height)
+    return CameraRig(world, 1).view(name, index, pose.bodies[None], np.array([0]), width, height)
 
 
 def _draw(

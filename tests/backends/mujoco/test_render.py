@@ -236,3 +236,17 @@ def test_another_backend_in_one_process_is_refused(make):
     other = {"egl": "osmesa", "osmesa": "egl"}[used]
     with pytest.raises(EngineError, match=f"this process draws with {used}"):
         make(two_boxes(), gl=other).render("top")
+
+
+def test_antialiasing_costs_too_much_without_a_graphics_card(make):
+    """By default a software renderer draws one sample per pixel, a graphics card four; a number is what it says."""
+    automatic, none, four = (make(two_boxes(), **options) for options in ({}, {"antialiasing": 0}, {"antialiasing": 4}))
+    engines = {"auto": automatic, "none": none, "four": four}
+    pictures = {name: engine.render("top")["rgb"] for name, engine in engines.items()}
+    assert not np.array_equal(pictures["none"], pictures["four"])
+    software = "in software" in automatic.renderer_name()
+    assert np.array_equal(pictures["auto"], pictures["none" if software else "four"])
+    assert none.renderer_name().endswith("no antialiasing")
+    assert four.renderer_name().endswith("4 samples per pixel")
+    assert automatic.options.samples(in_software=True) == 0
+    assert automatic.options.samples(in_software=False) == 4

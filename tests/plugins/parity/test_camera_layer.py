@@ -116,7 +116,7 @@ def test_an_engine_that_cannot_draw_is_named(drawn: None) -> None:
 
 def view_from(eye: tuple[float, float, float], target: tuple[float, float, float], size: tuple[int, int]) -> CameraView:
     pose = np.array([[*eye, *P.look_at(np.array(eye), np.array(target))]])
-    return CameraView("eye", pose, np.array([60.0]), *size, 0.01, 20.0)
+    return CameraView("eye", pose, np.array([60.0]), np.zeros((len(pose), 0, 7)), *size, 0.01, 20.0)
 
 
 def test_rays_know_the_answer() -> None:

@@ -334,7 +334,12 @@ class ShardedEngine(SimEngine):
     def _render(self, view: CameraView, ids: Array, channels: tuple[str, ...]) -> dict[str, Array]:
         parts = self._blocks.split_query(ids)
         orders = {
-            p.worker: (replace(view, pose=view.pose[p.rows], fov=view.fov[p.rows]), p.ids, channels) for p in parts
+            p.worker: (
+                replace(view, pose=view.pose[p.rows], fov=view.fov[p.rows], body_pose=view.body_pose[p.rows]),
+                p.ids,
+                channels,
+            )
+            for p in parts
         }
         answers = self._ask("render", orders, max(START_S, self.timeout_s))  # the first image may compile shaders
         return joined_by_name(((p.rows, answers[p.worker]) for p in parts), len(ids))
