@@ -18,3 +18,9 @@ class RecordSpec(Spec):
     cameras: tuple[Name, ...] = Field(default=(), description="cameras of the world whose images become videos")
     fps: Positive = Field(default=25.0, description="frames per second of the videos; every n-th control step")
     keep: Literal["success", "all"] = Field(default="success", description="which trajectories are kept")
+    film: Literal["auto", "live", "success"] = Field(
+        default="auto",
+        description="when the videos are drawn; live: in each step; success: when an episode has ended and is kept, "
+        "from its recorded states, with the same pixels; auto: success where what is seen follows from the recorded "
+        "states and from what was drawn at the reset, else live",
+    )

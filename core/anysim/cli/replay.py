@@ -27,10 +27,11 @@ def replay(
     """
     from anysim.cli.output import counting, print_json
     from anysim.errors import RecordError
+    from anysim.record.names import find_trajectories
     from anysim.record.replay import replay as replay_one
     from anysim.record.verify import verify
 
-    found = _found(directories)
+    found = find_trajectories(directories)
     results: dict[str, ReplayResult] = {}
     with counting("replays", len(found), quiet=json) as show:
         for path in found:
@@ -56,19 +57,6 @@ def replay(
         _report(results, same)
     if engine is None and same < len(results):
         raise typer.Exit(1)
-
-
-def _found(directories: list[Path]) -> list[Path]:
-    from anysim.errors import RecordError
-    from anysim.record.names import MANIFEST_FILE, trajectories
-
-    found: list[Path] = []
-    for directory in directories:
-        inside = [directory] if (directory / MANIFEST_FILE).exists() else trajectories(directory)
-        if not inside:
-            raise RecordError(f"{directory} holds no trajectory; expected a directory with a {MANIFEST_FILE}, or a run")
-        found.extend(inside)
-    return found
 
 
 def _same_outcome(result: "ReplayResult") -> bool:

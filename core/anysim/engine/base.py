@@ -17,7 +17,7 @@ from anysim.engine.capability import Capability
 from anysim.engine.control import Control
 from anysim.engine.lifecycle import EnvIds, Indices
 from anysim.engine.named_access import observation, send
-from anysim.engine.parameters import PARAMETERS, Parameter, check_values, count
+from anysim.engine.parameters import APPEARANCE, PARAMETERS, Parameter, check_values, count
 from anysim.engine.presence import write_present
 from anysim.engine.records import below
 from anysim.engine.sensing import EngineSensing
@@ -135,6 +135,8 @@ class SimEngine(EngineSensing):
             self._retire_state()
             self._set_parameter(name, rows, ids, which)
             self._records.changed[name] = None
+            if name in APPEARANCE:
+                self._records.appearance[ids] += 1
             arguments.kept(self.name, name, rows, self._get_parameter(name)[np.ix_(ids, which)])
             if name in ("actuator.kp", "actuator.kd"):
                 self._commands.control_changed = True

@@ -224,6 +224,7 @@ class EngineLifecycle(Primitives):
             self._require(Capability.VARYING_ENTITIES)
             self._retire_state()
             before = self._presence.entities[ids]
+            self._records.appearance[changed] += 1
             self._presence.write(ids, present)
             try:
                 self._populate(changed)

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.engine.lighting import SURROUNDINGS
 from anysim.errors import EngineError, listing
 from anysim.model.world import BodyKind, World
 
@@ -56,6 +57,13 @@ _ALL = (
 )
 PARAMETERS: Mapping[str, Parameter] = {p.name: p for p in _ALL}
 """Every parameter the contract knows; an engine declares which of them it can change."""
+
+APPEARANCE = frozenset(
+    name
+    for name, parameter in PARAMETERS.items()
+    if parameter.target == "lights" or name in ("geom.color", "geom.texture", "geom.material", *SURROUNDINGS)
+)
+"""Those that are seen in images and nowhere else."""
 
 
 def count(parameter: Parameter, world: World) -> int:

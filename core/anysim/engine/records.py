@@ -24,6 +24,7 @@ class EnvRecords:
         rig: camera poses and fields of view.
         presence: which entities are there.
         changed: the names of parameters that were written since the build, in order.
+        appearance: (N,) int64, how often what is seen in an env was changed, other than by the motion of its bodies.
     """
 
     def __init__(self, world: World, num_envs: int) -> None:
@@ -33,6 +34,7 @@ class EnvRecords:
         self.rig = CameraRig(world, num_envs)
         self.presence = Presence(world, num_envs)
         self.changed: dict[str, None] = {}
+        self.appearance = np.zeros(num_envs, dtype=np.int64)
 
     def reset(self, ids: Array) -> None:
         """Start the clocks of envs anew, and have their drives hold the initial joint positions."""
@@ -69,6 +71,7 @@ class EnvRecords:
         self.commands.restore(ids, below("commands.", data))
         self.rig.poses[ids], self.rig.fov[ids] = data["cameras"], data["fov"]
         self.ticks[ids] = data["ticks"]
+        self.appearance[ids] += 1
 
     def carry(self, old: "EnvRecords") -> None:
         """Take over from the records of another World what both have by name: commands, cameras, and the clocks.
@@ -80,6 +83,7 @@ class EnvRecords:
             ours[:, after] = theirs[:, before]
         self.rig.carry(old.rig)
         self.ticks[:] = old.ticks
+        self.appearance[:] = old.appearance + 1
 
     def add_cameras(self, world: World) -> None:
         """Go on with the same World with more cameras."""

@@ -66,6 +66,7 @@ class EngineSensing(EngineLifecycle):
             self._require_world()
             ids = self._ids(env_ids)
             self._records.rig.poses[ids, self.index.camera(camera_name)] = arguments.poses("pose", pose, (len(ids), 7))
+            self._records.appearance[ids] += 1
 
     def camera_mounts(self, camera_name: str, env_ids: EnvIds = None) -> Array:
         """Poses (E, 7) of a camera's optical frame in the frame of its body, or of the world where it has none."""
@@ -90,6 +91,14 @@ class EngineSensing(EngineLifecycle):
                     f"a field of view lies between 1 and 170 degrees, got {rows.min():g} to {rows.max():g}"
                 )
             self._records.rig.fov[ids, self.index.camera(camera_name)] = rows
+            self._records.appearance[ids] += 1
+
+    @property
+    def appearance_changes(self) -> Array:
+        """(N,) how often what is seen in an env was changed, other than by the motion of its bodies."""
+        with self._lock:
+            self._require_world()
+            return self._records.appearance.copy()
 
     def raycast(self, origins: Any, directions: Any, env_ids: EnvIds = None) -> RayHits:
         """First hits of rays (E, R, 3) [m], world frame, with collision geometry. Directions need not be unit."""

@@ -82,6 +82,7 @@ def write(engine: "SimEngine", records: EnvRecords, state: WorldState, ids: Arra
     if world.actuators:
         _write_commands(engine, here, state, ids)
     records.rig.poses[ids] = _merged(here.cameras, here.camera_pose, state.cameras, state.camera_pose)
+    records.appearance[ids] += 1
     records.ticks[ids] = np.rint(state.time / world.physics.dt)
     return carried
 

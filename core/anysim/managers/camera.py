@@ -176,9 +176,17 @@ class CaptureManager(Manager):
         latest, taken = self._latest[camera], self._taken[camera]
         missing = env_ids[taken[env_ids] != self.episodes.elapsed[env_ids]]
         if len(missing):
-            latest[missing] = self._shoot(camera, missing)
+            latest[missing] = self._shoot(camera, missing, self.episodes.elapsed[missing])
             taken[missing] = self.episodes.elapsed[missing]
         return latest[env_ids]
+
+    def image_then(self, camera: str, env: int, tick: int, body_pose: Array) -> Array:
+        """The image (H, W, 3) uint8 of a camera at an earlier control step of an env's present episode.
+
+        It is the one that `image` gave or would have given then, if nothing that is seen was changed since the reset
+        but the poses of the bodies: `body_pose` (B, 7), as the state had them.
+        """
+        return self._shoot(camera, np.array([env]), np.array([tick]), body_pose[None])[0]
 
     def _room(self, camera: str) -> None:
         if camera not in self._latest:
@@ -186,19 +194,19 @@ class CaptureManager(Manager):
             self._latest[camera] = np.zeros((n, found.height, found.width, 3), dtype=np.uint8)
             self._taken[camera] = np.full(n, -1, dtype=np.int64)
 
-    def _shoot(self, camera: str, env_ids: Array) -> Array:
+    def _shoot(self, camera: str, env_ids: Array, ticks: Array, body_pose: Array | None = None) -> Array:
         found = self.engine.world.cameras[self.engine.index.camera(camera)]
         if "rgb" not in found.channels:
             # a run that only looks its names up has cameras that give nothing
             return np.zeros((len(env_ids), found.height, found.width, 3), dtype=np.uint8)
-        images = self.engine.render(camera, env_ids=env_ids)["rgb"]
+        images = self.engine.render(camera, env_ids=env_ids, body_pose=body_pose)["rgb"]
         if camera not in self._specs:
             return images
         for row, env in enumerate(env_ids.tolist()):
             light = images[row] * self._exposure[camera][env]
             level = self._noise[camera][env]
             if level > 0:
-                generator = self.streams.generator(env, f"capture/{camera}/pixels", int(self.episodes.elapsed[env]))
+                generator = self.streams.generator(env, f"capture/{camera}/pixels", int(ticks[row]))
                 light = light + 255 * level * generator.standard_normal(light.shape, dtype=np.float32)
             images[row] = np.rint(np.clip(light, 0, 255))
         return images

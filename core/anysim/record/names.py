@@ -1,6 +1,7 @@
 """Names inside a run directory, and which names a manifest may mention."""
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 from anysim.errors import RecordError
@@ -54,6 +55,21 @@ def checked_file_name(name: str) -> str:
             f"a letter or digit, and {MANIFEST_FILE} is taken"
         )
     return name
+
+
+def find_trajectories(directories: Iterable[Path]) -> list[Path]:
+    """The committed trajectories that are meant by directories of trajectories and of runs, in order.
+
+    Raises:
+        RecordError: a directory is neither.
+    """
+    found: list[Path] = []
+    for directory in directories:
+        inside = [directory] if (directory / MANIFEST_FILE).exists() else trajectories(directory)
+        if not inside:
+            raise RecordError(f"{directory} holds no trajectory; expected a directory with a {MANIFEST_FILE}, or a run")
+        found.extend(inside)
+    return found
 
 
 def trajectories(run: Path) -> list[Path]:

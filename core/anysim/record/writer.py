@@ -4,11 +4,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 from anysim import registry
+from anysim.conventions import Array
+from anysim.errors import RecordError
 from anysim.record.frame import Frame
-from anysim.record.header import Header
+from anysim.record.header import CameraInfo, Header
 
 
 class WrittenFile(NamedTuple):
@@ -17,6 +19,25 @@ class WrittenFile(NamedTuple):
     name: str
     camera: str | None = None
     frames: int = 0
+
+
+class Video(Protocol):
+    """A video while it is written."""
+
+    frames: int
+    """How many images it has."""
+
+    def write(self, image: Array) -> None:
+        """Add the next image (H, W, 3) uint8."""
+        ...
+
+    def close(self) -> None:
+        """Complete the file."""
+        ...
+
+    def abort(self) -> None:
+        """Close the file in whatever state, without raising an OSError."""
+        ...
 
 
 class TrajectoryWriter(ABC):
@@ -50,6 +71,23 @@ class TrajectoryWriter(ABC):
     @abstractmethod
     def abort(self) -> None:
         """Close whatever is open, in whatever state, without raising an OSError. May be called after any failure."""
+
+    # ------------------------------------------------------------------ videos by themselves
+
+    def video_file(self, camera: str) -> str:
+        """The name of the file that a camera's video has beside the others of a trajectory."""
+        raise self._no_videos()
+
+    def open_video(self, path: Path, camera: CameraInfo, control_dt: float) -> Video:
+        """Begin a camera's video by itself: the file that `append` would have made of the same images.
+
+        Raises:
+            RecordError: the writer has none.
+        """
+        raise self._no_videos()
+
+    def _no_videos(self) -> RecordError:
+        return RecordError(f"the writer '{self.name}' cannot write a video by itself; record with `record.film: live`")
 
 
 def writer_factory(name: str, options: Mapping[str, Any]) -> Callable[[], TrajectoryWriter]:

@@ -1,7 +1,8 @@
 """The MDP contract: what a step returns, and what its words mean."""
 
+from collections.abc import Callable
 from enum import StrEnum
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -15,6 +16,22 @@ class Status(StrEnum):
     SUCCESS = "success"
     FAILED = "failed"
     TRUNCATED = "truncated"
+
+
+Event = TypeVar("Event", bound=Callable[..., None])
+
+UNSEEN = "changes_nothing_seen"
+"""The mark of an event term, an attribute of the function."""
+
+
+def changes_nothing_seen(event: Event) -> Event:
+    """Mark an event term that changes no colour, texture, light or camera, and nothing that is there.
+
+    Videos of a task with other terms at each step are drawn as the steps are made: what such a term changes is not
+    recorded.
+    """
+    vars(event)[UNSEEN] = True
+    return event
 
 
 STATUS_NAMES = np.array([str(s) for s in Status])

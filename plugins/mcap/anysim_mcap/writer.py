@@ -9,7 +9,7 @@ from pydantic import Field, ValidationError
 import anysim_mcap
 from anysim.errors import RecordError
 from anysim.record.frame import Frame
-from anysim.record.header import Header
+from anysim.record.header import CameraInfo, Header
 from anysim.record.json import dump_json, plain
 from anysim.record.writer import TrajectoryWriter, WrittenFile
 from anysim_mcap import messages as m
@@ -74,10 +74,7 @@ class McapWriter(TrajectoryWriter):
         self._describe(header)
         self._register(header)
         for name, camera in header.episode.cameras.items():
-            rate = frame_rate(header.run.control_dt, camera.every)
-            self._videos[name] = VideoWriter(
-                directory / _video_file(name), camera.width, camera.height, rate, self.options.crf, self.options.preset
-            )
+            self._videos[name] = self.open_video(directory / self.video_file(name), camera, header.run.control_dt)
 
     def append(self, frame: Frame) -> None:
         time = self._log_time = round(frame.time * 1e9)
@@ -112,7 +109,7 @@ class McapWriter(TrajectoryWriter):
             video.close()
             del self._videos[name]
             if video.frames:  # a camera that took no image makes no file
-                files.append(WrittenFile(_video_file(name), name, video.frames))
+                files.append(WrittenFile(self.video_file(name), name, video.frames))
         return tuple(files)
 
     def abort(self) -> None:
@@ -122,6 +119,15 @@ class McapWriter(TrajectoryWriter):
                 file.close()
         while self._videos:
             self._videos.popitem()[1].abort()
+
+    # ------------------------------------------------------------------ videos by themselves
+
+    def video_file(self, camera: str) -> str:
+        return f"{camera}.mp4"
+
+    def open_video(self, path: Path, camera: CameraInfo, control_dt: float) -> VideoWriter:
+        rate = frame_rate(control_dt, camera.every)
+        return VideoWriter(path, camera.width, camera.height, rate, self.options.crf, self.options.preset)
 
     # ------------------------------------------------------------------ inside
 
@@ -182,7 +188,3 @@ class McapWriter(TrajectoryWriter):
 
     def _channel(self, topic: str, schema: int, encoding: str = "protobuf") -> int:
         return self._mcap.register_channel(topic, encoding, schema)
-
-
-def _video_file(camera: str) -> str:
-    return f"{camera}.mp4"

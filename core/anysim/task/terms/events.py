@@ -10,6 +10,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.errors import TaskError
 from anysim.math.pose import norm
+from anysim.task.contract import changes_nothing_seen
 from anysim.task.scene import Frame, ObjectView, SceneView
 from anysim_schemas.base import NonNegative
 from anysim_schemas.values import NonNegativeValue, Vec3Value
@@ -19,6 +20,7 @@ __all__ = ["climb_levels", "push", "set_friction"]
 Draw = Callable[..., Array]
 
 
+@changes_nothing_seen
 def climb_levels(scene: SceneView, draw: Draw, *, frame: Frame, promote: NonNegative, demote: NonNegative) -> None:
     """The terrain's curriculum, for `when: step`: by how far a frame is from its tile's origin when an episode ends.
 
@@ -31,6 +33,7 @@ def climb_levels(scene: SceneView, draw: Draw, *, frame: Frame, promote: NonNega
     scene.terrain.promote(scene.env_ids, (away > promote).astype(int) - (away < demote))
 
 
+@changes_nothing_seen
 def push(scene: SceneView, draw: Draw, *, object: ObjectView, force: Vec3Value, every: NonNegative = 50) -> None:
     """A force [N], world axes, on an object during one control step out of `every`."""
     due = (scene.elapsed[scene.rows] % max(1, int(every))) == 0
@@ -42,6 +45,7 @@ def push(scene: SceneView, draw: Draw, *, object: ObjectView, force: Vec3Value, 
         scene.engine.apply_wrench(wrench[own, None], [entity.root], own)
 
 
+@changes_nothing_seen
 def set_friction(scene: SceneView, draw: Draw, *, object: ObjectView, friction: NonNegativeValue) -> None:
     """Give all surfaces of an object one friction coefficient."""
     values = np.zeros(scene.engine.num_envs)

@@ -1,0 +1,88 @@
+"""`anysim render`: videos of recorded episodes, drawn from their recorded states."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from anysim.cli.options import AsJson, Engine, Overrides
+
+if TYPE_CHECKING:
+    from anysim.record.filming import Filmed
+
+
+def render(
+    directories: Annotated[list[Path], typer.Argument(metavar="DIR…", help="Trajectories, or runs with many of them.")],
+    camera: Annotated[
+        list[str] | None,
+        typer.Option("--camera", "-c", help="One of the recorded world's; may be repeated. Default: those of the run."),
+    ] = None,
+    size: Annotated[tuple[int, int] | None, typer.Option(help="Width and height of the images [px].")] = None,
+    fps: Annotated[float | None, typer.Option(min=0.01, help="Images per second of simulated time.")] = None,
+    engine: Engine = None,
+    override: Overrides = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Directory of the videos; default: each trajectory's own, whose cameras lack.")
+    ] = None,
+    base: Annotated[
+        Path | None, typer.Option(help="Folder of the recorded file, where its world has assets with relative paths.")
+    ] = None,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Processes that draw.")] = 1,
+    json: AsJson = False,
+) -> None:
+    """Draw recorded episodes from their recorded states; nothing is simulated.
+
+    Without options it adds the videos that a trajectory lacks of its cameras, with the pixels that a live recording
+    would have had. With other sizes, looks, lights, cameras or another engine they go into another directory, --out.
+    What is there already is passed over, so the same command goes on where an interrupted one stopped.
+
+    Examples:
+      anysim run pick_cube -k 64 -o record.cameras=[] --out runs/a && anysim render runs/a -c front
+      anysim render runs/a --size 1280 720 -e sapien -o world.scenery.shadows=true --out films/a
+    """
+    from anysim.cli.output import counting, print_json
+    from anysim.record.film_jobs import film_all
+    from anysim.record.filming import FilmOrder, film_targets
+    from anysim.record.names import find_trajectories
+
+    order = FilmOrder(tuple(camera or ()), engine, tuple(override or ()), size, fps, base)
+    work = film_targets(find_trajectories(directories), out)
+    films: list[Filmed] = []
+    with counting("episodes", len(work), quiet=json) as show:
+        for film in film_all(work, order, jobs):
+            films.append(film)
+            show(_line(film), f"{sum(f.frames for f in films)} images")
+    if json:
+        films.sort(key=lambda film: film.trajectory)
+        print_json(
+            {
+                "filmed": sum(bool(f.cameras) for f in films),
+                "images": sum(f.frames for f in films),
+                "trajectories": [_row(film) for film in films],
+            }
+        )
+        return
+    still = sorted({name for film in films for name in film.still})
+    if still:
+        typer.echo(f"not recorded, and standing where a reset puts them: {', '.join(still)}")
+    new = sum(bool(film.cameras) for film in films)
+    typer.echo(f"{new} of {len(films)} episodes filmed, {sum(f.frames for f in films)} images; the others were there")
+
+
+def _line(film: "Filmed") -> str:
+    name = film.trajectory.name
+    if not film.cameras:
+        return f"{name}: {', '.join(film.present)} there already"
+    return f"{name}: {', '.join(film.cameras)}, {film.frames} images -> {film.directory}"
+
+
+def _row(film: "Filmed") -> dict[str, object]:
+    return {
+        "trajectory": str(film.trajectory),
+        "directory": str(film.directory),
+        "cameras": list(film.cameras),
+        "present": list(film.present),
+        "images": film.frames,
+        "engine": film.engine,
+        "still": list(film.still),
+    }

@@ -1,0 +1,58 @@
+"""film.json: what a directory of videos shows that were drawn from a trajectory, beside it."""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationError
+
+from anysim.errors import RecordError
+from anysim.record.header import Count, Label
+from anysim.record.json import load_json
+from anysim.record.manifest import CameraEntry, Digest, FileEntry
+from anysim_schemas.base import Name, Spec
+
+FILM_FILE = "film.json"
+FILM_FORMAT = "anysim-film-1"
+
+
+class FilmSheet(Spec):
+    """The content of film.json. Equal commands give equal sheets, but for the key `clock`.
+
+    `final_digest` says which episode it is: that of its last state. `engine`, `world_hash` and `spec` are those that it
+    was drawn with, and `still` names the bodies that were not recorded and stand where a reset puts them.
+    """
+
+    format: Literal["anysim-film-1"] = FILM_FORMAT
+    task: Label
+    env: Count
+    episode: Count
+    episode_seed: Annotated[int, Field(ge=0)]
+    final_digest: Digest
+    engine: Label
+    engine_version: Label
+    world_hash: Label
+    spec: dict[str, Any]
+    still: tuple[Label, ...] = ()
+    cameras: dict[Name, CameraEntry] = Field(default_factory=dict)
+    files: dict[str, FileEntry] = Field(default_factory=dict)
+    clock: dict[str, Any] = Field(default_factory=dict, description="all that differs between equal films")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, None included."""
+        return self.model_dump(mode="json")
+
+
+def read_sheet(directory: Path) -> FilmSheet | None:
+    """The sheet of a directory of videos; None where nothing was filmed yet.
+
+    Raises:
+        RecordError: it is damaged, or of another format.
+    """
+    path = directory / FILM_FILE
+    if not path.exists():
+        return None
+    try:
+        return FilmSheet.model_validate(load_json(path))
+    except ValidationError as error:
+        faults = "; ".join(f"{'.'.join(map(str, e['loc'])) or 'file'}: {e['msg']}" for e in error.errors()[:3])
+        raise RecordError(f"{path} is damaged or is no film sheet: {faults}") from error

@@ -1,0 +1,281 @@
+"""Filming recorded trajectories: their videos, made afterwards, as they would have been or otherwise."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from anysim.errors import RecordError, listing, suggest
+from anysim.record.commit import describe
+from anysim.record.film import Moments, film_episode, moments_for
+from anysim.record.film_commit import add_videos, workspace
+from anysim.record.film_sheet import FILM_FILE, FilmSheet, read_sheet
+from anysim.record.json import plain
+from anysim.record.manifest import Manifest, read_manifest
+from anysim.record.names import MANIFEST_FILE
+from anysim.record.reader import TrajectoryReader, open_trajectory
+from anysim.record.replay import begin
+from anysim.record.writer import writer_factory
+from anysim.task.env import TaskEnv
+from anysim_schemas.load import LoadedRun
+
+
+@dataclass(frozen=True)
+class FilmOrder:
+    """What to film, of each trajectory.
+
+    Attributes:
+        cameras: of its world; none: those that its run records, or else all that give colours.
+        engine: another one than it was recorded on.
+        overrides: of the recorded spec, such as `world.objects.cube.color=red`.
+        size: width and height of the images [px], in place of the cameras' own.
+        fps: images per second, in place of the recorded spec's.
+        base: folder of the recorded file, where its world has assets with relative paths.
+    """
+
+    cameras: tuple[str, ...] = ()
+    engine: str | None = None
+    overrides: tuple[str, ...] = ()
+    size: tuple[int, int] | None = None
+    fps: float | None = None
+    base: Path | None = None
+
+    def as_recorded(self, manifest: Manifest) -> bool:
+        """Whether these are the images that a live recording would have taken."""
+        changed = bool(self.overrides) or self.size is not None or self.fps is not None
+        return not changed and self.engine in (None, manifest.engine)
+
+
+@dataclass(frozen=True)
+class Filmed:
+    """What came of one trajectory.
+
+    Attributes:
+        trajectory: its directory.
+        directory: where its videos are.
+        cameras: those filmed now; `present` those whose videos were there already.
+        frames: images drawn now.
+        engine: what drew them, with version; empty where nothing was drawn.
+        still: bodies that the recording does not have, and that stand where the reset put them.
+    """
+
+    trajectory: Path
+    directory: Path
+    cameras: tuple[str, ...]
+    present: tuple[str, ...]
+    frames: int = 0
+    engine: str = ""
+    still: tuple[str, ...] = ()
+
+
+class Filmer:
+    """Films trajectories one after the other. The env of one is kept for the next one of the same run."""
+
+    def __init__(self, order: FilmOrder) -> None:
+        self.order = order
+        self._text = ""
+        self._loaded: LoadedRun | None = None
+        self._env: TaskEnv | None = None
+
+    def film(self, trajectory: Path, directory: Path | None = None) -> Filmed:
+        """Film a trajectory: what is not there yet of what was ordered.
+
+        Args:
+            trajectory: a committed one.
+            directory: of the videos and their sheet; None adds them to the trajectory itself, for which they must be
+                those that a live recording would have taken.
+
+        Raises:
+            RecordError: the trajectory or what is in `directory` is damaged or is of something else, or there is no
+                such camera.
+            CapabilityError: the engine cannot draw this world.
+        """
+        manifest = read_manifest(trajectory)
+        if directory is None and not self.order.as_recorded(manifest):
+            raise RecordError(
+                f"{trajectory} holds what was recorded, and other cameras' sizes, looks or engines are not: pass --out "
+                "DIR for videos beside it"
+            )
+        loaded = self._load(manifest)
+        cameras = self._cameras(loaded)
+        where = trajectory if directory is None else directory
+        present = self._present(manifest, loaded, directory)
+        if present >= set(cameras):
+            return Filmed(trajectory, where, (), cameras)
+        try:
+            where.mkdir(parents=True, exist_ok=True)
+            with workspace(where.resolve()) as aside:
+                return self._make(trajectory, directory, aside, loaded, cameras)
+        except OSError as error:
+            raise RecordError(
+                f"cannot film {trajectory}: {error.strerror or error} ({error.filename or where}). Videos that were "
+                "complete are there; make room, or choose another directory, and start it again"
+            ) from error
+
+    def close(self) -> None:
+        """Free the engine."""
+        if self._env is not None:
+            self._env.close()
+            self._env = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    # ------------------------------------------------------------------ what and where
+
+    def _load(self, manifest: Manifest) -> LoadedRun:
+        """The spec to draw with; the last one again where the trajectories are of one run."""
+        from anysim.api import load
+
+        text = json.dumps(plain(manifest.spec))
+        if self._loaded is None or text != self._text:
+            self.close()
+            spec = dict(manifest.spec) | {"num_envs": 1}
+            first = load(spec, overrides=self._changes(load(spec)))
+            self._loaded, self._text = first, text
+        return self._loaded
+
+    def _changes(self, recorded: LoadedRun) -> list[str]:
+        """The overrides of the recorded spec."""
+        order, changes = self.order, ["engine.shards=1"]
+        if order.engine is not None and order.engine != recorded.spec.engine.name:
+            changes.append(f"engine={json.dumps(order.engine)}")
+        changes += order.overrides
+        if order.fps is not None:
+            changes.append(f"record.fps={order.fps}")
+        if order.size is not None:
+            cameras = order.cameras or recorded.spec.record.cameras or tuple(recorded.spec.world.cameras)
+            changes += [f"world.cameras.{name}.size={list(order.size)}" for name in cameras]
+        return changes
+
+    def _cameras(self, loaded: LoadedRun) -> tuple[str, ...]:
+        there = loaded.spec.world.cameras
+        seeing = tuple(name for name, camera in there.items() if "rgb" in camera.channels)
+        chosen = self.order.cameras or loaded.spec.record.cameras or seeing
+        for name in chosen:
+            if name not in there:
+                raise RecordError(
+                    f"there is no camera '{name}'{suggest(name, list(there))} (cameras: {listing(there)})"
+                )
+            if name not in seeing:
+                raise RecordError(f"the camera '{name}' gives no colours; add -o world.cameras.{name}.channels=[rgb]")
+        if not chosen:
+            raise RecordError("the recorded world has no camera; add one, as in -o world.cameras.eye={...}, and --out")
+        return chosen
+
+    def _present(self, manifest: Manifest, loaded: LoadedRun, directory: Path | None) -> set[str]:
+        """The cameras whose videos are there."""
+        if directory is None:
+            return set(manifest.cameras)
+        sheet = read_sheet(directory)
+        if sheet is None:
+            return set()
+        if sheet.final_digest != manifest.final_digest or sheet.spec != plain(loaded.spec.to_dict()):
+            raise RecordError(f"{directory} holds videos of something else, as {FILM_FILE} says; choose another --out")
+        return set(sheet.cameras)
+
+    # ------------------------------------------------------------------ how
+
+    def _make(
+        self, trajectory: Path, directory: Path | None, aside: Path, loaded: LoadedRun, cameras: Sequence[str]
+    ) -> Filmed:
+        """Film what is missing, now that nobody else does."""
+        manifest = read_manifest(trajectory)
+        present = self._present(manifest, loaded, directory)
+        missing = tuple(camera for camera in cameras if camera not in present)
+        where = trajectory if directory is None else directory
+        if not missing:
+            return Filmed(trajectory, where, (), tuple(cameras))
+        _refuse_damage(trajectory, manifest)
+        env = self._stage(loaded)
+        engine = env.engine
+        if directory is None and engine.world.hash != manifest.world_hash:
+            raise RecordError(
+                f"the world of {trajectory} cannot be rebuilt as it was (its hash differs), so these would not be its "
+                "images; pass --out DIR for videos beside it"
+            )
+        recorded = manifest.layout.bodies
+        still = tuple(body.name for body in engine.world.bodies if body.name not in recorded)
+        sheet: FilmSheet | None = None
+        if directory is not None:
+            sheet = read_sheet(directory) or _sheet(manifest, env, plain(loaded.spec.to_dict()), still)
+        begin(env, manifest)
+        moments = moments_for(env, recorded, *_columns(open_trajectory(trajectory)))
+        record = loaded.spec.record
+        found = film_episode(env, 0, moments, missing, aside, writer_factory(record.writer, record.options)())
+        drawn = f"{engine.name} {engine.version}"
+        said = {"at": datetime.now(UTC).isoformat(), "engine": drawn, "renderer": engine.renderer_name()}
+        clock = dict.fromkeys(found, said)
+        if directory is None or sheet is None:
+            add_videos(aside, trajectory, MANIFEST_FILE, manifest, found, clock)
+        else:
+            add_videos(aside, directory, FILM_FILE, sheet, found, clock)
+        frames = sum(entry.frames for entry in found.values())
+        others = tuple(camera for camera in cameras if camera in present)
+        return Filmed(trajectory, where, missing, others, frames, drawn, still)
+
+    def _stage(self, loaded: LoadedRun) -> TaskEnv:
+        """The env to draw in."""
+        from anysim.api import make
+
+        if self._env is None:
+            self._env = make(loaded, base=self.order.base)
+        return self._env
+
+
+def film_targets(trajectories: Sequence[Path], out: Path | None) -> list[tuple[Path, Path | None]]:
+    """Each trajectory and the directory of its videos in `out`, by its name, and its run's where names are not enough.
+
+    Raises:
+        RecordError: two trajectories would share a directory.
+    """
+    if out is None:
+        return [(path, None) for path in trajectories]
+    for name in (lambda path: path.name, lambda path: f"{path.resolve().parent.parent.name}/{path.name}"):
+        places = [out / name(path) for path in trajectories]
+        if len(set(places)) == len(places):
+            return list(zip(trajectories, places, strict=True))
+    raise RecordError("runs of the same name were given together; film them one by one, each into its own --out")
+
+
+def _columns(reader: TrajectoryReader) -> Moments:
+    """All recorded moments, in the order of the recording's bodies."""
+    if "body_pose" not in reader.manifest.layout.state:
+        raise RecordError(f"{reader.directory} does not hold body_pose, which its images are drawn from")
+    poses = reader.states["body_pose"]
+    steps = np.arange(1, len(poses) + 1)
+    if not reader.initial_state:
+        return Moments(steps, np.asarray(poses))
+    first = reader.initial_state["body_pose"]
+    return Moments(np.append(0, steps), np.concatenate([first[None], poses]))
+
+
+def _refuse_damage(trajectory: Path, manifest: Manifest) -> None:
+    """The videos that are there do not matter here."""
+    videos = {camera.file for camera in manifest.cameras.values()}
+    for name, entry in manifest.files.items():
+        file = trajectory / name
+        if name not in videos and (not file.is_file() or describe(file) != entry):
+            raise RecordError(f"{file} is not what was committed, so nothing is drawn from it; record it again")
+
+
+def _sheet(manifest: Manifest, env: TaskEnv, spec: Mapping[str, Any], still: tuple[str, ...]) -> FilmSheet:
+    return FilmSheet(
+        task=manifest.task,
+        env=manifest.env,
+        episode=manifest.episode,
+        episode_seed=manifest.episode_seed,
+        final_digest=manifest.final_digest,
+        engine=env.engine.name,
+        engine_version=env.engine.version,
+        world_hash=env.engine.world.hash,
+        spec=dict(spec),
+        still=still,
+    )
