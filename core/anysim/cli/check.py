@@ -1,11 +1,14 @@
 """`anysim check`: read files and say everything that is wrong with them."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from anysim.cli.options import AsJson, Engine, Overrides
+
+if TYPE_CHECKING:
+    from anysim_schemas.load import LoadedRun
 
 
 def check(
@@ -46,6 +49,7 @@ def check_one(name: str, engine: str | None, all_engines: bool, overrides: list[
         world = compile_world(loaded)
         if loaded.spec.task is not None:
             dry_run(loaded, world)
+            _check_film(loaded)
     except (SpecError, AssetError) as error:
         return [str(issue) for issue in error.issues] or [f"{name}: {error}"]
     except AnysimError as error:
@@ -60,3 +64,15 @@ def check_one(name: str, engine: str | None, all_engines: bool, overrides: list[
         except AnysimError as error:
             faults.append(f"{name}: {error}")
     return faults
+
+
+def _check_film(loaded: "LoadedRun") -> None:
+    """Whether episodes can be filmed when the file wants them filmed."""
+    from anysim.api import located
+    from anysim.errors import SpecError
+    from anysim.record.film_mode import film_mode
+
+    try:
+        film_mode(loaded.spec)
+    except SpecError as error:
+        raise located(error, loaded) from None

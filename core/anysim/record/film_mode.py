@@ -21,7 +21,9 @@ def film_mode(spec: RunSpec) -> FilmMode:
     if spec.record.film == "live":
         return "live"
     reasons = hindrances(spec)
-    if spec.record.film == "success" and reasons:
+    if spec.record.film == "success":
+        if not reasons:
+            return "success"
         text = f"episodes cannot be filmed when they have ended: {'; '.join(reasons)}. Use film: live, or auto"
         raise SpecError([SpecIssue("", "record.film", text)])
     observed = spec.task is not None and not set(spec.record.cameras).isdisjoint(spec.task.images)

@@ -73,8 +73,7 @@ class McapWriter(TrajectoryWriter):
         self._mcap.start(library=f"anysim-mcap {anysim_mcap.__version__}")
         self._describe(header)
         self._register(header)
-        for name, camera in header.episode.cameras.items():
-            self._videos[name] = self.open_video(directory / self.video_file(name), camera, header.run.control_dt)
+        self._directory, self._header = directory, header
 
     def append(self, frame: Frame) -> None:
         time = self._log_time = round(frame.time * 1e9)
@@ -95,6 +94,9 @@ class McapWriter(TrajectoryWriter):
         if frame.language and frame.language != self._language:
             self._say(frame.language, frame.step)
         for name, image in frame.images.items():
+            if name not in self._videos:  # a camera that takes no image makes no file, and another may write it
+                path, camera = self._directory / self.video_file(name), self._header.episode.cameras[name]
+                self._videos[name] = self.open_video(path, camera, self._header.run.control_dt)
             self._videos[name].write(image)
 
     def finish(self, status: str) -> tuple[WrittenFile, ...]:
@@ -108,8 +110,7 @@ class McapWriter(TrajectoryWriter):
             name, video = next(iter(self._videos.items()))
             video.close()
             del self._videos[name]
-            if video.frames:  # a camera that took no image makes no file
-                files.append(WrittenFile(self.video_file(name), name, video.frames))
+            files.append(WrittenFile(self.video_file(name), name, video.frames))
         return tuple(files)
 
     def abort(self) -> None:

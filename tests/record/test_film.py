@@ -1,0 +1,202 @@
+"""Deferred filming: images of an episode that are drawn when it has ended are those of the episode, to the pixel."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import anysim
+from anysim import registry
+from anysim.api import load
+from anysim.engine.base import SimEngine
+from anysim.errors import RecordError, SpecError
+from anysim.record.film import Moments, film_episode, images, moments_for
+from anysim.record.film_mode import film_mode, hindrances
+from anysim.record.writer import writer_factory
+from anysim.task.env import TaskEnv
+from anysim.task.terms import events
+from anysim.testing.fixtures import drawing_trouble
+
+ENGINES = ("mujoco", "pybullet", "sapien")
+CAMERAS = ("front", "wrist")
+SEEN = (
+    "world.objects.cube.source={choice: [{box: [0.05, 0.05, 0.05]}, {sphere: 0.03}]}",
+    "world.objects.cube.texture={choice: [checker, brick, {pattern: noise, seed: 7}]}",
+    "world.objects.cube.material={choice: [plastic, metal, matte]}",
+    "world.objects.toy={source: {box: [0.05, 0.05, 0.1]}, count: {range: [0, 2]}, color: {choice: [red, blue, white]}}",
+    "world.layout.toy={on: table, x: {range: [0.3, 0.6]}, y: {range: [-0.3, 0.3]}}",
+    "world.lights.key={direction: {range: [[-0.5, -0.5, -1.0], [0.5, 0.5, -0.6]]}, intensity: {range: [0.3, 0.9]}}",
+    "world.scenery={ambient: {range: [[0.1, 0.1, 0.1], [0.4, 0.4, 0.4]]}, "
+    "background: {range: [[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]}}",
+    "world.cameras.front.size=[80, 60]", "world.cameras.wrist.size=[60, 80]",
+    "world.cameras.front.fov={range: [30.0, 60.0]}", "world.cameras.front.exposure={range: [0.7, 1.3]}",
+    "world.cameras.wrist.noise={range: [0.02, 0.06]}", "record.fps=50",
+    "task.success={at_goal: null, at_rest: null, there: {term: present, object: cube}}", "task.hold=100",
+)  # fmt: skip
+"""Something of all that images depend on: what is there, textures, lights, a camera that rides, lens and noise."""
+
+
+def filmed_env(engine: str, num_envs: int, *more: str) -> TaskEnv:
+    """pick_cube with looks that differ between episodes, and shadows where the engine casts any."""
+    if trouble := drawing_trouble(registry.load("engines", engine)):
+        pytest.skip(f"{engine} cannot draw here: {trouble}")
+    shadows = [] if engine == "sapien" else ["world.scenery.shadows=true"]
+    return anysim.make("pick_cube", engine=engine, num_envs=num_envs, overrides=[*SEEN, *shadows, *more])
+
+
+def recorded(env: TaskEnv, steps: int) -> tuple[list[dict[str, Any]], np.ndarray]:
+    """Live images (N, H, W, 3) by camera after each step of a run, and the body poses (N, T, B, 7)."""
+    assert env.capture is not None
+    everyone, rng = np.arange(env.num_envs), np.random.default_rng(3)
+    live, poses = [], []
+    for step in range(steps + 1):
+        if step:
+            env.step(rng.uniform(-1.0, 1.0, (env.num_envs, env.action_dim)))
+        live.append({camera: env.capture.image(camera, everyone) for camera in CAMERAS})
+        poses.append(np.array(env.engine.get_state().body_pose))
+    return live, np.stack(poses, axis=1)
+
+
+def assert_filmed(env: TaskEnv, index: int, live: list[dict[str, Any]], row: int, poses: np.ndarray) -> None:
+    moments = Moments(np.arange(len(live)), poses[row])
+    for camera in CAMERAS:
+        drawn = dict(images(env, index, camera, moments))
+        assert list(drawn) == list(range(len(live)))
+        for step, image in drawn.items():
+            assert np.array_equal(image, live[step][camera][row]), f"{camera}, step {step}"
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_images_of_a_finished_episode_are_those_of_the_episode(engine: str) -> None:
+    """In the env that it ran in, and in another one that begins it and never moves, over three episodes."""
+    with filmed_env(engine, 3) as env, filmed_env(engine, 1) as other:
+        env.reset(seed=5)
+        live, poses = recorded(env, 4)
+        present = env.engine.presence
+        assert not (present == present[0]).all(), "the episodes must differ in what is there"
+        first, last = live[0], live[-1]
+        assert all(not np.array_equal(first[c][i], last[c][i]) for c in CAMERAS for i in range(3))
+        for i in range(3):
+            assert_filmed(env, i, live, i, poses)
+            other.reset(episode_seeds=[int(env.streams.episode_seed[i])])
+            assert_filmed(other, 0, live, i, poses)
+
+
+def test_filming_leaves_the_run_alone() -> None:
+    """Episodes go on with the same bits, and their next images are of the present."""
+    with filmed_env("mujoco", 2) as env, filmed_env("mujoco", 2) as clean:
+        for one in (env, clean):
+            one.reset(seed=5)
+        live, poses = recorded(env, 3)
+        recorded(clean, 3)
+        assert_filmed(env, 1, live, 1, poses)
+        assert np.array_equal(recorded(env, 2)[1], recorded(clean, 2)[1])
+        assert env.capture is not None
+        assert clean.capture is not None
+        assert np.array_equal(env.capture.image("wrist", np.arange(2)), clean.capture.image("wrist", np.arange(2)))
+
+
+def test_bodies_go_by_name(tmp_path: Path) -> None:
+    """A world with a thing more draws the recorded ones where they were, and the thing where its reset put it."""
+    more = (
+        "world.objects.post={source: {box: [0.05, 0.05, 0.4]}, fixed: true}",
+        "world.layout.post={position: [0.2, 0.4, 0.6]}",
+    )
+    with filmed_env("mujoco", 1) as env, filmed_env("mujoco", 1, *more) as other:
+        env.reset(seed=5)
+        names = [body.name for body in env.engine.world.bodies]
+        _, poses = recorded(env, 3)
+        other.reset(episode_seeds=[int(env.streams.episode_seed[0])])
+        moments = moments_for(other, names, np.arange(4), poses[0])
+        theirs = [body.name for body in other.engine.world.bodies]
+        assert {"post"} == set(theirs) - set(names)
+        for name in names:
+            assert np.array_equal(moments.body_pose[:, theirs.index(name)], poses[0][:, names.index(name)])
+        assert (moments.body_pose[:, theirs.index("post"), :3] == [0.2, 0.4, 0.6]).all()
+        writer = writer_factory("mcap", {})()
+        found = film_episode(other, 0, moments, ["front"], tmp_path, writer)
+        assert found["front"].frames == 4
+        assert (tmp_path / found["front"].file).stat().st_size > 0
+
+
+def _without_a_toy(engine: SimEngine) -> np.ndarray:
+    """What is in env 0, with one of its toys more or less."""
+    row = engine.presence[[0]]
+    toy = next(slot.entities[0] for slot in engine.world.slots if slot.name.startswith("toy"))
+    row[0, toy] = not row[0, toy]
+    return row
+
+
+CHANGES: dict[str, Callable[[SimEngine], object]] = {
+    "a colour": lambda e: e.set_parameters("geom.color", [0.1, 0.2, 0.3, 1.0], [0], [0]),
+    "a light": lambda e: e.set_parameters("world.ambient", [[[0.5, 0.5, 0.5]]], [0]),
+    "a camera": lambda e: e.set_camera_pose("front", [0.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0], [0]),
+    "a lens": lambda e: e.set_camera_fov("front", [20.0], [0]),
+    "what is there": lambda e: e.reset([0], present=_without_a_toy(e)),
+    "a snapshot": lambda e: e.restore(e.snapshot([0]), [0]),
+    "a thing more": lambda e: e.add_object("rod", {"box": [0.1, 0.1, 0.1]}, fixed=True, position=(0.0, 0.0, 3.0)),
+}
+
+
+@pytest.mark.parametrize("what", CHANGES)
+def test_what_was_changed_midway_is_not_filmed(what: str, tmp_path: Path) -> None:
+    """It is not recorded, so the images would be others; motion and what is felt are no such change."""
+    with filmed_env("mujoco", 2) as env:
+        env.reset(seed=5)
+        before = env.engine.appearance_changes.copy()
+        _, poses = recorded(env, 1)
+        env.engine.set_parameters("body.mass", [[0.3]], [0], [env.engine.index.body("cube~0")])
+        assert (env.engine.appearance_changes == before).all()
+        CHANGES[what](env.engine)
+        moments = Moments(np.arange(2), poses[0])
+        writer = writer_factory("mcap", {})()
+        with pytest.raises(RecordError, match="changed after the reset"):
+            film_episode(env, 0, moments, ["front"], tmp_path, writer, since=int(before[0]))
+        if what != "a thing more":  # in the other env nothing was changed
+            film_episode(env, 1, Moments(np.arange(2), poses[1]), ["front"], tmp_path, writer, since=int(before[1]))
+
+
+# ---------------------------------------------------------------------- live or later
+
+
+def repaint(scene: Any, draw: Any) -> None:
+    """An event that a stranger might write."""
+
+
+def _spec(monkeypatch: pytest.MonkeyPatch, *overrides: str) -> Any:
+    monkeypatch.setattr(events, "repaint", repaint, raising=False)
+    monkeypatch.setattr(events, "__all__", [*events.__all__, "repaint"])
+    return load("pick_cube", overrides=overrides).spec
+
+
+PUSH = "task.events.wind={term: push, object: cube, force: [0.1, 0, 0], when: step}"
+REPAINT = "task.events.paint={term: repaint, when: step}"
+
+
+def test_films_are_made_later_where_they_can_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By default; a push is not seen, whatever happens at the reset is drawn again, and observed images exist."""
+    assert film_mode(_spec(monkeypatch)) == "success"
+    assert film_mode(_spec(monkeypatch, "record.film=live")) == "live"
+    assert film_mode(_spec(monkeypatch, PUSH, "record.film=success")) == "success"
+    assert film_mode(_spec(monkeypatch, "task.events.paint={term: repaint}")) == "success"
+    assert film_mode(_spec(monkeypatch, REPAINT)) == "live"
+    assert film_mode(_spec(monkeypatch, "task.images.front={}")) == "live"
+    assert film_mode(_spec(monkeypatch, "task.images.front={}", "record.film=success")) == "success"
+
+
+def test_what_cannot_be_filmed_later_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(
+        SpecError, match=r"record.film: episodes cannot be filmed .* the event 'paint' acts at each step"
+    ):
+        film_mode(_spec(monkeypatch, REPAINT, "record.film=success"))
+
+
+def test_a_writer_without_videos_of_their_own_films_live(monkeypatch: pytest.MonkeyPatch, writer: type) -> None:
+    spec = _spec(monkeypatch)
+    assert hindrances(spec) == []
+    monkeypatch.setattr(registry, "load", lambda kind, name: writer)
+    assert hindrances(spec) == ["the writer 'mcap' cannot write a video by itself"]
+    with pytest.raises(RecordError, match="the writer 'lines' cannot write a video by itself"):
+        writer().video_file("front")
