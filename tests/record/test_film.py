@@ -10,6 +10,7 @@ import pytest
 import anysim
 from anysim import registry
 from anysim.api import load
+from anysim.cli.check import check_one
 from anysim.engine.base import SimEngine
 from anysim.errors import RecordError, SpecError
 from anysim.record.film import Moments, film_episode, images, moments_for
@@ -191,6 +192,14 @@ def test_what_cannot_be_filmed_later_says_why(monkeypatch: pytest.MonkeyPatch) -
         SpecError, match=r"record.film: episodes cannot be filmed .* the event 'paint' acts at each step"
     ):
         film_mode(_spec(monkeypatch, REPAINT, "record.film=success"))
+
+
+def test_check_says_where_it_was_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    _spec(monkeypatch)
+    fault, *more = check_one("pick_cube", None, False, [REPAINT, "record.film=success"])
+    assert more == []
+    assert fault.startswith("-o record.film=success: record.film: episodes cannot be filmed")
+    assert check_one("pick_cube", None, False, [PUSH, "record.film=success"]) == []
 
 
 def test_a_writer_without_videos_of_their_own_films_live(monkeypatch: pytest.MonkeyPatch, writer: type) -> None:

@@ -65,6 +65,9 @@ def render(
     still = sorted({name for film in films for name in film.still})
     if still:
         typer.echo(f"not recorded, and standing where a reset puts them: {', '.join(still)}")
+    versions = sorted({(f.recorded_with, f.engine) for f in films if f.engine and f.engine != f.recorded_with})
+    for recorded, drawn in versions:
+        typer.echo(f"recorded with {recorded}, drawn with {drawn}: not the pixels that a recording would have had")
     new = sum(bool(film.cameras) for film in films)
     typer.echo(f"{new} of {len(films)} episodes filmed, {sum(f.frames for f in films)} images; the others were there")
 
@@ -84,5 +87,6 @@ def _row(film: "Filmed") -> dict[str, object]:
         "present": list(film.present),
         "images": film.frames,
         "engine": film.engine,
+        "recorded_with": film.recorded_with,
         "still": list(film.still),
     }

@@ -60,6 +60,7 @@ class Filmed:
         cameras: those filmed now; `present` those whose videos were there already.
         frames: images drawn now.
         engine: what drew them, with version; empty where nothing was drawn.
+        recorded_with: the engine of the recording, with version: the pixels of another version may be others.
         still: bodies that the recording does not have, and that stand where the reset put them.
     """
 
@@ -69,6 +70,7 @@ class Filmed:
     present: tuple[str, ...]
     frames: int = 0
     engine: str = ""
+    recorded_with: str = ""
     still: tuple[str, ...] = ()
 
 
@@ -210,7 +212,7 @@ class Filmer:
         moments = moments_for(env, recorded, *_columns(open_trajectory(trajectory)))
         record = loaded.spec.record
         found = film_episode(env, 0, moments, missing, aside, writer_factory(record.writer, record.options)())
-        drawn = f"{engine.name} {engine.version}"
+        drawn, before = f"{engine.name} {engine.version}", f"{manifest.engine} {manifest.engine_version}"
         said = {"at": datetime.now(UTC).isoformat(), "engine": drawn, "renderer": engine.renderer_name()}
         clock = dict.fromkeys(found, said)
         if directory is None or sheet is None:
@@ -219,7 +221,7 @@ class Filmer:
             add_videos(aside, directory, FILM_FILE, sheet, found, clock)
         frames = sum(entry.frames for entry in found.values())
         others = tuple(camera for camera in cameras if camera in present)
-        return Filmed(trajectory, where, missing, others, frames, drawn, still)
+        return Filmed(trajectory, where, missing, others, frames, drawn, before, still)
 
     def _stage(self, loaded: LoadedRun) -> TaskEnv:
         """The env to draw in."""
