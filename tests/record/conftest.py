@@ -1,17 +1,18 @@
 """A run without an engine, and a writer whose every stage can be made to fail."""
 
 import errno
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 
+from anysim.record.columns import EpisodeColumns
 from anysim.record.frame import Frame
 from anysim.record.header import ArrayLayout, EpisodeHeader, Header, RunHeader, StateLayout
 from anysim.record.recorder import Recorder
-from anysim.record.writer import TrajectoryWriter, WrittenFile
+from anysim.record.writer import ImageWriter, TrajectoryWriter, WrittenFile
 
 LAYOUT = StateLayout(
     bodies=("cube",),
@@ -23,40 +24,66 @@ LAYOUT = StateLayout(
 )
 
 
-class LineWriter(TrajectoryWriter):
-    """One line per frame, in two files."""
+class Failing:
+    """Fails as on a full disk at the stage that a test names."""
 
-    name: ClassVar[str] = "lines"
     fail_at: ClassVar[str] = ""
 
-    def _stage(self, stage: str) -> None:
+    def stage(self, stage: str) -> None:
         if self.fail_at == stage:
             raise OSError(errno.ENOSPC, "No space left on device")
 
-    def begin(self, directory: Path, header: Header) -> None:
-        self.files = [(directory / name).open("w") for name in ("states.txt", "actions.txt")]
-        self._stage("begin")
 
-    def append(self, frame: Frame) -> None:
-        self._stage("append")
-        self.files[0].write(f"{frame.state['joint_pos'].tolist()}\n")
-        self.files[1].write(f"{frame.action}\n")
+class LineImages(ImageWriter):
+    """The sums of all images, one file for each camera."""
 
-    def finish(self, status: str) -> tuple[WrittenFile, ...]:
-        self._stage("finish")
-        for file in self.files:
-            file.close()
-        return (WrittenFile("states.txt"), WrittenFile("actions.txt"))
+    def __init__(self, directory: Path, header: Header, failing: Failing) -> None:
+        self.failing = failing
+        self.files = {name: (directory / f"{name}.txt").open("w") for name in header.episode.cameras}
+        self.frames = dict.fromkeys(self.files, 0)
+
+    def append(self, images: Mapping[str, Any]) -> None:
+        self.failing.stage("append")
+        for name, image in images.items():
+            self.files[name].write(f"{image.sum()}\n")
+            self.frames[name] += 1
+
+    def finish(self) -> tuple[WrittenFile, ...]:
+        self.failing.stage("finish")
+        self.abort()
+        return tuple(WrittenFile(f"{name}.txt", name, frames) for name, frames in self.frames.items())
 
     def abort(self) -> None:
-        for file in getattr(self, "files", []):
+        for file in self.files.values():
             file.close()
+
+
+class LineWriter(Failing, TrajectoryWriter):
+    """One line for each frame, in two files."""
+
+    name: ClassVar[str] = "lines"
+
+    def prepare(self, run: RunHeader) -> None:
+        self.run = run
+
+    def write(self, directory: Path, columns: EpisodeColumns, status: str) -> tuple[WrittenFile, ...]:
+        assert columns.header.run == self.run
+        self.stage("begin")
+        files = {"states.txt": columns.state["joint_pos"], "actions.txt": columns.action}
+        for name, rows in files.items():
+            with (directory / name).open("w") as file:
+                self.stage("write")
+                file.writelines(f"{row.tolist()}\n" for row in rows)
+        return tuple(map(WrittenFile, files))
+
+    def open_images(self, directory: Path, header: Header) -> ImageWriter:
+        self.stage("open")
+        return LineImages(directory, header, self)
 
 
 @pytest.fixture
-def writer(monkeypatch: pytest.MonkeyPatch) -> type[LineWriter]:
-    monkeypatch.setattr(LineWriter, "fail_at", "")
-    return LineWriter
+def writer() -> LineWriter:
+    return LineWriter()
 
 
 @pytest.fixture
@@ -99,6 +126,6 @@ def record(make_frame: Callable[..., Frame]) -> Callable[..., Path]:
         recorder.start(EpisodeHeader(env=env, episode=episode, episode_seed=11, drawn={"mass": np.float32(0.5)}))
         for step in range(steps + 1):
             recorder.append(env, make_frame(step))
-        return recorder.commit(env, "success")
+        return recorder.commit(env, "success").wait()
 
     return run

@@ -3,15 +3,18 @@
 import errno
 import itertools
 import os
+import threading
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from anysim.errors import RecordError
-from anysim.record import commit as protocol
-from anysim.record.header import EpisodeHeader
+from anysim.record import commit as protocol, recording_thread
+from anysim.record.header import CameraInfo, EpisodeHeader
 from anysim.record.manifest import read_manifest
 from anysim.record.recorder import Recorder
+from anysim.record.writer import TrajectoryWriter, WrittenFile
 
 FULL = OSError(errno.ENOSPC, "No space left on device")
 
@@ -34,8 +37,7 @@ def is_rename_into_place(source, target):
 
 FAULTS = {
     "begin": lambda patch, writer: patch.setattr(writer, "fail_at", "begin"),
-    "append": lambda patch, writer: patch.setattr(writer, "fail_at", "append"),
-    "finish": lambda patch, writer: patch.setattr(writer, "fail_at", "finish"),
+    "write": lambda patch, writer: patch.setattr(writer, "fail_at", "write"),
     "fsync of the first file": lambda patch, writer: patch.setattr(os, "fsync", failing(os.fsync, nth=1)),
     "fsync of the second file": lambda patch, writer: patch.setattr(os, "fsync", failing(os.fsync, nth=2)),
     "hash": lambda patch, writer: patch.setattr(protocol, "describe", failing(protocol.describe)),
@@ -68,7 +70,7 @@ def test_a_full_disk_at(stage, tmp_path, writer, run_header, record, make_frame)
         # there is room again: the same one, the interrupted neighbour and further ones go on in this process
         record(recorder, env=1)
         recorder.append(5, make_frame(2))
-        recorder.commit(5, "success")
+        recorder.commit(5, "success").wait()
         assert recorder.committed() == {(0, 0), (1, 0), (5, 0)}
     assert sorted(p.name for p in tmp_path.iterdir()) == ["episodes", "run.json"]
 
@@ -84,14 +86,172 @@ def test_the_faults_are_all_reached(tmp_path, writer, run_header, record, monkey
     assert len(calls) == 5
 
 
-def test_an_error_of_another_kind_discards_too(tmp_path, writer, run_header, make_frame, monkeypatch):
+CAMERAS = {"front": CameraInfo(width=4, height=3), "back": CameraInfo(width=2, height=2, every=2)}
+
+
+def images(step):
+    due = {name: camera for name, camera in CAMERAS.items() if step % camera.every == 0}
+    return {name: np.full((camera.height, camera.width, 3), step, np.uint8) for name, camera in due.items()}
+
+
+@pytest.mark.parametrize("stage", ["open", "append", "finish"])
+def test_a_full_disk_at_an_image(stage, tmp_path, writer, run_header, make_frame, monkeypatch):
+    def film(recorder):
+        recorder.start(EpisodeHeader(env=0, episode=0, episode_seed=1, cameras=CAMERAS))
+        for step in range(1, 4):
+            recorder.append(0, make_frame(step, images=images(step)))
+            recorder.flush()
+        return recorder.commit(0, "success").wait()
+
     with Recorder(tmp_path, writer, run_header) as recorder:
-        recorder.start(EpisodeHeader(env=0, episode=0, episode_seed=1))
-        monkeypatch.setattr(writer, "append", lambda self, frame: 1 // 0)
+        with monkeypatch.context() as patch:
+            patch.setattr(writer, "fail_at", stage)
+            what = {"open": "cannot begin env 0", "append": "cannot write step 1 of env 0", "finish": "cannot commit"}
+            with pytest.raises(RecordError, match=f"{what[stage]}.*No space left on device .*Make room"):
+                film(recorder)
+        assert recorder.open_envs == ()
+        recorder.flush()
+        assert not [path for path in (tmp_path / ".incoming").iterdir() if path.is_dir()]
+        manifest = read_manifest(film(recorder))
+    assert {name: (c.frames, c.first_step) for name, c in manifest.cameras.items()} == {"front": (3, 1), "back": (1, 2)}
+
+
+def test_a_writer_without_images_says_so(tmp_path, writer, run_header, make_frame, monkeypatch):
+    monkeypatch.setattr(type(writer), "open_images", TrajectoryWriter.open_images)
+    with Recorder(tmp_path, writer, run_header) as recorder:
+        recorder.start(EpisodeHeader(env=0, episode=0, episode_seed=1, cameras=CAMERAS))
+        recorder.flush()
+        with pytest.raises(RecordError, match=r"'lines' writes no images of front, back; set record\.cameras"):
+            recorder.append(0, make_frame(1, images=images(1)))
+
+
+def test_an_error_of_another_kind_discards_too(tmp_path, writer, run_header, record, monkeypatch):
+    with Recorder(tmp_path, writer, run_header) as recorder:
+        monkeypatch.setattr(writer, "write", lambda directory, columns, status: 1 // 0)
         with pytest.raises(ZeroDivisionError):
-            recorder.append(0, make_frame(1))
+            record(recorder)
         assert recorder.open_envs == ()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run.json"]
+
+
+def test_a_failure_that_nobody_waits_for_is_told_when_the_recorder_closes(tmp_path, writer, run_header, make_frame):
+    def record_badly():
+        with Recorder(tmp_path, writer, run_header) as recorder:
+            for env in range(3):
+                recorder.start(EpisodeHeader(env=env, episode=0, episode_seed=1))
+                recorder.append(env, make_frame(1))
+                recorder.flush()
+                writer.fail_at = "write" if env == 1 else ""
+                recorder.commit(env, "success")
+
+    with pytest.raises(RecordError, match="cannot commit env 1, episode 0: No space left on device"):
+        record_badly()
+    assert sorted(p.name for p in (tmp_path / "episodes").iterdir()) == [
+        "env_0000_episode_0000",
+        "env_0002_episode_0000",
+    ]
+    assert not (tmp_path / ".incoming").exists()
+
+
+@pytest.fixture
+def held(writer, monkeypatch):
+    """Keeps the recorder's thread in its first `write` until the event is set, so that commits gather behind it."""
+    event, write = threading.Event(), writer.write
+
+    def wait(directory, columns, status):
+        assert event.wait(20)
+        return write(directory, columns, status)
+
+    monkeypatch.setattr(writer, "write", wait)
+    return event
+
+
+def commit_together(recorder, make_frame, held, envs):
+    for env in envs:
+        recorder.start(EpisodeHeader(env=env, episode=0, episode_seed=1))
+        recorder.append(env, make_frame(1))
+    pending = [recorder.commit(env, "success") for env in envs]
+    assert not any(commit.done for commit in pending)
+    held.set()
+    recorder.flush()
+    assert all(commit.done for commit in pending)
+    return pending
+
+
+def test_commits_that_wait_together_share_the_last_fsync(tmp_path, writer, run_header, make_frame, held, monkeypatch):
+    calls = []
+    real = protocol.fsync
+    monkeypatch.setattr(protocol, "fsync", lambda path: (calls.append(path.name), real(path)))
+    with Recorder(tmp_path, writer, run_header) as recorder:
+        pending = commit_together(recorder, make_frame, held, range(5))
+        assert [commit.wait().name for commit in pending] == [f"env_{env:04d}_episode_0000" for env in range(5)]
+    assert calls.count("episodes") == 1
+    assert calls.count("states.txt") == 5
+    assert calls.index("episodes") > max(place for place, name in enumerate(calls) if name.startswith("env_"))
+
+
+@pytest.mark.parametrize(("nth", "lost"), [(1, {0}), (3, {2}), (5, {4})])
+def test_one_rename_of_a_group_that_fails(nth, lost, tmp_path, writer, run_header, make_frame, held, monkeypatch):
+    with Recorder(tmp_path, writer, run_header) as recorder:
+        monkeypatch.setattr(Path, "rename", failing(Path.rename, is_rename_into_place, nth))
+        pending = commit_together(recorder, make_frame, held, range(5))
+        for env, commit in enumerate(pending):
+            if env in lost:
+                with pytest.raises(RecordError, match=f"cannot commit env {env}, episode 0: No space left"):
+                    commit.wait()
+        assert recorder.committed() == {(env, 0) for env in set(range(5)) - lost}
+        assert not [path for path in (tmp_path / ".incoming").iterdir() if path.is_dir()]
+
+
+def test_a_last_fsync_that_fails_takes_the_whole_group_back(
+    tmp_path, writer, run_header, make_frame, held, monkeypatch
+):
+    real = protocol.fsync
+    fails = failing(real, lambda path: path.name == "episodes")
+    monkeypatch.setattr(protocol, "fsync", fails)
+    with Recorder(tmp_path, writer, run_header) as recorder:
+        for commit in commit_together(recorder, make_frame, held, range(3)):
+            with pytest.raises(RecordError, match="No space left on device"):
+                commit.wait()
+        assert recorder.committed() == set()
+        for env in range(3):
+            recorder.start(EpisodeHeader(env=env, episode=0, episode_seed=1))
+            recorder.append(env, make_frame(1))
+            recorder.commit(env, "success").wait()
+        assert recorder.committed() == {(0, 0), (1, 0), (2, 0)}
+
+
+def test_a_trajectory_that_is_about_to_be_committed_is_not_begun_again(tmp_path, writer, run_header, make_frame, held):
+    with Recorder(tmp_path, writer, run_header) as recorder:
+        recorder.start(EpisodeHeader(env=0, episode=0, episode_seed=1))
+        recorder.append(0, make_frame(1))
+        recorder.commit(0, "success")
+        with pytest.raises(RecordError, match="is committed already and is never overwritten"):
+            recorder.start(EpisodeHeader(env=0, episode=0, episode_seed=1))
+        recorder.start(EpisodeHeader(env=0, episode=1, episode_seed=1))
+        held.set()
+
+
+def test_whoever_commits_faster_than_the_disk_waits(tmp_path, writer, run_header, make_frame, held, monkeypatch):
+    monkeypatch.setattr(recording_thread, "QUEUE_BYTES", 3 * recording_thread.SMALLEST)
+    with Recorder(tmp_path, writer, run_header) as recorder:
+        done = threading.Event()
+
+        def commit_all():
+            for env in range(8):
+                recorder.start(EpisodeHeader(env=env, episode=0, episode_seed=1))
+                recorder.append(env, make_frame(1))
+                recorder.commit(env, "success")
+            done.set()
+
+        thread = threading.Thread(target=commit_all)
+        thread.start()
+        assert not done.wait(0.3)  # one is being written, three wait, the fifth does not fit
+        held.set()
+        thread.join(20)
+        assert done.is_set()
+        recorder.flush()
+        assert len(recorder.committed()) == 8
 
 
 def test_a_disk_that_is_full_from_the_start(tmp_path, writer, run_header, monkeypatch):
@@ -104,10 +264,8 @@ def test_a_disk_that_is_full_from_the_start(tmp_path, writer, run_header, monkey
 
 
 def test_a_writer_cannot_place_files_elsewhere(tmp_path, writer, run_header, record, monkeypatch):
-    from anysim.record.writer import WrittenFile
-
-    finish = writer.finish
-    monkeypatch.setattr(writer, "finish", lambda self, status: (*finish(self, status), WrittenFile("../run.json")))
+    write = writer.write
+    monkeypatch.setattr(writer, "write", lambda *args: (*write(*args), WrittenFile("../run.json")))
     with Recorder(tmp_path, writer, run_header) as recorder:
         with pytest.raises(RecordError, match=r"'\.\./run\.json' cannot be a file of a trajectory"):
             record(recorder)
@@ -123,9 +281,9 @@ def test_a_writer_cannot_place_files_elsewhere(tmp_path, writer, run_header, rec
     ],
 )
 def test_the_remedy_fits_the_trouble(number, remedy, tmp_path, writer, run_header, record, monkeypatch):
-    def begin(self, directory, header):
+    def write(directory, columns, status):
         raise OSError(number, os.strerror(number), str(directory))
 
-    monkeypatch.setattr(writer, "begin", begin)
+    monkeypatch.setattr(writer, "write", write)
     with Recorder(tmp_path, writer, run_header) as recorder, pytest.raises(RecordError, match=remedy):
         record(recorder)

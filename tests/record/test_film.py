@@ -15,7 +15,7 @@ from anysim.engine.base import SimEngine
 from anysim.errors import RecordError, SpecError
 from anysim.record.film import Moments, film_episode, images, moments_for
 from anysim.record.film_mode import film_mode, hindrances
-from anysim.record.writer import writer_factory
+from anysim.record.writer import make_writer
 from anysim.task.env import TaskEnv
 from anysim.task.terms import events
 from anysim.testing.fixtures import drawing_trouble
@@ -116,7 +116,7 @@ def test_bodies_go_by_name(tmp_path: Path) -> None:
         for name in names:
             assert np.array_equal(moments.body_pose[:, theirs.index(name)], poses[0][:, names.index(name)])
         assert (moments.body_pose[:, theirs.index("post"), :3] == [0.2, 0.4, 0.6]).all()
-        writer = writer_factory("mcap", {})()
+        writer = make_writer("mcap", {})
         found = film_episode(other, 0, moments, ["front"], tmp_path, writer)
         assert found["front"].frames == 4
         assert (tmp_path / found["front"].file).stat().st_size > 0
@@ -152,7 +152,7 @@ def test_what_was_changed_midway_is_not_filmed(what: str, tmp_path: Path) -> Non
         assert (env.engine.appearance_changes == before).all()
         CHANGES[what](env.engine)
         moments = Moments(np.arange(2), poses[0])
-        writer = writer_factory("mcap", {})()
+        writer = make_writer("mcap", {})
         with pytest.raises(RecordError, match="changed after the reset"):
             film_episode(env, 0, moments, ["front"], tmp_path, writer, since=int(before[0]))
         if what != "a thing more":  # in the other env nothing was changed

@@ -7,24 +7,23 @@ from anysim.engine.state import State
 from anysim.errors import RecordError
 from anysim.managers.camera import interval
 from anysim.model.world import Actuator, Body, BodyKind, Camera, ControlMode, Joint, JointType, World
-from anysim.record.episode import Episode
-from anysim.record.frame import state_digest, state_rows
-from anysim.record.header import CameraInfo, EpisodeHeader, Header, camera_info, state_layout
-
-
-class Sink:
-    def __init__(self):
-        self.frames = []
-
-    def append(self, frame):
-        self.frames.append(frame)
+from anysim.record.frame import FrameBatch, state_digest, state_rows
+from anysim.record.header import CameraInfo, EpisodeHeader, camera_info, state_layout
+from anysim.record.manifest import read_manifest
+from anysim.record.recorder import Recorder
 
 
 @pytest.fixture
-def episode(run_header):
+def episode(tmp_path, writer, run_header):
+    """A recorder in which episode 2 of env 3 is open, with a camera."""
+    with Recorder(tmp_path, writer, run_header) as recorder:
+        restart(recorder)
+        yield recorder
+
+
+def restart(recorder):
     cameras = {"front": CameraInfo(width=4, height=3, every=2)}
-    header = Header(run_header, EpisodeHeader(env=3, episode=2, episode_seed=0, cameras=cameras))
-    return Episode(header, Sink())
+    recorder.start(EpisodeHeader(env=3, episode=2, episode_seed=0, cameras=cameras))
 
 
 def image(step):
@@ -33,13 +32,16 @@ def image(step):
 
 def test_steps_follow_one_by_one(episode, make_frame):
     with pytest.raises(RecordError, match="env 3, episode 2: frame of step 2, but step 0 or 1 is next"):
-        episode.append(make_frame(2))
-    episode.append(make_frame(1))
+        episode.append(3, make_frame(2))
     for wrong in (0, 1, 3):
+        restart(episode)
+        episode.append(3, make_frame(1))
         with pytest.raises(RecordError, match=f"frame of step {wrong}, but step 2 is next"):
-            episode.append(make_frame(wrong))
-    episode.append(make_frame(2, images=image(2)))
-    assert episode.summary().steps == 2
+            episode.append(3, make_frame(wrong))
+    restart(episode)
+    episode.append(3, make_frame(1))
+    episode.append(3, make_frame(2, images=image(2)))
+    assert read_manifest(episode.commit(3, "success").wait()).steps == 2
 
 
 @pytest.mark.parametrize(
@@ -63,27 +65,113 @@ def test_steps_follow_one_by_one(episode, make_frame):
     ],
 )
 def test_a_frame_that_does_not_fit_is_refused(episode, make_frame, changes, message):
+    """Names, shapes and turns at once, numbers when the episode is committed."""
+
+    def record():
+        episode.append(3, make_frame(1, **changes))
+        episode.append(3, make_frame(2, images=image(2)))
+        episode.commit(3, "success")
+
     with pytest.raises(RecordError, match=message):
-        episode.append(make_frame(1, **changes))
-    assert episode.writer.frames == []
+        record()
+    assert episode.open_envs == ()
+    episode.flush()
+    assert episode.committed() == set()
+
+
+def test_a_number_is_refused_by_the_step_where_it_is(episode, make_frame):
+    for step in range(300):  # beyond the rows that were made ready
+        wrong = {"joint_pos": np.array([0.0, np.nan if step == 257 else 1.0]), "body_pose": np.zeros((1, 7))}
+        episode.append(3, make_frame(step, state=wrong, images=image(step)))
+    with pytest.raises(RecordError, match=r"env 3, episode 2, step 257: joint_pos\[1\] is nan"):
+        episode.commit(3, "success")
 
 
 def test_images_belong_to_every_nth_step(episode, make_frame):
-    assert episode.cameras_due(0) == ("front",)
-    assert episode.cameras_due(1) == ()
+    assert episode.cameras_due(3, 0) == ("front",)
+    assert episode.cameras_due(3, 1) == ()
     with pytest.raises(RecordError, match="images of none; due are front"):
-        episode.append(make_frame(0))
+        episode.append(3, make_frame(0))
+    restart(episode)
     with pytest.raises(RecordError, match=r"camera 'front' has shape \(2, 4, 3\) of uint8; \(3, 4, 3\) of uint8"):
-        episode.append(make_frame(0, images={"front": np.zeros((2, 4, 3), np.uint8)}))
-    episode.append(make_frame(0, images=image(0)))
-    episode.append(make_frame(1))
-    assert episode.first_image == {"front": 0}
+        episode.append(3, make_frame(0, images={"front": np.zeros((2, 4, 3), np.uint8)}))
+    restart(episode)
+    episode.append(3, make_frame(0, images=image(0)))
+    episode.append(3, make_frame(1))
+    manifest = read_manifest(episode.commit(3, "success").wait())
+    assert (manifest.cameras["front"].first_step, manifest.cameras["front"].frames) == (0, 1)
 
 
 def test_images_among_the_observations_are_ignored(episode, make_frame):
     frame = make_frame(1)
-    episode.append(frame._replace(obs={**frame.obs, "images/front": np.zeros((3, 4, 3), np.uint8)}))
-    assert list(episode.writer.frames[0].obs) == ["policy"]
+    episode.append(3, frame._replace(obs={**frame.obs, "images/front": np.zeros((3, 4, 3), np.uint8)}))
+    assert episode.commit(3, "success").wait().is_dir()
+
+
+def test_envs_at_different_steps_are_appended_together(tmp_path, writer, run_header, make_frame, monkeypatch):
+    seen = {}
+    write = writer.write
+    monkeypatch.setattr(
+        writer,
+        "write",
+        lambda directory, columns, status: (
+            seen.update({columns.header.episode.env: columns}) or write(directory, columns, status)
+        ),
+    )
+    with Recorder(tmp_path, writer, run_header, horizon=4) as recorder:
+        for env, first in ((7, 0), (3, 1), (5, 1)):
+            recorder.start(EpisodeHeader(env=env, episode=0, episode_seed=0, instruction="go"))
+            recorder.append(env, make_frame(first))
+        words = [{"phase": "a"}, {"phase": "b"}]
+        for k in range(12):  # more than there is room for at first
+            frames = [make_frame(1 + k), make_frame(2 + k)]
+            recorder.append_batch(
+                [7, 5],
+                FrameBatch(
+                    step=[frame.step for frame in frames],
+                    time=np.array([frame.time for frame in frames]),
+                    action=np.stack([frame.action for frame in frames]),
+                    state={n: np.stack([frame.state[n] for frame in frames]) for n in frames[0].state},
+                    reward=np.array([frame.reward for frame in frames]),
+                    status=["running", f"s{k // 6}"],
+                    obs={"policy": np.stack([frame.obs["policy"] for frame in frames])},
+                    annotations=[words[k % 2], words[k // 6]],
+                    language=["", "stop" if k > 6 else "go"],
+                    images=[{}, {}],
+                ),
+            )
+        recorder.commit(5, "success")
+        recorder.commit(7, "success")
+    assert (len(seen[7]), seen[7].first_step, len(seen[5]), seen[5].first_step) == (13, 0, 13, 1)
+    for env, first in ((7, 0), (5, 1)):
+        frames = [make_frame(first + k) for k in range(13)]
+        assert np.array_equal(seen[env].time, [frame.time for frame in frames])
+        assert np.array_equal(seen[env].reward, [frame.reward for frame in frames])
+        for name in ("joint_pos", "body_pose"):
+            assert np.array_equal(seen[env].state[name], [frame.state[name] for frame in frames])
+        assert np.array_equal(seen[env].obs["policy"], [frame.obs["policy"] for frame in frames])
+        actions = [np.zeros(2) if frame.action is None else frame.action for frame in frames]
+        assert np.array_equal(seen[env].action, actions)
+    assert seen[7].status == ((0, "running"),)
+    assert seen[5].status == ((0, "running"), (1, "s0"), (7, "s1"))
+    assert seen[7].annotations == tuple((1 + k, words[k % 2]) for k in range(12))
+    assert seen[5].annotations == ((1, words[0]), (7, words[1]))
+    assert seen[5].language == ((8, "stop"),)
+    assert seen[7].language == ()
+
+
+def test_annotations_may_hold_arrays_and_be_changed_in_place(tmp_path, writer, run_header, make_frame, monkeypatch):
+    seen = []
+    write = writer.write
+    monkeypatch.setattr(writer, "write", lambda d, columns, s: seen.append(columns.annotations) or write(d, columns, s))
+    words = {"at": np.zeros(2)}
+    with Recorder(tmp_path, writer, run_header) as recorder:
+        recorder.start(EpisodeHeader(env=0, episode=0, episode_seed=0))
+        for step in range(1, 5):
+            words["at"][0] = step // 2
+            recorder.append(0, make_frame(step, annotations=words))
+        recorder.commit(0, "success")
+    assert seen == [((0, {"at": [0.0, 0.0]}), (1, {"at": [1.0, 0.0]}), (3, {"at": [2.0, 0.0]}))]
 
 
 def test_the_digest_sees_every_bit():

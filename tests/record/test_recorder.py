@@ -9,7 +9,7 @@ import pytest
 
 from anysim.errors import RecordError
 from anysim.record.frame import state_digest
-from anysim.record.header import EpisodeHeader
+from anysim.record.header import CameraInfo, EpisodeHeader
 from anysim.record.manifest import read_manifest, read_run
 from anysim.record.recorder import Recorder
 
@@ -76,6 +76,7 @@ def test_envs_are_recorded_side_by_side_and_discarded_alone(tmp_path, writer, ru
         assert recorder.open_envs == (0, 2)
         recorder.commit(2, "success")
         recorder.commit(0, "failed")
+        recorder.flush()
         assert recorder.committed() == {(0, 0), (2, 0)}
     assert not read_manifest(tmp_path / "episodes/env_0002_episode_0000").has_initial_frame
 
@@ -119,7 +120,7 @@ def test_two_recorders_share_a_run(tmp_path, writer, run_header, record, make_fr
             record(second, env=1)
         first.append(0, make_frame(2))
         with pytest.raises(RecordError, match="is committed already"):
-            first.commit(0, "success")
+            first.commit(0, "success").wait()
         record(first, env=2)
         assert first.committed() == {(0, 5), (1, 0), (2, 0)}
     assert read_manifest(tmp_path / "episodes/env_0000_episode_0005").steps == 3
@@ -128,8 +129,9 @@ def test_two_recorders_share_a_run(tmp_path, writer, run_header, record, make_fr
 
 def test_orphans_are_swept_and_the_living_are_not(tmp_path, writer, run_header, make_frame):
     with Recorder(tmp_path, writer, run_header) as living:
-        living.start(episode(0))
+        living.start(episode(0, cameras={"front": CameraInfo(width=4, height=3, every=2)}))
         living.append(0, make_frame(1))
+        living.flush()
         incoming = tmp_path / ".incoming"
         # a dead process with our own number, as in a container that was started again; one without a lock; a stranger
         for name in (f"env_0001_episode_0000.{os.getpid()}-1", "env_0002_episode_0000.77777-0", "notes"):
@@ -143,7 +145,7 @@ def test_orphans_are_swept_and_the_living_are_not(tmp_path, writer, run_header, 
             f"env_0000_episode_0000.{os.getpid()}-0",
             "notes",
         ]
-        living.commit(0, "success")
+        living.commit(0, "success").wait()
     assert living.committed() == {(0, 0)}
 
 
@@ -189,7 +191,7 @@ def test_arrays_may_be_reused_by_the_caller(tmp_path, writer, run_header, make_f
         recorder.append(0, second._replace(state=buffer))
         for array in buffer.values():
             array[...] = 0.0
-        manifest = read_manifest(recorder.commit(0, "success"))
+        manifest = read_manifest(recorder.commit(0, "success").wait())
     assert manifest.final_digest == state_digest(second.state)
     lines = (tmp_path / "episodes/env_0000_episode_0000/states.txt").read_text().splitlines()
     assert lines == [str(frame.state["joint_pos"].tolist()) for frame in (first, second)]

@@ -1,5 +1,6 @@
 """Cameras: where they look from in an episode, and the one place where their images are taken in a run."""
 
+import time
 from collections.abc import Mapping
 from typing import Any
 
@@ -134,6 +135,8 @@ class CaptureManager(Manager):
         self._noise = {name: np.zeros(n) for name in self._specs}
         self._latest: dict[str, Array] = {}
         self._taken: dict[str, Array] = {}
+        self.draw_seconds = 0.0
+        """Wall time [s] of drawing so far, for tables of where time goes; nothing else depends on it."""
         self.image_shapes = {
             f"images/{name}": (camera.height, camera.width, 3)
             for name in self.observed
@@ -199,7 +202,9 @@ class CaptureManager(Manager):
         if "rgb" not in found.channels:
             # a run that only looks its names up has cameras that give nothing
             return np.zeros((len(env_ids), found.height, found.width, 3), dtype=np.uint8)
+        began = time.perf_counter()
         images = self.engine.render(camera, env_ids=env_ids, body_pose=body_pose)["rgb"]
+        self.draw_seconds += time.perf_counter() - began
         if camera not in self._specs:
             return images
         for row, env in enumerate(env_ids.tolist()):

@@ -4,19 +4,24 @@ Env i runs episodes 0, 1, 2… of its own stream, as many as its share; so which
 does not depend on how fast the others are or how many there are.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+import sys
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.record.frame import Frame, state_rows
+from anysim.errors import RecordError
+from anysim.record.collect_times import CollectTimes
+from anysim.record.frame import NOTHING, FrameBatch, state_batch
 from anysim.record.header import EpisodeHeader, RunHeader, camera_info, state_layout
 from anysim.record.provenance import package_versions
 from anysim.record.recorder import Recorder
-from anysim.record.writer import writer_factory
+from anysim.record.trajectory_files import PendingCommit
+from anysim.record.writer import make_writer
 from anysim.task.contract import Status
 from anysim.task.env import TaskEnv
 
@@ -90,39 +95,65 @@ class Collector:
     def __init__(self, env: TaskEnv, policy: Policy, out: Path, episodes: int, seed: int) -> None:
         """Run `episodes` in all, shared out as evenly as can be: env i runs one of every N."""
         self.env, self.policy, self.seed = env, policy, seed
-        record = env.spec.record
-        self.recorder = Recorder(out, writer_factory(record.writer, record.options), run_header(env, seed))
-        self._capture = env.capture
+        record, task = env.spec.record, env.spec.task
+        assert task is not None
+        writer = make_writer(record.writer, record.options)
+        self.recorder = Recorder(out, writer, run_header(env, seed), horizon=task.horizon)
+        self.times = CollectTimes(env)
+        self._capture, self._instruction = env.capture, task.description
         self._share = np.array([len(range(i, episodes, env.num_envs)) for i in range(env.num_envs)])
         self._episode = np.full(env.num_envs, -1)
         self._total = np.zeros(env.num_envs)
+        self._pending: deque[tuple[EpisodeResult, PendingCommit]] = deque()
 
     def run(self) -> Iterator[EpisodeResult]:
-        """Run all episodes; yields each as it ends, and first those that were committed by an earlier run."""
-        env = self.env
+        """Run all episodes.
+
+        Yields each that an earlier run has committed, and each other one when it has ended and, where it is kept, when
+        its trajectory is on the disk.
+        """
+        env, times = self.env, self.times
         try:
             env.streams.seed(self.seed, np.arange(env.num_envs))
             yield from self._start(np.arange(env.num_envs))
             while (active := env.running).any():
                 ids = np.flatnonzero(active)
-                result = env.step(self.policy.act(ids), None if active.all() else active)
+                with times.policy:
+                    action = self.policy.act(ids)
+                with times.env:
+                    result = env.step(action, None if active.all() else active)
+                times.steps += len(ids)
                 self._append(ids, result.reward, result.status)
                 over = ids[(result.status[ids] != Status.RUNNING) | self.policy.gave_up(ids)]
                 for i in over:
-                    yield self._finish(int(i), str(result.status[i]))
+                    yield from self._finish(int(i), str(result.status[i]))
+                yield from self._settled()
                 yield from self._start(over)
+            with times.record:
+                self.recorder.flush()
+            yield from self._settled()
         finally:
+            with times.record:
+                self._close()
+
+    def _close(self) -> None:
+        failing = sys.exc_info()[0] is not None
+        try:
             self.recorder.close()
+        except RecordError:
+            if not failing:  # else it is the error that ends the run that is told
+                raise
 
     # ------------------------------------------------------------------ the beginning and end of an episode
 
     def _start(self, ids: Array) -> Iterator[EpisodeResult]:
         """Begin the next episode of these envs, passing over what is committed already."""
-        committed = self.recorder.committed()
+        if len(ids) == 0:
+            return
         begin = np.zeros(self.env.num_envs, dtype=bool)
         for i in map(int, ids):
             self._episode[i] += 1
-            while (i, int(self._episode[i])) in committed and self._episode[i] < self._share[i]:
+            while self._episode[i] < self._share[i] and self.recorder.is_committed(i, int(self._episode[i])):
                 self.env.streams.skip(i, 1)
                 yield self._resumed(i, int(self._episode[i]))
                 self._episode[i] += 1
@@ -130,17 +161,19 @@ class Collector:
         self.env.retire(np.setdiff1d(ids, np.flatnonzero(begin)))
         if not begin.any():
             return
-        self.env.reset(mask=begin)
         fresh = np.flatnonzero(begin)
-        self.policy.begin(fresh)
+        with self.times.reset:
+            self.env.reset(mask=begin)
+        with self.times.policy:
+            self.policy.begin(fresh)
         self._total[fresh] = 0.0
-        for i in map(int, fresh):
-            self.recorder.start(self._header(i))
+        with self.times.record:
+            for i in map(int, fresh):
+                self.recorder.start(self._header(i))
         self._append(fresh, None, self.env.status)
 
     def _header(self, i: int) -> EpisodeHeader:
         env = self.env
-        assert env.spec.task is not None
         cameras = {}
         for name in env.spec.record.cameras:
             number = env.engine.index.camera(name)
@@ -153,7 +186,7 @@ class Collector:
             episode_seed=int(env.streams.episode_seed[i]),
             drawn=env.streams.draws[i],
             overridden=env.streams.overridden[i],
-            instruction=env.spec.task.description,
+            instruction=self._instruction,
             cameras=cameras,
         )
 
@@ -167,55 +200,72 @@ class Collector:
         reward = float(outcome.pop("total_reward", 0.0))
         return EpisodeResult(env, episode, m.episode_seed, m.status, m.steps, reward, outcome, path, resumed=True)
 
-    def _finish(self, i: int, status: str) -> EpisodeResult:
+    def _finish(self, i: int, status: str) -> Iterator[EpisodeResult]:
+        """Commit or discard an episode; yields it at once where it is not kept."""
         env = self.env
         steps, total = int(env.scene.elapsed[i]), float(self._total[i])
         outcome = self.policy.describe(i)
         if status == Status.RUNNING:  # the policy gave up
             status = str(Status.FAILED)
         keep = env.spec.record.keep == "all" or status == Status.SUCCESS
-        path = None
+        seed = int(env.streams.episode_seed[i])
+        result = EpisodeResult(i, int(self._episode[i]), seed, status, steps, total, outcome)
         if keep and not env.info["fault"][i]:
-            path = self.recorder.commit(i, status, outcome | {"total_reward": total})
+            with self.times.record:
+                self._pending.append((result, self.recorder.commit(i, status, outcome | {"total_reward": total})))
         else:
             self.recorder.discard(i)
-        seed = int(env.streams.episode_seed[i])
-        return EpisodeResult(i, int(self._episode[i]), seed, status, steps, total, outcome, path)
+            yield result
+
+    def _settled(self) -> Iterator[EpisodeResult]:
+        """The episodes whose trajectories are on the disk by now, oldest first.
+
+        Every committed episode passes here once: whatever is to be done with its files can begin here.
+        """
+        while self._pending and self._pending[0][1].done:
+            result, pending = self._pending.popleft()
+            yield replace(result, path=pending.wait())
 
     # ------------------------------------------------------------------ frames
 
     def _append(self, ids: Array, reward: Array | None, status: Array) -> None:
         """Record one frame of each env, with images of the cameras that are due. A faulted env has no frame."""
-        env = self.env
-        state, control, obs = env.engine.get_state(), env.engine.control, env.obs
-        healthy = ids[~env.info["fault"][ids]]
-        images = self._images(healthy)
-        for i in map(int, healthy):
-            step = int(env.scene.elapsed[i])
-            gained = 0.0 if reward is None else float(reward[i])
-            self._total[i] += gained
-            self.recorder.append(
-                i,
-                Frame(
-                    step=step,
-                    time=float(state.time[i]),
-                    action=None if step == 0 else env.scene.last_action[i],
-                    state=state_rows(state, i, STATE_FIELDS, control),
+        env, times = self.env, self.times
+        ids = ids[~env.info["fault"][ids]]
+        if len(ids) == 0:
+            return
+        images: Sequence[Mapping[str, Array]] = [NOTHING] * len(ids)
+        if env.spec.record.cameras:
+            with times.record:
+                images = self._images(ids)
+        with times.record:
+            state, numbers = env.engine.get_state(), ids.tolist()
+            rows = None if len(ids) == env.num_envs else ids
+            gained = np.zeros(len(ids)) if reward is None else reward[ids].astype(float)
+            self._total[ids] += gained
+            self.recorder.append_batch(
+                numbers,
+                FrameBatch(
+                    step=env.scene.elapsed[ids].tolist(),
+                    time=state.time[ids],
+                    action=env.scene.last_action[ids],
+                    state=state_batch(state, STATE_FIELDS, env.engine.control, rows),
                     reward=gained,
-                    status=str(status[i]),
-                    obs={group: rows[i] for group, rows in obs.items()},
-                    annotations=self.policy.describe(i),
-                    language=env.spec.task.description if env.spec.task else "",
-                    images=images.get(i, {}),
+                    status=status[ids].tolist(),
+                    obs={group: values[ids] for group, values in env.obs.items() if not group.startswith("images/")},
+                    annotations=[self.policy.describe(i) for i in numbers],
+                    language=[self._instruction] * len(ids),
+                    images=images,
                 ),
             )
 
-    def _images(self, ids: Array) -> dict[int, dict[str, Array]]:
+    def _images(self, ids: Array) -> list[dict[str, Array]]:
+        """The images of each of these envs by camera, of those that are due."""
         due = self._capture.due(ids)
-        images: dict[int, dict[str, Array]] = {int(i): {} for i in due}
+        images: dict[int, dict[str, Array]] = {i: {} for i in ids.tolist()}
         if len(due):
             for camera in self.env.spec.record.cameras:
                 pictures = self._capture.image(camera, due)
-                for row, i in enumerate(map(int, due)):
+                for row, i in enumerate(due.tolist()):
                     images[i][camera] = pictures[row]
-        return images
+        return list(images.values())

@@ -1,8 +1,13 @@
-"""The commit protocol: everything on the disk, then one rename that makes it visible."""
+"""The commit protocol: everything on the disk, then one rename for each trajectory that makes it visible.
+
+Trajectories that wait at the same time share the last step: their directories are brought to the disk and renamed one
+after the other, and then the directory that they are in now is brought to the disk once for all.
+"""
 
 import hashlib
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from anysim.record.manifest import FileEntry
@@ -43,15 +48,41 @@ def write_durably(path: Path, data: bytes) -> None:
 
 
 def publish(incoming: Path, final: Path) -> None:
-    """Make a sealed directory visible under its final name, by one rename. Never replaces a directory with content.
+    """Make a sealed file or directory visible under its final name, by one rename.
+
+    A directory with content is never replaced.
 
     Raises:
         OSError: it is not visible, unless even taking it back failed.
     """
-    fsync(incoming)
-    incoming.rename(final)
+    [error] = publish_all([(incoming, final)])
+    if error is not None:
+        raise error
+
+
+def publish_all(moves: Sequence[tuple[Path, Path]]) -> list[OSError | None]:
+    """Make sealed entries visible in one directory, each (incoming, final) by one rename, all with one last fsync.
+
+    Returns:
+        For each, the error for which it is not visible, or None. If the last fsync fails, all are taken back.
+    """
+    errors: list[OSError | None] = []
+    for incoming, final in moves:
+        try:
+            fsync(incoming)
+            incoming.rename(final)
+        except OSError as error:
+            errors.append(error)
+        else:
+            errors.append(None)
+    done = [place for place, error in enumerate(errors) if error is None]
     try:
-        fsync(final.parent)
-    except OSError:
-        final.rename(incoming)
-        raise
+        if done:
+            fsync(moves[done[0]][1].parent)
+    except OSError as error:
+        for place in done:
+            incoming, final = moves[place]
+            with suppress(OSError):  # where even this fails it stays, and is whole
+                final.rename(incoming)
+            errors[place] = error
+    return errors

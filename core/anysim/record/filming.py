@@ -19,7 +19,7 @@ from anysim.record.manifest import Manifest, read_manifest
 from anysim.record.names import MANIFEST_FILE
 from anysim.record.reader import TrajectoryReader, open_trajectory
 from anysim.record.replay import begin
-from anysim.record.writer import writer_factory
+from anysim.record.writer import make_writer
 from anysim.task.env import TaskEnv
 from anysim_schemas.load import LoadedRun
 
@@ -211,7 +211,7 @@ class Filmer:
         begin(env, manifest)
         moments = moments_for(env, recorded, *_columns(open_trajectory(trajectory)))
         record = loaded.spec.record
-        found = film_episode(env, 0, moments, missing, aside, writer_factory(record.writer, record.options)())
+        found = film_episode(env, 0, moments, missing, aside, make_writer(record.writer, record.options))
         drawn, before = f"{engine.name} {engine.version}", f"{manifest.engine} {manifest.engine_version}"
         said = {"at": datetime.now(UTC).isoformat(), "engine": drawn, "renderer": engine.renderer_name()}
         clock = dict.fromkeys(found, said)

@@ -1,7 +1,7 @@
-"""What is recorded of one env at one control step."""
+"""What is recorded of one env, or of many at once, at one control step."""
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -46,17 +46,51 @@ class Frame(NamedTuple):
     images: Mapping[str, Array] = NOTHING
 
 
-def state_rows(state: State, env: int, fields: Iterable[str], control: Control | None = None) -> dict[str, Array]:
-    """The arrays of one env, by the names of `state_layout`; views, not copies."""
-    rows: dict[str, Array] = {}
+class FrameBatch(NamedTuple):
+    """A frame for each of n envs, with the fields of `Frame` and a leading axis; the envs may be at different steps.
+
+    Attributes:
+        step, time, reward: (n,).
+        action: (n, A); rows at step 0 mean nothing.
+        state, obs: arrays (n, …) by name.
+        status, annotations, language, images: n of each.
+    """
+
+    step: Sequence[int]
+    time: Array
+    action: Array
+    state: Mapping[str, Array]
+    reward: Array
+    status: Sequence[str]
+    obs: Mapping[str, Array]
+    annotations: Sequence[Mapping[str, Any]]
+    language: Sequence[str]
+    images: Sequence[Mapping[str, Array]]
+
+
+def state_batch(
+    state: State, fields: Sequence[str], control: Control | None = None, env_ids: Array | None = None
+) -> dict[str, Array]:
+    """The arrays (n, …) of these envs (default: all), by the names of `state_layout`; views where they can be.
+
+    Raises:
+        RecordError: the fields have a command, and no control is given.
+    """
+    arrays: dict[str, Array] = {}
     for name in fields:
         if not name.startswith("control_"):
-            rows[name] = getattr(state, name)[env]
+            rows: Array = getattr(state, name)
         elif control is not None:
-            rows[name] = getattr(control, name.removeprefix("control_"))[env]
+            rows = getattr(control, name.removeprefix("control_"))
         else:
             raise RecordError(f"the layout has '{name}', which is read from the commands; pass control=")
-    return rows
+        arrays[name] = rows if env_ids is None else rows[env_ids]
+    return arrays
+
+
+def state_rows(state: State, env: int, fields: Sequence[str], control: Control | None = None) -> dict[str, Array]:
+    """The arrays of one env, by the names of `state_layout`; views, not copies."""
+    return {name: rows[env] for name, rows in state_batch(state, fields, control).items()}
 
 
 def state_digest(state: Mapping[str, Array]) -> str:

@@ -1,5 +1,6 @@
 """Names inside a run directory, and which names a manifest may mention."""
 
+import os
 import re
 from collections.abc import Iterable
 from pathlib import Path
@@ -77,4 +78,6 @@ def trajectories(run: Path) -> list[Path]:
     episodes = run / EPISODES
     if not episodes.is_dir():
         return []
-    return sorted(p for p in episodes.iterdir() if parse_trajectory(p.name) is not None and p.is_dir())
+    with os.scandir(episodes) as entries:
+        names = [entry.name for entry in entries if parse_trajectory(entry.name) is not None and entry.is_dir()]
+    return [episodes / name for name in sorted(names)]

@@ -1,39 +1,37 @@
-"""The recorder of a run: starts, feeds, commits and discards the trajectories of its envs."""
+"""The recorder of a run: keeps the open episodes of its envs in columns, and commits or discards each.
 
-import errno
+The thread that steps fills columns and nothing else. All that touches the disk happens in order on the recorder's own
+thread: images as they come, everything else when an episode is committed.
+"""
+
 import os
-import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
+
 from anysim.errors import RecordError, listing
-from anysim.record import commit as protocol
-from anysim.record.episode import Episode
-from anysim.record.frame import Frame
+from anysim.record.column_checks import check_columns
+from anysim.record.columns import ColumnStore
+from anysim.record.committer import Committer
+from anysim.record.episode import BatchChecks, OpenEpisode, batch_of
+from anysim.record.frame import Frame, FrameBatch
 from anysim.record.header import EpisodeHeader, Header, RunHeader
-from anysim.record.incoming import Incoming, remove
-from anysim.record.json import dump_json, plain
-from anysim.record.manifest import CameraEntry, Manifest, RunRecord, read_run
-from anysim.record.names import (
-    EPISODES,
-    MANIFEST_FILE,
-    RUN_FILE,
-    checked_file_name,
-    parse_trajectory,
-    trajectories,
-    trajectory_name,
-)
-from anysim.record.writer import TrajectoryWriter, WrittenFile
+from anysim.record.incoming import Incoming
+from anysim.record.json import plain
+from anysim.record.names import EPISODES, parse_trajectory, trajectories, trajectory_name
+from anysim.record.run_file import describe_run
+from anysim.record.trajectory_files import Ending, PendingCommit, TrajectoryFiles
+from anysim.record.trouble import disk_trouble
+from anysim.record.writer import TrajectoryWriter
 
 
 class _Attempt:
-    def __init__(self, directory: Path, episode: Episode) -> None:
-        self.directory = directory
-        self.episode = episode
+    def __init__(self, episode: OpenEpisode, files: TrajectoryFiles) -> None:
+        self.episode, self.files = episode, files
         self.began = time.monotonic()
 
 
@@ -42,43 +40,49 @@ class Recorder:
 
     A trajectory is visible under `episodes/` from its commit on, whole, or never. Where anything goes wrong with one,
     that one is discarded and RecordError says why; the others, and what is committed, are untouched, and the next
-    `start` begins afresh.
+    `start` begins afresh. What goes wrong on the recorder's thread is told by `PendingCommit.wait`, by the env's next
+    `append` or `commit`, or by `close` at the latest.
     """
 
     def __init__(
         self,
         out: str | os.PathLike[str],
-        writer: Callable[[], TrajectoryWriter],
+        writer: TrajectoryWriter,
         run: RunHeader,
         now: Callable[[], datetime] = lambda: datetime.now(UTC),
+        horizon: int = 512,
     ) -> None:
         """Join the run in `out`, or begin it. Removes what recorders that died have left unfinished.
 
         Args:
             out: the run's directory; made if needed.
-            writer: makes a fresh writer for each trajectory.
+            writer: writes the trajectories; used by this recorder alone from here on.
             run: what is run. An existing directory must hold the same.
             now: the clock of `clock.created_at`.
+            horizon: control steps for which room is made; longer episodes get more when they need it.
 
         Raises:
             RecordError: the directory holds another run, or cannot be written.
         """
         self.out = Path(out)
         self.run = RunHeader.model_validate({**dict(run), "spec": plain(run.spec, "spec")})
-        self._writer = writer
         self._now = now
         self._attempts: dict[int, _Attempt] = {}
+        self._store = ColumnStore(run.layout, horizon + 1)
+        self._checks = BatchChecks(run.layout)
+        self._writer = writer
+        self._committer = Committer(self.out, writer, self.run)
         self._closed = False
         try:
             self._incoming = Incoming(self.out)
         except OSError as error:
-            raise RecordError(_trouble(f"cannot record into {self.out}", error, self.out)) from error
+            raise disk_trouble(f"cannot record into {self.out}", error, self.out) from error
         try:
             with self._incoming.startup():
-                self._describe_run()
+                describe_run(self.out, self._incoming.path, self.run)
         except OSError as error:
             self._incoming.close()
-            raise RecordError(_trouble(f"cannot record into {self.out}", error, self.out)) from error
+            raise disk_trouble(f"cannot record into {self.out}", error, self.out) from error
         except BaseException:
             self._incoming.close()
             raise
@@ -90,21 +94,30 @@ class Recorder:
 
     @property
     def open_envs(self) -> tuple[int, ...]:
-        """The envs whose trajectories are being written."""
+        """The envs whose episodes are open."""
         return tuple(sorted(self._attempts))
 
+    @property
+    def thread_ident(self) -> int | None:
+        """The identifier of the recorder's thread, or None while it has not been needed."""
+        return self._committer.thread_ident
+
     def committed(self) -> set[tuple[int, int]]:
-        """(env, episode) of the trajectories that are there, so that a resumed run can skip them."""
+        """(env, episode) of the trajectories that are there. Reads the directory: ask once, at the start."""
         found = (parse_trajectory(path.name) for path in trajectories(self.out))
         return {ids for ids in found if ids is not None}
+
+    def is_committed(self, env: int, episode: int) -> bool:
+        """Whether a trajectory is there. As quick among ten thousand others as alone."""
+        return (self.out / EPISODES / trajectory_name(env, episode)).exists()
 
     # ------------------------------------------------------------------ one trajectory
 
     def start(self, episode: EpisodeHeader) -> None:
-        """Begin the trajectory of an env.
+        """Begin an episode of an env.
 
         Raises:
-            RecordError: it is committed already, the env has one open, or its files cannot be made.
+            RecordError: it is committed already, the env has one open, or its header is no plain data.
         """
         env = episode.env
         self._require_open()
@@ -112,40 +125,72 @@ class Recorder:
             raise RecordError(
                 f"env {env} has a trajectory open ({self._attempts[env].episode.where}); commit or discard it"
             )
-        final = self._final(episode)
-        if final.exists():
-            raise RecordError(_taken(final))
+        self._committer.refuse_taken(self._final(episode))
         values = {name: plain(getattr(episode, name), name) for name in ("drawn", "overridden")}
-        episode = EpisodeHeader.model_validate({**dict(episode), **values})
-        header = Header(self.run, episode)
-        where = f"cannot begin env {env}, episode {episode.episode}"
-        try:
-            directory = self._incoming.attempt(env, episode.episode)
-        except OSError as error:
-            raise RecordError(_trouble(where, error, self.out)) from error
-        attempt = _Attempt(directory, Episode(header, self._writer()))
-        self._attempts[env] = attempt
-        with self._guard(env, where):
-            attempt.episode.writer.begin(directory, header)
+        header = Header(self.run, EpisodeHeader.model_validate({**dict(episode), **values}))
+        files = TrajectoryFiles(self._incoming, self._writer, header, self.out)
+        self._attempts[env] = _Attempt(OpenEpisode(header, self._store.open()), files)
+        if header.episode.cameras:
+            self._committer.open_images(files)
 
     def cameras_due(self, env: int, step: int) -> tuple[str, ...]:
         """The cameras whose images belong to the frame of a control step of the env."""
         return self._attempt(env).episode.cameras_due(step)
 
     def append(self, env: int, frame: Frame) -> None:
-        """Write one frame.
+        """Add one frame to the episode of an env. Its arrays may be used again by the caller.
 
         Raises:
-            RecordError: it does not fit the header, or could not be written; the trajectory is discarded.
+            RecordError: it does not fit the header, or an earlier image could not be written; the trajectory is
+                discarded.
         """
-        episode = self._attempt(env).episode
-        with self._guard(env, f"cannot write step {frame.step} of {episode.where}"):
-            episode.append(frame)
+        attempt = self._attempt(env)
+        try:
+            batch = batch_of(attempt.episode, frame)
+        except BaseException:
+            self.discard(env)
+            raise
+        self.append_batch([env], batch)
+
+    def append_batch(self, envs: Sequence[int], batch: FrameBatch) -> None:
+        """Add one frame to the episodes of several envs. Arrays may be used again by the caller.
+
+        Raises:
+            RecordError: something does not fit the headers, or an earlier image could not be written. The trajectory
+                at fault is discarded, and no other one has got its frame; it is all of them where it is an array.
+        """
+        attempts = [self._attempt(env) for env in envs]
+        for row, (env, attempt) in enumerate(zip(envs, attempts, strict=True)):
+            try:
+                if attempt.files.trouble is not None:
+                    raise attempt.files.trouble
+                attempt.episode.check(batch.step[row], batch.images[row])
+            except BaseException:
+                self.discard(env)
+                raise
+        episodes = [attempt.episode for attempt in attempts]
+        try:
+            values = self._checks.values(episodes, batch)
+            slots = np.array([episode.slot for episode in episodes], dtype=np.intp)
+            rows = np.array([episode.count for episode in episodes], dtype=np.intp)
+            self._store.write(slots, rows, values)
+            for row, episode in enumerate(episodes):
+                episode.note(
+                    batch.step[row], batch.status[row], batch.annotations[row], batch.language[row], batch.images[row]
+                )
+        except BaseException:
+            for env in envs:
+                self.discard(env)
+            raise
+        for row, attempt in enumerate(attempts):
+            if batch.images[row]:
+                images = {name: np.array(image) for name, image in batch.images[row].items()}
+                self._committer.append_images(attempt.files, batch.step[row], images)
 
     def commit(
         self, env: int, status: str, outcome: Mapping[str, Any] | None = None, clock: Mapping[str, Any] | None = None
-    ) -> Path:
-        """Complete the trajectory of an env and make it visible. Returns its directory.
+    ) -> PendingCommit:
+        """Complete the trajectory of an env: it is written, and made visible, on the recorder's thread.
 
         Args:
             env: whose trajectory.
@@ -154,49 +199,42 @@ class Recorder:
             clock: further plain data that differs between equal runs.
 
         Raises:
-            RecordError: it could not be completed; the trajectory is discarded.
+            RecordError: its numbers are not finite, it has no steps, or an image could not be written; the trajectory
+                is discarded.
         """
         attempt = self._attempt(env)
-        final = self._final(attempt.episode.header.episode)
-        with self._guard(env, f"cannot commit {attempt.episode.where}"):
-            summary = attempt.episode.summary()
-            written = attempt.episode.writer.finish(status)
-            entries = protocol.seal(attempt.directory, [checked_file_name(file.name) for file in written])
+        try:
+            if attempt.files.trouble is not None:
+                raise attempt.files.trouble
+            columns = attempt.episode.columns(self._store)
+            check_columns(columns)
             now = {"created_at": self._now().isoformat(), "wall_s": round(time.monotonic() - attempt.began, 6)}
-            manifest = Manifest(
-                **dict(attempt.episode.header.run),
-                **{**dict(attempt.episode.header.episode), "cameras": _cameras(attempt.episode, written)},
-                writer=attempt.episode.writer.name,
-                status=status,
-                steps=summary.steps,
-                has_initial_frame=summary.has_initial_frame,
-                initial_digest=summary.initial_digest,
-                final_digest=summary.final_digest,
-                outcome=plain(outcome or {}, "outcome"),
-                files=entries,
-                clock={**plain(clock or {}, "clock"), **now},
-            )
-            protocol.write_durably(attempt.directory / MANIFEST_FILE, dump_json(manifest.to_dict(), "manifest"))
-            if not final.parent.exists():
-                final.parent.mkdir(exist_ok=True)
-                protocol.fsync(self.out)
-            protocol.publish(attempt.directory, final)
-        del self._attempts[env]
-        return final
+            ending = Ending(status, plain(outcome or {}, "outcome"), {**plain(clock or {}, "clock"), **now})
+        except BaseException:
+            self.discard(env)
+            raise
+        self._forget(env)
+        return self._committer.commit(self._final(columns.header.episode), attempt.files, columns, ending)
 
     def discard(self, env: int) -> None:
-        """Forget the trajectory of an env, and remove what was written of it; fine if there is none."""
-        attempt = self._attempts.pop(env, None)
+        """Forget the episode of an env, and remove what was written of it; fine if there is none."""
+        attempt = self._attempts.get(env)
         if attempt is None:
             return
-        try:
-            attempt.episode.writer.abort()
-        finally:
-            with suppress(OSError):  # what cannot be removed now is an orphan, which the next recorder sweeps
-                remove(attempt.directory)
+        self._forget(env)
+        if attempt.episode.header.episode.cameras:
+            self._committer.abort(attempt.files)
+
+    def flush(self) -> None:
+        """Wait for the recorder's thread: whatever was committed is visible, or has failed, when this returns."""
+        self._committer.flush()
 
     def close(self) -> None:
-        """Discard what is open and leave the directory. Further calls do nothing."""
+        """Discard what is open, wait for what was committed, and leave the directory. Further calls do nothing.
+
+        Raises:
+            RecordError: a commit failed that nobody has waited for; the first of them.
+        """
         if self._closed:
             return
         self._closed = True
@@ -204,15 +242,24 @@ class Recorder:
             for env in self.open_envs:
                 self.discard(env)
         finally:
+            self._committer.stop()
             self._incoming.close()
+        self._committer.raise_untold()
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __exit__(self, kind: object, error: BaseException | None, _: object) -> None:
+        try:
+            self.close()
+        except RecordError:
+            if error is None:  # else it is the error that ends the run that is told
+                raise
 
     # ------------------------------------------------------------------ inside
+
+    def _forget(self, env: int) -> None:
+        self._store.release(self._attempts.pop(env).episode.slot)
 
     def _final(self, episode: EpisodeHeader) -> Path:
         return self.out / EPISODES / trajectory_name(episode.env, episode.episode)
@@ -230,81 +277,3 @@ class Recorder:
                 "call start() first"
             )
         return attempt
-
-    @contextmanager
-    def _guard(self, env: int, what: str) -> Iterator[None]:
-        """Discards the trajectory when anything goes wrong inside, and turns an OSError into a RecordError."""
-        try:
-            yield
-        except OSError as error:
-            self.discard(env)
-            if error.filename2 is not None and error.errno in (errno.ENOTEMPTY, errno.EEXIST):
-                raise RecordError(_taken(Path(error.filename2))) from error
-            raise RecordError(_trouble(what, error, self.out)) from error
-        except BaseException:
-            self.discard(env)
-            raise
-
-    def _describe_run(self) -> None:
-        """Write run.json, or see that it says the same."""
-        record = RunRecord.model_validate(dict(self.run))
-        path = self.out / RUN_FILE
-        if path.exists():
-            theirs, ours = read_run(self.out).to_dict(), record.to_dict()
-            differing = sorted(key for key in {*theirs, *ours} if theirs.get(key) != ours.get(key))
-            if differing:
-                raise RecordError(
-                    f"{self.out} holds the trajectories of another run: {listing(differing)} differ"
-                    f"{'s' if len(differing) == 1 else ''} from {path}; record into another directory"
-                )
-            return
-        aside = self._incoming.path / RUN_FILE
-        aside.unlink(missing_ok=True)
-        try:
-            protocol.write_durably(aside, dump_json(record.to_dict(), "run"))
-            protocol.publish(aside, path)
-        except OSError:
-            aside.unlink(missing_ok=True)
-            raise
-
-
-def _cameras(episode: Episode, written: tuple[WrittenFile, ...]) -> dict[str, CameraEntry]:
-    run, header = episode.header
-    return {
-        file.camera: CameraEntry(
-            **dict(header.cameras[file.camera]),
-            file=file.name,
-            frames=file.frames,
-            first_step=episode.first_image.get(file.camera, 0),
-            fps=1.0 / (run.control_dt * header.cameras[file.camera].every),
-        )
-        for file in written
-        if file.camera is not None
-    }
-
-
-def _taken(final: Path) -> str:
-    return (
-        f"{final} is committed already and is never overwritten; skip the ids in Recorder.committed(), "
-        "or record into another directory"
-    )
-
-
-def _trouble(what: str, error: OSError, out: Path) -> str:
-    """The sentence for a failed write: which path, how much space there is, what remains, what to do."""
-    if error.errno in (errno.EMFILE, errno.ENFILE):
-        remedy = "Allow more open files (ulimit -n), or record fewer envs at once: each has one, and one per camera"
-    elif error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
-        remedy = "Make the directory writable, or record into another one"
-    else:
-        remedy = "Make room, or record into another directory, and start it again"
-    path = error.filename or out
-    existing = next((p for p in (out, *out.parents) if p.exists()), Path())
-    try:
-        free = f"{shutil.disk_usage(existing).free / 2**20:.1f} MiB are free there"
-    except OSError:
-        free = "its free space is unknown"
-    return (
-        f"{what}: {error.strerror or error} ({path}; {free}). What was unfinished of it is discarded, committed "
-        f"trajectories are whole. {remedy}"
-    )

@@ -1,16 +1,25 @@
-"""What a record writer is: a plugin of the kind `writers` that turns frames into files."""
+"""The contract of a record writer: a plugin of the kind `writers` that turns whole episodes into files.
+
+A writer of numbers alone is one method:
+
+    class NpzWriter(TrajectoryWriter):
+        name = "npz"
+
+        def write(self, directory, columns, status):
+            np.savez(directory / "trajectory.npz", time=columns.time, action=columns.action, **columns.state)
+            return (WrittenFile("trajectory.npz"),)
+"""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 from anysim import registry
 from anysim.conventions import Array
 from anysim.errors import RecordError
-from anysim.record.frame import Frame
-from anysim.record.header import CameraInfo, Header
+from anysim.record.columns import EpisodeColumns
+from anysim.record.header import CameraInfo, Header, RunHeader
 
 
 class WrittenFile(NamedTuple):
@@ -40,12 +49,28 @@ class Video(Protocol):
         ...
 
 
-class TrajectoryWriter(ABC):
-    """Writes one trajectory into one directory: begin, append…, then finish or abort. Used once.
+class ImageWriter(ABC):
+    """Writes the images of one trajectory as they come: `append`…, then `finish` or `abort`. Used once."""
 
-    What is written must follow from header and frames alone: no wall clock, no process id, no random names. An OSError
-    (a full disk) may come out of any method; the recorder then calls `abort` and removes the directory. Frames come
-    checked: names, shapes, order and types are those of the header. A writer keeps no reference to a frame's arrays.
+    @abstractmethod
+    def append(self, images: Mapping[str, Array]) -> None:
+        """Write the images (H, W, 3) uint8 of the cameras that are due at a control step; steps come in order."""
+
+    @abstractmethod
+    def finish(self) -> tuple[WrittenFile, ...]:
+        """Complete and close the files, and say which there are."""
+
+    @abstractmethod
+    def abort(self) -> None:
+        """Close whatever is open, in whatever state, without raising an OSError. May be called after any failure."""
+
+
+class TrajectoryWriter(ABC):
+    """Writes the trajectories of a run, each at once when it has ended, into a directory of its own.
+
+    What is written must follow from columns and images alone: no wall clock, no process id, no random names. An
+    OSError (a full disk) may come out of any method, which closes its own files then; the recorder removes the
+    directory. All methods but the constructor are called on the recorder's thread, never two at once.
     """
 
     name: ClassVar[str]
@@ -56,21 +81,23 @@ class TrajectoryWriter(ABC):
         """The pydantic model of the writer's options (`record.options`), or None if it has none."""
         return None
 
-    @abstractmethod
-    def begin(self, directory: Path, header: Header) -> None:
-        """Open the files."""
+    def prepare(self, run: RunHeader) -> None:
+        """Make what all trajectories of the run have in common. Called once, before the first of them."""
 
     @abstractmethod
-    def append(self, frame: Frame) -> None:
-        """Write one frame."""
+    def write(self, directory: Path, columns: EpisodeColumns, status: str) -> tuple[WrittenFile, ...]:
+        """Write an episode into a new directory, and say which files there are. `status` is how it came out."""
 
-    @abstractmethod
-    def finish(self, status: str) -> tuple[WrittenFile, ...]:
-        """Complete and close the files, and say which there are. `status` is the trajectory's outcome."""
+    def open_images(self, directory: Path, header: Header) -> ImageWriter:
+        """What writes the images of one trajectory; called before its first one, where cameras are recorded.
 
-    @abstractmethod
-    def abort(self) -> None:
-        """Close whatever is open, in whatever state, without raising an OSError. May be called after any failure."""
+        Raises:
+            RecordError: this writer takes no images.
+        """
+        raise RecordError(
+            f"the writer '{self.name}' writes no images of {', '.join(header.episode.cameras)}; "
+            "set record.cameras=[], or choose another record.writer"
+        )
 
     # ------------------------------------------------------------------ videos by themselves
 
@@ -90,13 +117,11 @@ class TrajectoryWriter(ABC):
         return RecordError(f"the writer '{self.name}' cannot write a video by itself; record with `record.film: live`")
 
 
-def writer_factory(name: str, options: Mapping[str, Any]) -> Callable[[], TrajectoryWriter]:
-    """What a Recorder takes: makes a fresh writer by its installed name, with the options of `record.options`.
+def make_writer(name: str, options: Mapping[str, Any]) -> TrajectoryWriter:
+    """A writer by its installed name, with the options of `record.options`.
 
     Raises:
         PluginError: no such writer is installed (says what to install).
-        RecordError: an option is wrong; found here and not at the first trajectory.
+        RecordError: an option is wrong.
     """
-    factory: Callable[[], TrajectoryWriter] = partial(registry.load("writers", name), **options)
-    factory()
-    return factory
+    return registry.load("writers", name)(**options)

@@ -1,5 +1,6 @@
 """TaskEnv: the loop. No autoreset here; gymnasium's modes and other dialects are views on it."""
 
+import time
 from collections.abc import Mapping, Sequence
 from typing import Any, Self, TypeVar
 
@@ -57,6 +58,8 @@ class TaskEnv:
         self._fault = np.zeros(self.num_envs, dtype=bool)
         self._success = np.zeros(self.num_envs, dtype=bool)
         self._closed = False
+        self.physics_seconds = 0.0
+        """Wall time [s] of the engine's steps so far, for tables of where time goes; nothing else depends on it."""
         self._obs: Obs = {}
         self._hooks = hooks.manager().hook
         self.scene.look(None)
@@ -223,7 +226,9 @@ class TaskEnv:
         for part, steps in enumerate(schedule):
             if part:
                 self.actions.update(part)
+            began = time.perf_counter()
             self.engine.step(steps, ids, keep_wrench=part + 1 < len(schedule))
+            self.physics_seconds += time.perf_counter() - began
 
     def _stepped(self, running: Array, mask: Array | None) -> Array | None:
         """The envs to step: None for all of them."""

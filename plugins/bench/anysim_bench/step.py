@@ -168,7 +168,7 @@ def env_cost(engine_name: str, num_envs: int, task: str = _BUDGET_TASK, rounds: 
 
 def _action_for(env: TaskEnv, control: Control) -> Array:
     action, ids = np.zeros((env.num_envs, env.action_dim)), np.arange(env.num_envs)
-    for part in () if env.robots is None else env.robots.slices:
+    for part in env.actions.slices:
         targets = control.position[:, part.controller.channel.columns]
         try:
             action[:, part.start : part.stop] = part.controller.action_for(targets, ids)

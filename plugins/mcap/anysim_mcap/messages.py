@@ -1,4 +1,4 @@
-"""The messages of a trajectory: their schemas, built at run time from the layout, and how frames become their bytes.
+"""The messages of a trajectory: their schemas, built at run time from the layout, and what is said once.
 
 | topic | schema | content |
 |---|---|---|
@@ -17,19 +17,17 @@ import json
 import math
 from typing import Any
 
-import numpy as np
-
-from anysim.conventions import Array
 from anysim.record.header import CameraInfo, StateLayout
-from anysim_mcap.wire import FIXED64, VARINT, block, block_head, double, tag, varint
+from anysim_mcap.wire import FIXED64, VARINT, tag
 
 FIRST_ARRAY = 10
 """Arrays have field numbers from here on, in the order of their sorted names."""
 
 ACTION, STATE, COLLECT = "anysim.Action", "anysim.State", "anysim.Collect"
+TRANSFORMS, CALIBRATION = "foxglove.FrameTransforms", "foxglove.CameraCalibration"
 OBS_PREFIX = "obs_"
-_STEP, _TIME = tag(1, VARINT), tag(2, FIXED64)
-_REWARD = tag(3, FIXED64)
+STEP, TIME, REWARD = tag(1, VARINT), tag(2, FIXED64), tag(3, FIXED64)
+"""Keys of the fields that hold them."""
 
 ANNOTATION_SCHEMA = {
     "title": "anysim.Annotation",
@@ -78,51 +76,18 @@ def file_descriptor_set(name: str, layout: StateLayout) -> bytes:
     return FileDescriptorSet(file=[file]).SerializeToString(deterministic=True)
 
 
+def schemas(layout: StateLayout) -> dict[str, bytes]:
+    """The serialised FileDescriptorSets of all protobuf messages, by name."""
+    from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
+    from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+    from mcap_protobuf.schema import build_file_descriptor_set
+
+    own = {name: file_descriptor_set(name, layout) for name in (ACTION, STATE, COLLECT)}
+    foxglove = {TRANSFORMS: FrameTransforms, CALIBRATION: CameraCalibration}
+    return own | {name: build_file_descriptor_set(kind).SerializeToString() for name, kind in foxglove.items()}
+
+
 # ---------------------------------------------------------------------- content
-
-
-class FrameEncoder:
-    """Frames to the bytes of anysim's messages."""
-
-    def __init__(self, layout: StateLayout) -> None:
-        self._action = block_head(FIRST_ARRAY, 8 * len(layout.action))
-        self._state = [
-            (name, block_head(FIRST_ARRAY + i, 8 * math.prod(layout.state[name])))
-            for i, name in enumerate(sorted(layout.state))
-        ]
-        self._obs = [
-            (
-                name,
-                block_head(
-                    FIRST_ARRAY + i, np.dtype(layout.obs[name].dtype).itemsize * math.prod(layout.obs[name].shape)
-                ),
-            )
-            for i, name in enumerate(sorted(layout.obs))
-        ]
-
-    def start(self, step: int, time: float) -> bytes:
-        """The fields that the messages of one frame share."""
-        return _STEP + varint(step) + _TIME + double(time)
-
-    def action(self, start: bytes, action: Array) -> bytes:
-        """anysim.Action."""
-        return start + self._action + action.tobytes()
-
-    def state(self, start: bytes, state: Any) -> bytes:
-        """anysim.State."""
-        parts = [start]
-        for name, head in self._state:
-            parts.append(head)
-            parts.append(state[name].tobytes())
-        return b"".join(parts)
-
-    def collect(self, start: bytes, reward: float, status: str, obs: Any) -> bytes:
-        """anysim.Collect."""
-        parts = [start, _REWARD, double(reward), block(4, status.encode())]
-        for name, head in self._obs:
-            parts.append(head)
-            parts.append(obs[name].tobytes())
-        return b"".join(parts)
 
 
 def camera_frame(name: str) -> str:

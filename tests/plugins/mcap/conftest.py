@@ -11,7 +11,7 @@ import pytest
 from anysim.record.frame import Frame
 from anysim.record.header import ArrayLayout, CameraInfo, EpisodeHeader, RunHeader, StateLayout
 from anysim.record.recorder import Recorder
-from anysim.record.writer import writer_factory
+from anysim.record.writer import make_writer
 
 LAYOUT = StateLayout(
     bodies=("cube", "panda.link0", "panda.hand"),
@@ -87,11 +87,11 @@ def record() -> Callable[..., Path]:
     """Record one trajectory into a run's directory."""
 
     def run(out: Path, steps: int = 8, cameras: Any = CAMERAS, first: int = 0, **options: Any) -> Path:
-        with Recorder(out, writer_factory("mcap", options), RUN) as recorder:
+        with Recorder(out, make_writer("mcap", options), RUN) as recorder:
             number = len(recorder.committed())
             recorder.start(episode(number=number, cameras=cameras))
             for step in range(first, steps + 1):
                 recorder.append(0, frame(step, cameras))
-            return recorder.commit(0, "success")
+            return recorder.commit(0, "success").wait()
 
     return run

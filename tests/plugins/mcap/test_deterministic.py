@@ -14,14 +14,14 @@ spec.loader.exec_module(sample)
 import numpy as np
 from anysim.record.header import CameraInfo
 from anysim.record.recorder import Recorder
-from anysim.record.writer import writer_factory
+from anysim.record.writer import make_writer
 cameras = {**sample.CAMERAS, "wide": CameraInfo(width=320, height=240)}
 noise = np.random.default_rng(0)
 def picture(camera, step):
     image = sample.picture(camera.width, camera.height, step % 20)
     image[step % camera.height] = noise.integers(0, 255, (camera.width, 3))
     return image
-with Recorder(sys.argv[2], writer_factory("mcap", {}), sample.RUN) as recorder:
+with Recorder(sys.argv[2], make_writer("mcap", {}), sample.RUN) as recorder:
     recorder.start(sample.episode(cameras=cameras))
     for step in range(41):
         recorder.append(0, sample.frame(step % 20)._replace(step=step, time=step * 0.02,

@@ -9,7 +9,7 @@ from anysim.record.header import ArrayLayout, EpisodeHeader, RunHeader, StateLay
 from anysim.record.reader import open_trajectory
 from anysim.record.recorder import Recorder
 from anysim.record.verify import verify
-from anysim.record.writer import writer_factory
+from anysim.record.writer import make_writer
 
 
 def same_bits(a, b):
@@ -58,11 +58,11 @@ def test_options_change_nothing_that_is_read(tmp_path, record, options):
 def test_a_robot_without_channels_has_empty_actions(tmp_path):
     layout = StateLayout(action=(), state={"x": (1,)})
     run = RunHeader(task="t", seed=0, engine="e", engine_version="1", world_hash="w", control_dt=0.01, layout=layout)
-    with Recorder(tmp_path, writer_factory("mcap", {}), run) as recorder:
+    with Recorder(tmp_path, make_writer("mcap", {}), run) as recorder:
         recorder.start(EpisodeHeader(env=0, episode=0, episode_seed=1))
         for step in (1, 2, 3):
             recorder.append(0, Frame(step, 0.0, np.zeros(0), {"x": np.full(1, float(step))}, reward=0.0))
-        reader = open_trajectory(recorder.commit(0, "success"))
+        reader = open_trajectory(recorder.commit(0, "success").wait())
     assert reader.actions.shape == (3, 0)
 
 
@@ -75,11 +75,11 @@ loose = hnp.arrays(np.float32, (6, 2), elements=st.floats(width=32, allow_nan=Fa
 def test_every_finite_float_comes_back_bit_for_bit(tmp_path_factory, values, obs, seed):
     layout = StateLayout(action=("u",), state={"x": (5,)}, obs={"o": ArrayLayout(shape=(2,), dtype="float32")})
     run = RunHeader(task="t", seed=0, engine="e", engine_version="1", world_hash="w", control_dt=0.01, layout=layout)
-    with Recorder(tmp_path_factory.mktemp("run"), writer_factory("mcap", {}), run) as recorder:
+    with Recorder(tmp_path_factory.mktemp("run"), make_writer("mcap", {}), run) as recorder:
         recorder.start(EpisodeHeader(env=0, episode=0, episode_seed=seed))
         for i, row in enumerate(values):
             recorder.append(0, Frame(i + 1, 0.0, row[:1], {"x": row}, reward=float(row[4]), obs={"o": obs[i]}))
-        reader = open_trajectory(recorder.commit(0, "success"))
+        reader = open_trajectory(recorder.commit(0, "success").wait())
     assert same_bits(reader.states["x"], values)
     assert same_bits(reader.actions, np.ascontiguousarray(values[:, :1]))
     assert same_bits(reader.rewards, np.ascontiguousarray(values[:, 4]))
@@ -88,34 +88,35 @@ def test_every_finite_float_comes_back_bit_for_bit(tmp_path_factory, values, obs
 
 @pytest.mark.parametrize("value", [5e-324, -0.0, 1.7976931348623157e308, -2.2250738585072014e-308])
 def test_extreme_numbers(tmp_path, sample, value):
-    with Recorder(tmp_path, writer_factory("mcap", {}), sample.RUN) as recorder:
+    with Recorder(tmp_path, make_writer("mcap", {}), sample.RUN) as recorder:
         recorder.start(sample.episode(cameras={}))
         state = {name: np.full(shape, value) for name, shape in sample.LAYOUT.state.items()}
         recorder.append(0, sample.frame(1, {}, state=state, action=np.array([value]), reward=value))
-        reader = open_trajectory(recorder.commit(0, "success"))
+        reader = open_trajectory(recorder.commit(0, "success").wait())
     for array in (*reader.states.values(), reader.actions, reader.rewards):
         assert same_bits(array, np.full(array.shape, value))
 
 
 def test_observations_may_be_infinite(tmp_path, sample):
     obs = {"policy": np.array([np.inf, -np.inf, np.nan, -0.0], np.float32), "privileged": np.zeros((2, 2))}
-    with Recorder(tmp_path, writer_factory("mcap", {}), sample.RUN) as recorder:
+    with Recorder(tmp_path, make_writer("mcap", {}), sample.RUN) as recorder:
         recorder.start(sample.episode(cameras={}))
         recorder.append(0, sample.frame(1, {}, obs=obs))
-        reader = open_trajectory(recorder.commit(0, "success"))
+        reader = open_trajectory(recorder.commit(0, "success").wait())
     np.testing.assert_array_equal(reader.obs["policy"][0], obs["policy"])
 
 
 def test_a_state_that_is_not_finite_is_refused(tmp_path, sample):
     frame = sample.frame(1, {})
     frame.state["joint_vel"][1] = np.nan
-    with Recorder(tmp_path, writer_factory("mcap", {}), sample.RUN) as recorder:
+    with Recorder(tmp_path, make_writer("mcap", {}), sample.RUN) as recorder:
         recorder.start(sample.episode(env=2, cameras={}))
+        recorder.append(2, frame)
         with pytest.raises(RecordError, match=r"env 2, episode 0, step 1: joint_vel\[1\] is nan; .*discard"):
-            recorder.append(2, frame)
+            recorder.commit(2, "success")
         assert recorder.open_envs == ()
 
 
 def test_wrong_options_are_explained():
     with pytest.raises(RecordError, match=r"options of the writer mcap: .*\n?crff"):
-        writer_factory("mcap", {"crff": 3})
+        make_writer("mcap", {"crff": 3})

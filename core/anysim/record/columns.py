@@ -1,0 +1,139 @@
+"""Columns of episodes: an array for each field, filled row by row while an episode runs, handed on whole at its end."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.record.header import Header, StateLayout
+
+MAX_CAPACITY = 1024
+"""No more rows for each episode are kept ready than this; longer ones make the columns grow."""
+
+Field = tuple[str, str]
+"""(`state`, `joint_pos`), (`obs`, `policy`); `time`, `reward` and `action` have no second name."""
+TIME, REWARD, ACTION = ("time", ""), ("reward", ""), ("action", "")
+
+
+class Change(NamedTuple):
+    """A value that holds from a row on, until the next change of it."""
+
+    row: int
+    value: Any
+
+
+@dataclass(frozen=True)
+class EpisodeColumns:
+    """A whole episode of F frames, as a writer gets it. Row r is the frame of control step `first_step` + r.
+
+    Nothing else holds the arrays, and everything in them has been checked: shapes and types are those of the header,
+    and times, rewards, states and actions are finite.
+
+    Attributes:
+        header: what was known before the first frame.
+        first_step: 0 where the initial frame was recorded, else 1.
+        time: (F,) simulated time since the reset [s], never decreasing.
+        action: (F, A) float64; the row of step 0 is zero and means nothing.
+        state: (F, …) float64 by the names of the layout.
+        reward: (F,) float64.
+        obs: (F, …) by the names of the layout, in its types.
+        status: what the task said, at the rows where it changed; the first is at row 0.
+        annotations: plain mappings, at the rows where they changed; empty before the first.
+        language: the instruction, at the rows where it changed; that of the header before the first.
+        first_image: the control step of the first image of each camera that took one.
+    """
+
+    header: Header
+    first_step: int
+    time: Array
+    action: Array
+    state: Mapping[str, Array]
+    reward: Array
+    obs: Mapping[str, Array]
+    status: tuple[Change, ...]
+    annotations: tuple[Change, ...]
+    language: tuple[Change, ...]
+    first_image: Mapping[str, int]
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def steps(self) -> int:
+        """The last control step."""
+        return self.first_step + len(self) - 1
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays."""
+        arrays = (self.time, self.action, self.reward, *self.state.values(), *self.obs.values())
+        return sum(array.nbytes for array in arrays)
+
+    def state_at(self, row: int) -> dict[str, Array]:
+        """The state arrays (…) of one row."""
+        return {name: rows[row] for name, rows in self.state.items()}
+
+
+def fields_of(layout: StateLayout) -> dict[Field, tuple[tuple[int, ...], np.dtype[Any]]]:
+    """Shape and type of one row of every field, in the order of sorted names."""
+    double = np.dtype(np.float64)
+    fields: dict[Field, tuple[tuple[int, ...], np.dtype[Any]]] = {
+        TIME: ((), double),
+        REWARD: ((), double),
+        ACTION: ((len(layout.action),), double),
+    }
+    fields |= {("state", name): (layout.state[name], double) for name in sorted(layout.state)}
+    fields |= {("obs", name): (layout.obs[name].shape, np.dtype(layout.obs[name].dtype)) for name in sorted(layout.obs)}
+    return fields
+
+
+class ColumnStore:
+    """The columns of all open episodes of a run: for each field one array (slots, capacity, …).
+
+    So a control step of all envs is one assignment for each field. A slot belongs to one open episode.
+    """
+
+    def __init__(self, layout: StateLayout, capacity: int) -> None:
+        """`capacity`: rows that an episode will hardly exceed."""
+        self._fields = fields_of(layout)
+        self._capacity = max(2, min(capacity, MAX_CAPACITY))
+        self._free: list[int] = []
+        self._slots = 0
+        self._arrays: dict[Field, Array] = {}
+        self._resize(0, self._capacity)
+
+    def open(self) -> int:
+        """A free slot."""
+        if not self._free:
+            self._free = list(range(max(2 * self._slots, 1) - 1, self._slots - 1, -1))
+            self._resize(max(2 * self._slots, 1), self._capacity)
+        return self._free.pop()
+
+    def release(self, slot: int) -> None:
+        """Give a slot back; what it held is lost."""
+        self._free.append(slot)
+
+    def write(self, slots: Array, rows: Array, values: Mapping[Field, Array]) -> None:
+        """Write one row for each of n episodes: values (n, …) of every field, of the right shapes."""
+        last = int(rows.max(initial=0))
+        if last >= self._capacity:
+            self._resize(self._slots, max(2 * self._capacity, last + 1))
+        for field, column in self._arrays.items():
+            column[slots, rows] = values[field]
+
+    def take(self, slot: int, count: int) -> dict[Field, Array]:
+        """Copies (count, …) of the first rows of a slot."""
+        return {field: column[slot, :count].copy() for field, column in self._arrays.items()}
+
+    def _resize(self, slots: int, capacity: int) -> None:
+        for field, (shape, dtype) in self._fields.items():
+            # memory of rows that are never written is never touched, and so is not taken from the system
+            fresh = np.empty((slots, capacity, *shape), dtype)
+            old = self._arrays.get(field)
+            if old is not None and math.prod(old.shape):
+                fresh[: self._slots, : self._capacity] = old
+            self._arrays[field] = fresh
+        self._slots, self._capacity = slots, capacity
