@@ -53,7 +53,7 @@ def run(
                 results.append(result)
                 show(result)
     results.sort(key=lambda r: (r.env, r.episode))
-    _report(results, directory, json)
+    _report(results, directory, collector.times.steps, collector.times.parts(), json)
     if sum(r.success for r in results) < min_success * len(results):
         raise typer.Exit(1)
 
@@ -99,10 +99,13 @@ def _line(result: "EpisodeResult") -> str:
     return f"env {result.env} episode {result.episode}: {result.status} in {result.steps} steps{kept}"
 
 
-def _report(results: "list[EpisodeResult]", directory: Path, as_json: bool) -> None:
+def _report(
+    results: "list[EpisodeResult]", directory: Path, steps: int, parts: dict[str, float], as_json: bool
+) -> None:
     from anysim.cli.output import print_json, print_table
 
     good, total = sum(r.success for r in results), len(results)
+    wall = sum(parts.values())
     if as_json:
         episodes = [
             {
@@ -118,7 +121,8 @@ def _report(results: "list[EpisodeResult]", directory: Path, as_json: bool) -> N
             }
             for r in results
         ]
-        print_json({"out": str(directory), "attempts": total, "successes": good, "episodes": episodes})
+        speed = {"steps": steps, "wall_s": wall, "steps_per_s": steps / wall, "where_s": parts}
+        print_json({"out": str(directory), "attempts": total, "successes": good, "episodes": episodes, "speed": speed})
         return
     print_table(
         "Episodes",
@@ -136,6 +140,12 @@ def _report(results: "list[EpisodeResult]", directory: Path, as_json: bool) -> N
             for r in results
         ],
     )
+    if steps:
+        print_table(
+            f"{steps:,} steps in {wall:.1f} s: {steps / wall:,.0f} steps/s",
+            ("part", "seconds", "share"),
+            [(part, f"{seconds:.2f}", f"{seconds / wall:.1%}") for part, seconds in parts.items()],
+        )
     kept = sum(r.path is not None for r in results)
     rate = f"{good / total:.1%}" if total else "none"
     typer.echo(f"{good} of {total} attempts succeeded ({rate}); {kept} trajectories in {directory / 'episodes'}")

@@ -192,8 +192,8 @@ def look_at(eye: Array, target: Array) -> Array:
     return np.array([from_matrix(m) for m in flat]).reshape(*forward.shape[:-1], 4)
 
 
-def step_toward(pose: Array, target: Array, max_distance: float, max_angle: float) -> Array:
-    """Move poses (n, 7) straight towards targets (n, 7): at most `max_distance` [m] and `max_angle` [rad].
+def step_toward(pose: Array, target: Array, max_distance: float | Array, max_angle: float | Array) -> Array:
+    """Move poses (n, 7) straight towards targets (n, 7): at most `max_distance` [m] and `max_angle` [rad], () or (n,).
 
     Position and rotation keep pace: both cover the same fraction of what is left, so they arrive together.
     """

@@ -121,8 +121,9 @@ class ColumnStore:
         last = int(rows.max(initial=0))
         if last >= self._capacity:
             self._resize(self._slots, max(2 * self._capacity, last + 1))
-        for field, column in self._arrays.items():
-            column[slots, rows] = values[field]
+        places = slots * self._capacity + rows
+        for field, column in self._flat.items():
+            column[places] = values[field]
 
     def take(self, slot: int, count: int) -> dict[Field, Array]:
         """Copies (count, …) of the first rows of a slot."""
@@ -137,3 +138,6 @@ class ColumnStore:
                 fresh[: self._slots, : self._capacity] = old
             self._arrays[field] = fresh
         self._slots, self._capacity = slots, capacity
+        self._flat = {
+            field: column.reshape(slots * capacity, *column.shape[2:]) for field, column in self._arrays.items()
+        }

@@ -25,6 +25,7 @@ class Outcome(StrEnum):
 
 
 OUTCOMES = tuple(Outcome)
+_WORDS = tuple(map(str, OUTCOMES))
 
 
 class Skill(ABC):
@@ -62,6 +63,6 @@ class Skill(ABC):
         """What an env is doing, for records and tables."""
         return {
             "phase": self.phases[self.phase[env]],
-            "outcome": str(OUTCOMES[self.outcome[env]]),
+            "outcome": _WORDS[self.outcome[env]],
             "attempt": int(self.attempts[env]),
         }

@@ -61,6 +61,7 @@ class Pick(Skill):
         self._solver = inverse_kinematics(self._chain, solver)
         self._dt = env.engine.world.physics.control_dt
         self._hover, self._speed, self._descend_speed = hover, speed, descend_speed
+        self._above = np.array([0.0, 0.0, hover])
         self._max_attempts, self._phase_steps = max_attempts, phase_steps
         self._fingers = np.array(env.engine.index.robot(robot.name).channels["eef"].joints, dtype=int)
         n = env.num_envs
@@ -93,21 +94,19 @@ class Pick(Skill):
         """Of four turns about the vertical, the one that reaches pre-grasp, grasp and goal with the least motion."""
         cube, base = self._object.root.pose, self._base(ids)
         yaw = 2.0 * np.arctan2(cube[:, 5], cube[:, 6])
-        seeds = self._joints[ids]
-        best = np.full(len(ids), np.inf)
-        keys = self.env.streams.episode_seed[ids]
-        for turn in YAWS:
-            hand = _pointing_down(yaw + turn)
-            effort = np.zeros(len(ids))
-            for offset, place in ((self._hover, cube), (0.0, cube), (0.0, self._goal.pose)):
-                target = np.concatenate([place[:, :3] + [0.0, 0.0, offset], hand], axis=1)
-                found = self._solver.solve(target, base, seeds, random_restarts=0, rng_seeds=keys)
-                moved = np.abs(found.joint_pos - seeds).max(axis=1)
-                effort = np.maximum(effort, np.where(found.converged, moved, np.inf))
-            better = effort < best
-            best = np.where(better, effort, best)
-            self._grasp_turn[ids[better]] = hand[better]
-        self.outcome[ids[~np.isfinite(best)]] = OUTCOMES.index(Outcome.NO_IK)
+        hands = [_pointing_down(yaw + turn) for turn in YAWS]
+        places = cube[:, :3] + self._above, cube[:, :3], self._goal.position
+        targets = np.concatenate([np.concatenate([place, hand], axis=1) for hand in hands for place in places])
+        count = len(hands) * len(places)
+        seeds = np.tile(self._joints[ids], (count, 1))
+        keys = np.tile(self.env.streams.episode_seed[ids], count)
+        found = self._solver.solve(targets, np.tile(base, (count, 1)), seeds, random_restarts=0, rng_seeds=keys)
+        moved = np.where(found.converged, np.abs(found.joint_pos - seeds).max(axis=1), np.inf)
+        effort = moved.reshape(len(hands), len(places), len(ids)).max(axis=1)
+        best = effort.argmin(axis=0)  # the first of several that are equal
+        rows = np.arange(len(ids))
+        self._grasp_turn[ids] = np.stack(hands)[best, rows]
+        self.outcome[ids[~np.isfinite(effort[best, rows])]] = OUTCOMES.index(Outcome.NO_IK)
 
     def _base(self, ids: Array) -> Array:
         return self.env.scene.state.body_pose[ids, self._chain.root]
@@ -116,38 +115,46 @@ class Pick(Skill):
         ids = env_ids[self.outcome[env_ids] == 0]
         if len(ids) == 0:
             return
-        self._advance(ids)
-        ids = ids[self.outcome[ids] == 0]
-        if len(ids) == 0:
-            return
         self.env.scene.look(ids)
-        self._move(ids)
+        targets = self._targets(ids)
+        if self._advance(ids, targets):
+            ids = ids[self.outcome[ids] == 0]
+            if len(ids) == 0:
+                return
+            self.env.scene.look(ids)
+            targets = self._targets(ids)
+        self._move(ids, targets)
         self._steps[ids] += 1
         action[ids, self._arm.start : self._arm.stop] = self._arm.controller.action_for(self._joints[ids], ids)
-        closed = (self.phase[ids] == CLOSE) | (self.phase[ids] == CARRY)
+        phase = self.phase[ids]
+        closed = (phase == CLOSE) | (phase == CARRY)
         action[ids, self._eef.start : self._eef.stop] = np.where(closed, -1.0, 1.0)[:, None]
+
+    # With few envs it is the number of numpy's calls that takes time, so what concerns no row is left out.
 
     def _targets(self, ids: Array) -> Array:
         """Where the tool should end up in the present phase (n, 7); the scene must be looking at `ids`."""
-        tool, cube, goal = self._tool.position, self._object.root.position, self._goal.position
-        phase = self.phase[ids][:, None]
-        above = cube + np.array([0.0, 0.0, self._hover])
-        position = np.where(phase == APPROACH, above, cube)
-        position = np.where(phase == CLOSE, self._command[ids, :3], position)
-        position = np.where(phase == CARRY, goal + (tool - cube), position)
-        position = np.where(phase == BACK_OFF, above, position)
-        return np.concatenate([position, self._grasp_turn[ids]], axis=1)
+        cube, phase = self._object.root.position, self.phase[ids]
+        targets = np.empty((len(ids), 7))
+        targets[:, :3] = cube
+        targets[:, 3:] = self._grasp_turn[ids]
+        high = (phase == APPROACH) | (phase == BACK_OFF)
+        if high.any():
+            targets[high, :3] = cube[high] + self._above
+        closing, carrying = phase == CLOSE, phase == CARRY
+        if closing.any():
+            targets[closing, :3] = self._command[ids[closing], :3]
+        if carrying.any():
+            targets[carrying, :3] = self._goal.position[carrying] + (self._tool.position[carrying] - cube[carrying])
+        return targets
 
-    def _move(self, ids: Array) -> None:
+    def _move(self, ids: Array, targets: Array) -> None:
         """Advance the commanded tool pose along its line and solve for the joints."""
-        slow = self.phase[ids] == DESCEND
         near = P.norm(self._command[ids, :3] - self._tool.position) < MAX_LEAD
-        targets = self._targets(ids)
-        for speed, chosen in ((self._speed, ~slow & near), (self._descend_speed, slow & near)):
-            rows = ids[chosen]
-            if len(rows):
-                distance = speed * self._dt
-                self._command[rows] = P.step_toward(self._command[rows], targets[chosen], distance, 5.0 * distance)
+        rows = ids[near]
+        if len(rows):
+            distance = np.where(self.phase[rows] == DESCEND, self._descend_speed * self._dt, self._speed * self._dt)
+            self._command[rows] = P.step_toward(self._command[rows], targets[near], distance, 5.0 * distance)
         keys = self.env.streams.episode_seed[ids]
         found = self._solver.solve(
             self._command[ids], self._base(ids), self._joints[ids], random_restarts=0, rng_seeds=keys
@@ -155,24 +162,32 @@ class Pick(Skill):
         solved = ids[found.converged]
         self._joints[solved] = found.joint_pos[found.converged]
 
-    def _advance(self, ids: Array) -> None:
-        """Gates between the phases."""
-        self.env.scene.look(ids)
-        tool, cube = self._tool.pose, self._object.root.position
-        targets = self._targets(ids)
-        arrived = (P.norm(targets[:, :3] - tool[:, :3]) < ARRIVED) & (
-            P.angle_between(tool[:, 3:], targets[:, 3:]) < 10 * ARRIVED
-        )
-        speed = np.abs(self.env.scene.state.joint_vel[np.ix_(ids, self._fingers)]).max(axis=1)
-        gripped = (self._steps[ids] >= 5) & (speed < SETTLED) | (self._steps[ids] >= CLOSING_STEPS)
-        lost = P.norm(cube - tool[:, :3]) > SLIPPED
-        phase, late = self.phase[ids], self._steps[ids] >= self._phase_steps
+    def _advance(self, ids: Array, targets: Array) -> bool:
+        """Gates between the phases. Returns whether any env went through one, or gave up."""
+        tool, phase, steps = self._tool.pose, self.phase[ids], self._steps[ids]
+        closing, carrying = phase == CLOSE, phase == CARRY
+        moving = ~(closing | carrying)
+        late = moving & (steps >= self._phase_steps)
+        arrived = moving & (P.norm(targets[:, :3] - tool[:, :3]) < ARRIVED)
+        if arrived.any():
+            turn = P.angle_between(tool[arrived, 3:], targets[arrived, 3:])
+            arrived[arrived] = turn < 10 * ARRIVED
+        gripped, lost = closing, carrying
+        if closing.any():
+            speed = np.abs(self.env.scene.state.joint_vel[np.ix_(ids[closing], self._fingers)]).max(axis=1)
+            gripped = closing.copy()
+            gripped[closing] = (steps[closing] >= 5) & (speed < SETTLED) | (steps[closing] >= CLOSING_STEPS)
+        if carrying.any():
+            lost = carrying & (P.norm(self._object.root.position - tool[:, :3]) > SLIPPED)
+        if not (arrived.any() or gripped.any() or lost.any() or late.any()):
+            return False
         self._enter(ids[(phase == APPROACH) & arrived], DESCEND)
         self._enter(ids[(phase == DESCEND) & arrived], CLOSE)
-        self._enter(ids[(phase == CLOSE) & gripped], CARRY)
+        self._enter(ids[gripped], CARRY)
         self._restart(ids[(phase == BACK_OFF) & (arrived | late)])
-        self._retry(ids[(phase == CARRY) & lost], Outcome.UNSTABLE_GRASP)
+        self._retry(ids[lost], Outcome.UNSTABLE_GRASP)
         self._retry(ids[late & ((phase == APPROACH) | (phase == DESCEND))], Outcome.TIMEOUT)
+        return True
 
     def _enter(self, ids: Array, phase: int) -> None:
         self.phase[ids], self._steps[ids] = phase, 0

@@ -144,6 +144,59 @@ def managers(
     )
 
 
+@app.command("collect")
+def collect(
+    engine: Annotated[str | None, typer.Option("--engine", "-e", help="Engines, separated by commas.")] = None,
+    num_envs: Annotated[int, typer.Option("--num-envs", "-n", min=1, help="Envs.")] = 16,
+    episodes: Annotated[int, typer.Option("--episodes", "-k", min=1, help="Episodes, over all envs.")] = 64,
+    present: Annotated[
+        str, typer.Option(help="Trajectories in the directory before; several numbers are separated by commas.")
+    ] = "0",
+    cameras: Annotated[bool, typer.Option("--cameras/--no-cameras", help="Record the task's cameras.")] = False,
+    task: Annotated[str, typer.Option(help="The task, which has an expert.")] = "pick_cube",
+    rounds: Annotated[int, typer.Option(min=1, help="Collections; the one with the median share counts.")] = 3,
+    json: AsJson = False,
+) -> None:
+    """Collect episodes with the task's expert, and see which share of the processor time is the engine's.
+
+    All threads count. Building and a first collection, in which everything is compiled and loaded, do not.
+    """
+    from anysim.cli.output import print_json, print_table
+    from anysim.engine.factory import default_engine
+    from anysim.errors import EngineError
+    from anysim_bench.collect import ENGINE_SHARE_GOAL, collect_costs, typical
+
+    try:
+        numbers = [int(n) for n in present.split(",")]
+    except ValueError:
+        raise EngineError(f"--present takes whole numbers separated by commas, got '{present}'") from None
+    costs = []
+    for name in (engine or default_engine()).split(","):
+        for number in numbers:
+            typer.echo(f"collecting {episodes} episodes in {num_envs} envs on {name}…", err=True)
+            costs.append(typical(collect_costs(name, num_envs, episodes, number, task, cameras, rounds)))
+    if json:
+        print_json([cost._asdict() for cost in costs])
+        return
+    print_table(
+        f"Collecting {task}; the goal on MuJoCo, without cameras, is an engine's share of {ENGINE_SHARE_GOAL:.0%}",
+        ("engine", "envs", "episodes", "there before", "steps/s", "cpu [s]", "engine", "recorder's thread"),
+        [
+            (
+                c.engine,
+                c.num_envs,
+                c.episodes,
+                c.present,
+                f"{c.steps_per_s:,.0f}",
+                f"{c.cpu_s:.2f}",
+                f"{c.engine_share:.1%}",
+                f"{c.record_s / c.cpu_s:.1%}",
+            )
+            for c in costs
+        ],
+    )
+
+
 @app.command("resets")
 def resets(
     engine: Annotated[
