@@ -42,8 +42,11 @@ class Incoming:
     def attempt(self, env: int, episode: int) -> Path:
         """A new, empty directory for one trajectory."""
         path = self.path / attempt_name(env, episode, self.owner)
-        remove(path)  # of an earlier attempt of ours that could not be removed then
-        path.mkdir()
+        try:
+            path.mkdir()
+        except FileExistsError:  # of an earlier attempt of ours that could not be removed then
+            remove(path)
+            path.mkdir()
         return path
 
     def close(self) -> None:

@@ -4,6 +4,7 @@ Byte for byte what `mcap.writer.Writer` writes of the same messages one by one, 
 """
 
 import zlib
+from collections.abc import Callable
 from typing import IO, NamedTuple
 
 import numpy as np
@@ -40,9 +41,9 @@ def one_message(channel: int, sequence: int, time: int, content: bytes) -> Messa
 class McapFile:
     """Writes one file: schemas, channels and what is said once, then messages, then `finish`."""
 
-    def __init__(self, file: IO[bytes], library: str, chunk_size: int, compressed: bool) -> None:
-        """`chunk_size` [bytes]: a chunk ends with the message that exceeds it."""
-        self._file, self._chunk_size, self._compressed = file, chunk_size, compressed
+    def __init__(self, file: IO[bytes], library: str, chunk_size: int, zstd: Callable[[bytes], bytes] | None) -> None:
+        """`chunk_size` [bytes]: a chunk ends with the message that exceeds it. `zstd` compresses chunks."""
+        self._file, self._chunk_size, self._zstd = file, chunk_size, zstd
         self._crc = self._offset = 0
         self._schemas: list[bytes] = []
         self._channels: list[bytes] = []
@@ -155,7 +156,7 @@ class McapFile:
             begins[place] = base + int(piece.ends[-1]) - len(piece.data)
             place += len(piece.ends)
         span = int(times[0]), int(times[-1])
-        compression, packed = ("zstd", _compress(data)) if self._compressed else ("", data)
+        compression, packed = ("", data) if self._zstd is None else ("zstd", self._zstd(data))
         chunk = records.chunk(*span, data, packed, compression)
         chunk_at = index_at = self._offset
         index_at += len(chunk)
@@ -180,9 +181,3 @@ class McapFile:
         self._crc = zlib.crc32(data, self._crc)
         self._offset += len(data)
         self._file.write(data)
-
-
-def _compress(data: bytes) -> bytes:
-    import zstandard
-
-    return zstandard.compress(data)

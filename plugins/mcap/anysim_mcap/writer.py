@@ -1,6 +1,6 @@
 """The writer `mcap`: trajectory.mcap with all numbers and words, and one MP4 per camera."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -21,6 +21,8 @@ from anysim_schemas.base import Spec
 
 TRAJECTORY_FILE = "trajectory.mcap"
 SPEC_ATTACHMENT = "spec.json"
+WRITE_BUFFER = 1 << 20
+"""Bytes that go into the file at once; most trajectories are smaller."""
 
 
 class Options(Spec):
@@ -58,11 +60,15 @@ class McapWriter(TrajectoryWriter):
         self._spec = dump_json(run.spec, "spec")
         self._schemas = m.schemas(run.layout)
         self._encoder: BlockEncoder | None = None
+        self._zstd: Callable[[bytes], bytes] | None = None
+        if self.options.compression == "zstd":
+            from zstandard import ZstdCompressor
+
+            self._zstd = ZstdCompressor().compress  # one for all chunks: its tables are made once
 
     def write(self, directory: Path, columns: EpisodeColumns, status: str) -> tuple[WrittenFile, ...]:
-        with (directory / TRAJECTORY_FILE).open("xb") as file:
-            compressed = self.options.compression == "zstd"
-            mcap = McapFile(file, f"anysim-mcap {anysim_mcap.__version__}", self.options.chunk_size, compressed)
+        with (directory / TRAJECTORY_FILE).open("xb", buffering=WRITE_BUFFER) as file:
+            mcap = McapFile(file, f"anysim-mcap {anysim_mcap.__version__}", self.options.chunk_size, self._zstd)
             self._describe(mcap, columns.header)
             channels = self._register(mcap, columns.header)
             if self._encoder is None:
