@@ -174,6 +174,35 @@ def test_bench_gives_a_ratio_for_each_loop() -> None:
     assert [row["missed"] for row in rows[:2]] == [row["ratio"] < 0.90 for row in rows[:2]]
 
 
+def test_bench_collect_tells_the_engines_share_from_the_rest() -> None:
+    arguments = ("-n", "2", "-k", "4", "--rounds", "1", "--present", "0,70", "--json")
+    result = anysim("bench", "collect", "-e", "mujoco", *arguments)
+    assert result.returncode == 0, result.stderr
+    alone, among = json.loads(result.stdout)
+    assert (alone["present"], among["present"]) == (0, 70)
+    for row in (alone, among):
+        assert row["steps"] > 4 * 50
+        assert row["engine_share"] == row["engine_s"] / row["cpu_s"]
+        assert 0.05 < row["engine_share"] < 1
+        assert 0 < row["record_s"] < row["cpu_s"] - row["engine_s"]
+
+
+def test_a_run_says_where_its_time_went(tmp_path: Path) -> None:
+    arguments = ("run", "pick_cube", "-n", "2", "-k", "2", *FAST)
+    told = anysim(*arguments, "--out", str(tmp_path / "told"))
+    assert told.returncode == 0, told.stderr
+    assert " steps/s" in told.stdout
+    parts = ["physics", "terms", "resets", "policy", "record", "draw", "other"]
+    assert [line.split("\t")[0] for line in told.stdout.splitlines() if line.split("\t")[0] in parts] == parts
+    speed = json.loads(anysim(*arguments, "--out", str(tmp_path / "data"), "--json").stdout)["speed"]
+    assert speed["steps"] == sum(m["steps"] for m in manifests(tmp_path / "data").values())
+    assert list(speed["where_s"]) == parts
+    assert speed["where_s"]["physics"] > 0
+    assert speed["where_s"]["draw"] == 0
+    assert abs(sum(speed["where_s"].values()) - speed["wall_s"]) < 1e-6
+    assert abs(speed["steps_per_s"] * speed["wall_s"] - speed["steps"]) < 1e-6 * speed["steps"]
+
+
 def test_overrides_are_checked_like_files() -> None:
     result = anysim("run", "pick_cube", "-o", "world.objects.cube.masss=0.1")
     assert result.returncode == 2
