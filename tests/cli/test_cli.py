@@ -195,7 +195,7 @@ def test_a_run_says_where_its_time_went(tmp_path: Path) -> None:
     parts = ["physics", "terms", "resets", "policy", "record", "draw", "other"]
     assert [line.split("\t")[0] for line in told.stdout.splitlines() if line.split("\t")[0] in parts] == parts
     speed = json.loads(anysim(*arguments, "--out", str(tmp_path / "data"), "--json").stdout)["speed"]
-    assert speed["steps"] == sum(m["steps"] for m in manifests(tmp_path / "data").values())
+    assert speed["steps"] == sum(int(str(m["steps"])) for m in manifests(tmp_path / "data").values())
     assert list(speed["where_s"]) == parts
     assert speed["where_s"]["physics"] > 0
     assert speed["where_s"]["draw"] == 0

@@ -142,10 +142,11 @@ def _report(
     )
     if steps:
         print_table(
-            f"{steps:,} steps in {wall:.1f} s: {steps / wall:,.0f} steps/s",
+            "Where the time went",
             ("part", "seconds", "share"),
             [(part, f"{seconds:.2f}", f"{seconds / wall:.1%}") for part, seconds in parts.items()],
         )
+        typer.echo(f"{steps:,} control steps in {wall:.1f} s: {steps / wall:,.0f} steps/s")
     kept = sum(r.path is not None for r in results)
     rate = f"{good / total:.1%}" if total else "none"
     typer.echo(f"{good} of {total} attempts succeeded ({rate}); {kept} trajectories in {directory / 'episodes'}")
