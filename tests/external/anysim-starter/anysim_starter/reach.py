@@ -31,9 +31,8 @@ class Reach(Skill):
         patience: Annotated[int, Field(ge=1, description="control steps until it gives up")] = 200,
     ) -> None:
         super().__init__(env)
-        assert env.robots is not None
         self._goal, self._tool, self._patience = goal, robot.tool(tool), patience
-        self._arm = env.robots.slice_of(robot.name, "arm")
+        self._arm = env.actions.slice_of(robot.name, "arm")
         self._chain = Chain.from_world(env.engine.world, robot.name, "arm", tool)
         self._solver = inverse_kinematics(self._chain, solver)
         self._joints = np.zeros((env.num_envs, len(self._chain)))
