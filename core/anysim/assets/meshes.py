@@ -1,4 +1,4 @@
-"""Mesh files to what engines take: convex hulls of few vertices to collide, light triangles in few colours to look at.
+"""Meshes for engines: convex hulls of few vertices to collide, light triangles in few colours to look at.
 
 Processing is deterministic and cached; `Mesh.hash` is the digest of the source bytes, the processing version and its
 parameters, never of the result, so that it is equal on all machines.

@@ -1,4 +1,4 @@
-"""Links made of solids: what a builder adds up to a model, with masses and inertias that follow from the solids."""
+"""Links made of solids, which a builder adds up to a model, with masses and inertias that follow from the solids."""
 
 from collections.abc import Sequence
 from math import inf

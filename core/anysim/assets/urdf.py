@@ -1,4 +1,4 @@
-"""URDF to the parts of a World.
+"""The importer of URDF files: from links and joints to the parts of a World.
 
 Rules where a source leaves room or is wrong; each use is a note in the report:
 - Fixed joints are lumped into the parent; the frame survives as a site, the inertia is composed exactly.

@@ -1,4 +1,4 @@
-"""Asset URIs to local files. A file has a root folder that neither `..` nor a symbolic link can leave.
+"""Asset URIs and their local files. A file has a root folder that neither `..` nor a symbolic link can leave.
 
 | URI | file | root |
 |---|---|---|
@@ -102,7 +102,7 @@ def resolve_reference(reference: str, *, file: Path, root: Path, asked_by: str) 
 
     `package://NAME/rest` (and `model://`) is searched in the folders from the file's own up to `root`: in one that is
     called NAME, in its child NAME, then without NAME; `package://example-robot-data/…` also in that pip package. All
-    else is relative to the file. `asked_by` says who asks, as in `link 'panda_hand' of panda.urdf`.
+    else is relative to the file. `asked_by` names what asks, as in `link 'panda_hand' of panda.urdf`.
 
     Raises:
         AssetError: missing (says where it was looked for and the nearest name there is), or outside of the root.

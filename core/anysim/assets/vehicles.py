@@ -1,4 +1,4 @@
-"""What a vehicle's entry changes of its model: joints that move it over a plane, and wheels that are round."""
+"""Changes of a vehicle's model by its entry: joints that move it over a plane, and wheels that are round."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

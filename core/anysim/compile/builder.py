@@ -1,4 +1,4 @@
-"""Putting imported models into a World: local names get the entity's name in front, local indices become global."""
+"""The builder of a World from imported models: local names get the entity's name in front, indices become global."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -121,14 +121,14 @@ class WorldBuilder:
         return entity
 
     def add_mesh(self, mesh: Mesh) -> str:
-        """Store a mesh once, whoever uses it; returns its name in the World, which says its content."""
+        """Store a mesh once, however many use it; returns its name in the World, which says its content."""
         tag = f"_{mesh.hash[:8]}"
         name = mesh.name if mesh.name.endswith(tag) else mesh.name + tag
         self._meshes.setdefault(name, replace(mesh, name=name))
         return name
 
     def _add_looks(self, model: ImportedModel) -> None:
-        """Store textures and materials once, whoever uses them.
+        """Store textures and materials once, however many use them.
 
         Raises:
             AssetError: two different images have one name.

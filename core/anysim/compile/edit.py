@@ -147,7 +147,7 @@ def without_entity(world: World, name: str) -> World:
 
 
 def nominal_population(world: World) -> World:
-    """With who is there before anything is drawn, and nobody else: the same in every env, so any engine can run it."""
+    """With the entities alone that are there before anything is drawn: the same in every env, for any engine."""
     gone = [e.name for e, there in zip(world.entities, world.initial_presence, strict=True) if not there]
     standing = {slot.name: world.entities[slot.entities[0]].name for slot in world.slots if slot.initially}
     cameras = tuple(replace(c, look_at=standing.get(c.look_at or "", c.look_at)) for c in world.cameras)

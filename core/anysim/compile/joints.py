@@ -1,4 +1,4 @@
-"""What a spec says about the joints of an object, on top of what its asset says."""
+"""Joints of an object as its spec has them, on top of what its asset says."""
 
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""An object of a spec into a World under construction."""
+"""Compilation of an object."""
 
 from collections.abc import Mapping
 from dataclasses import replace

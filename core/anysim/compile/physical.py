@@ -1,4 +1,4 @@
-"""What an object is like, put on top of the model that its source gives: damping, solver, inertia, looks."""
+"""Physical properties and looks of an object, on top of the model of its source: damping, solver, inertia, colours."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The declared objects into a World under construction: how many of each there can be, and what each can be.
+"""Compilation of the declared objects: how many of each there can be, and what each can be.
 
 An object of one source is one entity of its own name. Where it can be several things, each is an entity `mug~0`,
 `mug~1`, …, and a slot says that they are one object; where it has a count there are `cube_0`, `cube_1`, … of it.

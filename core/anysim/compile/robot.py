@@ -1,4 +1,4 @@
-"""A robot of a spec, by its catalogue entry, into a World under construction."""
+"""Compilation of a robot by its catalogue entry."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The room of a spec into a World under construction: a static thing for its shell, and one for each piece in it."""
+"""Compilation of a room: a static thing for its shell, and one for each piece in it."""
 
 from dataclasses import replace
 from math import cos, sin

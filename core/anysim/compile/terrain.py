@@ -1,4 +1,4 @@
-"""The ground of a spec into a World under construction."""
+"""Compilation of the ground of a spec."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What a declared object can be: its sources, its sizes, its number, and how each of them is drawn.
+"""Variants of a declared object: its sources, its sizes, its number, and how each of them is drawn.
 
 Geometry is fixed at build, so each source in each size is an entity of its own, and a draw decides which is there.
 """

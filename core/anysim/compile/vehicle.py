@@ -1,4 +1,4 @@
-"""Whether what a catalogue entry says of a vehicle is so in its model."""
+"""Checks of a vehicle: its catalogue entry against its model."""
 
 from collections.abc import Iterable, Sequence
 from math import isfinite

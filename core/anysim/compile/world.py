@@ -1,4 +1,4 @@
-"""From a validated spec to a World: robots, objects, their nominal places, cameras, sensors, lights.
+"""Compilation of a validated spec: robots, objects, their nominal places, cameras, sensors, lights.
 
 Fields that are drawn anew in each episode enter with their nominal value. All faults of a spec are reported at once,
 each with its dotted key.

@@ -1,4 +1,4 @@
-"""Bounds of shapes and entities: what the layout needs to set things onto each other without touching an engine.
+"""Bounds of shapes and entities, with which a layout sets things onto each other without an engine.
 
 All functions are batched over leading axes of the poses, row by row the same whatever the batch.
 """

@@ -1,4 +1,4 @@
-"""An entity as the layout sees it: rigid convex parts, with extents in any direction, fast for one pose at a time.
+"""Rigid convex parts of an entity, for the layout: extents in any direction, fast for one pose at a time.
 
 Plain floats where the sizes are small: an object is placed thousands of times, and a call of numpy costs more than the
 arithmetic of a box. No linear algebra library is involved, so a result is the same on every machine.

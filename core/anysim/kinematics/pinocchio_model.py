@@ -1,4 +1,4 @@
-"""The Pinocchio model of one robot of a World: what every controller that knows mechanics computes with.
+"""The Pinocchio model of one robot of a World, with which every controller that knows mechanics computes.
 
 Joints keep the World's order (depth first), so a vector of joint positions means the same here and in an engine. A
 floating robot has Pinocchio's free-flyer first: `nq = 7 + J`, `nv = 6 + J`; its velocity is in the base's own frame.

@@ -1,4 +1,4 @@
-"""Names in a World while it is being made: frames that things are mounted on, bodies that are sensed."""
+"""Frames and bodies of a World by name: what things are mounted on, and what is sensed."""
 
 from typing import NamedTuple
 

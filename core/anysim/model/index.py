@@ -1,4 +1,4 @@
-"""Names to indices, once, at build."""
+"""Indices of names, looked up once, at build, and names that two Worlds have in common."""
 
 from collections.abc import Sequence
 from typing import TypeVar

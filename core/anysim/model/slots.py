@@ -1,4 +1,4 @@
-"""Logical identity: which objects a World has, whatever they are made of and whether they are there.
+"""Logical objects of a World, of whatever assets they are made and whether they are there or not.
 
 A logical object is (category, instance). Its name is that of a slot, or of an entity that is the same in every env.
 """

@@ -42,7 +42,7 @@ class PlacementTask:
     constant: bool
     """Nothing is drawn for its place."""
     proposed: ProposedPose | None = None
-    """A pose that somebody proposes; nothing else is tried then."""
+    """A proposed pose; nothing else is tried then."""
     tick: int = 0
 
 

@@ -1,4 +1,4 @@
-"""Drawing the values of a spec: one stream for each value, by its name.
+"""Draws of the values of a spec: one stream for each value, by its name.
 
 A draw is a quantile in [0, 1) for each component, and the value's own map from quantiles to values. Fields that share a
 name (`shared: heavy`) take their quantiles from that name's stream, so that all are high together, or low together.

@@ -1,4 +1,4 @@
-"""Random streams: who draws what, and why nothing else moves when one more thing is drawn.
+"""Random streams: one for each name, so that nothing else moves when one more thing is drawn.
 
 A seed gives each env a master generator; each episode draws one 64-bit `episode_seed` from it. Everything random in
 the episode is a draw from a stream named by its purpose (`layout/cube/x`) and keyed by (episode_seed, name, tick)
@@ -24,7 +24,7 @@ def stream_key(name: str) -> int:
 
 
 OVERRIDDEN = "overridden"
-"""The stream of a value that was not drawn, but set for the episode by whoever began it or went on with it."""
+"""The stream of a value that was not drawn, but set for the episode when it began or went on."""
 
 
 class Origin(NamedTuple):

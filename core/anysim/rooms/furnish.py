@@ -1,4 +1,4 @@
-"""Where furniture goes: along walls, at tables, in the open, never before doors, with ways left between the doors.
+"""Places of furniture: along walls, at tables, in the open, never before doors, with paths left between the doors.
 
 Each piece looks for a place with its own generator, the large kinds first; what cannot be placed, or bars the way,
 makes the whole arrangement start anew with other numbers, a bounded number of times.

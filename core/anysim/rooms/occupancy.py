@@ -1,4 +1,4 @@
-"""Where there is free space: a grid of what is covered, distances in it, points that keep a distance, and ways.
+"""Free space: a grid of what is covered, distances in it, points that keep a distance, and paths.
 
 A cell counts as occupied as soon as anything in it could be: what the grid calls free is free.
 """
