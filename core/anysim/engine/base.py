@@ -12,18 +12,18 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine import arguments, world_state_io
+from anysim.engine import arguments
 from anysim.engine.capability import Capability
 from anysim.engine.control import Control
 from anysim.engine.lifecycle import EnvIds, Indices
-from anysim.engine.named_access import observation, send
 from anysim.engine.parameters import APPEARANCE, PARAMETERS, Parameter, check_values, count
 from anysim.engine.presence import write_present
 from anysim.engine.records import below
 from anysim.engine.sensing import EngineSensing
 from anysim.engine.state import Snapshot, SnapshotLevel
-from anysim.engine.world_state import Carried, Missing, WorldState
-from anysim.errors import CapabilityError, EngineError, listing
+from anysim.engine.world_state import Carried, Missing, WorldState, read_world_state, write_world_state
+from anysim.errors import CapabilityError, EngineError, listing, suggest
+from anysim.math import pose as P
 from anysim.model.index import Index
 from anysim.model.world import BodyKind, ControlMode
 
@@ -204,7 +204,7 @@ class SimEngine(EngineSensing):
         """Where everything is, by name, in a form for any engine; close and not exact, unlike a snapshot."""
         with self._lock:
             self._require_world()
-            return world_state_io.read(self, self._records, self._ids(env_ids))
+            return read_world_state(self, self._records, self._ids(env_ids))
 
     def set_world_state(self, state: WorldState, env_ids: EnvIds = None, missing: Missing = "refuse") -> Carried:
         """Put envs into a state, from whatever engine and world, as if they had just been reset into it.
@@ -216,7 +216,7 @@ class SimEngine(EngineSensing):
         """
         with self._lock:
             self._require_world()
-            carried = world_state_io.write(self, self._records, state, self._ids(env_ids), missing)
+            carried = write_world_state(self, self._records, state, self._ids(env_ids), missing)
             self._retire_state()
             return carried
 
@@ -282,12 +282,45 @@ class SimEngine(EngineSensing):
         `joint_pos`, `joint_vel` (N, J), `<tool>_pose` (N, 7), and `images/<camera>` of all cameras unless skipped.
         """
         with self._lock:
-            return observation(self, robot_name, skip_images)
+            robot = self.index.robot(robot_name)
+            joints = list(self.index.robot_joints(robot.name))
+            state = self.get_state()
+            result: dict[str, Array] = {
+                "joint_pos": state.joint_pos[:, joints],
+                "joint_vel": state.joint_vel[:, joints],
+                "base_pose": state.body_pose[:, self.index.entity(robot.name).root].copy(),
+            }
+            for tool in robot.tools:
+                frame = self.index.frame(f"{robot.name}.{tool}")
+                local = np.array([*frame.position, *frame.quaternion])
+                result[f"{tool}_pose"] = P.compose(state.body_pose[:, frame.body], local[None])
+            if not skip_images:
+                for camera in self.world.cameras:
+                    result[f"images/{camera.name}"] = self.render(camera.name)["rgb"]
+            return result
 
     def send_action(
         self, action: Mapping[str, float] | Any, robot_name: str | None = None, n_substeps: int = 1
     ) -> None:
         """Set position targets (by joint name, or (N, A) for all of the robot's drives) and step."""
         with self._lock:
-            send(self, action, robot_name)
+            self._send(action, robot_name)
             self.step(n_substeps)
+
+    def _send(self, action: Mapping[str, float] | Any, robot_name: str | None) -> None:
+        robot = self.index.robot(robot_name)
+        joints = self.index.robot_joints(robot.name)
+        drives = [i for i, a in enumerate(self.world.actuators) if a.joint in joints]
+        names = [self.world.joints[self.world.actuators[i].joint].name[len(robot.name) + 1 :] for i in drives]
+        if not isinstance(action, Mapping):
+            self.set_control(position=action, actuators=drives)
+            return
+        unknown = [name for name in action if name not in names]
+        if unknown:
+            raise EngineError(
+                f"robot '{robot.name}' has no driven joint '{unknown[0]}'{suggest(unknown[0], names)} "
+                f"(joints: {listing(names)})"
+            )
+        chosen = [drives[names.index(name)] for name in action]
+        values = np.array([np.broadcast_to(np.asarray(v, dtype=float), self.num_envs) for v in action.values()]).T
+        self.set_control(position=values.reshape(self.num_envs, len(chosen)), actuators=chosen)

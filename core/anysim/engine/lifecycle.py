@@ -17,8 +17,7 @@ from anysim.engine.drive_checks import check_drives
 from anysim.engine.options import EngineOptions
 from anysim.engine.presence import Lifecycle, Presence, write_present
 from anysim.engine.primitives import Primitives
-from anysim.engine.rebuild import Kept
-from anysim.engine.records import EnvRecords
+from anysim.engine.records import EnvRecords, Kept
 from anysim.engine.requirements import needs_of
 from anysim.engine.state import Availability, State
 from anysim.errors import CapabilityError, EngineError

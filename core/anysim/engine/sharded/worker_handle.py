@@ -18,13 +18,14 @@ from multiprocessing.spawn import get_executable
 from typing import Any
 
 from anysim import errors
-from anysim.engine.own_process import how_it_ended
 from anysim.engine.sharded.parent_watch import Lifeline
 from anysim.errors import AnysimError, EngineError
+from anysim.own_process import how_it_ended
 
+_MODULE = "anysim.engine.sharded.worker"
 _PROGRAM = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
-    "from anysim.engine.sharded.worker import main; main(int(sys.argv[2]), int(sys.argv[3]))"
+    f"from {_MODULE} import main; main(int(sys.argv[2]), int(sys.argv[3]))"
 )
 GRACE_S = 10.0
 """How long a worker may take to free its engine and end by itself [s]."""
