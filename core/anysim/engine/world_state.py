@@ -17,7 +17,7 @@ from anysim.engine import snapshot_file
 from anysim.engine.control import MODES
 from anysim.engine.parameters import PARAMETERS
 from anysim.engine.records import EnvRecords
-from anysim.engine.snapshot import row_numbers
+from anysim.engine.state import row_numbers
 from anysim.errors import SnapshotError, listing
 from anysim.model.index import names_of, paired_names
 from anysim.model.world import BodyKind, World

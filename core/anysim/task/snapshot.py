@@ -15,8 +15,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine import snapshot_file
-from anysim.engine.snapshot import joined, joined_rows, row_numbers, stamp_of, stamped
-from anysim.engine.state import Snapshot
+from anysim.engine.state import Snapshot, joined, joined_rows, row_numbers, stamp_of, stamped
 from anysim.errors import SnapshotError, listing
 from anysim_schemas.run import RunSpec
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from anysim.engine.capability import Capability as C
-from anysim.engine.snapshot import joined
-from anysim.engine.state import SnapshotLevel
+from anysim.engine.state import SnapshotLevel, joined
 from anysim.errors import CapabilityError, SnapshotError
 from anysim.testing import tolerances, worlds
 from anysim.testing.compare import MOTION, assert_close, assert_same, play, read, spread, tape

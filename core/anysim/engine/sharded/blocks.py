@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from anysim.engine.base import SimEngine
 
 
-class Part(NamedTuple):
+class WorkerRows(NamedTuple):
     """The envs of a call that one worker holds: their rows in the call, and their numbers in the worker."""
 
     worker: int
@@ -29,18 +29,18 @@ class Blocks:
         stops = np.cumsum([size + (k < more) for k in range(workers)]).tolist()
         self.bounds = tuple(zip([0, *stops[:-1]], stops, strict=True))
 
-    def split(self, ids: Array) -> list[Part]:
+    def split(self, ids: Array) -> list[WorkerRows]:
         """Parts of a call for envs `ids`, without workers that have none of them."""
-        parts: list[Part] = []
+        parts: list[WorkerRows] = []
         for worker, (first, stop) in enumerate(self.bounds):
             rows = np.flatnonzero((ids >= first) & (ids < stop))
             if len(rows):
-                parts.append(Part(worker, rows, ids[rows] - first))
+                parts.append(WorkerRows(worker, rows, ids[rows] - first))
         return parts
 
-    def split_query(self, ids: Array) -> list[Part]:
+    def split_query(self, ids: Array) -> list[WorkerRows]:
         """The same; a query for no env goes to the first worker, which knows the shapes of nothing."""
-        return self.split(ids) or [Part(0, np.arange(0), ids)]
+        return self.split(ids) or [WorkerRows(0, np.arange(0), ids)]
 
 
 def usable_cores() -> int:
@@ -64,7 +64,7 @@ def joined_by_name(pieces: Iterable[tuple[Array, Mapping[str, Array]]], size: in
     return {name: joined([(rows, data[name]) for rows, data in held], size) for name in held[0][1]}
 
 
-def joined_contacts(found: Sequence[tuple[ContactPoints, Part]], blocks: Blocks, ids: Array) -> ContactPoints:
+def joined_contacts(found: Sequence[tuple[ContactPoints, WorkerRows]], blocks: Blocks, ids: Array) -> ContactPoints:
     """The contacts of all workers, with the envs' numbers, in the order in which `ids` asks for the envs."""
     columns = zip(*(c._replace(env=c.env + blocks.bounds[part.worker][0]) for c, part in found), strict=True)
     points = ContactPoints(*map(np.concatenate, columns))
