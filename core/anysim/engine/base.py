@@ -307,7 +307,7 @@ class SimEngine(EngineSensing):
             self._send(action, robot_name)
             self.step(n_substeps)
 
-    def _send(self, action: Mapping[str, float] | Any, robot_name: str | None) -> None:
+    def _send(self, action: Mapping[str, float] | Array, robot_name: str | None) -> None:
         robot = self.index.robot(robot_name)
         joints = self.index.robot_joints(robot.name)
         drives = [i for i, a in enumerate(self.world.actuators) if a.joint in joints]
