@@ -8,7 +8,8 @@ import numpy as np
 
 from anysim.conventions import Array
 
-_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+_LEFT, _RIGHT = np.array([1, 2, 0, 2, 0, 1]), np.array([2, 0, 1, 1, 2, 0])
+"""A cross product is the first three products of these components of the factors less the last three."""
 _INVERSE = np.array([-1.0, -1.0, -1.0, 1.0])
 _FIRST = np.array([3, 0, 1, 2])
 _SECOND = np.array([[0, 1, 2, 3], [3, 2, 1, 0], [2, 3, 0, 1], [1, 0, 3, 2]])
@@ -65,14 +66,17 @@ def dot(a: Array, b: Array) -> Array:
 def cross(a: Array, b: Array) -> Array:
     """Cross product along the last axis. Shape (..., 3)."""
     # a few operations on whole rows: with few envs it is their number that takes time
-    return a.take(_NEXT, axis=-1) * b.take(_LAST, axis=-1) - a.take(_LAST, axis=-1) * b.take(_NEXT, axis=-1)
+    products = a.take(_LEFT, axis=-1) * b.take(_RIGHT, axis=-1)
+    return products[..., :3] - products[..., 3:]
 
 
 def rotate(q: Array, v: Array) -> Array:
     """Rotate vectors v (..., 3) by unit quaternions q (..., 4)."""
-    after, before = q.take(_NEXT, axis=-1), q.take(_LAST, axis=-1)
-    t = 2.0 * (after * v.take(_LAST, axis=-1) - before * v.take(_NEXT, axis=-1))
-    return v + q[..., 3:4] * t + (after * t.take(_LAST, axis=-1) - before * t.take(_NEXT, axis=-1))
+    left = q.take(_LEFT, axis=-1)
+    products = left * v.take(_RIGHT, axis=-1)
+    t = 2.0 * (products[..., :3] - products[..., 3:])
+    products = left * t.take(_RIGHT, axis=-1)
+    return v + q[..., 3:4] * t + (products[..., :3] - products[..., 3:])
 
 
 def rotate_inverse(q: Array, v: Array) -> Array:

@@ -251,13 +251,12 @@ class TaskEnv:
         fault = self.engine.get_state().fault[rows]
         self._fault[rows] = fault
         self._success[rows] = success & ~fault
+        self._code[rows] = RUNNING
+        wins = success if self._task.on_success == "end" else None
         late = self._episodes.elapsed[rows] >= self._task.horizon
-        code = np.where(late, np.int8(TRUNCATED), np.int8(RUNNING))
-        code[failure] = FAILED
-        if self._task.on_success == "end":
-            code[success] = SUCCESS
-        code[fault] = FAILED
-        self._code[rows] = code
+        for where, word in ((late, TRUNCATED), (failure, FAILED), (wins, SUCCESS), (fault, FAILED)):
+            if where is not None and np.count_nonzero(where):
+                self._code[self.scene.env_ids[where]] = word
 
     def _reward(self, ids: Array | None) -> Array:
         if ids is None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from functools import partial
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -121,11 +122,11 @@ class Mdp:
             value = term()
             if value.shape != total.shape:
                 raise TaskError(f"reward term '{name}' returned shape {value.shape}, expected {total.shape}")
-            total = total + weight * value
-        wrong = ~(np.isfinite(total) | faulted)
-        if np.count_nonzero(wrong):
-            envs = np.flatnonzero(wrong).tolist()
-            raise TaskError(f"the reward of envs {envs} is not finite although their state is")
+            total += weight * value
+        if not isfinite(np.vdot(total, total)):  # else all are finite
+            wrong = np.flatnonzero(~(np.isfinite(total) | faulted))
+            if len(wrong):
+                raise TaskError(f"the reward of envs {wrong.tolist()} is not finite although their state is")
         if np.count_nonzero(faulted):
             total[faulted] = np.nan
         return total.astype(np.float32)
@@ -134,13 +135,12 @@ class Mdp:
         """(success, failure) (n,) bool for the rows at hand; counts how long success has held."""
         rows = self.scene.rows
         held = self.held[rows]
-        success = np.full(held.shape, bool(self._success))
-        for term in self._success.values():
-            success &= term()
-        self.held[rows] = held = (held + 1) * success
-        failure = np.zeros(held.shape, dtype=bool)
+        success = failure = np.zeros(held.shape, dtype=bool)
+        for number, term in enumerate(self._success.values()):
+            success = success & term() if number else term()
         for term in self._failure.values():
-            failure |= term()
+            failure = failure | term()
+        self.held[rows] = held = (held + 1) * success
         return held >= self.spec.hold, failure
 
     def overridable(self) -> list[Overridable]:
