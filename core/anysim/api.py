@@ -172,7 +172,7 @@ def blind_env(loaded: LoadedRun, world: "World", name: str) -> "TaskEnv":
 
 
 def _proposals(loaded: LoadedRun, given: Any) -> Any:
-    """Who proposes poses: what was given, else the file that the spec names, relative to the file that names it."""
+    """The source of poses: what was given, else the file that the spec names, relative to the file that names it."""
     source = loaded.spec.world.layout_source
     if given is not None or source is None or not source.proposal.endswith(".json"):
         return Path(given) if isinstance(given, str) and given.endswith(".json") else given
@@ -234,7 +234,7 @@ def make(
         seed: seeds the envs now; otherwise the first `reset(seed=...)` does.
         overrides: dotted overrides, as `-o` on the command line.
         base: the folder that relative asset paths are relative to; that of the file where there is one.
-        proposals: poses of objects that somebody else proposes: a mapping, a JSON file, or a callable that takes a
+        proposals: poses of objects that come from outside: a mapping, a JSON file, or a callable that takes a
             `anysim.placement.proposals.Request` and gives one; wins over `world.layout_source` of the file.
 
     Raises:

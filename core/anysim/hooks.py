@@ -58,3 +58,15 @@ def manager() -> pluggy.PluginManager:
     plugins.add_hookspecs(Specs)
     plugins.load_setuptools_entrypoints(PROJECT)
     return plugins
+
+
+def stepped(env: "TaskEnv", result: "StepResult", env_ids: "Array | None") -> None:
+    """Call the observers of a control step of these envs (None: of all); without observers nothing is worked out."""
+    hook = manager().hook
+    if hook.after_step.get_hookimpls():
+        hook.after_step(env=env, result=result)
+    for call, happened in ((hook.on_fault, lambda: result.info["fault"]), (hook.after_episode, lambda: result.done)):
+        if call.get_hookimpls():
+            concerned = happened().nonzero()[0] if env_ids is None else env_ids[happened()[env_ids]]
+            if len(concerned):
+                call(env=env, env_ids=concerned)

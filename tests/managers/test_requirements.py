@@ -56,3 +56,22 @@ def test_what_the_engine_can_change_is_taken(tmp_path) -> None:
     path.write_text(YAML)
     loaded = load(path, overrides=["world.objects.cube.friction=0.5"])
     check_engine(loaded, compile_world(loaded), Rigid, "cube.yaml")
+
+
+def test_a_joint_that_rubs_anew_in_each_episode_is_refused_too(tmp_path) -> None:
+    path = tmp_path / "cabinet.yaml"
+    path.write_text(
+        "world:\n"
+        "  objects:\n"
+        "    cabinet:\n"
+        "      source: procedural:cabinet\n"
+        "      fixed: true\n"
+        "      joints:\n"
+        "        drawer_1: {friction: {range: [2.0, 10.0]}, opened: {range: [0.0, 0.3]}}\n"
+    )
+    loaded = load(path)
+    with pytest.raises(CapabilityError) as caught:
+        check_engine(loaded, compile_world(loaded), Rigid, "cabinet.yaml")
+    assert "world.objects.cabinet.joints.drawer_1.friction" in str(caught.value)
+    assert "cannot change 'joint.friction'" in str(caught.value)
+    assert "opened" not in str(caught.value)  # a state, not a parameter

@@ -22,6 +22,21 @@ def columns(indices: Array) -> slice | Array:
     return slice(int(indices[0]), int(indices[-1]) + 1) if contiguous else indices
 
 
+class ChannelColumns(NamedTuple):
+    """Columns of a channel's joints and drives among the world's, and the nominal home (K,) of the joints [rad, m]."""
+
+    joints: slice | Array
+    drives: slice | Array
+    home: Array
+
+    @classmethod
+    def of(cls, world: World, channel: Channel) -> Self:
+        """Those of a channel of a World."""
+        joints, drives = np.array(channel.joints, dtype=int), np.array(channel.actuators, dtype=int)
+        home = np.array([world.joints[j].initial for j in channel.joints], dtype=float)
+        return cls(columns(joints), columns(drives), home)
+
+
 @dataclass(frozen=True)
 class ChannelView:
     """What a controller knows of its channel. Arrays have one entry for each drive (K,).

@@ -1,4 +1,4 @@
-"""LayoutManager: a pose for every object that is there, from the layout of the spec or from somebody's proposal."""
+"""LayoutManager: a pose for every object that is there, from the layout of the spec or from a proposal."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -33,7 +33,7 @@ class LayoutManager(Manager):
     name = "layout"
 
     def __init__(self, proposals: Proposed | None = None) -> None:
-        """`proposals` are poses by somebody else, as in `anysim.make`; they win over the spec's."""
+        """`proposals` are poses from outside, as in `anysim.make`; they win over the spec's."""
         self._proposals = proposals
 
     def recall(self, env: int, drawn: Mapping[str, Any]) -> None:

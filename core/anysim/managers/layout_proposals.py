@@ -28,8 +28,7 @@ REFUSED = "layout/proposal_refused"
 
 
 Proposed = Path | str | Proposal | Mapping[str, Any] | list[Any] | Proposer
-"""Poses by somebody else: proposals as data or JSON text, a JSON file, a callable that gives them, or the name of an
-installed one."""
+"""Proposals as data or JSON text, a JSON file, a callable that gives them, or the name of an installed one."""
 
 
 class ProposalSource:

@@ -1,4 +1,4 @@
-"""PopulationManager: who is there in this episode: how many of each object, and which of its sources and sizes."""
+"""PopulationManager: how many of each object are there in this episode, and which of its sources and sizes."""
 
 from typing import NamedTuple
 
@@ -31,7 +31,7 @@ class _Group(NamedTuple):
 
 
 class PopulationManager(Manager):
-    """Draws numbers, sources and sizes, and has the engine change who is there in the envs where that is another."""
+    """Draws numbers, sources and sizes, and has the engine change what is there in the envs where that differs."""
 
     name = "population"
 
@@ -49,7 +49,7 @@ class PopulationManager(Manager):
             self.engine.reset(env_ids[other], present=wanted[other])
 
     def _draw(self, env: int) -> Array:
-        """Who is there in an env (entities,) bool."""
+        """The entities that are there in an env (entities,) bool."""
         there = self._nominal.copy()
         for group in self._groups:
             path = f"world.objects.{group.name}"

@@ -1,6 +1,6 @@
 """TerrainManager: on which piece of ground an env stands, and what ground and room look like in this episode.
 
-With `choose: curriculum` each env keeps its level over episodes. Whoever judges progress calls `promote` or `demote`;
+With `choose: curriculum` each env keeps its level over episodes. What judges progress calls `promote` or `demote`;
 that takes effect at the env's next reset. An env that has mastered the last level gets one of all levels, by its
 streams, so that it does not forget the easy ones.
 """

@@ -1,4 +1,4 @@
-"""What skills ask of inverse kinematics, and what they get. Solvers are planners found by name (`anysim.planners`).
+"""Inverse kinematics as skills ask for it: problems, answers and solvers, which are found by name.
 
 A solver answers a batch of independent problems. Row i of an answer depends on row i of the question alone: not on the
 rows beside it, their order, or the number of threads; that is part of the contract.

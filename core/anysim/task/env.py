@@ -128,7 +128,7 @@ class TaskEnv:
         """
         ids = self._chosen(mask)
         plan = self.counterfactuals.checked(overrides, len(ids), midway=False)
-        if len(ids) == 0:  # managers need not know how to reset nobody
+        if len(ids) == 0:  # managers need not know how to reset no env
             return {g: r[:0] for g, r in self.mdp.observe().items()}, {k: v[ids] for k, v in self._info().items()}
         if seed is not None:
             self.streams.seed(seed, ids)
@@ -152,7 +152,7 @@ class TaskEnv:
         return {g: r.copy() for g, r in rows.items()}, {k: v[ids] for k, v in self._info().items()}
 
     def retire(self, env_ids: Array) -> None:
-        """End episodes that nobody wants to go on with: these envs are truncated now if they were running."""
+        """End episodes that are given up: these envs are truncated now if they were running."""
         running = env_ids[self._code[env_ids] == RUNNING]
         self._code[running] = TRUNCATED
 
@@ -217,7 +217,7 @@ class TaskEnv:
         observed = self._observe(ids)
         self._store(observed, ids)
         result = StepResult(self._full(observed, ids), reward, STATUS_NAMES[self._code], self._info())
-        self._announce(result, ids)
+        hooks.stepped(self, result, ids)
         return result
 
     def _advance(self, ids: Array | None) -> None:
@@ -275,17 +275,6 @@ class TaskEnv:
             "elapsed_steps": self._episodes.elapsed.copy(),
             "episode_seed": self.streams.episode_seed.copy(),
         }
-
-    def _announce(self, result: StepResult, ids: Array | None) -> None:
-        """Call the observers; a call that nobody hears takes longer than to ask."""
-        after_step, on_fault, after_episode = self._hooks.after_step, self._hooks.on_fault, self._hooks.after_episode
-        if after_step.get_hookimpls():
-            after_step(env=self, result=result)
-        for hook, which in ((on_fault, self._fault), (after_episode, self._code != RUNNING)):
-            if hook.get_hookimpls():
-                concerned = np.flatnonzero(which) if ids is None else ids[which[ids]]
-                if len(concerned):
-                    hook(env=self, env_ids=concerned)
 
     # ------------------------------------------------------------------ snapshots, images, end
 

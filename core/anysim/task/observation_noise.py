@@ -1,4 +1,4 @@
-"""What a policy gets of an observed term: late, biased and noisy, as its spec says."""
+"""Imperfect observations: a term as a policy gets it, late, biased and noisy, as its spec says."""
 
 from collections.abc import Callable, Mapping
 

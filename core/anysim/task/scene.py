@@ -6,11 +6,11 @@ env is built. A handle returns arrays for `scene.rows` only: all envs in a step,
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
-from anysim.controllers.base import columns
+from anysim.controllers.base import ChannelColumns, columns
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.state import State
@@ -30,7 +30,7 @@ class SceneView:
     def __init__(
         self, engine: SimEngine, episodes: Episodes | None = None, terrain: TerrainManager | None = None
     ) -> None:
-        """`episodes` are those of an env's managers, `terrain` the one of them that knows who stands on which tile."""
+        """`episodes` are those of an env's managers, `terrain` the one of them that has tiles."""
         self.engine = engine
         self.index = engine.index
         episodes = Episodes(engine.num_envs) if episodes is None else episodes
@@ -53,12 +53,12 @@ class SceneView:
         self._robots: dict[str, RobotView] = {}
         self.moment = 0
         self.population = 0
-        """Changes whenever who is there may have changed."""
+        """Changes whenever the entities that are there may have changed."""
         self.presence = engine.presence
         """(N, entities) bool: which of the World's entities are there; as of the last `meet`."""
 
     def meet(self) -> None:
-        """Who is there may have changed: look again."""
+        """The entities that are there may have changed: look again."""
         if self.engine.world.slots:
             self.presence = self.engine.presence
             self.population += 1
@@ -349,20 +349,9 @@ class RobotView(Jointed):
             )
         return self.model.channels[name]
 
-    def channel_columns(self, name: str) -> "ChannelColumns":
+    def channel_columns(self, name: str) -> ChannelColumns:
         """What addresses the joints and drives of one of its channels; looked up once."""
         found = self._channels.get(name)
         if found is None:
-            channel, world = self.channel(name), self.scene.engine.world
-            joints, drives = np.array(channel.joints, dtype=int), np.array(channel.actuators, dtype=int)
-            home = np.array([world.joints[j].initial for j in channel.joints], dtype=float)
-            found = self._channels[name] = ChannelColumns(columns(joints), columns(drives), home)
+            found = self._channels[name] = ChannelColumns.of(self.scene.engine.world, self.channel(name))
         return found
-
-
-class ChannelColumns(NamedTuple):
-    """Columns of a channel's joints and drives among the world's, and the nominal home (K,) of the joints [rad, m]."""
-
-    joints: slice | Array
-    drives: slice | Array
-    home: Array

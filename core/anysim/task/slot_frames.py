@@ -1,6 +1,6 @@
 """Frames of logical objects: they follow what is there, which may be another entity, or nothing, in each env.
 
-Which body that is, is looked up by env when who is there has changed, at resets; a step only gathers.
+Which body that is, is looked up by env when the entities there have changed, at resets; a step only gathers.
 """
 
 from collections.abc import Sequence
@@ -81,7 +81,7 @@ class Follower:
         self._population = -1
 
     def _meet(self) -> None:
-        """Look up who is there in each env, where that may have changed."""
+        """Look up what is there in each env, where that may have changed."""
         if self._population == self.scene.population:
             return
         there = self.scene.presence[:, self._entities]  # (N, K, variants)

@@ -60,7 +60,7 @@ def frame_pose(scene: SceneView, *, frame: Frame) -> Array:
 
 
 def _flat(rows: Array) -> Array:
-    """(n, K, k) as (n, K k), also of nobody."""
+    """(n, K, k) as (n, K k), also of no env."""
     return rows.reshape(len(rows), rows.shape[1] * rows.shape[2])
 
 
