@@ -1,15 +1,21 @@
 """Observers: pluggy hooks of the group `anysim`. They look at a run, they don't touch it.
 
 A distribution registers a light module through an entry point of the group `anysim`; a function of it that is marked
-with `hookimpl` takes only the arguments it wants.
+with `hookimpl` takes only the arguments it wants. A module that fails is left out with a warning that names its
+distribution: what only looks on must not stop a run, and less so the command that would say how to repair it.
 """
 
+import warnings
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pluggy
 
+from anysim import registry
+
 if TYPE_CHECKING:
+    import typer
+
     from anysim.conventions import Array
     from anysim.task.contract import StepResult
     from anysim.task.env import TaskEnv
@@ -47,16 +53,21 @@ class Specs:
         """The env is about to be destroyed."""
 
     @hookspec
-    def add_cli(self, app: Any) -> None:
+    def add_cli(self, app: "typer.Typer") -> None:
         """Add commands to the command line's typer application."""
 
 
 @cache
 def manager() -> pluggy.PluginManager:
-    """The observers of this process; those of installed distributions are found on first use."""
+    """The observers of this process; those of installed distributions are found on first use, in order of name."""
     plugins = pluggy.PluginManager(PROJECT)
     plugins.add_hookspecs(Specs)
-    plugins.load_setuptools_entrypoints(PROJECT)
+    found = {f"{entry.dist.name if entry.dist else 'unknown'}:{entry.name}": entry for entry in registry.observers()}
+    for name in sorted(found):
+        try:
+            plugins.register(found[name].load(), name)
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever a plugin does, the others go on
+            _left_out(name, f"does not load: {type(error).__name__}: {error}")
     return plugins
 
 
@@ -70,3 +81,21 @@ def stepped(env: "TaskEnv", result: "StepResult", env_ids: "Array | None") -> No
             concerned = happened().nonzero()[0] if env_ids is None else env_ids[happened()[env_ids]]
             if len(concerned):
                 call(env=env, env_ids=concerned)
+
+
+def add_commands(app: "typer.Typer") -> None:
+    """Add the commands of all observers to the command line; one that fails costs its own commands alone."""
+    plugins = manager()
+    for name, plugin in plugins.list_name_plugin():
+        others = [other for other in plugins.get_plugins() if other is not plugin]
+        try:
+            plugins.subset_hook_caller("add_cli", others)(app=app)
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever a plugin does, the others go on
+            _left_out(name, f"adds no commands: {type(error).__name__}: {error}")
+
+
+def _left_out(name: str, what: str) -> None:
+    """Warn of an observer, `distribution:entry point`, and say how to be rid of it."""
+    distribution, _, entry = name.partition(":")
+    remedy = f"repair the package {distribution}, or remove it: pip uninstall {distribution}"
+    warnings.warn(f"the plugin '{entry}' of {distribution} {what}; {remedy}", RuntimeWarning, stacklevel=3)

@@ -44,13 +44,32 @@ INSTALL_HINTS: Mapping[tuple[str, str], str] = {
 
 
 @cache
+def _scan() -> Mapping[str, tuple[metadata.EntryPoint, ...]]:
+    """Our entry points by group, read once: finding those of one group takes as long as finding all."""
+    found = metadata.entry_points()
+    return {group: tuple(found.select(group=group)) for group in found.groups if group.partition(".")[0] == "anysim"}
+
+
+@cache
 def _entries(kind: str) -> Mapping[str, tuple[metadata.EntryPoint, ...]]:
     table: dict[str, list[metadata.EntryPoint]] = {}
-    for entry in metadata.entry_points(group=f"anysim.{kind}"):
+    for entry in _scan().get(f"anysim.{kind}", ()):
         known = table.setdefault(entry.name, [])
         if not any(_dist(entry) == _dist(other) and entry.value == other.value for other in known):
             known.append(entry)
     return {name: tuple(table[name]) for name in sorted(table)}
+
+
+def observers() -> tuple[metadata.EntryPoint, ...]:
+    """The entry points of the modules whose hooks look at runs (see `anysim.hooks`)."""
+    return _scan().get("anysim", ())
+
+
+def participants() -> dict[str, metadata.Distribution]:
+    """The installed distributions that offer something to anysim, itself among them, by name."""
+    entries = (entry for entries in _scan().values() for entry in entries)
+    found = {id(entry.dist): entry.dist for entry in entries}  # a name is read from a file: once for each of them
+    return {dist.name: dist for dist in found.values() if dist is not None}
 
 
 def _dist(entry: metadata.EntryPoint) -> str:
@@ -65,6 +84,7 @@ def _one(kind: str) -> str:
 def refresh() -> None:
     """Forget what was found; the next look-up reads the installed distributions again."""
     _entries.cache_clear()
+    _scan.cache_clear()
 
 
 def names(kind: str) -> list[str]:

@@ -10,7 +10,10 @@ from pydantic_core import CoreSchema, core_schema
 class Spec(BaseModel):
     """A frozen, closed piece of configuration: an unknown key is an error, a loaded spec never changes."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=False, allow_inf_nan=False)
+    # A model is built when it is first used: most are used only as parts of another, which builds them again.
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, validate_default=False, allow_inf_nan=False, defer_build=True
+    )
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()
     """Groups of keys that exclude each other. A file that gives one group drops what it inherited of the others."""

@@ -31,17 +31,9 @@ def test_help_teaches() -> None:
     text = anysim("--help").stdout
     for word in ("run", "replay", "check", "list", "doctor", "audit", "compare", "schema", "bench", "Exit codes"):
         assert word in text
-    assert "anysim run pick_cube --num-envs 16" in anysim("run", "--help").stdout
-
-
-def test_help_loads_nothing_heavy() -> None:
-    code = (
-        "import sys\nsys.argv = ['anysim', '--help']\nfrom anysim.cli.main import main\n"
-        "try:\n    main()\nexcept SystemExit:\n    pass\n"
-        "heavy = [m for m in ('numpy', 'mujoco', 'gymnasium', 'pydantic', 'trimesh', 'scipy') if m in sys.modules]\n"
-        "assert not heavy, heavy\n"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, timeout=60)
+    assert "..." not in text.partition("Commands:")[2], "a summary is cut off"
+    assert "\n    anysim run pick_cube --num-envs 16 --episodes 64 --seed 1\n" in anysim("run", "--help").stdout
+    assert "\n    anysim robot import my_arm.urdf\n" in anysim("robot", "import", "--help").stdout
 
 
 def test_list_names_what_is_installed() -> None:

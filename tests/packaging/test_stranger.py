@@ -1,7 +1,7 @@
 """A stranger's engine: its wheel beside ours in an environment without any other backend, and all that a user does.
 
 `tests/external/anysim-ballistic` is no member of the workspace; anysim knows it by its entry points alone.
-`tests/external/anysim-broken` offers two engines that do not work, and must hurt nobody.
+`tests/external/anysim-broken` offers engines and commands that do not work, and must hurt nobody.
 """
 
 import json
@@ -184,6 +184,14 @@ def test_choosing_a_broken_engine_says_why(crowded, name, cause):
     assert tested.returncode == pytest.ExitCode.USAGE_ERROR
     assert cause in tested.stdout + tested.stderr
     assert "INTERNALERROR" not in tested.stdout + tested.stderr
+
+
+def test_broken_commands_leave_the_others_in_place(crowded):
+    done = crowded.anysim("--help")
+    assert "Run a task's expert" in done.stdout
+    assert done.stderr.count("\n") == 1
+    assert "the plugin 'commands' of anysim-broken does not load" in done.stderr
+    assert "pip uninstall anysim-broken" in done.stderr
 
 
 def test_checking_against_all_engines_goes_past_a_broken_one(crowded):

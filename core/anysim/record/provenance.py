@@ -1,30 +1,34 @@
-"""Which versions were involved."""
+"""Versions of what takes part in a run."""
 
 import re
 from importlib import metadata
+
+from anysim import registry
 
 _NAME = re.compile(r"[A-Za-z0-9._-]+")
 
 
 def package_versions() -> dict[str, str]:
-    """Versions of the installed `anysim` distributions and of what they require directly, sorted by name.
+    """Versions of the distributions that offer something to anysim and of what they require directly, sorted by name.
 
     Extras are left out; what is not installed is not listed.
     """
-    ours = {dist.name: dist for dist in metadata.distributions() if _normal(dist.name or "").startswith("anysim")}
-    names = {_normal(name) for name in ours}
-    for dist in ours.values():
-        for requirement in dist.requires or []:
+    known = {_normal(name): dist for name, dist in registry.participants().items()}
+    names = set(known)
+    for dist in [*known.values(), _installed("anysim-schemas")]:
+        for requirement in (dist.requires if dist else None) or []:
             found = _NAME.match(requirement)
             if found is not None and "extra ==" not in requirement:
                 names.add(_normal(found[0]))
-    versions: dict[str, str] = {}
-    for name in sorted(names):
-        try:
-            versions[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            continue
-    return versions
+    present = {name: known.get(name) or _installed(name) for name in sorted(names)}
+    return {name: dist.version for name, dist in present.items() if dist is not None}
+
+
+def _installed(name: str) -> metadata.Distribution | None:
+    try:
+        return metadata.distribution(name)
+    except metadata.PackageNotFoundError:
+        return None
 
 
 def _normal(name: str) -> str:
