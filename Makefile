@@ -3,14 +3,15 @@
 BIN     := .venv/bin
 MEMBERS := $(patsubst %/,%,$(dir $(wildcard schemas/pyproject.toml core/pyproject.toml backends/*/pyproject.toml \
              plugins/*/pyproject.toml tasks/pyproject.toml)))
-STAMP   := .venv/installed
+# What is installed: all packages, and with the first call of a target that needs them the tools of a dependency group.
+STAMP := .venv/installed
+TEST  := .venv/with-test
+CHECK := .venv/with-check
+SITE  := .venv/with-site
 
 # The demo: a scripted robot picks cubes in four worlds at once, records it, and a picture shows what happened. Then
 # every installed engine gets the same world, and a page shows how far they agree.
-DEMO_OUT     ?= runs/demo
-DEMO_RUN      = $(BIN)/anysim run pick_cube --num-envs 4 --episodes 8 --seed 1 --out $(DEMO_OUT)
-DEMO_PICTURE  = $(BIN)/python scripts/demo_picture.py $(DEMO_OUT)
-DEMO_COMPARE  = $(BIN)/anysim compare pick_cube --episodes 4 --seed 1 --out $(DEMO_OUT)/compare
+DEMO_OUT ?= runs/demo
 
 # More words for pytest: make test ARGS="-k pose -x"
 ARGS ?=
@@ -18,38 +19,39 @@ ARGS ?=
 PYTEST = $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist loadgroup
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test test-slow test-all check format lock schema docs bench wheels clean
+.PHONY: help venv demo test test-slow test-full check format lock schema docs site bench wheels clean
 
 help:  ## list the targets
 	@echo "make TARGET, where TARGET is one of"
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  \1|\2/p' Makefile | awk -F'|' '{printf "%-12s %s\n", $$1, $$2}'
 
-venv: $(STAMP)  ## make .venv with all packages (editable) and the developers' tools
+venv: $(STAMP)  ## make .venv with all packages (editable), ready to use
 
 # Runs again only when one of these files changed.
 $(STAMP): pyproject.toml constraints.txt scripts/setup.sh $(addsuffix /pyproject.toml,$(MEMBERS))
 	@scripts/setup.sh $(MEMBERS)
 	@touch $@
 
+.venv/with-%: $(STAMP)
+	@scripts/setup.sh --group $*
+	@touch $@
+
 demo: $(STAMP)  ## run a pick-and-place task in four worlds, record it, draw a picture, and compare the engines
-	@$(if $(filter runs/demo,$(DEMO_OUT)),rm -rf runs/demo)
-	$(DEMO_RUN)
-	@$(DEMO_PICTURE)
-	$(DEMO_COMPARE)
+	@scripts/demo.sh $(DEMO_OUT)
 
-test: $(STAMP)  ## run all tests that are not marked slow (minutes), on all cores
-	$(PYTEST) -m "not slow" $(ARGS)
+test: $(TEST)  ## run the tests that are neither marked slow nor full (minutes), on all cores
+	$(PYTEST) -m "not slow and not full" $(ARGS)
 
-test-slow: $(STAMP)  ## run the tests that are marked slow
-	$(PYTEST) -m slow $(ARGS)
+test-slow: $(TEST)  ## run the tests that are marked slow
+	$(PYTEST) -m "slow and not full" $(ARGS)
 
-test-all: $(STAMP)  ## run every test
+test-full: $(TEST)  ## run every test, those that are marked full too (hours): before a release
 	$(PYTEST) $(ARGS)
 
-CHECKS := check-lint check-format check-style check-layers check-schema check-tables check-types
+CHECKS := check-lint check-format check-style check-layers check-schema check-tables check-types check-site
 check: $(CHECKS)  ## lint, format, types, layers, style and generated files (make -k check: do not stop at the first)
 .PHONY: $(CHECKS)
-$(CHECKS): $(STAMP)
+$(CHECKS): $(CHECK)
 check-lint:
 	$(BIN)/ruff check
 check-format:
@@ -65,32 +67,40 @@ check-tables:
 	$(BIN)/python scripts/axes_table.py --check
 	$(BIN)/python scripts/term_table.py --check
 	$(BIN)/python scripts/robot_table.py --check
+	$(BIN)/python scripts/install_sizes.py --check
 check-types:
 	$(BIN)/pyright
+check-site: site
 
-format: $(STAMP)  ## format the code and fix what ruff can fix
+format: $(CHECK)  ## format the code and fix what ruff can fix
 	$(BIN)/ruff check --fix --exit-zero
 	$(BIN)/ruff format
 
-lock: $(STAMP)  ## write constraints.txt after a change of dependencies
+lock: $(CHECK)  ## write constraints.txt after a change of dependencies
 	$(BIN)/python scripts/lock.py
 
 schema: $(STAMP)  ## write the JSON Schemas that editors complete YAML from
 	$(BIN)/python -m anysim_schemas.jsonschema schemas/json
 
-docs: schema  ## write what is generated and run the examples of docs/
+docs: schema $(TEST)  ## write what is generated and run the examples of docs/
 	$(BIN)/python scripts/capability_table.py
 	$(BIN)/python scripts/axes_table.py
 	$(BIN)/python scripts/term_table.py
 	$(BIN)/python scripts/robot_table.py
 	$(BIN)/python -m pytest tests/docs $(ARGS)
 
+site: $(SITE)  ## build the documentation with its API pages into build/site
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo "open build/site/index.html; searching needs a server: $(BIN)/python -m http.server -d build/site"
+
 bench: $(STAMP)  ## measure speed against the budgets, as ratios
 	$(BIN)/anysim bench step $(ARGS)
 	@set -e; for program in $(wildcard benchmarks/*.py); do echo "$$program"; $(BIN)/python $$program; done
 
-wheels: $(STAMP)  ## build the wheels of all packages into dist/
+wheels: $(STAMP)  ## build the wheels of all packages into dist/ (docs/install.md)
+	@rm -rf dist
 	@PATH="$$PATH:.venv-tools/bin" uv build --quiet --all-packages --wheel --out-dir dist
+	@scripts/wheel_list.sh dist
 	@ls dist
 
 clean:  ## remove .venv, caches, wheels and the demo's output; other recordings stay

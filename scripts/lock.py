@@ -1,4 +1,4 @@
-"""Write constraints.txt: one exact version of everything in the environment, for every Python from 3.11 on.
+"""Exact versions: writes constraints.txt with one of everything in the environment, for every Python from 3.11 on.
 
     python scripts/lock.py               keep the versions where the pyproject.toml files allow it
     python scripts/lock.py --upgrade     take the newest that they allow
@@ -30,7 +30,7 @@ def find_uv(root: Path) -> str:
 
 
 def resolve(root: Path, upgrade: bool) -> list[str]:
-    """The lines of the file: what uv resolves for all members and the dev group."""
+    """The lines of the file: what uv resolves for all members, the extras that `make venv` installs, and all groups."""
     projects = [str(member.folder / "pyproject.toml") for member in Tree.of(root).members]
     with tempfile.TemporaryDirectory() as folder:
         pins, out = Path(folder) / "pins.txt", Path(folder) / "out.txt"
@@ -39,7 +39,7 @@ def resolve(root: Path, upgrade: bool) -> list[str]:
             shutil.copy(root / FILE, out)  # uv keeps what its output file says
         command = [
             find_uv(root), "pip", "compile", "--quiet", "--universal", "--python-version", "3.11",
-            "--fork-strategy", "fewest", "--no-header", "--no-annotate", "--group", "dev",
+            "--fork-strategy", "fewest", "--no-header", "--no-annotate", "--extra", "all", "--group", "dev",
             "--constraint", str(pins), "--output-file", str(out), *projects,
         ]  # fmt: skip
         subprocess.run(command, cwd=root, check=True, stdout=subprocess.DEVNULL)

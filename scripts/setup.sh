@@ -1,7 +1,9 @@
 #!/bin/sh
-# Make .venv: a Python of its own with every member of the workspace (editable) and the developers' tools in it, in the
-# versions of constraints.txt. Called by `make venv`; needs Python 3.11 or newer and touches nothing outside this folder.
+# Make .venv: a Python of its own with every member of the workspace (editable), in the versions of constraints.txt; or
+# add the tools of one dependency group to it. Called by the Makefile; needs Python 3.11 or newer and touches nothing
+# outside this folder.
 #   usage: scripts/setup.sh MEMBER...        PYTHON=/path/to/python chooses the interpreter
+#          scripts/setup.sh --group GROUP    GROUP is test, check or site
 set -eu
 
 say() { printf '%s\n' "setup: $*"; }
@@ -21,7 +23,7 @@ find_python() {
 # uv from the PATH, else from .venv-tools, else fetched into .venv-tools with the pip of a virtual environment, else
 # (Debian's python3 without python3-venv) with the system's pip, which then only writes into that folder.
 find_uv() {
-    if uv pip install --help 2>/dev/null | grep -q -e --group; then  # older ones cannot install the dev group
+    if uv pip install --help 2>/dev/null | grep -q -e --group; then  # older ones cannot install groups
         echo uv
         return
     fi
@@ -42,9 +44,32 @@ find_uv() {
     echo .venv-tools/bin/uv
 }
 
-[ $# -gt 0 ] || fail "usage: scripts/setup.sh MEMBER..."
+# Install what the arguments say. A terminal gets the installer's progress bars; a pipe its lines, without the list of
+# every package. Byte code is compiled here and not by whoever comes first: without it a process takes twice as long to
+# start, and where PYTHONDONTWRITEBYTECODE is set or .venv is read-only it would be missing for good.
+install() {
+    set -- "$uv" pip install --python .venv/bin/python --constraint constraints.txt --compile-bytecode "$@"
+    if [ -t 2 ]; then
+        "$@"
+    else
+        status=$({ { "$@" 2>&1 && echo 0 >&3 || echo $? >&3; } | sed '/^ [-+~] /d; /^ *Buil[dt]/d; s/^/  /' >&2; } 3>&1)
+        return "$status"
+    fi
+}
+
+size() { du -sh .venv | cut -f 1; }
+
+[ $# -gt 0 ] || fail "usage: scripts/setup.sh MEMBER... or scripts/setup.sh --group GROUP"
+started=$(date +%s)
 python=$(find_python)
 uv=$(find_uv)
+
+if [ "$1" = --group ]; then
+    say "adding the tools of 'make $2' to .venv"
+    install --group "$2"
+    say "done after $(($(date +%s) - started)) s; .venv takes $(size)"
+    exit
+fi
 
 if ! .venv/bin/python -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then
     say "making .venv with $python"
@@ -59,7 +84,9 @@ for member in "$@"; do
         *) editable="$editable --editable ./$member" ;;
     esac
 done
-say "installing $* and the developers' tools into .venv"
+say "installing anysim and the engines into .venv (some minutes where packages must be downloaded, else seconds)"
 # shellcheck disable=SC2086  # the options are words
-"$uv" pip install --quiet --python .venv/bin/python --constraint constraints.txt --group dev $editable
-say "done: $(.venv/bin/python --version) in .venv"
+install $editable
+say "compiling the sources of $*"
+.venv/bin/python -m compileall -q "$@"
+say "done after $(($(date +%s) - started)) s: $(.venv/bin/python --version) in .venv, which takes $(size)"

@@ -24,6 +24,7 @@ def pytest_configure(config: pytest.Config) -> None:
     environment variable so that processes that a test starts use it too.
     """
     config.addinivalue_line("markers", "slow: takes many seconds; `make test` leaves it out, `make test-slow` runs it")
+    config.addinivalue_line("markers", "full: takes minutes and rarely finds more; only `make test-full` runs it")
     os.environ["ANYSIM_CACHE_DIR"] = str(ROOT / ".cache" / "tests")
 
 

@@ -1,4 +1,4 @@
-"""constraints.txt holds one exact version of everything, by name alone, and satisfies every pyproject.toml."""
+"""Exact versions: constraints.txt holds one of everything, by name alone, and satisfies every pyproject.toml."""
 
 import re
 from collections.abc import Iterator
@@ -49,11 +49,17 @@ def check(tree: Tree) -> Iterator[Fault]:
 def _unmet(tree: Tree, pinned: dict[str, list[str]]) -> Iterator[Fault]:
     own = {canonicalize_name(member.project["name"]) for member in tree.members}
     wanted = [(member.folder / "pyproject.toml", r) for member in tree.members for r in member.project["dependencies"]]
-    wanted += [(Path("pyproject.toml"), r) for r in tree.settings["dependency-groups"]["dev"]]
+    for member in tree.members:
+        optional = member.project.get("optional-dependencies", {}).values()
+        wanted += [(member.folder / "pyproject.toml", r) for extra in optional for r in extra]
+    groups = tree.settings["dependency-groups"].values()
+    wanted += [
+        (Path("pyproject.toml"), r) for group in groups for r in group if isinstance(r, str)
+    ]  # else it includes one
     for source, text in wanted:
         requirement = Requirement(text)
         name = canonicalize_name(requirement.name)
-        if name in own:
+        if name in own or name in UNWANTED:
             continue
         if name not in pinned:
             yield Fault(source, 0, f"{name} is not in {FILE}; {REMEDY}")
