@@ -90,7 +90,7 @@ docs: schema $(TEST)  ## write what is generated and run the examples of docs/
 	$(BIN)/python -m pytest tests/docs $(ARGS)
 
 site: $(SITE)  ## build the documentation with its API pages into build/site
-	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 	@echo "open build/site/index.html; searching needs a server: $(BIN)/python -m http.server -d build/site"
 
 bench: $(STAMP)  ## measure speed against the budgets, as ratios

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.plugins import event_priority
-from mkdocs.structure.files import File, Files
+from mkdocs.structure.files import File, Files, InclusionLevel
 from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).parents[1]
@@ -22,8 +22,11 @@ HOME = {"README.md": "index.md", "docs/README.md": "contents.md"}
 OUTSIDE = "repository"
 """The folder of the site for what pages link to outside of docs/."""
 LINK = re.compile(r"(\]\(<?)([^)\s#>]+)")
+EXCERPT = re.compile(r"^```(\w+) (\S+)$", re.MULTILINE)
+"""The first line of an excerpt from a file: what GitHub ignores is a title here."""
 FROM_NETWORK = re.compile(r"""<(?:script|link|img|iframe)\b[^>]*\b(?:src|href)=["']?(?:https?:)?//[^\s"'>]+""")
 LOG = logging.getLogger("mkdocs.hooks.site_pages")
+OFF_NAV = InclusionLevel.NOT_IN_NAV
 GROUPS = (
     ("Core", ("schemas", "core")),
     ("Engines", ("backends/*",)),
@@ -68,14 +71,15 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
             if target is None or (path := ROOT / target) in seen or target.startswith("docs/"):
                 continue
             seen.add(path)
-            files.append(File.generated(config, _place(target), abs_src_path=str(path)))
+            files.append(File.generated(config, _place(target), abs_src_path=str(path), inclusion=OFF_NAV))
             if path.suffix == ".md":
                 waiting.append(path)
     return files
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Turn links between files of the repository into links between pages of the site."""
+    """Turn links between files of the repository into links between pages, and names of excerpts into titles."""
+    markdown = EXCERPT.sub(r'```\1 title="\2"', markdown)
     source = page.file.abs_src_path
     if source is None or not Path(source).is_relative_to(ROOT):
         return markdown
