@@ -1,4 +1,4 @@
-"""What collecting costs beside the engine: the processor time of its steps, as a share of all of a collection's.
+"""Share of the engine in collecting: the processor time of its steps against that of the whole collection.
 
 All threads count on both sides: those in which the engine steps, and the recorder's own, whose time during the engine's
 steps is not the engine's.

@@ -1,4 +1,4 @@
-"""How much anysim costs on top of an engine: both loops in one run, interleaved, the best of several rounds of each."""
+"""Cost of anysim on top of an engine: both loops in one run, interleaved, the best of several rounds of each."""
 
 import time
 from collections.abc import Callable, Sequence
