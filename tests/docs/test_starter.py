@@ -14,6 +14,8 @@ KINDS = {
     "controllers": "starter_eased_position",
     "assets": "starter_shelf",
     "terms": "starter",
+    "writers": "starter_npz",
+    "readers": "starter_npz",
 }
 
 
@@ -84,6 +86,31 @@ with anysim.make("touch_shelf", engine="mujoco", num_envs=2) as env:
         env.step(np.zeros((2, env.action_dim)), env.running)
     assert sum(tally(env).values()) == 2, tally(env)
 """
+
+
+def test_its_writer_and_reader_keep_what_the_standard_ones_keep(site: Path, tmp_path: Path) -> None:
+    code = """
+import sys
+import numpy as np
+from anysim.record.reader import open_trajectory
+first, second = map(open_trajectory, sys.argv[1:])
+assert (first.times == second.times).all() and (first.actions == second.actions).all()
+assert first.statuses == second.statuses and first.language == second.language
+assert list(first.annotations) == list(second.annotations)
+for mine, other in ((first.states, second.states), (first.obs, second.obs)):
+    assert mine.keys() == other.keys() and all((mine[name] == other[name]).all() for name in mine)
+assert all((first.initial_state[name] == rows).all() for name, rows in second.initial_state.items())
+assert first.faults() == []
+"""
+    episodes: list[str] = []
+    for writer in ("starter_npz", "mcap"):
+        out = tmp_path / writer
+        words = ("-k", "1", "-o", "record.cameras=[]", "-o", f"record.writer={writer}", "--out", str(out))
+        assert anysim(site, "run", "touch_shelf", *words)["successes"] == 1
+        assert anysim(site, "replay", str(out))["identical"] == 1
+        episodes += [str(path.parent) for path in out.rglob("manifest.json")]
+    done = run(site, "-c", code, *episodes)
+    assert done.returncode == 0, done.stderr
 
 
 def test_its_controller_is_restored_and_its_observer_counts(site: Path) -> None:
