@@ -117,7 +117,7 @@ def test_every_builder_makes_a_sound_model(name: str) -> None:
 
 @pytest.mark.parametrize("name", registry.names("assets"))
 def test_the_page_lists_the_parameters_of_every_builder(name: str) -> None:
-    page = (Path(__file__).parents[2] / "docs" / "concepts" / "articulations.md").read_text()
+    page = (Path(__file__).parents[3] / "docs" / "concepts" / "articulations.md").read_text()
     section = page.split(f"### `{name}`")[1].split("\n#")[0]
     missing = [parameter for parameter in parameters(registry.load("assets", name)) if f"`{parameter}`" not in section]
     assert missing == []

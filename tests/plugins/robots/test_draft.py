@@ -15,7 +15,7 @@ from anysim_robots.drafting.draft import draft
 from anysim_robots.drafting.gains import BANDWIDTH
 from anysim_robots.qualify.stage import stage
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 ARM = ROOT / "tests" / "external" / "anysim-thirdarm" / "anysim_thirdarm" / "third_arm.urdf"
 
 GUESSES = {  # file: category, legs, wheels, arm, eef, tool

@@ -11,7 +11,7 @@ from anysim.assets.catalogue import load_robot
 from anysim_robots.gallery.store import Stored, due, fingerprint, measure, package, read
 from anysim_robots.qualify.run import Durations
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 ARM = ROOT / "tests" / "external" / "anysim-thirdarm" / "anysim_thirdarm"
 SHORT = Durations(0.2, 0.1, 0.1)
 

@@ -8,7 +8,7 @@ import pytest
 
 from tests.cli.test_cli import anysim
 
-ARM = Path(__file__).parents[1] / "external" / "anysim-thirdarm" / "anysim_thirdarm"
+ARM = Path(__file__).parents[2] / "external" / "anysim-thirdarm" / "anysim_thirdarm"
 
 
 def test_a_robot_is_shown_with_its_joints() -> None:
