@@ -15,7 +15,7 @@ from anysim.engine.base import SimEngine
 from anysim.errors import RecordError, SpecError
 from anysim.record.film import Moments, film_episode, images, moments_for
 from anysim.record.film_mode import film_mode, hindrances
-from anysim.record.writer import make_writer
+from anysim.record.writer import TrajectoryWriter, make_writer
 from anysim.task.env import TaskEnv
 from anysim.task.terms import events
 from anysim.testing.fixtures import drawing_trouble
@@ -202,10 +202,12 @@ def test_check_says_where_it_was_asked_for(monkeypatch: pytest.MonkeyPatch) -> N
     assert check_one("pick_cube", None, False, [PUSH, "record.film=success"]) == []
 
 
-def test_a_writer_without_videos_of_their_own_films_live(monkeypatch: pytest.MonkeyPatch, writer: type) -> None:
+def test_a_writer_without_videos_of_their_own_films_live(
+    monkeypatch: pytest.MonkeyPatch, writer: TrajectoryWriter
+) -> None:
     spec = _spec(monkeypatch)
     assert hindrances(spec) == []
-    monkeypatch.setattr(registry, "load", lambda kind, name: writer)
+    monkeypatch.setattr(registry, "load", lambda kind, name: type(writer))
     assert hindrances(spec) == ["the writer 'mcap' cannot write a video by itself"]
     with pytest.raises(RecordError, match="the writer 'lines' cannot write a video by itself"):
-        writer().video_file("front")
+        writer.video_file("front")

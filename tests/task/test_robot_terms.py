@@ -118,7 +118,7 @@ def test_delay_and_noise_apply_to_them() -> None:
 @pytest.mark.parametrize(
     ("terms_", "words"),
     [
-        ("[{term: tool_pose, tool: tol}]", "panda.tol"),
+        ("[{term: tool_pose, tool: tol}]", "'panda' has no link or tool 'tol'"),
         ("[{term: tool_pose, frame: bas}]", "expected one of world, base"),
         ("[{term: channel_joint_pos, channel: am}]", "no channel 'am'.*arm"),
         ("[{term: commanded_velocity}]", "no channel 'base'"),

@@ -3,11 +3,11 @@
 import pytest
 from typer.testing import CliRunner
 
-from anysim.cli.main import app
 from anysim.engine.capability import Capability
 from anysim.engine.factory import runnable
 from anysim.errors import EngineError
 from anysim.testing.engines import require_engine
+from anysim_bench.cli import app
 from anysim_bench.resets import Sample, changing_world, growth, reset_cost
 
 RESETS = 300
@@ -52,7 +52,7 @@ def test_too_few_resets_are_refused():
 
 def test_the_command_prints_a_verdict():
     assert "null" in runnable(Capability.VARYING_ENTITIES)
-    done = CliRunner().invoke(app, ["bench", "resets", "--engine", "null", "--resets", "40", "-n", "2"])
+    done = CliRunner().invoke(app, ["resets", "--engine", "null", "--resets", "40", "-n", "2"])
     assert done.exit_code in (0, 1), done.output  # so few resets say little about time
     assert "P2" in done.output
     assert "same" in done.output

@@ -3,8 +3,8 @@
 import pytest
 from typer.testing import CliRunner
 
-from anysim.cli.main import app
 from anysim.errors import EngineError
+from anysim_bench.cli import app
 from anysim_bench.shards import shard_gains
 
 
@@ -24,6 +24,6 @@ def test_shards_without_envs_are_refused(shards):
 
 
 def test_numbers_are_wanted():
-    done = CliRunner().invoke(app, ["bench", "shards", "--shards", "1,two"])
+    done = CliRunner().invoke(app, ["shards", "--shards", "1,two"])
     assert done.exit_code
     assert "whole numbers" in str(done.exception) + done.output
