@@ -183,13 +183,15 @@ def test_fifty_engines_leave_no_memory_behind(worlds):
             with contextlib.suppress(EngineError):  # where there is no OpenGL
                 engine.render("default", 64, 64)
 
-    for _ in range(5):
-        once()
-    before = _resident_mb()
-    for _ in range(50):
-        once()
-    grown = _resident_mb() - before
-    assert grown < 15, f"{grown:.1f} MiB"
+    def grown(engines: int) -> float:
+        before = _resident_mb()
+        for _ in range(engines):
+            once()
+        return _resident_mb() - before
+
+    grown(5)
+    rounds = [grown(17) for _ in range(3)]  # a leak grows in each; drivers fill their caches in some
+    assert min(rounds) < 5, f"{rounds} MiB"
 
 
 def test_a_destroyed_engine_holds_no_arrays(worlds):
