@@ -13,7 +13,7 @@ from anysim.assets.uri import locate
 from anysim.compile.builder import WorldBuilder
 from anysim.compile.joints import with_joints
 from anysim.compile.physical import with_matter
-from anysim.compile.variants import INSTANCER, Origin, source_text
+from anysim.compile.variants import INSTANCER, KeyedSource, source_text
 from anysim.conventions import IDENTITY_QUATERNION
 from anysim.errors import AssetError, PluginError, SpecError, listing
 from anysim.issues import Issues
@@ -61,7 +61,7 @@ def add_object(
     if not isinstance(spec.source, SourceSpec) or isinstance(spec.scale, Drawn) or spec.count is not None:
         issues.add("", "an object that is added to a world has one source, one scale and no count; add each by its own")
         return []
-    model = object_model(name, spec, Origin(spec.source, "source"), spec.scale, issues, base)
+    model = object_model(name, spec, KeyedSource(spec.source, "source"), spec.scale, issues, base)
     if model is None:
         return []
     try:
@@ -106,7 +106,7 @@ def source_name(source: SourceSpec) -> str:
 
 
 def object_model(
-    name: str, spec: ObjectSpec, origin: Origin, size: float, issues: Issues, base: Path | None
+    name: str, spec: ObjectSpec, origin: KeyedSource, size: float, issues: Issues, base: Path | None
 ) -> ImportedModel | None:
     """An object as one of its sources makes it, `size` times as large; None where that fails, which `issues` says."""
     source = origin.source.model_copy(update={"scale": origin.source.scale * size})

@@ -12,7 +12,7 @@ from anysim.assets.instancer import instanced
 from anysim.assets.model import ImportedModel, ImportNote
 from anysim.compile.builder import WorldBuilder
 from anysim.compile.object import object_model, place_model
-from anysim.compile.variants import INSTANCER, Options, Origin, counts, instances, sizes, sources
+from anysim.compile.variants import INSTANCER, KeyedSource, Options, counts, instances, sizes, sources
 from anysim.errors import AssetError, listing
 from anysim.issues import Issues
 from anysim.model.world import Slot
@@ -74,7 +74,12 @@ def _whole(spec: ObjectSpec, model: ImportedModel) -> ImportedModel:
 
 
 def _add(
-    builder: WorldBuilder, name: str, spec: ObjectSpec, origins: list[Origin], models: list[ImportedModel], first: int
+    builder: WorldBuilder,
+    name: str,
+    spec: ObjectSpec,
+    origins: list[KeyedSource],
+    models: list[ImportedModel],
+    first: int,
 ) -> list[Slot]:
     """The entities of all instances. `first` is the model that is there nominally."""
     names = instances(name, spec)

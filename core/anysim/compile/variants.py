@@ -83,14 +83,14 @@ def instances(name: str, spec: ObjectSpec) -> tuple[str, ...]:
     return tuple(f"{name}_{i}" for i in range(most(spec.count)))
 
 
-class Origin(NamedTuple):
+class KeyedSource(NamedTuple):
     """One of the sources of an object, and its dotted key below the object's."""
 
     source: SourceSpec
     key: str
 
 
-def sources(spec: ObjectSpec, base: Path | None) -> tuple[list[Origin], int]:
+def sources(spec: ObjectSpec, base: Path | None) -> tuple[list[KeyedSource], int]:
     """The sources of an object, and the index of the nominal one; a folder's are its files by name.
 
     Raises:
@@ -98,15 +98,15 @@ def sources(spec: ObjectSpec, base: Path | None) -> tuple[list[Origin], int]:
     """
     source = spec.source
     if isinstance(source, SourceFolder):
-        return [Origin(one, "source") for one in _files(source, base)], 0
+        return [KeyedSource(one, "source") for one in _files(source, base)], 0
     if not isinstance(source, SourceChoice):
-        return [Origin(source, "source")], 0
-    found = [Origin(one, f"source.choice.{i}") for i, one in enumerate(source.choice)]
+        return [KeyedSource(source, "source")], 0
+    found = [KeyedSource(one, f"source.choice.{i}") for i, one in enumerate(source.choice)]
     if source.otherwise is None:
         return found, 0
     if source.otherwise in source.choice:
         return found, source.choice.index(source.otherwise)
-    return [*found, Origin(source.otherwise, "source.otherwise")], len(found)
+    return [*found, KeyedSource(source.otherwise, "source.otherwise")], len(found)
 
 
 def _files(spec: SourceFolder, base: Path | None) -> list[SourceSpec]:

@@ -14,7 +14,7 @@ from anysim import registry
 from anysim.geometry.convex_parts import IDENTITY, Pose
 from anysim.placement.constraints import PlacementTask
 from anysim.placement.context import PlacementContext, Settled
-from anysim.placement.proposals import Proposer, Request, Support, Thing, faults, parsed, read_file
+from anysim.placement.proposals import LevelSurface, Proposer, Request, Thing, faults, parsed, read_file
 from anysim.placement.search import Refused
 from anysim.placement.support_surfaces import HEADROOM
 from anysim.randomization.streams import Origin, Streams
@@ -143,7 +143,7 @@ def _request(
             ]
             outline = [(x + px, y + py) for px, py in surface.polygon]
             headroom = 1e3 if surface.headroom == inf else surface.headroom
-            supports.append(Support(f"{name}.{surface.name}", height, headroom, outline, taken))
+            supports.append(LevelSurface(f"{name}.{surface.name}", height, headroom, outline, taken))
     robots = {
         robot.name: [float(v) for v in np.array(world.bodies[e.root].position)]
         for robot in world.robots

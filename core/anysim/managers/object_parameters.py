@@ -24,8 +24,8 @@ Drawn = Mapping[str, Sequence[Any]]
 
 
 @dataclass(frozen=True)
-class Part:
-    """An entity that parameters are written to."""
+class EntityIndices:
+    """The bodies and geoms of an entity that parameters are written to; `shown` are the visible geoms."""
 
     world: World
     bodies: Array
@@ -34,7 +34,7 @@ class Part:
     roots: Array
 
     @classmethod
-    def of(cls, world: World, entity: int) -> "Part":
+    def of(cls, world: World, entity: int) -> "EntityIndices":
         """The entity by its index."""
         thing = world.entities[entity]
         own = range(thing.body_start, thing.body_stop)
@@ -72,7 +72,7 @@ class Rule(NamedTuple):
 
     parameter: str
     fields: tuple[str, ...]
-    rows: Callable[[Part, ObjectSpec, Drawn], Rows]
+    rows: Callable[[EntityIndices, ObjectSpec, Drawn], Rows]
     reads: tuple[str, ...] = ()
 
 
@@ -97,7 +97,7 @@ def _column(drawn: Drawn, field: str) -> Array:
     return np.array(drawn[field], dtype=float)
 
 
-def _heavier(part: Part, spec: ObjectSpec, drawn: Drawn) -> Array | None:
+def _heavier(part: EntityIndices, spec: ObjectSpec, drawn: Drawn) -> Array | None:
     """(E,) by what factor all masses change, so that the object's shape stays what it was."""
     total = part.mass
     if part.world.bodies[part.bodies[0]].kind is BodyKind.STATIC and not total:
@@ -107,12 +107,12 @@ def _heavier(part: Part, spec: ObjectSpec, drawn: Drawn) -> Array | None:
     return np.array([1.0 if mass is None else mass / total for mass in drawn["mass"]])
 
 
-def _mass(part: Part, spec: ObjectSpec, drawn: Drawn) -> Rows:
+def _mass(part: EntityIndices, spec: ObjectSpec, drawn: Drawn) -> Rows:
     ratio = _heavier(part, spec, drawn)
     return None if ratio is None else ratio[:, None] * part.masses
 
 
-def _inertia(part: Part, spec: ObjectSpec, drawn: Drawn) -> Rows:
+def _inertia(part: EntityIndices, spec: ObjectSpec, drawn: Drawn) -> Rows:
     ratio = _heavier(part, spec, drawn)
     if ratio is None:
         return None
@@ -121,30 +121,30 @@ def _inertia(part: Part, spec: ObjectSpec, drawn: Drawn) -> Rows:
     return ratio[:, None, None] * np.array([part.world.bodies[b].inertial.inertia for b in part.bodies])
 
 
-def _com(part: Part, spec: ObjectSpec, drawn: Drawn) -> Rows:
+def _com(part: EntityIndices, spec: ObjectSpec, drawn: Drawn) -> Rows:
     built = np.array([part.world.bodies[b].inertial.com for b in part.roots]) - np.array(
         nominal(spec.com_offset or 0.0)
     )
     return built + _column(drawn, "com_offset")[:, None]
 
 
-def _root(field: str) -> Callable[[Part, ObjectSpec, Drawn], Rows]:
+def _root(field: str) -> Callable[[EntityIndices, ObjectSpec, Drawn], Rows]:
     return lambda part, spec, drawn: np.repeat(_column(drawn, field)[:, None], len(part.roots), axis=1)
 
 
-def _surface(field: str) -> Callable[[Part, ObjectSpec, Drawn], Rows]:
+def _surface(field: str) -> Callable[[EntityIndices, ObjectSpec, Drawn], Rows]:
     return lambda part, spec, drawn: np.repeat(_column(drawn, field)[:, None], len(part.geoms), axis=1)
 
 
-def _look(field: str, things: str) -> Callable[[Part, ObjectSpec, Drawn], Rows]:
-    def rows(part: Part, spec: ObjectSpec, drawn: Drawn) -> Rows:
+def _look(field: str, things: str) -> Callable[[EntityIndices, ObjectSpec, Drawn], Rows]:
+    def rows(part: EntityIndices, spec: ObjectSpec, drawn: Drawn) -> Rows:
         table = {thing.name: i for i, thing in enumerate(getattr(part.world, things))}
         return np.repeat(np.array([[float(table[name])] for name in drawn[field]]), len(part.shown), axis=1)
 
     return rows
 
 
-def _color(part: Part, spec: ObjectSpec, drawn: Drawn) -> Rows:
+def _color(part: EntityIndices, spec: ObjectSpec, drawn: Drawn) -> Rows:
     """The colour over the texture's white over the material's; opacity is the material's."""
     materials = {material.name: material for material in part.world.materials}
     built = np.array([part.world.geoms[g].color for g in part.shown]).reshape(-1, 4)
@@ -190,7 +190,7 @@ class _Thing(NamedTuple):
     spec: ObjectSpec
     values: Mapping[str, Any]
     rules: tuple[Rule, ...]
-    parts: Mapping[int, Part]
+    parts: Mapping[int, EntityIndices]
 
 
 class SceneManager(Manager):
@@ -290,6 +290,6 @@ def _things(world: World, name: str, spec: ObjectSpec) -> list[_Thing]:
     rules = tuple(rule for rule in RULES if any(is_random(values[field]) for field in rule.fields))
     slots = {one: slot.entities for one, slot in world.logical_objects.items() if slot.category == name}
     return [
-        _Thing(slot, name, spec, values, rules, {e: Part.of(world, e) for e in entities})
+        _Thing(slot, name, spec, values, rules, {e: EntityIndices.of(world, e) for e in entities})
         for slot, entities in slots.items()
     ]

@@ -26,7 +26,7 @@ NEVER = -1
 """The level of an env that was not reset yet."""
 
 
-class Look(NamedTuple):
+class DrawnColor(NamedTuple):
     """Geoms that have one colour, which is drawn in each episode."""
 
     color: Any
@@ -35,7 +35,7 @@ class Look(NamedTuple):
     geoms: Array
 
 
-def _looks(spec: WorldSpec, world: World) -> list[Look]:
+def _looks(spec: WorldSpec, world: World) -> list[DrawnColor]:
     """What of the ground and of the room looks different in each episode."""
     owner = {b: e.name for e in world.entities for b in range(e.body_start, e.body_stop)}
     parts: list[tuple[Any, str, str, list[int]]] = [
@@ -56,7 +56,7 @@ def _looks(spec: WorldSpec, world: World) -> list[Look]:
             ]
             stream = f"terrain/{name}/color"
             parts.append((spec.room.furniture_color, stream, "world.room.furniture_color", main))
-    return [Look(c, s, p, np.array(g)) for c, s, p, g in parts if is_random(c) and g]
+    return [DrawnColor(c, s, p, np.array(g)) for c, s, p, g in parts if is_random(c) and g]
 
 
 LEVEL = "terrain/level"

@@ -35,7 +35,7 @@ class Thing:
 
 
 @dataclass(frozen=True)
-class Support:
+class LevelSurface:
     """A level surface: `outline` are its corners x, y [m] where its owner is nominally, `free` the boxes that are not.
 
     `taken` are rectangles (x0, y0, x1, y1) of what stands there already and stays.
@@ -55,7 +55,7 @@ class Request:
     scene: str
     seed: int
     things: Sequence[Thing]
-    supports: Sequence[Support]
+    supports: Sequence[LevelSurface]
     robots: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
     def to_json(self) -> str:

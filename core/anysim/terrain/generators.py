@@ -36,7 +36,7 @@ class Lattice(NamedTuple):
         return np.maximum(np.abs(self.x), np.abs(self.y))
 
 
-class Piece(NamedTuple):
+class HeightPatch(NamedTuple):
     """Heights (rows, cols) [m], first row at the lowest y; `top` is the height of the platform in the middle."""
 
     heights: Array
@@ -67,7 +67,7 @@ def at(span: float | tuple[float, float], difficulty: float) -> float:
 
 def generate(
     kind: str, parameters: Parameters, difficulty: float, size: tuple[float, float], cell: float, seed: tuple[int, ...]
-) -> Piece:
+) -> HeightPatch:
     """The heights of one piece of ground.
 
     Args:
@@ -83,7 +83,7 @@ def generate(
     grid = lattice(size, cell)
     rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed)))
     heights = np.round(GENERATORS[kind](grid, parameters, difficulty, rng), 6) + 0.0
-    return Piece(heights, float(heights[heights.shape[0] // 2, heights.shape[1] // 2]))
+    return HeightPatch(heights, float(heights[heights.shape[0] // 2, heights.shape[1] // 2]))
 
 
 def _room_around(grid: Lattice, platform: float, need: float, what: str) -> float:

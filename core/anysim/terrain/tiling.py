@@ -6,7 +6,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.model.world import Tile
-from anysim.terrain.generators import Piece, generate
+from anysim.terrain.generators import HeightPatch, generate
 from anysim_schemas.terrain import TerrainSpec, TilesSpec
 
 
@@ -37,7 +37,7 @@ def tile(spec: TerrainSpec, tiles: TilesSpec) -> Tiling:
     cell, rows, columns = spec.cell, tiles.rows, len(tiles.columns)
     n, b = round(tiles.size / cell), round(tiles.border / cell)
     heights = np.zeros((columns * n + 1 + 2 * b, rows * n + 1 + 2 * b))
-    pieces: dict[tuple[int, int], Piece] = {}
+    pieces: dict[tuple[int, int], HeightPatch] = {}
     for k, column in enumerate(tiles.columns):
         for row in range(rows):
             try:
