@@ -18,11 +18,10 @@ from pathlib import Path
 import numpy as np
 
 from anysim.api import compile_world, load
-from anysim.compile.room import furniture_names
 from anysim.engine.factory import create_simulation, runnable
 from anysim.managers.standard import standard_managers
 from anysim.math import pose as P
-from anysim_schemas.rooms import RoomSpec
+from anysim_schemas.rooms import RoomSpec, furniture_names
 
 DEPTH, DRIFT = 1e-3, 5e-3  # [m]
 SLACK = 2e-5  # [m] of rounding: PyBullet has hulls 1 mm larger than they are, which is DEPTH exactly

@@ -26,6 +26,7 @@ KINDS: Mapping[str, str] = {
     "oracles": "independent readers of robots that importers are held against, by file format",
     "assets": "builders of procedural assets",
     "layouts": "proposers of layouts",
+    "rooms": "builders of rooms",
 }
 """The kinds that anysim looks up, and what each is."""
 
@@ -35,10 +36,11 @@ INSTALL_HINTS: Mapping[tuple[str, str], str] = {
     ("engines", "sapien"): "anysim-sapien",
     ("writers", "mcap"): "anysim-mcap",
     ("readers", "mcap"): "anysim-mcap",
-    ("planners", "numba_ik"): "anysim-ik",
+    ("planners", "numba_ik"): "anysim-control",
     ("importers", "mjcf"): "anysim-mujoco",
     ("controllers", "policy"): "anysim-policy",
     ("oracles", "mjcf"): "anysim-mujoco",
+    ("rooms", "furnished"): "anysim-assets",
 }
 """Where well-known plugins come from, for the remedy in an error."""
 

@@ -1,6 +1,7 @@
 """A room: its plan, walls with doors and windows, and furniture, all made from a seed when the world is built."""
 
-from typing import Any, ClassVar, Literal
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal, get_args
 
 from pydantic import Field, model_validator
 
@@ -24,6 +25,10 @@ STYLES: dict[str, dict[Furniture, int]] = {
     "office": {"desk": 2, "chair": 2, "shelf": 2, "plant": 1},
 }
 """What stands in a room of a style."""
+
+
+FURNITURE: tuple[Furniture, ...] = get_args(Furniture)
+"""The kinds of furniture, in the order in which they look for a place."""
 
 
 class OpeningSpec(Spec):
@@ -121,3 +126,18 @@ class RoomSpec(Spec):
                 if not 0 <= self.wall_number(opening) < walls:
                     raise KeyFault(f"there are the walls 0 to {walls - 1}, got {opening.wall}", key, str(i), "wall")
         return self
+
+
+def names_of(pieces: Mapping[str, int]) -> list[tuple[str, str]]:
+    """(name, kind) of all pieces in the order of placement: `table` where there is one, else `chair_0`, `chair_1`."""
+    return [
+        (kind if pieces[kind] == 1 else f"{kind}_{i}", kind)
+        for kind in FURNITURE
+        if kind in pieces
+        for i in range(pieces[kind])
+    ]
+
+
+def furniture_names(spec: RoomSpec) -> list[str]:
+    """The entities that the furniture of a room becomes."""
+    return [name for name, _ in names_of(spec.pieces)]

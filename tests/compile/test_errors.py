@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from anysim import registry
 from anysim.assets.catalogue import CatalogueEntry, load_robot
 from anysim.compile import robot
 from anysim.compile.world import compile_world
@@ -143,3 +144,11 @@ def test_a_wrong_catalogue_entry_names_its_file(monkeypatch: pytest.MonkeyPatch)
     assert len(found) == len(starts), "\n".join(found)
     for text, start in zip(found, starts, strict=True):
         assert text.startswith(start)
+
+
+def test_a_room_needs_its_builder(monkeypatch: pytest.MonkeyPatch) -> None:
+    installed = registry._entries
+    monkeypatch.setattr(registry, "_entries", lambda kind: {} if kind == "rooms" else installed(kind))
+    with pytest.raises(SpecError, match=r"anysim-assets: pip install anysim-assets") as caught:
+        compile_world(WorldSpec.model_validate({"room": "kitchen"}))
+    assert [issue.path for issue in caught.value.issues] == ["room"]

@@ -16,7 +16,7 @@ from anysim.compile.dynamics import with_dynamics
 from anysim.compile.lights import compile_lights, compile_scenery
 from anysim.compile.population import add_population, check_names
 from anysim.compile.robot import add_robot
-from anysim.compile.room import add_room, furniture_names
+from anysim.compile.room import add_room
 from anysim.compile.sensors import with_sensors
 from anysim.compile.terrain import add_terrain
 from anysim.compile.variants import instances
@@ -27,6 +27,7 @@ from anysim.placement.nominal import place_nominally
 from anysim.placement.order import check_layout
 from anysim.randomization.distributions import nominal
 from anysim_schemas.engine import PhysicsSpec
+from anysim_schemas.rooms import furniture_names
 from anysim_schemas.run import RunSpec, WorldSpec
 
 

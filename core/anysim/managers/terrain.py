@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from anysim.compile.room import MAIN, ROOM, furniture_names
+from anysim.compile.room import MAIN, ROOM
 from anysim.conventions import GROUND, WORLD, Array
 from anysim.engine.base import SimEngine
 from anysim.errors import TaskError
@@ -19,6 +19,7 @@ from anysim.model.colors import rgb
 from anysim.model.world import World
 from anysim.randomization.draw import draw, is_random
 from anysim.randomization.streams import Origin
+from anysim_schemas.rooms import furniture_names
 from anysim_schemas.run import WorldSpec
 from anysim_schemas.values import Choice
 

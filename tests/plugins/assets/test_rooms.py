@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from anysim.compile.room import Furnished, room_of
 from anysim.compile.world import compile_world
 from anysim.errors import AnysimError, SpecError
 from anysim.geometry import polygon as G
 from anysim.issues import Issues
 from anysim.model.world import BodyKind, World
-from anysim.rooms.furnish import FRONT, HOSTS, NoPlace, furnish
-from anysim.rooms.furniture import MAKERS, piece
-from anysim.rooms.occupancy import Occupancy, footprints, occupancy
-from anysim.rooms.plan import plan_of
-from anysim_schemas.rooms import STYLES, RoomSpec
+from anysim_assets.rooms.furnish import FRONT, HOSTS, NoPlace, furnish
+from anysim_assets.rooms.furnished import Furnished, room_of
+from anysim_assets.rooms.furniture import MAKERS, piece
+from anysim_assets.rooms.occupancy import Occupancy, footprints, occupancy
+from anysim_assets.rooms.plan import plan_of
+from anysim_schemas.rooms import FURNITURE, STYLES, RoomSpec
 from anysim_schemas.run import WorldSpec
 
 L_SHAPE = [[0, 0], [6, 0], [6, 3], [3.5, 3], [3.5, 5.5], [0, 5.5]]
@@ -261,3 +261,8 @@ def test_the_way_between_doors_is_kept_or_refused() -> None:
 
 def test_styles_have_furniture_that_exists() -> None:
     assert {kind for table in STYLES.values() for kind in table} <= set(MAKERS)
+
+
+def test_kinds_of_furniture_are_placed_in_the_order_of_the_spec() -> None:
+    """The draws of a piece come from the number of its kind, its name from the order of the spec's kinds."""
+    assert tuple(MAKERS) == FURNITURE

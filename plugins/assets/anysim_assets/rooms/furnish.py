@@ -12,9 +12,10 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.geometry import polygon as G
-from anysim.rooms.furniture import MAKERS, Piece, piece
-from anysim.rooms.occupancy import Occupancy
-from anysim.rooms.plan import RoomPlan
+from anysim_assets.rooms.furniture import MAKERS, Piece, piece
+from anysim_assets.rooms.occupancy import Occupancy
+from anysim_assets.rooms.plan import RoomPlan
+from anysim_schemas.rooms import names_of
 
 ARRANGEMENTS = 24
 """Arrangements that are begun before the furniture is said not to fit."""
@@ -57,16 +58,6 @@ class Placed:
         """The rectangle (4, 2) in front of it."""
         ahead = G.turned(np.array([0.0, self.piece.half[1] + depth / 2]), self.yaw)
         return G.oriented_rectangle(self.middle + ahead, (self.piece.half[0], depth / 2), self.yaw)
-
-
-def names_of(pieces: Mapping[str, int]) -> list[tuple[str, str]]:
-    """(name, kind) of all pieces in the order of placement: `table` where there is one, else `chair_0`, `chair_1`."""
-    return [
-        (kind if pieces[kind] == 1 else f"{kind}_{i}", kind)
-        for kind in MAKERS
-        if kind in pieces
-        for i in range(pieces[kind])
-    ]
 
 
 def furnish(plan: RoomPlan, pieces: Mapping[str, int], walkway: float, seed: int) -> list[Placed]:
