@@ -10,7 +10,7 @@ from anysim.cli.options import AsJson, Overrides, Seed, Task
 
 def explain(
     task: Task,
-    seed: Seed = 0,
+    seed: Seed = None,
     episode: Annotated[int, typer.Option("--episode", "-E", min=0, help="The env's episode, counted from 0.")] = 0,
     env: Annotated[int, typer.Option("--env", "-i", min=0, help="The env, counted from 0.")] = 0,
     override: Overrides = None,
@@ -30,7 +30,7 @@ def explain(
         print_json({"episode_seed": found.episode_seed, "draws": [draw._asdict() for draw in found.draws]})
         return
     print_table(
-        f"Env {env}, episode {episode} of seed {seed}",
+        f"Env {env}, episode {episode} of seed {found.seed}",
         ("drawn", "value", "stream", "where"),
         [(draw.path or draw.name, _text(draw.value), draw.stream, draw.where) for draw in found.draws],
     )

@@ -9,7 +9,10 @@ Engine = Annotated[str | None, typer.Option("--engine", "-e", help="An installed
 NumEnvs = Annotated[
     int | None, typer.Option("--num-envs", "-n", min=1, help="Parallel environments; wins over the file.")
 ]
-Seed = Annotated[int, typer.Option("--seed", "-s", min=0, help="The seed that everything random follows from.")]
+Seed = Annotated[
+    int | None,
+    typer.Option("--seed", "-s", min=0, help="The seed that everything random follows from; wins over the file's."),
+]
 Overrides = Annotated[
     list[str] | None,
     typer.Option(

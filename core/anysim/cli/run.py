@@ -19,7 +19,7 @@ def run(
     engine: Engine = None,
     num_envs: NumEnvs = None,
     episodes: Annotated[int, typer.Option("--episodes", "-k", min=1, help="Episodes to attempt, over all envs.")] = 1,
-    seed: Seed = 0,
+    seed: Seed = None,
     override: Overrides = None,
     out: Annotated[
         Path | None, typer.Option(help="Directory of the trajectories; default runs/<task>-<engine>-<id>.")
@@ -43,6 +43,7 @@ def run(
     from anysim.skills.runner import SkillPolicy
 
     with make(task, engine=engine, num_envs=num_envs, overrides=override or ()) as env:
+        seed = env.spec.seed if seed is None else seed
         directory = out or Path("runs") / f"{env.name}-{env.engine.name}-{_run_id(env, seed)}"
         collector = Collector(env, SkillPolicy(env), directory, episodes, seed)
         if not json:

@@ -22,7 +22,7 @@ from anysim_schemas.run import RunSpec
 
 def standard_managers(spec: RunSpec, world: World, num_envs: int, proposals: Proposed | None = None) -> list[Manager]:
     """Configured and built, sharing one set of streams. `proposals` is what `make` takes for poses."""
-    streams, episodes = Streams(num_envs), Episodes(num_envs)
+    streams, episodes = Streams(num_envs, spec.seed), Episodes(num_envs)
     managers: list[Manager] = [
         TerrainManager(), PopulationManager(), LayoutManager(proposals), SceneManager(), SceneParameterManager(),
         RobotResetManager(), ActionManager(), LightManager(), CameraManager(), CaptureManager(),

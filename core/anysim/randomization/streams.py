@@ -59,7 +59,8 @@ class Streams:
         overridden: for each env, the values that its current episode has instead of its draws, by dotted path.
     """
 
-    def __init__(self, num_envs: int) -> None:
+    def __init__(self, num_envs: int, seed: int = 0) -> None:
+        """`seed` is that of envs which are never given another."""
         self.num_envs = num_envs
         self.episode_seed = np.zeros(num_envs, dtype=np.uint64)
         self.draws: list[dict[str, object]] = [{} for _ in range(num_envs)]
@@ -71,12 +72,7 @@ class Streams:
             "uinteger": 0,
             "state": {"counter": np.zeros(4, dtype=np.uint64), "key": np.zeros(2, dtype=np.uint64)},
         }  # fmt: skip
-        self._masters: list[np.random.Generator | None] = [None] * num_envs
-
-    @property
-    def seeded(self) -> bool:
-        """Whether every env has been seeded."""
-        return all(master is not None for master in self._masters)
+        self._masters = [_master([seed, env]) for env in range(num_envs)]
 
     def seed(self, seed: int | Sequence[int], env_ids: Array) -> None:
         """Seed envs: an int seeds env i with (seed, i); a sequence gives one seed to each of `env_ids`."""
@@ -92,12 +88,9 @@ class Streams:
             self._masters[env] = _master(entropy)
 
     def begin(self, env_ids: Array, episode_seeds: Sequence[int] | Array | None = None) -> None:
-        """Start new episodes: draw their seeds, or take those given. Envs never seeded get entropy from the system."""
+        """Start new episodes: draw their seeds, or take those given."""
         for row, env in enumerate(env_ids):
-            master = self._masters[env]
-            if master is None:
-                master = self._masters[env] = np.random.default_rng()
-            drawn = _next_episode(master) if episode_seeds is None else int(episode_seeds[row])
+            drawn = _next_episode(self._masters[env]) if episode_seeds is None else int(episode_seeds[row])
             self.episode_seed[env] = drawn
             self.draws[env], self.origins[env], self.overridden[env] = {}, {}, {}
 
@@ -144,7 +137,7 @@ class Streams:
             "draws": [dict(self.draws[i]) for i in env_ids],
             "origins": [{name: tuple(origin) for name, origin in self.origins[i].items()} for i in env_ids],
             "overridden": [dict(self.overridden[i]) for i in env_ids],
-            "masters": [None if m is None else m.bit_generator.state for m in masters],
+            "masters": [master.bit_generator.state for master in masters],
         }
 
     def restore(self, env_ids: Array, data: Mapping[str, Any]) -> None:
@@ -154,8 +147,5 @@ class Streams:
             self.episode_seed[env] = data["episode_seed"][row]
             self.draws[env], self.overridden[env] = dict(data["draws"][row]), dict(data["overridden"][row])
             self.origins[env] = {name: Origin(*origin) for name, origin in data["origins"][row].items()}
-            master = None
-            if masters[row] is not None:
-                master = np.random.Generator(np.random.PCG64())
-                master.bit_generator.state = masters[row]
-            self._masters[env] = master
+            self._masters[env] = np.random.Generator(np.random.PCG64())
+            self._masters[env].bit_generator.state = masters[row]

@@ -32,6 +32,7 @@ class Draw(NamedTuple):
 class Explanation(NamedTuple):
     """The draws of one episode, in the order of the reset, and the seed that gives it again."""
 
+    seed: int
     episode_seed: int
     draws: tuple[Draw, ...]
 
@@ -39,17 +40,18 @@ class Explanation(NamedTuple):
 def explain(
     source: str | Path | LoadedRun | Mapping[str, Any],
     *,
-    seed: int = 0,
+    seed: int | None = None,
     env: int = 0,
     episode: int = 0,
     overrides: Sequence[str] = (),
 ) -> Explanation:
-    """The draws of episode `episode` (counted from 0) of env `env` under a global seed.
+    """The draws of episode `episode` (counted from 0) of env `env` under a global seed, by default the file's.
 
     Draws depend on the seed, the env and the names of streams alone, so no engine is needed: the reset runs on the
     kinematic one, with a single env.
     """
     loaded = source if isinstance(source, Loaded) else load(source, overrides=overrides)
+    seed = loaded.spec.seed if seed is None else seed
     chosen = episode_seed(seed, env, episode)
     with blind_env(loaded, compile_world(loaded), "explain") as one:
         one.reset(episode_seeds=[chosen])
@@ -58,4 +60,4 @@ def explain(
         Draw(name, value, origins[name].stream, origins[name].source, place_of(loaded, origins[name].source))
         for name, value in values.items()
     ]
-    return Explanation(chosen, tuple(draws))
+    return Explanation(seed, chosen, tuple(draws))

@@ -118,7 +118,7 @@ class TaskEnv:
 
         Args:
             seed: an int seeds env i with (seed, i), whatever N; a sequence gives each chosen env its own seed; None
-                goes on with the generators as they are.
+                goes on with the generators as they are, at first those of the spec's seed.
             episode_seeds: draw exactly these episodes instead (for replay).
             overrides: for these episodes, values in place of those that the spec has drawn or fixed, by dotted path, as
                 in `{"layout.cube.x": 0.4}`; or a list of such mappings, one for each env. Nothing else moves.

@@ -22,7 +22,7 @@ def compare(
         typer.Option("--engines", "-e", help="Names separated by commas; default all installed ones with dynamics."),
     ] = None,
     episodes: Annotated[int, typer.Option("--episodes", "-k", min=1, help="Episodes of the layer task.")] = 16,
-    seed: Seed = 0,
+    seed: Seed = None,
     layers: Annotated[
         str | None,
         typer.Option(help="Some of asset, kinematics, actuation, contact, camera, task; default all that apply."),
@@ -56,6 +56,7 @@ def compare(
     from anysim_parity.write import check_out, write
 
     loaded = load(task, overrides=override or [])
+    seed = loaded.spec.seed if seed is None else seed
     name = Path(task).stem
     directory = out or Path("runs") / "compare" / f"{name}-seed{seed}"
     check_out(directory)

@@ -17,7 +17,7 @@ def picture(
         typer.Option("--engines", "-e", help="Names separated by commas; default all installed ones that draw."),
     ] = None,
     num_envs: Annotated[int, typer.Option("--num-envs", "-n", min=1, help="Episodes, one in each env.")] = 4,
-    seed: Seed = 0,
+    seed: Seed = None,
     camera: Annotated[str | None, typer.Option(help="One of the world's; its first, or an overview.")] = None,
     size: Annotated[tuple[int, int] | None, typer.Option(help="Width and height of one image [px].")] = None,
     seconds: Annotated[float, typer.Option(min=0.0, help="Simulated time before the image is taken.")] = 0.0,
@@ -33,6 +33,7 @@ def picture(
       anysim picture pick_cube
       anysim picture my_world.yaml --engines mujoco,sapien -n 16 --seconds 1 --out world.png
     """
+    from anysim.api import load
     from anysim.cli.output import working_on
     from anysim.engine.capability import Capability
     from anysim.engine.factory import runnable
@@ -43,15 +44,16 @@ def picture(
     names = [name.strip() for name in engines.split(",")] if engines else list(runnable(Capability.RENDER_RGB))
     file = Path(world)
     with working_on(f"drawing {world}"):
+        loaded = load(file if file.exists() else world, overrides=override or [])
+        seed = loaded.spec.seed if seed is None else seed
         found = pictures(
-            file if file.exists() else world,
+            loaded,
             names,
             num_envs=num_envs,
             seed=seed,
             camera=camera,
             size=size,
             seconds=seconds,
-            overrides=override or [],
         )
         target = out or Path("runs") / "pictures" / f"{file.stem}-seed{seed}.png"
         figure = sheet(found, columns)
