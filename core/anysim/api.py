@@ -9,14 +9,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict
 
 from anysim import registry
+from anysim.controllers.base import DEFAULT_CONTROLLER
 from anysim.conventions import GROUND
 from anysim.engine.factory import ENGINE_VARIABLE, create_simulation, engine_class
-from anysim.errors import AssetError, SpecError, SpecIssue, TaskError
-from anysim.plugin_options import resolve_options
+from anysim.errors import AssetError, PluginError, SpecError, SpecIssue, TaskError
+from anysim.plugin_parameters import options_model
 from anysim_schemas.load import Loaded, LoadedRun, load_run
 from anysim_schemas.object_source import Source, SourceChoice, SourceFolder
+from anysim_schemas.plugin import UnknownPlugin
 
 if TYPE_CHECKING:
     from anysim.engine.base import SimEngine
@@ -255,3 +258,32 @@ def make(
     if seed is not None:
         env.streams.seed(seed, np.arange(spec.num_envs))
     return env
+
+
+TERM_KINDS = ("observation", "reward", "predicate", "command", "event")
+
+
+class _Anything(BaseModel):
+    """Options that somebody else checks."""
+
+    model_config = ConfigDict(extra="allow")
+
+
+def resolve_options(kind: str, name: str) -> type[BaseModel] | None:
+    """The options model of a plugin by slot kind and name; see `anysim_schemas.plugin`.
+
+    Raises:
+        UnknownPlugin: with a sentence that lists what exists.
+    """
+    from anysim.task.term_registry import find
+
+    try:
+        if (kind, name) == ("controller", DEFAULT_CONTROLLER):
+            return _Anything
+        if kind in TERM_KINDS:
+            return options_model(find(kind, name))
+        if kind in ("engine", "writer"):
+            return registry.load(f"{kind}s", name).options_model()
+        return options_model(registry.load(f"{kind}s", name))
+    except PluginError as error:
+        raise UnknownPlugin(str(error)) from error

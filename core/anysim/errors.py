@@ -1,4 +1,7 @@
-"""The error family: every message says what, where, what was expected, what exists, and the remedy."""
+"""The error family: every message says what, where, what was expected, what exists, and the remedy.
+
+`Issues` collects what is wrong with a spec, so that all of it is said at once.
+"""
 
 import difflib
 from collections.abc import Iterable, Sequence
@@ -6,9 +9,22 @@ from collections.abc import Iterable, Sequence
 from anysim_schemas.errors import AnysimError, SpecError, SpecIssue
 
 __all__ = [
-    "AnysimError", "AssetError", "CapabilityError", "EngineError", "NameLookupError", "PluginError", "RecordError",
-    "SnapshotError", "SpecError", "SpecIssue", "StaleStateError", "TaskError", "listing", "suggest",
-]  # fmt: skip
+    "AnysimError",
+    "AssetError",
+    "CapabilityError",
+    "EngineError",
+    "Issues",
+    "NameLookupError",
+    "PluginError",
+    "RecordError",
+    "SnapshotError",
+    "SpecError",
+    "SpecIssue",
+    "StaleStateError",
+    "TaskError",
+    "listing",
+    "suggest",
+]
 
 
 class PluginError(AnysimError):
@@ -67,3 +83,50 @@ def suggest(name: str, names: Sequence[str]) -> str:
     """`; did you mean 'x'?` for the nearest existing name, else an empty string."""
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
     return f"; did you mean '{near[0]}'?" if near else ""
+
+
+class Issues:
+    """Faults found so far. `at(...)` gives a view whose paths start deeper; all views share one list."""
+
+    def __init__(
+        self,
+        prefix: str = "",
+        where: str = "",
+        spec: list[SpecIssue] | None = None,
+        assets: list[SpecIssue] | None = None,
+    ) -> None:
+        self._prefix, self._where = prefix, where
+        self._spec: list[SpecIssue] = [] if spec is None else spec
+        self._assets: list[SpecIssue] = [] if assets is None else assets
+
+    def at(self, *parts: str | int) -> "Issues":
+        """The same list, at a deeper path."""
+        return Issues(self._join(*parts), self._where, self._spec, self._assets)
+
+    def inside(self, where: str) -> "Issues":
+        """The same list, for another file; paths start anew."""
+        return Issues("", where, self._spec, self._assets)
+
+    def add(self, path: str, message: str) -> None:
+        """A fault at `path` below this view's path."""
+        _note(self._spec, SpecIssue(self._where, self._join(path) if path else self._prefix, message))
+
+    def asset(self, path: str, error: AssetError) -> None:
+        """An asset that `path` asks for and that cannot be had."""
+        _note(self._assets, SpecIssue(self._where, self._join(path), str(error)))
+
+    def raise_if_any(self) -> None:
+        """Raises SpecError with all faults; AssetError where nothing but assets are at fault."""
+        if self._spec:
+            raise SpecError([*self._spec, *self._assets])
+        if self._assets:
+            raise AssetError(issues=self._assets)
+
+    def _join(self, *parts: str | int) -> str:
+        return ".".join(str(part) for part in (self._prefix, *parts) if part != "")
+
+
+def _note(found: list[SpecIssue], issue: SpecIssue) -> None:
+    """Once: what can be several things is compiled several times, and has its faults in all of them."""
+    if issue not in found:
+        found.append(issue)

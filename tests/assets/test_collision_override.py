@@ -6,8 +6,8 @@ from math import pi
 import pytest
 from pydantic import ValidationError
 
-from anysim.assets.collision_override import with_solids
 from anysim.assets.model import ImportedModel
+from anysim.compile.collisions import with_solids
 from anysim.errors import AssetError
 from anysim.model.world import Box, Capsule, Cylinder, Sphere
 from anysim_schemas.robot_model import SolidSpec

@@ -9,7 +9,7 @@ import trimesh
 from anysim import cache
 from anysim.assets import meshes
 from anysim.errors import AssetError
-from anysim.geometry.hull import convex_hull
+from anysim.geometry.tessellate import convex_hull
 
 
 @pytest.fixture(autouse=True)

@@ -10,8 +10,7 @@ from anysim.assets.procedural import build
 from anysim.assets.vehicles import PLANAR_JOINTS, as_vehicle, planar
 from anysim.compile.robot import import_robot
 from anysim.compile.vehicle import check_vehicle
-from anysim.errors import AssetError, SpecError
-from anysim.issues import Issues
+from anysim.errors import AssetError, Issues, SpecError
 from anysim.model.world import BodyKind, JointType, Sphere
 from anysim_schemas.robot_model import RobotModelSpec
 

@@ -12,7 +12,7 @@ import pytest
 
 from anysim.engine.kinematic import NullEngine
 from anysim.engine.sharded.engine import sharded
-from anysim.engine.sharded.pool_cache import keeping_workers
+from anysim.engine.sharded.pool import keeping_workers
 from anysim.testing import worlds
 from anysim.testing.compare import assert_same, read
 from tests.engine.shards_help import PROC, alive, children, gone, segments

@@ -6,7 +6,7 @@ from math import cos, sin
 import numpy as np
 import pytest
 
-from anysim.engine.drive_checks import damping_ratio, speed_bound
+from anysim.engine.requirements import damping_ratio, speed_bound
 from anysim.kinematics.dynamics import Mechanism, coupling, frame_jacobians, mass_matrix, point_jacobian
 from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.sketch import Sketch

@@ -10,7 +10,7 @@ from anysim.api import check_engine, compile_world, load
 from anysim.engine.factory import engine_class
 from anysim.engine.kinematic import NullEngine
 from anysim.errors import CapabilityError, SpecError
-from anysim.randomization.noise import noise_rows
+from anysim.randomization.draw import noise_rows
 from anysim.randomization.streams import Streams
 from anysim.record.explain import explain
 from anysim.task.env import TaskEnv

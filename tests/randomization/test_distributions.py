@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from anysim.errors import SpecError
-from anysim.issues import Issues
-from anysim.model.colors import COLORS, nominal_rgb
+from anysim.errors import Issues, SpecError
+from anysim.model.appearance import COLORS, nominal_rgb
 from anysim.randomization.distributions import draw_one, extremes, nominal, quantile, weighted, written
 from anysim_schemas.values import Choice, LogUniform, Normal, NormalParameters, Range
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array, xyzw_from_wxyz
-from anysim.engine.damping import drag, gain
+from anysim.kinematics.dynamics import drag, gain
 from anysim.math import pose as P
 from anysim.model.world import World
 from anysim_mujoco.layout import Layout

@@ -13,7 +13,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.control import MODES, Control
-from anysim.engine.drive_checks import speed_bound
+from anysim.engine.requirements import speed_bound
 from anysim.model.world import ControlMode, World
 from anysim_mujoco.layout import Layout
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.control import MODES, Control
-from anysim.engine.damping import drag, gain
-from anysim.engine.drive_checks import speed_bound
+from anysim.engine.requirements import speed_bound
+from anysim.kinematics.dynamics import drag, gain
 from anysim.model.world import Actuation, ControlMode, World
 from anysim_pybullet import kernels as K
 from anysim_pybullet.client import Env

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array, xyzw_from_wxyz
-from anysim.engine.damping import gain
 from anysim.engine.lighting import LIGHTS, SURROUNDINGS, Looks
 from anysim.engine.parameters import nominal
+from anysim.kinematics.dynamics import gain
 from anysim.kinematics.inertia import check_physical, from_principal, principal
 from anysim.model.world import World
 from anysim_sapien.drives import Drives

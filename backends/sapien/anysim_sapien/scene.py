@@ -11,7 +11,7 @@ from weakref import WeakSet
 import numpy as np
 
 from anysim.conventions import WORLD, Array, wxyz_from_xyzw
-from anysim.engine.damping import gain
+from anysim.kinematics.dynamics import gain
 from anysim.model.world import Body, BodyKind, JointType, Solver
 from anysim_sapien.exclusions import Group
 from anysim_sapien.journal import Journal, Op

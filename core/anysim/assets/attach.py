@@ -16,7 +16,7 @@ from anysim.conventions import Array
 from anysim.errors import AssetError, listing, suggest
 from anysim.kinematics import inertia
 from anysim.math import pose as P
-from anysim.model.rounding import split
+from anysim.model.hash import split
 from anysim.model.world import Body, Geom, HeightFieldShape, Joint, MeshShape, Site
 
 _IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])

@@ -13,7 +13,7 @@ import numpy as np
 from anysim import cache
 from anysim.conventions import Array
 from anysim.errors import AssetError
-from anysim.geometry.hull import convex_hull
+from anysim.geometry.tessellate import convex_hull
 from anysim.model.world import Mesh, Vec3
 
 FORMATS = (".stl", ".obj", ".dae", ".glb", ".ply")

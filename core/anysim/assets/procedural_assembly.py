@@ -9,8 +9,8 @@ from anysim.assets.model import ImportedModel
 from anysim.conventions import IDENTITY_QUATERNION
 from anysim.kinematics import inertia
 from anysim.math import pose as P
-from anysim.model.colors import rgb
-from anysim.model.rounding import split, tidy
+from anysim.model.appearance import rgb
+from anysim.model.hash import split, tidy
 from anysim.model.world import (
     ORIGIN,
     Body,

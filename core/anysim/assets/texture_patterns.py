@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.model.colors import Rgb
+from anysim.model.appearance import Rgb
 
 _SQUARES, _BANDS, _DOTS = 4, 4, 4
 _ROWS, _BRICKS, _MORTAR = 6, 3, 0.08

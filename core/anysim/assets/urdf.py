@@ -27,7 +27,7 @@ from anysim.conventions import Array
 from anysim.errors import AssetError, listing, suggest
 from anysim.kinematics import inertia
 from anysim.math import pose as P
-from anysim.model.rounding import split, tidy
+from anysim.model.hash import split, tidy
 from anysim.model.world import Body, BodyKind, Inertial, Joint, JointType, Mimic, Site
 
 _LIMIT_SLACK = 1e-3  # [rad] or [m] that limits of followers and leaders may differ by, from rounding

@@ -13,7 +13,7 @@ from anysim.assets.uri import resolve_reference
 from anysim.conventions import Array
 from anysim.errors import AssetError
 from anysim.math import pose as P
-from anysim.model.rounding import split
+from anysim.model.hash import split
 from anysim.model.world import Box, Cylinder, Geom, Mesh, MeshShape, Quat, Shape, Sphere, Vec3
 
 _GREY = (0.7, 0.7, 0.7, 1.0)

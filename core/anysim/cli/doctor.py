@@ -1,13 +1,23 @@
 """`anysim doctor`: what works on this machine, and the remedy for what does not."""
 
+import os
+import platform
+from typing import TYPE_CHECKING
+
 import typer
 
 from anysim.cli.options import AsJson
+
+if TYPE_CHECKING:
+    from anysim.engine.doctor import Finding
 
 STYLES = {
     "ok": "green", "note": "dim", "absent": "dim", "missing": "yellow", "unavailable": "red", "wrong": "bold red",
     "broken": "bold red",
 }  # fmt: skip
+
+VARIABLES = ("ANYSIM_ENGINE", "ANYSIM_CACHE_DIR", "MUJOCO_GL", "VK_DRIVER_FILES", "VK_ICD_FILENAMES", "OMP_NUM_THREADS")
+"""Environment variables that change what anysim or an engine does."""
 
 
 def doctor(json: AsJson = False) -> None:
@@ -17,7 +27,6 @@ def doctor(json: AsJson = False) -> None:
     costs nothing but its own rows. Exit code 1 if no engine with dynamics works.
     """
     from anysim import registry
-    from anysim.cli.machine import machine
     from anysim.cli.output import print_json, print_table, working_on
     from anysim.engine.doctor import Finding, Health, examine
 
@@ -39,3 +48,35 @@ def doctor(json: AsJson = False) -> None:
         print_table("anysim doctor", Finding._fields, rows, STYLES)
     if not works:
         raise typer.Exit(1)
+
+
+def machine() -> "list[Finding]":
+    """Versions, processors, the cache, and the variables that are set."""
+    from anysim import __version__
+    from anysim.engine.doctor import Finding, Health
+
+    rows = [
+        Finding("anysim", Health.OK, __version__),
+        Finding("python", Health.OK, f"{platform.python_version()} on {platform.system()} {platform.machine()}"),
+        Finding("processors", Health.OK, _processors()),
+        _cache(),
+    ]
+    return rows + [Finding(f"${name}", Health.NOTE, os.environ[name]) for name in VARIABLES if os.environ.get(name)]
+
+
+def _processors() -> str:
+    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return f"{usable} usable of {os.cpu_count()}"
+
+
+def _cache() -> "Finding":
+    from anysim.cache import cache_folder
+    from anysim.engine.doctor import Finding, Health
+
+    folder = cache_folder()
+    nearest = next((p for p in (folder, *folder.parents) if p.exists()), folder)
+    if os.access(nearest, os.W_OK):
+        return Finding("cache", Health.OK, str(folder))
+    return Finding(
+        "cache", Health.UNAVAILABLE, f"{folder} cannot be written", "set ANYSIM_CACHE_DIR to a folder of yours"
+    )

@@ -7,7 +7,7 @@ import typer
 
 from anysim import __version__
 from anysim.cli import audit, check, doctor, explain, listing, render, replay, run, schema, snapshot
-from anysim.cli.help import Commands
+from anysim.cli.options import Commands
 
 EXIT_CODES = """Exit codes: 0 done; 1 it ran, and the answer is no (a replay that differs, a file with faults, too few
 successes); 2 bad input; 130 interrupted."""

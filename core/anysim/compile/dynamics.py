@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from anysim.errors import NameLookupError
-from anysim.issues import Issues
+from anysim.errors import Issues, NameLookupError
 from anysim.kinematics import inertia
 from anysim.math import pose as P
 from anysim.model.frames import find_frame

@@ -15,9 +15,8 @@ from anysim.compile.object import add_object
 from anysim.compile.robot import add_robot, placement
 from anysim.compile.sensors import compile_camera
 from anysim.conventions import GROUND, WORLD
-from anysim.errors import NameLookupError, SpecError, SpecIssue, listing, suggest
-from anysim.issues import Issues
-from anysim.model.rounding import split
+from anysim.errors import Issues, NameLookupError, SpecError, SpecIssue, listing, suggest
+from anysim.model.hash import split
 from anysim.model.slots import members
 from anysim.model.world import Channel, MeshShape, Quat, Robot, Slot, Vec3, World
 from anysim_schemas.base import Spec

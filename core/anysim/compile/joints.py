@@ -7,8 +7,7 @@ from math import isfinite
 from typing import Any, NamedTuple
 
 from anysim.assets.model import ImportedModel
-from anysim.errors import listing, suggest
-from anysim.issues import Issues
+from anysim.errors import Issues, listing, suggest
 from anysim.model.world import Joint
 from anysim.randomization.distributions import nominal, written
 from anysim_schemas.joints import ObjectJointSpec

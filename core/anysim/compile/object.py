@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from anysim.assets.contact_presets import surface
 from anysim.assets.load import import_asset
 from anysim.assets.meshes import collision_mesh, visual_parts
 from anysim.assets.model import ImportedModel, ImportNote
@@ -12,13 +11,12 @@ from anysim.assets.procedural import build
 from anysim.assets.uri import locate
 from anysim.compile.builder import WorldBuilder
 from anysim.compile.joints import with_joints
-from anysim.compile.physical import with_matter
+from anysim.compile.physical import surface, with_matter
 from anysim.compile.variants import INSTANCER, KeyedSource, source_text
 from anysim.conventions import IDENTITY_QUATERNION
-from anysim.errors import AssetError, PluginError, SpecError, listing
-from anysim.issues import Issues
+from anysim.errors import AssetError, Issues, PluginError, SpecError, listing
 from anysim.kinematics import inertia
-from anysim.model.colors import Rgb, nominal_rgb
+from anysim.model.appearance import Rgb, nominal_rgb
 from anysim.model.world import (
     ORIGIN,
     Body,

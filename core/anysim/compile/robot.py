@@ -10,18 +10,17 @@ import numpy as np
 
 from anysim.assets.attach import attach
 from anysim.assets.catalogue import CatalogueEntry, load_robot, missing_source
-from anysim.assets.collision_override import with_solids
-from anysim.assets.contact_presets import GRIPPER_LIMIT_SOFTNESS, surface
 from anysim.assets.load import import_asset
 from anysim.assets.model import ImportedModel, ImportNote
 from anysim.assets.procedural import build
 from anysim.assets.vehicles import as_vehicle
 from anysim.compile.builder import WorldBuilder
+from anysim.compile.collisions import with_solids
+from anysim.compile.physical import GRIPPER_LIMIT_SOFTNESS, surface
 from anysim.compile.vehicle import check_vehicle
-from anysim.errors import AssetError, PluginError, SpecError, listing, suggest
-from anysim.issues import Issues
+from anysim.errors import AssetError, Issues, PluginError, SpecError, listing, suggest
 from anysim.math import pose as P
-from anysim.model.rounding import split
+from anysim.model.hash import split
 from anysim.model.world import (
     Actuator,
     BodyKind,

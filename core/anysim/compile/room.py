@@ -7,8 +7,7 @@ from typing import NamedTuple
 from anysim import registry
 from anysim.assets.model import ImportedModel
 from anysim.compile.builder import WorldBuilder
-from anysim.errors import PluginError
-from anysim.issues import Issues
+from anysim.errors import Issues, PluginError
 from anysim.model.world import BodyKind, EntityKind, Quat, Vec3
 from anysim_schemas.rooms import RoomSpec, furniture_names
 from anysim_schemas.run import WorldSpec

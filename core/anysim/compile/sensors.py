@@ -6,11 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from anysim.conventions import WORLD
-from anysim.errors import NameLookupError, listing, suggest
-from anysim.issues import Issues
+from anysim.errors import Issues, NameLookupError, listing, suggest
 from anysim.math import pose as P
 from anysim.model.frames import find_bodies, find_frame
-from anysim.model.rounding import split
+from anysim.model.hash import split
 from anysim.model.slots import members
 from anysim.model.world import Camera, ContactSensor, World
 from anysim.randomization.distributions import nominal

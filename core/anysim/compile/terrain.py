@@ -8,13 +8,11 @@ from anysim.assets.meshes import FORMATS
 from anysim.assets.uri import locate
 from anysim.compile.builder import WorldBuilder
 from anysim.conventions import GROUND, WORLD, Array
-from anysim.errors import AssetError
-from anysim.issues import Issues
-from anysim.model.colors import Rgb, nominal_rgb
+from anysim.errors import AssetError, Issues
+from anysim.model.appearance import Rgb, nominal_rgb
 from anysim.model.world import ORIGIN, Geom, HeightField, HeightFieldShape, MeshShape, Plane, Shape, Surface, Vec3
 from anysim.terrain.files import heights_of_mesh, read_heights, read_mesh
-from anysim.terrain.generators import generate
-from anysim.terrain.tiling import tile
+from anysim.terrain.generators import generate, tile
 from anysim_schemas.terrain import GENERATED, TerrainSpec
 
 DIFFICULTY = 0.5

@@ -7,8 +7,7 @@ import numpy as np
 
 from anysim.assets.model import ImportedModel
 from anysim.conventions import Array
-from anysim.errors import listing, suggest
-from anysim.issues import Issues
+from anysim.errors import Issues, listing, suggest
 from anysim.math import pose as P
 from anysim.model.world import Joint, JointType
 from anysim_schemas.robot_model import RobotModelSpec

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from anysim.assets.model import ImportNote
+from anysim.compile.appearance import compile_lights, compile_scenery
 from anysim.compile.builder import WorldBuilder
 from anysim.compile.collisions import with_exclusions
 from anysim.compile.dynamics import with_dynamics
-from anysim.compile.lights import compile_lights, compile_scenery
 from anysim.compile.population import add_population, check_names
 from anysim.compile.robot import add_robot
 from anysim.compile.room import add_room
@@ -21,7 +21,7 @@ from anysim.compile.sensors import with_sensors
 from anysim.compile.terrain import add_terrain
 from anysim.compile.variants import instances
 from anysim.conventions import GROUND
-from anysim.issues import Issues
+from anysim.errors import Issues
 from anysim.model.world import Actuation, Physics, Slot, World
 from anysim.placement.nominal import place_nominally
 from anysim.placement.order import check_layout

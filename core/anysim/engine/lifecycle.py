@@ -13,12 +13,11 @@ from anysim.engine import arguments
 from anysim.engine.capability import Allowance, Capabilities, Capability, Need, check
 from anysim.engine.control import CommandBuffer
 from anysim.engine.doctor import Finding
-from anysim.engine.drive_checks import check_drives
 from anysim.engine.options import EngineOptions
 from anysim.engine.presence import Lifecycle, Presence, write_present
 from anysim.engine.primitives import Primitives
 from anysim.engine.records import EnvRecords, Kept
-from anysim.engine.requirements import needs_of
+from anysim.engine.requirements import check_drives, needs_of
 from anysim.engine.state import Availability, State
 from anysim.errors import CapabilityError, EngineError
 from anysim.model.index import Index

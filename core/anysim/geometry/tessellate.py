@@ -1,10 +1,11 @@
-"""Primitives as triangles, for renderers that draw nothing else or put textures on their own shapes in another way."""
+"""Triangles: of primitives, for renderers that need them, and of the convex hull of points."""
 
 from math import pi
 
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.errors import AssetError
 from anysim.model.shapes import Box, Capsule, Cylinder, Shape, Sphere
 
 ROUND = 16
@@ -46,3 +47,64 @@ def turned(across: Array, height: Array) -> tuple[Array, Array]:
     b = (ring * 2 * ROUND + (place + 1) % (2 * ROUND)).ravel()
     lower, upper = np.stack([a, b, b + 2 * ROUND], axis=1), np.stack([a, b + 2 * ROUND, a + 2 * ROUND], axis=1)
     return vertices, np.concatenate([lower, upper])
+
+
+_THINNEST = 1e-3  # [m] that a flat mesh is thickened to, along the direction in which it has no extent
+
+
+def convex_hull(points: Array, budget: int) -> tuple[Array, Array]:
+    """The convex hull of points (V, 3): vertices (K, 3) with K <= budget and outward faces (F, 3).
+
+    A larger hull is approximated from inside: from its extreme points along the axes on, the vertex farthest outside of
+    the present hull is added until the budget is used. Points in a plane are thickened to a millimetre.
+
+    Raises:
+        AssetError: fewer than three distinct points, or all in one line.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    points = _with_volume(np.unique(np.asarray(points, dtype=float), axis=0))
+    try:
+        full = points[np.sort(ConvexHull(points).vertices)]
+        if len(full) > budget:
+            full = full[_greedy(full, budget)]
+        hull = ConvexHull(full)
+    except QhullError as error:
+        raise AssetError(f"a collision mesh has no convex hull: {str(error).splitlines()[0]}") from error
+    vertices = full[np.sort(hull.vertices)]
+    number = {old: new for new, old in enumerate(np.sort(hull.vertices).tolist())}
+    faces = np.array([[number[i] for i in row] for row in hull.simplices.tolist()], dtype=np.int32)
+    a, b, c = vertices[faces[:, 0]], vertices[faces[:, 1]], vertices[faces[:, 2]]
+    inward = (np.cross(b - a, c - a) * (a - vertices.mean(axis=0))).sum(axis=1) < 0
+    faces[inward] = faces[inward][:, ::-1]
+    return vertices, faces
+
+
+def _with_volume(points: Array) -> Array:
+    centred = points - points.mean(axis=0) if len(points) else points
+    if len(points) < 3:
+        raise AssetError(f"a collision mesh needs at least three distinct points, this one has {len(points)}")
+    _, extent, axes = np.linalg.svd(centred, full_matrices=False)
+    if extent[1] < 1e-9 * max(extent[0], 1e-9):
+        raise AssetError("a collision mesh needs an area, the points of this one are all in one line")
+    normal = axes[2] if len(axes) > 2 else np.cross(axes[0], axes[1])
+    if len(points) > 3 and np.ptp(centred @ normal) > 1e-6 * extent[0] / np.sqrt(len(points)):
+        return points
+    return np.concatenate([points - normal * _THINNEST / 2, points + normal * _THINNEST / 2])
+
+
+def _greedy(points: Array, budget: int) -> Array:
+    """Indices of `budget` hull vertices that leave little of the hull outside of theirs."""
+    from scipy.spatial import ConvexHull
+
+    axes = np.concatenate([np.eye(3), -np.eye(3), [[1, 1, 1], [-1, -1, 1], [-1, 1, -1], [1, -1, -1]]])
+    chosen: list[int] = list(dict.fromkeys(np.argmax(points @ axes.T, axis=0).tolist()))
+    while len(chosen) < budget:
+        planes = ConvexHull(points[chosen]).equations  # (F, 4): outward normal, offset
+        outside = (points @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+        outside[chosen] = -np.inf
+        farthest = int(np.argmax(outside))
+        if outside[farthest] <= 0:
+            break
+        chosen.append(farthest)
+    return np.array(sorted(chosen))

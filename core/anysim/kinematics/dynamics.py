@@ -3,6 +3,9 @@
 The generalised velocity of a World is (its J joint rates, then for each free body the velocity of its frame's origin
 and its angular rate, world axes). Every joint counts as a degree of freedom of its own, also one that follows another.
 Everything is written for clarity and used at build or in comparisons, not in a step.
+
+The law of damping is for the steps of engines whose own is another one: a body that nothing touches slows down as
+exp(-rate t). Over a step of `dt` a wrench of -(1 - exp(-rate dt)) / dt times its momenta does exactly that.
 """
 
 from typing import NamedTuple
@@ -191,3 +194,24 @@ def _cross_force(a: Array, f: Array) -> Array:
     """The same of a force or momentum f (n, 6)."""
     couple = P.cross(a[:, :3], f[:, :3]) + P.cross(a[:, 3:], f[:, 3:])
     return np.concatenate([couple, P.cross(a[:, :3], f[:, 3:])], axis=1)
+
+
+def gain(rate: Array, dt: float) -> Array:
+    """[1/s] the share of its momentum that a body loses in a step, over the step."""
+    return -np.expm1(-rate * dt) / dt
+
+
+def drag(gains: Array, mass: Array, moments: Array, axes: Array, velocity: Array, rate: Array) -> Array:
+    """Wrenches (..., 6) [N, N m] at the centres of mass, world axes.
+
+    Args:
+        gains: (..., 2) of `gain`, linear and angular.
+        mass: (...,) [kg].
+        moments: (..., 3) principal moments [kg m^2].
+        axes: (..., 4) the orientation of the principal axes in the world.
+        velocity: (..., 3) of the centres of mass [m/s].
+        rate: (..., 3) angular [rad/s].
+    """
+    force = -(gains[..., :1] * mass[..., None]) * velocity
+    turning = P.rotate(axes, moments * P.rotate_inverse(axes, rate))
+    return np.concatenate([force, -gains[..., 1:] * turning], axis=-1)

@@ -13,7 +13,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.errors import EngineError
 from anysim.math import pose as P
-from anysim.model.rounding import tidy
+from anysim.model.hash import tidy
 from anysim.model.shapes import solid_moments
 from anysim.model.world import Box, Capsule, Cylinder, Inertial, Mesh, MeshShape, Shape, Sphere
 

@@ -16,8 +16,7 @@ from anysim.errors import SpecError, SpecIssue, TaskError, listing, suggest
 from anysim.managers.base import WORLD, Manager, Overridable, random_fields
 from anysim.model.world import ControlMode, World
 from anysim.plugin_parameters import options_model
-from anysim.randomization.draw import draw_rows
-from anysim.randomization.noise import DelayLine, longest_delay, noise_rows, note_noise
+from anysim.randomization.draw import DelayLine, draw_rows, longest_delay, noise_rows, note_noise
 from anysim_schemas.robots import ActionSpec
 
 

@@ -13,7 +13,7 @@ from anysim.compile.appearance import by_name, material_name, texture_name, tint
 from anysim.compile.variants import INSTANCER
 from anysim.conventions import Array
 from anysim.managers.base import WORLD, Manager, Overridable, revert
-from anysim.model.colors import rgb
+from anysim.model.appearance import rgb
 from anysim.model.world import BodyKind, World
 from anysim.randomization.distributions import nominal
 from anysim.randomization.draw import draw, is_random

@@ -13,7 +13,7 @@ import numpy as np
 from anysim.compile.joints import asked_of, opened_to
 from anysim.conventions import Array
 from anysim.managers.base import WORLD, Manager, Overridable, random_fields, revert
-from anysim.model.colors import rgb
+from anysim.model.appearance import rgb
 from anysim.model.world import Joint, World
 from anysim.randomization.draw import draw, is_random
 

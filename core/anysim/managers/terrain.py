@@ -15,7 +15,7 @@ from anysim.conventions import GROUND, WORLD, Array
 from anysim.engine.base import SimEngine
 from anysim.errors import TaskError
 from anysim.managers.base import Manager
-from anysim.model.colors import rgb
+from anysim.model.appearance import rgb
 from anysim.model.world import World
 from anysim.randomization.draw import draw, is_random
 from anysim.randomization.streams import Origin

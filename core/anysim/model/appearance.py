@@ -1,11 +1,15 @@
-"""Textures and materials: how things look, engine-neutrally. Nothing here changes how anything moves."""
+"""Colours by name, textures and materials: engine-neutral looks. Nothing here changes how anything moves."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.errors import Issues, listing, suggest
 from anysim.model.shapes import Vec3
+from anysim.randomization.distributions import nominal, written
 
 NONE = -1
 """Stands for no texture, or no material, where an index into the World's lists is expected."""
@@ -70,3 +74,47 @@ def lying(corners: Array) -> Array:
     """Places (T, 3, 2) in a texture that lies on the ground, once a metre; u along x and v along y, above 0."""
     flat = corners[..., :2]
     return flat - np.floor(flat.reshape(-1, 2).min(axis=0))
+
+
+Rgb = tuple[float, float, float]
+
+_HEX = {
+    "black": 0x000000, "white": 0xFFFFFF, "gray": 0x808080, "grey": 0x808080, "silver": 0xC0C0C0, "red": 0xFF0000,
+    "maroon": 0x800000, "brown": 0xA52A2A, "orange": 0xFFA500, "gold": 0xFFD700, "yellow": 0xFFFF00, "olive": 0x808000,
+    "lime": 0x00FF00, "green": 0x008000, "teal": 0x008080, "cyan": 0x00FFFF, "blue": 0x0000FF, "navy": 0x000080,
+    "purple": 0x800080, "magenta": 0xFF00FF, "pink": 0xFFC0CB, "beige": 0xF5F5DC,
+}  # fmt: skip
+
+COLORS: Mapping[str, Rgb] = {
+    name: ((value >> 16) / 255, (value >> 8 & 255) / 255, (value & 255) / 255) for name, value in _HEX.items()
+}
+WHITE: Rgb = (1.0, 1.0, 1.0)
+
+
+def rgb(color: str | Sequence[float]) -> Rgb:
+    """Red, green, blue in [0, 1] of a colour name or a triple.
+
+    Raises:
+        ValueError: an unknown name; lists the known ones.
+    """
+    if isinstance(color, str):
+        if color not in COLORS:
+            raise ValueError(
+                f"there is no colour '{color}'{suggest(color, list(COLORS))} (colours: {listing(COLORS, 30)})"
+            )
+        return COLORS[color]
+    red, green, blue = color
+    return (float(red), float(green), float(blue))
+
+
+def nominal_rgb(color: Any, otherwise: Rgb, issues: Issues, path: str = "color") -> Rgb:
+    """The nominal colour of a value, `otherwise` where it is None or at fault; all that may be drawn are checked."""
+    if color is None:
+        return otherwise
+    try:
+        for one in written(color):
+            rgb(one)
+        return rgb(nominal(color))
+    except ValueError as error:
+        issues.add(path, str(error))
+        return otherwise

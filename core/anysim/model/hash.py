@@ -1,4 +1,4 @@
-"""The hash of a World: equal across processes and machines.
+"""The hash of a World, equal across processes and machines, and the rounding of what enters one.
 
 Numbers enter with ten significant digits, so that a last-bit difference between two machines' arithmetic does not
 change the hash; meshes enter by the hash of their source and processing, not by their vertices, and textures
@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from anysim.model.world import Mesh, Texture, World
+from anysim.conventions import Array
+from anysim.model.world import Mesh, Quat, Texture, Vec3, World
 
 FORMAT = "anysim-world-1"
 
@@ -62,3 +63,15 @@ def world_hash(world: World) -> str:
     digest = hashlib.sha256(FORMAT.encode())
     _feed(digest, world)
     return digest.hexdigest()
+
+
+def tidy(vector: Array) -> Vec3:
+    """Three numbers rounded to 1e-12 (a picometre), without negative zeros."""
+    x, y, z = (round(float(v), 12) + 0.0 for v in vector)
+    return (x, y, z)
+
+
+def split(pose: Array) -> tuple[Vec3, Quat]:
+    """Position and quaternion of a pose (7,), rounded to 1e-12 and 1e-14."""
+    x, y, z, w = (round(float(v), 14) + 0.0 for v in pose[3:])
+    return tidy(pose[:3]), (x, y, z, w)

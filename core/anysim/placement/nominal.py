@@ -5,11 +5,11 @@ from dataclasses import replace
 from typing import Any
 
 from anysim.conventions import GROUND, Array
+from anysim.errors import Issues
 from anysim.geometry.bounds import EntityShape
 from anysim.geometry.convex_parts import row_of
-from anysim.issues import Issues
 from anysim.math import pose as P
-from anysim.model.rounding import split
+from anysim.model.hash import split
 from anysim.model.slots import is_robot
 from anysim.model.world import BodyKind, Slot, World
 from anysim.placement.candidate import candidate

@@ -7,8 +7,7 @@ name, or for all of a category; a reference is one of them by name, or of a cate
 from collections.abc import Iterable, Mapping, Sequence
 
 from anysim.conventions import GROUND
-from anysim.errors import listing, suggest
-from anysim.issues import Issues
+from anysim.errors import Issues, listing, suggest
 from anysim.model.world import Slot, World
 from anysim_schemas.layout import PlacementSpec
 

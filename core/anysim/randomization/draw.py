@@ -2,6 +2,9 @@
 
 A draw is a quantile in [0, 1) for each component, and the value's own map from quantiles to values. Fields that share a
 name (`shared: heavy`) take their quantiles from that name's stream, so that all are high together, or low together.
+
+Noise is drawn anew at each control step. It depends on the episode, the stream's name and the step alone, so a restored
+env goes on with the same noise and nothing is kept; nor is it noted draw by draw, as the seed gives it again.
 """
 
 from typing import Any
@@ -9,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.randomization.distributions import draw_one, nominal
+from anysim.randomization.distributions import draw_one, extremes, nominal
 from anysim.randomization.streams import OVERRIDDEN, Origin, Streams
-from anysim_schemas.values import Drawn
+from anysim_schemas.values import Choice, Drawn
 
 
 def is_random(value: Any) -> bool:
@@ -48,3 +51,62 @@ def draw_rows(value: Any, name: str, streams: Streams, env_ids: Array, tick: Any
     ticks = np.broadcast_to(np.asarray(tick), len(env_ids))
     rows = [draw(value, name, streams, int(e), int(t), source=source) for e, t in zip(env_ids, ticks, strict=True)]
     return np.array(rows, dtype=float)
+
+
+def noise_rows(value: Any, name: str, streams: Streams, env_ids: Array, ticks: Array, size: int) -> Array:
+    """Independent draws (E, size) of a number for the step `ticks` (E,) of each env; constants are what they are."""
+    if not is_random(value):
+        return np.full((len(env_ids), size), float(value))
+    rows = np.empty((len(env_ids), size))
+    for row, (env, tick) in enumerate(zip(env_ids.tolist(), ticks.tolist(), strict=True)):
+        if value.ratio < 1.0 and streams.generator(env, f"{name}/ratio", tick).random() >= value.ratio:
+            rows[row] = nominal(value)
+            continue
+        generator = streams.generator(env, name, tick)
+        if isinstance(value, Choice):
+            rows[row] = [draw_one(value, generator.random) for _ in range(size)]
+        else:
+            rows[row] = draw_one(value, lambda shape, of=generator: of.random((size, *shape)))
+    return rows
+
+
+def note_noise(value: Any, name: str, streams: Streams, env_ids: Array, source: str) -> None:
+    """Say in the draws of an episode that there is noise, and of what kind: it has no single value."""
+    if is_random(value):
+        text = f"at each step: {value.model_dump(mode='json', exclude_defaults=True)}"
+        for env in env_ids.tolist():
+            streams.note(env, name, text, Origin(name, source))
+
+
+class DelayLine:
+    """Rows of the last steps of each env, to be read some whole steps late.
+
+    The row of step t stands at t modulo the length, so writing the same step again changes nothing.
+    """
+
+    def __init__(self, num_envs: int, size: int, longest: int) -> None:
+        self.delay = np.zeros(num_envs, dtype=np.int64)
+        """(N,) whole steps."""
+        self.rows = np.zeros((num_envs, longest + 1, size))
+
+    def write(self, env_ids: Array, ticks: Array, rows: Array) -> None:
+        """Keep the rows (E, size) of these steps."""
+        self.rows[env_ids, ticks % self.rows.shape[1]] = rows
+
+    def read(self, env_ids: Array, ticks: Array) -> Array:
+        """The rows of `delay` steps before; the first one where there was nothing yet."""
+        then = np.maximum(ticks - self.delay[env_ids], 0)
+        return self.rows[env_ids, then % self.rows.shape[1]]
+
+    def arrived(self, env_ids: Array, ticks: Array) -> Array:
+        """(E,) bool: there is a row of `delay` steps before."""
+        return ticks >= self.delay[env_ids]
+
+    def reset(self, env_ids: Array, delay: Array) -> None:
+        """Empty, with these delays (E,)."""
+        self.delay[env_ids], self.rows[env_ids] = delay, 0.0
+
+
+def longest_delay(value: Any) -> int:
+    """The most steps that a value can ask for."""
+    return int(extremes(value)[1])

@@ -5,8 +5,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.randomization.draw import draw_rows, is_random
-from anysim.randomization.noise import DelayLine, longest_delay, noise_rows, note_noise
+from anysim.randomization.draw import DelayLine, draw_rows, is_random, longest_delay, noise_rows, note_noise
 from anysim.randomization.streams import Origin, Streams
 from anysim.task.scene import SceneView
 from anysim_schemas.task import ObservationTermSpec

@@ -9,7 +9,7 @@ import pytest
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capability
 from anysim.engine.requirements import needs_of
-from anysim.engine.sharded.pool_cache import keeping_workers
+from anysim.engine.sharded.pool import keeping_workers
 from anysim.errors import EngineError
 from anysim.model.world import World
 from anysim.testing import plugin

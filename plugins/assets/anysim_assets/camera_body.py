@@ -3,7 +3,7 @@
 from math import inf, pi
 
 from anysim.assets.model import ImportedModel
-from anysim.model.colors import rgb
+from anysim.model.appearance import rgb
 from anysim.model.world import Body, BodyKind, Box, Geom, Inertial, Joint, JointType, Site
 from anysim_schemas.base import Color, Positive
 

@@ -3,9 +3,9 @@
 from dataclasses import replace
 from math import inf
 
-from anysim.assets.contact_presets import GRIPPER_LIMIT_SOFTNESS, surface
 from anysim.assets.model import ImportedModel
 from anysim.assets.procedural_assembly import Assembly
+from anysim.compile.physical import GRIPPER_LIMIT_SOFTNESS, surface
 from anysim.model.world import JointType, Mimic
 from anysim_schemas.base import Color, NonNegative, Positive
 from anysim_schemas.errors import KeyFault

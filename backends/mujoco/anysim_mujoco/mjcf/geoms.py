@@ -11,7 +11,7 @@ from anysim.assets.meshes import hull_of, light_mesh
 from anysim.assets.model import ImportNote
 from anysim.conventions import Array, xyzw_from_wxyz
 from anysim.math import pose as P
-from anysim.model.rounding import split
+from anysim.model.hash import split
 from anysim.model.world import (
     Box,
     Capsule,

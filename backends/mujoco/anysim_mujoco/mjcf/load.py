@@ -24,7 +24,7 @@ from anysim.conventions import Array
 from anysim.errors import AssetError, listing
 from anysim.kinematics import inertia
 from anysim.math import pose as P
-from anysim.model.rounding import split, tidy
+from anysim.model.hash import split, tidy
 from anysim.model.world import Body, BodyKind, Inertial, Joint, JointType, Mimic, Site
 from anysim_mujoco.inertia import full
 from anysim_mujoco.mjcf.drives import drive_hint

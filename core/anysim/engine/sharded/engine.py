@@ -21,8 +21,7 @@ from anysim.engine.cameras import CameraView
 from anysim.engine.control import Control
 from anysim.engine.sharded.blocks import Blocks, joined, joined_by_name, joined_contacts, rows_of, usable_cores
 from anysim.engine.sharded.hosted import News
-from anysim.engine.sharded.pool import START_S, Crew, importable_path
-from anysim.engine.sharded.pool_cache import dismiss, hire
+from anysim.engine.sharded.pool import START_S, Crew, dismiss, hire, importable_path
 from anysim.engine.sharded.shared_memory import SharedArrays, state_layout
 from anysim.engine.sharded.worker_handle import WorkerLost
 from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel

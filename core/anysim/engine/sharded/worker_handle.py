@@ -18,9 +18,8 @@ from multiprocessing.spawn import get_executable
 from typing import Any
 
 from anysim import errors
-from anysim.engine.sharded.parent_watch import Lifeline
 from anysim.errors import AnysimError, EngineError
-from anysim.own_process import how_it_ended
+from anysim.own_process import Lifeline, how_it_ended
 
 _MODULE = "anysim.engine.sharded.worker"
 _PROGRAM = (

@@ -9,9 +9,9 @@ from anysim import cache
 from anysim.assets.model import ImportedModel
 from anysim.compile.room import MAIN, ROOM, RoomThing
 from anysim.conventions import IDENTITY_QUATERNION
+from anysim.errors import Issues
 from anysim.geometry import polygon as G
-from anysim.issues import Issues
-from anysim.model.colors import Rgb, nominal_rgb
+from anysim.model.appearance import Rgb, nominal_rgb
 from anysim.model.world import ORIGIN, Body, BodyKind, Box, Geom, Mesh, MeshShape, Quat, Surface
 from anysim_assets.rooms.furnish import NoPlace, Placed, furnish
 from anysim_assets.rooms.plan import RoomPlan, plan_of, wall_boxes

@@ -6,8 +6,8 @@ from math import atan2, pi
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.errors import Issues
 from anysim.geometry import polygon as G
-from anysim.issues import Issues
 from anysim_schemas.rooms import DoorSpec, OpeningSpec, RoomSpec, WindowSpec
 
 APPROACH = 0.9
