@@ -53,9 +53,10 @@ def planar(model: ImportedModel, name: str) -> ImportedModel:
     own = [replace(body, parent=body.parent + _ADDED) for body in model.bodies[1:]]
     bodies = (rail, *carriages, replace(root, kind=BodyKind.LINK, parent=2), *own)
     axes = (
-        (JointType.PRISMATIC, (1.0, 0.0, 0.0)), (JointType.PRISMATIC, (0.0, 1.0, 0.0)),
+        (JointType.PRISMATIC, (1.0, 0.0, 0.0)),
+        (JointType.PRISMATIC, (0.0, 1.0, 0.0)),
         (JointType.REVOLUTE, (0.0, 0.0, 1.0)),
-    )  # fmt: skip
+    )
     added = [
         Joint(joint, i + 1, type, axis) for i, (joint, (type, axis)) in enumerate(zip(PLANAR_JOINTS, axes, strict=True))
     ]

@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from anysim.conventions import Array
 from anysim.engine.state import Snapshot
@@ -10,7 +11,7 @@ from anysim.errors import EngineError, SnapshotError, listing, suggest
 from anysim.model.world import BodyKind, World
 
 
-def indices(values: Any, size: int, kind: str) -> Array:
+def indices(values: ArrayLike, size: int, kind: str) -> Array:
     """Unique int indices in [0, size) from a sequence, an int array or an int."""
     array = np.atleast_1d(np.asarray(values))
     if array.dtype == bool or (array.size and not np.issubdtype(array.dtype, np.integer)):
@@ -24,7 +25,7 @@ def indices(values: Any, size: int, kind: str) -> Array:
     return array
 
 
-def rows(name: str, values: Any, shape: tuple[int | None, ...]) -> Array:
+def rows(name: str, values: ArrayLike, shape: tuple[int | None, ...]) -> Array:
     """Finite float64 values of the shape (None matches any length); missing leading axes are broadcast."""
     array = np.asarray(values, dtype=np.float64)
     if None in shape:
@@ -46,7 +47,7 @@ def _spell(shape: tuple[int | None, ...]) -> str:
     return "(" + ", ".join("any" if s is None else str(s) for s in shape) + ")"
 
 
-def poses(name: str, values: Any, shape: tuple[int, ...]) -> Array:
+def poses(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
     """Like rows; the quaternions must be unit within 1e-3 and are normalised."""
     array = rows(name, values, shape).copy()
     length = np.linalg.norm(array[..., 3:], axis=-1, keepdims=True)

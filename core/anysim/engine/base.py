@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from anysim.conventions import Array
 from anysim.engine import arguments
@@ -36,7 +37,11 @@ class SimEngine(EngineSensing):
     # ------------------------------------------------------------------ writing
 
     def set_joint_state(
-        self, position: Any = None, velocity: Any = None, env_ids: EnvIds = None, joints: Indices = None
+        self,
+        position: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        env_ids: EnvIds = None,
+        joints: Indices = None,
     ) -> None:
         """Write joint positions and velocities (E, K); mimic joints follow their leaders. Commands stay."""
         with self._lock:
@@ -50,7 +55,11 @@ class SimEngine(EngineSensing):
             write_present(self._write_joints, self._presence.joints, ids, which, pos, vel)
 
     def set_body_state(
-        self, pose: Any = None, twist: Any = None, env_ids: EnvIds = None, bodies: Indices = None
+        self,
+        pose: ArrayLike | None = None,
+        twist: ArrayLike | None = None,
+        env_ids: EnvIds = None,
+        bodies: Indices = None,
     ) -> None:
         """Write poses (E, K, 7) and twists (E, K, 6) of root bodies: free ones, and poses of static ones.
 
@@ -70,9 +79,9 @@ class SimEngine(EngineSensing):
 
     def set_control(
         self,
-        position: Any = None,
-        velocity: Any = None,
-        effort: Any = None,
+        position: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        effort: ArrayLike | None = None,
         env_ids: EnvIds = None,
         actuators: Indices = None,
     ) -> None:
@@ -101,7 +110,7 @@ class SimEngine(EngineSensing):
             which = self._which(actuators, len(self.world.actuators), "actuator")
             self._commands.set_mode(ControlMode(mode), self._ids(env_ids), which)
 
-    def apply_wrench(self, wrench: Any, bodies: Sequence[int], env_ids: EnvIds = None) -> None:
+    def apply_wrench(self, wrench: ArrayLike, bodies: Sequence[int], env_ids: EnvIds = None) -> None:
         """Forces and torques (E, K, 6) [N, N m], world axes, at the bodies' centres of mass, for the next step()."""
         with self._lock:
             self._require_world()
@@ -120,7 +129,7 @@ class SimEngine(EngineSensing):
             _, ids, which = self._chosen(name, env_ids, indices)
             return self._get_parameter(name)[np.ix_(ids, which)].copy()
 
-    def set_parameters(self, name: str, values: Any, env_ids: EnvIds = None, indices: Indices = None) -> None:
+    def set_parameters(self, name: str, values: ArrayLike, env_ids: EnvIds = None, indices: Indices = None) -> None:
         """Change a neutral parameter per env, values (E, K, ...); what the engine took is read back and compared.
 
         Raises:

@@ -2,9 +2,10 @@
 
 from collections.abc import Mapping
 from math import isfinite
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from anysim.conventions import Array
 from anysim.engine.arguments import rows as checked_rows
@@ -57,7 +58,14 @@ class CommandBuffer:
         self.spend_wrench(ids)
         self.control_changed = True
 
-    def write(self, position: Any, velocity: Any, effort: Any, ids: Array | None, which: Array | None) -> None:
+    def write(
+        self,
+        position: ArrayLike | None,
+        velocity: ArrayLike | None,
+        effort: ArrayLike | None,
+        ids: Array | None,
+        which: Array | None,
+    ) -> None:
         """Write targets; None leaves a kind of target as it is."""
         for name, buffer, values in (
             ("position", self.control.position, position),

@@ -1,9 +1,9 @@
 """Sensing of an engine: images, cameras, rays and contact points."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from anysim.conventions import Array
 from anysim.engine import arguments
@@ -23,7 +23,7 @@ class EngineSensing(EngineLifecycle):
         height: int | None = None,
         env_ids: EnvIds = None,
         channels: Sequence[str] = ("rgb",),
-        body_pose: Any = None,
+        body_pose: ArrayLike | None = None,
     ) -> dict[str, Array]:
         """Images of one camera, by channel.
 
@@ -46,7 +46,7 @@ class EngineSensing(EngineLifecycle):
             view = self._records.rig.view(camera_name, self.index, poses, ids, width, height)
             return self._render(view, ids, tuple(channels))
 
-    def _recorded(self, body_pose: Any, ids: Array) -> Array:
+    def _recorded(self, body_pose: ArrayLike, ids: Array) -> Array:
         """Poses as they were given, to the bit: no quaternion is normalised, so that the same pixels come of them."""
         shape = (len(ids), len(self.world.bodies), 7)
         arguments.poses("body_pose", body_pose, shape)
@@ -60,7 +60,7 @@ class EngineSensing(EngineLifecycle):
             poses = self.get_state().body_pose[ids]
             return self._records.rig.view(camera_name, self.index, poses, ids, None, None).pose
 
-    def set_camera_pose(self, camera_name: str, pose: Any, env_ids: EnvIds = None) -> None:
+    def set_camera_pose(self, camera_name: str, pose: ArrayLike, env_ids: EnvIds = None) -> None:
         """Place a camera per env: poses (E, 7) in the frame of its body, or of the world where it has none."""
         with self._lock:
             self._require_world()
@@ -80,7 +80,7 @@ class EngineSensing(EngineLifecycle):
             self._require_world()
             return self._records.rig.fov[self._ids(env_ids), self.index.camera(camera_name)]
 
-    def set_camera_fov(self, camera_name: str, fov: Any, env_ids: EnvIds = None) -> None:
+    def set_camera_fov(self, camera_name: str, fov: ArrayLike, env_ids: EnvIds = None) -> None:
         """Change a camera's vertical field of view per env: (E,) [degrees], between 1 and 170."""
         with self._lock:
             self._require_world()
@@ -100,7 +100,7 @@ class EngineSensing(EngineLifecycle):
             self._require_world()
             return self._records.appearance.copy()
 
-    def raycast(self, origins: Any, directions: Any, env_ids: EnvIds = None) -> RayHits:
+    def raycast(self, origins: ArrayLike, directions: ArrayLike, env_ids: EnvIds = None) -> RayHits:
         """First hits of rays (E, R, 3) [m], world frame, with collision geometry. Directions need not be unit."""
         with self._lock:
             self._require_world()

@@ -88,9 +88,14 @@ def write(path: str | Path, kind: str, stamp: Mapping[str, Any], data: Any) -> P
         for name, (member, content) in zip(arrays, members.items(), strict=True)
     }
     head = {
-        "format": FORMAT, "version": VERSION, "kind": kind, "stamp": encode(dict(stamp), {}),
-        "made_with": dict(made_with()), "arrays": table, "data": tree,
-    }  # fmt: skip
+        "format": FORMAT,
+        "version": VERSION,
+        "kind": kind,
+        "stamp": encode(dict(stamp), {}),
+        "made_with": dict(made_with()),
+        "arrays": table,
+        "data": tree,
+    }
     header = json.dumps(head, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()
     aside = path.with_name(f".{path.name}.{os.getpid()}-{threading.get_ident()}.partial")
     try:

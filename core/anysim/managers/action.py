@@ -251,9 +251,11 @@ class ActionManager(Manager):
     def snapshot(self, env_ids: Array) -> dict[str, Array]:
         """Copies of commands, delayed actions and controllers' own state."""
         data = {
-            "targets": self._position[env_ids], "velocities": self._velocity[env_ids],
-            "efforts": self._effort[env_ids], "support": self._support[:, env_ids].swapaxes(0, 1).copy(),
-        }  # fmt: skip
+            "targets": self._position[env_ids],
+            "velocities": self._velocity[env_ids],
+            "efforts": self._effort[env_ids],
+            "support": self._support[:, env_ids].swapaxes(0, 1).copy(),
+        }
         for s in self.slices:
             if s.line is not None:
                 data[f"delayed.{s.robot}.{s.channel}.delay"] = s.line.delay[env_ids]

@@ -68,10 +68,13 @@ class Streams:
         self.overridden: list[dict[str, Any]] = [{} for _ in range(num_envs)]
         self._turning = np.random.Generator(np.random.Philox(key=0))
         self._state: Any = {
-            "bit_generator": "Philox", "buffer": np.zeros(4, dtype=np.uint64), "buffer_pos": 4, "has_uint32": 0,
+            "bit_generator": "Philox",
+            "buffer": np.zeros(4, dtype=np.uint64),
+            "buffer_pos": 4,
+            "has_uint32": 0,
             "uinteger": 0,
             "state": {"counter": np.zeros(4, dtype=np.uint64), "key": np.zeros(2, dtype=np.uint64)},
-        }  # fmt: skip
+        }
         self._masters = [_master([seed, env]) for env in range(num_envs)]
 
     def seed(self, seed: int | Sequence[int], env_ids: Array) -> None:

@@ -100,9 +100,12 @@ class EnvSnapshot:
         seeds = [int(seed) for seed in self.streams["episode_seed"]]
         steps = [int(n) for n in self.managers["task"]["elapsed"]]
         stamp = {
-            "task": self.task, "spec_hash": self.spec_hash, **stamp_of(self.engine),
-            "episode_seeds": seeds, "elapsed_steps": steps,
-        }  # fmt: skip
+            "task": self.task,
+            "spec_hash": self.spec_hash,
+            **stamp_of(self.engine),
+            "episode_seeds": seeds,
+            "elapsed_steps": steps,
+        }
         data = {"engine": self.engine.data, "managers": self.managers, "streams": self.streams}
         return snapshot_file.write(path, snapshot_file.ENV, stamp, data)
 

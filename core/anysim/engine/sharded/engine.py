@@ -365,9 +365,14 @@ def sharded(engine_class: type[SimEngine], shards: int, timeout_s: float = TIMEO
         raise EngineError(f"shards must be at least 1 and timeout_s more than 0, got {shards} and {timeout_s:g}")
     importable_path(engine_class)
     body = {
-        "__doc__": f"{engine_class.__name__} in worker processes.", "__module__": __name__, "inner": engine_class,
-        "shards": shards, "timeout_s": timeout_s, "name": engine_class.name,
-        "capabilities": engine_class.capabilities, "parameters": engine_class.parameters,
+        "__doc__": f"{engine_class.__name__} in worker processes.",
+        "__module__": __name__,
+        "inner": engine_class,
+        "shards": shards,
+        "timeout_s": timeout_s,
+        "name": engine_class.name,
+        "capabilities": engine_class.capabilities,
+        "parameters": engine_class.parameters,
         "lifecycle": engine_class.lifecycle,
-    }  # fmt: skip
+    }
     return type(f"Sharded{engine_class.__name__}", (ShardedEngine,), body)
