@@ -1,13 +1,11 @@
 """Polygons in the plane: cutting, measuring, comparing them, and drawing points from them.
 
 A polygon is a tuple of corners (x, y) [m], counter-clockwise, in plain floats, as it has few corners; an area is a
-tuple of convex polygons that do not overlap. Where many points are compared with it, a polygon is an array (K, 2).
+tuple of convex polygons that do not overlap.
 """
 
 from collections.abc import Callable, Sequence
 from math import cos, hypot, pi, sin, sqrt
-
-import numpy as np
 
 from anysim.conventions import Array
 
@@ -137,12 +135,12 @@ def point_in(area: Area, u: float, v: float, w: float) -> Point:
 def convex_parts(corners: Sequence[Point]) -> Area:
     """A simple polygon, which may bend inwards, in triangles (by cutting off ears)."""
     ring = list(corners) if size(tuple(corners)) > 0 else list(reversed(corners))
-    cut_off, left = _ears(ring, 1e-9)
+    cut_off, left = ears(ring, 1e-9)
     parts = [tuple(ring[k] for k in part) for part in (*cut_off, left)]
     return tuple(part for part in parts if size(part) > 0)
 
 
-def _ears(ring: Sequence[Point], slack: float) -> tuple[list[tuple[int, int, int]], list[int]]:
+def ears(ring: Sequence[Point], slack: float) -> tuple[list[tuple[int, int, int]], list[int]]:
     """Triangles of a simple counter-clockwise polygon by its corners' numbers, and the corners that are left.
 
     No other corner is nearer than `slack` [m] to the inside of a triangle.
@@ -154,7 +152,7 @@ def _ears(ring: Sequence[Point], slack: float) -> tuple[list[tuple[int, int, int
         for k in range(len(left)):
             a, b, c = left[k - 1], left[k], left[(k + 1) % len(left)]
             ear = (ring[a], ring[b], ring[c])
-            if _side(*ear) > 1e-12 and not any(_within(ear, ring[i], slack) for i in left if ring[i] not in ear):
+            if side(*ear) > 1e-12 and not any(_within(ear, ring[i], slack) for i in left if ring[i] not in ear):
                 found.append((a, b, c))
                 del left[k]
                 break
@@ -165,10 +163,10 @@ def _ears(ring: Sequence[Point], slack: float) -> tuple[list[tuple[int, int, int
 
 def _within(ear: Polygon, point: Point, slack: float) -> bool:
     edges = zip(ear, (*ear[1:], ear[0]), strict=True)
-    return all(_side(a, b, point) >= -slack * hypot(b[0] - a[0], b[1] - a[1]) for a, b in edges)
+    return all(side(a, b, point) >= -slack * hypot(b[0] - a[0], b[1] - a[1]) for a, b in edges)
 
 
-def _side(a: Point | Array, b: Point | Array, p: Point | Array) -> float:
+def side(a: Point | Array, b: Point | Array, p: Point | Array) -> float:
     """Twice the area of a triangle: positive where p is to the left of the line from a to b."""
     return float((b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]))
 
@@ -189,90 +187,3 @@ def hull(points: Sequence[Point]) -> Polygon:
 
     lower, upper = chain(ordered), chain(ordered[::-1])
     return tuple(lower[:-1] + upper[:-1])
-
-
-# ------------------------------------------------------------------ polygons as arrays (K, 2)
-
-
-def corners_of(polygon: Array) -> Polygon:
-    """A polygon (K, 2) as a tuple of corners."""
-    return tuple((float(x), float(y)) for x, y in polygon)
-
-
-def oriented_rectangle(middle: Array, half: tuple[float, float], yaw: float) -> Array:
-    """Corners (4, 2), counter-clockwise, of a rectangle of half sizes along its own axes."""
-    x, y = half
-    own = np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
-    return middle + turned(own, yaw)
-
-
-def turned(points: Array, yaw: float) -> Array:
-    """Points (..., 2) turned about the origin."""
-    c, s = np.cos(yaw), np.sin(yaw)
-    return points @ np.array([[c, s], [-s, c]])
-
-
-def overlap(a: Array, b: Array, gap: float = 0.0) -> bool:
-    """Whether two convex polygons (or segments) come nearer than `gap` to each other along every edge's normal."""
-    for first, second in ((a, b), (b, a)):
-        edges = np.roll(first, -1, axis=0) - first
-        normals = np.stack([edges[:, 1], -edges[:, 0]], axis=-1)
-        length = np.linalg.norm(normals, axis=1, keepdims=True)
-        normals = normals[length[:, 0] > 1e-12] / length[length[:, 0] > 1e-12]
-        one, two = first @ normals.T, second @ normals.T
-        if ((one.max(axis=0) + gap <= two.min(axis=0)) | (two.max(axis=0) + gap <= one.min(axis=0))).any():
-            return False
-    return True
-
-
-def distance(points: Array, polygon: Array) -> Array:
-    """Distance (N,) [m] of points (N, 2) to a polygon's border; 0 inside of it."""
-    start, end = polygon, np.roll(polygon, -1, axis=0)
-    run = end - start
-    to = points[:, None] - start
-    share = np.clip((to * run).sum(-1) / np.maximum((run**2).sum(-1), 1e-300), 0.0, 1.0)
-    away = np.linalg.norm(to - share[..., None] * run, axis=-1).min(axis=1)
-    return np.where(inside(points, polygon), 0.0, away)
-
-
-def inside(points: Array, polygon: Array) -> Array:
-    """(N,) bool: which points (N, 2) are in a simple polygon."""
-    a, b = polygon, np.roll(polygon, -1, axis=0)
-    x, y = points[:, None, 0], points[:, None, 1]
-    crosses = (a[:, 1] > y) != (b[:, 1] > y)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        at = a[:, 0] + (y - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
-    return (crosses & (x < at)).sum(axis=1) % 2 == 1
-
-
-def encloses(polygon: Array, part: Array) -> bool:
-    """Whether a simple polygon (K, 2) holds a convex one (L, 2)."""
-    if not inside(part, polygon).all():
-        return False
-    ends = np.roll(polygon, -1, axis=0)
-    return not any(overlap(np.stack([a, b]), part) for a, b in zip(polygon, ends, strict=True))
-
-
-def crossing(polygon: Array) -> tuple[int, int] | None:
-    """Two sides of a polygon that meet where they should not, by number."""
-    n = len(polygon)
-    for i in range(n):
-        for j in range(i + 1, n):
-            if j in ((i + 1) % n, (i - 1) % n):
-                continue
-            a, b, c, d = polygon[i], polygon[(i + 1) % n], polygon[j], polygon[(j + 1) % n]
-            if _side(a, b, c) * _side(a, b, d) <= 0 and _side(c, d, a) * _side(c, d, b) <= 0:
-                return i, j
-    return None
-
-
-def triangles(polygon: Array) -> Array:
-    """(K - 2, 3) corners of the triangles of a simple counter-clockwise polygon (K, 2), one ear after the other.
-
-    Raises:
-        ValueError: the corners make no simple polygon.
-    """
-    found, left = _ears(corners_of(polygon), 0.0)
-    if len(left) > 3:
-        raise ValueError("the corners make no simple polygon")
-    return np.array([*found, left], dtype=np.int32)

@@ -9,8 +9,8 @@ from pydantic import ValidationError
 
 from anysim.compile.world import compile_world
 from anysim.errors import AnysimError, Issues, SpecError
-from anysim.geometry import polygon as G
 from anysim.model.world import BodyKind, World
+from anysim_assets.rooms import outlines as G
 from anysim_assets.rooms.furnish import FRONT, HOSTS, NoPlace, furnish
 from anysim_assets.rooms.furnished import Furnished, room_of
 from anysim_assets.rooms.furniture import MAKERS, piece

@@ -11,7 +11,7 @@ from math import pi
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.geometry import polygon as G
+from anysim_assets.rooms import outlines as G
 from anysim_assets.rooms.furniture import MAKERS, Piece, piece
 from anysim_assets.rooms.occupancy import Occupancy
 from anysim_assets.rooms.plan import RoomPlan

@@ -10,9 +10,9 @@ from anysim.assets.model import ImportedModel
 from anysim.compile.room import MAIN, ROOM, RoomThing
 from anysim.conventions import IDENTITY_QUATERNION
 from anysim.errors import Issues
-from anysim.geometry import polygon as G
 from anysim.model.appearance import Rgb, nominal_rgb
 from anysim.model.world import ORIGIN, Body, BodyKind, Box, Geom, Mesh, MeshShape, Quat, Surface
+from anysim_assets.rooms import outlines as G
 from anysim_assets.rooms.furnish import NoPlace, Placed, furnish
 from anysim_assets.rooms.plan import RoomPlan, plan_of, wall_boxes
 from anysim_schemas.rooms import RoomSpec

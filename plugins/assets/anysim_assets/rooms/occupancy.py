@@ -12,11 +12,11 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import AnysimError
-from anysim.geometry import polygon as G
 from anysim.geometry.bounds import shape_bounds
 from anysim.math import pose as P
 from anysim.model.shapes import is_ground
 from anysim.model.world import Box, Capsule, Cylinder, Mesh, MeshShape, Shape, Sphere, World
+from anysim_assets.rooms import outlines as G
 
 ROUND = 24
 """Corners of the polygon that stands for a disc, which lies inside of it."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import Issues
-from anysim.geometry import polygon as G
+from anysim_assets.rooms import outlines as G
 from anysim_schemas.rooms import DoorSpec, OpeningSpec, RoomSpec, WindowSpec
 
 APPROACH = 0.9
