@@ -94,12 +94,21 @@ def images(step):
     return {name: np.full((camera.height, camera.width, 3), step, np.uint8) for name, camera in due.items()}
 
 
+@pytest.mark.parametrize("later", [False, True], ids=["live", "later"])
 @pytest.mark.parametrize("stage", ["open", "append", "finish"])
-def test_a_full_disk_at_an_image(stage, tmp_path, writer, run_header, make_frame, monkeypatch):
+def test_a_full_disk_at_an_image(stage, later, tmp_path, writer, run_header, make_frame, monkeypatch):
+    """Of an image that comes with its frame, and of one that is drawn when the episode has ended."""
+
+    def draw(columns, step, cameras):
+        assert columns.steps == 3
+        assert set(cameras) == set(images(step))
+        return images(step)
+
     def film(recorder):
-        recorder.start(EpisodeHeader(env=0, episode=0, episode_seed=1, cameras=CAMERAS))
+        header = EpisodeHeader(env=0, episode=0, episode_seed=1, cameras=CAMERAS)
+        recorder.start(header, draw if later else None)
         for step in range(1, 4):
-            recorder.append(0, make_frame(step, images=images(step)))
+            recorder.append(0, make_frame(step, images={} if later else images(step)))
             recorder.flush()
         return recorder.commit(0, "success").wait()
 
@@ -114,6 +123,26 @@ def test_a_full_disk_at_an_image(stage, tmp_path, writer, run_header, make_frame
         assert not [path for path in (tmp_path / ".incoming").iterdir() if path.is_dir()]
         manifest = read_manifest(film(recorder))
     assert {name: (c.frames, c.first_step) for name, c in manifest.cameras.items()} == {"front": (3, 1), "back": (1, 2)}
+
+
+def test_images_drawn_later_are_those_of_the_cameras_that_are_due(tmp_path, writer, run_header, make_frame):
+    """Neither with a frame, nor of another camera, nor of another size."""
+    header = EpisodeHeader(env=0, episode=0, episode_seed=1, cameras=CAMERAS)
+    with Recorder(tmp_path, writer, run_header) as recorder:
+        recorder.start(header, lambda columns, step, cameras: images(step))
+        with pytest.raises(RecordError, match="images of front; due are none"):
+            recorder.append(0, make_frame(1, images=images(1)))
+        large = {**images(2), "back": images(1)["front"]}
+        wrong = {"images of front; due are front, back": images(1), "has shape": large}
+        for words, drawn in wrong.items():
+            recorder.start(header, lambda columns, step, cameras, drawn=drawn: images(1) if step == 1 else drawn)
+            for step in (1, 2):
+                recorder.append(0, make_frame(step))
+            with pytest.raises(RecordError, match=words):
+                recorder.commit(0, "success")
+            assert recorder.open_envs == ()
+        recorder.flush()
+        assert not [path for path in (tmp_path / ".incoming").iterdir() if path.is_dir()]
 
 
 def test_a_writer_without_images_says_so(tmp_path, writer, run_header, make_frame, monkeypatch):

@@ -1,6 +1,8 @@
 """Deferred filming: images of an episode that are drawn when it has ended are those of the episode, to the pixel."""
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Iterator
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +15,16 @@ from anysim.api import load
 from anysim.cli.check import check_one
 from anysim.engine.base import SimEngine
 from anysim.errors import RecordError, SpecError
-from anysim.record.film import Moments, film_episode, images, moments_for
-from anysim.record.film_mode import film_mode, hindrances
-from anysim.record.writer import TrajectoryWriter, make_writer
+from anysim.record.collector import Collector, run_header
+from anysim.record.columns import EpisodeColumns
+from anysim.record.film import draw_recorded, film_mode, hindrances
+from anysim.record.film_episode import moments_for
+from anysim.record.header import EpisodeHeader, Header
+from anysim.record.manifest import read_manifest
+from anysim.record.names import trajectories
+from anysim.record.verify import verify
+from anysim.record.writer import TrajectoryWriter
+from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
 from anysim.task.terms import events
 from anysim.testing.fixtures import drawing_trouble
@@ -60,13 +69,19 @@ def recorded(env: TaskEnv, steps: int) -> tuple[list[dict[str, Any]], np.ndarray
     return live, np.stack(poses, axis=1)
 
 
+def columns_of(env: TaskEnv, poses: np.ndarray) -> EpisodeColumns:
+    """An episode with these body poses (T, B, 7), and nothing else in it."""
+    header = Header(run_header(env, 0), EpisodeHeader(env=0, episode=0, episode_seed=0))
+    zeros = np.zeros(len(poses))
+    return EpisodeColumns(header, 0, zeros, zeros[:, None], {"body_pose": poses}, zeros, {}, (), (), (), {})
+
+
 def assert_filmed(env: TaskEnv, index: int, live: list[dict[str, Any]], row: int, poses: np.ndarray) -> None:
-    moments = Moments(np.arange(len(live)), poses[row])
-    for camera in CAMERAS:
-        drawn = dict(images(env, index, camera, moments))
-        assert list(drawn) == list(range(len(live)))
-        for step, image in drawn.items():
-            assert np.array_equal(image, live[step][camera][row]), f"{camera}, step {step}"
+    columns, since = columns_of(env, poses[row]), int(env.engine.appearance_changes[index])
+    for step, images in enumerate(live):
+        drawn = draw_recorded(env, index, since, columns, step, CAMERAS)
+        for camera in CAMERAS:
+            assert np.array_equal(drawn[camera], images[camera][row]), f"{camera}, step {step}"
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -99,7 +114,7 @@ def test_filming_leaves_the_run_alone() -> None:
         assert np.array_equal(env.capture.image("wrist", np.arange(2)), clean.capture.image("wrist", np.arange(2)))
 
 
-def test_bodies_go_by_name(tmp_path: Path) -> None:
+def test_bodies_go_by_name() -> None:
     """A world with a thing more draws the recorded ones where they were, and the thing where its reset put it."""
     more = (
         "world.objects.post={source: {box: [0.05, 0.05, 0.4]}, fixed: true}",
@@ -116,10 +131,6 @@ def test_bodies_go_by_name(tmp_path: Path) -> None:
         for name in names:
             assert np.array_equal(moments.body_pose[:, theirs.index(name)], poses[0][:, names.index(name)])
         assert (moments.body_pose[:, theirs.index("post"), :3] == [0.2, 0.4, 0.6]).all()
-        writer = make_writer("mcap", {})
-        found = film_episode(other, 0, moments, ["front"], tmp_path, writer)
-        assert found["front"].frames == 4
-        assert (tmp_path / found["front"].file).stat().st_size > 0
 
 
 def _without_a_toy(engine: SimEngine) -> np.ndarray:
@@ -142,7 +153,7 @@ CHANGES: dict[str, Callable[[SimEngine], object]] = {
 
 
 @pytest.mark.parametrize("what", CHANGES)
-def test_what_was_changed_midway_is_not_filmed(what: str, tmp_path: Path) -> None:
+def test_what_was_changed_midway_is_not_filmed(what: str) -> None:
     """It is not recorded, so the images would be others; motion and what is felt are no such change."""
     with filmed_env("mujoco", 2) as env:
         env.reset(seed=5)
@@ -151,12 +162,106 @@ def test_what_was_changed_midway_is_not_filmed(what: str, tmp_path: Path) -> Non
         env.engine.set_parameters("body.mass", [[0.3]], [0], [env.engine.index.body("cube~0")])
         assert (env.engine.appearance_changes == before).all()
         CHANGES[what](env.engine)
-        moments = Moments(np.arange(2), poses[0])
-        writer = make_writer("mcap", {})
         with pytest.raises(RecordError, match="changed after the reset"):
-            film_episode(env, 0, moments, ["front"], tmp_path, writer, since=int(before[0]))
+            draw_recorded(env, 0, int(before[0]), columns_of(env, poses[0]), 1, ["front"])
         if what != "a thing more":  # in the other env nothing was changed
-            film_episode(env, 1, Moments(np.arange(2), poses[1]), ["front"], tmp_path, writer, since=int(before[1]))
+            draw_recorded(env, 1, int(before[1]), columns_of(env, poses[1]), 1, ["front"])
+
+
+# ---------------------------------------------------------------------- a run that films what it keeps
+
+SHORT = ("task.horizon=6", "record.fps=25", "record.cameras=[front, wrist]", "record.keep=all")
+
+
+def collected(out: Path, engine: str, *more: str) -> Iterator[tuple[TaskEnv, Collector]]:
+    """A run of five short episodes in two envs, before and after."""
+    with filmed_env(engine, 2, *SHORT, *more) as env:
+        collector = Collector(env, SkillPolicy(env), out, 5, 0)
+        yield env, collector
+        list(collector.run())
+        yield env, collector
+
+
+RUNS = [
+    pytest.param("mujoco", (), id="mujoco"),
+    pytest.param("mujoco", ("engine.shards=2",), id="mujoco in two processes", marks=pytest.mark.slow),
+    pytest.param("pybullet", (), id="pybullet", marks=pytest.mark.slow),
+    pytest.param("sapien", (), id="sapien", marks=pytest.mark.slow),
+]
+
+
+@pytest.mark.parametrize(("engine", "more"), RUNS)
+def test_a_run_filmed_later_writes_the_files_of_one_filmed_live(
+    engine: str, more: tuple[str, ...], tmp_path: Path
+) -> None:
+    """The same manifests but for clock and the word itself, and the same bytes of numbers and videos."""
+    for mode in ("live", "success"):
+        *_, (_, collector) = collected(tmp_path / mode, engine, f"record.film={mode}", *more)
+        parts = collector.times.parts()
+        assert parts["draw"] > 0
+        assert min(parts.values()) >= 0
+    live, later = trajectories(tmp_path / "live"), trajectories(tmp_path / "success")
+    assert [path.name for path in live] == [path.name for path in later]
+    assert len(live) == 5
+    for ours, theirs in zip(later, live, strict=True):
+        manifests = [json.loads((path / "manifest.json").read_text()) for path in (ours, theirs)]
+        assert [m["spec"]["record"].pop("film") for m in manifests] == ["success", "live"]
+        assert all(m.pop("clock") for m in manifests)
+        assert len(manifests[0]["cameras"]) == 2
+        for name in ("front.mp4", "wrist.mp4"):
+            assert (ours / name).read_bytes() == (theirs / name).read_bytes()
+        for manifest in manifests:  # the spec is an attachment of it
+            assert manifest["files"].pop("trajectory.mcap")
+        assert list(manifests[0]) == list(manifests[1])
+        assert manifests[0] == manifests[1]
+        assert verify(ours) == []
+
+
+def at_each_step(collector: Collector, look: Callable[[int], object]) -> None:
+    """Have `look` called with 0, 1, 2… before the policy decides on each action."""
+    act, calls = collector.policy.act, count()
+
+    def look_and_act(env_ids: np.ndarray) -> np.ndarray:
+        look(next(calls))
+        return act(env_ids)
+
+    collector.policy.act = look_and_act
+
+
+@pytest.mark.parametrize("keep", ["all", "success"])
+def test_only_what_is_kept_is_drawn(keep: str, tmp_path: Path) -> None:
+    """When it has ended, and not in the steps before; of the short episodes here none succeeds."""
+    run = collected(tmp_path, "mujoco", f"record.keep={keep}")
+    env, collector = next(run)
+    assert env.capture is not None
+    drawn: list[float] = []
+    at_each_step(collector, lambda _: drawn.append(env.capture.draw_seconds))
+    next(run)
+    assert drawn[:6] == [0.0] * 6
+    assert len(drawn) == 18
+    assert (drawn[6] > 0) == (keep == "all")
+    assert (env.capture.draw_seconds > drawn[12]) == (keep == "all")
+    assert len(trajectories(tmp_path)) == (5 if keep == "all" else 0)
+
+
+def test_a_look_changed_midway_ends_the_run_and_leaves_whole_trajectories(tmp_path: Path) -> None:
+    """It is not recorded, so what would be drawn is not what was there."""
+    run = collected(tmp_path, "mujoco")
+    env, collector = next(run)
+
+    def repaint(call: int) -> None:
+        if call == 9:  # each episode has six steps
+            env.engine.set_parameters("geom.color", [0.1, 0.2, 0.3, 1.0], [1], [0])
+
+    at_each_step(collector, repaint)
+    with pytest.raises(RecordError, match=r"env 1 cannot be filmed: .* record with `record.film: live`"):
+        next(run)
+    there = trajectories(tmp_path)
+    assert [path.name[4:] for path in there] == ["0000_episode_0000", "0000_episode_0001", "0001_episode_0000"]
+    for path in there:
+        assert len(read_manifest(path).cameras) == 2
+        assert verify(path) == []
+    assert not (tmp_path / ".incoming").exists()
 
 
 # ---------------------------------------------------------------------- live or later
@@ -202,12 +307,12 @@ def test_check_says_where_it_was_asked_for(monkeypatch: pytest.MonkeyPatch) -> N
     assert check_one("pick_cube", None, False, [PUSH, "record.film=success"]) == []
 
 
-def test_a_writer_without_videos_of_their_own_films_live(
-    monkeypatch: pytest.MonkeyPatch, writer: TrajectoryWriter
-) -> None:
+def test_a_writer_without_images_says_so_at_once(monkeypatch: pytest.MonkeyPatch, writer: TrajectoryWriter) -> None:
+    """It is asked for the first image, and not when an episode has succeeded."""
     spec = _spec(monkeypatch)
     assert hindrances(spec) == []
     monkeypatch.setattr(registry, "load", lambda kind, name: type(writer))
-    assert hindrances(spec) == ["the writer 'mcap' cannot write a video by itself"]
-    with pytest.raises(RecordError, match="the writer 'lines' cannot write a video by itself"):
-        writer.video_file("front")
+    assert hindrances(spec) == []
+    monkeypatch.setattr(type(writer), "open_images", TrajectoryWriter.open_images)
+    assert hindrances(spec) == ["the writer 'mcap' writes no images"]
+    assert film_mode(spec) == "live"

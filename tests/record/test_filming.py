@@ -42,7 +42,7 @@ def collect(out: Path, engine: str, *more: str) -> list[Path]:
 @pytest.fixture(scope="module")
 def live(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """Trajectories with the videos of both cameras, as they were recorded."""
-    return collect(tmp_path_factory.mktemp("live"), "mujoco")
+    return collect(tmp_path_factory.mktemp("live"), "mujoco", "record.film=live")
 
 
 @pytest.fixture(scope="module")
@@ -244,7 +244,7 @@ def test_several_processes_make_the_same_videos(live: list[Path], blind: list[Pa
 def test_another_process_makes_the_videos_of_the_recording(engine: str, tmp_path: Path) -> None:
     """Lossless ones, so that every pixel counts: recorded in this process, drawn by the command line in another one."""
     lossless = "record.options={crf: 0, preset: ultrafast}"
-    wanted = collect(tmp_path / "live", engine, lossless)
+    wanted = collect(tmp_path / "live", engine, lossless, "record.film=live")
     blind = collect(tmp_path / "blind", engine, lossless, "record.cameras=[]")
     command = [sys.executable, "-m", "anysim.cli", "render", str(tmp_path / "blind"), "--json"]
     done = subprocess.run([*command, "-c", "front", "-c", "wrist"], capture_output=True, text=True, check=False)

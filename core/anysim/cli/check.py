@@ -70,7 +70,7 @@ def _check_film(loaded: "LoadedRun") -> None:
     """Whether episodes can be filmed when the file wants them filmed."""
     from anysim.api import located
     from anysim.errors import SpecError
-    from anysim.record.film_mode import film_mode
+    from anysim.record.film import film_mode
 
     try:
         film_mode(loaded.spec)

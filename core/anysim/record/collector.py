@@ -8,6 +8,7 @@ import sys
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -16,8 +17,9 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.errors import RecordError
 from anysim.record.collect_times import CollectTimes
+from anysim.record.film import camera_of, draw_recorded, film_mode
 from anysim.record.frame import NOTHING, FrameBatch, state_batch
-from anysim.record.header import EpisodeHeader, RunHeader, camera_info, state_layout
+from anysim.record.header import EpisodeHeader, RunHeader, state_layout
 from anysim.record.provenance import package_versions
 from anysim.record.recorder import Recorder
 from anysim.record.trajectory_files import PendingCommit
@@ -97,6 +99,7 @@ class Collector:
         self.env, self.policy, self.seed = env, policy, seed
         record, task = env.spec.record, env.spec.task
         assert task is not None
+        self._film = film_mode(env.spec)
         writer = make_writer(record.writer, record.options)
         self.recorder = Recorder(out, writer, run_header(env, seed), horizon=task.horizon)
         self.times = CollectTimes(env)
@@ -164,22 +167,18 @@ class Collector:
         fresh = np.flatnonzero(begin)
         with self.times.reset:
             self.env.reset(mask=begin)
+        seen = self.env.engine.appearance_changes
         with self.times.policy:
             self.policy.begin(fresh)
         self._total[fresh] = 0.0
         with self.times.record:
             for i in map(int, fresh):
-                self.recorder.start(self._header(i))
+                later = partial(draw_recorded, self.env, i, int(seen[i])) if self._film == "success" else None
+                self.recorder.start(self._header(i), later)
         self._append(fresh, None, self.env.status)
 
     def _header(self, i: int) -> EpisodeHeader:
         env = self.env
-        cameras = {}
-        for name in env.spec.record.cameras:
-            number = env.engine.index.camera(name)
-            camera = env.engine.world.cameras[number]
-            pose, fov = env.engine.camera_mounts(name, [i])[0], float(env.engine.camera_fov(name, [i])[0])
-            cameras[name] = camera_info(env.engine.world, camera, self._capture.every, pose, fov)
         return EpisodeHeader(
             env=i,
             episode=int(self._episode[i]),
@@ -187,7 +186,7 @@ class Collector:
             drawn=env.streams.draws[i],
             overridden=env.streams.overridden[i],
             instruction=self._instruction,
-            cameras=cameras,
+            cameras={name: camera_of(env, i, name) for name in env.spec.record.cameras},
         )
 
     def _resumed(self, env: int, episode: int) -> EpisodeResult:
@@ -229,13 +228,16 @@ class Collector:
     # ------------------------------------------------------------------ frames
 
     def _append(self, ids: Array, reward: Array | None, status: Array) -> None:
-        """Record one frame of each env, with images of the cameras that are due. A faulted env has no frame."""
+        """Record one frame of each env; filmed live, with images of the cameras that are due.
+
+        A faulted env has no frame.
+        """
         env, times = self.env, self.times
         ids = ids[~env.info["fault"][ids]]
         if len(ids) == 0:
             return
         images: Sequence[Mapping[str, Array]] = [NOTHING] * len(ids)
-        if env.spec.record.cameras:
+        if env.spec.record.cameras and self._film == "live":
             with times.record:
                 images = self._images(ids)
         with times.record:

@@ -1,6 +1,6 @@
 """An open episode: how far it is, the words that changed in it, and whether the next frame fits."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,18 +13,23 @@ from anysim.record.frame import Frame, FrameBatch
 from anysim.record.header import Header, StateLayout
 from anysim.record.json import plain
 
+Film = Callable[[EpisodeColumns, int, Sequence[str]], Mapping[str, Array]]
+"""Draws images (H, W, 3) uint8 of an ended episode, by its columns, a control step and the cameras due at it."""
+
 
 class OpenEpisode:
     """An episode whose numbers are in a slot of the column store, and whose words are here.
 
     Attributes:
+        film: draws its images when it has ended; None where they come with its frames.
         count: frames so far.
         first_step: the control step of the first one.
         first_image: the control step of the first image of each camera.
     """
 
-    def __init__(self, header: Header, slot: int) -> None:
+    def __init__(self, header: Header, slot: int, film: Film | None = None) -> None:
         self.header, self.slot = header, slot
+        self.film = film if header.episode.cameras else None
         self.count = self.first_step = 0
         self.first_image: dict[str, int] = {}
         self._status: list[Change] = []
@@ -39,7 +44,7 @@ class OpenEpisode:
         return where(self.header)
 
     def cameras_due(self, step: int) -> tuple[str, ...]:
-        """The cameras whose images belong to the frame of a control step."""
+        """The cameras whose images belong to a control step."""
         return tuple(name for name, camera in self.header.episode.cameras.items() if step % camera.every == 0)
 
     def check(self, step: int, images: Mapping[str, Array]) -> None:
@@ -52,10 +57,17 @@ class OpenEpisode:
         if step != following and not (self.count == 0 and step == 1):
             expected = str(following) if self.count else "0 or 1"
             raise RecordError(f"{self.where}: frame of step {step}, but step {expected} is next")
+        due = self.cameras_due(step) if self.header.episode.cameras and self.film is None else ()
+        if images or due:
+            self.check_images(step, images, due)
+
+    def check_images(self, step: int, images: Mapping[str, Array], due: Sequence[str]) -> None:
+        """See that these are the images of the cameras that are due.
+
+        Raises:
+            RecordError: they are not.
+        """
         cameras = self.header.episode.cameras
-        due = self.cameras_due(step) if cameras else ()
-        if not images and not due:
-            return
         if set(images) != set(due):
             raise RecordError(f"{self.where}, step {step}: images of {listing(images)}; due are {listing(due)}")
         for name in due:
@@ -83,9 +95,13 @@ class OpenEpisode:
         if language and language != self._words:
             self._words = language
             self._language.append(Change(row, language))
+        self.note_images(step, images)
+        self.count += 1
+
+    def note_images(self, step: int, images: Mapping[str, Array]) -> None:
+        """Keep which control step a camera's first image is of."""
         for name in images:
             self.first_image.setdefault(name, step)
-        self.count += 1
 
     def columns(self, store: ColumnStore) -> EpisodeColumns:
         """The episode as it is now, copied out of the store."""

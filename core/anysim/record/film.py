@@ -1,35 +1,62 @@
-"""Deferred filming: the images of an episode, drawn from the body poses that were recorded of it.
+"""Filming of episodes: live, in each step, or from the recorded body poses of an episode that has ended.
 
-An env in which the episode began, and in which nothing that is seen was changed since, gives the pixels that a camera
+An env in which an episode began, and in which nothing that is seen was changed since, gives the pixels that a camera
 gave then: colours, textures, lights, lenses and noise are those of the reset, and the rest follows from the poses. It
 need not stand where the episode stood, and it is not stepped.
 """
 
-from collections.abc import Iterator, Sequence
-from pathlib import Path
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Literal
 
-import numpy as np
-
+from anysim import registry
 from anysim.conventions import Array
-from anysim.errors import RecordError
+from anysim.errors import RecordError, SpecError, SpecIssue
 from anysim.managers.camera import CaptureManager
+from anysim.record.columns import EpisodeColumns
 from anysim.record.header import CameraInfo, camera_info
-from anysim.record.manifest import CameraEntry
 from anysim.record.writer import TrajectoryWriter
+from anysim.task.contract import UNSEEN
 from anysim.task.env import TaskEnv
+from anysim.task.term_registry import find
+from anysim_schemas.run import RunSpec
+
+FilmMode = Literal["live", "success"]
 
 
-class Moments(NamedTuple):
-    """Columns of an episode.
+def film_mode(spec: RunSpec) -> FilmMode:
+    """When the videos of a run are drawn: `live`, in each step, or `success`, when an episode has ended and is kept.
 
-    Attributes:
-        steps: (K,) control steps, in order; step 0 is right after the reset.
-        body_pose: (K, B, 7) float64, as `State.body_pose` had them, bodies in the order of the env's world.
+    Raises:
+        SpecError: at `record.film`: `success` is asked for, and why what is seen cannot be drawn afterwards.
     """
+    if spec.record.film == "live":
+        return "live"
+    reasons = hindrances(spec)
+    if spec.record.film == "success":
+        if not reasons:
+            return "success"
+        text = f"episodes cannot be filmed when they have ended: {'; '.join(reasons)}. Use film: live, or auto"
+        raise SpecError([SpecIssue("", "record.film", text)])
+    observed = spec.task is not None and not set(spec.record.cameras).isdisjoint(spec.task.images)
+    return "live" if reasons or observed else "success"  # what is observed is drawn in each step anyway
 
-    steps: Array
-    body_pose: Array
+
+def hindrances(spec: RunSpec) -> list[str]:
+    """Why the images of an episode cannot be drawn from its recorded states, a reason each; empty if they can.
+
+    Recorded are poses of bodies; colours, textures, lights, lenses and what is there follow from the episode's seed, as
+    they are drawn at its reset. What changes them in the middle of an episode is not recorded.
+    """
+    reasons = [
+        f"the event '{name}' acts at each step, and its term '{event.term}' is not marked as one that changes nothing "
+        "that is seen (anysim.task.contract.changes_nothing_seen)"
+        for name, event in (spec.task.events if spec.task is not None else {}).items()
+        if event.when == "step" and not getattr(find("event", event.term), UNSEEN, False)
+    ]
+    writer: type[TrajectoryWriter] = registry.load("writers", spec.record.writer)
+    if spec.record.cameras and writer.open_images is TrajectoryWriter.open_images:
+        reasons.append(f"the writer '{spec.record.writer}' writes no images")
+    return reasons
 
 
 def camera_of(env: TaskEnv, index: int, camera: str) -> CameraInfo:
@@ -37,84 +64,40 @@ def camera_of(env: TaskEnv, index: int, camera: str) -> CameraInfo:
     engine = env.engine
     found = engine.world.cameras[engine.index.camera(camera)]
     pose, fov = engine.camera_mounts(camera, [index])[0], float(engine.camera_fov(camera, [index])[0])
-    return camera_info(engine.world, found, _capture(env).every, pose, fov)
+    return camera_info(engine.world, found, capture_of(env).every, pose, fov)
 
 
-def images(env: TaskEnv, index: int, camera: str, moments: Moments) -> Iterator[tuple[int, Array]]:
-    """(control step, (H, W, 3) uint8) of each step at which images of an env are recorded."""
-    capture = _capture(env)
-    for step, poses in zip(moments.steps.tolist(), moments.body_pose, strict=True):
-        if step % capture.every == 0:
-            yield step, capture.image_then(camera, index, step, poses)
-
-
-def film_episode(
-    env: TaskEnv,
-    index: int,
-    moments: Moments,
-    cameras: Sequence[str],
-    directory: Path,
-    writer: TrajectoryWriter,
-    since: int | None = None,
-) -> dict[str, CameraEntry]:
-    """Write a video of each camera into a directory: the files that a recording of the live images would have.
+def draw_recorded(
+    env: TaskEnv, index: int, since: int, columns: EpisodeColumns, step: int, cameras: Sequence[str]
+) -> dict[str, Array]:
+    """Images (H, W, 3) uint8 of cameras at a control step of an episode that has ended.
 
     Args:
-        env: has begun the episode in the env `index`.
-        moments: of the whole episode.
-        cameras: of the env's world.
-        directory: where no such videos are yet. Incomplete ones are left in it where anything is raised.
-        writer: the codec is that of its options; nothing else of it is used.
+        env: has begun the episode in the env `index`, and no other one since.
+        index: the env.
         since: what `engine.appearance_changes[index]` was right after the reset, to be sure that it is still.
-
-    Returns:
-        What a manifest says of them; a camera that took no image makes no file.
+        columns: of the whole episode.
+        step: a control step of it.
+        cameras: of the env's world.
 
     Raises:
-        RecordError: what is seen was changed after the reset, or the writer has no videos.
+        RecordError: what is seen was changed after the reset.
     """
-    if since is not None and int(env.engine.appearance_changes[index]) != since:
+    if int(env.engine.appearance_changes[index]) != since:
         raise RecordError(
             f"env {index} cannot be filmed: its colours, lights, cameras or what is there were changed after the "
             "reset, which is not recorded; record with `record.film: live`"
         )
-    dt = env.engine.world.physics.control_dt
-    found: dict[str, CameraEntry] = {}
-    for camera in cameras:
-        info, file = camera_of(env, index, camera), writer.video_file(camera)
-        due = moments.steps[moments.steps % info.every == 0]
-        if not len(due):
-            continue
-        video = writer.open_video(directory / file, info, dt)
-        try:
-            for _, image in images(env, index, camera, moments):
-                video.write(image)
-            video.close()
-        except BaseException:
-            video.abort()
-            raise
-        found[camera] = CameraEntry(
-            **dict(info), file=file, frames=video.frames, first_step=int(due[0]), fps=1.0 / (dt * info.every)
-        )
-    return found
+    poses = columns.state["body_pose"][step - columns.first_step]
+    return {camera: capture_of(env).image_then(camera, index, step, poses) for camera in cameras}
 
 
-def moments_for(env: TaskEnv, bodies: Sequence[str], steps: Array, body_pose: Array) -> Moments:
-    """Recorded poses (K, R, 7) of bodies by name as moments of an env, whose world may have others too.
+def capture_of(env: TaskEnv) -> CaptureManager:
+    """What takes an env's images.
 
-    Bodies that were not recorded stand where they are now; recorded ones that the world does not have are left out.
+    Raises:
+        RecordError: the env has none.
     """
-    names = [body.name for body in env.engine.world.bodies]
-    if names == list(bodies):
-        return Moments(steps, body_pose)
-    rows = np.repeat(env.engine.get_state().body_pose[:1], len(steps), axis=0)
-    pairs = [(names.index(name), place) for place, name in enumerate(bodies) if name in names]
-    for here, there in pairs:
-        rows[:, here] = body_pose[:, there]
-    return Moments(steps, rows)
-
-
-def _capture(env: TaskEnv) -> CaptureManager:
     if env.capture is None:
         raise RecordError("an env without a CaptureManager takes no images; make it with `anysim.make`")
     return env.capture

@@ -11,8 +11,8 @@ import numpy as np
 
 from anysim.errors import RecordError, listing, suggest
 from anysim.record.commit import describe
-from anysim.record.film import Moments, film_episode, moments_for
 from anysim.record.film_commit import add_videos, workspace
+from anysim.record.film_episode import Moments, film_episode, moments_for
 from anysim.record.film_sheet import FILM_FILE, FilmSheet, read_sheet
 from anysim.record.json import plain
 from anysim.record.manifest import Manifest, read_manifest
@@ -211,7 +211,7 @@ class Filmer:
         begin(env, manifest)
         moments = moments_for(env, recorded, *_columns(open_trajectory(trajectory)))
         record = loaded.spec.record
-        found = film_episode(env, 0, moments, missing, aside, make_writer(record.writer, record.options))
+        found = film_episode(env, manifest, moments, missing, aside, make_writer(record.writer, record.options))
         drawn, before = f"{engine.name} {engine.version}", f"{manifest.engine} {manifest.engine_version}"
         said = {"at": datetime.now(UTC).isoformat(), "engine": drawn, "renderer": engine.renderer_name()}
         clock = dict.fromkeys(found, said)

@@ -1,23 +1,26 @@
 """The recorder of a run: keeps the open episodes of its envs in columns, and commits or discards each.
 
 The thread that steps fills columns and nothing else. All that touches the disk happens in order on the recorder's own
-thread: images as they come, everything else when an episode is committed.
+thread: images as they come, everything else when an episode is committed. Images that are drawn from the columns of an
+episode are drawn by the thread that steps, when it commits the episode.
 """
 
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
+from anysim.conventions import Array
 from anysim.errors import RecordError, listing
 from anysim.record.column_checks import check_columns
-from anysim.record.columns import ColumnStore
+from anysim.record.columns import ColumnStore, EpisodeColumns
 from anysim.record.committer import Committer
-from anysim.record.episode import BatchChecks, OpenEpisode, batch_of
+from anysim.record.episode import BatchChecks, Film, OpenEpisode, batch_of
 from anysim.record.frame import Frame, FrameBatch
 from anysim.record.header import EpisodeHeader, Header, RunHeader
 from anysim.record.incoming import Incoming
@@ -32,6 +35,7 @@ from anysim.record.writer import TrajectoryWriter
 class _Attempt:
     def __init__(self, episode: OpenEpisode, files: TrajectoryFiles) -> None:
         self.episode, self.files = episode, files
+        self.has_images = False
         self.began = time.monotonic()
 
 
@@ -113,8 +117,12 @@ class Recorder:
 
     # ------------------------------------------------------------------ one trajectory
 
-    def start(self, episode: EpisodeHeader) -> None:
+    def start(self, episode: EpisodeHeader, film: Film | None = None) -> None:
         """Begin an episode of an env.
+
+        Args:
+            episode: what is known of it.
+            film: draws its images, within `commit`; its frames have none then. None: they come with its frames.
 
         Raises:
             RecordError: it is committed already, the env has one open, or its header is no plain data.
@@ -129,12 +137,12 @@ class Recorder:
         values = {name: plain(getattr(episode, name), name) for name in ("drawn", "overridden")}
         header = Header(self.run, EpisodeHeader.model_validate({**dict(episode), **values}))
         files = TrajectoryFiles(self._incoming, self._writer, header, self.out)
-        self._attempts[env] = _Attempt(OpenEpisode(header, self._store.open()), files)
-        if header.episode.cameras:
-            self._committer.open_images(files)
+        attempt = self._attempts[env] = _Attempt(OpenEpisode(header, self._store.open(), film), files)
+        if header.episode.cameras and film is None:
+            self._open_images(attempt)
 
     def cameras_due(self, env: int, step: int) -> tuple[str, ...]:
-        """The cameras whose images belong to the frame of a control step of the env."""
+        """The cameras whose images belong to a control step of the env."""
         return self._attempt(env).episode.cameras_due(step)
 
     def append(self, env: int, frame: Frame) -> None:
@@ -184,8 +192,7 @@ class Recorder:
             raise
         for row, attempt in enumerate(attempts):
             if batch.images[row]:
-                images = {name: np.array(image) for name, image in batch.images[row].items()}
-                self._committer.append_images(attempt.files, batch.step[row], images)
+                self._append_images(attempt, batch.step[row], batch.images[row])
 
     def commit(
         self, env: int, status: str, outcome: Mapping[str, Any] | None = None, clock: Mapping[str, Any] | None = None
@@ -199,8 +206,8 @@ class Recorder:
             clock: further plain data that differs between equal runs.
 
         Raises:
-            RecordError: its numbers are not finite, it has no steps, or an image could not be written; the trajectory
-                is discarded.
+            RecordError: its numbers are not finite, it has no steps, or an image could not be drawn or written; the
+                trajectory is discarded.
         """
         attempt = self._attempt(env)
         try:
@@ -208,6 +215,8 @@ class Recorder:
                 raise attempt.files.trouble
             columns = attempt.episode.columns(self._store)
             check_columns(columns)
+            if attempt.episode.film is not None:
+                columns = self._filmed(attempt, columns, attempt.episode.film)
             now = {"created_at": self._now().isoformat(), "wall_s": round(time.monotonic() - attempt.began, 6)}
             ending = Ending(status, plain(outcome or {}, "outcome"), {**plain(clock or {}, "clock"), **now})
         except BaseException:
@@ -222,7 +231,7 @@ class Recorder:
         if attempt is None:
             return
         self._forget(env)
-        if attempt.episode.header.episode.cameras:
+        if attempt.has_images:
             self._committer.abort(attempt.files)
 
     def flush(self) -> None:
@@ -257,6 +266,30 @@ class Recorder:
                 raise
 
     # ------------------------------------------------------------------ inside
+
+    def _open_images(self, attempt: _Attempt) -> None:
+        attempt.has_images = True
+        self._committer.open_images(attempt.files)
+
+    def _append_images(self, attempt: _Attempt, step: int, images: Mapping[str, Array]) -> None:
+        copies = {name: np.array(image) for name, image in images.items()}
+        self._committer.append_images(attempt.files, step, copies)
+
+    def _filmed(self, attempt: _Attempt, columns: EpisodeColumns, film: Film) -> EpisodeColumns:
+        """Draw the images of an episode that has ended, and hand each over: one is encoded while the next is drawn."""
+        episode = attempt.episode
+        self._open_images(attempt)
+        for step in range(columns.first_step, columns.steps + 1):
+            due = episode.cameras_due(step)
+            if not due:
+                continue
+            images = film(columns, step, due)
+            episode.check_images(step, images, due)
+            if attempt.files.trouble is not None:
+                raise attempt.files.trouble
+            episode.note_images(step, images)
+            self._append_images(attempt, step, images)
+        return replace(columns, first_image=dict(episode.first_image))
 
     def _forget(self, env: int) -> None:
         self._store.release(self._attempts.pop(env).episode.slot)

@@ -1,6 +1,6 @@
 """The files of one trajectory, from its first image to the moment before its rename; all on the recorder's thread."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from threading import Event
@@ -138,7 +138,8 @@ class TrajectoryFiles:
                 written += self._images.finish()
                 self._images = None
             entries = protocol.seal(directory, [checked_file_name(file.name) for file in written])
-            manifest = text.encode(columns, ending, entries, _cameras(columns, written))
+            cameras = camera_entries(columns.header, columns.first_image, written)
+            manifest = text.encode(columns, ending, entries, cameras)
             protocol.write_durably(directory / MANIFEST_FILE, manifest)
         except OSError as error:
             raise disk_trouble(f"cannot commit {self.where}", error, self._out) from error
@@ -173,14 +174,17 @@ class TrajectoryFiles:
             self.trouble = error
 
 
-def _cameras(columns: EpisodeColumns, written: tuple[WrittenFile, ...]) -> dict[str, CameraEntry]:
-    run, episode = columns.header
+def camera_entries(
+    header: Header, first_image: Mapping[str, int], written: Iterable[WrittenFile]
+) -> dict[str, CameraEntry]:
+    """What a manifest says of the cameras whose videos were written; a camera that took no image has none."""
+    run, episode = header
     return {
         file.camera: CameraEntry(
             **dict(episode.cameras[file.camera]),
             file=file.name,
             frames=file.frames,
-            first_step=columns.first_image.get(file.camera, 0),
+            first_step=first_image.get(file.camera, 0),
             fps=1.0 / (run.control_dt * episode.cameras[file.camera].every),
         )
         for file in written

@@ -13,13 +13,13 @@ A writer of numbers alone is one method:
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple
 
 from anysim import registry
 from anysim.conventions import Array
 from anysim.errors import RecordError
 from anysim.record.columns import EpisodeColumns
-from anysim.record.header import CameraInfo, Header, RunHeader
+from anysim.record.header import Header, RunHeader
 
 
 class WrittenFile(NamedTuple):
@@ -28,25 +28,6 @@ class WrittenFile(NamedTuple):
     name: str
     camera: str | None = None
     frames: int = 0
-
-
-class Video(Protocol):
-    """A video while it is written."""
-
-    frames: int
-    """How many images it has."""
-
-    def write(self, image: Array) -> None:
-        """Add the next image (H, W, 3) uint8."""
-        ...
-
-    def close(self) -> None:
-        """Complete the file."""
-        ...
-
-    def abort(self) -> None:
-        """Close the file in whatever state, without raising an OSError."""
-        ...
 
 
 class ImageWriter(ABC):
@@ -70,7 +51,7 @@ class TrajectoryWriter(ABC):
 
     What is written must follow from columns and images alone: no wall clock, no process id, no random names. An
     OSError (a full disk) may come out of any method, which closes its own files then; the recorder removes the
-    directory. All methods but the constructor are called on the recorder's thread, never two at once.
+    directory. All methods but the constructor are called on one thread.
     """
 
     name: ClassVar[str]
@@ -98,23 +79,6 @@ class TrajectoryWriter(ABC):
             f"the writer '{self.name}' writes no images of {', '.join(header.episode.cameras)}; "
             "set record.cameras=[], or choose another record.writer"
         )
-
-    # ------------------------------------------------------------------ videos by themselves
-
-    def video_file(self, camera: str) -> str:
-        """The name of the file that a camera's video has beside the others of a trajectory."""
-        raise self._no_videos()
-
-    def open_video(self, path: Path, camera: CameraInfo, control_dt: float) -> Video:
-        """Begin a camera's video by itself: the file that `append` would have made of the same images.
-
-        Raises:
-            RecordError: the writer has none.
-        """
-        raise self._no_videos()
-
-    def _no_videos(self) -> RecordError:
-        return RecordError(f"the writer '{self.name}' cannot write a video by itself; record with `record.film: live`")
 
 
 def make_writer(name: str, options: Mapping[str, Any]) -> TrajectoryWriter:

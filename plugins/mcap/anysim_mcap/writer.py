@@ -80,14 +80,7 @@ class McapWriter(TrajectoryWriter):
         return (WrittenFile(TRAJECTORY_FILE),)
 
     def open_images(self, directory: Path, header: Header) -> ImageWriter:
-        return VideoFiles(directory, header, self)
-
-    def video_file(self, camera: str) -> str:
-        return f"{camera}.mp4"
-
-    def open_video(self, path: Path, camera: CameraInfo, control_dt: float) -> VideoWriter:
-        rate = frame_rate(control_dt, camera.every)
-        return VideoWriter(path, camera.width, camera.height, rate, self.options.crf, self.options.preset)
+        return VideoFiles(directory, header, self.options)
 
     # ------------------------------------------------------------------ what is said once
 
@@ -135,15 +128,14 @@ class McapWriter(TrajectoryWriter):
 class VideoFiles(ImageWriter):
     """One MP4 for each camera that takes an image; one that takes none makes no file."""
 
-    def __init__(self, directory: Path, header: Header, writer: "McapWriter") -> None:
+    def __init__(self, directory: Path, header: Header, options: Options) -> None:
         self._videos: dict[str, VideoWriter] = {}
-        self._directory, self._header, self._writer = directory, header, writer
+        self._directory, self._header, self._options = directory, header, options
 
     def append(self, images: Mapping[str, Array]) -> None:
         for name, image in images.items():
             if name not in self._videos:
-                path, camera = self._directory / self._writer.video_file(name), self._header.episode.cameras[name]
-                self._videos[name] = self._writer.open_video(path, camera, self._header.run.control_dt)
+                self._videos[name] = self._begun(name, self._header.episode.cameras[name])
             self._videos[name].write(image)
 
     def finish(self) -> tuple[WrittenFile, ...]:
@@ -152,9 +144,18 @@ class VideoFiles(ImageWriter):
             name, video = next(iter(self._videos.items()))
             video.close()
             del self._videos[name]
-            files.append(WrittenFile(self._writer.video_file(name), name, video.frames))
+            files.append(WrittenFile(_file(name), name, video.frames))
         return tuple(files)
 
     def abort(self) -> None:
         while self._videos:
             self._videos.popitem()[1].abort()
+
+    def _begun(self, name: str, camera: CameraInfo) -> VideoWriter:
+        rate = frame_rate(self._header.run.control_dt, camera.every)
+        path, options = self._directory / _file(name), self._options
+        return VideoWriter(path, camera.width, camera.height, rate, options.crf, options.preset)
+
+
+def _file(camera: str) -> str:
+    return f"{camera}.mp4"
