@@ -25,6 +25,7 @@ WORDS = {
     "assets": "cabinets, lids, valves, wheeled bases, a gripper, a flying camera",
     "bench": "`anysim bench`: what anysim costs on top of an engine",
     "control": "tools by inverse kinematics and operational space, vehicles, hands, cameras",
+    "film": "`anysim render`: videos of recorded episodes, with other sizes, looks or engines",
     "kinematics": "mechanics of robots (Pinocchio), for controllers of your own",
     "legged": "a trot, balance and walking",
     "mcap": "recordings: MCAP files and videos",

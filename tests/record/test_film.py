@@ -18,7 +18,6 @@ from anysim.errors import RecordError, SpecError
 from anysim.record.collector import Collector, run_header
 from anysim.record.columns import EpisodeColumns
 from anysim.record.film import draw_recorded, film_mode, hindrances
-from anysim.record.film_episode import moments_for
 from anysim.record.header import EpisodeHeader, Header
 from anysim.record.manifest import read_manifest
 from anysim.record.names import trajectories
@@ -112,25 +111,6 @@ def test_filming_leaves_the_run_alone() -> None:
         assert env.capture is not None
         assert clean.capture is not None
         assert np.array_equal(env.capture.image("wrist", np.arange(2)), clean.capture.image("wrist", np.arange(2)))
-
-
-def test_bodies_go_by_name() -> None:
-    """A world with a thing more draws the recorded ones where they were, and the thing where its reset put it."""
-    more = (
-        "world.objects.post={source: {box: [0.05, 0.05, 0.4]}, fixed: true}",
-        "world.layout.post={position: [0.2, 0.4, 0.6]}",
-    )
-    with filmed_env("mujoco", 1) as env, filmed_env("mujoco", 1, *more) as other:
-        env.reset(seed=5)
-        names = [body.name for body in env.engine.world.bodies]
-        _, poses = recorded(env, 3)
-        other.reset(episode_seeds=[int(env.streams.episode_seed[0])])
-        moments = moments_for(other, names, np.arange(4), poses[0])
-        theirs = [body.name for body in other.engine.world.bodies]
-        assert {"post"} == set(theirs) - set(names)
-        for name in names:
-            assert np.array_equal(moments.body_pose[:, theirs.index(name)], poses[0][:, names.index(name)])
-        assert (moments.body_pose[:, theirs.index("post"), :3] == [0.2, 0.4, 0.6]).all()
 
 
 def _without_a_toy(engine: SimEngine) -> np.ndarray:

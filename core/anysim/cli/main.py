@@ -6,7 +6,7 @@ import warnings
 import typer
 
 from anysim import __version__
-from anysim.cli import audit, check, doctor, explain, listing, render, replay, run, schema, snapshot
+from anysim.cli import audit, check, doctor, explain, listing, replay, run, schema, snapshot
 from anysim.cli.options import Commands
 
 EXIT_CODES = """Exit codes: 0 done; 1 it ran, and the answer is no (a replay that differs, a file with faults, too few
@@ -25,7 +25,6 @@ app = typer.Typer(
 )
 app.command("run")(run.run)
 app.command("replay")(replay.replay)
-app.command("render")(render.render)
 app.command("check")(check.check)
 app.command("list")(listing.list_)
 app.command("explain")(explain.explain)

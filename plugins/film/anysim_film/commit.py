@@ -8,10 +8,10 @@ from typing import Any, TypeVar
 
 from anysim.errors import RecordError
 from anysim.record.commit import fsync, seal, write_durably
-from anysim.record.film_sheet import FilmSheet
 from anysim.record.json import dump_json
 from anysim.record.lock import FileLock
 from anysim.record.manifest import CameraEntry, Manifest
+from anysim_film.sheet import FilmSheet
 
 Listing = TypeVar("Listing", Manifest, FilmSheet)
 

@@ -12,11 +12,7 @@ import pytest
 import anysim
 from anysim import registry
 from anysim.errors import RecordError
-from anysim.record import film_commit
 from anysim.record.collector import Collector
-from anysim.record.film_jobs import film_all
-from anysim.record.film_sheet import FILM_FILE, read_sheet
-from anysim.record.filming import Filmer, FilmOrder, film_targets
 from anysim.record.lock import FileLock
 from anysim.record.manifest import read_manifest
 from anysim.record.names import MANIFEST_FILE, trajectories
@@ -24,7 +20,12 @@ from anysim.record.reader import open_trajectory
 from anysim.record.verify import verify
 from anysim.skills.runner import SkillPolicy
 from anysim.testing.fixtures import drawing_trouble
-from tests.record.test_film import SEEN
+from anysim_film import commit
+from anysim_film.episode import moments_for
+from anysim_film.filmer import Filmer, FilmOrder, film_targets
+from anysim_film.jobs import film_all
+from anysim_film.sheet import FILM_FILE, read_sheet
+from tests.record.test_film import SEEN, filmed_env, recorded as played
 
 SHORT = (*SEEN, "task.horizon=6", "record.keep=all", "record.fps=25")
 BOTH = FilmOrder(("front", "wrist"))
@@ -217,13 +218,32 @@ def test_each_trajectory_has_a_place_of_its_own(tmp_path: Path) -> None:
 
 def test_the_workspace_is_gone_after_an_error(tmp_path: Path) -> None:
     def work() -> None:
-        with film_commit.workspace(tmp_path / "film") as aside:
+        with commit.workspace(tmp_path / "film") as aside:
             (aside / "front.mp4").write_bytes(b"half a video")
             raise KeyError
 
     with pytest.raises(KeyError):
         work()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_bodies_go_by_name() -> None:
+    """A world with a thing more draws the recorded ones where they were, and the thing where its reset put it."""
+    more = (
+        "world.objects.post={source: {box: [0.05, 0.05, 0.4]}, fixed: true}",
+        "world.layout.post={position: [0.2, 0.4, 0.6]}",
+    )
+    with filmed_env("mujoco", 1) as env, filmed_env("mujoco", 1, *more) as other:
+        env.reset(seed=5)
+        names = [body.name for body in env.engine.world.bodies]
+        _, poses = played(env, 3)
+        other.reset(episode_seeds=[int(env.streams.episode_seed[0])])
+        moments = moments_for(other, names, np.arange(4), poses[0])
+        theirs = [body.name for body in other.engine.world.bodies]
+        assert {"post"} == set(theirs) - set(names)
+        for name in names:
+            assert np.array_equal(moments.body_pose[:, theirs.index(name)], poses[0][:, names.index(name)])
+        assert (moments.body_pose[:, theirs.index("post"), :3] == [0.2, 0.4, 0.6]).all()
 
 
 # ---------------------------------------------------------------------- other processes

@@ -11,9 +11,6 @@ import numpy as np
 
 from anysim.errors import RecordError, listing, suggest
 from anysim.record.commit import describe
-from anysim.record.film_commit import add_videos, workspace
-from anysim.record.film_episode import Moments, film_episode, moments_for
-from anysim.record.film_sheet import FILM_FILE, FilmSheet, read_sheet
 from anysim.record.json import plain
 from anysim.record.manifest import Manifest, read_manifest
 from anysim.record.names import MANIFEST_FILE
@@ -21,6 +18,9 @@ from anysim.record.reader import TrajectoryReader, open_trajectory
 from anysim.record.replay import begin
 from anysim.record.writer import make_writer
 from anysim.task.env import TaskEnv
+from anysim_film.commit import add_videos, workspace
+from anysim_film.episode import Moments, film_episode, moments_for
+from anysim_film.sheet import FILM_FILE, FilmSheet, read_sheet
 from anysim_schemas.load import LoadedRun
 
 

@@ -8,7 +8,7 @@ import typer
 from anysim.cli.options import AsJson, Engine, Overrides
 
 if TYPE_CHECKING:
-    from anysim.record.filming import Filmed
+    from anysim_film.filmer import Filmed
 
 
 def render(
@@ -41,9 +41,9 @@ def render(
       anysim render runs/a --size 1280 720 -e sapien -o world.scenery.shadows=true --out films/a
     """
     from anysim.cli.output import counting, print_json
-    from anysim.record.film_jobs import film_all
-    from anysim.record.filming import FilmOrder, film_targets
     from anysim.record.names import find_trajectories
+    from anysim_film.filmer import FilmOrder, film_targets
+    from anysim_film.jobs import film_all
 
     order = FilmOrder(tuple(camera or ()), engine, tuple(override or ()), size, fps, base)
     work = film_targets(find_trajectories(directories), out)
