@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from anysim.record.columns import EpisodeColumns
-from anysim.record.frame import Frame
+from anysim.record.frame import RecordedFrame
 from anysim.record.header import ArrayLayout, EpisodeHeader, Header, RunHeader, StateLayout
 from anysim.record.recorder import Recorder
 from anysim.record.writer import ImageWriter, TrajectoryWriter, WrittenFile
@@ -102,10 +102,10 @@ def run_header() -> RunHeader:
 
 
 @pytest.fixture
-def make_frame() -> Callable[..., Frame]:
-    def make(step: int, **changes: Any) -> Frame:
+def make_frame() -> Callable[..., RecordedFrame]:
+    def make(step: int, **changes: Any) -> RecordedFrame:
         generator = np.random.default_rng(step)
-        frame = Frame(
+        frame = RecordedFrame(
             step=step,
             time=step * 0.02,
             action=None if step == 0 else generator.normal(size=2),
@@ -119,7 +119,7 @@ def make_frame() -> Callable[..., Frame]:
 
 
 @pytest.fixture
-def record(make_frame: Callable[..., Frame]) -> Callable[..., Path]:
+def record(make_frame: Callable[..., RecordedFrame]) -> Callable[..., Path]:
     """Record one whole trajectory."""
 
     def run(recorder: Recorder, env: int = 0, episode: int = 0, steps: int = 3) -> Path:

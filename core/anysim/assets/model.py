@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Literal, NamedTuple, Protocol
 
 from anysim.conventions import IDENTITY_QUATERNION
-from anysim.model.frames import Frame
+from anysim.model.frames import FixedFrame
 from anysim.model.world import ORIGIN, Body, ControlMode, Geom, HeightField, Joint, Material, Mesh, Site, Texture
 
 
@@ -67,10 +67,10 @@ class ImportedModel:
     report: tuple[ImportNote, ...] = ()
 
     @property
-    def frames(self) -> Mapping[str, Frame]:
+    def frames(self) -> Mapping[str, FixedFrame]:
         """The links and sites by name, each fixed to a body; a site wins over a link that is called the same."""
-        links = {name: Frame(body, ORIGIN, IDENTITY_QUATERNION) for name, body in self.links.items()}
-        return links | {site.name: Frame(site.body, site.position, site.quaternion) for site in self.sites}
+        links = {name: FixedFrame(body, ORIGIN, IDENTITY_QUATERNION) for name, body in self.links.items()}
+        return links | {site.name: FixedFrame(site.body, site.position, site.quaternion) for site in self.sites}
 
 
 class Importer(Protocol):

@@ -8,7 +8,7 @@ from anysim.model.slots import members
 from anysim.model.world import ORIGIN, Entity, Quat, Slot, Vec3, World
 
 
-class Frame(NamedTuple):
+class FixedFrame(NamedTuple):
     """A frame fixed to a body (-1: the world), with its pose in the body's frame."""
 
     body: int
@@ -16,7 +16,7 @@ class Frame(NamedTuple):
     quaternion: Quat
 
 
-def find_frame(world: World, name: str) -> Frame:
+def find_frame(world: World, name: str) -> FixedFrame:
     """A tool (`panda.tool`), link, lumped link, or entity (its root) by name; it is the same in every env.
 
     Raises:
@@ -28,7 +28,7 @@ def find_frame(world: World, name: str) -> Frame:
     return found
 
 
-def _frame(world: World, name: str) -> Frame | None:
+def _frame(world: World, name: str) -> FixedFrame | None:
     owner, _, part = name.partition(".")
     robot = next((r for r in world.robots if r.name == owner), None)
     site = robot.tools.get(part) if robot is not None else None
@@ -36,14 +36,14 @@ def _frame(world: World, name: str) -> Frame | None:
         site = next((i for i, s in enumerate(world.sites) if s.name == name), None)
     if site is not None:
         found = world.sites[site]
-        return Frame(found.body, found.position, found.quaternion)
+        return FixedFrame(found.body, found.position, found.quaternion)
     body = next((i for i, b in enumerate(world.bodies) if b.name == name), None)
     if body is None:
         body = next((e.root for e in world.entities if e.name == name), None)
-    return None if body is None else Frame(body, ORIGIN, IDENTITY_QUATERNION)
+    return None if body is None else FixedFrame(body, ORIGIN, IDENTITY_QUATERNION)
 
 
-def frames_of(world: World, name: str) -> tuple[tuple[Slot, tuple[Frame, ...]], ...]:
+def frames_of(world: World, name: str) -> tuple[tuple[Slot, tuple[FixedFrame, ...]], ...]:
     """A frame of logical objects: `mug.handle` is that of whatever the mug is, `cube` that of every cube.
 
     Returns:
@@ -59,7 +59,7 @@ def frames_of(world: World, name: str) -> tuple[tuple[Slot, tuple[Frame, ...]], 
     return tuple((slot, tuple(_on(world, slot, e, dot + part) for e in slot.entities)) for slot in slots)
 
 
-def _on(world: World, slot: Slot, entity: int, part: str) -> Frame:
+def _on(world: World, slot: Slot, entity: int, part: str) -> FixedFrame:
     name = world.entities[entity].name
     found = _frame(world, name + part)
     if found is not None:

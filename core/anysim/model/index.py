@@ -7,7 +7,7 @@ import numpy as np
 
 from anysim.conventions import GROUND, IDENTITY_QUATERNION, WORLD, Array
 from anysim.errors import NameLookupError, listing, suggest
-from anysim.model.frames import Frame, find_frame
+from anysim.model.frames import FixedFrame, find_frame
 from anysim.model.slots import members
 from anysim.model.world import ORIGIN, Entity, EntityKind, Robot, World
 
@@ -120,9 +120,9 @@ class Index:
         """The geoms on an entity's bodies."""
         return [i for i, g in enumerate(self.world.geoms) if entity.body_start <= g.body < entity.body_stop]
 
-    def frame(self, name: str) -> Frame:
+    def frame(self, name: str) -> FixedFrame:
         """A frame by reference: an entity, a body (`panda.panda_hand`), a site, a robot's tool, or the ground."""
-        return Frame(WORLD, ORIGIN, IDENTITY_QUATERNION) if name == GROUND else find_frame(self.world, name)
+        return FixedFrame(WORLD, ORIGIN, IDENTITY_QUATERNION) if name == GROUND else find_frame(self.world, name)
 
     @property
     def objects(self) -> list[Entity]:

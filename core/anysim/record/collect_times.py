@@ -1,4 +1,4 @@
-"""Where the time of a collection goes: clocks that run while their part is at work. No result depends on them."""
+"""Clocks of a collection, that run while their part of it is at work. No result depends on them."""
 
 import time
 from typing import Self

@@ -9,7 +9,7 @@ from anysim.conventions import Array
 from anysim.errors import RecordError, listing
 from anysim.record.column_checks import where
 from anysim.record.columns import ACTION, REWARD, TIME, Change, ColumnStore, EpisodeColumns, Field, fields_of
-from anysim.record.frame import Frame, FrameBatch
+from anysim.record.frame import FrameBatch, RecordedFrame
 from anysim.record.header import Header, StateLayout
 from anysim.record.json import plain
 
@@ -124,7 +124,7 @@ class OpenEpisode:
         )
 
 
-def batch_of(episode: OpenEpisode, frame: Frame) -> FrameBatch:
+def batch_of(episode: OpenEpisode, frame: RecordedFrame) -> FrameBatch:
     """A single frame as a batch of one.
 
     Raises:

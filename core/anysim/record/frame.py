@@ -1,4 +1,4 @@
-"""What is recorded of one env, or of many at once, at one control step."""
+"""Recorded frames: the state, action and words of one env, or of many at once, at one control step."""
 
 import hashlib
 from collections.abc import Mapping, Sequence
@@ -15,7 +15,7 @@ from anysim.errors import RecordError
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
-class Frame(NamedTuple):
+class RecordedFrame(NamedTuple):
     """Control step `step`: the action that was taken, and everything else as it was right after it.
 
     Step 0, if there is one, is the beginning: no action, the state and observation right after the reset. The others
@@ -47,7 +47,7 @@ class Frame(NamedTuple):
 
 
 class FrameBatch(NamedTuple):
-    """A frame for each of n envs, with the fields of `Frame` and a leading axis; the envs may be at different steps.
+    """A `RecordedFrame` for each of n envs, its fields with a leading axis; the envs may be at different steps.
 
     Attributes:
         step, time, reward: (n,).

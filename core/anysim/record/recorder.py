@@ -21,7 +21,7 @@ from anysim.record.column_checks import check_columns
 from anysim.record.columns import ColumnStore, EpisodeColumns
 from anysim.record.committer import Committer
 from anysim.record.episode import BatchChecks, Film, OpenEpisode, batch_of
-from anysim.record.frame import Frame, FrameBatch
+from anysim.record.frame import FrameBatch, RecordedFrame
 from anysim.record.header import EpisodeHeader, Header, RunHeader
 from anysim.record.incoming import Incoming
 from anysim.record.json import plain
@@ -145,7 +145,7 @@ class Recorder:
         """The cameras whose images belong to a control step of the env."""
         return self._attempt(env).episode.cameras_due(step)
 
-    def append(self, env: int, frame: Frame) -> None:
+    def append(self, env: int, frame: RecordedFrame) -> None:
         """Add one frame to the episode of an env. Its arrays may be used again by the caller.
 
         Raises:

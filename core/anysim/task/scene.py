@@ -179,7 +179,7 @@ class GoalFrame(Frame):
 class BodyFrame(Frame):
     """A frame fixed to a body."""
 
-    def __init__(self, scene: SceneView, name: str, frame: frames.Frame) -> None:
+    def __init__(self, scene: SceneView, name: str, frame: frames.FixedFrame) -> None:
         super().__init__(scene, name)
         self.index = frame
         local = np.array([*frame.position, *frame.quaternion])

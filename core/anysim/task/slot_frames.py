@@ -12,7 +12,7 @@ from anysim.compile.variants import INSTANCER
 from anysim.conventions import Array
 from anysim.errors import NameLookupError, listing
 from anysim.math import pose as P
-from anysim.model.frames import Frame, frames_of
+from anysim.model.frames import FixedFrame, frames_of
 from anysim.model.slots import ABSENT, members
 from anysim.model.world import ORIGIN, Slot, World
 
@@ -27,7 +27,7 @@ class Column(NamedTuple):
 
     name: str
     entities: tuple[int, ...]
-    frames: tuple[Frame, ...]
+    frames: tuple[FixedFrame, ...]
 
 
 def columns_of(world: World, name: str) -> list[Column]:
@@ -45,13 +45,13 @@ def columns_of(world: World, name: str) -> list[Column]:
     return found
 
 
-def _instances(world: World, slot: Slot, frames: tuple[Frame, ...]) -> list[Column]:
+def _instances(world: World, slot: Slot, frames: tuple[FixedFrame, ...]) -> list[Column]:
     entities = [world.entities[e] for e in slot.entities]
     return [
         Column(
             f"{slot.name}.{i}",
             slot.entities,
-            tuple(Frame(e.body_start + i, ORIGIN, f.quaternion) for e, f in zip(entities, frames, strict=True)),
+            tuple(FixedFrame(e.body_start + i, ORIGIN, f.quaternion) for e, f in zip(entities, frames, strict=True)),
         )
         for i in range(entities[0].body_stop - entities[0].body_start)
     ]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from anysim.record.frame import Frame
+from anysim.record.frame import RecordedFrame
 from anysim.record.header import ArrayLayout, CameraInfo, EpisodeHeader, RunHeader, StateLayout
 from anysim.record.recorder import Recorder
 from anysim.record.writer import make_writer
@@ -59,9 +59,9 @@ def picture(width: int, height: int, step: int) -> np.ndarray:
     return image
 
 
-def frame(step: int, cameras: Any = CAMERAS, **changes: Any) -> Frame:
+def frame(step: int, cameras: Any = CAMERAS, **changes: Any) -> RecordedFrame:
     generator = np.random.default_rng(step)
-    made = Frame(
+    made = RecordedFrame(
         step=step,
         time=step * 0.02,
         action=None if step == 0 else generator.normal(size=1),

@@ -4,7 +4,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 from hypothesis.extra import numpy as hnp
 
 from anysim.errors import RecordError
-from anysim.record.frame import Frame
+from anysim.record.frame import RecordedFrame
 from anysim.record.header import ArrayLayout, EpisodeHeader, RunHeader, StateLayout
 from anysim.record.reader import open_trajectory
 from anysim.record.recorder import Recorder
@@ -61,7 +61,7 @@ def test_a_robot_without_channels_has_empty_actions(tmp_path):
     with Recorder(tmp_path, make_writer("mcap", {}), run) as recorder:
         recorder.start(EpisodeHeader(env=0, episode=0, episode_seed=1))
         for step in (1, 2, 3):
-            recorder.append(0, Frame(step, 0.0, np.zeros(0), {"x": np.full(1, float(step))}, reward=0.0))
+            recorder.append(0, RecordedFrame(step, 0.0, np.zeros(0), {"x": np.full(1, float(step))}, reward=0.0))
         reader = open_trajectory(recorder.commit(0, "success").wait())
     assert reader.actions.shape == (3, 0)
 
@@ -78,7 +78,7 @@ def test_every_finite_float_comes_back_bit_for_bit(tmp_path_factory, values, obs
     with Recorder(tmp_path_factory.mktemp("run"), make_writer("mcap", {}), run) as recorder:
         recorder.start(EpisodeHeader(env=0, episode=0, episode_seed=seed))
         for i, row in enumerate(values):
-            recorder.append(0, Frame(i + 1, 0.0, row[:1], {"x": row}, reward=float(row[4]), obs={"o": obs[i]}))
+            recorder.append(0, RecordedFrame(i + 1, 0.0, row[:1], {"x": row}, reward=float(row[4]), obs={"o": obs[i]}))
         reader = open_trajectory(recorder.commit(0, "success").wait())
     assert same_bits(reader.states["x"], values)
     assert same_bits(reader.actions, np.ascontiguousarray(values[:, :1]))

@@ -8,7 +8,7 @@ from anysim.engine.audit import audit
 from anysim.engine.base import SimEngine
 from anysim.errors import listing
 from anysim.math import pose as P
-from anysim.model.frames import Frame, find_frame
+from anysim.model.frames import FixedFrame, find_frame
 from anysim.model.world import JointType, World
 from anysim_robots.qualify.oracle import Oracle
 from anysim_robots.qualify.result import Check, Facts
@@ -107,7 +107,7 @@ def kinematics_check(engine: SimEngine, oracle: Oracle) -> Check:
     )
 
 
-def _frames(world: World, oracle: Oracle, still: dict[str, float]) -> dict[str, Frame]:
+def _frames(world: World, oracle: Oracle, still: dict[str, float]) -> dict[str, FixedFrame]:
     """The links that both know."""
     entity = next(e for e in world.entities if e.name == NAME)
     bodies = range(entity.body_start, entity.body_stop)
