@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from anysim.errors import RecordError
-from anysim.record.drift import compare_states, summarise
+from anysim.record.replay import compare_states, summarise
 
 
 def states(steps=5):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from anysim.errors import RecordError
-from anysim.record import commit as protocol, recording_thread
+from anysim.record import commit as protocol, committer
 from anysim.record.header import CameraInfo, EpisodeHeader
 from anysim.record.manifest import read_manifest
 from anysim.record.recorder import Recorder
@@ -262,7 +262,7 @@ def test_a_trajectory_that_is_about_to_be_committed_is_not_begun_again(tmp_path,
 
 
 def test_whoever_commits_faster_than_the_disk_waits(tmp_path, writer, run_header, make_frame, held, monkeypatch):
-    monkeypatch.setattr(recording_thread, "QUEUE_BYTES", 3 * recording_thread.SMALLEST)
+    monkeypatch.setattr(committer, "QUEUE_BYTES", 3 * committer.SMALLEST)
     with Recorder(tmp_path, writer, run_header) as recorder:
         done = threading.Event()
 

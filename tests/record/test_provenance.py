@@ -1,6 +1,6 @@
 from importlib import metadata
 
-from anysim.record.provenance import package_versions
+from anysim.record.header import package_versions
 
 
 def test_versions_of_what_takes_part():

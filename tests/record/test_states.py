@@ -6,8 +6,7 @@ import pytest
 import anysim
 from anysim.errors import RecordError
 from anysim.record.collector import Collector
-from anysim.record.reader import open_trajectory
-from anysim.record.states import world_state
+from anysim.record.reader import open_trajectory, world_state
 from anysim.skills.runner import SkillPolicy
 from tests.task.helpers import BLIND
 

@@ -8,8 +8,7 @@ import typer
 from anysim.cli.options import AsJson, Engine
 
 if TYPE_CHECKING:
-    from anysim.record.drift import FieldSummary
-    from anysim.record.replay import ReplayResult
+    from anysim.record.replay import FieldSummary, ReplayResult
 
 
 def replay(
@@ -64,7 +63,7 @@ def _same_outcome(result: "ReplayResult") -> bool:
 
 
 def _summary(results: "dict[str, ReplayResult]") -> "list[FieldSummary]":
-    from anysim.record.drift import summarise
+    from anysim.record.replay import summarise
 
     return summarise({Path(path).name: result.drift for path, result in results.items()})
 

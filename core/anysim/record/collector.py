@@ -19,8 +19,7 @@ from anysim.errors import RecordError
 from anysim.record.collect_times import CollectTimes
 from anysim.record.film import camera_of, draw_recorded, film_mode
 from anysim.record.frame import NOTHING, FrameBatch, state_batch
-from anysim.record.header import EpisodeHeader, RunHeader, state_layout
-from anysim.record.provenance import package_versions
+from anysim.record.header import EpisodeHeader, RunHeader, package_versions, state_layout
 from anysim.record.recorder import Recorder
 from anysim.record.trajectory_files import PendingCommit
 from anysim.record.writer import make_writer

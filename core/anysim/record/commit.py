@@ -1,16 +1,23 @@
 """The commit protocol: everything on the disk, then one rename for each trajectory that makes it visible.
 
 Trajectories that wait at the same time share the last step: their directories are brought to the disk and renamed one
-after the other, and then the directory that they are in now is brought to the disk once for all.
+after the other, and then the directory that they are in now is brought to the disk once for all. The sentences for what
+goes wrong on the disk are here too.
 """
 
+import errno
 import hashlib
 import os
+import shutil
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from anysim.record.manifest import FileEntry
+from anysim.errors import RecordError, listing
+from anysim.record.header import RunHeader
+from anysim.record.json import dump_json
+from anysim.record.manifest import FileEntry, RunRecord, read_run
+from anysim.record.names import RUN_FILE
 
 
 def fsync(path: Path) -> None:
@@ -86,3 +93,61 @@ def publish_all(moves: Sequence[tuple[Path, Path]]) -> list[OSError | None]:
                 final.rename(incoming)
             errors[place] = error
     return errors
+
+
+def describe_run(out: Path, incoming: Path, run: RunHeader) -> None:
+    """Write run.json by way of `incoming`, or see that it says the same.
+
+    Raises:
+        RecordError: the directory holds the trajectories of another run.
+        OSError: it cannot be written.
+    """
+    record = RunRecord.model_validate(dict(run))
+    path = out / RUN_FILE
+    if path.exists():
+        theirs, ours = read_run(out).to_dict(), record.to_dict()
+        differing = sorted(key for key in {*theirs, *ours} if theirs.get(key) != ours.get(key))
+        if differing:
+            raise RecordError(
+                f"{out} holds the trajectories of another run: {listing(differing)} differ"
+                f"{'s' if len(differing) == 1 else ''} from {path}; record into another directory"
+            )
+        return
+    aside = incoming / RUN_FILE
+    aside.unlink(missing_ok=True)
+    try:
+        write_durably(aside, dump_json(record.to_dict(), "run"))
+        publish(aside, path)
+    except OSError:
+        aside.unlink(missing_ok=True)
+        raise
+
+
+def disk_trouble(what: str, error: OSError, out: Path) -> RecordError:
+    """The error for a failed write into a run's directory; `what` begins its sentence."""
+    if error.filename2 is not None and error.errno in (errno.ENOTEMPTY, errno.EEXIST):
+        return RecordError(taken(Path(error.filename2)))
+    if error.errno in (errno.EMFILE, errno.ENFILE):
+        remedy = "Allow more open files (ulimit -n), or record fewer cameras at once: each has one in every env"
+    elif error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
+        remedy = "Make the directory writable, or record into another one"
+    else:
+        remedy = "Make room, or record into another directory, and start it again"
+    path = error.filename or out
+    existing = next((p for p in (out, *out.parents) if p.exists()), Path())
+    try:
+        free = f"{shutil.disk_usage(existing).free / 2**20:.1f} MiB are free there"
+    except OSError:
+        free = "its free space is unknown"
+    return RecordError(
+        f"{what}: {error.strerror or error} ({path}; {free}). What was unfinished of it is discarded, committed "
+        f"trajectories are whole. {remedy}"
+    )
+
+
+def taken(final: Path) -> str:
+    """The sentence for a trajectory that is there already."""
+    return (
+        f"{final} is committed already and is never overwritten; skip the ids in Recorder.committed(), "
+        "or record into another directory"
+    )

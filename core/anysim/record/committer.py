@@ -1,8 +1,11 @@
 """The committer of a run: writes images and ended episodes on a thread of its own, and makes trajectories visible.
 
-Trajectories that end at about the same time are written aside one after the other and published together.
+The thread does tasks in the order in which they were handed over, from a queue of bounded size. Trajectories that end
+at about the same time are written aside one after the other and published together.
 """
 
+import threading
+from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -11,12 +14,81 @@ from anysim.conventions import Array
 from anysim.errors import RecordError
 from anysim.record import commit as protocol
 from anysim.record.columns import EpisodeColumns
+from anysim.record.commit import disk_trouble, taken
 from anysim.record.header import RunHeader
 from anysim.record.names import EPISODES
-from anysim.record.recording_thread import RecordingThread
 from anysim.record.trajectory_files import Ending, ManifestText, PendingCommit, TrajectoryFiles
-from anysim.record.trouble import disk_trouble, taken
 from anysim.record.writer import TrajectoryWriter
+
+QUEUE_BYTES = 64 << 20
+"""What waits for the thread may hold as much memory; who hands over more waits."""
+SMALLEST = 1 << 20
+"""Each task counts as at least as many bytes, so that not too many wait."""
+
+
+class RecordingThread:
+    """Runs tasks one after the other. Tasks do not raise: what goes wrong in one is its own to keep."""
+
+    def __init__(self, after_task: Callable[[bool], None]) -> None:
+        """`after_task` is called in the thread after each task, and told whether no other one is waiting."""
+        self._after_task = after_task
+        self._tasks: deque[tuple[Callable[[], None], int]] = deque()
+        self._bytes = 0
+        self._changed = threading.Condition()
+        self._busy = self._stopping = False
+        self._thread: threading.Thread | None = None
+
+    @property
+    def ident(self) -> int | None:
+        """The thread's identifier as of `threading`, or None while it has not been needed."""
+        return None if self._thread is None else self._thread.ident
+
+    def put(self, task: Callable[[], None], nbytes: int = 0) -> None:
+        """Hand a task over; waits while too much is waiting already."""
+        size = max(nbytes, SMALLEST)
+        with self._changed:
+            if self._thread is None:
+                # a daemon: who never closes the recorder can still end, and loses what was not committed yet
+                self._thread = threading.Thread(target=self._run, name="anysim-record", daemon=True)
+                self._thread.start()
+            while self._tasks and self._bytes + size > QUEUE_BYTES:
+                self._changed.wait()
+            self._tasks.append((task, size))
+            self._bytes += size
+            self._changed.notify_all()
+
+    def wait(self) -> None:
+        """Return when all tasks are done."""
+        with self._changed:
+            while self._tasks or self._busy:
+                self._changed.wait()
+
+    def stop(self) -> None:
+        """Do what is waiting, and end. No task may be put afterwards."""
+        with self._changed:
+            self._stopping = True
+            self._changed.notify_all()
+        if self._thread is not None:
+            self._thread.join()
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                self._busy = False
+                self._changed.notify_all()
+                while not self._tasks and not self._stopping:
+                    self._changed.wait()
+                if not self._tasks:
+                    return
+                task, size = self._tasks.popleft()
+                self._bytes -= size
+                self._busy = True
+                self._changed.notify_all()
+            task()
+            with self._changed:
+                idle = not self._tasks
+            self._after_task(idle)
+
 
 GROUP = 16
 """At most as many trajectories become visible together."""

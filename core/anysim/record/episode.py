@@ -7,8 +7,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import RecordError, listing
-from anysim.record.column_checks import where
-from anysim.record.columns import ACTION, REWARD, TIME, Change, ColumnStore, EpisodeColumns, Field, fields_of
+from anysim.record.columns import ACTION, REWARD, TIME, Change, ColumnStore, EpisodeColumns, Field, fields_of, where
 from anysim.record.frame import FrameBatch, RecordedFrame
 from anysim.record.header import Header, StateLayout
 from anysim.record.json import plain

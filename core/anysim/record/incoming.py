@@ -1,16 +1,71 @@
 """The directory in which trajectories are written before they are committed, shared by all recorders of a run.
 
 Each recorder owns a locked file there, `<pid>-<n>.lock`, and its attempts end in `.<pid>-<n>`. What belongs to nobody
-alive is an orphan.
+alive is an orphan. A lock is a file that its owner keeps locked, and that the kernel unlocks when the owner dies; a
+process number says less: it is used again, and means nothing on another machine that shares the directory.
 """
 
+import fcntl
 import os
 import shutil
 from itertools import count
 from pathlib import Path
+from typing import Self
 
-from anysim.record.lock import FileLock
 from anysim.record.names import INCOMING, STARTUP_LOCK, attempt_name, owner_of
+
+
+class FileLock:
+    """An exclusive lock on a file that exists as long as the lock is held."""
+
+    def __init__(self, path: Path, descriptor: int) -> None:
+        self.path = path
+        self._descriptor: int | None = descriptor
+
+    @classmethod
+    def take(cls, path: Path, wait: bool = False) -> "FileLock | None":
+        """The lock, or None where `wait` is false and somebody alive holds it.
+
+        Raises:
+            OSError: the file cannot be made, for instance because its directory is gone.
+        """
+        while True:
+            descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+                if _is_still(path, descriptor):
+                    return cls(path, descriptor)
+            except BlockingIOError:
+                os.close(descriptor)
+                return None
+            except BaseException:
+                os.close(descriptor)
+                raise
+            # the owner removed the file while we waited for it: what we hold is the lock of a file without a name
+            os.close(descriptor)
+
+    def release(self) -> None:
+        """Remove the file and unlock it. Further calls do nothing."""
+        if self._descriptor is None:
+            return
+        descriptor, self._descriptor = self._descriptor, None
+        try:
+            self.path.unlink(missing_ok=True)
+        finally:
+            os.close(descriptor)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+
+def _is_still(path: Path, descriptor: int) -> bool:
+    try:
+        return os.path.samestat(path.stat(), os.fstat(descriptor))
+    except FileNotFoundError:
+        return False
 
 
 class Incoming:

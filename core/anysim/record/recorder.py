@@ -17,8 +17,8 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import RecordError, listing
-from anysim.record.column_checks import check_columns
-from anysim.record.columns import ColumnStore, EpisodeColumns
+from anysim.record.columns import ColumnStore, EpisodeColumns, check_columns
+from anysim.record.commit import describe_run, disk_trouble
 from anysim.record.committer import Committer
 from anysim.record.episode import BatchChecks, Film, OpenEpisode, batch_of
 from anysim.record.frame import FrameBatch, RecordedFrame
@@ -26,9 +26,7 @@ from anysim.record.header import EpisodeHeader, Header, RunHeader
 from anysim.record.incoming import Incoming
 from anysim.record.json import plain
 from anysim.record.names import EPISODES, parse_trajectory, trajectories, trajectory_name
-from anysim.record.run_file import describe_run
 from anysim.record.trajectory_files import Ending, PendingCommit, TrajectoryFiles
-from anysim.record.trouble import disk_trouble
 from anysim.record.writer import TrajectoryWriter
 
 

@@ -1,17 +1,150 @@
-"""Replay: rebuild a run from its manifest, apply the recorded actions, and compare every state."""
+"""Replay: a run is rebuilt from its manifest, the recorded actions are applied, and every state is compared."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.record.drift import Drift, compare_states
+from anysim.errors import RecordError, listing
 from anysim.record.frame import state_digest, state_rows
 from anysim.record.manifest import Manifest
 from anysim.record.reader import TrajectoryReader, open_trajectory
 from anysim.task.env import TaskEnv
+
+
+class FieldDrift(NamedTuple):
+    """One state array.
+
+    Attributes:
+        identical: every bit is the same.
+        first_step: the first control step that differs in a bit, or None.
+        max_abs: the largest absolute difference, in the array's units; quaternions q and -q do not differ; inf where
+            one of two values is not finite.
+        max_step: the control step where that is; 0 if nothing differs.
+    """
+
+    identical: bool
+    first_step: int | None
+    max_abs: float
+    max_step: int
+
+
+class Drift(NamedTuple):
+    """All state arrays that both have, over the steps that both have."""
+
+    fields: Mapping[str, FieldDrift]
+    recorded_steps: int
+    replayed_steps: int
+
+    @property
+    def identical(self) -> bool:
+        """As many steps, and every bit the same."""
+        return self.recorded_steps == self.replayed_steps and all(f.identical for f in self.fields.values())
+
+    @property
+    def first_step(self) -> int | None:
+        """The first control step at which anything differs, or None."""
+        steps = [f.first_step for f in self.fields.values() if f.first_step is not None]
+        if self.recorded_steps != self.replayed_steps:
+            steps.append(min(self.recorded_steps, self.replayed_steps) + 1)
+        return min(steps, default=None)
+
+    def __str__(self) -> str:
+        if self.identical:
+            return f"identical, bit for bit, over {self.recorded_steps} steps"
+        steps = f"of {self.recorded_steps} recorded, {self.replayed_steps} replayed"
+        lines = [f"differs from step {self.first_step} on ({steps})"]
+        for name, field in self.fields.items():
+            if not field.identical:
+                lines.append(
+                    f"  {name}: from step {field.first_step}, at most {field.max_abs:.3g} (at step {field.max_step})"
+                )
+        return "\n".join(lines)
+
+
+class FieldSummary(NamedTuple):
+    """One state array over several replays: the largest difference of each, and which replay has the largest of all.
+
+    `identical` counts the replays without any; `first_step` is the earliest control step that differs in a bit.
+    """
+
+    name: str
+    identical: int
+    first_step: int | None
+    median: float
+    worst: float
+    worst_replay: str
+
+
+def summarise(drifts: Mapping[str, Drift]) -> list[FieldSummary]:
+    """Field by field over replays by name."""
+    names = dict.fromkeys(name for drift in drifts.values() for name in drift.fields)
+    rows: list[FieldSummary] = []
+    for name in names:
+        fields = {replay: drift.fields[name] for replay, drift in drifts.items() if name in drift.fields}
+        worst = max(fields, key=lambda replay: fields[replay].max_abs)
+        steps = [field.first_step for field in fields.values() if field.first_step is not None]
+        rows.append(
+            FieldSummary(
+                name,
+                sum(field.identical for field in fields.values()),
+                min(steps, default=None),
+                float(np.median([field.max_abs for field in fields.values()])),
+                fields[worst].max_abs,
+                worst,
+            )
+        )
+    return rows
+
+
+def compare_states(recorded: Mapping[str, Array], replayed: Mapping[str, Array]) -> Drift:
+    """Compare (T, …) float64 arrays by name; row t is the state after control step t + 1.
+
+    Raises:
+        RecordError: names or shapes differ, so that the two are not of one world.
+    """
+    if recorded.keys() != replayed.keys():
+        raise RecordError(
+            "recorded and replayed states hold different arrays: "
+            f"{listing(sorted(recorded))} and {listing(sorted(replayed))}"
+        )
+    lengths = [_steps(recorded, "recorded"), _steps(replayed, "replayed")]
+    common = min(lengths)
+    fields: dict[str, FieldDrift] = {}
+    for name in sorted(recorded):
+        a, b = recorded[name][:common], replayed[name][:common]
+        if a.shape != b.shape:
+            raise RecordError(
+                f"'{name}' was recorded as {a.shape[1:]} and replayed as {b.shape[1:]}; the worlds differ"
+            )
+        fields[name] = _field(name, np.asarray(a, np.float64), np.asarray(b, np.float64))
+    return Drift(fields, *lengths)
+
+
+def _steps(states: Mapping[str, Array], which: str) -> int:
+    lengths = {len(array) for array in states.values()}
+    if len(lengths) > 1:
+        raise RecordError(f"the {which} arrays have different numbers of steps: {listing(map(str, sorted(lengths)))}")
+    return lengths.pop() if lengths else 0
+
+
+def _field(name: str, a: Array, b: Array) -> FieldDrift:
+    rows = len(a)
+    bits = (np.ascontiguousarray(a).view(np.uint64) != np.ascontiguousarray(b).view(np.uint64)).reshape(rows, -1)
+    differs = np.flatnonzero(bits.any(axis=1)) if bits.size else np.empty(0, dtype=int)
+    if not len(differs):
+        return FieldDrift(True, None, 0.0, 0)
+    if name == "body_pose":
+        sign = np.where((a[..., 3:] * b[..., 3:]).sum(axis=-1, keepdims=True) < 0, -1.0, 1.0)
+        b = np.concatenate([b[..., :3], b[..., 3:] * sign], axis=-1)
+    with np.errstate(invalid="ignore"):
+        gap = np.abs(a - b)
+    gap = np.where(np.isfinite(gap), gap, np.where(a == b, 0.0, np.inf)).reshape(rows, -1).max(axis=1)
+    worst = int(gap.argmax())
+    return FieldDrift(False, int(differs[0]) + 1, float(gap[worst]), worst + 1)
 
 
 @dataclass(frozen=True)

@@ -8,15 +8,14 @@ from typing import Any, NamedTuple
 
 from anysim.conventions import Array
 from anysim.record import commit as protocol
-from anysim.record.column_checks import where
-from anysim.record.columns import EpisodeColumns
+from anysim.record.columns import EpisodeColumns, where
+from anysim.record.commit import disk_trouble
 from anysim.record.frame import state_digest
 from anysim.record.header import Header, RunHeader
 from anysim.record.incoming import Incoming, remove
 from anysim.record.json import dump_json
 from anysim.record.manifest import CameraEntry, Manifest
 from anysim.record.names import MANIFEST_FILE, checked_file_name
-from anysim.record.trouble import disk_trouble
 from anysim.record.writer import ImageWriter, TrajectoryWriter, WrittenFile
 
 

@@ -8,8 +8,8 @@ from typing import Any, TypeVar
 
 from anysim.errors import RecordError
 from anysim.record.commit import fsync, seal, write_durably
+from anysim.record.incoming import FileLock
 from anysim.record.json import dump_json
-from anysim.record.lock import FileLock
 from anysim.record.manifest import CameraEntry, Manifest
 from anysim_film.sheet import FilmSheet
 

@@ -13,7 +13,7 @@ import anysim
 from anysim import registry
 from anysim.errors import RecordError
 from anysim.record.collector import Collector
-from anysim.record.lock import FileLock
+from anysim.record.incoming import FileLock
 from anysim.record.manifest import read_manifest
 from anysim.record.names import MANIFEST_FILE, trajectories
 from anysim.record.reader import open_trajectory
