@@ -1,6 +1,9 @@
 """Deferred filming: images of an episode that are drawn when it has ended are those of the episode, to the pixel."""
 
 import json
+import signal
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from itertools import count
 from pathlib import Path
@@ -239,6 +242,43 @@ def test_a_look_changed_midway_ends_the_run_and_leaves_whole_trajectories(tmp_pa
     there = trajectories(tmp_path)
     assert [path.name[4:] for path in there] == ["0000_episode_0000", "0000_episode_0001", "0001_episode_0000"]
     for path in there:
+        assert len(read_manifest(path).cameras) == 2
+        assert verify(path) == []
+    assert not (tmp_path / ".incoming").exists()
+
+
+KILLED_AT_AN_IMAGE = """
+import os, signal, sys
+from itertools import count
+from pathlib import Path
+from anysim.managers.camera import CaptureManager
+from tests.record.test_film import collected
+
+draw, images = CaptureManager.image_then, count(1)
+
+def image_then(*args):
+    if next(images) == int(sys.argv[2]):
+        os.kill(os.getpid(), signal.SIGKILL)
+    return draw(*args)
+
+CaptureManager.image_then = image_then
+list(collected(Path(sys.argv[1]), "mujoco"))
+"""
+
+
+@pytest.mark.parametrize("image", [1, 13, 24], ids=lambda number: f"image {number}")
+def test_kill_while_a_film_is_drawn(image: int, tmp_path: Path) -> None:
+    """Of eight images in each episode: what is there is whole, and the next run sweeps the rest and completes it."""
+    root = Path(__file__).parents[2]
+    command = [sys.executable, "-c", KILLED_AT_AN_IMAGE, str(tmp_path), str(image)]
+    assert subprocess.run(command, cwd=root, check=False).returncode == -signal.SIGKILL
+    there = trajectories(tmp_path)
+    assert len(there) <= (image - 1) // 8
+    for path in there:
+        assert verify(path) == []
+    list(collected(tmp_path, "mujoco"))
+    assert len(trajectories(tmp_path)) == 5
+    for path in trajectories(tmp_path):
         assert len(read_manifest(path).cameras) == 2
         assert verify(path) == []
     assert not (tmp_path / ".incoming").exists()
