@@ -46,15 +46,7 @@ def picture(
     with working_on(f"drawing {world}"):
         loaded = load(file if file.exists() else world, overrides=override or [])
         seed = loaded.spec.seed if seed is None else seed
-        found = pictures(
-            loaded,
-            names,
-            num_envs=num_envs,
-            seed=seed,
-            camera=camera,
-            size=size,
-            seconds=seconds,
-        )
+        found = pictures(loaded, names, num_envs=num_envs, seed=seed, camera=camera, size=size, seconds=seconds)
         target = out or Path("runs") / "pictures" / f"{file.stem}-seed{seed}.png"
         figure = sheet(found, columns)
         target.parent.mkdir(parents=True, exist_ok=True)
