@@ -41,6 +41,30 @@ INSTALL_HINTS: Mapping[tuple[str, str], str] = {
     ("controllers", "policy"): "anysim-policy",
     ("oracles", "mjcf"): "anysim-mujoco",
     ("rooms", "furnished"): "anysim-assets",
+    **{("assets", name): "anysim-assets" for name in ("cabinet", "hinge_box", "parallel_gripper", "valve")},
+    **{
+        ("controllers", name): "anysim-control"
+        for name in (
+            "ackermann_drive",
+            "batched_ik",
+            "camera_gimbal",
+            "camera_motion",
+            "differential_drive",
+            "differential_ik",
+            "gripper_multi_finger",
+            "holonomic_drive",
+            "mink_ik",
+            "operational_space",
+            "pink_ik",
+            "planar_drive",
+        )
+    },
+    ("commands", "bench"): "anysim-bench",
+    ("commands", "compare"): "anysim-parity",
+    ("commands", "gallery"): "anysim-robots",
+    ("commands", "picture"): "anysim-parity",
+    ("commands", "render"): "anysim-film",
+    ("commands", "robot"): "anysim-robots",
 }
 """Where well-known plugins come from, for the remedy in an error."""
 

@@ -201,3 +201,17 @@ def test_overrides_are_checked_like_files() -> None:
     assert (
         "-o world.objects.cube.masss=0.1: world.objects.cube.masss: unknown key; did you mean 'mass'?" in result.stderr
     )
+
+
+def test_a_command_of_a_package_that_is_not_installed_names_the_package() -> None:
+    import click
+    from typer.main import get_command
+
+    from anysim.cli.main import app
+    from anysim.errors import PluginError
+
+    group = get_command(app)  # without plugins: they are added by `main`
+    with pytest.raises(
+        PluginError, match="`anysim robot` comes with anysim-robots, which is not installed: pip install"
+    ):
+        group.resolve_command(click.Context(group), ["robot", "show"])

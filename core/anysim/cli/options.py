@@ -5,6 +5,9 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from anysim.errors import PluginError
+from anysim.registry import INSTALL_HINTS
+
 Task = Annotated[str, typer.Argument(metavar="TASK", help="An installed task (`anysim list tasks`) or a YAML file.")]
 Engine = Annotated[str | None, typer.Option("--engine", "-e", help="An installed engine; wins over the file.")]
 NumEnvs = Annotated[
@@ -28,6 +31,13 @@ UNWRAPPED = "\b\n"
 
 class Commands(TyperGroup):
     """A group whose list shows the first paragraph of each command; a paragraph with indented lines is not wrapped."""
+
+    def resolve_command(self, ctx: typer.Context, args: list[str]):  # noqa: ANN201
+        """The command that is named; one of a package that is not installed is an error that names the package."""
+        package = INSTALL_HINTS.get(("commands", args[0]))
+        if package is not None and self.get_command(ctx, args[0]) is None:
+            raise PluginError(f"`anysim {args[0]}` comes with {package}, which is not installed: pip install {package}")
+        return super().resolve_command(ctx, args)
 
     def get_command(self, ctx: typer.Context, cmd_name: str):  # noqa: ANN201 - typer moves the class of commands
         """The command of a name, or None; those inside it are prepared too."""
