@@ -48,8 +48,9 @@ def descriptors() -> int:
 
 
 def segments() -> set[str]:
-    """What lies in the shared memory that has names."""
-    return {path.name for path in Path("/dev/shm").iterdir()} if Path("/dev/shm").exists() else set()
+    """What lies in the shared memory that has names, but for semaphores: shards have none, process pools beside us do."""
+    folder = Path("/dev/shm")
+    return {path.name for path in folder.iterdir() if not path.name.startswith("sem.")} if folder.exists() else set()
 
 
 def program(engine, seed: int = 0, envs: int = 5, level: str = "trajectory"):
