@@ -1,5 +1,6 @@
 """Train with Stable-Baselines3: `pip install stable-baselines3` first, which brings torch."""
-# pyright: reportMissingImports=false  torch is not in the environment of development
+# torch is not in the environment of development
+# pyright: reportMissingImports=false
 
 from gymnasium.wrappers import FilterObservation, FlattenObservation
 from stable_baselines3 import PPO

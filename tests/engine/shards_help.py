@@ -48,7 +48,7 @@ def descriptors() -> int:
 
 
 def segments() -> set[str]:
-    """What lies in the shared memory that has names, but for semaphores: shards have none, process pools beside us do."""
+    """Names in the shared memory but for semaphores: shards have none, and process pools beside us do."""
     folder = Path("/dev/shm")
     return {path.name for path in folder.iterdir() if not path.name.startswith("sem.")} if folder.exists() else set()
 
