@@ -9,8 +9,7 @@ import pytest
 from checks.constraints import FILE as CONSTRAINTS
 from lock import find_uv
 
-from anysim.engine import factory
-from anysim.errors import PluginError
+from anysim.testing.engines import require_engine
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("wheels")]  # built once, by one worker
 
@@ -44,15 +43,6 @@ task:
 record: {writer: mcap}
 """
 ORIGIN = "import anysim, anysim_tasks; print(anysim.__file__); print(anysim_tasks.__file__)"
-
-
-def _skip_unless_here(engine: str) -> None:
-    try:
-        here = factory.availability(engine)
-    except PluginError as error:
-        pytest.skip(str(error))
-    if not here.available:
-        pytest.skip(f"{engine} cannot run here: {'; '.join(here.missing)}")
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +81,7 @@ def test_nothing_of_the_checkout_is_on_the_path(python: Path, program: Any, fold
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("task", ["pick_cube", "own.yaml"])
 def test_a_task_runs_and_is_recorded(task: str, engine: str, python: Path, program: Any, folder: Path) -> None:
-    _skip_unless_here(engine)
+    require_engine(engine)
     out = folder / f"{Path(task).stem}-{engine}"
     words = (
         "run",

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from anysim import registry
 from anysim.skills.runner import SkillPolicy
+from anysim.testing.engines import require_engine
 from tests.task.helpers import arm
 
 FILE = Path(__file__).with_name("pick_cube.json")
@@ -66,8 +66,7 @@ def measured(engine: str) -> dict[str, Any]:
 
 @pytest.mark.parametrize("engine", sorted(LIBRARIES))
 def test_trajectories_are_those_that_were_recorded(engine: str) -> None:
-    if engine not in registry.names("engines"):
-        pytest.skip(f"{engine} is not installed")
+    require_engine(engine)
     wanted, found = json.loads(FILE.read_text())[engine], measured(engine)
     assert found["draws"] == wanted["draws"], "a stream has another name, or a draw moved"
     np.testing.assert_allclose(found["cube"], wanted["cube"], atol=2e-3)
