@@ -69,7 +69,6 @@ def test_kill_in_the_middle_of_a_run(tmp_path, delay, sample):
     assert len(faults) >= len(seen) - 1  # the last one seen was in its middle
     assert not any(faults.values()), faults
     orphans = {path.name for path in (tmp_path / ".incoming").iterdir() if path.is_dir()}
-    assert orphans or delay
     with Recorder(tmp_path, make_writer("mcap", {}), sample.RUN) as recorder:
         assert set(recorder.swept) == orphans
         number = max(number for _, number in recorder.committed()) + 1
@@ -136,9 +135,10 @@ def test_kill_at_twenty_moments_of_a_run(tmp_path, sample):
     dying = run(MOMENTS, tmp_path / "killed", *moments)
     dying.communicate(timeout=120)
     assert dying.returncode == 0
-    found = []
+    found, orphans = [], 0
     for moment in moments:
         out = tmp_path / "killed" / str(moment)
+        orphans += len(list((out / ".incoming").glob("*/")))
         faults = verify_run(out) if (out / "episodes").is_dir() else {}
         assert not any(faults.values()), (moment, faults)
         found.append(len(faults))
@@ -154,6 +154,7 @@ def test_kill_at_twenty_moments_of_a_run(tmp_path, sample):
         assert not any(verify_run(out).values())
         assert sorted(p.name for p in out.iterdir()) == ["episodes", "run.json"]
     assert found[0] == 0
+    assert orphans > 0
     assert max(found) >= 2  # the moments reach beyond the first commits
 
 
