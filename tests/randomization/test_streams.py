@@ -37,8 +37,9 @@ def test_a_turned_generator_gives_what_a_new_one_gives() -> None:
     streams = episodes(3)
     for env, name, tick in ((0, "a", 0), (2, "layout/cube/x", 7), (1, "a", 2**40), (0, "a", 0)):
         new = streams.generator(env, name, tick)
-        assert streams.quantiles(env, name, tick)((3, 2)).tolist() == new.random((3, 2)).tolist()
-        assert streams.quantiles(env, name, tick)() == streams.generator(env, name, tick).random()
+        assert streams.shared_generator(env, name, tick).random((3, 2)).tolist() == new.random((3, 2)).tolist()
+        new = streams.generator(env, name, tick)
+        assert streams.shared_generator(env, name, tick).standard_normal() == new.standard_normal()
 
 
 def test_envs_and_episodes_differ_and_repeat() -> None:

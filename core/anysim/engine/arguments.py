@@ -14,13 +14,13 @@ from anysim.model.world import BodyKind, World
 def indices(values: ArrayLike, size: int, kind: str) -> Array:
     """Unique int indices in [0, size) from a sequence, an int array or an int."""
     array = np.atleast_1d(np.asarray(values))
-    if array.dtype == bool or (array.size and not np.issubdtype(array.dtype, np.integer)):
+    if array.dtype.kind == "b" or (array.size and array.dtype.kind not in "iu"):
         raise EngineError(f"{kind} indices must be integers, got {array.dtype} (for a mask pass np.flatnonzero(mask))")
     array = array.astype(np.int64).reshape(-1)
-    if array.size and (array.min() < 0 or array.max() >= size):
+    if array.size and (np.minimum.reduce(array) < 0 or np.maximum.reduce(array) >= size):
         bad = array[(array < 0) | (array >= size)]
         raise EngineError(f"{kind} index {int(bad[0])} is out of range; there are {size}")
-    if len(np.unique(array)) != len(array):
+    if (array[1:] <= array[:-1]).any() and len(set(array.tolist())) != len(array):
         raise EngineError(f"{kind} indices repeat: {array.tolist()}")
     return array
 
@@ -35,10 +35,10 @@ def rows(name: str, values: ArrayLike, shape: tuple[int | None, ...]) -> Array:
     else:
         target = tuple(s for s in shape if s is not None)
     try:
-        full = np.broadcast_to(array, target)
+        full = array if array.shape == target else np.broadcast_to(array, target)
     except ValueError:
         raise EngineError(f"{name} must have shape {_spell(shape)}, got {array.shape}") from None
-    if not np.isfinite(full).all():
+    if not np.isfinite(array).all():
         raise EngineError(f"{name} holds a value that is not finite")
     return full
 

@@ -123,6 +123,6 @@ class RobotResetManager(Manager):
             return
         for row, env in enumerate(env_ids):
             stream = f"robot/{found.name}/home_noise"
-            noise = deviation[row] * self.streams.generator(int(env), stream).standard_normal()
+            noise = deviation[row] * self.streams.shared_generator(int(env), stream).standard_normal()
             self.streams.note(int(env), stream, noise, Origin(stream, f"world.robots.{robot}.home_noise"))
             position[row, column] = min(max(position[row, column] + noise, found.lower), found.upper)

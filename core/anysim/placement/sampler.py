@@ -4,7 +4,7 @@ What is drawn for an attempt that comes to nothing leaves no trace; what holds i
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -68,7 +68,7 @@ class EpisodeSampler(PlacementSampler):
 
     def uniform(self, purpose: str, count: int) -> Sequence[float]:
         stream = f"layout/{self._name}/{purpose}"
-        drawn = tuple(float(u) for u in self._streams.generator(self._env, stream, self._tick).random(count))
+        drawn = tuple(float(u) for u in self._streams.shared_generator(self._env, stream, self._tick).random(count))
         self._aside.note(self._env, stream, drawn if count > 1 else drawn[0], Origin(stream, self._path))
         return drawn
 
@@ -94,8 +94,8 @@ class _Aside(Streams):
     def generator(self, env: int, name: str, tick: int = 0) -> np.random.Generator:
         return self._of.generator(env, name, tick)
 
-    def quantiles(self, env: int, name: str, tick: int = 0) -> Callable[..., Any]:
-        return self._of.quantiles(env, name, tick)
+    def shared_generator(self, env: int, name: str, tick: int = 0) -> np.random.Generator:
+        return self._of.shared_generator(env, name, tick)
 
     def note(self, env: int, name: str, drawn: object, origin: Origin) -> None:
         del env

@@ -5,6 +5,7 @@ rows beside it, their order, or the number of threads; that is part of the contr
 """
 
 from abc import ABC, abstractmethod
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -172,18 +173,19 @@ class InverseKinematics(ABC):
         for label, array, shape in zip(request._fields, request, shapes, strict=True):
             if array.shape != shape:
                 raise AnysimError(f"{label} of {self.chain.name}: expected shape {shape}, got {array.shape}")
-            if not np.isfinite(array).all():
+            if not isfinite(np.vdot(array, array)) and not np.isfinite(array).all():  # a skill asks in every step
                 bad = np.flatnonzero(~np.isfinite(array).reshape(len(array), -1).all(axis=1))
                 raise AnysimError(f"{label} of {self.chain.name}: not finite in rows {bad[:8].tolist()}")
         for label, array in (("targets", request.targets), ("base", request.base)):
-            square = (array[:, 3:] * array[:, 3:]).sum(axis=1)
-            if (np.abs(square - 1.0) > 1e-3).any():
-                row = int(np.argmax(np.abs(square - 1.0)))
+            turn = array[:, 3:]
+            away = np.abs(np.add.reduce(turn * turn, axis=1) - 1.0)
+            if np.maximum.reduce(away, initial=0.0) > 1e-3:
+                row = int(np.argmax(away))
                 raise AnysimError(
-                    f"{label} of {self.chain.name}: the quaternion of row {row} has length {np.sqrt(square[row]):.6g}; "
-                    f"expected a unit quaternion (x, y, z, w)"
+                    f"{label} of {self.chain.name}: the quaternion of row {row} has length "
+                    f"{np.linalg.norm(turn[row]):.6g}; expected a unit quaternion (x, y, z, w)"
                 )
-        if (request.rotation_weight < 0).any():
+        if np.minimum.reduce(request.rotation_weight) < 0:
             raise AnysimError(f"rotation_weight of {self.chain.name}: expected 3 numbers >= 0, got {rotation_weight}")
         return request
 

@@ -35,10 +35,10 @@ def draw(value: Any, name: str, streams: Streams, env: int, tick: int = 0, *, so
     if not is_random(value):
         return value
     stream = name if value.shared is None else f"shared/{value.shared}"
-    if value.ratio < 1.0 and streams.quantiles(env, f"{name}/ratio", tick)() >= value.ratio:
+    if value.ratio < 1.0 and streams.shared_generator(env, f"{name}/ratio", tick).random() >= value.ratio:
         stream, drawn = f"{name}/ratio", nominal(value)
     else:
-        drawn = draw_one(value, streams.quantiles(env, stream, tick if value.shared is None else 0))
+        drawn = draw_one(value, streams.shared_generator(env, stream, tick if value.shared is None else 0).random)
     streams.note(env, name if tick == 0 else f"{name}@{tick}", drawn, Origin(stream, source))
     return drawn
 
@@ -59,10 +59,10 @@ def noise_rows(value: Any, name: str, streams: Streams, env_ids: Array, ticks: A
         return np.full((len(env_ids), size), float(value))
     rows = np.empty((len(env_ids), size))
     for row, (env, tick) in enumerate(zip(env_ids.tolist(), ticks.tolist(), strict=True)):
-        if value.ratio < 1.0 and streams.generator(env, f"{name}/ratio", tick).random() >= value.ratio:
+        if value.ratio < 1.0 and streams.shared_generator(env, f"{name}/ratio", tick).random() >= value.ratio:
             rows[row] = nominal(value)
             continue
-        generator = streams.generator(env, name, tick)
+        generator = streams.shared_generator(env, name, tick)
         if isinstance(value, Choice):
             rows[row] = [draw_one(value, generator.random) for _ in range(size)]
         else:

@@ -7,7 +7,7 @@ from its `episode_seed`.
 """
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -122,15 +122,15 @@ class Streams:
         counter = np.array([0, 0, 0, tick], dtype=np.uint64)
         return np.random.Generator(np.random.Philox(key=key, counter=counter))
 
-    def quantiles(self, env: int, name: str, tick: int = 0) -> Callable[..., Any]:
-        """The `random` of `generator(env, name, tick)`, to be called at once: the next call of this takes it away.
+    def shared_generator(self, env: int, name: str, tick: int = 0) -> np.random.Generator:
+        """What `generator(env, name, tick)` is, to be used at once: the next call of this takes it away.
 
         A new generator takes 20 us, and a reset draws from hundreds of streams; this one is turned to each of them.
         """
         words = self._state["state"]
         words["key"][0], words["key"][1], words["counter"][3] = self.episode_seed[env], stream_key(name), tick
         self._turning.bit_generator.state = self._state
-        return self._turning.random
+        return self._turning
 
     def snapshot(self, env_ids: Array) -> dict[str, object]:
         """Both levels of randomness of envs, as plain data."""

@@ -160,7 +160,7 @@ class Collector:
                 yield self._resumed(i, int(self._episode[i]))
                 self._episode[i] += 1
             begin[i] = self._episode[i] < self._share[i]
-        self.env.retire(np.setdiff1d(ids, np.flatnonzero(begin)))
+        self.env.retire(ids[~begin[ids]])
         if not begin.any():
             return
         fresh = np.flatnonzero(begin)

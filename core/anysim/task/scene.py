@@ -15,6 +15,7 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.state import State
 from anysim.errors import NameLookupError, TaskError, listing, suggest
+from anysim.geometry.bounds import EntityShape
 from anysim.managers.base import Episodes
 from anysim.managers.terrain import TerrainManager
 from anysim.math import pose as P
@@ -51,6 +52,8 @@ class SceneView:
         self._everyone.setflags(write=False)
         self._frames: dict[str, Frame] = {}
         self._robots: dict[str, RobotView] = {}
+        self._shapes: dict[str, EntityShape] = {}
+        self._seen: State | None = None
         self.moment = 0
         self.population = 0
         """Changes whenever the entities that are there may have changed."""
@@ -64,9 +67,16 @@ class SceneView:
             self.population += 1
 
     def look(self, rows: Array | None) -> None:
-        """Start a new moment: all envs (None), or these."""
-        self._rows, self._env_ids = (slice(None), self._everyone) if rows is None else (rows, self._everyone[rows])
-        self.moment += 1
+        """Look at all envs (None), or these; a new moment unless neither they nor the engine's state have changed."""
+        state = self.engine.get_state()
+        if rows is None or (len(rows) == len(self._everyone) and (rows == self._everyone).all()):
+            if state is not self._seen or self._env_ids is not self._everyone:
+                self.moment += 1
+            self._rows, self._env_ids = slice(None), self._everyone
+        else:
+            self._rows, self._env_ids = rows, self._everyone[rows]
+            self.moment += 1
+        self._seen = state
 
     @property
     def rows(self) -> Array | slice:
@@ -107,6 +117,13 @@ class SceneView:
             return SlotFrame(self, name, columns_of(world, name)[0])
         whole = f"{slot.name}{dot}{part}"
         return BodyFrame(self, whole, self.index.frame(whole))
+
+    def entity_shape(self, name: str) -> EntityShape:
+        """The collision geometry of an entity of the World; made once."""
+        shape = self._shapes.get(name)
+        if shape is None:
+            shape = self._shapes[name] = EntityShape(self.engine.world, name)
+        return shape
 
     def category(self, name: str) -> CategoryView:
         """The handle of all instances of a category."""
@@ -171,6 +188,10 @@ class Frame(ABC):
 
 class GoalFrame(Frame):
     """Where a command wants something to be."""
+
+    def _see(self) -> None:  # goals move without the engine's state
+        self._pose = self._compute()
+        self._position, self._quaternion = self._pose[:, :3], self._pose[:, 3:]
 
     def _compute(self) -> Array:
         return self.scene.goals[self.name][self.scene.rows]

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.geometry.bounds import EntityShape
 from anysim.task.scene import Frame, ObjectView, SceneView
 from anysim_schemas.values import FloatValue, Vec3Value
 
@@ -32,8 +31,8 @@ def _top(scene: SceneView, surface: Frame) -> Array:
     thing = ObjectView(scene, surface.name)
     top = surface.pose[:, 2].copy()
     for entity, ids in thing.by_entity(scene.env_ids):
-        rows = np.isin(scene.env_ids, ids)
-        top[rows] = EntityShape(scene.engine.world, entity.name).top_height(surface.pose[rows])
+        rows = slice(None) if len(ids) == len(scene.env_ids) else np.isin(scene.env_ids, ids)
+        top[rows] = scene.entity_shape(entity.name).top_height(surface.pose[rows])
     return top
 
 
