@@ -55,7 +55,8 @@ class Drives:
             return
         np.multiply(control.position, self._stiffness, out=self._input)
         self._input += control.effort
-        self._input += control.velocity * self._damping
+        if np.count_nonzero(control.velocity):
+            self._input += control.velocity * self._damping
 
     def input_for(self, control: Control) -> Array:
         """A copy of the control input (N, A) of the next substep; these are the commands from now on."""

@@ -47,13 +47,10 @@ class _TwistColumns(NamedTuple):
         )
 
 
-def _columns(at: Array, *arrays: Array) -> Callable[[], tuple[Array, ...]]:
-    """Reads columns of live arrays: views made once where the columns are consecutive, else gathered at each read."""
+def _columns(array: Array, at: Array) -> Callable[[], Array]:
+    """Copies columns of a live array; of a view made once where they are consecutive, which costs one call."""
     chosen = as_slice(at)
-    if isinstance(chosen, slice):
-        views = tuple(array[:, chosen] for array in arrays)
-        return lambda: views
-    return lambda: tuple(array[:, at] for array in arrays)
+    return array[:, chosen].copy if isinstance(chosen, slice) else lambda: array[:, at]
 
 
 class StateReader:
@@ -67,17 +64,17 @@ class StateReader:
     def __init__(self, batch: Any, layout: Layout) -> None:
         self._batch, self._layout = batch, layout
         self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
-        self._pose_parts = _columns(layout.bodies, batch.bind("xpos"), batch.bind("xquat"))
+        self._frames, self._bodies = (batch.bind("xpos"), batch.bind("xquat")), as_slice(layout.bodies)
+        self._pose_parts = self._parts() if isinstance(self._bodies, slice) else None  # views, which stay true
         n = batch.nsim
         self._velocity, self._position, self._center = (
             batch.bind(name).reshape(n, -1) for name in ("cvel", "xpos", "subtree_com")
         )
         self._take = _TwistColumns.of(layout)
         self._sensordata = batch.bind("sensordata")
-        self._joint_pos, self._joint_vel, self._effort = (
-            _columns(at, batch.bind(name))
-            for at, name in ((layout.joint_q, "qpos"), (layout.joint_v, "qvel"), (layout.joint_v, "qfrc_actuator"))
-        )
+        self.joint_pos = _columns(self._qpos, layout.joint_q)
+        self.joint_vel = _columns(self._qvel, layout.joint_v)
+        self._effort = _columns(batch.bind("qfrc_actuator"), layout.joint_v)
         self._stale = np.zeros(n, dtype=bool)
         self._any_stale = False
         self._held = np.zeros(n, dtype=bool)
@@ -119,8 +116,11 @@ class StateReader:
     def body_pose(self) -> Array:
         if self._any_stale:
             self._forward()
-        position, quaternion = self._pose_parts()
-        return np.concatenate((position, quaternion[..., 1:], quaternion[..., :1]), axis=2)
+        return np.concatenate(self._pose_parts or self._parts(), axis=2)
+
+    def _parts(self) -> tuple[Array, Array, Array]:
+        position, quaternion = (array[:, self._bodies] for array in self._frames)
+        return position, quaternion[..., 1:], quaternion[..., :1]
 
     def body_twist(self) -> Array:
         # cvel is the angular velocity, then the linear one of the point at the centre of mass of the whole tree; the
@@ -133,18 +133,13 @@ class StateReader:
         arm = self._position.take(take.second, axis=1)
         arm -= self._center.take(take.second_root, axis=1)
         arm *= velocity.take(take.first, axis=1)
-        twist[..., :3] += arm[..., :3]
-        twist[..., :3] -= arm[..., 3:]
+        linear = twist[..., :3]
+        linear += arm[..., :3]
+        linear -= arm[..., 3:]
         return twist
 
-    def joint_pos(self) -> Array:
-        return self._joint_pos()[0].copy()
-
-    def joint_vel(self) -> Array:
-        return self._joint_vel()[0].copy()
-
     def joint_effort(self) -> Array:
-        effort = self._effort()[0].copy()
+        effort = self._effort()
         if self._any_held:
             effort[self._held] = self._held_effort[self._held]
         return effort

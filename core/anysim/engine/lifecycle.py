@@ -288,9 +288,9 @@ class EngineLifecycle(Primitives):
 
     def _read_locked(self, name: str) -> Array:
         with self._lock:
-            array = self._read(name)
-            if self._presence.varies:
-                self._presence.blank(name, array)
+            array, presence = self._read(name), self._records.presence
+            if presence.varies:
+                presence.blank(name, array)
             return array
 
     def _retire_state(self) -> None:

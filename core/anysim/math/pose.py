@@ -168,8 +168,8 @@ def rotation_vector(q: Array) -> Array:
     """Axis times angle (..., 3) of unit quaternions (..., 4), angle in [0, pi]."""
     q = np.where(q[..., 3:] < 0, -q, q)
     sine = norm(q[..., :3])
-    angle = 2.0 * np.arctan2(sine, q[..., 3])
-    scale = np.where(sine < 1e-12, 2.0, angle / np.where(sine < 1e-12, 1.0, sine))
+    angle, small = 2.0 * np.arctan2(sine, q[..., 3]), sine < 1e-12
+    scale = np.where(small, 2.0, angle / np.where(small, 1.0, sine))
     return q[..., :3] * scale[..., None]
 
 
