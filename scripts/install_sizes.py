@@ -35,6 +35,7 @@ WORDS = {
     "pybullet": "the engine PyBullet",
     "robots": "the robot catalogue with its files, `anysim robot`, `anysim gallery`",
     "sapien": "the engine SAPIEN",
+    "skills": "scripted solutions of tasks: `pick`",
     "tasks": "tasks with their experts: `pick_cube`",
 }
 """What each extra brings; the table has a row for each."""

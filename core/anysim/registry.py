@@ -41,6 +41,7 @@ INSTALL_HINTS: Mapping[tuple[str, str], str] = {
     ("controllers", "policy"): "anysim-policy",
     ("oracles", "mjcf"): "anysim-mujoco",
     ("rooms", "furnished"): "anysim-assets",
+    ("skills", "pick"): "anysim-skills",
     **{("assets", name): "anysim-assets" for name in ("cabinet", "hinge_box", "parallel_gripper", "valve")},
     **{
         ("controllers", name): "anysim-control"

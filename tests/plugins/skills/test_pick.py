@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from anysim import load, registry
+from anysim.errors import SpecError
 from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.runner import SkillPolicy
 from anysim.task.contract import Status
@@ -92,3 +94,13 @@ def test_a_task_without_an_expert_says_so() -> None:
 
     with blocks(1) as env, pytest.raises(TaskError, match=r"has no expert; add task\.expert"):
         SkillPolicy(env)
+
+
+def test_where_it_is_not_installed_the_error_names_its_package(monkeypatch: pytest.MonkeyPatch) -> None:
+    installed = registry._entries
+    monkeypatch.setattr(registry, "_entries", lambda kind: {} if kind == "skills" else installed(kind))
+    remedy = (
+        r"skill: no skill named 'pick' is installed; it comes with the package anysim-skills: pip install anysim-skill"
+    )
+    with pytest.raises(SpecError, match=remedy):
+        load("pick_cube")

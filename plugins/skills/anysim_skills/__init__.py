@@ -1,0 +1,1 @@
+"""Skills for anysim: scripted solutions, a folder for each group of them."""

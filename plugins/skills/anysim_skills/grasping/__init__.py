@@ -1,0 +1,1 @@
+"""Skills that grasp one object with one gripper."""
