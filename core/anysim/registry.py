@@ -27,6 +27,7 @@ KINDS: Mapping[str, str] = {
     "assets": "builders of procedural assets",
     "layouts": "proposers of layouts",
     "rooms": "builders of rooms",
+    "terrains": "builders of generated ground",
 }
 """The kinds that anysim looks up, and what each is."""
 
@@ -42,6 +43,7 @@ INSTALL_HINTS: Mapping[tuple[str, str], str] = {
     ("oracles", "mjcf"): "anysim-mujoco",
     ("rooms", "furnished"): "anysim-assets",
     ("skills", "pick"): "anysim-skills",
+    ("terrains", "generated"): "anysim-assets",
     **{("assets", name): "anysim-assets" for name in ("cabinet", "hinge_box", "parallel_gripper", "valve")},
     **{
         ("controllers", name): "anysim-control"

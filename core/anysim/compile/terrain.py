@@ -1,31 +1,46 @@
-"""Compilation of the ground of a spec."""
+"""Compilation of the ground of a spec. Generated ground comes from a builder of the kind `terrains`."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
+from anysim import registry
+from anysim.assets.ground_files import heights_of_mesh, read_heights, read_mesh
 from anysim.assets.meshes import FORMATS
 from anysim.assets.uri import locate
 from anysim.compile.builder import WorldBuilder
 from anysim.conventions import GROUND, WORLD, Array
-from anysim.errors import AssetError, Issues
+from anysim.errors import AssetError, Issues, PluginError
 from anysim.model.appearance import Rgb, nominal_rgb
-from anysim.model.world import ORIGIN, Geom, HeightField, HeightFieldShape, MeshShape, Plane, Shape, Surface, Vec3
-from anysim.terrain.files import heights_of_mesh, read_heights, read_mesh
-from anysim.terrain.generators import generate, tile
+from anysim.model.world import ORIGIN, Geom, HeightField, HeightFieldShape, MeshShape, Plane, Shape, Surface, Tile, Vec3
 from anysim_schemas.terrain import GENERATED, TerrainSpec
 
-DIFFICULTY = 0.5
-"""Of generated ground that says none."""
+BUILDER = "generated"
+"""The name of the entry point of the group `anysim.terrains` that makes pieces of the kinds `GENERATED`, and tiles."""
 
 _GREY: Rgb = (0.45, 0.47, 0.5)
 
 
-def add_terrain(builder: WorldBuilder, spec: TerrainSpec, issues: Issues, base: Path | None = None) -> None:
-    """The ground as a geom of the world; what is wrong goes to `issues`, whose path is that of the terrain.
+class GeneratedGround(NamedTuple):
+    """Heights (rows, cols) [m] over `size` [m], the first row at the lowest y; where their middle is; their tiles.
 
-    Generated ground lies so that the platform that robots start on is at the world's origin; of tiles, the first one's.
+    They lie so that the platform that robots start on is at the world's origin; of tiles, that of row 0 and column 0.
     """
+
+    heights: Array
+    size: tuple[float, float]
+    middle: Vec3
+    tiles: tuple[Tile, ...] = ()
+
+
+TerrainBuilder = Callable[[TerrainSpec, Issues], GeneratedGround | None]
+"""The ground of a spec; None, with the reasons in the issues, where its parameters do not fit."""
+
+
+def add_terrain(builder: WorldBuilder, spec: TerrainSpec, issues: Issues, base: Path | None = None) -> None:
+    """The ground as a geom of the world; what is wrong goes to `issues`, whose path is that of the terrain."""
     try:
         if spec.kind == "plane":
             _add(builder, spec, Plane(), issues)
@@ -33,25 +48,24 @@ def add_terrain(builder: WorldBuilder, spec: TerrainSpec, issues: Issues, base: 
             assert spec.file is not None  # the spec has been checked
             mesh = read_mesh(locate(spec.file, base=base).path, spec.scale or 1.0)
             _add(builder, spec, MeshShape(builder.add_mesh(mesh), concave=True), issues)
-        elif spec.kind == "tiles":
-            _add_tiles(builder, spec, issues)
-        elif spec.kind in GENERATED:
-            difficulty = DIFFICULTY if spec.difficulty is None else spec.difficulty
-            piece = generate(spec.kind, spec.parameters(spec.kind), difficulty, spec.size, spec.cell, (spec.seed,))
-            _add_field(builder, spec, piece.heights, spec.size, (0.0, 0.0, -piece.top), issues)
+        elif spec.kind == "tiles" or spec.kind in GENERATED:
+            _add_generated(builder, spec, issues)
         elif spec.kind == "heightfield":
             _add_given(builder, spec, issues, base)
     except AssetError as error:
         issues.asset("file", error)
-    except ValueError as error:
-        path, colon, message = str(error).rpartition(": ") if spec.kind == "tiles" else ("", "", str(error))
-        issues.add(f"tiles.{path}" if colon else path, message)
 
 
-def _add_tiles(builder: WorldBuilder, spec: TerrainSpec, issues: Issues) -> None:
-    made = tile(spec, spec.tiling)
-    _add_field(builder, spec, made.heights, made.size, made.middle, issues)
-    builder.tiles = made.tiles
+def _add_generated(builder: WorldBuilder, spec: TerrainSpec, issues: Issues) -> None:
+    try:
+        build: TerrainBuilder = registry.load("terrains", BUILDER)
+    except PluginError as error:
+        issues.add("kind", str(error))
+        return
+    made = build(spec, issues)
+    if made is not None:
+        _add_field(builder, spec, made.heights, made.size, made.middle, issues)
+        builder.tiles = made.tiles
 
 
 def _add_given(builder: WorldBuilder, spec: TerrainSpec, issues: Issues, base: Path | None) -> None:

@@ -1,1 +1,1 @@
-"""Procedural builders: cabinets, lids, valves, wheeled bases, a gripper, a flying camera; furnished rooms."""
+"""Procedural assets: cabinets, lids, valves, wheeled bases, a gripper, a flying camera; rooms and generated ground."""

@@ -1,1 +1,0 @@
-"""The ground: where its heights come from, and what they are below a point or a rectangle."""
