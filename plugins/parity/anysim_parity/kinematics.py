@@ -11,11 +11,12 @@ import numpy as np
 from anysim.compile.edit import unseen
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
-from anysim.kinematics.dynamics import Mechanism, coupling, frame_jacobians
+from anysim.kinematics.dynamics import coupling, frame_jacobians
 from anysim.math import pose as P
 from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.world import World
 from anysim_parity.engines import Engines, in_world, moves_by_force, on_each
+from anysim_parity.mechanism import Mechanism
 from anysim_parity.result import Gap, Layer, Measure
 from anysim_parity.variants import loose
 

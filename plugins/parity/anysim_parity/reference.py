@@ -8,8 +8,8 @@ fiftieth of the tolerance that it serves.
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.kinematics.dynamics import Mechanism
 from anysim.model.world import ControlMode, World
+from anysim_parity.mechanism import Mechanism
 from anysim_parity.tape import Tape
 
 GAMMA = 1.0 - 1.0 / np.sqrt(2.0)
