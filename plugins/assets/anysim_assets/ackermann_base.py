@@ -5,8 +5,8 @@ from typing import Annotated
 from pydantic import Field
 
 from anysim.assets.model import ImportedModel
-from anysim.assets.procedural_assembly import Assembly
 from anysim.model.world import JointType, Sphere
+from anysim_assets.assembly import Assembly
 from anysim_assets.parameters import Size
 from anysim_assets.wheels import RUBBER, add_body, add_wheel, check_bottom, made
 from anysim_schemas.base import Color, Positive

@@ -1,7 +1,7 @@
 """A base with two driven wheels and castors."""
 
 from anysim.assets.model import ImportedModel
-from anysim.assets.procedural_assembly import Assembly
+from anysim_assets.assembly import Assembly
 from anysim_assets.parameters import Size
 from anysim_assets.wheels import add_body, add_castor, add_wheel, check_bottom, made
 from anysim_schemas.base import Color, Number, Positive

@@ -2,8 +2,8 @@
 
 from math import pi
 
-from anysim.assets.procedural_assembly import Assembly, Colour, turned
 from anysim.model.world import Capsule, Cylinder, Vec3
+from anysim_assets.assembly import Assembly, Colour, turned
 from anysim_assets.parameters import Handle
 from anysim_schemas.errors import KeyFault
 

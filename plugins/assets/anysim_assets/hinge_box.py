@@ -3,8 +3,8 @@
 from math import radians
 
 from anysim.assets.model import ImportedModel
-from anysim.assets.procedural_assembly import Assembly
 from anysim.model.world import JointType
+from anysim_assets.assembly import Assembly
 from anysim_assets.handles import add_handle
 from anysim_assets.parameters import Angle, Handle, Size
 from anysim_schemas.base import Color, NonNegative, Positive

@@ -1,8 +1,8 @@
 """A base on four wheels that are each steered and driven."""
 
 from anysim.assets.model import ImportedModel
-from anysim.assets.procedural_assembly import Assembly
 from anysim.model.world import Cylinder, JointType
+from anysim_assets.assembly import Assembly
 from anysim_assets.parameters import Size
 from anysim_assets.wheels import RUBBER, add_body, add_wheel, check_bottom, made
 from anysim_schemas.base import Color, Positive

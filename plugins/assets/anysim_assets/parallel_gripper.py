@@ -4,9 +4,9 @@ from dataclasses import replace
 from math import inf
 
 from anysim.assets.model import ImportedModel
-from anysim.assets.procedural_assembly import Assembly
 from anysim.compile.physical import GRIPPER_LIMIT_SOFTNESS, surface
 from anysim.model.world import JointType, Mimic
+from anysim_assets.assembly import Assembly
 from anysim_schemas.base import Color, NonNegative, Positive
 from anysim_schemas.errors import KeyFault
 from anysim_schemas.objects import ContactSpec

@@ -7,9 +7,9 @@ import numpy as np
 from pydantic import Field
 
 from anysim.assets.model import ImportedModel
-from anysim.assets.procedural_assembly import Assembly, turned
 from anysim.math import pose as P
 from anysim.model.world import Box, Capsule, Cylinder, JointType, Shape
+from anysim_assets.assembly import Assembly, turned
 from anysim_schemas.base import Color, NonNegative, Number, Positive
 from anysim_schemas.errors import KeyFault
 

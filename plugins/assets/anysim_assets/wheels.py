@@ -5,8 +5,8 @@ from itertools import combinations
 from math import pi
 
 from anysim.assets.model import ImportedModel
-from anysim.assets.procedural_assembly import Assembly, Colour, turned
 from anysim.model.world import Box, Cylinder, JointType, Sphere, Surface, Vec3
+from anysim_assets.assembly import Assembly, Colour, turned
 from anysim_schemas.errors import KeyFault
 
 TYRE = Surface(friction=1.0)

@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from anysim.assets.model import ImportedModel
-from anysim.assets.procedural_assembly import Assembly
+from anysim_assets.assembly import Assembly
 
 Metres = Annotated[float, Field(gt=0)]
 
