@@ -6,13 +6,13 @@ from typing import ClassVar
 import pytest
 
 import anysim
-from anysim.engine.audit import audit
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Allowance
 from anysim.engine.factory import create_simulation
 from anysim.engine.kinematic import NullEngine
 from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.world import World
+from anysim.testing.audit import audit
 from tests.task.helpers import BLIND
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from anysim.engine.audit import audit, world_rows
+from anysim.testing.audit import audit, world_rows
 from anysim.testing.engines import require_engine
 from anysim.testing.varying import having, varied
 

@@ -7,8 +7,8 @@ from hypothesis import given, settings, strategies as st
 from anysim.errors import EngineError
 from anysim.kinematics import inertia
 from anysim.math import pose as P
-from anysim.model.sketch import inertial
 from anysim.model.world import Box, Capsule, Cylinder, Inertial, Mesh, MeshShape, Plane, Shape, Sphere
+from anysim.testing.sketch import inertial
 
 
 def cloud(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -22,7 +22,6 @@ from anysim.engine.parameters import PARAMETERS
 from anysim.engine.state import FIELDS, Snapshot, SnapshotLevel
 from anysim.geometry.tessellate import convex_hull
 from anysim.math import pose as P
-from anysim.model.sketch import Sketch, inertial
 from anysim.model.world import (
     Box,
     Capsule,
@@ -37,6 +36,7 @@ from anysim.model.world import (
     Surface,
     World,
 )
+from anysim.testing.sketch import Sketch, inertial
 from anysim_schemas.run import WorldSpec
 
 PANDA_EVERY = 10

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from anysim.engine.audit import audit
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capability
 from anysim.engine.factory import create_simulation, runnable
 from anysim.math import pose as P
 from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.world import JointType, World
+from anysim.testing.audit import audit
 from tests.parity.articulated import (
     CABINET,
     DT,

@@ -6,10 +6,10 @@ import pytest
 from anysim import api
 from anysim.engine.factory import create_simulation
 from anysim.math import pose as P
-from anysim.model.sketch import Sketch
 from anysim.model.world import Box, Camera, Capsule, Cylinder, Sphere, World
 from anysim.testing.engines import require_engine
 from anysim.testing.fixtures import drawing_trouble
+from anysim.testing.sketch import Sketch
 from anysim_parity.camera import DEPTH, OVERLAP, camera_layer
 from anysim_parity.judge import agreement
 

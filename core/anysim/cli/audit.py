@@ -7,7 +7,7 @@ import typer
 from anysim.cli.options import AsJson, Overrides, Task
 
 if TYPE_CHECKING:
-    from anysim.engine.audit import AuditLine
+    from anysim.testing.audit import AuditLine
 
 
 class _Audited(NamedTuple):
@@ -55,8 +55,8 @@ def audit(
     from anysim.api import compile_world, load
     from anysim.cli.output import print_json
     from anysim.compile.edit import unseen
-    from anysim.engine.audit import audit as run_audit
     from anysim.engine.factory import create_simulation
+    from anysim.testing.audit import audit as run_audit
 
     loaded = load(task, overrides=override or [])
     world = unseen(compile_world(loaded))

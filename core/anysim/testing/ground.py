@@ -5,8 +5,8 @@ from math import cos, sin, tan
 import numpy as np
 
 from anysim.conventions import WORLD, Array
-from anysim.model.sketch import Sketch
 from anysim.model.world import Box, Geom, HeightField, HeightFieldShape, Mesh, MeshShape, Sphere, Surface, World
+from anysim.testing.sketch import Sketch
 
 RADIUS = 0.1
 STEP = 0.2

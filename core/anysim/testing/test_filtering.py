@@ -8,11 +8,11 @@ import pytest
 
 from anysim.conventions import WORLD
 from anysim.engine.capability import Capability as C
-from anysim.model.sketch import Sketch, inertial
 from anysim.model.world import Box, Capsule, Geom, JointType, Sphere
 from anysim.testing import tolerances
 from anysim.testing.compare import assert_close
 from anysim.testing.fixtures import needs
+from anysim.testing.sketch import Sketch, inertial
 
 pytestmark = needs(C.DYNAMICS, C.CONTACTS)
 RADIUS = 0.05

@@ -69,8 +69,8 @@ def test_create_world_returns_the_engine(new_engine):
 def test_worlds_in_which_nothing_moves(build, world):
     """A world without bodies, or without any that move, can be built, stepped and read."""
     if world.name == "tables":
-        from anysim.model.sketch import Sketch
         from anysim.model.world import Box
+        from anysim.testing.sketch import Sketch
 
         sketch = Sketch("tables")
         sketch.fixed("table", Box((0.1, 0.1, 0.1)), (0.0, 0.0, 0.5))

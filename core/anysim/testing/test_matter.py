@@ -8,11 +8,11 @@ import pytest
 
 from anysim.engine.capability import Capability as C
 from anysim.errors import EngineError
-from anysim.model.sketch import Sketch
 from anysim.model.world import Box, Camera, ContactSensor, Solver, Sphere, Surface
 from anysim.testing import looks, tolerances, worlds
 from anysim.testing.compare import assert_close, assert_ratio, assert_same, read
 from anysim.testing.fixtures import needs, skip_without_parameter
+from anysim.testing.sketch import Sketch
 
 RATES = np.array([0.0, 0.5, 2.0, 400.0])
 """[1/s]; with the last one all speed is gone within a few steps, and none must come back."""

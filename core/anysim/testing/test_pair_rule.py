@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from anysim.engine.capability import Capability as C
-from anysim.model.sketch import Sketch
 from anysim.model.world import Box, Sphere, Surface
 from anysim.testing import tolerances
 from anysim.testing.compare import assert_close
 from anysim.testing.fixtures import needs
+from anysim.testing.sketch import Sketch
 
 pytestmark = needs(C.DYNAMICS, C.CONTACTS)
 G = 9.81

@@ -9,11 +9,11 @@ import pytest
 
 from anysim.engine.capability import Capability as C
 from anysim.math import pose as P
-from anysim.model.sketch import inertial
 from anysim.model.world import Box, Capsule, ControlMode, Cylinder, Sphere, Surface
 from anysim.testing import tolerances, worlds
 from anysim.testing.compare import assert_close, assert_ratio
 from anysim.testing.fixtures import needs
+from anysim.testing.sketch import inertial
 
 pytestmark = needs(C.DYNAMICS)
 G = 9.81

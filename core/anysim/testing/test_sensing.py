@@ -5,11 +5,11 @@ import numpy as np
 from anysim.conventions import WORLD
 from anysim.engine.capability import Capability as C
 from anysim.math import pose as P
-from anysim.model.sketch import Sketch
 from anysim.model.world import Box, ContactSensor, Sphere
 from anysim.testing import tolerances, worlds
 from anysim.testing.compare import assert_close, assert_ratio, assert_same, play, read, tape
 from anysim.testing.fixtures import needs
+from anysim.testing.sketch import Sketch
 
 G = 9.81
 

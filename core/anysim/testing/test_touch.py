@@ -8,11 +8,11 @@ import numpy as np
 from anysim.conventions import WORLD
 from anysim.engine.capability import Capability as C
 from anysim.engine.state import SnapshotLevel
-from anysim.model.sketch import Sketch, inertial
 from anysim.model.world import Box, ContactSensor, JointType, Surface
 from anysim.testing import tolerances, worlds
 from anysim.testing.compare import assert_close, read
 from anysim.testing.fixtures import needs
+from anysim.testing.sketch import Sketch, inertial
 
 pytestmark = needs(C.DYNAMICS, C.CONTACT_SENSORS)
 G = 9.81

@@ -9,11 +9,11 @@ import pytest
 from anysim.compile.edit import without_entity
 from anysim.engine.capability import Capability as C
 from anysim.engine.parameters import PARAMETERS
-from anysim.model.sketch import Sketch
 from anysim.model.world import Box, Sphere
 from anysim.testing import plugin, tolerances
 from anysim.testing.compare import MOTION, assert_close, assert_same, play, read, tape
 from anysim.testing.fixtures import needs, skip_without_parameter
+from anysim.testing.sketch import Sketch
 from anysim.testing.varying import FULL, having, varied, with_slots
 
 varies = needs(C.VARYING_ENTITIES)

@@ -9,7 +9,6 @@ from anysim.conventions import WORLD, Array
 from anysim.engine.capability import Capabilities
 from anysim.engine.requirements import needs_of
 from anysim.math import pose as P
-from anysim.model.sketch import Sketch, inertial
 from anysim.model.world import (
     Box,
     Camera,
@@ -23,6 +22,7 @@ from anysim.model.world import (
     Vec3,
     World,
 )
+from anysim.testing.sketch import Sketch, inertial
 
 CHOICES = {"mug": ("mug~0", "mug~1", "mug~2"), "chest": ("chest~0", "chest~1"), "post": ("post",), "lid": ("lid",)}
 """Slots of `varied` and the entities that each can be."""

@@ -10,7 +10,6 @@ from anysim.conventions import WORLD
 from anysim.engine.capability import Capabilities
 from anysim.engine.requirements import needs_of
 from anysim.math import pose as P
-from anysim.model.sketch import ORIGIN, Sketch, inertial
 from anysim.model.world import (
     Actuation,
     Box,
@@ -35,6 +34,7 @@ from anysim.model.world import (
     Vec3,
     World,
 )
+from anysim.testing.sketch import ORIGIN, Sketch, inertial
 
 REVOLUTE, PRISMATIC = JointType.REVOLUTE, JointType.PRISMATIC
 X: Vec3 = (1.0, 0.0, 0.0)

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from anysim.compile.edit import unseen
-from anysim.engine.audit import ABSOLUTE, FRAME_TOLERANCE, RELATIVE, AuditLine, audit
 from anysim.model.world import World
+from anysim.testing.audit import ABSOLUTE, FRAME_TOLERANCE, RELATIVE, AuditLine, audit
 from anysim_parity.engines import Engines, in_world, on_each
 from anysim_parity.result import Layer, Measure
 

@@ -9,7 +9,6 @@ import pytest
 
 from anysim.engine.base import SimEngine
 from anysim.engine.factory import create_simulation
-from anysim.model.sketch import Sketch, inertial
 from anysim.model.world import (
     Body as WorldBody,
     BodyKind,
@@ -23,6 +22,7 @@ from anysim.model.world import (
     Sphere,
     World,
 )
+from anysim.testing.sketch import Sketch, inertial
 
 pytest.importorskip("pybullet", reason="the package pybullet is not installed")
 

@@ -7,9 +7,9 @@ import pytest
 
 from anysim.engine.factory import create_simulation
 from anysim.math import pose as P
-from anysim.model.sketch import Sketch, inertial
 from anysim.model.world import Box, ControlMode, JointType
 from anysim.testing import tolerances
+from anysim.testing.sketch import Sketch, inertial
 from anysim_pybullet import kernels as K
 from anysim_pybullet.bullet import bullet
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from anysim.errors import EngineError
-from anysim.model.sketch import Sketch
 from anysim.model.world import Box, Sphere, Surface
 from anysim.testing import worlds
+from anysim.testing.sketch import Sketch
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.engine import PybulletEngine
 from anysim_pybullet.urdf import roll_pitch_yaw
@@ -122,7 +122,7 @@ def test_angles_of_a_rotation(pitch):
 
 def test_an_audit_finds_the_world(build, own):
     """Masses, centres of mass, moments, limits and frames, as Bullet itself reports them, are the World's."""
-    from anysim.engine.audit import audit
+    from anysim.testing.audit import audit
 
     lines = audit(build(own.skew_arm(free=True)))
     assert [line for line in lines if line.ok is False] == []
@@ -133,7 +133,7 @@ def test_an_audit_finds_the_world(build, own):
 def test_an_audit_of_a_robot_that_does_not_move_its_base(build):
     """The mass of a fixed base counts; limits at 0 are limits."""
     from anysim.api import compile_world
-    from anysim.engine.audit import audit
+    from anysim.testing.audit import audit
     from anysim_bench.step import panda_and_boxes
 
     lines = audit(build(compile_world(panda_and_boxes())))

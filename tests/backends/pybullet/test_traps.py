@@ -8,10 +8,10 @@ import pytest
 
 import anysim_pybullet
 from anysim.math import pose as P
-from anysim.model.sketch import Sketch
 from anysim.model.world import Box, Geom, HeightField, HeightFieldShape, MeshShape, Sphere
 from anysim.testing import worlds
 from anysim.testing.compare import assert_same, play, read, spread, tape
+from anysim.testing.sketch import Sketch
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.urdf import roll_pitch_yaw
 
@@ -186,8 +186,8 @@ def test_links_of_one_robot_collide(build):
     def chain(excluded=()):
         s = Sketch("chain", gravity=(0.0, 0.0, 0.0))
         base = s.robot("r")
-        from anysim.model.sketch import inertial
         from anysim.model.world import JointType
+        from anysim.testing.sketch import inertial
 
         ball = inertial(Sphere(0.1), 1.0)
         a = s.link("a", base, JointType.PRISMATIC, (1.0, 0.0, 0.0), ball)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from anysim.errors import EngineError
-from anysim.model.sketch import Sketch, inertial
 from anysim.model.world import Box, Geom, HeightField, HeightFieldShape, Inertial, JointType, Mimic, Physics, Sphere
 from anysim.testing import worlds
+from anysim.testing.sketch import Sketch, inertial
 
 REVOLUTE, PRISMATIC = JointType.REVOLUTE, JointType.PRISMATIC
 Z = (0.0, 0.0, 1.0)

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anysim.model.sketch import Sketch, inertial
 from anysim.model.world import Actuator, Box, ControlMode, JointType
 from anysim.testing import worlds
+from anysim.testing.sketch import Sketch, inertial
 
 POSITION, VELOCITY, EFFORT = ControlMode.POSITION, ControlMode.VELOCITY, ControlMode.EFFORT
 Z = (0.0, 0.0, 1.0)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from anysim.model.sketch import Sketch, inertial
 from anysim.model.world import Box, ContactSensor, JointType, Sphere, Surface
+from anysim.testing.sketch import Sketch, inertial
 
 G, FRICTION = 9.81, 0.5
 

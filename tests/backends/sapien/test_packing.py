@@ -10,10 +10,10 @@ import pytest
 from anysim.compile.world import compile_world
 from anysim.errors import EngineError
 from anysim.math import pose as P
-from anysim.model.sketch import Sketch, inertial
 from anysim.model.world import Actuation, Box, JointType, Sphere, Surface
 from anysim.testing import worlds
 from anysim.testing.compare import assert_same, play, read, spread, tape
+from anysim.testing.sketch import Sketch, inertial
 from anysim.testing.varying import having, varied, with_slots
 from anysim_sapien.declared import CAPABILITIES
 from anysim_schemas.run import WorldSpec

@@ -7,8 +7,8 @@ import pytest
 
 from anysim.engine.sharded.engine import sharded
 from anysim.errors import CapabilityError, EngineError
-from anysim.model.sketch import Sketch, inertial
 from anysim.model.world import Body, BodyKind, Box, JointType, Sphere, Surface, World
+from anysim.testing.sketch import Sketch, inertial
 from anysim.testing.varying import having, with_slots
 from anysim_sapien.engine import SapienEngine
 from anysim_sapien.exclusions import Group, apart_of

@@ -171,8 +171,8 @@ def test_free_points_can_keep_to_what_is_reached() -> None:
 
 def test_outlines_hold_the_shapes_of_geoms() -> None:
     from anysim.math import pose as P
-    from anysim.model.sketch import Sketch
     from anysim.model.world import Box, Capsule, Cylinder, Sphere
+    from anysim.testing.sketch import Sketch
 
     rng = np.random.default_rng(4)
     for shape in (Box((0.2, 0.1, 0.3)), Sphere(0.2), Capsule(0.1, 0.2), Cylinder(0.15, 0.25)):

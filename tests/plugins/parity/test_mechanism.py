@@ -8,8 +8,8 @@ import pytest
 
 from anysim.kinematics.dynamics import mass_matrix
 from anysim.model.forward_kinematics import forward_kinematics
-from anysim.model.sketch import Sketch
 from anysim.model.world import Inertial, JointType, Physics, World
+from anysim.testing.sketch import Sketch
 from anysim_parity.mechanism import Mechanism
 from tests.plugins.parity.wrong import arm
 

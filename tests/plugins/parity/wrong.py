@@ -6,8 +6,8 @@ from anysim.engine.factory import create_simulation
 from anysim.engine.kinematic import NullEngine
 from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.shapes import Box
-from anysim.model.sketch import Sketch, inertial
 from anysim.model.world import BodyKind, JointType, World
+from anysim.testing.sketch import Sketch, inertial
 
 
 def arm() -> World:

@@ -5,8 +5,8 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capability
-from anysim.model.sketch import Sketch, inertial
 from anysim.model.world import Box, ContactSensor, ControlMode, JointType, Surface, World
+from anysim.testing.sketch import Sketch, inertial
 from anysim_parity.probes import tolerances as T
 from anysim_parity.probes.probe import Found, G, Probe, Quantity, Z, cube, lane, record, threshold
 from anysim_parity.result import Plot, Series

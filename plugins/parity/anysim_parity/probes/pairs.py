@@ -3,8 +3,8 @@
 import numpy as np
 
 from anysim.engine.base import SimEngine
-from anysim.model.sketch import Sketch
 from anysim.model.world import Box, Surface, World
+from anysim.testing.sketch import Sketch
 from anysim_parity.probes import tolerances as T
 from anysim_parity.probes.probe import Found, G, Probe, Quantity, lane, record, slope_of
 from anysim_parity.probes.slide import HALF

@@ -6,8 +6,8 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
-from anysim.model.sketch import Sketch
 from anysim.model.world import Cylinder, Quat, Sphere, Surface, World
+from anysim.testing.sketch import Sketch
 from anysim_parity.probes import tolerances as T
 from anysim_parity.probes.probe import CURVE_POINTS, Found, G, Probe, Quantity, lane, record, series, slope_of
 from anysim_parity.probes.slide import on_slab, slab

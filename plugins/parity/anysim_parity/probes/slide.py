@@ -6,8 +6,8 @@ import numpy as np
 
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capability
-from anysim.model.sketch import Sketch
 from anysim.model.world import Box, Surface, Vec3, World
+from anysim.testing.sketch import Sketch
 from anysim_parity.probes import tolerances as T
 from anysim_parity.probes.probe import CURVE_POINTS, Found, G, Probe, Quantity, about_y, lane, record, series, slope_of
 from anysim_parity.result import Plot

@@ -7,8 +7,8 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.math import pose as P
-from anysim.model.sketch import Sketch
 from anysim.model.world import Box, Surface, Vec3, World
+from anysim.testing.sketch import Sketch
 from anysim_parity.probes import tolerances as T
 from anysim_parity.probes.probe import Found, Probe, Quantity, about_y, lane, record, threshold
 from anysim_parity.probes.slide import HALF, on_slab, slab

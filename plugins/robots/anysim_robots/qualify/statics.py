@@ -4,12 +4,12 @@ import numpy as np
 
 from anysim.assets.model import ImportNote
 from anysim.conventions import Array
-from anysim.engine.audit import audit
 from anysim.engine.base import SimEngine
 from anysim.errors import listing
 from anysim.math import pose as P
 from anysim.model.frames import FixedFrame, find_frame
 from anysim.model.world import JointType, World
+from anysim.testing.audit import audit
 from anysim_robots.qualify.oracle import Oracle
 from anysim_robots.qualify.result import Check, Facts
 from anysim_robots.qualify.stage import NAME
