@@ -28,46 +28,38 @@ KINDS: Mapping[str, str] = {
     "layouts": "proposers of layouts",
     "rooms": "builders of rooms",
     "terrains": "builders of generated ground",
+    "textures": "patterns of procedural textures",
 }
 """The kinds that anysim looks up, and what each is."""
 
-INSTALL_HINTS: Mapping[tuple[str, str], str] = {
-    ("engines", "mujoco"): "anysim-mujoco",
-    ("engines", "pybullet"): "anysim-pybullet",
-    ("engines", "sapien"): "anysim-sapien",
-    ("writers", "mcap"): "anysim-mcap",
-    ("readers", "mcap"): "anysim-mcap",
-    ("planners", "numba_ik"): "anysim-control",
-    ("importers", "mjcf"): "anysim-mujoco",
-    ("controllers", "policy"): "anysim-policy",
-    ("oracles", "mjcf"): "anysim-mujoco",
-    ("rooms", "furnished"): "anysim-assets",
-    ("skills", "pick"): "anysim-skills",
-    ("terrains", "generated"): "anysim-assets",
-    **{("assets", name): "anysim-assets" for name in ("cabinet", "hinge_box", "parallel_gripper", "valve")},
-    **{
-        ("controllers", name): "anysim-control"
-        for name in (
-            "ackermann_drive",
-            "batched_ik",
-            "camera_gimbal",
-            "camera_motion",
-            "differential_drive",
-            "differential_ik",
-            "gripper_multi_finger",
-            "holonomic_drive",
-            "mink_ik",
-            "operational_space",
-            "pink_ik",
-            "planar_drive",
-        )
+_OFFERS: Mapping[str, Mapping[str, str]] = {
+    "anysim-assets": {
+        "assets": "cabinet hinge_box parallel_gripper valve",
+        "rooms": "furnished",
+        "terrains": "generated",
+        "textures": "brick checker dots gradient noise stripes wood",
     },
-    ("commands", "bench"): "anysim-bench",
-    ("commands", "compare"): "anysim-parity",
-    ("commands", "gallery"): "anysim-robots",
-    ("commands", "picture"): "anysim-parity",
-    ("commands", "render"): "anysim-film",
-    ("commands", "robot"): "anysim-robots",
+    "anysim-bench": {"commands": "bench"},
+    "anysim-control": {
+        "controllers": "ackermann_drive batched_ik camera_gimbal camera_motion differential_drive differential_ik"
+        " gripper_multi_finger holonomic_drive mink_ik operational_space pink_ik planar_drive",
+        "planners": "numba_ik",
+    },
+    "anysim-film": {"commands": "render"},
+    "anysim-mcap": {"readers": "mcap", "writers": "mcap"},
+    "anysim-mujoco": {"engines": "mujoco", "importers": "mjcf", "oracles": "mjcf"},
+    "anysim-parity": {"commands": "compare picture"},
+    "anysim-policy": {"controllers": "policy"},
+    "anysim-pybullet": {"engines": "pybullet"},
+    "anysim-robots": {"commands": "gallery robot"},
+    "anysim-sapien": {"engines": "sapien"},
+    "anysim-skills": {"skills": "pick"},
+}
+INSTALL_HINTS: Mapping[tuple[str, str], str] = {
+    (kind, name): package
+    for package, kinds in _OFFERS.items()
+    for kind, names in kinds.items()
+    for name in names.split()
 }
 """Where well-known plugins come from, for the remedy in an error."""
 

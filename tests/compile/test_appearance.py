@@ -6,41 +6,16 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from anysim import registry
 from anysim.api import compile_world, load
-from anysim.assets.texture_patterns import PATTERNS, draw_pattern
 from anysim.compile.appearance import material, material_name, texture, texture_name
 from anysim.engine.capability import Capability
 from anysim.engine.requirements import needs_of
-from anysim.errors import AssetError
+from anysim.errors import AssetError, SpecError
 from anysim.geometry.tessellate import triangles
 from anysim.model.appearance import lying, wrapped
 from anysim.model.shapes import Box, Capsule, Cylinder, Sphere
 from anysim_schemas.matter import MaterialSpec, TextureSpec
-
-
-@pytest.mark.parametrize("name", PATTERNS)
-def test_a_pattern_follows_from_its_seed_and_colours(name: str) -> None:
-    pixels = draw_pattern(name, None, None, 3, 64)
-    assert pixels.shape == (64, 64, 3)
-    assert np.array_equal(pixels, draw_pattern(name, None, None, 3, 64))
-    assert len(np.unique(pixels.reshape(-1, 3), axis=0)) >= 2, "one colour all over"
-    blue = draw_pattern(name, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 3, 64)
-    assert not blue[..., :2].any()
-    assert blue[..., 2].max() > 180
-
-
-@pytest.mark.parametrize("name", ["noise", "wood", "brick"])
-def test_a_seed_changes_what_is_random(name: str) -> None:
-    assert not np.array_equal(draw_pattern(name, None, None, 0, 64), draw_pattern(name, None, None, 1, 64))
-
-
-@pytest.mark.parametrize("name", [name for name in PATTERNS if name not in ("gradient", "stripes", "checker", "brick")])
-def test_a_pattern_goes_on_across_its_edges(name: str) -> None:
-    """What is left and right of the seam differs no more than neighbours elsewhere do."""
-    pixels = draw_pattern(name, None, None, 5, 128).astype(int)
-    steps = np.abs(np.diff(pixels, axis=1)).sum(axis=(0, 2))
-    seam = np.abs(pixels[:, 0] - pixels[:, -1]).sum()
-    assert seam <= 1.5 * steps.max()
 
 
 def test_names_follow_from_what_is_given() -> None:
@@ -88,6 +63,16 @@ def test_what_may_be_drawn_is_in_the_world_once() -> None:
     assert again.hash == world.hash
     tree["world"]["objects"]["b"]["texture"] = {"pattern": "noise", "seed": 1}
     assert compile_world(load(tree)).hash != world.hash
+
+
+def test_a_pattern_needs_its_package(monkeypatch: pytest.MonkeyPatch) -> None:
+    installed = registry._entries
+    monkeypatch.setattr(registry, "_entries", lambda kind: {} if kind == "textures" else installed(kind))
+    box = {"source": {"box": [0.1, 0.1, 0.1]}, "texture": {"choice": ["brick", {"pattern": "noise", "seed": 1}]}}
+    with pytest.raises(SpecError, match=r"no texture named 'noise' .* pip install anysim-assets") as caught:
+        compile_world(load({"world": {"objects": {"box": box}, "layout": {"box": {"position": [0, 0, 1]}}}}))
+    where = "world.objects.box.texture.choice"
+    assert [issue.path for issue in caught.value.issues] == [f"{where}.0.pattern", f"{where}.1.pattern"]
 
 
 @pytest.mark.parametrize("shape", [Box((1.0, 2.0, 3.0)), Sphere(0.5), Capsule(0.2, 0.5), Cylinder(0.3, 0.4)])

@@ -6,14 +6,14 @@ The names of textures and materials follow from the spec alone.
 import hashlib
 import io
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from anysim.assets.texture_patterns import draw_pattern
+from anysim import registry
 from anysim.assets.uri import locate
 from anysim.conventions import Array
 from anysim.errors import AssetError, Issues
@@ -40,6 +40,28 @@ PRESETS: Mapping[str, Material] = {
     "ceramic": Material("ceramic", (0.93, 0.92, 0.89), roughness=0.15, specular=0.7),
     "lamp": Material("lamp", (1.00, 0.95, 0.80), roughness=0.9, specular=0.0, emission=1.0),
 }
+
+
+class Pattern(NamedTuple):
+    """A procedural texture: a member of the kind `textures`.
+
+    Attributes:
+        weights: shares of the second colour at places (u to the right, v downwards, both in [0, 1)), from a seed.
+        first: its own colour of weight 0; `second` that of weight 1.
+    """
+
+    weights: Callable[[Array, Array, int], Array]
+    first: Rgb
+    second: Rgb
+
+    def pixels(self, first: Rgb | None, second: Rgb | None, seed: int, resolution: int) -> Array:
+        """The image (resolution, resolution, 3) uint8; None for its own colour."""
+        middle = (np.arange(resolution) + 0.5) / resolution
+        u, v = np.meshgrid(middle, middle)
+        weight = self.weights(u, v, seed)[..., None]
+        low, high = np.array(first or self.first), np.array(second or self.second)
+        # the cosine of two machines may differ in its last bit; half a grey level apart is far more than that
+        return np.floor(255 * ((1 - weight) * low + weight * high) + 0.5 + 1e-9).astype(np.uint8)
 
 
 def options(value: Any) -> Iterator[tuple[str, Any]]:
@@ -87,6 +109,7 @@ def texture(spec: TextureSpec, base: Path | None) -> Texture:
 
     Raises:
         AssetError: an image that is missing, leaves its root, or cannot be read.
+        PluginError: the pattern is not installed.
         ValueError: an unknown colour name.
     """
     if spec.image is not None:
@@ -94,8 +117,9 @@ def texture(spec: TextureSpec, base: Path | None) -> Texture:
         content = f"{pixels.shape}".encode() + pixels.tobytes()
     else:
         assert spec.pattern is not None
-        low, high = (None, None) if spec.colors is None else (rgb(spec.colors[0]), rgb(spec.colors[1]))
-        pixels = draw_pattern(spec.pattern, low, high, spec.seed, spec.resolution)
+        pattern: Pattern = registry.load("textures", spec.pattern)
+        first, second = (None, None) if spec.colors is None else map(rgb, spec.colors)
+        pixels = pattern.pixels(first, second, spec.seed, spec.resolution)
         # what it is made from: a sine may differ in its last bit between two machines
         content = f"{PATTERN_FORMAT} {json.dumps(spec.to_dict(), sort_keys=True)}".encode()
     pixels.setflags(write=False)

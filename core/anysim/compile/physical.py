@@ -6,7 +6,7 @@ from pathlib import Path
 
 from anysim.assets.model import ImportedModel
 from anysim.compile.appearance import material, material_name, options, texture, texture_name, tint
-from anysim.errors import AssetError, Issues
+from anysim.errors import AssetError, Issues, PluginError
 from anysim.model.appearance import Material, Texture
 from anysim.model.world import Geom, Inertial, Solver, Surface
 from anysim.randomization.distributions import nominal
@@ -89,6 +89,8 @@ def _with_looks(model: ImportedModel, spec: ObjectSpec, issues: Issues, base: Pa
             textures[made.name] = made
         except AssetError as error:
             issues.asset(f"{where}.image", error)
+        except PluginError as error:
+            issues.add(f"{where}.pattern", str(error))
         except ValueError as error:
             issues.add(f"{where}.colors", str(error))
     for _, one in options(spec.material):

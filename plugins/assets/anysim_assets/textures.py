@@ -1,15 +1,12 @@
-"""Procedural textures: patterns as images, made by arithmetic from a seed. No files, the same on every machine.
+"""Procedural textures: patterns made by arithmetic from a seed. No files, the same on every machine.
 
-Each pattern is a field of weights in [0, 1] that blends two colours. All of them but `gradient` continue across their
-edges, so that they can stand side by side.
+All of them but `gradient` continue across their edges, so that they can stand side by side.
 """
-
-from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from anysim.compile.appearance import Pattern
 from anysim.conventions import Array
-from anysim.model.appearance import Rgb
 
 _SQUARES, _BANDS, _DOTS = 4, 4, 4
 _ROWS, _BRICKS, _MORTAR = 6, 3, 0.08
@@ -78,24 +75,10 @@ def _wood(u: Array, v: Array, seed: int) -> Array:
     return np.clip(0.5 + 0.5 * np.sin(2 * np.pi * rings) + 0.25 * (_noise(u, v, seed + 1) - 0.5), 0.0, 1.0)
 
 
-PATTERNS: Mapping[str, tuple[Callable[[Array, Array, int], Array], Rgb, Rgb]] = {
-    "checker": (_checker, (0.15, 0.15, 0.15), (0.95, 0.95, 0.95)),
-    "stripes": (_stripes, (0.20, 0.30, 0.60), (0.95, 0.95, 0.95)),
-    "dots": (_dots, (0.95, 0.95, 0.90), (0.80, 0.15, 0.15)),
-    "gradient": (_gradient, (0.95, 0.75, 0.30), (0.25, 0.15, 0.45)),
-    "noise": (_noise, (0.25, 0.30, 0.25), (0.85, 0.85, 0.75)),
-    "brick": (_brick, (0.80, 0.78, 0.74), (0.62, 0.25, 0.18)),
-    "wood": (_wood, (0.45, 0.27, 0.13), (0.76, 0.55, 0.32)),
-}
-"""The weights of a pattern, from places (u to the right, v downwards, in [0, 1)) and a seed, and its own colours."""
-
-
-def draw_pattern(name: str, low: Rgb | None, high: Rgb | None, seed: int, resolution: int) -> Array:
-    """The pixels (resolution, resolution, 3) uint8 of a pattern; None for its own colour of weight 0 or 1."""
-    field, first, second = PATTERNS[name]
-    middle = (np.arange(resolution) + 0.5) / resolution
-    u, v = np.meshgrid(middle, middle)
-    weight = field(u, v, seed)[..., None]
-    colors = np.array(first if low is None else low), np.array(second if high is None else high)
-    # the cosine of two machines may differ in its last bit; half a grey level apart is far more than that
-    return np.floor(255 * ((1 - weight) * colors[0] + weight * colors[1]) + 0.5 + 1e-9).astype(np.uint8)
+CHECKER = Pattern(_checker, (0.15, 0.15, 0.15), (0.95, 0.95, 0.95))
+STRIPES = Pattern(_stripes, (0.20, 0.30, 0.60), (0.95, 0.95, 0.95))
+DOTS = Pattern(_dots, (0.95, 0.95, 0.90), (0.80, 0.15, 0.15))
+GRADIENT = Pattern(_gradient, (0.95, 0.75, 0.30), (0.25, 0.15, 0.45))
+NOISE = Pattern(_noise, (0.25, 0.30, 0.25), (0.85, 0.85, 0.75))
+BRICK = Pattern(_brick, (0.80, 0.78, 0.74), (0.62, 0.25, 0.18))
+WOOD = Pattern(_wood, (0.45, 0.27, 0.13), (0.76, 0.55, 0.32))
