@@ -2,7 +2,8 @@
 
 A function or class takes its positional arguments from anysim and its keyword-only ones from the YAML file. Their
 annotations are checked when the file is loaded; an annotation with an attribute `reference_kind` (a handle such as
-`Frame`) is written as a name in the file and resolved when the env is built.
+`Frame`) is written as a name in the file and resolved when the env is built. A constructor that takes `**options` and
+hands them on to the constructor of its base has the parameters of that one too, before its own.
 """
 
 import inspect
@@ -20,12 +21,16 @@ def parameters(function: Callable[..., Any]) -> dict[str, inspect.Parameter]:
     """The keyword-only parameters, with resolved annotations."""
     hinted = function.__init__ if inspect.isclass(function) else function
     hints = get_type_hints(hinted, include_extras=True)
-    signature = inspect.signature(hinted)
-    return {
+    every = inspect.signature(hinted).parameters
+    found = {
         name: p.replace(annotation=hints.get(name, Any))
-        for name, p in signature.parameters.items()
+        for name, p in every.items()
         if p.kind is inspect.Parameter.KEYWORD_ONLY
     }
+    if inspect.isclass(function) and any(p.kind is inspect.Parameter.VAR_KEYWORD for p in every.values()):
+        made = [c for c in function.__mro__[:-1] if "__init__" in vars(c)]  # object's takes none
+        found = {**(parameters(made[1]) if len(made) > 1 else {}), **found}
+    return found
 
 
 def reference_kind(annotation: Any) -> str | None:

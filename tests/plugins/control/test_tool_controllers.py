@@ -70,11 +70,11 @@ def test_out_of_reach_it_stays_within_the_joint_limits(controller: str) -> None:
 def test_the_posture_does_not_move_the_tool(controller: str) -> None:
     robot = puppet(controller, frame="world", posture_gain=0.05)
     target = robot.tool()
-    reference = robot.controller._servo._reference
+    reference = robot.controller._reference
     # the elbow elsewhere, the tool where it was: along the nullspace, then held
     home = reference.copy()
     elsewhere = home + np.array([0.4, 0.0, -0.4, 0.0, 0.3, 0.0, 0.0])
-    robot.controller._servo._posture[:] = np.clip(elsewhere, robot.view.lower, robot.view.upper)
+    robot.controller._posture[:] = np.clip(elsewhere, robot.view.lower, robot.view.upper)
     for _ in range(120):
         robot.step(target)
     assert np.abs(robot.joint_pos[:, robot.columns] - home).max() > 0.02, "the posture pulls"

@@ -107,7 +107,7 @@ def operational(num_envs: int = 1, **params: Any) -> Puppet:
 def fall(robot: Puppet, effort: np.ndarray, rate: np.ndarray) -> np.ndarray:
     """Joint rates a step later, of links alone in space: Pinocchio's dynamics, no engine."""
     model, links = robot.robot.kinematics, LinkEffort(robot.robot)
-    spread, joints = robot.controller._frames.spread, robot.joint_pos[0]
+    spread, joints = robot.controller.frames.spread, robot.joint_pos[0]
     mass = spread.T @ model.mass_matrix(model.q(joints)) @ spread
     base = robot.robot.base_pose(None)[0]
     carried = spread.T @ links.of(joints, spread @ rate, np.zeros(len(joints)), base)

@@ -1,34 +1,21 @@
 """`batched_ik`: the compiled kernels as a controller: one call a control step for all envs."""
 
-from collections.abc import Mapping
 from importlib.util import find_spec
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Unpack
 
 import numpy as np
 from pydantic import Field
 
-from anysim.controllers.base import ChannelView, Command, Controller
+from anysim.controllers.base import ChannelView
 from anysim.conventions import Array
 from anysim.planning.api import InverseKinematics, inverse_kinematics
 from anysim_control.batch.limbs import Limb, limbs
-from anysim_control.tools.frames import ToolFrames
-from anysim_control.tools.link_effort import CarryWeight
-from anysim_control.tools.servo import FeedForward, ToolServo, VelocityScale
-from anysim_control.tools.target import (
-    CommandName,
-    FrameName,
-    Speed,
-    StepAngle,
-    StepLength,
-    ToolNames,
-    ToolTargets,
-    TurnRate,
-)
+from anysim_control.tools.ik_controller import IkController, IkOptions
 
 FREE, FIXED = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 
 
-class BatchedIk(Controller):
+class BatchedIk(IkController):
     """Damped steps, or whole solutions, of serial chains in compiled code; fastest where there are many envs.
 
     Each tool has a chain of its own: arms that share a waist are one problem, which `pink_ik` solves. With `full`
@@ -41,16 +28,6 @@ class BatchedIk(Controller):
         channel: ChannelView,
         num_envs: int,
         *,
-        tool: ToolNames = None,
-        frame: FrameName = "base",
-        command: CommandName = "pose",
-        step_length: StepLength = 0.02,
-        step_angle: StepAngle = 0.1,
-        speed: Speed = 0.5,
-        turn_rate: TurnRate = 1.5,
-        velocity_scale: VelocityScale = 1.0,
-        feed_forward: FeedForward = "effort",
-        carry_weight: CarryWeight = None,
         solve: Annotated[Literal["step", "full"], Field(description="what is computed in a control step")] = "step",
         solver: Annotated[
             Literal["numba_ik", "numpy_ik"] | None,
@@ -61,57 +38,22 @@ class BatchedIk(Controller):
             float, Field(ge=0, le=1, description="step: the part of the way to the posture at the reset in a step")
         ] = 0.02,
         restarts: Annotated[int, Field(ge=0, description="full: random starts where the first does not get there")] = 5,
+        **options: Unpack[IkOptions],
     ) -> None:
-        super().__init__(channel, num_envs)
-        frames = ToolFrames(channel, tool)
-        targets = ToolTargets(
-            frames,
-            num_envs,
-            command=command,
-            frame=frame,
-            step_length=step_length,
-            step_angle=step_angle,
-            speed=speed,
-            turn_rate=turn_rate,
-        )
-        self._servo = ToolServo(
-            frames,
-            targets,
-            self._solve,
-            num_envs,
-            feed_forward=feed_forward,
-            velocity_scale=velocity_scale,
-            carry_weight=carry_weight,
-        )
-        self.dim, self.low, self.high, self.labels = targets.dim, targets.low, targets.high, targets.labels
-        self._limbs = limbs(frames)
+        super().__init__(channel, num_envs, **options)
+        self._limbs = limbs(self.frames)
         name = solver or ("numba_ik" if find_spec("numba") else "numpy_ik")
         self._solvers: list[InverseKinematics] = [inverse_kinematics(limb.chain, name) for limb in self._limbs]
-        self._weight = FIXED if targets.oriented else FREE
+        self._weight = FIXED if self.targets.oriented else FREE
         self._full, self._restarts = solve == "full", restarts
         self._damping, self._gain = damping, posture_gain
 
-    def reset(self, env_ids: Array, targets: Array) -> None:
-        self._servo.reset(env_ids, targets)
-
-    def apply(self, action: Array, env_ids: Array | None) -> Command:
-        return self._servo.apply(action, env_ids)
-
-    def action_for(self, targets: Array, env_ids: Array) -> Array:
-        return self._servo.action_for(targets, env_ids)
-
-    def snapshot(self, env_ids: Array) -> dict[str, Array]:
-        return self._servo.snapshot(env_ids)
-
-    def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
-        self._servo.restore(env_ids, data)
-
-    def _solve(self, joint_pos: Array, targets: Array, posture: Array) -> Array:
+    def solve(self, joint_pos: Array, targets: Array, posture: Array) -> Array:
         now = joint_pos[:, self.channel.joint_columns]
         answer = np.array(now)
         for number, (limb, ik) in enumerate(zip(self._limbs, self._solvers, strict=True)):
             mine = answer[:, limb.columns]
-            most = self._servo.max_step[limb.columns]
+            most = self.max_step[limb.columns]
             wanted = (self._searched if self._full else self._stepped)(
                 limb, ik, targets[:, number], joint_pos, mine, posture, most
             )

@@ -1,10 +1,6 @@
 """`mink_ik`: tools, posture and centre of mass weighed against each other in one quadratic program a control step."""
 
-from collections.abc import Mapping
-
-from anysim.conventions import Array
-from anysim_control.tools.frames import ToolFrames
-from anysim_control.tools.program import Program, ToolProgram
+from anysim_control.tools.program import Costs, Program, ToolProgram
 
 
 class MinkIk(ToolProgram):
@@ -14,7 +10,7 @@ class MinkIk(ToolProgram):
     others (mimic) stay coupled, and joints of other channels stand still at what is measured, as equality constraints.
     """
 
-    def _made(self, frames: ToolFrames, max_step: Array, costs: Mapping[str, float]) -> Program:
+    def _made(self, costs: Costs) -> Program:
         from anysim_control.tools.mink_problem import MinkProblem
 
-        return MinkProblem(frames, max_step, **costs)
+        return MinkProblem(self.frames, self.max_step, costs)

@@ -1,33 +1,22 @@
 """`operational_space`: tools behave as masses on springs, whatever the pose of the arm (Khatib's formulation)."""
 
-from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Unpack
 
 import numpy as np
 from pydantic import Field
 
-from anysim.controllers.base import ChannelView, Command, Controller
+from anysim.controllers.base import ChannelView, Command
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.model.world import ControlMode
-from anysim_control.tools.frames import ToolFrames
+from anysim_control.tools.controller import ToolController, ToolOptions
 from anysim_control.tools.link_effort import CarryWeight
-from anysim_control.tools.target import (
-    CommandName,
-    FrameName,
-    Speed,
-    StepAngle,
-    StepLength,
-    ToolNames,
-    ToolTargets,
-    TurnRate,
-)
 from anysim_control.tools.task_space import TaskSpace
 
 Gain = Annotated[float, Field(gt=0)]
 
 
-class OperationalSpace(Controller):
+class OperationalSpace(ToolController):
     """Efforts that accelerate the tools towards their targets, and in what they leave free the joints to the posture.
 
     The inertia is that of the channel's joints on a base that stands still; joints of other channels are taken as held.
@@ -43,13 +32,6 @@ class OperationalSpace(Controller):
         channel: ChannelView,
         num_envs: int,
         *,
-        tool: ToolNames = None,
-        frame: FrameName = "base",
-        command: CommandName = "pose",
-        step_length: StepLength = 0.02,
-        step_angle: StepAngle = 0.1,
-        speed: Speed = 0.5,
-        turn_rate: TurnRate = 1.5,
         stiffness: Annotated[Gain, Field(description="acceleration by distance of a tool [1/s^2]")] = 400.0,
         damping_ratio: Annotated[Gain, Field(description="1 arrives soonest without going beyond")] = 1.0,
         posture_stiffness: Annotated[Gain, Field(description="acceleration by distance of a joint [1/s^2]")] = 20.0,
@@ -60,54 +42,42 @@ class OperationalSpace(Controller):
         ] = "effort",
         carry_weight: CarryWeight = None,
         period: Annotated[float, Field(gt=0, description="[s] between efforts; at least a physics step")] = 0.002,
+        **options: Unpack[ToolOptions],
     ) -> None:
-        super().__init__(channel, num_envs)
-        self._frames = ToolFrames(channel, tool)
-        self._targets = ToolTargets(
-            self._frames,
-            num_envs,
-            command=command,
-            frame=frame,
-            step_length=step_length,
-            step_angle=step_angle,
-            speed=speed,
-            turn_rate=turn_rate,
-        )
-        self.dim, self.low, self.high = self._targets.dim, self._targets.low, self._targets.high
-        self.labels = self._targets.labels
+        super().__init__(channel, num_envs, **options)
         self.mode = ControlMode.EFFORT if drives == "effort" else ControlMode.POSITION
         dt, control_dt = self.robot.dt, self.robot.control_dt
         self.period = min(max(1, round(period / dt)) * dt, control_dt)
         self._space = TaskSpace(
-            self._frames,
+            self.frames,
             stiffness=stiffness,
             damping_ratio=damping_ratio,
             posture_stiffness=posture_stiffness,
             max_speed=max_speed,
             max_turn_rate=max_turn_rate,
-            oriented=self._targets.oriented,
+            oriented=self.targets.oriented,
             carry_weight=carry_weight,
         )
-        shape = (num_envs, len(self._frames), 7)
+        shape = (num_envs, len(self.frames), 7)
         self._earlier, self._before, self._after = np.zeros(shape), np.zeros(shape), np.zeros(shape)
         """The targets at the end of this control step and of the two before, base frame: tools are led along them."""
-        self._posture = np.zeros((num_envs, len(channel)))
         self._time = np.zeros(num_envs)
         """[s] since the last action."""
+        self._state = {
+            "earlier": self._earlier,
+            "before": self._before,
+            "after": self._after,
+            "posture": self._posture,
+            "time": self._time,
+        }
         self._far = np.array([max_speed, max_turn_rate]) * control_dt
 
-    def reset(self, env_ids: Array, targets: Array) -> None:
-        joint_pos = self._frames.whole(self.robot.joint_pos(env_ids), targets)
-        poses = self._frames.poses(joint_pos)
-        self._targets.reset(env_ids, poses, self.robot.base_pose(env_ids))
+    def _begin(self, env_ids: Array, targets: Array, poses: Array) -> None:
         self._earlier[env_ids], self._before[env_ids], self._after[env_ids] = poses, poses, poses
-        self._posture[env_ids], self._time[env_ids] = targets, 0.0
+        self._time[env_ids] = 0.0
 
-    def apply(self, action: Array, env_ids: Array | None) -> Command:
+    def _follow(self, joint_pos: Array, target: Array, env_ids: Array | None) -> Command:
         rows = slice(None) if env_ids is None else env_ids
-        stepping = self._targets.stepping
-        poses = self._frames.poses(self.robot.joint_pos(env_ids)) if stepping else None
-        target = self._targets.apply(action, env_ids, poses, self.robot.base_pose(env_ids))
         self._earlier[rows] = self._before[rows]
         self._before[rows] = self._after[rows]
         self._after[rows], self._time[rows] = target, 0.0
@@ -116,22 +86,6 @@ class OperationalSpace(Controller):
     def update(self, env_ids: Array | None) -> Command:
         self._time[slice(None) if env_ids is None else env_ids] += self.period or 0.0
         return self._command(env_ids)
-
-    def snapshot(self, env_ids: Array) -> dict[str, Array]:
-        return {
-            "earlier": self._earlier[env_ids],
-            "before": self._before[env_ids],
-            "after": self._after[env_ids],
-            "posture": self._posture[env_ids],
-            "time": self._time[env_ids],
-            **self._targets.snapshot(env_ids),
-        }
-
-    def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
-        self._earlier[env_ids], self._before[env_ids] = data["earlier"], data["before"]
-        self._after[env_ids] = data["after"]
-        self._posture[env_ids], self._time[env_ids] = data["posture"], data["time"]
-        self._targets.restore(env_ids, data)
 
     def _command(self, env_ids: Array | None) -> Command:
         rows = slice(None) if env_ids is None else env_ids
