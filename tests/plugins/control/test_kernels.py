@@ -9,8 +9,9 @@ from anysim.kinematics.chain import Chain
 from anysim.math import pose as P
 from anysim.model.world import JointType, World
 from anysim.testing.arms import Link, panda_arm, serial_arm
-from anysim_control.batch import kernels
+from anysim_control.batch import compiled, kernels
 from anysim_control.batch.frames import canonical_frames
+from anysim_control.batch.starts import start_position, uniform
 
 ODD = serial_arm(
     (
@@ -146,30 +147,53 @@ def test_the_generator_matches_the_published_algorithm_and_is_uniform() -> None:
     # The first outputs of SplitMix64 from state 1234567, a common reference.
     published = [6457827717110365317, 3203168211198807973, 9817491932198370423, 4593380528125082431]
     key = np.uint64(1234567)
-    assert [kernels.uniform(key, i) for i in range(4)] == [(value >> 11) / 2.0**53 for value in published]
-    draws = np.array([kernels.uniform(np.uint64(key), i) for key in range(100) for i in range(20)])
+    assert [uniform(key, i) for i in range(4)] == [(value >> 11) / 2.0**53 for value in published]
+    draws = np.array([uniform(np.uint64(key), i) for key in range(100) for i in range(20)])
     assert 0.0 <= draws.min()
     assert draws.max() < 1.0
     assert abs(draws.mean() - 0.5) < 0.02
     assert len(np.unique(draws)) == len(draws)
 
 
+def test_the_kernels_in_use_have_the_starts_of_the_source() -> None:
+    """numba's cache does not notice a change of starts.py; without iterations a row's answer is its best start."""
+    chain = Chain.from_world(panda_arm(), "panda", "arm", "tool")
+    seeds = np.random.default_rng(6).uniform(chain.lower, chain.upper, (20, len(chain)))
+    targets, keys = np.tile(chain.tool_pose(ROOT, chain.initial), (20, 1)), np.arange(20, dtype=np.uint64)
+    spread, attempts, rows = np.full(len(chain), np.pi), 8, (20,)
+    out = np.empty_like(seeds), np.empty(rows, bool), np.empty(rows), np.empty(rows), np.empty(rows, np.int64)
+    fixed = canonical_frames(chain), chain.prismatic, chain.lower, chain.upper, spread, np.ones(3), np.full(2, 1e-4)
+    kernels.solve_rows(*fixed, attempts, 0, targets, np.tile(ROOT, (20, 1)), seeds, keys, *out)
+    restarted = 0
+    for row, found in enumerate(out[0]):
+        starts = [
+            [
+                start_position(attempt, k, len(chain), chain.lower[k], chain.upper[k], spread[k], seed, keys[row])
+                for k, seed in enumerate(seeds[row])
+            ]
+            for attempt in range(attempts)
+        ]
+        assert found.tolist() in starts, "machine code of other starts: delete numba's cache, or touch kernels.py"
+        restarted += found.tolist() != starts[0]
+    assert restarted > 5
+
+
 def test_kernels_compile_where_no_cache_can_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
-    real = kernels.njit
+    real = compiled.njit
 
     def without_a_place(cache: bool = False, **options: Any) -> Any:
         if cache:
             raise RuntimeError("cannot cache function 'f': no locator available for file 'f.py'")
         return real(**options)
 
-    monkeypatch.setattr(kernels, "njit", without_a_place)
-    assert kernels.compiled(lambda x: x + 1)(1) == 2
+    monkeypatch.setattr(compiled, "njit", without_a_place)
+    assert compiled.compiled(lambda x: x + 1)(1) == 2
 
 
 def test_other_compilation_faults_are_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(**options: Any) -> Any:
         raise RuntimeError("out of order")
 
-    monkeypatch.setattr(kernels, "njit", broken)
+    monkeypatch.setattr(compiled, "njit", broken)
     with pytest.raises(RuntimeError, match="out of order"):
-        kernels.compiled(lambda x: x)
+        compiled.compiled(lambda x: x)

@@ -9,51 +9,21 @@ vector in tool axes, weighted axis by axis. Its Jacobian is exact: with weights 
 
 No kernel adds in an order that depends on the batch, and none is compiled with fast-math: a row's bits are its own.
 
-All kernels share one file because numba's cache notices a change of a kernel's own file only, not of what it calls.
+The arithmetic shares one file because numba's cache notices a change of a kernel's own file only, not of what it calls.
+Random starts are beside it: recorded results depend on them, so they do not change, and a test would notice.
 """
 
 import math
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
-from numba import njit
 
 from anysim.conventions import Array
-
-
-def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile on first call; keep the machine code on disk where there is a place for it.
-
-    numba looks at NUMBA_CACHE_DIR, then beside this file, then in the user's cache directory, and raises if none can be
-    written to. A read-only installation without a home still has to work: it compiles anew in each process.
-    """
-    try:
-        return njit(cache=True, nogil=True, fastmath=False)(function)
-    except RuntimeError as error:
-        if "no locator available" not in str(error):
-            raise
-        return njit(nogil=True, fastmath=False)(function)
-
-
-GOLDEN = np.uint64(0x9E3779B97F4A7C15)
-MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
-MIX_2 = np.uint64(0x94D049BB133111EB)
-S11, S27, S30, S31 = np.uint64(11), np.uint64(27), np.uint64(30), np.uint64(31)
+from anysim_control.batch.compiled import compiled
+from anysim_control.batch.starts import start_position
 
 MAX_MOVE = 1.0
 """The most [rad] or [m] a joint moves in an iteration: the linear model is worth nothing beyond."""
 STALLS = 3
-
-
-@compiled
-def uniform(key: np.uint64, counter: int) -> float:
-    """Draw number `counter` of the stream `key`, in [0, 1): SplitMix64 with the counter as its state."""
-    z = key + (np.uint64(counter) + np.uint64(1)) * GOLDEN
-    z = (z ^ (z >> S30)) * MIX_1
-    z = (z ^ (z >> S27)) * MIX_2
-    z = z ^ (z >> S31)
-    return np.float64(z >> S11) * (1.0 / 9007199254740992.0)
 
 
 @compiled
@@ -286,22 +256,6 @@ def errors(error: Array, vector: Array, weight: Array) -> tuple[float, float]:
         if weight[i] > 0.0:
             angle += vector[i] * vector[i]
     return math.sqrt(error[0] * error[0] + error[1] * error[1] + error[2] * error[2]), math.sqrt(angle)
-
-
-@compiled
-def start_position(
-    attempt: int, k: int, joints: int, lower: float, upper: float, spread: float, seed: float, key: np.uint64
-) -> float:
-    """Where joint k starts an attempt: at its seed, later anywhere in its limits (in seed +- spread if it has none)."""
-    if attempt == 0:
-        value = seed
-    else:
-        draw = uniform(key, (attempt - 1) * joints + k)
-        if math.isfinite(lower) and math.isfinite(upper):
-            value = lower + (upper - lower) * draw
-        else:
-            value = seed + spread * (2.0 * draw - 1.0)
-    return min(max(value, lower), upper)
 
 
 @compiled
