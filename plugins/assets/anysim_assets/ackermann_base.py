@@ -5,10 +5,10 @@ from typing import Annotated
 from pydantic import Field
 
 from anysim.assets.model import ImportedModel
-from anysim.model.world import JointType, Sphere
+from anysim.model.world import Sphere
 from anysim_assets.assembly import Assembly
 from anysim_assets.parameters import Size
-from anysim_assets.wheels import RUBBER, add_body, add_wheel, check_bottom, made
+from anysim_assets.wheels import RUBBER, Wheel, add_body, add_steering, add_wheel, check_bottom, made
 from anysim_schemas.base import Color, Positive
 from anysim_schemas.errors import KeyFault
 
@@ -64,38 +64,13 @@ def ackermann_base(
         raise KeyFault(f"axles {wheelbase:g} m apart leave wheels of {wheel_radius:g} m in each other", "wheelbase")
     base = Assembly("ackermann_base")
     add_body(base, size, bottom, wheelbase / 2, mass, color)
-    for side, y in (("left", track / 2), ("right", -track / 2)):
-        add_wheel(
-            base,
-            f"rear_{side}",
-            (0.0, y, 0.0),
-            wheel_radius,
-            wheel_width,
-            wheel_color,
-            speed=wheel_speed,
-            torque=wheel_torque,
-        )
-    for side, y in (("left", track / 2), ("right", -track / 2)):
-        knuckle = base.link(
-            f"steer_{side}",
-            (wheelbase, y, 0.0),
-            JointType.REVOLUTE,
-            (0.0, 0.0, 1.0),
-            lower=-steering_limit,
-            upper=steering_limit,
-            velocity_limit=steering_speed,
-            effort_limit=steering_torque,
-        )
+    wheel = Wheel(wheel_radius, wheel_width, wheel_speed, wheel_torque, wheel_color)
+    sides = {"left": track / 2, "right": -track / 2}
+    for side, y in sides.items():
+        add_wheel(base, f"rear_{side}", (0.0, y, 0.0), wheel)
+    for side, y in sides.items():
+        place, limit = (wheelbase, y, 0.0), steering_limit
+        knuckle = add_steering(base, f"steer_{side}", place, speed=steering_speed, torque=steering_torque, limit=limit)
         base.solid(knuckle, "knuckle", Sphere(_KNUCKLE), (0.0, 0.0, 0.0), 8 * RUBBER, wheel_color, collides=False)
-        add_wheel(
-            base,
-            f"front_{side}",
-            (0.0, 0.0, 0.0),
-            wheel_radius,
-            wheel_width,
-            wheel_color,
-            parent=knuckle,
-            speed=wheel_speed,
-            torque=wheel_torque,
-        )
+        add_wheel(base, f"front_{side}", (0.0, 0.0, 0.0), wheel, parent=knuckle)
     return made(base)

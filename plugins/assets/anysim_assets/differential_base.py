@@ -3,7 +3,7 @@
 from anysim.assets.model import ImportedModel
 from anysim_assets.assembly import Assembly
 from anysim_assets.parameters import Size
-from anysim_assets.wheels import add_body, add_castor, add_wheel, check_bottom, made
+from anysim_assets.wheels import Wheel, add_body, add_castor, add_wheel, check_bottom, made
 from anysim_schemas.base import Color, Number, Positive
 from anysim_schemas.errors import KeyFault
 
@@ -56,8 +56,7 @@ def differential_base(
     add_body(base, size, bottom, 0.0, mass, color)
     for i, (x, y) in enumerate(castors):
         add_castor(base, f"castor_{i + 1}", x, y, castor_radius, -wheel_radius, wheel_color)
+    wheel = Wheel(wheel_radius, wheel_width, wheel_speed, wheel_torque, wheel_color)
     for name, y in (("left_wheel", track / 2), ("right_wheel", -track / 2)):
-        add_wheel(
-            base, name, (0.0, y, 0.0), wheel_radius, wheel_width, wheel_color, speed=wheel_speed, torque=wheel_torque
-        )
+        add_wheel(base, name, (0.0, y, 0.0), wheel)
     return made(base)

@@ -1,10 +1,10 @@
 """A base on four wheels that are each steered and driven."""
 
 from anysim.assets.model import ImportedModel
-from anysim.model.world import Cylinder, JointType
+from anysim.model.world import Cylinder
 from anysim_assets.assembly import Assembly
 from anysim_assets.parameters import Size
-from anysim_assets.wheels import RUBBER, add_body, add_wheel, check_bottom, made
+from anysim_assets.wheels import RUBBER, Wheel, add_body, add_steering, add_wheel, check_bottom, made
 from anysim_schemas.base import Color, Positive
 from anysim_schemas.errors import KeyFault
 
@@ -58,34 +58,12 @@ def holonomic_base(
         )
     base = Assembly("holonomic_base")
     add_body(base, size, bottom, 0.0, mass, color)
+    wheel = Wheel(wheel_radius, wheel_width, wheel_speed, wheel_torque, wheel_color)
     post = (bottom - wheel_width / 2) / 2
+    shape, middle = Cylinder(wheel_width / 4, post), (0.0, 0.0, bottom - post)
     for corner, (x, y) in CORNERS.items():
-        steer = base.link(
-            f"steer_{corner}",
-            (x * wheelbase / 2, y * track / 2, 0.0),
-            JointType.REVOLUTE,
-            (0.0, 0.0, 1.0),
-            velocity_limit=steering_speed,
-            effort_limit=steering_torque,
-        )
-        base.solid(
-            steer,
-            "post",
-            Cylinder(wheel_width / 4, post),
-            (0.0, 0.0, bottom - post),
-            RUBBER,
-            wheel_color,
-            collides=False,
-        )
-        add_wheel(
-            base,
-            f"wheel_{corner}",
-            (0.0, 0.0, 0.0),
-            wheel_radius,
-            wheel_width,
-            wheel_color,
-            parent=steer,
-            speed=wheel_speed,
-            torque=wheel_torque,
-        )
+        place = (x * wheelbase / 2, y * track / 2, 0.0)
+        steer = add_steering(base, f"steer_{corner}", place, speed=steering_speed, torque=steering_torque)
+        base.solid(steer, "post", shape, middle, RUBBER, wheel_color, collides=False)
+        add_wheel(base, f"wheel_{corner}", (0.0, 0.0, 0.0), wheel, parent=steer)
     return made(base)

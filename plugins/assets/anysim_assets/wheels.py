@@ -2,7 +2,8 @@
 
 from dataclasses import replace
 from itertools import combinations
-from math import pi
+from math import inf, pi
+from typing import NamedTuple
 
 from anysim.assets.model import ImportedModel
 from anysim.model.world import Box, Cylinder, JointType, Sphere, Surface, Vec3
@@ -19,29 +20,34 @@ _LYING = turned((1.0, 0.0, 0.0), pi / 2)  # takes a cylinder's z to y
 RUBBER = 1200.0  # [kg/m^3]
 
 
-def add_wheel(
-    base: Assembly,
-    name: str,
-    position: Vec3,
-    radius: float,
-    width: float,
-    color: Colour,
-    *,
-    parent: int = 0,
-    speed: float,
-    torque: float,
-) -> int:
+class Wheel(NamedTuple):
+    """A driven wheel: [m], [m], [rad/s], [N m]."""
+
+    radius: float
+    width: float
+    speed: float
+    torque: float
+    color: Colour
+
+
+def add_wheel(base: Assembly, name: str, position: Vec3, wheel: Wheel, *, parent: int = 0) -> None:
     """A wheel about y: the mass and the looks of a cylinder, touching the ground as a sphere about its middle.
 
     A sphere is round on every engine, where a cylinder is a prism of many sides on one, and touches in one point,
     which does not resist being turned on the spot.
     """
-    wheel = base.link(
+    radius, width, speed, torque, color = wheel
+    link = base.link(
         name, position, JointType.REVOLUTE, (0.0, 1.0, 0.0), velocity_limit=speed, effort_limit=torque, parent=parent
     )
-    base.solid(wheel, "rim", Cylinder(radius, width / 2), (0.0, 0.0, 0.0), RUBBER, color, _LYING, collides=False)
-    base.contact(wheel, "tyre", Sphere(radius), (0.0, 0.0, 0.0), TYRE)
-    return wheel
+    base.solid(link, "rim", Cylinder(radius, width / 2), (0.0, 0.0, 0.0), RUBBER, color, _LYING, collides=False)
+    base.contact(link, "tyre", Sphere(radius), (0.0, 0.0, 0.0), TYRE)
+
+
+def add_steering(base: Assembly, name: str, position: Vec3, *, speed: float, torque: float, limit: float = inf) -> int:
+    """The link that turns with a steered wheel about the upright axis through its middle; it has no mass yet."""
+    up, turn = (0.0, 0.0, 1.0), JointType.REVOLUTE
+    return base.link(name, position, turn, up, lower=-limit, upper=limit, velocity_limit=speed, effort_limit=torque)
 
 
 def add_castor(base: Assembly, name: str, x: float, y: float, radius: float, ground: float, color: Colour) -> None:
