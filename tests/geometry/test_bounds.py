@@ -85,19 +85,6 @@ def test_an_entity_is_one_shape_at_its_initial_joints(panda: World) -> None:
         EntityShape(panda, "pand")
 
 
-def test_resting_is_batched_row_by_row(world: Make) -> None:
-    made = world(objects={"cube": {"source": {"box": [0.2, 0.2, 0.2]}}})
-    cube = EntityShape(made, "cube")
-    quaternions = P.from_roll_pitch_yaw(np.random.default_rng(0).uniform(-3, 3, size=(7, 3)))
-    x, y = np.linspace(0, 1, 7), np.zeros(7)
-    poses = cube.resting_on(np.full(7, 0.5), x, y, quaternions)
-    low, _ = cube.bounds(poses)
-    np.testing.assert_allclose(low[:, 2], 0.5, atol=1e-12)
-    np.testing.assert_array_equal(poses[:, 0], x)
-    one = cube.resting_on(np.array(0.5), x[3], y[3], quaternions[3])
-    np.testing.assert_array_equal(one, poses[3])  # the same bits alone and in a batch
-
-
 def test_what_does_not_collide_is_measured_by_its_looks(world: Make) -> None:
     made = world(objects={"ghost": {"source": {"sphere": 0.3}, "collides": False}})
     assert EntityShape(made, "ghost").lowest_point(np.array([0, 0, 0, 1.0])) == pytest.approx(-0.3)

@@ -145,17 +145,6 @@ def without_entity(world: World, name: str) -> World:
     )
 
 
-def nominal_population(world: World) -> World:
-    """With the entities alone that are there before anything is drawn: the same in every env, for any engine."""
-    gone = [e.name for e, there in zip(world.entities, world.initial_presence, strict=True) if not there]
-    standing = {slot.name: world.entities[slot.entities[0]].name for slot in world.slots if slot.initially}
-    cameras = tuple(replace(c, look_at=standing.get(c.look_at or "", c.look_at)) for c in world.cameras)
-    world = replace(world, cameras=cameras)
-    for name in gone:
-        world = without_entity(world, name)
-    return replace(world, slots=())
-
-
 def _numbers(count: int, gone: Iterable[int]) -> dict[int, int]:
     """New indices of what stays; the world's own (-1) stays."""
     dropped = set(gone)

@@ -116,12 +116,6 @@ class EntityShape:
         low, high = self.bounds(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]))
         return float(np.sqrt((np.maximum(np.abs(low), np.abs(high)) ** 2).sum()))
 
-    def resting_on(self, height: Array, x: Array, y: Array, quaternion: Array) -> Array:
-        """Root poses (..., 7) at x, y with the lowest point at a world height (...)."""
-        z = height - self.lowest_point(quaternion)
-        position = np.stack(np.broadcast_arrays(x, y, z), axis=-1)
-        return np.concatenate([position, np.broadcast_to(quaternion, (*position.shape[:-1], 4))], axis=-1)
-
 
 def ground_top(world: World, low: Array, high: Array) -> Array:
     """The greatest height (...) [m] of the ground under rectangles from `low` to `high` (..., 2); 0 without ground."""

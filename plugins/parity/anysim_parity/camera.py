@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from anysim.compile.edit import nominal_population
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.cameras import CameraRig, CameraView
@@ -24,6 +23,7 @@ from anysim.model.world import BodyKind, World
 from anysim_parity.pictures import depth_picture, segmentation_picture
 from anysim_parity.result import Gap, Layer, Measure, Picture
 from anysim_parity.sight import Sight, sight
+from anysim_parity.variants import nominal_population
 
 QUESTION = "Do the same cameras see the same things at the same distances?"
 

@@ -24,6 +24,17 @@ def mechanisms(world: World) -> World:
     )
 
 
+def nominal_population(world: World) -> World:
+    """With the entities alone that are there before anything is drawn: the same in every env, for any engine."""
+    gone = [e.name for e, there in zip(world.entities, world.initial_presence, strict=True) if not there]
+    standing = {slot.name: world.entities[slot.entities[0]].name for slot in world.slots if slot.initially}
+    cameras = tuple(replace(c, look_at=standing.get(c.look_at or "", c.look_at)) for c in world.cameras)
+    world = replace(world, cameras=cameras)
+    for name in gone:
+        world = without_entity(world, name)
+    return replace(world, slots=())
+
+
 def loose(world: World) -> World:
     """The mechanisms without gravity, damping, friction, limits and couplings; an effort drive on every joint.
 

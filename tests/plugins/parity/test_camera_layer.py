@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from anysim import compile_world
 from anysim.engine.cameras import CameraView
 from anysim.engine.kinematic import NullEngine
 from anysim.math import pose as P
@@ -16,6 +17,7 @@ from anysim_parity.camera import alone, bent, camera_layer, middle
 from anysim_parity.judge import agreement, outside
 from anysim_parity.pictures import depth_picture, segmentation_picture
 from anysim_parity.sight import project, sight
+from anysim_parity.variants import nominal_population
 
 
 class Sideways(MujocoEngine):
@@ -164,3 +166,15 @@ def test_the_second_state_is_another_within_the_limits() -> None:
     assert state.joints[1] == pytest.approx(0.5 * state.joints[0] + 0.01)
     for joint, value in zip(world.joints, state.joints, strict=True):
         assert joint.lower <= value <= joint.upper
+
+
+def test_what_varies_is_drawn_as_what_it_is_before_anything_is_drawn() -> None:
+    ball, brick = {"sphere": 0.05}, {"box": [0.1, 0.1, 0.2]}
+    objects = {
+        "mug": {"source": {"choice": [ball, brick], "otherwise": brick, "ratio": 0.5}},
+        "cube": {"source": ball, "count": {"range": [0, 2]}},
+    }
+    made = compile_world({"world": {"objects": objects, "cameras": {"c": {"from": [1, 1, 1], "look_at": "mug"}}}})
+    plain = nominal_population(made)
+    assert [entity.name for entity in plain.entities] == ["mug~1", "cube_0"]
+    assert (plain.slots, plain.cameras[0].look_at) == ((), "mug~1")
