@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -78,6 +79,14 @@ def test_an_example_of_a_world_checks(path: Path) -> None:
     from anysim.cli.check import check_one
 
     assert check_one(str(path), engine=None, all_engines=False, overrides=[]) == []
+
+
+@pytest.mark.full
+@pytest.mark.skipif(
+    find_spec("stable_baselines3") is None, reason="stable-baselines3 brings torch, which no group of ours installs"
+)
+def test_the_example_with_stable_baselines_trains(tmp_path: Path) -> None:
+    run([str(ROOT / "docs" / "examples" / "train_with_sb3.py")], tmp_path)
 
 
 def _words(text: str) -> str:
