@@ -24,7 +24,7 @@ def spread(video: Path, count: int) -> list[Any]:
     return [images[i] for i in chosen]
 
 
-def draw(run: Path, videos: Sequence[Path], out: Path) -> None:
+def draw(videos: Sequence[Path], out: Path) -> None:
     """Write the picture."""
     from matplotlib.figure import Figure
 
@@ -37,7 +37,8 @@ def draw(run: Path, videos: Sequence[Path], out: Path) -> None:
     for line, (video, images) in enumerate(zip(videos, rows, strict=True)):
         for column, image in enumerate(images):
             axes[line, column].imshow(image)
-        axes[line, 0].set_title(str(video.relative_to(run).with_suffix("")), fontsize=7, loc="left")
+        env, episode = (int(number) for number in video.parent.name.removeprefix("env_").split("_episode_"))
+        axes[line, 0].set_title(f"{video.stem} camera: env {env}, episode {episode}", fontsize=7, loc="left")
     figure.savefig(out, dpi=100)
 
 
@@ -54,7 +55,7 @@ def main() -> None:
         sys.exit(f"{run} holds no video; record with a camera: record: {{writer: mcap, cameras: [front]}}")
     chosen = recorded[: arguments.trajectories]
     out: Path = arguments.out or run / PICTURE
-    draw(run, [video for folder in chosen for video in sorted(folder.glob("*.mp4"))], out)
+    draw([video for folder in chosen for video in sorted(folder.glob("*.mp4"))], out)
     print(f"{out}: {len(chosen)} of {len(recorded)} trajectories")
 
 
