@@ -1,0 +1,86 @@
+"""Changes of the keys beside `world`: engine, physics, task and record."""
+
+from tests.schemas.keys.row import OBSERVED, SEEING, Row, row
+from tests.schemas.keys.world import ARM, SEE_ARM
+
+FILMED = *SEEING, "record.cameras=[eye]"
+EASY = "task.success={there: {term: near, a: red, b: goal, tolerance: 9.0}}"
+"""Holds from the first step on."""
+
+SOME = "task.success={there: {term: near, a: red, b: ball, tolerance: 0.5}}"
+"""Holds in some envs."""
+EXPERT = (
+    "task.expert={skill: pick, object: red, goal: goal}",
+    "world.robots.panda={robot: franka_panda, position: [0, 0, 0.4]}",
+    "world.robots.panda.actions={arm: joint_position, eef: gripper_binary}",
+)
+
+ROWS: dict[str, Row] = {
+    "RunSpec.engine": row("engine=mujoco", seen="engine"),
+    "RunSpec.num_envs": row("num_envs=3", seen="engine"),
+    "RunSpec.seed": row("seed=1", seen="episode"),
+    "RunSpec.physics": row("physics={dt: 0.001}"),
+    "RunSpec.world": row("world.objects.red.fixed=true"),
+    "RunSpec.task": row("task.horizon=2", seen="episode"),
+    "RunSpec.record": row("record.keep=all", seen="recorded"),
+    "EngineSpec.name": row("engine.name=mujoco", given="engine={name: 'null'}", seen="engine"),
+    "EngineSpec.options": row("engine.options={threads: 1}", given="engine=mujoco", seen="engine"),
+    "EngineSpec.shards": row("engine={name: 'null', shards: 2}", given="num_envs=2", seen="engine"),
+    "EngineSpec.shard_timeout": row(
+        "engine.shard_timeout=7", given=("num_envs=2", "engine={name: 'null', shards: 2}"), seen="engine"
+    ),
+    "PhysicsSpec.dt": row("physics.dt=0.004"),
+    "PhysicsSpec.control_dt": row("physics.control_dt=0.04"),
+    "PhysicsSpec.gravity": row("physics.gravity=[0, 0, -1.6]"),
+    "PhysicsSpec.friction_cone": row("physics.friction_cone=pyramidal"),
+    "PhysicsSpec.impratio": row("physics.impratio=10.0"),
+    "PhysicsSpec.actuation": row("physics.actuation=native", given=ARM),
+    "PhysicsSpec.velocity_limits": row("physics.velocity_limits=enforce", given=ARM),
+    "TaskSpec.description": row("task.description=stack them", given="record.keep=all", seen="recorded"),
+    "TaskSpec.horizon": row("task.horizon=2", seen="episode"),
+    "TaskSpec.command": row("task.command.goal.height=0.5", seen="episode"),
+    "TaskSpec.observations": row("task.observations.policy=[{term: frame_pose, frame: ball}]", seen="episode"),
+    "TaskSpec.images": row("task.images={eye: {}}", given=SEEING, seen="filmed"),
+    "TaskSpec.rewards": row("task.rewards.close=null", seen="episode"),
+    "TaskSpec.success": row(EASY, seen="episode"),
+    "TaskSpec.hold": row("task.hold=3", given=EASY, seen="episode"),
+    "TaskSpec.failure": row("task.failure={fell: {term: below, frame: red, height: 9.0}}", seen="episode"),
+    "TaskSpec.events": row(
+        "task.events={polish: {term: set_friction, object: red, friction: {range: [0.1, 0.2]}}}", seen="episode"
+    ),
+    "TaskSpec.on_success": row("task.on_success=continue", given=EASY, seen="episode"),
+    "TaskSpec.ended": row(
+        "task.ended=error", given=(SOME, "task.ended=hold"), seen="stepped", error="cannot be stepped"
+    ),
+    "TaskSpec.expert": row("task.expert=null", given=EXPERT, seen="expert", error="has no expert"),
+    "TermSpec.term": row("task.rewards.close.term=tanh_distance", seen="episode"),
+    "ObservationTermSpec.noise": row(
+        "task.observations.policy=[{term: frame_pose, frame: red, noise: {normal: {mean: 0, std: 0.1}}}]",
+        given="task.observations.policy=[{term: frame_pose, frame: red}]",
+        seen="episode",
+    ),
+    "ObservationTermSpec.bias": row(
+        "task.observations.policy=[{term: frame_pose, frame: red, bias: 0.1}]",
+        given="task.observations.policy=[{term: frame_pose, frame: red}]",
+        seen="episode",
+    ),
+    "ObservationTermSpec.delay": row(
+        "task.observations.policy=[{term: joint_pos, delay: 1}]",
+        given=(ARM, SEE_ARM, "task.observations.policy=[joint_pos]"),
+        seen="episode",
+    ),
+    "ImageSpec.fps": row("task.images.eye.fps=25", given=(*OBSERVED, ARM), seen="filmed"),
+    "RewardTermSpec.weight": row("task.rewards.close.weight=-2.0", seen="episode"),
+    "EventTermSpec.when": row(
+        "task.events.polish.when=step",
+        given="task.events={polish: {term: set_friction, object: red, friction: {range: [0.1, 0.2]}}}",
+        seen="episode",
+    ),
+    "ExpertSpec.skill": row("task.expert.skill=toss", given=EXPERT, seen="expert", error="no skill named 'toss'"),
+    "RecordSpec.writer": row("record.writer=other", seen="recorded", error="no writer named 'other'"),
+    "RecordSpec.options": row("record.options={crf: 51}", given=FILMED, seen="filmed"),
+    "RecordSpec.cameras": row("record.cameras=[eye]", given=SEEING, seen="filmed"),
+    "RecordSpec.fps": row("record.fps=10", given=FILMED, seen="filmed"),
+    "RecordSpec.keep": row("record.keep=all", seen="recorded"),
+    "RecordSpec.film": row("record.film=live", given=FILMED, seen="filmed"),
+}
