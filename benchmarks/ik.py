@@ -1,4 +1,4 @@
-"""How many inverse kinematics problems a second: the compiled solver and its numpy twin against plain loops.
+"""Speed of inverse kinematics, in problems a second: the compiled solver and its numpy twin against plain loops.
 
     python benchmarks/ik.py [--rows 4000] [--threads 2]
 

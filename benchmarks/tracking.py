@@ -1,4 +1,4 @@
-"""How well tools follow a circle: root mean square distances of arms, controllers and engines.
+"""Accuracy of tools on a circle: root mean square distances of arms, controllers and engines.
 
     python benchmarks/tracking.py [--robots franka_panda ur5 …] [--controllers pink_ik …] [--engines mujoco …]
 

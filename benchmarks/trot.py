@@ -1,4 +1,4 @@
-"""How fast quadrupeds trot, on every engine: speeds reached per robot, engine and command, one controller for all.
+"""Speeds of trotting quadrupeds on every engine: those reached per robot, engine and command, one controller for all.
 
     python benchmarks/trot.py [ROBOT ...] [--engines mujoco,sapien] [--seconds 7]
 

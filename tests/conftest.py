@@ -1,4 +1,4 @@
-"""What holds for every test: markers, a cache of its own, and nothing left behind."""
+"""Rules of every test: markers, a cache of its own, and nothing left behind."""
 
 import multiprocessing
 import os

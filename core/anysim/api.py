@@ -1,4 +1,4 @@
-"""The way from a name or a file to a running env: load, compile, create, bind."""
+"""Steps from a name or a file to a running env: load, compile, create, bind."""
 
 import json
 import os
@@ -264,7 +264,7 @@ TERM_KINDS = ("observation", "reward", "predicate", "command", "event")
 
 
 class _Anything(BaseModel):
-    """Options that somebody else checks."""
+    """Options that are checked elsewhere."""
 
     model_config = ConfigDict(extra="allow")
 

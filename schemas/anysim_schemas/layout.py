@@ -192,7 +192,7 @@ class RepairSpec(Spec):
 
 
 class LayoutSourceSpec(Spec):
-    """Poses that somebody else proposes. A bare string is the file or the name of the proposer.
+    """Poses that are proposed from outside. A bare string is the file or the name of the proposer.
 
     The proposal is checked like everything else: names, numbers, collisions, and what the objects' own layout entries
     say. It is repaired within bounds, or refused with a sentence for each object.

@@ -76,7 +76,7 @@ class RoomSpec(Spec):
     furniture: dict[Furniture, Integer] = Field(
         default_factory=dict[Furniture, Integer], description="how many of each kind, on top of the style; 0 for none"
     )
-    walkway: NonNegative = Field(default=0.6, description="width of the way that stays free from door to door [m]")
+    walkway: NonNegative = Field(default=0.6, description="width of the passage that stays free from door to door [m]")
     seed: Integer = Field(default=0, ge=0, description="of sizes, places and colours; the same seed is the same room")
     friction: NonNegative = Field(default=0.8, description="sliding friction coefficient of walls and furniture")
     floor_color: ColorValue = Field(

@@ -31,7 +31,7 @@ class WorldSpec(Spec):
     objects: dict[Name, ObjectSpec] = Field(default_factory=dict, description="objects by name")
     layout: dict[Name, PlacementSpec] = Field(default_factory=dict, description="where each object goes at reset")
     layout_source: LayoutSourceSpec | None = Field(
-        default=None, description="who proposes where objects go, if anybody"
+        default=None, description="where proposals of objects' poses come from; none where not given"
     )
     regions: dict[Name, RegionSpec] = Field(
         default_factory=dict, description="named parts of the plane, for the layout"

@@ -160,7 +160,9 @@ def _private(tree: Tree) -> Iterator[Fault]:
 
 def _docstrings(tree: Tree) -> Iterator[Fault]:
     """Modules whose docstring begins with a question word."""
-    for path in tree.under("core", "schemas", "backends", "plugins", "tasks", "scripts", suffixes=(".py",)):
+    for path in tree.under(
+        "core", "schemas", "backends", "plugins", "tasks", "scripts", "tests", "benchmarks", suffixes=(".py",)
+    ):
         text = ast.get_docstring(_module(tree, path)) or ""
         if found := SENTENCE.match(text):
             yield Fault(

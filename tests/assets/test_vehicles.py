@@ -1,4 +1,4 @@
-"""What an entry says of a vehicle, against its model; bases made from parameters."""
+"""Vehicles in entries, checked against their models; bases made from parameters."""
 
 from dataclasses import replace
 from typing import Any

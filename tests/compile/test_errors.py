@@ -1,4 +1,4 @@
-"""What a wrong world says: all faults at once, each with its dotted key and the nearest name."""
+"""Errors of a wrong world: all faults at once, each with its dotted key and the nearest name."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""What a declared object becomes: entities, slots and categories."""
+"""Declared objects and what they become: entities, slots and categories."""
 
 from collections.abc import Callable
 from pathlib import Path

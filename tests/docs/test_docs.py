@@ -19,7 +19,7 @@ EXCERPT = re.compile(r"^```(\w+) (\S+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FENCE = re.compile(r"^```(\w+)$", re.MULTILINE)
 EXTERNAL = ROOT / "tests" / "external"
 SOURCES = (*(EXTERNAL / f"anysim-{name}" for name in ("ballistic", "thirdarm", "starter")), EXTERNAL, ROOT)
-"""Where the file at the head of an excerpt is looked for."""
+"""Folders in which the file at the head of an excerpt is looked for."""
 
 
 def excerpts() -> list[tuple[str, str, str]]:

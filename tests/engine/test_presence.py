@@ -27,7 +27,7 @@ def test_the_first_of_a_slot_is_there_after_the_build(world: World) -> None:
         assert engine.presence.tolist() == [[True, True, False]] * 2
 
 
-def test_a_reset_changes_who_is_there_and_the_next_keeps_it(world: World) -> None:
+def test_a_reset_changes_presence_and_the_next_keeps_it(world: World) -> None:
     with NullEngine().create_world(world, 3) as engine:
         engine.reset([1], present=np.array([[True, False, True]]))
         engine.reset()
@@ -63,7 +63,7 @@ def test_rows_that_no_env_can_have_are_refused(world: World, row: list[bool], me
         assert engine.presence.tolist() == [[True, True, False]] * 2
 
 
-def test_a_snapshot_brings_back_who_was_there(world: World) -> None:
+def test_a_snapshot_brings_back_what_was_present(world: World) -> None:
     with NullEngine().create_world(world, 2) as engine:
         engine.reset([0], present=np.array([[True, False, True]]))
         saved = engine.snapshot([0])

@@ -15,7 +15,7 @@ WITHOUT_FAULTS = [field for field in FIELDS if field != "fault"]
 
 
 @pytest.mark.parametrize("name", ["null", "mujoco", "pybullet", "sapien"])
-def test_a_lost_worker_comes_back_with_who_was_there(name):
+def test_a_lost_worker_comes_back_with_what_was_present(name):
     """Its envs are as after a reset with their own entities and parameters; the others never notice."""
     engine_class = require_engine(name)
     world = varied(engine_class.capabilities)
@@ -42,7 +42,7 @@ def test_a_lost_worker_comes_back_with_who_was_there(name):
 
 
 @pytest.mark.parametrize("name", ["null", "pybullet"])
-def test_a_worker_that_is_lost_in_a_reset_takes_over_who_is_wanted(name):
+def test_a_worker_that_is_lost_in_a_reset_takes_over_what_is_to_be_present(name):
     """A worker dies, and the next call is a reset with other entities: the new worker has them."""
     engine_class = require_engine(name)
     world = varied(engine_class.capabilities)

@@ -28,7 +28,7 @@ env.close()
 NEVER = frozenset(
     {"pandas", "pybullet", "sapien", "torch", "matplotlib", "cv2", "onnxruntime", "pinocchio", "yourdfpy"}
 )
-"""What neither a command nor a step on MuJoCo needs."""
+"""Packages that neither a command nor a step on MuJoCo needs."""
 
 
 def loaded(code: str, *arguments: str) -> set[str]:

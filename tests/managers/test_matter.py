@@ -1,4 +1,4 @@
-"""What is drawn of an object's matter is written to the engine, noted by name, and the same on every path."""
+"""Draws of an object's matter are written to the engine, noted by name, and are the same on every path."""
 
 from dataclasses import replace
 from typing import Any

@@ -1,4 +1,4 @@
-"""Who is there, episode by episode: numbers, sources and sizes."""
+"""Populations, episode by episode: numbers, sources and sizes."""
 
 import hashlib
 import json
@@ -137,7 +137,7 @@ def test_a_partial_reset_leaves_the_others() -> None:
         assert (env.engine.get_state().body_pose[others] == poses[others]).all()
 
 
-def test_a_snapshot_brings_back_who_was_there() -> None:
+def test_a_snapshot_brings_back_what_was_present() -> None:
     with toys(3) as env:
         first = env.reset(seed=4)[0]["policy"]
         saved, before = env.snapshot(), env.engine.presence

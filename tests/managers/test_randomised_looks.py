@@ -218,7 +218,7 @@ def test_an_image_holds_until_the_next_is_due() -> None:
         assert np.array_equal(rest, images[8:])
 
 
-def test_nothing_is_drawn_where_nobody_looks(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_is_drawn_where_no_image_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     unseen = {**SCENE, "task": {"observations": SCENE["task"]["observations"]}}
     with studio("mujoco", 2, scene=unseen) as env:
         monkeypatch.setattr(type(env.engine), "render", lambda *_, **__: pytest.fail("an image was taken"))

@@ -1,4 +1,4 @@
-"""What a run will change per env is known, and refused, before an engine builds anything."""
+"""Requirements of a run: what it changes per env is known, and refused, before an engine builds anything."""
 
 from typing import ClassVar
 

@@ -1,4 +1,4 @@
-"""What objects are and where they go, episode by episode."""
+"""Objects and their places, episode by episode."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Who stands on which tile, curricula, appearance, and what moves with the ground."""
+"""Tiles of envs, curricula, appearance, and what moves with the ground."""
 
 from typing import Any
 
@@ -115,7 +115,7 @@ def test_ground_without_levels_refuses_promotions() -> None:
             terrain(env).promote(np.array([0]))
 
 
-def test_the_term_promotes_who_walks_far() -> None:
+def test_the_term_promotes_envs_that_walk_far() -> None:
     event = "task.events.climb={frame: panda, promote: 1.0, demote: 0.4, term: climb_levels, when: step}"
     with env_of(3, CURRICULUM, event) as env:
         env.reset(seed=1)

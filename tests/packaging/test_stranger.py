@@ -154,7 +154,7 @@ def test_what_is_not_installed_comes_with_its_remedy(here):
 # ---------------------------------------------------------------------- engines that do not work
 
 
-def test_broken_engines_name_themselves_and_hurt_nobody(crowded):
+def test_broken_engines_name_themselves_and_hurt_no_other(crowded):
     rows = {row["name"]: row["what"] for row in crowded.json("list", "engines")}
     assert rows["ballistic"] == "0.3.0"
     assert "No module named 'warp_drive_solver'" in rows["broken"]

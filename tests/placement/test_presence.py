@@ -1,4 +1,4 @@
-"""Who is there differs between envs, and so do the origins of the envs."""
+"""Placement where envs differ in what is present, and in their origins."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What an entry says holds, in every episode."""
+"""Relations and regions of entries, which hold in every episode."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What every solver gets checked for it, shown on a solver that answers with its question."""
+"""Checks of requests that every solver shares, shown on a solver that answers with its question."""
 
 from typing import Any
 

@@ -114,7 +114,7 @@ def test_a_ratio_leaves_the_other_episodes_at_what_they_have_otherwise() -> None
     assert nominal == [1.5] * 5
 
 
-def test_fields_that_share_a_name_are_high_together_and_disturb_nobody() -> None:
+def test_fields_that_share_a_name_are_high_together_and_disturb_no_other() -> None:
     streams = episodes(200)
     mass = Range(range=(0.0, 2.0), shared="heavy")
     size = LogUniform(log_uniform=(0.1, 10.0), shared="heavy")

@@ -91,7 +91,7 @@ def test_a_full_disk_ends_the_run_and_leaves_whole_trajectories(tmp_path, env, n
     assert not (tmp_path / ".incoming").exists()
 
 
-def test_whoever_stops_listening_loses_only_what_was_running(tmp_path, env) -> None:
+def test_a_caller_that_stops_iterating_loses_only_what_was_running(tmp_path, env) -> None:
     run = Collector(env, SkillPolicy(env), tmp_path, 30, 1).run()
     next(run)
     run.close()

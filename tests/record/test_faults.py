@@ -163,7 +163,7 @@ def test_an_error_of_another_kind_discards_too(tmp_path, writer, run_header, rec
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run.json"]
 
 
-def test_a_failure_that_nobody_waits_for_is_told_when_the_recorder_closes(tmp_path, writer, run_header, make_frame):
+def test_a_failure_that_is_not_waited_for_is_raised_when_the_recorder_closes(tmp_path, writer, run_header, make_frame):
     def record_badly():
         with Recorder(tmp_path, writer, run_header) as recorder:
             for env in range(3):
@@ -261,7 +261,7 @@ def test_a_trajectory_that_is_about_to_be_committed_is_not_begun_again(tmp_path,
         held.set()
 
 
-def test_whoever_commits_faster_than_the_disk_waits(tmp_path, writer, run_header, make_frame, held, monkeypatch):
+def test_commits_that_are_faster_than_the_disk_wait(tmp_path, writer, run_header, make_frame, held, monkeypatch):
     monkeypatch.setattr(committer, "QUEUE_BYTES", 3 * committer.SMALLEST)
     with Recorder(tmp_path, writer, run_header) as recorder:
         done = threading.Event()

@@ -17,7 +17,7 @@ HOME = {
     "ur10_gripper": (0.6, 0.0, 0.35), "xarm7": (0.4, 0.0, 0.35), "xarm7_gripper": (0.4, 0.0, 0.25),
     "z1": (0.32, 0.0, 0.12),
 }  # fmt: skip
-"""Where the entry says that the tool is at home [m]."""
+"""Place of the tool at home, as the entry says [m]."""
 
 
 @pytest.mark.parametrize("name", HOME)

@@ -74,7 +74,7 @@ def test_pushes_from_eight_sides_do_not_fell_it(engine: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
-def test_it_balances_arms_that_somebody_else_moves(engine: str) -> None:
+def test_it_balances_arms_that_another_controller_moves(engine: str) -> None:
     made = env(engine, "default", arm="joint_position")
     arm = made.actions.slice_of("g1", "arm").controller.channel
     start = pelvis(made)

@@ -25,7 +25,7 @@ DOWN = {
     "kinova3": (0.45, 0.001, 0.3), "koch": (0.002, -0.2, 0.07), "kuka_iiwa": (0.55, 0.0, 0.35),
     "sawyer": (0.55, 0.16, 0.25),
 }  # fmt: skip
-"""Where the tools of arms are at home, pointing straight down [m]."""
+"""Places of the tools of arms at home, pointing straight down [m]."""
 
 
 def world_of(robot: str) -> World:

@@ -46,7 +46,7 @@ def up(env: TaskEnv, name: str) -> np.ndarray:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", REAL)
-def test_nobody_falls(engine: str) -> None:
+def test_no_robot_falls(engine: str) -> None:
     with team(engine, ENVS) as env:
         assert list(env.action_spaces) == [
             "panda.arm",

@@ -142,7 +142,7 @@ MIXED: dict[str, Any] = {
 
 _RUB = {"term": "set_friction", "object": "block", "when": "step", "friction": {"range": [0.2, 0.9]}}
 SPECS: Mapping[str, dict[str, Any]] = {"slide": SLIDE, "blocks_only": BLOCKS_ONLY, "mixed": MIXED}
-"""What the properties of the runtime are tested on. A new spec is held to all of them."""
+"""Specs on which the properties of the runtime are tested; a new one is held to all of them."""
 REAL = ("mujoco", "pybullet", "sapien")
 ENGINES = ["null", *(pytest.param(name, marks=pytest.mark.slow) for name in REAL)]
 """The kinematic engine in every run, the real ones in the slow one."""

@@ -120,7 +120,7 @@ REMOVABLE = {
     "task.events.polish": "task/event/polish",
     "task.events.shove": "task/event/shove",
 }
-"""What can be taken out of the spec, and how the names of its draws begin."""
+"""Parts that can be taken out of the spec, and the beginnings of the names of their draws."""
 ADDED = {
     "world__objects__ball__color": {"choice": ["red", "blue"]},
     "world__layout__ball__yaw": {"range": [-1, 1]},

@@ -162,7 +162,7 @@ def rewritten(path: Path, out: Path, change, *, compression=zipfile.ZIP_STORED, 
     return out
 
 
-def test_what_somebody_changed_is_refused(get, tmp_path) -> None:
+def test_a_snapshot_that_was_changed_is_refused(get, tmp_path) -> None:
     path = running(get("null", 3)).snapshot().save(tmp_path / "a.snapshot")
     out = tmp_path / "b.snapshot"
 

@@ -199,7 +199,7 @@ def test_a_cycle_shows_the_chain(write):
     assert issues("alone.yaml") == ["alone.yaml:1:10: extends: the file extends itself: alone.yaml → alone.yaml"]
 
 
-def test_a_missing_file_says_who_asked_for_it(write):
+def test_a_missing_file_is_named_with_the_file_that_refers_to_it(write):
     write(tabletop="seed: 1", a="extends: tabletp.yaml")
     assert issues("a.yaml") == [
         "a.yaml:1:10: extends: the file 'tabletp.yaml' that it extends does not exist; did you mean 'tabletop.yaml'?"

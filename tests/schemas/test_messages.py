@@ -32,7 +32,7 @@ JUNK = (
 )
 
 OWN_WORDS = ("value_error", "assertion_error")
-"""What the validators of the specs raise: their sentences are passed on."""
+"""Errors of the validators of the specs, whose sentences are passed on."""
 
 
 @pytest.mark.parametrize(

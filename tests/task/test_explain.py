@@ -1,4 +1,4 @@
-"""What an episode drew is explained without the engine that runs it, and is what it does draw."""
+"""Explanations of an episode's draws: without its engine, and the same as the episode's own."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""From files to worlds: where relative assets are, and what merged files make."""
+"""Loading of files into worlds: relative assets, and merged files."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What terms see of objects that are not the same in every env."""
+"""Frames that terms see of objects that are not the same in every env."""
 
 from pathlib import Path
 from typing import Any

@@ -157,7 +157,7 @@ def _load(path: Path, scale: Vec3, upright: bool) -> list[_Piece]:
     from trimesh.resolvers import FilePathResolver
 
     class MaterialsOnly(FilePathResolver):
-        """Serves the .mtl of the mesh's own folder: textures are not used, and nothing else is anybody's business."""
+        """Serves the .mtl of the mesh's own folder: textures are not used, and no other file may be read."""
 
         def get(self, name: str) -> bytes:
             file = path.parent / Path(str(name)).name

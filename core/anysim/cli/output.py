@@ -44,7 +44,7 @@ def print_table(
 
 @contextmanager
 def working_on(what: str) -> Iterator[None]:
-    """A spinner with a few words while something takes seconds; nothing where nobody looks."""
+    """A spinner with a few words while something takes seconds; nothing in a pipe."""
     import sys
 
     if not sys.stderr.isatty():

@@ -17,7 +17,7 @@ from anysim.model.world import Body, BodyKind, Camera, Entity, EntityKind, Geom,
 
 HEIGHT, RADIUS, STEPS = 1.0, 0.1, 100
 TOLERANCE = 0.02
-"""Relative, of the way fallen: a first-order integrator is off by 1/n after n steps."""
+"""Relative, of the distance fallen: a first-order integrator is off by 1/n after n steps."""
 
 
 def ball(drawn: bool) -> World:

@@ -1,7 +1,8 @@
 """WorldState: poses, velocities and commands by name. It goes between engines and worlds, and is close, not exact.
 
 A `Snapshot` is exact and belongs to one engine and one world. A `WorldState` holds what every engine can read and
-write: who is there, poses and velocities, joints, commands, camera mounts, and the parameters that were changed.
+write: which entities are present, poses and velocities, joints, commands, camera mounts, and parameters that were
+changed.
 """
 
 import json

@@ -151,7 +151,7 @@ class Committer:
         self._thread.stop()
 
     def raise_untold(self) -> None:
-        """Raise the first failure that nobody has waited for.
+        """Raise the first failure that was not waited for.
 
         Raises:
             RecordError: there is one.
@@ -168,7 +168,7 @@ class Committer:
             if self._text is None:
                 self._writer.prepare(self._run)
                 self._text = ManifestText(self._run, self._writer.name)
-        except BaseException as error:  # noqa: BLE001  told to whoever appends or commits next
+        except BaseException as error:  # noqa: BLE001  raised at the next append or commit
             files.trouble = error
         else:
             call()
@@ -182,7 +182,7 @@ class Committer:
             self._prepared(files, write)
             if files.trouble is not None:
                 raise files.trouble
-        except BaseException as error:  # noqa: BLE001  told to whoever waits for the commit
+        except BaseException as error:  # noqa: BLE001  raised where the commit is waited for
             self._fail(pending, files, error)
 
     def _after_task(self, idle: bool) -> None:

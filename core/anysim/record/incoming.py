@@ -1,8 +1,8 @@
 """The directory in which trajectories are written before they are committed, shared by all recorders of a run.
 
-Each recorder owns a locked file there, `<pid>-<n>.lock`, and its attempts end in `.<pid>-<n>`. What belongs to nobody
-alive is an orphan. A lock is a file that its owner keeps locked, and that the kernel unlocks when the owner dies; a
-process number says less: it is used again, and means nothing on another machine that shares the directory.
+Each recorder owns a locked file there, `<pid>-<n>.lock`, and its attempts end in `.<pid>-<n>`. An attempt whose
+recorder is not alive is an orphan. A lock is a file that its owner keeps locked, and the kernel unlocks when that dies;
+a process number says less: it is used again, and means nothing on another machine that shares the directory.
 """
 
 import fcntl
@@ -24,7 +24,7 @@ class FileLock:
 
     @classmethod
     def take(cls, path: Path, wait: bool = False) -> "FileLock | None":
-        """The lock, or None where `wait` is false and somebody alive holds it.
+        """The lock, or None where `wait` is false and a live process holds it.
 
         Raises:
             OSError: the file cannot be made, for instance because its directory is gone.
@@ -105,7 +105,7 @@ class Incoming:
         return path
 
     def close(self) -> None:
-        """Leave, and remove the directory if nobody else is in it. What stays behind, the next recorder sweeps."""
+        """Leave, and remove the directory if no other recorder is in it; what stays is swept by the next one."""
         try:
             self._lock.release()
             self.path.rmdir()

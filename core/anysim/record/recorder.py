@@ -240,7 +240,7 @@ class Recorder:
         """Discard what is open, wait for what was committed, and leave the directory. Further calls do nothing.
 
         Raises:
-            RecordError: a commit failed that nobody has waited for; the first of them.
+            RecordError: a commit failed that was not waited for; the first of them.
         """
         if self._closed:
             return

@@ -32,7 +32,7 @@ class PendingCommit:
 
     Attributes:
         path: where it is once it is committed.
-        told: whether somebody has been told how it came out.
+        told: whether its outcome has been reported.
     """
 
     def __init__(self, path: Path) -> None:
@@ -169,7 +169,7 @@ class TrajectoryFiles:
         except OSError as error:
             self.trouble = disk_trouble(what, error, self._out)
             self.trouble.__cause__ = error
-        except BaseException as error:  # noqa: BLE001  told to whoever appends or commits next
+        except BaseException as error:  # noqa: BLE001  raised at the next append or commit
             self.trouble = error
 
 

@@ -237,7 +237,7 @@ def _look(engine, target):
 
 @varies
 def test_other_envs_do_not_notice(build, engine_class):
-    """A reset that changes who is there touches its own rows alone, bit for bit, then and later."""
+    """A reset that changes which entities are present touches its own rows alone, bit for bit, then and later."""
     engine, calm = _engine(build, engine_class, 3), _engine(build, engine_class, 3)
     targets = tape(engine.world, range(3), 20)
     for e in (engine, calm):
@@ -282,7 +282,7 @@ def test_an_env_depends_on_its_own_presence_alone(build, engine_class):
 
 @varies
 def test_a_reset_without_presence_keeps_it(build, engine_class):
-    """A reset that says nothing of who is there brings the same entities back to their initial state."""
+    """A reset that says nothing of presence brings the same entities back to their initial state."""
     engine = _engine(build, engine_class)
     engine.reset([1], present=_other(engine))
     wanted, present = read(engine), engine.presence

@@ -43,7 +43,7 @@ def _snapshot_run(engine):
 
 
 @needs(C.VARYING_ENTITIES, C.SNAPSHOT_TRAJECTORY)
-def test_snapshots_bring_back_who_was_there(build, engine_class):
+def test_snapshots_bring_back_what_was_present(build, engine_class):
     """A snapshot restored where others are there now, in place and in a new engine, goes on bit for bit."""
     engine = _engine(build, engine_class)
     snapshot, wanted = _snapshot_run(engine)
@@ -72,7 +72,7 @@ def test_rows_of_a_snapshot_go_into_envs_of_another_presence(build, engine_class
 
 
 @needs(C.VARYING_ENTITIES, C.SNAPSHOT_STATE)
-def test_states_bring_back_who_was_there(build, engine_class):
+def test_states_bring_back_what_was_present(build, engine_class):
     """A snapshot of the level STATE brings back who was there, and where."""
     engine = _engine(build, engine_class)
     engine.reset([1], present=_other(engine))
@@ -161,8 +161,8 @@ def test_parameters_of_what_is_absent_wait_for_it(build, engine_class, name):
 
 
 @varies
-def test_live_editing_keeps_who_is_there(build, engine_class):
-    """An object is added and removed; who is there stays, and the run goes on."""
+def test_live_editing_keeps_what_is_present(build, engine_class):
+    """An object is added and removed; presence stays, and the run goes on."""
     engine, calm = _engine(build, engine_class), _engine(build, engine_class)
     for e in (engine, calm):
         e.reset([1], present=_other(e))

@@ -94,7 +94,7 @@ class Puppet:
 
 
 class Circle(NamedTuple):
-    """A tool's way: a circle in a plane, reached from its centre's rim at a speed that grows from zero.
+    """A tool's path: a circle in a plane, reached from its centre's rim at a speed that grows from zero.
 
     Attributes:
         radius: [m]
@@ -153,7 +153,7 @@ def tool_env(robot: str, controller: str, engine: str, *, params: Mapping[str, A
 
 
 def follow(robot: str, controller: str, engine: str, circle: Circle, *, seconds: float = 2.0) -> Tracking:
-    """Move the arm's tool along a circle from where it is at home, and see how far off its way it was."""
+    """Move the arm's tool along a circle from where it is at home, and see how far off its path it was."""
     with tool_env(robot, controller, engine) as env:
         env.reset(seed=0)
         controlled, control_dt = env.actions.slices[0].controller.robot, env.engine.world.physics.control_dt

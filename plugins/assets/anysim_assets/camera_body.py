@@ -46,7 +46,7 @@ def camera_body(
     link = Inertial(mass, inertia=(inertia, inertia, inertia, 0.0, 0.0, 0.0))
     for number, (name, (kind, axis)) in enumerate(_AXES.items()):
         slides = kind is JointType.PRISMATIC
-        # upside down is no view that anybody wants, and straight up or down has no heading
+        # upside down is no useful view, and straight up or down has no heading
         most = reach if slides else {"yaw": inf, "pitch": pi / 2, "roll": pi}[name]
         bodies.append(Body(f"{name}_link", BodyKind.LINK, number, inertial=link))
         joints.append(

@@ -210,7 +210,7 @@ def resets(
     ] = 4,
     json: AsJson = False,
 ) -> None:
-    """Change who is there in thousands of partial resets, and see whether anything accumulates.
+    """Change which objects are present in thousands of partial resets, and see whether anything accumulates.
 
     A Panda, a table and ten things, each a box, a ball, a can or nothing. Memory, open files, threads and what the
     engine holds of its library are printed on the way; the exit code is 1 where something grew.

@@ -1,7 +1,7 @@
 """Cost of managers, terms and streams: their share of a control step, and milliseconds of a reset.
 
-Both are timed from within: a clock runs for whoever is at work, each manager, the task's terms, or the engine below
-them, and stops while somebody it called is at work. So reading a state or writing a friction is the engine's time,
+Both are timed from within: a clock runs for what is at work, each manager, the task's terms, or the engine below
+them, and stops while something it called is at work. So reading a state or writing a friction is the engine's time,
 under the manager that asked for it, and all else is what managers, terms and streams cost. The best of many rounds of
 each clock counts; the share is a ratio of two clocks of one run.
 """

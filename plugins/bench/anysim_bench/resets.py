@@ -56,7 +56,7 @@ class ResetCost(NamedTuple):
         resets: how many.
         first_ms, last_ms: processor time of a reset and the first look at the state after it, mean of the first and of
             the last tenth [ms].
-        same_ms: that of a reset that keeps who is there, measured afterwards [ms].
+        same_ms: that of a reset that keeps which objects are present, measured afterwards [ms].
         samples: of the process on the way.
         grown: what grew between a fifth of the way and the end, in words; empty where nothing did.
     """
@@ -148,7 +148,7 @@ def _draw(world: World, rng: np.random.Generator) -> Array:
 
 
 def growth(samples: list[Sample], first_ms: float, last_ms: float, world: World, num_envs: int) -> tuple[str, ...]:
-    """What grew, in words. Bodies and the like vary with who is there: they may not exceed what all envs can hold."""
+    """What grew, in words. Bodies and the like vary with presence: they may not exceed what all envs can hold."""
     early, late = samples[len(samples) // 5], samples[-1]
     most = num_envs * (len(world.bodies) + len(world.geoms) + 1)
     words = []

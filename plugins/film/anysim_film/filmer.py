@@ -188,7 +188,7 @@ class Filmer:
     def _make(
         self, trajectory: Path, directory: Path | None, aside: Path, loaded: LoadedRun, cameras: Sequence[str]
     ) -> Filmed:
-        """Film what is missing, now that nobody else does."""
+        """Film what is missing, while no other process does."""
         manifest = read_manifest(trajectory)
         present = self._present(manifest, loaded, directory)
         missing = tuple(camera for camera in cameras if camera not in present)

@@ -1,4 +1,4 @@
-"""Standing on two feet: squat, lean and turn the trunk, with arms that somebody else moves."""
+"""Standing on two feet: squat, lean and turn the trunk, with arms that another controller moves."""
 
 from collections.abc import Mapping
 

@@ -12,7 +12,7 @@ from anysim.conventions import Array
 from anysim.errors import RecordError
 
 REPRODUCIBLE = "mbtree=0:rc-lookahead=0"
-"""Parameters of x264: its macroblock tree, fed by the look-ahead, depends on memory that nobody has written, and equal
+"""Parameters of x264: its macroblock tree, fed by the look-ahead, depends on uninitialised memory, and equal
 images gave different files."""
 
 BT709 = 1

@@ -12,7 +12,7 @@ from anysim.errors import AnysimError, NameLookupError, listing, suggest
 from anysim_schemas.load import Loaded, LoadedRun
 
 WATCHING: Mapping[str, Any] = {"task": {"observations": {"policy": ["last_action"]}}}
-"""The task of a file that has none: nothing is asked of anybody."""
+"""The task of a file that has none: nothing is rewarded or required."""
 
 
 class Pictures(NamedTuple):

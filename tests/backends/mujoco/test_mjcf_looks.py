@@ -1,4 +1,4 @@
-"""What of an MJCF file is there to be looked at."""
+"""Appearance in MJCF files: colours, textures, materials."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What the engine leaves behind in a process: nothing."""
+"""Processes that held an engine: nothing of it is left behind."""
 
 import contextlib
 import ctypes

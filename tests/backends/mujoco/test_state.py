@@ -1,4 +1,4 @@
-"""What is read is true: kinematics, velocities, forces, faults."""
+"""States as read, which are true: kinematics, velocities, forces, faults."""
 
 from dataclasses import replace
 

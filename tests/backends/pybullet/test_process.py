@@ -1,4 +1,4 @@
-"""What the engine leaves behind in a process, and what it says when something is wrong."""
+"""Processes that held an engine, and its messages when something is wrong."""
 
 import os
 import subprocess

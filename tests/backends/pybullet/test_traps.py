@@ -1,4 +1,4 @@
-"""What Bullet does unless it is told otherwise. Each test fails without the guard that its docstring names."""
+"""Traps: what Bullet does unless it is told otherwise. Each test fails without the guard that its docstring names."""
 
 from dataclasses import replace
 from pathlib import Path

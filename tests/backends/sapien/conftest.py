@@ -1,4 +1,4 @@
-"""What the tests of the SAPIEN backend share."""
+"""Fixtures of the tests of the SAPIEN backend."""
 
 from collections.abc import Callable, Iterator
 from typing import Any

@@ -1,4 +1,4 @@
-"""What is encoded from columns is, byte for byte, what the writer of the package `mcap` writes frame by frame."""
+"""Files encoded from columns: byte for byte those that the writer of the package `mcap` writes frame by frame."""
 
 from typing import Any
 

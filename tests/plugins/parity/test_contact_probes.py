@@ -123,7 +123,7 @@ DECLARED = {
     ("pybullet", "roll: acceleration of a cylinder down 15 degrees"): MULTIPLIES,
     ("sapien", "roll: acceleration of a cylinder down 15 degrees"): "a cylinder is a prism",
 }
-"""What the engines are known to be off in, and the declared words that account for it."""
+"""Known errors of the engines, and the declared words that account for them."""
 
 
 @pytest.mark.parametrize("engine", ENGINES)

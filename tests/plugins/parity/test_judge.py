@@ -1,4 +1,4 @@
-"""What a measure says of engines."""
+"""Judgements of engines by measures."""
 
 from anysim_parity.judge import agreement, errors, largest_gap, nearest, outside
 from anysim_parity.result import Measure

@@ -1,4 +1,4 @@
-"""What was measured of robots whose files come with a package that is not installed everywhere."""
+"""Measurements of robots whose files come with a package that is not installed everywhere."""
 
 import importlib.util
 import sys

@@ -157,7 +157,7 @@ def test_mjcf_is_held_against_raw_mujoco(tmp_path: Path) -> None:
     assert found.status == "qualified", [check.told for check in found.checks]
 
 
-def test_parts_are_put_together_by_nobody_but_the_oracle() -> None:
+def test_parts_are_put_together_by_the_oracle_alone() -> None:
     """The composition against frames that are known by hand: a box on the palm of the arm."""
     part = SimpleNamespace(
         source="third_arm.urdf",

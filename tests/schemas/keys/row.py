@@ -20,7 +20,7 @@ FILE: dict[str, Any] = {
         },
     },
 }
-"""What all rows begin with: a table, a red box on it that does not move, and a ball somewhere else."""
+"""The file of all rows: a table, a red box on it that does not move, and a ball somewhere else."""
 
 SEEING = "engine=mujoco", "world.cameras.eye.size=[16, 12]", "world.cameras.eye.channels=[rgb]", "record.keep=all"
 OBSERVED = *SEEING, "task.images={eye: {}}"

@@ -35,7 +35,7 @@ class WorkerLost(Exception):
 
 
 class Worker:
-    """One worker process. Every message is answered; an answer that nobody waited for is dropped before the next."""
+    """One worker process. Every message is answered; an answer that was not waited for is dropped before the next."""
 
     def __init__(self, environment: dict[str, str], timeout_s: float) -> None:
         self._timeout = timeout_s

@@ -1,6 +1,6 @@
 """Places of furniture: along walls, at tables, in the open, never before doors, with paths left between the doors.
 
-Each piece looks for a place with its own generator, the large kinds first; what cannot be placed, or bars the way,
+Each piece looks for a place with its own generator, the large kinds first; what cannot be placed, or bars the passage,
 makes the whole arrangement start anew with other numbers, a bounded number of times.
 """
 
@@ -106,7 +106,7 @@ def _generator(*seed: int) -> np.random.Generator:
 
 
 def passable(plan: RoomPlan, placed: list[Placed], walkway: float) -> bool:
-    """Whether a disc as wide as the way gets from each door to each other, and into the largest part of the room."""
+    """Whether a disc of the passage's width gets from each door to the others, and to the largest part of the room."""
     solid = [one.footprint for one in placed]
     grid = Occupancy.of_footprints(solid, plan.outline, 0.05)
     inner = [plan.approach(o).mean(axis=0) for o in plan.openings if o.is_door]

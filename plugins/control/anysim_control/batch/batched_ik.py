@@ -20,7 +20,7 @@ class BatchedIk(IkController):
 
     Each tool has a chain of its own: arms that share a waist are one problem, which `pink_ik` solves. With `full`
     each control step searches the joint positions of the target from where the reference is, with restarts where that
-    is no way; the reference goes there within the velocity limits. Use it where targets are far apart.
+    fails; the reference goes there within the velocity limits. Use it where targets are far apart.
     """
 
     def __init__(
@@ -35,7 +35,10 @@ class BatchedIk(IkController):
         ] = None,
         damping: Annotated[float, Field(gt=0, description="[m/rad] larger is calmer near singularities")] = 0.02,
         posture_gain: Annotated[
-            float, Field(ge=0, le=1, description="step: the part of the way to the posture at the reset in a step")
+            float,
+            Field(
+                ge=0, le=1, description="step: the part of the distance to the posture at the reset covered in a step"
+            ),
         ] = 0.02,
         restarts: Annotated[int, Field(ge=0, description="full: random starts where the first does not get there")] = 5,
         **options: Unpack[IkOptions],

@@ -21,7 +21,7 @@ class DifferentialIk(IkController):
         *,
         damping: Annotated[float, Field(gt=0, description="[m/rad] larger is calmer near singularities")] = 0.02,
         posture_gain: Annotated[
-            float, Field(ge=0, le=1, description="the part of the way to the posture asked for in a control step")
+            float, Field(ge=0, le=1, description="the part of the distance to the posture asked for in a control step")
         ] = 0.02,
         iterations: Annotated[int, Field(ge=1, le=20, description="linearisations in a control step")] = 2,
         **options: Unpack[IkOptions],

@@ -1,4 +1,4 @@
-"""Which tools a channel moves, with which joints: what every controller of tools starts from.
+"""Tools of a channel, and the joints that move them.
 
 Everything is in the frame of the robot's base, floating or not, so that a base that moves changes no kinematics.
 """

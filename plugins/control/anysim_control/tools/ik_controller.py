@@ -19,7 +19,7 @@ FeedForward = Annotated[
     Literal["none", "velocity", "effort"],
     Field(
         description="velocity: without it a moving tool lags by kd / kp times its speed; effort: that, and what "
-        "accelerates the links and carries them, without which a tool leaves its way where that bends"
+        "accelerates the links and carries them, without which a tool leaves its path where that bends"
     ),
 ]
 VelocityScale = Annotated[float, Field(gt=0, le=1, description="the part of the joints' velocity limits that is used")]

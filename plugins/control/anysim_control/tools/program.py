@@ -1,6 +1,6 @@
 """Tools, posture and centre of mass weighed against each other in one quadratic program a control step.
 
-What the controllers of this kind have in common; each brings the library that sets its program up and solves it.
+Each controller of this kind brings the library that sets its program up and solves it.
 """
 
 from abc import ABC, abstractmethod
@@ -135,13 +135,16 @@ class ToolProgram(IkController):
         position_cost: Annotated[Cost, Field(description="of the tools' positions [cost/m]")] = 1.0,
         orientation_cost: Annotated[Cost, Field(description="of the tools' orientations [cost/rad]")] = 0.3,
         posture_cost: Annotated[
-            Cost, Field(description="of motion that is not on the way to the posture at the reset [cost/rad]")
+            Cost, Field(description="of motion away from the posture at the reset [cost/rad]")
         ] = 1e-2,
         posture_gain: Annotated[
-            float, Field(ge=0, le=1, description="the part of the way to the posture asked for in a control step")
+            float, Field(ge=0, le=1, description="the part of the distance to the posture asked for in a control step")
         ] = 0.02,
         com_cost: Annotated[
-            Cost, Field(description="of the centre of mass's way from where it was at the reset, base x and y [cost/m]")
+            Cost,
+            Field(
+                description="of the centre of mass's displacement from where it was at the reset, base x and y [cost/m]"
+            ),
         ] = 0.0,
         damping: Annotated[Cost, Field(description="of every joint's motion [cost^2/rad^2]")] = 1e-8,
         **options: Unpack[IkOptions],

@@ -28,7 +28,7 @@ def slide(dt: float) -> Probe:
     """One block is given a speed, two are pushed, on the flat ground."""
     way, gained = SPEED**2 / (2 * FRICTION * G), PUSHES[1] - FRICTION * G
     t = np.linspace(0.0, SPEED / (FRICTION * G), CURVE_POINTS)
-    plot = Plot(PLOT, "time [s]", "way [m]", (), series("analytic", t, SPEED * t - FRICTION * G / 2 * t**2))
+    plot = Plot(PLOT, "time [s]", "distance [m]", (), series("analytic", t, SPEED * t - FRICTION * G / 2 * t**2))
     quantities = (
         Quantity(STOP, "m", way, T.SLIDING * way),
         Quantity(STUCK, "m/s", 0.0, T.CREEP, remark="Regularised friction creeps under any load."),
@@ -77,7 +77,7 @@ def incline(dt: float) -> Probe:
     """Two blocks on slabs: one that friction holds, one that slides."""
     gain = G * (sin(STEEP) - ROUGH * cos(STEEP))
     t = np.linspace(0.0, 0.8, CURVE_POINTS)
-    plot = Plot(INCLINE, "time [s]", "way [m]", (), series("analytic", t, gain / 2 * t**2))
+    plot = Plot(INCLINE, "time [s]", "distance [m]", (), series("analytic", t, gain / 2 * t**2))
     quantities = (
         Quantity(CREEP, "m/s", 0.0, T.CREEP, remark="Regularised friction creeps under any load."),
         Quantity(GAIN, "m/s^2", gain, T.SLIDING * gain),

@@ -11,7 +11,7 @@ from anysim.model.world import World
 from anysim_ballistic.motion import Constants
 
 _TENSOR = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
-"""Where the six numbers of an inertia (xx yy zz xy xz yz) go in its matrix."""
+"""Places of the six numbers of an inertia (xx yy zz xy xz yz) in its matrix."""
 
 
 class Parameters:
