@@ -95,18 +95,20 @@ def fields_of(layout: StateLayout) -> dict[Field, tuple[tuple[int, ...], np.dtyp
 
 
 class ColumnStore:
-    """The columns of all open episodes of a run: for each field one array (slots, capacity, …).
+    """The columns of all open episodes of a run: for each type one array (slots, capacity, width), fields side by side.
 
-    So a control step of all envs is one assignment for each field. A slot belongs to one open episode.
+    So a control step of all envs is one assignment. A slot belongs to one open episode.
     """
 
     def __init__(self, layout: StateLayout, capacity: int) -> None:
         """`capacity`: rows that an episode will hardly exceed."""
-        self._fields = fields_of(layout)
+        self._fields: dict[np.dtype[Any], dict[Field, tuple[int, ...]]] = {}
+        for field, (shape, dtype) in fields_of(layout).items():
+            self._fields.setdefault(dtype, {})[field] = shape
         self._capacity = max(2, min(capacity, MAX_CAPACITY))
         self._free: list[int] = []
         self._slots = 0
-        self._arrays: dict[Field, Array] = {}
+        self._arrays: dict[np.dtype[Any], Array] = {}
         self._resize(0, self._capacity)
 
     def open(self) -> int:
@@ -125,26 +127,29 @@ class ColumnStore:
         last = int(rows.max(initial=0))
         if last >= self._capacity:
             self._resize(self._slots, max(2 * self._capacity, last + 1))
-        places = slots * self._capacity + rows
-        for field, column in self._flat.items():
-            column[places] = values[field]
+        for dtype, array in self._arrays.items():
+            parts = [values[field].reshape(len(rows), -1) for field in self._fields[dtype]]
+            array[slots, rows] = np.concatenate(parts, axis=1, dtype=dtype)
 
     def take(self, slot: int, count: int) -> dict[Field, Array]:
         """Copies (count, …) of the first rows of a slot."""
-        return {field: column[slot, :count].copy() for field, column in self._arrays.items()}
+        taken: dict[Field, Array] = {}
+        for dtype, array in self._arrays.items():
+            start = 0
+            for field, shape in self._fields[dtype].items():
+                stop = start + math.prod(shape)
+                taken[field] = array[slot, :count, start:stop].copy().reshape(count, *shape)
+                start = stop
+        return taken
 
     def _resize(self, slots: int, capacity: int) -> None:
-        for field, (shape, dtype) in self._fields.items():
+        for dtype, fields in self._fields.items():
             # memory of rows that are never written is never touched, and so is not taken from the system
-            fresh = np.empty((slots, capacity, *shape), dtype)
-            old = self._arrays.get(field)
-            if old is not None and math.prod(old.shape):
-                fresh[: self._slots, : self._capacity] = old
-            self._arrays[field] = fresh
+            fresh = np.empty((slots, capacity, sum(map(math.prod, fields.values()))), dtype)
+            if self._slots:
+                fresh[: self._slots, : self._capacity] = self._arrays[dtype]
+            self._arrays[dtype] = fresh
         self._slots, self._capacity = slots, capacity
-        self._flat = {
-            field: column.reshape(slots * capacity, *column.shape[2:]) for field, column in self._arrays.items()
-        }
 
 
 MAX_TIME = 2.0**63 / 1e9
