@@ -1,4 +1,4 @@
-"""Snapshots of a hundred random scenes per engine: going on from one is the uninterrupted run, to the bit."""
+"""Snapshots of random scenes on each engine: going on from one is the uninterrupted run, to the bit."""
 
 import json
 import subprocess
@@ -14,21 +14,21 @@ from anysim.testing.compare import MOTION
 from anysim.testing.engines import require_engine
 from tests.parity import random_scenes as scenes
 
-SCENES = 100
+COUNTS = [pytest.param(25, marks=pytest.mark.slow), pytest.param(100, marks=pytest.mark.full)]
 BEFORE, LONGEST_FALL, AFTER = 15, 60, 10
 """Rounds of new commands, of 1 to 4 physics steps each."""
 
 ENGINES = ("null", "mujoco", "pybullet", "sapien")
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize("count", COUNTS)
 @pytest.mark.parametrize("name", ENGINES)
-def test_snapshots_of_random_scenes(name, tmp_path, capsys):
+def test_snapshots_of_random_scenes(name, count, tmp_path, capsys):
     """After a wild history, in other envs of a new engine, and in another process; and at the level STATE at once."""
     exact = Capability.SNAPSHOT_TRAJECTORY in require_engine(name).capabilities
     wrong: list[str] = []
     touching, worst, taken, wanted = 0, 0.0, {}, {}
-    for number in range(SCENES):
+    for number in range(count):
         with scenes.build(name, number) as engine:
             scenes.treat(engine, number, 1, BEFORE, [0, 1])
             touching += scenes.until_touch(engine, number, LONGEST_FALL)
@@ -58,13 +58,13 @@ def test_snapshots_of_random_scenes(name, tmp_path, capsys):
     with capsys.disabled():
         held = max((sum(a.nbytes for a in s.data.values()) for s in taken.values()), default=0) / scenes.ENVS
         print(
-            f"\n{name}: {SCENES} scenes, {touching} in touch at the snapshot, {len(wrong)} differ; at the level state "
+            f"\n{name}: {count} scenes, {touching} in touch at the snapshot, {len(wrong)} differ; at the level state "
             f"off by up to {worst:.2g}; {held / 1024:.0f} KiB an env at most"
         )
     assert not wrong, "\n".join(wrong)
     assert worst <= tolerances.READ_BACK
     if Capability.CONTACT_POINTS in require_engine(name).capabilities and name != "null":
-        assert touching >= 0.9 * SCENES, "the scenes are to be in touch where they are saved"
+        assert touching >= 0.85 * count, "the scenes are to be in touch where they are saved"
 
 
 def _differences(found: list[str], wanted: list[str], where: str) -> list[str]:

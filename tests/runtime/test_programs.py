@@ -13,7 +13,8 @@ from tests.runtime import light
 from tests.runtime.model import Alone, Row, action, check
 
 N = 3
-PROGRAMS = 1000
+COUNTS = [pytest.param(200, marks=pytest.mark.slow), pytest.param(1000, marks=pytest.mark.full)]
+"""Random programs on each engine."""
 masks = st.lists(st.booleans(), min_size=N, max_size=N)
 slots = st.lists(st.integers(0, N - 1), min_size=1, max_size=N, unique=True)
 operations = st.one_of(
@@ -113,12 +114,12 @@ def test_programs_on_the_kinematic_engine(get, alone, tmp_path, spec) -> None:
     run()
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize("count", COUNTS)
 @pytest.mark.parametrize("engine", ["null", *light.REAL])
-def test_a_thousand_programs(get, alone, tmp_path, engine, capsys) -> None:
+def test_programs_on_an_engine(get, alone, tmp_path, engine, count, capsys) -> None:
     done = {"programs": 0, "operations": 0}
 
-    @settled(PROGRAMS)
+    @settled(count)
     @given(st.sampled_from(list(light.SPECS)), programs)
     def run(spec, program) -> None:
         one = Run(get(engine, N, spec), alone(engine, spec), tmp_path)
@@ -130,4 +131,4 @@ def test_a_thousand_programs(get, alone, tmp_path, engine, capsys) -> None:
     run()
     with capsys.disabled():
         print(f"\n{engine}: {done['programs']} programs of {done['operations']} operations, no divergence")
-    assert done["programs"] >= PROGRAMS
+    assert done["programs"] >= count
