@@ -6,12 +6,11 @@ import mujoco
 import numpy as np
 
 from anysim.conventions import WORLD, Array, wxyz_from_xyzw
-from anysim.engine.control import MODES
+from anysim.engine.control import MODES, acting_gains
 from anysim.errors import EngineError
 from anysim.kinematics.inertia import check_physical
 from anysim.model.world import Actuation, Body, BodyKind, ContactSensor, Joint, JointType, World
 from anysim_mujoco.audit import UNLIMITED
-from anysim_mujoco.drives import feedback
 from anysim_mujoco.geoms import add_assets, add_geom, add_look
 from anysim_mujoco.inertia import principal
 from anysim_mujoco.layout import Handles, Layout
@@ -189,8 +188,8 @@ def _drives(spec: Any, world: World) -> None:
         )
         gain, bias = np.zeros_like(element.gainprm), np.zeros_like(element.biasprm)
         gain[0] = 1.0
-        stiffness, damping = feedback(MODES.index(actuator.mode), actuator.kp, actuator.kd)
-        bias[1:3] = -stiffness, -damping
+        mode, kp, kd = np.array([MODES.index(actuator.mode)]), np.array([actuator.kp]), np.array([actuator.kd])
+        bias[1:3] = -np.concatenate(acting_gains(mode, kp, kd))
         element.gainprm, element.biasprm = gain, bias
 
 

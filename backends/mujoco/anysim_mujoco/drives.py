@@ -12,17 +12,10 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.control import MODES, Control
+from anysim.engine.control import MODES, Control, acting_gains
 from anysim.engine.requirements import speed_bound
-from anysim.model.world import ControlMode, World
+from anysim.model.world import World
 from anysim_mujoco.layout import Layout
-
-_POSITION, _EFFORT = MODES.index(ControlMode.POSITION), MODES.index(ControlMode.EFFORT)
-
-
-def feedback(mode: Any, kp: Any, kd: Any) -> tuple[Any, Any]:
-    """The gains that act in a mode (index into MODES): position kp and kd, velocity kd, effort none."""
-    return kp * (mode == _POSITION), kd * (mode != _EFFORT)
 
 
 class Drives:
@@ -42,7 +35,7 @@ class Drives:
         self._modes = self._mode.tobytes()  # comparing bytes costs a tenth of comparing arrays
         self.kp = np.tile(np.array([a.kp for a in actuators], dtype=float), (n, 1))
         self.kd = np.tile(np.array([a.kd for a in actuators], dtype=float), (n, 1))
-        self._stiffness, self._damping = feedback(self._mode, self.kp, self.kd)
+        self._stiffness, self._damping = acting_gains(self._mode, self.kp, self.kd)
 
     def apply(self, control: Control) -> None:
         """Write the control input of all envs."""
@@ -76,7 +69,7 @@ class Drives:
 
     def refresh(self) -> None:
         """Write the feedback of all envs, after a change of modes or gains."""
-        self._stiffness, self._damping = feedback(self._mode, self.kp, self.kd)
+        self._stiffness, self._damping = acting_gains(self._mode, self.kp, self.kd)
         bias = self._batch.expand("actuator_biasprm")
         bias[:, :, 1] = -self._stiffness
         bias[:, :, 2] = -self._damping

@@ -48,9 +48,7 @@ class Queries:
 
     def contacts(self, ids: Array) -> ContactPoints:
         """Contacts that exert force, with the force the solver finds for the present controls."""
-        parts = [self._contacts_of(int(index)) for index in ids]
-        joined = [np.concatenate(columns) for columns in zip(*parts, strict=True)] if parts else _nothing()
-        return ContactPoints(*joined)
+        return ContactPoints.joined([self._contacts_of(int(index)) for index in ids])
 
     def _contacts_of(self, index: int) -> list[Array]:
         model, data = self.env(index)
@@ -58,7 +56,7 @@ class Queries:
         contact = data.contact
         chosen = np.flatnonzero(contact.efc_address >= 0) if data.ncon else np.zeros(0, dtype=int)
         if not len(chosen):
-            return _nothing()
+            return list(ContactPoints.joined([]))
         bodies = self._layout.world_body[model.geom_bodyid[contact.geom[chosen]]]
         frames = contact.frame[chosen].reshape(-1, 3, 3)  # rows: normal from the first geom to the second, tangents
         local = np.zeros(6)
@@ -75,8 +73,3 @@ class Queries:
             force,
             -contact.dist[chosen],
         ]
-
-
-def _nothing() -> list[Array]:
-    whole, rows = np.zeros(0, dtype=int), np.zeros((0, 3))
-    return [whole, whole, whole, rows, rows, rows, np.zeros(0)]

@@ -53,13 +53,7 @@ class Painter:
         self._fit(view.width, view.height)
         # another engine's painter may have drawn in between, into buffers of its own
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
-        size = (len(ids), view.height, view.width)
-        shapes: dict[str, tuple[tuple[int, ...], Any]] = {
-            "rgb": ((*size, 3), np.uint8),
-            "depth": (size, np.float32),
-            "segmentation": (size, np.int32),
-        }
-        images = {name: np.empty(*shapes[name]) for name in channels}
+        images = view.blank(channels)
         axes = P.to_matrix(view.pose[:, 3:])
         rect = mujoco.MjrRect(0, 0, view.width, view.height)
         colors = np.empty((view.height, view.width, 3), dtype=np.uint8)

@@ -7,6 +7,7 @@ import numpy as np
 
 from anysim.conventions import WORLD, Array
 from anysim.engine.state import ContactPoints, RayHits
+from anysim.model.pairs import counted
 from anysim.model.world import World
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.client import Env
@@ -52,10 +53,7 @@ def sensor_forces(world: World, env: Env) -> Array:
         return forces
     on_a, (a, b) = _vectors(points), _bodies(env, points)
     for row, sensor in enumerate(world.contact_sensors):
-        for own, other, sign in ((a, b, 1.0), (b, a, -1.0)):
-            counts = np.isin(own, sensor.bodies)
-            if sensor.against is not None:
-                counts &= np.isin(other, sensor.against)
+        for counts, sign in zip(counted(sensor, a, b), (1.0, -1.0), strict=True):
             forces[row] += sign * on_a[counts].sum(axis=0)
     return forces
 
@@ -70,10 +68,7 @@ def contact_points(envs: Sequence[Env], ids: Array) -> ContactPoints:
         normal = -np.array([c[NORMAL] for c in points], dtype=float).reshape(-1, 3)
         depth = -np.array([c[DISTANCE] for c in points], dtype=float)
         parts.append((np.full(len(points), index), a, b, place, normal, -_vectors(points), depth))
-    if not parts:
-        none, nowhere = np.zeros(0, dtype=int), np.zeros((0, 3))
-        return ContactPoints(none, none, none, nowhere, nowhere, nowhere, np.zeros(0))
-    return ContactPoints(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    return ContactPoints.joined(parts)
 
 
 def raycast(world: World, envs: Sequence[Env], origins: Array, directions: Array, ids: Array) -> RayHits:

@@ -9,24 +9,11 @@ velocity, joint rates), linear before angular, world axes; else it is the joint 
 """
 
 import math
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
-from numba import njit
 
 from anysim.conventions import Array
-
-
-def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile on first call; keep the machine code on disk where there is a place for it."""
-    try:
-        return njit(cache=True, fastmath=False)(function)
-    except RuntimeError as error:
-        if "no locator available" not in str(error):
-            raise
-        return njit(fastmath=False)(function)
-
+from anysim.math.compiled import compiled
 
 PARENT, PRISMATIC, LEADER = range(3)  # columns of `joint_ints` (n, 3)
 AXIS, ORIGIN, REST = 0, 3, 6  # columns of `joint_floats` (n, 15): axis, origin in the parent, rest rotation by rows

@@ -9,18 +9,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.control import MODES, Control
+from anysim.engine.control import EFFORT, Control, acting_gains
 from anysim.engine.requirements import speed_bound
 from anysim.kinematics.dynamics import drag, gain
-from anysim.model.world import Actuation, ControlMode, World
+from anysim.model.world import Actuation, World
 from anysim_pybullet import kernels as K
 from anysim_pybullet.client import Env
 from anysim_pybullet.lift import Lift, Lifter
 from anysim_pybullet.motors import Motors, feed
 from anysim_pybullet.tree import Frames, Tree
-
-_POSITION, _EFFORT = MODES.index(ControlMode.POSITION), MODES.index(ControlMode.EFFORT)
-
 
 _ONLY_COUPLED = np.array([0, 0, 0, 0, 1, 0, 1, 0, 1, 0], dtype=float)
 """Takes everything away from the drive of a joint that a motor moves, but limits and its multiplier."""
@@ -114,7 +111,7 @@ class Laws:
         if self.motors is not None:
             self._apply_natively(control, self.motors)
             return
-        stiffness, drag = self.kp * (control.mode == _POSITION), self.kd * (control.mode != _EFFORT)
+        stiffness, drag = acting_gains(control.mode, self.kp, self.kd)
         at = self.drives[:, self._driven]
         at[:, :, K.STIFFNESS], at[:, :, K.DRAG], at[:, :, K.LIMIT] = stiffness, drag, self.limit
         at[:, :, K.PULL] = stiffness * control.position + drag * control.velocity
@@ -129,7 +126,7 @@ class Laws:
             self.acting = self.drives.copy()
             self.acting[:, self._driven, K.LIMIT] = self.limit
             self.acting[motors.running] *= _ONLY_COUPLED
-            self._feeds = bool((control.mode == _EFFORT).any())
+            self._feeds = bool((control.mode == EFFORT).any())
             if not np.array_equal(before, motors.running):
                 self.forget(np.arange(len(self._envs)))
                 self._sort_trees()

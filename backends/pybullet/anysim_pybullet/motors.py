@@ -13,16 +13,14 @@ from typing import NamedTuple
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.control import MODES, Control
+from anysim.engine.control import EFFORT, Control, acting_gains
 from anysim.errors import EngineError
 from anysim.kinematics.dynamics import mass_matrix
-from anysim.model.world import ControlMode, World
+from anysim.math.compiled import compiled
+from anysim.model.world import World
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.client import Env
-from anysim_pybullet.kernels import compiled
 from anysim_pybullet.tree import Tree
-
-_POSITION, _EFFORT = MODES.index(ControlMode.POSITION), MODES.index(ControlMode.EFFORT)
 
 ENDLESS = 1e30
 """Stands for no effort limit: Bullet multiplies it by the time step."""
@@ -96,9 +94,8 @@ class Motors:
     ) -> None:
         """Keep all that does not depend on targets; gains and limits are (N, A), the others (N, J)."""
         dt = self._dt
-        motor = mode != _EFFORT
-        stiffness, drag = kp * (mode == _POSITION), kd * motor
-        motor &= (stiffness > 0) | (drag > 0)
+        stiffness, drag = acting_gains(mode, kp, kd)
+        motor = (stiffness > 0) | (drag > 0)
         whole = drag + damping[:, self._driven]
         inertia = self._inertia + armature[:, self._driven] + dt * whole
         self.running[:, self._driven] = motor
@@ -176,4 +173,4 @@ def refuse_dry_friction(world: World, joint: int, friction: float) -> None:
 
 def feed(control: Control) -> Array:
     """What is left of the commands for the law: the effort of drives in effort mode (N, A)."""
-    return np.where(control.mode == _EFFORT, control.effort, 0.0)
+    return np.where(control.mode == EFFORT, control.effort, 0.0)

@@ -83,13 +83,7 @@ class Painter:
         self, view: CameraView, colors: Array, textures: Array, there: Array, ids: Array, channels: tuple[str, ...]
     ) -> dict[str, Array]:
         """See `SimEngine.render`: `colors` (N, G, 4), `textures` (N, G) and who is there (N, B)."""
-        size = (len(ids), view.height, view.width)
-        shapes: dict[str, tuple[tuple[int, ...], Any]] = {
-            "rgb": ((*size, 3), np.uint8),
-            "depth": (size, np.float32),
-            "segmentation": (size, np.int32),
-        }
-        images = {name: np.empty(*shapes[name]) for name in channels}
+        images = view.blank(channels)
         for row, index in enumerate(ids.tolist()):
             painted = textures[index, self._geoms].astype(int)
             self._arrange(view.body_pose[row], colors[index, self._geoms], painted, there[index])

@@ -14,8 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from anysim.conventions import WORLD, Array
-from anysim.model.world import BodyKind, Geom, World
-from anysim_pybullet.kernels import compiled
+from anysim.math.compiled import compiled
+from anysim.model.pairs import may_meet, pair_friction, pair_restitution
+from anysim.model.world import Geom, World
 from anysim_pybullet.tree import Tree
 
 _SWEEPS = 100
@@ -82,38 +83,20 @@ class PairRules:
 
     def _weights(self, world: World, bodies: list[int], tree_of: dict[int, int], trees: list[Tree]) -> Array:
         tree = np.array([tree_of[b] for b in bodies], dtype=int)
-        still = np.array([b == WORLD or world.bodies[b].kind is BodyKind.STATIC for b in bodies], dtype=bool)
         single = np.array([t >= 0 and trees[t].free and len(trees[t].bodies) == 1 for t in tree.tolist()], dtype=bool)
         weight = np.where(single[:, None] & single, _LOOSE, _APART)
         weight[tree[:, None] == tree] = _WITHIN
-        weight[still[:, None] & still] = 0.0
-        body = np.array(bodies, dtype=int)
-        parent = np.array([world.bodies[b].parent if b != WORLD else WORLD for b in bodies], dtype=int)
-        link = np.array([b != WORLD and world.bodies[b].kind is BodyKind.LINK for b in bodies], dtype=bool)
-        weight[body[:, None] == body] = 0.0
-        child = link[:, None] & (parent[:, None] == body)
-        weight[child | child.T] = 0.0
-        which = {entity: number for number, slot in enumerate(world.slots) for entity in slot.entities}
-        entity = np.array([world.body_entity[b] if b != WORLD else -1 for b in bodies], dtype=int)
-        slot = np.array([which.get(e, -1) for e in entity.tolist()], dtype=int)
-        # at most one entity of a slot is there at a time
-        weight[(slot[:, None] == slot) & (slot >= 0) & (entity[:, None] != entity)] = 0.0
-        for low, high in world.excluded_pairs:
-            weight[np.ix_(body == low, body == high)] = weight[np.ix_(body == high, body == low)] = 0.0
-        return weight
+        return np.where(may_meet(world, np.array(bodies, dtype=int)), weight, 0.0)
 
     def pair_friction(self, friction: Array) -> Array:
         """(K, K) the friction that each pair should have."""
-        above = self.priority[:, None] - self.priority
-        return np.where(
-            above > 0, friction[:, None], np.where(above < 0, friction, np.maximum.outer(friction, friction))
-        )
+        return pair_friction(friction, self.priority)
 
     def pair_restitution(self, restitution: Array) -> Array:
         """(K, K) the restitution that each pair should be given."""
         # What an impact sinks, up to a step's way, is pushed out with `contact_erp` of its speed, which adds to the
         # bounce: half of that on average.
-        return np.maximum(np.maximum.outer(restitution, restitution) - 0.5 * self._erp, 0.0)
+        return np.maximum(pair_restitution(restitution) - 0.5 * self._erp, 0.0)
 
     def numbers(self, friction: Array, restitution: Array, shapes: Array | None = None) -> Surfaces:
         """What Bullet gets, for coefficients (K,) of all shapes' geoms, for those shapes that are there (None: all)."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from anysim.conventions import WORLD, Array
 from anysim.engine.state import ContactPoints
+from anysim.model.pairs import counted
 from anysim.model.world import World
 from anysim_sapien.momentum import Balance, Momentum
 from anysim_sapien.scene import EnvScene
@@ -102,18 +103,15 @@ def _friction(pairs: list[Pair], spread: list[Array], balance: Balance) -> Array
 
 def sensor_forces(world: World, scene: EnvScene, momentum: Momentum, env: int) -> Array:
     """(S, 3) [N]: the net contact force of the last substep on each contact sensor's bodies."""
-    sensors = world.contact_sensors
-    total = np.zeros((len(sensors), 3))
-    if not sensors:
-        return total
-    for pair in pairs_of(world, scene, momentum, env):
-        if not pair.pressure.any():
-            continue
-        force = pair.force
-        for row, sensor in zip(total, sensors, strict=True):
-            for body, other, on in ((pair.first, pair.second, force), (pair.second, pair.first, -force)):
-                if body in sensor.bodies and (sensor.against is None or other in sensor.against):
-                    row += on
+    total = np.zeros((len(world.contact_sensors), 3))
+    pairs = [pair for pair in pairs_of(world, scene, momentum, env) if pair.pressure.any()] if len(total) else []
+    first, second = np.array([(pair.first, pair.second) for pair in pairs], dtype=int).reshape(-1, 2).T
+    for row, sensor in zip(total, world.contact_sensors, strict=True):
+        for pair, on_first, on_second in zip(pairs, *counted(sensor, first, second), strict=True):
+            if on_first:
+                row += pair.force
+            if on_second:
+                row -= pair.force
     return total
 
 
@@ -135,7 +133,4 @@ def contact_points(world: World, scenes: list[EnvScene], momentum: Momentum, ids
                     -pair.separation[counts],
                 )
             )
-    if not parts:
-        whole, empty = np.zeros(0, dtype=int), np.zeros((0, 3))
-        return ContactPoints(whole, whole, whole, empty, empty, empty, np.zeros(0))
-    return ContactPoints(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    return ContactPoints.joined(parts)

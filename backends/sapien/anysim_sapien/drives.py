@@ -16,14 +16,12 @@ from typing import NamedTuple
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.control import MODES, Control
+from anysim.engine.control import EFFORT, POSITION, Control
 from anysim.errors import EngineError
-from anysim.model.world import Actuation, ControlMode, World
+from anysim.model.world import Actuation, World
 from anysim_sapien.journal import Journal, Op
 from anysim_sapien.packing import Packing
 from anysim_sapien.scene import UNBOUNDED, EnvScene
-
-_POSITION, _EFFORT = MODES.index(ControlMode.POSITION), MODES.index(ControlMode.EFFORT)
 
 
 class _Ended(NamedTuple):
@@ -90,8 +88,8 @@ class Drives:
             self.limit,
             self.passive,
             self._speeds,
-            _POSITION,
-            _EFFORT,
+            POSITION,
+            EFFORT,
             self._law,
         )
 

@@ -4,24 +4,10 @@ Kernels that call each other share one file because numba's cache notices a chan
 compiled with fast-math, and none adds in an order that depends on the number of envs: an env's bits are its own.
 """
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
-from numba import njit
 
 from anysim.conventions import Array
-
-
-def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile on first call; keep the machine code on disk where there is a place for it."""
-    try:
-        return njit(cache=True, fastmath=False)(function)
-    except RuntimeError as error:
-        if "no locator available" not in str(error):
-            raise
-        return njit(fastmath=False)(function)
-
+from anysim.math.compiled import compiled
 
 PUSH, FEED, STIFFNESS, DAMPING, BOUND, ASKED, PASSIVE, GIVEN = range(8)
 """Rows of a law (N, 8, J); `ASKED` bounds what the targets ask for, `GIVEN` is what the last substep was given."""

@@ -6,8 +6,9 @@ from math import prod
 
 import numpy as np
 
-from anysim.conventions import WORLD, Array
+from anysim.conventions import Array
 from anysim.errors import EngineError
+from anysim.model.pairs import may_meet
 from anysim.model.world import World
 from anysim_sapien.exclusions import Apart, apart_of
 from anysim_sapien.layout import Layout
@@ -32,19 +33,7 @@ class Meeting:
         self._surfaces = [world.geoms[i].surface for i in self.solid]
         self._labels = [self.apart.labels.get(world.geoms[i].body, 0) for i in self.solid]
         self._fixed = layout.geom_fixed[self.solid]
-        self._meet = self._may_meet(world)
-
-    def _may_meet(self, world: World) -> Array:
-        """(C, C) bool: which of the geoms that collide can ever touch."""
-        bodies = np.array([world.geoms[i].body for i in self.solid], dtype=int)
-        parents = np.array([world.bodies[b].parent if b != WORLD else WORLD for b in bodies], dtype=int)
-        child = (parents[:, None] == bodies) & (bodies != WORLD)
-        apart = (bodies[:, None] == bodies) | child | child.T | (self._fixed[:, None] & self._fixed)
-        size = len(world.bodies) + 1
-        excluded = np.zeros((size, size), dtype=bool)
-        for low, high in world.excluded_pairs:
-            excluded[low, high] = excluded[high, low] = True  # the world is the last row, by its index of -1
-        return ~(apart | excluded[np.ix_(bodies, bodies)])
+        self._meet = may_meet(world, np.array([world.geoms[i].body for i in self.solid], dtype=int))
 
     def copies(self, friction: Array, restitution: Array | None = None) -> dict[int, list[Copy]]:
         """The shapes of each geom that collides, for the coefficients in force (G,); restitutions as built for None.

@@ -100,11 +100,7 @@ class Painter:
         self, view: CameraView, ids: Array, skins: tuple[Array, ...], there: Array, channels: tuple[str, ...]
     ) -> dict[str, Array]:
         """See `SimEngine.render`. Colour, texture and material (E, G) of geoms, and which bodies are there (E, B)."""
-        size = (len(ids), view.height, view.width)
-        images: dict[str, Array] = {}
-        for name in channels:
-            shape, kind = {"rgb": ((*size, 3), np.uint8), "depth": (size, np.float32)}.get(name, (size, np.int32))
-            images[name] = np.empty(shape, dtype=kind)
+        images = view.blank(channels)
         with drawing:
             camera, mount = self._camera(view)
             for row, index in enumerate(ids.tolist()):

@@ -16,6 +16,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import EngineError
+from anysim.model.pairs import pair_friction, pair_restitution
 from anysim.model.world import Surface
 
 BITS = 32
@@ -58,15 +59,6 @@ class _Bits:
         bits[1] |= meets
 
 
-def pair(a: _Class, b: _Class) -> Touch:
-    """The pair rule: the larger friction unless priorities differ; the larger restitution."""
-    if a.priority == b.priority:
-        friction = max(a.friction, b.friction)
-    else:
-        friction = max(a, b, key=lambda c: c.priority).friction
-    return Touch(friction, max(a.restitution, b.restitution))
-
-
 def copies_of(
     surfaces: Sequence[Surface],
     frictions: Array,
@@ -93,6 +85,14 @@ def copies_of(
         for s, f, label in zip(surfaces, frictions, labels or [0] * len(surfaces), strict=True)
     ]
     classes = sorted(set(keys))
+    friction, restitution, priority = (np.array([key[i] for key in classes]) for i in range(3))
+    rule = pair_friction(friction, priority).tolist(), pair_restitution(restitution).tolist()
+
+    def pair(first: _Class, second: _Class) -> Touch:
+        i, k = number[first], number[second]
+        return Touch(rule[0][i][k], rule[1][i][k])
+
+    number = {key: i for i, key in enumerate(classes)}
     movable = {c for c, still in zip(keys, fixed, strict=True) if not still}
     still = {c for c, f in zip(keys, fixed, strict=True) if f}
     loose: dict[_Class, _Bits] = {c: _Bits({}) for c in classes}

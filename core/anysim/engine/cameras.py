@@ -1,5 +1,6 @@
 """Cameras of all envs: the contract turns mounts and poses into world poses, and an engine only draws."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +33,12 @@ class CameraView:
     height: int
     near: float
     far: float
+
+    def blank(self, channels: Sequence[str]) -> dict[str, Array]:
+        """Images (E, H, W, ...) of these channels, to be drawn into."""
+        size = (len(self.pose), self.height, self.width)
+        kinds = {"rgb": ((*size, 3), np.uint8), "depth": (size, np.float32), "segmentation": (size, np.int32)}
+        return {name: np.empty(*kinds[name]) for name in channels}
 
 
 class CameraRig:

@@ -12,6 +12,13 @@ from anysim.engine.arguments import rows as checked_rows
 from anysim.model.world import ControlMode, World
 
 MODES = tuple(ControlMode)
+POSITION, VELOCITY, EFFORT = map(MODES.index, ControlMode)
+"""Numbers of the modes."""
+
+
+def acting_gains(mode: Array, kp: Array, kd: Array) -> tuple[Array, Array]:
+    """The gains (N, A) that act in these modes: both in position control, kd in velocity control, none for efforts."""
+    return kp * (mode == POSITION), kd * (mode != EFFORT)
 
 
 class Control(NamedTuple):

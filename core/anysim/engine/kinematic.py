@@ -16,20 +16,19 @@ from anysim import __version__
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capabilities, Capability as C
-from anysim.engine.control import MODES, Control
+from anysim.engine.control import POSITION, VELOCITY, Control
 from anysim.engine.lighting import LIGHTS, SURROUNDINGS, Looks
 from anysim.engine.parameters import PARAMETERS, nominal
 from anysim.engine.presence import Lifecycle
 from anysim.engine.state import Availability, SnapshotLevel
 from anysim.math import pose as P
 from anysim.model.forward_kinematics import forward_kinematics
-from anysim.model.world import BodyKind, ControlMode, JointType, Scenery, World
+from anysim.model.world import BodyKind, JointType, Scenery, World
 
 _UNSEEN = Scenery(background=(0.0, 0.0, 0.0), ambient=(0.0, 0.0, 0.0), shadows=False)
 """Surroundings of an engine that does not draw."""
 
 _IGNORED = "ignored: kinematic engine"
-_POSITION, _VELOCITY = MODES.index(ControlMode.POSITION), MODES.index(ControlMode.VELOCITY)
 
 
 class NullEngine(SimEngine):
@@ -142,11 +141,11 @@ class NullEngine(SimEngine):
             )
             here = position[:, self._driven]
             way = (target - here) / dt
-            rate = np.where(mode == _VELOCITY, self._control.velocity[rows], velocity[:, self._driven])
-            rate = np.where(mode == _POSITION, way, rate)
+            rate = np.where(mode == VELOCITY, self._control.velocity[rows], velocity[:, self._driven])
+            rate = np.where(mode == POSITION, way, rate)
             velocity[:, self._driven] = np.clip(rate, -reach, reach)
             # a joint that arrives gets the target's own bits, which a sum would round
-            arrives = (mode == _POSITION) & (np.abs(way) <= reach)
+            arrives = (mode == POSITION) & (np.abs(way) <= reach)
             goal[:, self._driven] = np.where(arrives, target, here + velocity[:, self._driven] * dt)
         velocity[(goal < self._lower) | (goal > self._upper)] = 0.0
         goal = np.clip(goal, self._lower, self._upper)

@@ -173,6 +173,13 @@ class ContactPoints(NamedTuple):
     force: Array
     depth: Array
 
+    @classmethod
+    def joined(cls, parts: Sequence[Sequence[Array]]) -> "ContactPoints":
+        """Those of several envs: all columns of each, one after the other."""
+        whole, rows = np.zeros(0, dtype=int), np.zeros((0, 3))
+        none = (whole, whole, whole, rows, rows, rows, np.zeros(0))
+        return cls(*(np.concatenate(column) for column in zip(none, *parts, strict=True)))
+
 
 FIELDS = ("body_pose", "body_twist", "joint_pos", "joint_vel", "joint_effort", "contact_force", "fault")
 

@@ -18,8 +18,7 @@ import math
 import numpy as np
 
 from anysim.conventions import Array
-from anysim_control.batch.compiled import compiled
-from anysim_control.batch.starts import start_position
+from anysim_control.batch.starts import compiled, start_position
 
 MAX_MOVE = 1.0
 """The most [rad] or [m] a joint moves in an iteration: the linear model is worth nothing beyond."""

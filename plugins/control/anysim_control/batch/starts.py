@@ -1,11 +1,15 @@
 """Random starts of inverse kinematics in the kernels: the draws of `draws.py`, one at a time."""
 
 import math
+from functools import partial
 
 import numpy as np
 
-from anysim_control.batch.compiled import compiled
+from anysim.math.compiled import compiled as in_numba
 from anysim_control.batch.draws import GOLDEN, MIX_1, MIX_2
+
+compiled = partial(in_numba, nogil=True)
+"""The decorator of all kernels."""
 
 S11, S27, S30, S31 = np.uint64(11), np.uint64(27), np.uint64(30), np.uint64(31)
 
