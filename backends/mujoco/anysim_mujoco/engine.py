@@ -15,7 +15,7 @@ from anysim.engine.control import Control, alternating
 from anysim.engine.doctor import Finding, Health
 from anysim.engine.lighting import Looks
 from anysim.engine.presence import Lifecycle
-from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
+from anysim.engine.state import ContactPoints, RayHits, SnapshotLevel
 from anysim.math import pose as P
 from anysim.model.world import World
 from anysim_mujoco import declared
@@ -51,22 +51,14 @@ class MujocoEngine(SimEngine):
     parameters: ClassVar[frozenset[str]] = Parameters.NAMES
     lifecycle: ClassVar[Lifecycle] = Lifecycle.P2
     parallel: ClassVar[bool] = True  # a Batch steps its envs in C threads, without Python's lock
+    library = declared.LIBRARY
+    options_type = MujocoOptions
     options: MujocoOptions
 
     @classmethod
     def share_of_threads(cls, options: Mapping[str, Any], threads: int) -> dict[str, Any]:
         """A Batch takes all cores unless it is told otherwise."""
         return {**options, "threads": options.get("threads") or threads}
-
-    @classmethod
-    def availability(cls) -> Availability:
-        """By the installed version alone; imports nothing."""
-        return declared.LIBRARY.availability()
-
-    @classmethod
-    def options_model(cls) -> type[MujocoOptions]:
-        """The engine's options."""
-        return MujocoOptions
 
     @classmethod
     def findings(cls) -> tuple[Finding, ...]:

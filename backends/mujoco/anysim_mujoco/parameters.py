@@ -8,8 +8,8 @@ import numpy as np
 from mujoco.batch import SimulationError
 
 from anysim.conventions import Array
-from anysim.engine.lighting import LIGHTS, SURROUNDINGS, Looks
-from anysim.engine.parameters import nominal
+from anysim.engine.lighting import Looks
+from anysim.engine.parameters import PARAMETERS, nominal
 from anysim.errors import EngineError
 from anysim.kinematics.inertia import check_physical
 from anysim.model.world import World
@@ -36,29 +36,7 @@ class _Field(NamedTuple):
 class Parameters:
     """Reads and writes neutral parameters. Derived constants are brought up to date by `settle`, for touched envs."""
 
-    NAMES = frozenset(
-        {
-            "body.mass",
-            "body.com",
-            "body.inertia",
-            "body.linear_damping",
-            "body.angular_damping",
-            "geom.friction",
-            "geom.restitution",
-            "geom.color",
-            "geom.texture",
-            "geom.material",
-            "joint.damping",
-            "joint.friction",
-            "joint.armature",
-            "actuator.kp",
-            "actuator.kd",
-            "actuator.effort_limit",
-            "world.gravity",
-            *LIGHTS,
-            *SURROUNDINGS,
-        }
-    )
+    NAMES = frozenset(PARAMETERS)
 
     def __init__(
         self, batch: Any, world: World, layout: Layout, drives: Drives, dampers: Dampers, looks: Looks

@@ -23,7 +23,12 @@ def handles(envs: Sequence[Env]) -> dict[str, int]:
     }
 
 
-def joint_limits(env: Env) -> Array:
+def read_back(env: Env) -> dict[str, Array]:
+    """Joint limits, volumes, masses, centres of mass and inertias as Bullet has them."""
+    return {"joint.limits": _joint_limits(env), "geom.volume": _geom_volumes(env), **_inertials(env)}
+
+
+def _joint_limits(env: Env) -> Array:
     """(J, 2) [rad, m] as Bullet enforces them, infinite where it does not, not a number for what is not there."""
     limits = np.full((len(env.joint_link), 2), np.nan)
     for j in env.cast.joints.tolist():
@@ -34,7 +39,7 @@ def joint_limits(env: Env) -> Array:
     return np.where(np.abs(limits) >= UNLIMITED, np.copysign(np.inf, limits), limits)
 
 
-def inertials(env: Env) -> dict[str, Array]:
+def _inertials(env: Env) -> dict[str, Array]:
     """Masses (B,), centres of mass (B, 3) in the bodies' frames, and inertias (B, 6) in their axes; 0 of the absent."""
     count = len(env.body_at)
     mass, com, inertia = np.zeros(count), np.zeros((count, 3)), np.zeros((count, 6))
@@ -48,7 +53,7 @@ def inertials(env: Env) -> dict[str, Array]:
     return {"body.mass": mass, "body.com": com, "body.inertia": inertia}
 
 
-def geom_volumes(env: Env) -> Array:
+def _geom_volumes(env: Env) -> Array:
     """(G,) [m^3] of colliding geoms; 0 for others, for planes and for height fields."""
     volumes = np.zeros(len(env.plan.world.geoms))
     for number, (uid, link) in env.shape_at.items():

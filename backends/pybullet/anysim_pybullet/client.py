@@ -122,8 +122,10 @@ class Env:
             raise
 
     def close(self) -> None:
-        """Free the client."""
-        disconnect(self.id)
+        """Free the client. May be called again."""
+        if self.id >= 0:
+            disconnect(self.id)
+        self.id = -1
 
     def rebuild(self, cast: Cast, com: Array | None = None) -> None:
         """Build what is there now, in the same client: half the work of a new one, and with the same bits after it."""

@@ -1,12 +1,10 @@
 """Contacts and ray hits in the names of the neutral model."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from anysim.conventions import WORLD, Array
-from anysim.engine.state import ContactPoints, RayHits
 from anysim.model.pairs import counted
 from anysim.model.world import World
 from anysim_pybullet.bullet import bullet
@@ -58,39 +56,27 @@ def sensor_forces(world: World, env: Env) -> Array:
     return forces
 
 
-def contact_points(envs: Sequence[Env], ids: Array) -> ContactPoints:
-    """All contact points of envs."""
-    parts = []
-    for index in ids.tolist():
-        points = [c for c in _points(envs[index]) if c[DISTANCE] <= 0.0 or c[FORCE] != 0.0]
-        a, b = _bodies(envs[index], points)
-        place = np.array([c[POINT] for c in points], dtype=float).reshape(-1, 3)
-        normal = -np.array([c[NORMAL] for c in points], dtype=float).reshape(-1, 3)
-        depth = -np.array([c[DISTANCE] for c in points], dtype=float)
-        parts.append((np.full(len(points), index), a, b, place, normal, -_vectors(points), depth))
-    return ContactPoints.joined(parts)
+def contact_points(env: Env) -> tuple[Array, ...]:
+    """All contact points of an env, as columns of `ContactPoints`."""
+    points = [c for c in _points(env) if c[DISTANCE] <= 0.0 or c[FORCE] != 0.0]
+    place = np.array([c[POINT] for c in points], dtype=float).reshape(-1, 3)
+    normal = -np.array([c[NORMAL] for c in points], dtype=float).reshape(-1, 3)
+    depth = -np.array([c[DISTANCE] for c in points], dtype=float)
+    return (*_bodies(env, points), place, normal, -_vectors(points), depth)
 
 
-def raycast(world: World, envs: Sequence[Env], origins: Array, directions: Array, ids: Array) -> RayHits:
-    """First hits of rays (E, R, 3)."""
-    entity_of = {WORLD: 0} | {b: e + 1 for b, e in enumerate(world.body_entity)}
-    distance = np.full(origins.shape[:2], np.inf)
-    entity = np.full(origins.shape[:2], -1, dtype=int)
-    for row, index in enumerate(ids.tolist()):
-        left = np.arange(origins.shape[1])
-        for reach in REACHES:
-            for begin in range(0, len(left), _BATCH):
-                some = left[begin : begin + _BATCH]
-                start, along = origins[row, some], directions[row, some]
-                for k, hit in zip(some.tolist(), _cast(envs[index], start, start + reach * along), strict=True):
-                    if hit[0] >= 0:
-                        distance[row, k] = hit[2] * reach
-                        entity[row, k] = entity_of[envs[index].body_of[hit[0]][hit[1]]]
-            left = left[entity[row, left] < 0]
-            if not len(left):
-                break
-    return RayHits(distance, entity)
-
-
-def _cast(env: Env, start: Array, end: Array) -> Any:
-    return bullet().rayTestBatch(start.tolist(), end.tolist(), numThreads=1, physicsClientId=env.id)
+def raycast(env: Env, origins: Array, directions: Array) -> tuple[Array, Array]:
+    """First hits of rays (R, 3): distances, and bodies."""
+    distance, body = np.full(len(origins), np.inf), np.full(len(origins), WORLD)
+    left = np.arange(len(origins))
+    for reach in REACHES:
+        for some in np.split(left, range(_BATCH, len(left), _BATCH)):
+            start, end = origins[some], origins[some] + reach * directions[some]
+            hits = bullet().rayTestBatch(start.tolist(), end.tolist(), numThreads=1, physicsClientId=env.id)
+            for k, hit in zip(some.tolist(), hits, strict=True):
+                if hit[0] >= 0:
+                    distance[k], body[k] = hit[2] * reach, env.body_of[hit[0]][hit[1]]
+        left = left[np.isinf(distance[left])]
+        if not len(left):
+            break
+    return distance, body

@@ -2,7 +2,7 @@
 
 from anysim.engine.availability import LibraryRequirement
 from anysim.engine.capability import Allowance, Capabilities, Capability
-from anysim.engine.lighting import LIGHTS
+from anysim.engine.parameters import PARAMETERS as ALL
 
 LIBRARY = LibraryRequirement(
     "pybullet",
@@ -49,30 +49,7 @@ CAPABILITIES = Capabilities.of(
     *(c for c in Capability if c not in _APPROXIMATE and c not in _ABSENT), approximate=_APPROXIMATE
 )
 
-PARAMETERS = frozenset(
-    {
-        "body.mass",
-        "body.com",
-        "body.inertia",
-        "body.linear_damping",
-        "body.angular_damping",
-        "geom.friction",
-        "geom.restitution",
-        "geom.color",
-        "geom.texture",
-        "geom.material",
-        "joint.damping",
-        "joint.friction",
-        "joint.armature",
-        "actuator.kp",
-        "actuator.kd",
-        "actuator.effort_limit",
-        "world.gravity",
-        *LIGHTS,
-        "world.ambient",
-        "world.background",
-    }
-)
+PARAMETERS = frozenset(ALL) - {"world.shadows"}
 """What can be changed per env."""
 
 AUDIT_ALLOWANCES = {

@@ -26,7 +26,8 @@ _ONLY_COUPLED = np.array([0, 0, 0, 0, 1, 0, 1, 0, 1, 0], dtype=float)
 class Laws:
     """Arrays of the drive law, env by env: per joint, per body, and what the last step left."""
 
-    def __init__(self, world: World, frames: Frames, trees: list[Tree], envs: list[Env]) -> None:
+    def __init__(self, world: World, frames: Frames, trees: list[Tree], envs: list[Env], effort: Array) -> None:
+        """`effort` (N, J) is where what the drives exert is written."""
         num_envs = len(envs)
         n, bodies, joints, actuators = num_envs, world.bodies, world.joints, world.actuators
         self._world, self._trees, self._envs = world, trees, envs
@@ -63,7 +64,7 @@ class Laws:
             row[:, K.COMPENSATED] = body.gravity_compensation
         self.damping = np.tile(np.array([b.damping for b in bodies], dtype=float).reshape(-1, 2), (n, 1, 1))
         self.gravity = np.tile(np.array(world.physics.gravity), (n, 1))
-        self.effort = np.zeros((n, len(joints)))
+        self.effort = effort
         self._starts = np.cumsum([0, *(self._length(t) for t in trees)])
         self.memory = np.zeros((n, int(self._starts[-1])))
         self.roots = np.tile(np.array([[*b.position, *b.quaternion] for b in bodies]).reshape(-1, 7), (n, 1, 1))

@@ -1,13 +1,12 @@
 """Bullet's own loop over the same envs, which the engine is measured against."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import cycle
 from weakref import finalize
 
 import numpy as np
 
-from anysim.conventions import Array
 from anysim.engine.control import Control, alternating
 from anysim.engine.state import SnapshotLevel
 from anysim.model.world import Actuation
@@ -26,15 +25,17 @@ def raw_loop(envs: Envs, control: Control) -> Callable[[int], None]:
     Raises:
         EngineError: the world asks for what Bullet's motors cannot do.
     """
-    p, ids, n = bullet(), np.arange(len(envs.clients)), len(envs.clients)
+    p, n = bullet(), len(envs.clients)
     world = replace(envs.world, physics=replace(envs.world.physics, actuation=Actuation.NATIVE))
     copy = Envs(world, np.array([env.cast.present for env in envs.clients]), envs.plan.options)
-    state: Mapping[str, Array] = envs.snapshot(ids, SnapshotLevel.TRAJECTORY)
-    copy.restore(ids, state, SnapshotLevel.TRAJECTORY)
+    for i in range(n):
+        rows = {name: np.asarray(row) for name, row in envs.rows(i, SnapshotLevel.TRAJECTORY).items()}
+        copy.put_rows(i, rows, SnapshotLevel.TRAJECTORY)
     laws = copy.laws
     laws.apply(control)
     turns = cycle([_orders(copy, commands) for commands in alternating(control)])
-    copy.step(1, None)
+    for i in range(n):
+        copy.step(i, 1)
     lifted = [
         [
             (env.root_ids[t.number], env.tree_links[t.number], laws.lift.torque[i, t.joints].tolist())

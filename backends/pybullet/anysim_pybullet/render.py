@@ -80,13 +80,13 @@ class Painter:
         disconnect(self._client)
 
     def draw(
-        self, view: CameraView, colors: Array, textures: Array, there: Array, ids: Array, channels: tuple[str, ...]
+        self, view: CameraView, ids: Array, skins: tuple[Array, ...], there: Array, channels: tuple[str, ...]
     ) -> dict[str, Array]:
-        """See `SimEngine.render`: `colors` (N, G, 4), `textures` (N, G) and who is there (N, B)."""
+        """See `anysim.engine.one_world.base.Painter`."""
         images = view.blank(channels)
         for row, index in enumerate(ids.tolist()):
-            painted = textures[index, self._geoms].astype(int)
-            self._arrange(view.body_pose[row], colors[index, self._geoms], painted, there[index])
+            color, texture, _ = (part[row, self._geoms] for part in skins)
+            self._arrange(view.body_pose[row], color, texture.astype(int), there[row])
             look = self._looks.of(index)
             rgba, raw, owner = self._shoot(view, row, look)
             near, far = view.near, view.far

@@ -15,7 +15,6 @@ from anysim.model.world import World
 from anysim_pybullet import kernels as K
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.client import Env
-from anysim_pybullet.contacts import sensor_forces
 from anysim_pybullet.law import Laws
 
 LINKS, ALL = range(2)
@@ -28,29 +27,26 @@ FAR, FAST = 1e6, 1e8
 
 
 class Mirror:
-    """State arrays of all envs: body poses and twists, joint positions and velocities, contact forces, faults."""
+    """State arrays of all envs: body poses and twists, joint positions and velocities, faults."""
 
     def __init__(self, world: World, envs: list[Env], laws: Laws) -> None:
         n, bodies, joints = len(envs), len(world.bodies), len(world.joints)
-        self._world, self._envs, self._laws = world, envs, laws
+        self._envs, self._laws = envs, laws
         self.pose, self.twist = np.zeros((n, bodies, 7)), np.zeros((n, bodies, 6))
         self.position, self.velocity = np.zeros((n, joints)), np.zeros((n, joints))
-        self.contact = np.zeros((n, len(world.contact_sensors), 3))
         self.fault = np.zeros(n, dtype=bool)
         self._stale = dict.fromkeys(range(n), ALL)
         """How much is out of date, of envs of which anything is."""
-        self._contact_stale: set[int] = set()
         self._motor = np.zeros((n, joints))
         self._running = np.zeros((n, joints), dtype=bool) if laws.motors is None else laws.motors.running
         self._fields: Mapping[str, Array] = {
             "body_pose": self.pose, "body_twist": self.twist, "joint_pos": self.position, "joint_vel": self.velocity,
-            "contact_force": self.contact, "fault": self.fault, "joint_effort": laws.effort,
+            "fault": self.fault,
         }  # fmt: skip
 
     def stepped(self, index: int, sound: bool) -> None:
         """This env was stepped; everything of it is new."""
         self._stale[index] = ALL
-        self._contact_stale.add(index)
         if not sound:
             self.fault[index] = True
 
@@ -61,7 +57,6 @@ class Mirror:
     def hold(self, index: int) -> None:
         """All of this env's arrays were written."""
         self._stale.pop(index, None)
-        self._contact_stale.discard(index)
 
     def known_position(self, index: int) -> Array | None:
         """The joint positions (J,) of an env, if they are those that Bullet has now."""
@@ -74,21 +69,10 @@ class Mirror:
             self._read(index, level == ALL)
             del self._stale[index]
 
-    def settle(self, index: int) -> None:
-        """Bring everything of an env up to date, also its contacts."""
-        self.refresh(index)
-        if index in self._contact_stale:
-            self.contact[index] = sensor_forces(self._world, self._envs[index])
-            self._contact_stale.remove(index)
-
     def field(self, name: str) -> Array:
         """A fresh array of one of the neutral fields."""
-        if name == "contact_force":
-            for index in range(len(self._envs)):
-                self.settle(index)
-        elif self._stale and not (name == "joint_effort" and self._laws.motors is None):
-            for index in list(self._stale):
-                self.refresh(index)
+        for index in tuple(self._stale):
+            self.refresh(index)
         return self._fields[name].copy()
 
     def _read(self, index: int, everything: bool) -> None:

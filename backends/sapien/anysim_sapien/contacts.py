@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 
 from anysim.conventions import WORLD, Array
-from anysim.engine.state import ContactPoints
 from anysim.model.pairs import counted
 from anysim.model.world import World
 from anysim_sapien.momentum import Balance, Momentum
@@ -115,22 +114,12 @@ def sensor_forces(world: World, scene: EnvScene, momentum: Momentum, env: int) -
     return total
 
 
-def contact_points(world: World, scenes: list[EnvScene], momentum: Momentum, ids: Array) -> ContactPoints:
-    """All points that touch or exert force."""
+def contact_points(world: World, scene: EnvScene, momentum: Momentum, env: int) -> list[tuple[Array, ...]]:
+    """All points that touch or exert force, as columns of `ContactPoints` for each pair."""
     parts: list[tuple[Array, ...]] = []
-    for env in ids.tolist():
-        for pair in pairs_of(world, scenes[env], momentum, env):
-            counts = (pair.separation <= 0) | (pair.pressure != 0)
-            size = int(counts.sum())
-            parts.append(
-                (
-                    np.full(size, env),
-                    np.full(size, pair.first),
-                    np.full(size, pair.second),
-                    pair.position[counts],
-                    -pair.normals[counts],
-                    -pair.shared()[counts],
-                    -pair.separation[counts],
-                )
-            )
-    return ContactPoints.joined(parts)
+    for pair in pairs_of(world, scene, momentum, env):
+        counts = (pair.separation <= 0) | (pair.pressure != 0)
+        bodies = np.full(counts.sum(), pair.first), np.full(counts.sum(), pair.second)
+        rows = pair.position, -pair.normals, -pair.shared(), -pair.separation
+        parts.append((*bodies, *(row[counts] for row in rows)))
+    return parts

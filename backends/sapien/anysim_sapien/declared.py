@@ -2,6 +2,7 @@
 
 from anysim.engine.availability import LibraryRequirement
 from anysim.engine.capability import Allowance, Capabilities, Capability
+from anysim.engine.parameters import PARAMETERS as ALL
 
 LIBRARY = LibraryRequirement(
     "sapien",
@@ -42,6 +43,9 @@ _ABSENT = (Capability.RENDER_SHADOWS,)
 CAPABILITIES = Capabilities.of(
     *(c for c in Capability if c not in _APPROXIMATE and c not in _ABSENT), approximate=_APPROXIMATE
 )
+
+PARAMETERS = frozenset(ALL) - {"world.shadows"}
+"""What can be changed per env."""
 
 AUDIT_ALLOWANCES = {
     "volume": Allowance(

@@ -62,7 +62,6 @@ class Drives:
         # damping, force limit and velocity target of PhysX' drives, as PhysX has them
         self._told = np.full((n, 3, len(joints)), np.nan)
         self._news = np.zeros((len(joints), 2), dtype=int)
-        self._effort = np.zeros((n, len(joints)))
         self._ended: list[_Ended | None] = [None] * n
         self._update()
 
@@ -165,17 +164,10 @@ class Drives:
         """After the last substep: the drives' damping acted on the speed at its end. Most steps are never asked for."""
         self._ended[env] = _Ended(self._law, scene.packed(), scene.packing)
 
-    def effort(self) -> Array:
-        """What the drives exerted in the last substep (N, J); not a copy."""
-        for env, ended in enumerate(self._ended):
-            if ended is not None:
-                law, packed, packing = ended
-                state = np.frombuffer(packed, dtype=np.float32)
-                self._kernels.exerted(law, env, state, packing.joint_pos, packing.joint_vel, self._kind, self._effort)
-                self._ended[env] = None
-        return self._effort
-
-    def hold_effort(self, env: int, effort: Array | float, joints: Array | slice = slice(None)) -> None:
-        """Make these the efforts (K,) of an env's joints in the last substep."""
-        self._ended[env] = None
-        self._effort[env, joints] = effort
+    def exerted(self, env: int, effort: Array) -> None:
+        """Write what the env's drives exerted in the last substep into its row of (N, J)."""
+        ended = self._ended[env]
+        if ended is not None:
+            law, packed, packing = ended
+            state = np.frombuffer(packed, dtype=np.float32)
+            self._kernels.exerted(law, env, state, packing.joint_pos, packing.joint_vel, self._kind, effort)

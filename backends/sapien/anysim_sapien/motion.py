@@ -1,6 +1,5 @@
 """Poses and velocities of root bodies and joints, in and out of a scene."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -28,12 +27,6 @@ def motion_of(scene: EnvScene) -> Motion:
     roots = (layout.free | layout.fixed)[:, None]
     pose = np.where(roots, scene.poses(), 0.0)
     return Motion(pose, scene.velocities(), scene.joint_positions(), scene.joint_velocities())
-
-
-def motions_of(scenes: Sequence[EnvScene]) -> dict[str, Array]:
-    """Those of several scenes (E, ...), by the names of `Motion`."""
-    parts = [motion_of(scene) for scene in scenes]
-    return {name: np.array([getattr(part, name) for part in parts]) for name in Motion._fields}
 
 
 def put_motion(scene: EnvScene, motion: Motion) -> None:

@@ -6,14 +6,13 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array, xyzw_from_wxyz
-from anysim.engine.lighting import LIGHTS, SURROUNDINGS, Looks
-from anysim.engine.parameters import nominal
+from anysim.engine.parameter_table import ParameterTable
+from anysim.errors import EngineError
 from anysim.kinematics.dynamics import gain
 from anysim.kinematics.inertia import check_physical, from_principal, principal
-from anysim.model.world import World
 from anysim_sapien.drives import Drives
-from anysim_sapien.layout import Layout
-from anysim_sapien.recipe import Values
+from anysim_sapien.options import OWN_SCENERY
+from anysim_sapien.recipe import Recipes, Values
 from anysim_sapien.scene import EnvScene
 from anysim_sapien.surfaces import Copy
 
@@ -24,42 +23,30 @@ _SURFACES = ("geom.friction", "geom.restitution")
 _REBUILD = (*_SURFACES, "world.gravity")
 """PhysX reads gravity once, and a change of coefficients regroups the shapes: the scene is built anew."""
 _SKINS = ("geom.color", "geom.texture", "geom.material")
+_ELSEWHERE = (*_DRIVES, "geom.color")
+"""What is no part of a snapshot's rows here: the base class saves it."""
 
 
-LOOKS = frozenset({*LIGHTS, *SURROUNDINGS} - {"world.shadows"})
-"""What is drawn; there are no shadows."""
-
-LIT = LOOKS - {"world.background"}
-"""What needs a shader with lights."""
-
-
-class Parameters:
+class Parameters(ParameterTable):
     """The values in force (N, K, ...), and how they get into the scenes."""
-
-    NAMES = LOOKS | {*_DRIVES, *_BODIES, *_DAMPING, *_REBUILD, *_SKINS, "joint.friction", "joint.armature"}
 
     def __init__(
         self,
-        world: World,
-        layout: Layout,
+        recipes: Recipes,
         drives: Drives,
         scenes: list[EnvScene],
         rebuild: Callable[[int], None],
-        num_envs: int,
-        looks: Looks,
+        written: Callable[[int], None],
     ) -> None:
-        self._world, self._layout, self._drives, self._scenes, self._rebuild = world, layout, drives, scenes, rebuild
-        self._looks = looks
-        self._defaults = {name: nominal(name, world) for name in sorted(self.NAMES - LOOKS)}
-        self._wanted = {
-            name: np.repeat(values[None], num_envs, axis=0)
-            for name, values in self._defaults.items()
-            if name not in _DRIVES
-        }
+        """`rebuild` makes an env's scene anew in its state, `written` is told of envs that were written to."""
+        self._layout, self._options = recipes.layout, recipes.options
+        self._drives, self._scenes, self._rebuild, self._written = drives, scenes, rebuild, written
+        kept = {name: getattr(drives, kind) for name, kind in _DRIVES.items()}
+        super().__init__(recipes.world, len(drives.kp), OWN_SCENERY, kept)
 
-    def values(self, env: int) -> Values:
+    def of(self, env: int) -> Values:
         """What the scene of an env is built with."""
-        w = self._wanted
+        w = self.values
         return Values(
             w["body.mass"][env],
             w["body.com"][env],
@@ -72,37 +59,25 @@ class Parameters:
             w["world.gravity"][env, 0],
         )
 
-    def default(self, name: str) -> Array:
-        """Values (K, ...) as built."""
-        return self._looks.default(name) if name in LOOKS else self._defaults[name].copy()
-
-    def rows(self, ids: Array) -> dict[str, Array]:
+    def rows(self, env: int) -> dict[str, Array]:
         """What scenes are built with, as it was asked for: what is read from PhysX is rounded, and not asked for again.
 
         A scene that is built anew later, as its steps run out, has to be built from the same bits.
         """
-        return {f"wanted.{name}": values[ids] for name, values in self._wanted.items() if name != "geom.color"}
+        return {f"wanted.{name}": self.values[name][env] for name in self.values if name not in _ELSEWHERE}
 
-    def put_rows(self, ids: Array, data: Mapping[str, Array]) -> None:
-        """Write what `rows` made; the scenes themselves come from elsewhere."""
-        for name, values in self._wanted.items():
-            if name != "geom.color":
-                values[ids] = data[f"wanted.{name}"]
+    def put_rows(self, env: int, rows: Mapping[str, Array]) -> None:
+        """Write what `rows` returned; the scene itself comes from elsewhere."""
+        for name, values in self.values.items():
+            if name not in _ELSEWHERE:
+                values[env] = rows[f"wanted.{name}"]
 
     # ------------------------------------------------------------------ reading
 
-    def get(self, name: str) -> Array:
-        """All values (N, K, ...)."""
-        if name in LOOKS:
-            return self._looks.get(name)
-        if name in _DRIVES:
-            return getattr(self._drives, _DRIVES[name]).copy()
-        values = self._wanted[name].copy()
-        if name in _SKINS:
-            return values
-        for row, scene in zip(values, self._scenes, strict=True):
-            self._read(name, row, scene)
-        return values
+    def read(self, name: str, values: Array) -> None:
+        if name not in (*_DRIVES, *_SKINS):
+            for row, scene in zip(values, self._scenes, strict=True):
+                self._read(name, row, scene)
 
     def _read(self, name: str, row: Array, scene: EnvScene) -> None:
         """Overwrite the wanted values by PhysX' own where it has the thing.
@@ -135,8 +110,8 @@ class Parameters:
 
     def _read_damping(self, which: int, row: Array, scene: EnvScene) -> None:
         """A rate is the wanted one where PhysX has the single-precision share that it makes."""
-        dt = self._world.physics.dt
-        for body in np.flatnonzero(scene.layout.there & self._world.loose):
+        dt = self.world.physics.dt
+        for body in np.flatnonzero(scene.layout.there & self.world.loose):
             component = scene.bodies[body]
             found = (component.linear_damping, component.angular_damping)[which]
             if abs(found - gain(row[body], dt)) > 1e-6 * max(1.0, found):
@@ -144,34 +119,26 @@ class Parameters:
 
     # ------------------------------------------------------------------ writing
 
-    def set(self, name: str, values: Array, ids: Array, indices: Array) -> None:
-        """Write values (E, K, ...)."""
-        if name in LOOKS:
-            self._looks.set(name, values, ids, indices)
-            return
-        at = np.ix_(ids, indices)
-        if name in _DRIVES:
-            getattr(self._drives, _DRIVES[name])[at] = values
-            self._drives.refresh()
-            return
+    def check(self, name: str, values: Array, indices: Array) -> None:
+        if name in self.looks and name != "world.background" and self._options.shader == "trivial":
+            raise EngineError(
+                f"sapien's shader 'trivial' draws no light: {name} is not seen; choose options.shader: lit"
+            )
         if name == "body.inertia":
             for row in values:
                 for index, tensor in zip(indices, row, strict=True):
                     if not self._layout.fixed[index]:
-                        check_physical(self._world.bodies[index].name, principal(tensor).moments)
-        before = self._wanted[name][ids]
-        self._wanted[name][at] = values
-        try:
-            for env in ids:
-                self._write(name, int(env), indices)
-        except BaseException:
-            self._wanted[name][ids] = before
-            for env in ids:
-                self._write(name, int(env), indices)
-            raise
+                        check_physical(self.world.bodies[index].name, principal(tensor).moments)
+
+    def push(self, name: str, ids: Array, indices: Array) -> None:
+        if name in _DRIVES:
+            self._drives.refresh()
+        for env in ids.tolist():
+            self._write(name, env, indices)
+            self._written(env)
 
     def _write(self, name: str, env: int, indices: Sequence[int] | Array) -> None:
-        scene, wanted = self._scenes[env], self._wanted
+        scene, wanted = self._scenes[env], self.values
         if name in _BODIES:
             for body in indices:
                 if scene.layout.there[body] and not self._layout.fixed[body]:
@@ -185,7 +152,7 @@ class Parameters:
         elif name in _DAMPING:
             rates = np.stack([wanted[part][env] for part in _DAMPING], axis=-1)
             for body in indices:
-                if scene.layout.there[body] and self._world.loose[body]:
+                if scene.layout.there[body] and self.world.loose[body]:
                     scene.set_damping(int(body), rates[body])
         elif name in _REBUILD:
             self._rebuild(env)

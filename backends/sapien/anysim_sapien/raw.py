@@ -3,44 +3,37 @@
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import cycle
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from anysim.conventions import Array
 from anysim.engine.control import Control, alternating
-from anysim.model.world import Actuation, World
-from anysim_sapien.drives import Drives
-from anysim_sapien.motion import Motion, put_motion
+from anysim.model.world import Actuation
+from anysim_sapien.motion import motion_of, put_motion
 from anysim_sapien.native import NativeDrives
-from anysim_sapien.options import SapienOptions
-from anysim_sapien.recipe import Recipes, Values
+from anysim_sapien.recipe import Recipes
 from anysim_sapien.scene import EnvScene
 
+if TYPE_CHECKING:
+    from anysim_sapien.envs import Envs
 
-def raw_loop(
-    world: World,
-    options: SapienOptions,
-    present: Array,
-    values: list[Values],
-    motions: list[Motion],
-    drives: Drives,
-    control: Control,
-) -> Callable[[int], None]:
+
+def raw_loop(envs: "Envs", control: Control) -> Callable[[int], None]:
     """A function of the number of physics steps: set targets, step private scenes, copy the state out into arrays.
 
     As one would write it for SAPIEN alone: PhysX' own drives, whose gains were set before; all targets are set in each
     call, two commands in turn, and joint positions and velocities, poses and velocities of bodies copied as SAPIEN
     gives them.
     """
+    world, drives, originals = envs.world, envs.drives, envs.scenes
     native = replace(world, physics=replace(world.physics, actuation=Actuation.NATIVE))
-    recipes = Recipes(native, options)
-    scenes = [EnvScene(recipes.of(there), row) for there, row in zip(present, values, strict=True)]
+    recipes = Recipes(native, envs.options)
+    scenes = [EnvScene(recipes.of(o.recipe.present), envs.parameters.of(env)) for env, o in enumerate(originals)]
     own = NativeDrives(native, len(scenes))
     own.kp[...], own.kd[...], own.limit[...], own.passive[...] = drives.kp, drives.kd, drives.limit, drives.passive
     own.apply(control)
-    for env, (scene, motion) in enumerate(zip(scenes, motions, strict=True)):
-        put_motion(scene, motion)
+    for env, (scene, original) in enumerate(zip(scenes, originals, strict=True)):
+        put_motion(scene, motion_of(original))
         own.begin(env, scene)
     driven = [a.joint for a in world.actuators]
     written: list[list[list[tuple[Any, float, float]]]] = []

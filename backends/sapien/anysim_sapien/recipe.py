@@ -70,6 +70,8 @@ class Recipe:
 
     def __init__(self, common: Recipes, present: Array) -> None:
         self.world, self.options, self.common = common.world, common.options, common
+        self.present = present
+        """(E,) bool, the entities that are there."""
         self.layout = Layout.of(common.world, bodies_there(common.world, present))
         self._meeting = Meeting(self.world, self.layout)
         self.groups = self._meeting.apart.groups

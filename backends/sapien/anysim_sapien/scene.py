@@ -63,7 +63,7 @@ class EnvScene:
     def __init__(self, recipe: Recipe, values: Values) -> None:
         world = recipe.world
         EnvScene.alive.add(self)
-        self._recipe = recipe
+        self.recipe = recipe
         self.values = Values(*(np.array(part) for part in values))
         """The parameters that it was built with."""
         self.journal = Journal()
@@ -113,7 +113,7 @@ class EnvScene:
 
     def _enter(self, body: int, component: Any, pose: Any) -> None:
         """Give a component its shapes and put it into the scene."""
-        recipe = self._recipe
+        recipe = self.recipe
         for index in recipe.geoms_on.get(body, ()):
             for copy in self.copies[index]:
                 shape = make_shape(
@@ -137,7 +137,7 @@ class EnvScene:
         self.scene.add_entity(entity)
 
     def _actor(self, body: int) -> None:
-        recipe = self._recipe
+        recipe = self.recipe
         if recipe.world.bodies[body].kind is BodyKind.STATIC:
             self._enter(body, physx.PhysxRigidStaticComponent(), recipe.common.root_pose[body])
             return
@@ -147,7 +147,7 @@ class EnvScene:
 
     def _set_solver(self, target: Any, root: Body) -> None:
         """Iterations and sleep of an actor or an articulation: its own, or those of the engine's options."""
-        own, options = root.solver or Solver(), self._recipe.options
+        own, options = root.solver or Solver(), self.recipe.options
         positions, velocities = own.position_iterations, own.velocity_iterations
         target.set_sleep_threshold(own.sleep_threshold or 0.0)
         target.set_solver_position_iterations(options.position_iterations if positions is None else positions)
@@ -159,11 +159,11 @@ class EnvScene:
         component.set_max_linear_velocity(FAST)
         component.set_max_angular_velocity(FAST)
         own = None if body.solver is None else body.solver.depenetration_speed
-        component.set_max_depenetration_velocity(self._recipe.options.depenetration_velocity if own is None else own)
+        component.set_max_depenetration_velocity(self.recipe.options.depenetration_velocity if own is None else own)
         component.set_disable_gravity(body.gravity_compensation)
 
     def _tree(self, members: tuple[int, ...]) -> Tree:
-        recipe, world = self._recipe, self._recipe.world
+        recipe, world = self.recipe, self.recipe.world
         made: dict[int, Any] = {}
         for body in members:
             made[body] = physx.PhysxArticulationLinkComponent(made.get(world.bodies[body].parent))
@@ -199,13 +199,13 @@ class EnvScene:
         PhysX keeps the frames of joints relative to the centres of mass, and shifts them, rounding, whenever one moves:
         with each shape and with the inertial. Said last, links are where they should be three times as closely.
         """
-        in_parent, in_child = self._recipe.common.frames[self._recipe.world.body_joint[body]]
+        in_parent, in_child = self.recipe.common.frames[self.recipe.world.body_joint[body]]
         self.bodies[body].joint.set_pose_in_parent(in_parent)
         self.bodies[body].joint.set_pose_in_child(in_child)
 
     def _tendons(self, handle: Any, joints: Array) -> None:
         """Mimic joints: a stiff spring between follower and leader."""
-        world = self._recipe.world
+        world = self.recipe.world
         for index in sorted(int(j) for j in joints):
             if world.joints[index].mimic is not None:
                 tendon = tendon_of(world, index)
@@ -220,7 +220,7 @@ class EnvScene:
                 )
 
     def _joints(self) -> list[Any]:
-        joints: list[Any] = [None] * len(self._recipe.world.joints)
+        joints: list[Any] = [None] * len(self.recipe.world.joints)
         for tree in self.trees:
             for index, joint in zip(tree.joints, tree.handle.active_joints, strict=True):
                 joints[int(index)] = joint
@@ -243,13 +243,13 @@ class EnvScene:
         """Mass [kg], centre of mass [m] and inertia about it (6,) [kg m^2], in the body's frame."""
         self._note(Op.INERTIAL, body, mass, com, inertia)
         component = self.bodies[body]
-        if self._recipe.layout.fixed[body]:
+        if self.recipe.layout.fixed[body]:
             # the root of a fixed articulation: it cannot move, and PhysX wants positive numbers
             component.set_mass(max(float(mass), 1e-3))
             component.set_inertia([1e-3, 1e-3, 1e-3])
             component.set_cmass_local_pose(sapien.Pose())
             return
-        moments, frame = self._recipe.common.principal(body, inertia)
+        moments, frame = self.recipe.common.principal(body, inertia)
         component.set_mass(float(mass))
         self.mass = _with(self.mass, body, component.mass)  # PhysX keeps its inverse, in single precision
         component.set_inertia(moments.tolist())
@@ -262,7 +262,7 @@ class EnvScene:
         PhysX takes a share of `damping dt` in each step; this share is that of an exponential.
         """
         self._note(Op.DAMPING, body, rates)
-        linear, angular = gain(rates, self._recipe.world.physics.dt).tolist()
+        linear, angular = gain(rates, self.recipe.world.physics.dt).tolist()
         self.bodies[body].set_linear_damping(linear)
         self.bodies[body].set_angular_damping(angular)
         damping = self.bodies[body].linear_damping, self.bodies[body].angular_damping
@@ -270,7 +270,7 @@ class EnvScene:
 
     def set_dry(self, index: int, friction: float) -> None:
         """Dry friction [N m] or [N] of a joint: a drive to standstill that may exert this much and no more."""
-        world = self._recipe.world
+        world = self.recipe.world
         spec = world.joints[index]
         self._note(Op.DRY, index, friction)
         drive = self.dry.get(index)
@@ -279,7 +279,7 @@ class EnvScene:
                 return  # no drive, no friction
             drive = physx.PhysxDriveComponent(self.bodies[spec.body])
             drive.set_parent(self.bodies[world.bodies[spec.body].parent])
-            in_parent, in_child = self._recipe.common.frames[index]
+            in_parent, in_child = self.recipe.common.frames[index]
             drive.set_pose_in_parent(in_parent)
             drive.set_pose_in_child(in_child)
             self.entities[spec.body].add_component(drive)
@@ -297,9 +297,9 @@ class EnvScene:
         drive = self.dry.get(index)
         if drive is None:
             return 0.0
-        sliding = self._recipe.world.joints[index].type is JointType.PRISMATIC
+        sliding = self.recipe.world.joints[index].type is JointType.PRISMATIC
         properties = drive.get_drive_property_x() if sliding else drive.get_drive_property_twist()
-        return float(properties[2]) / self._recipe.world.physics.dt
+        return float(properties[2]) / self.recipe.world.physics.dt
 
     def set_armature(self, index: int, armature: float) -> None:
         """Armature [kg m^2] or [kg] of a joint."""
@@ -314,7 +314,7 @@ class EnvScene:
     def push_body(self, body: int, linear: Array, rate: Array) -> None:
         """Write the velocity of a free root's centre of mass [m/s], and its angular rate [rad/s], world axes."""
         self._note(Op.VELOCITY, body, linear, rate)
-        tree = self._recipe.layout.tree_of[body]
+        tree = self.recipe.layout.tree_of[body]
         if tree >= 0:
             self.trees[tree].handle.set_root_linear_velocity(linear)
             self.trees[tree].handle.set_root_angular_velocity(rate)
@@ -324,7 +324,7 @@ class EnvScene:
 
     def place_joints(self, position: Array | None, velocity: Array | None) -> None:
         """Write all joint positions and velocities (J,)."""
-        nothing = np.zeros(len(self._recipe.world.joints))
+        nothing = np.zeros(len(self.recipe.world.joints))
         self._note(
             Op.JOINTS,
             position is not None,

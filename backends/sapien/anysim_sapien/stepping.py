@@ -1,9 +1,10 @@
 """Steps of an env: in a run, and in the same way when its journal is played again."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from anysim.conventions import Array
 from anysim.engine.control import Control
@@ -84,15 +85,11 @@ def replay(scene: EnvScene, recipe: Recipe, rows: Array) -> tuple[Drives, Moment
     return drives, momentum
 
 
-def pasts_of(scenes: Sequence[EnvScene]) -> dict[str, Array]:
-    """What scenes were built with, and their journals (E, L), each as long as `length` says, then zeros."""
-    data = {f"base.{name}": np.array([getattr(s.values, name) for s in scenes]) for name in Values._fields}
-    journals = [scene.journal.rows() for scene in scenes]
-    length = np.array([len(journal) for journal in journals], dtype=np.int64)
-    rows = np.zeros((len(scenes), length.max(initial=0)))
-    for row, journal in zip(rows, journals, strict=True):
-        row[: len(journal)] = journal
-    return data | {"journal": rows, "length": length, "journal_format": np.full(len(scenes), FORMAT)}
+def past_of(scene: EnvScene) -> dict[str, ArrayLike]:
+    """What a scene was built with, and its journal (L,), as long as `length` says where zeros follow."""
+    journal = scene.journal.rows()
+    past: dict[str, ArrayLike] = {f"base.{name}": part for name, part in scene.values._asdict().items()}
+    return past | {"journal": journal, "length": len(journal), "journal_format": FORMAT}
 
 
 def refuse_pasts(data: Mapping[str, Array]) -> None:
@@ -118,10 +115,10 @@ def refuse_pasts(data: Mapping[str, Array]) -> None:
             pass
 
 
-def relive(recipe: Recipe, data: Mapping[str, Array], row: int) -> tuple[EnvScene, Drives, Momentum]:
-    """The scene of a row that `pasts_of` made, in the same state to the bit, with its drives and its momentum."""
-    scene = EnvScene(recipe, Values(*(data[f"base.{name}"][row] for name in Values._fields)))
-    return scene, *replay(scene, recipe, data["journal"][row, : int(data["length"][row])])
+def relive(recipe: Recipe, past: Mapping[str, Array]) -> tuple[EnvScene, Drives, Momentum]:
+    """The scene of which `past_of` says this, in the same state to the bit, with its drives and its momentum."""
+    scene = EnvScene(recipe, Values(*(past[f"base.{name}"] for name in Values._fields)))
+    return scene, *replay(scene, recipe, past["journal"][: int(past["length"])])
 
 
 def wrenches(rows: Array, fixed: Array) -> Array:

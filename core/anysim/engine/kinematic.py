@@ -17,8 +17,8 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capabilities, Capability as C
 from anysim.engine.control import POSITION, VELOCITY, Control
-from anysim.engine.lighting import LIGHTS, SURROUNDINGS, Looks
-from anysim.engine.parameters import PARAMETERS, nominal
+from anysim.engine.parameter_table import ParameterTable
+from anysim.engine.parameters import PARAMETERS
 from anysim.engine.presence import Lifecycle
 from anysim.engine.state import Availability, SnapshotLevel
 from anysim.math import pose as P
@@ -95,11 +95,10 @@ class NullEngine(SimEngine):
         self._driven = np.array([a.joint for a in world.actuators], dtype=int)
         self._followers = [(i, j.mimic) for i, j in enumerate(world.joints) if j.mimic is not None]
         self._control: Control | None = None
-        self._defaults = {name: _default(world, name) for name in PARAMETERS}
-        self._values = {name: np.repeat(v[None], n, axis=0) for name, v in self._defaults.items()}
+        self._table = ParameterTable(world, n, _UNSEEN)
 
     def _free(self) -> None:
-        del self._roots, self._twists, self._position, self._velocity, self._values, self._control
+        del self._roots, self._twists, self._position, self._velocity, self._table, self._control
 
     def _reset(self, ids: Array) -> None:
         self._roots[ids] = self.world.initial_body_pose
@@ -211,13 +210,13 @@ class NullEngine(SimEngine):
     # ------------------------------------------------------------------ parameters and snapshots
 
     def _get_parameter(self, name: str) -> Array:
-        return self._values[name]
+        return self._table.get(name)
 
     def _set_parameter(self, name: str, values: Array, ids: Array, indices: Array) -> None:
-        self._values[name][np.ix_(ids, indices)] = values
+        self._table.set(name, values, ids, indices)
 
     def _default_parameter(self, name: str) -> Array:
-        return self._defaults[name]
+        return self._table.default(name)
 
     def _snapshot(self, ids: Array, level: SnapshotLevel) -> dict[str, Array]:
         return {
@@ -230,8 +229,3 @@ class NullEngine(SimEngine):
     def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:
         self._roots[ids], self._twists[ids] = data["roots"], data["twists"]
         self._position[ids], self._velocity[ids] = data["position"], data["velocity"]
-
-
-def _default(world: World, name: str) -> Array:
-    """The values (K, ...) of a parameter before anything changes it."""
-    return Looks(world, 1, _UNSEEN).default(name) if name in (*LIGHTS, *SURROUNDINGS) else nominal(name, world)

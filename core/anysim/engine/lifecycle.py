@@ -1,7 +1,6 @@
 """Lifecycle of an engine: what it declares, its World from build to destruction, resets, steps and states."""
 
 import threading
-from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from typing import Any, ClassVar, Self
@@ -10,6 +9,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine import arguments
+from anysim.engine.availability import LibraryRequirement
 from anysim.engine.capability import Allowance, Capabilities, Capability, Need, check
 from anysim.engine.control import CommandBuffer
 from anysim.engine.doctor import Finding
@@ -41,6 +41,9 @@ class EngineLifecycle(Primitives):
     """What it can do with an entity after the build; all but P3 goes with Capability.VARYING_ENTITIES."""
     parallel: ClassVar[bool] = False
     """Whether it steps its envs on several cores by itself, so that more processes (`shards: auto`) gain nothing."""
+    library: ClassVar[LibraryRequirement | None] = None
+    """What it is built on, None for nothing that could be missing."""
+    options_type: ClassVar[type[EngineOptions] | None] = None
     audit_allowances: ClassVar[Mapping[str, Allowance]] = {}
     """By quantity of the audit what the engine declares to be off; all else is taken over to single precision."""
 
@@ -54,14 +57,14 @@ class EngineLifecycle(Primitives):
     # ------------------------------------------------------------------ what it is
 
     @classmethod
-    @abstractmethod
     def availability(cls) -> Availability:
-        """Whether it can run here. Imports nothing heavy and never raises."""
+        """Whether it can run here, by the installed version of its library. Imports nothing heavy and never raises."""
+        return Availability(True) if cls.library is None else cls.library.availability()
 
     @classmethod
     def options_model(cls) -> Any:
-        """The pydantic model of the engine's options, or None if it has none."""
-        return None
+        """The pydantic model of the engine's options, or None if it has none: the type of its attribute `options`."""
+        return cls.options_type
 
     @classmethod
     def findings(cls) -> Sequence[Finding]:

@@ -23,7 +23,7 @@ def _objects(*coefficients, ground=0.8):
 def _gaps(engine):
     """What Bullet has less what the rule wants, for the pairs of shapes that meet."""
     rules = engine._envs.plan.rules
-    friction = engine._envs.parameters.friction[0, rules.geoms]
+    friction = engine._envs.parameters.values["geom.friction"][0, rules.geoms]
     values = rules.numbers(friction, np.zeros(len(friction))).friction
     return (np.multiply.outer(values, values) - rules.pair_friction(friction))[rules.weight > 0]
 
@@ -50,7 +50,7 @@ def test_changed_frictions_come_near(build):
     engine = build(_objects(0.8, 0.8, 0.8, 0.8))
     engine.set_parameters("geom.friction", [[0.8, 0.2, 0.2, 0.5, 1.0]])
     rules = engine._envs.plan.rules
-    friction = engine._envs.parameters.friction[0, rules.geoms]
+    friction = engine._envs.parameters.values["geom.friction"][0, rules.geoms]
     numbers = rules.numbers(friction, np.zeros(len(friction))).friction
     assert numbers[0] * numbers[1:] == pytest.approx([0.8, 0.8, 0.8, 1.0], abs=0.006)
     assert np.abs(_gaps(engine)).max() < 0.45

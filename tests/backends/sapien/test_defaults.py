@@ -26,7 +26,7 @@ def spinner(**joint):
 def test_every_default_that_acts_on_bodies_and_joints_is_set(make):
     """A value that PhysX would choose itself shows up here with its own default."""
     engine = make(worlds.scene())
-    scene = engine._scenes[0]
+    scene = engine._envs.scenes[0]
     for body, component in zip(engine.world.bodies, scene.bodies, strict=True):
         if body.kind == "static" and body.name != "arm.base":
             continue
@@ -97,7 +97,7 @@ def test_scenes_live_as_long_as_the_engine(make):
 def test_joints_are_found_by_name(make):
     """PhysX sorts degrees of freedom breadth first; the World goes depth first."""
     engine = make(worlds.tree())
-    order = engine._scenes[0].trees[0].joints.tolist()
+    order = engine._envs.scenes[0].trees[0].joints.tolist()
     assert order != sorted(order), "this world does not show the difference"
     engine.set_joint_state([[0.1, 0.2, 0.3, 0.4]])
     assert engine.get_state().joint_pos[0] == pytest.approx([0.1, 0.2, 0.3, 0.4])
@@ -110,7 +110,7 @@ def test_no_material_is_shared(make):
     before = physx.get_default_material().static_friction
     engine = make(worlds.scene(), 2)
     engine.set_parameters("geom.friction", 0.123)
-    materials = [shape.physical_material for s in engine._scenes for shapes in s.shapes for shape in shapes]
+    materials = [shape.physical_material for s in engine._envs.scenes for shapes in s.shapes for shape in shapes]
     assert physx.get_default_material().static_friction == before
     assert len({id(material) for material in materials}) == len(materials)
 

@@ -14,7 +14,6 @@ from anysim.testing import worlds
 from anysim_sapien import diagnosis, vulkan
 from anysim_sapien.engine import SapienEngine
 from anysim_sapien.options import OWN_SCENERY
-from anysim_sapien.render import Painter
 from anysim_schemas.run import WorldSpec
 
 NOTHING = "/no/such/driver.json"
@@ -127,9 +126,8 @@ def test_a_driver_in_software_gets_the_cheap_shader(make):
     computes = any(word in device.name.lower() for word in ("swiftshader", "llvmpipe"))
     assert device.is_cpu == computes
     assert where == ("in software" if computes else "on the GPU")
-    assert Painter(engine.world, engine._layout, engine._looks, engine.options)._shader == (
-        "lit" if computes else "default"
-    )
+    painter = engine._envs.painter()
+    assert painter._shader == ("lit" if computes else "default")
 
 
 def test_faces_are_as_bright_as_light_falls_on_them():

@@ -31,7 +31,7 @@ def _busy(engine):
 
 
 def _journal(engine, env=0):
-    return engine._scenes[env].journal.rows()
+    return engine._envs.scenes[env].journal.rows()
 
 
 def test_a_restored_scene_has_the_journal_of_the_one_before(make):
@@ -55,12 +55,12 @@ def test_a_journal_is_as_short_as_what_was_done(make):
     """Commands that stay, and steps that follow each other, take no room."""
     engine = make(worlds.scene())
     engine.step(5)
-    before = engine._scenes[0].journal.size
+    before = engine._envs.scenes[0].journal.size
     target = engine.control.position
     for _ in range(50):
         engine.set_control(position=target)
         engine.step(3)
-    assert engine._scenes[0].journal.size == before
+    assert engine._envs.scenes[0].journal.size == before
     engine.set_control(position=target + 0.1)
     engine.step(1)
     added = len(_journal(engine)) - before // 8
@@ -87,7 +87,7 @@ def test_scenes_are_renewed_at_the_same_instants_however_they_are_stepped(make):
     assert_same(read(beside, [0]), read(one), "beside others")
     assert_same(read(beside, [1]), read(one), "in parts")
     assert_same(read(beside, [2]), read(one), "in other parts")
-    assert one._scenes[0].journal.steps == 10
+    assert one._envs.scenes[0].journal.steps == 10
     assert np.abs(read(plain)["body_pose"] - read(one)["body_pose"]).max() < 2e-3
     assert not np.array_equal(read(plain)["body_pose"], read(one)["body_pose"]), "scenes were not renewed at all"
 
@@ -119,7 +119,7 @@ def test_a_journal_stays_bounded_where_nothing_steps(make):
     sizes = []
     for k in range(400):
         engine.set_joint_state(position=[[0.001 * k, 0.0]])
-        sizes.append(engine._scenes[0].journal.size)
+        sizes.append(engine._envs.scenes[0].journal.size)
     assert max(sizes) < 60 * 8 * (2 + 2 + 2 * len(engine.world.joints)) + 2000
     assert np.allclose(engine.get_state().joint_pos, [[0.399, 0.0]], atol=1e-6)
 
@@ -132,7 +132,7 @@ def test_a_resting_stack_does_not_feel_a_renewal(make):
     engine.step(1)
     engine.step(1)
     after = read(engine)
-    assert engine._scenes[0].journal.steps == 1, "the scene was not renewed"
+    assert engine._envs.scenes[0].journal.steps == 1, "the scene was not renewed"
     assert np.abs(after["body_pose"] - before["body_pose"]).max() < 2e-5
 
 

@@ -39,7 +39,7 @@ def _several():
 
 def _agrees(engine, env):
     """Poses, joints and velocities of an env, as its scene packs them, are those of the getters, and none is 0."""
-    scene = engine._scenes[env]
+    scene = engine._envs.scenes[env]
     scene.packing.check(scene)
     assert all(scene.velocities()[scene.layout.free].any(axis=1))
     assert all(scene.joint_velocities()[scene.layout.joint_there])
@@ -71,7 +71,7 @@ def test_packed_numbers_of_what_is_there(make):
         engine.set_body_state(twist=[0.1, 0.2, 0.3, 0.4, 0.5, 0.6], bodies=free)
         engine.set_joint_state(velocity=0.1)
         engine.step(2)
-        sizes = {scene.packing.size for scene in engine._scenes}
+        sizes = {scene.packing.size for scene in engine._envs.scenes}
         assert len(sizes) == 3, "the envs do not differ"
         for env in range(3):
             _agrees(engine, env)
@@ -194,7 +194,7 @@ def test_twists_follow_a_centre_of_mass_that_moves(make):
     engine.set_body_state(twist=[0.0, 0.0, 0.0, 0.0, 0.0, 1.0], bodies=free)
     for _ in range(2):
         engine.set_parameters("body.com", engine.get_parameters("body.com", indices=free) + 0.03, indices=free)
-        state, scene = engine.get_state(), engine._scenes[0]
+        state, scene = engine.get_state(), engine._envs.scenes[0]
         for body in free:
             arm = P.rotate(state.body_pose[0, body, 3:], engine.get_parameters("body.com")[0, body])
             wanted = scene.bodies[body].linear_velocity - P.cross(

@@ -17,7 +17,7 @@ def test_packed_poses_are_the_entities_poses(make):
     engine = make(worlds.tree())
     spread(engine)
     engine.step(10)
-    scene = engine._scenes[0]
+    scene = engine._envs.scenes[0]
     wanted = [[*e.pose.p, *np.asarray(e.pose.q)[[1, 2, 3, 0]]] for e in scene.entities]
     assert np.array_equal(scene.poses(), np.array(wanted, dtype=float))
 
@@ -41,7 +41,7 @@ def test_twists_of_links_agree_with_physx_at_rest_of_the_step(make):
     """Our sums over joints are PhysX' own velocities, where no step lies between velocity and pose."""
     engine = make(worlds.tree())
     engine.set_joint_state([[0.1, -0.2, 0.3, 0.4]], [[0.5, -0.3, 0.7, 0.2]])
-    scene, twist = engine._scenes[0], engine.get_state().body_twist[0]
+    scene, twist = engine._envs.scenes[0], engine.get_state().body_twist[0]
     for tree in scene.trees:
         for body in tree.bodies[1:]:
             assert twist[body, 3:] == pytest.approx(scene.bodies[body].angular_velocity, abs=1e-5)

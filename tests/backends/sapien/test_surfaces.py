@@ -141,7 +141,7 @@ def test_friction_of_bouncing_pairs(make):
     s.ground(Surface(friction=0.9))
     s.free("ball", Sphere(0.1), (0.0, 0.0, 0.6), surface=Surface(friction=0.1, restitution=0.8))
     engine = make(s.world())
-    touches = {copy.touch for copies in engine._scenes[0].copies.values() for copy in copies}
+    touches = {copy.touch for copies in engine._envs.scenes[0].copies.values() for copy in copies}
     assert touches == {(0.9, 0.8)}
 
 

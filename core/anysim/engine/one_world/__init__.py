@@ -1,0 +1,1 @@
+"""Engines whose library has a world of its own for each env."""
