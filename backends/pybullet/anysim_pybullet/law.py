@@ -13,7 +13,7 @@ from anysim.engine.control import EFFORT, Control, acting_gains
 from anysim.engine.requirements import speed_bound
 from anysim.kinematics.dynamics import drag, gain
 from anysim.model.world import Actuation, World
-from anysim_pybullet import kernels as K
+from anysim_pybullet import kernels as K, reading
 from anysim_pybullet.client import Env
 from anysim_pybullet.lift import Lift, Lifter
 from anysim_pybullet.motors import Motors, feed
@@ -298,8 +298,8 @@ class Pusher:
 
     def _free_root(self, tree: Tree, place: Any, turn: Any, velocity: Any, root: Array) -> None:
         pose, twist = np.zeros((1, 7)), np.zeros((1, 6))
-        row = np.array([[*place, *turn, *velocity[0], *velocity[1], *K.UNUSED]])
-        K.frames(row, self._env.local[tree.bodies[:1]], 1, pose, twist)
+        row = np.array([[*place, *turn, *velocity[0], *velocity[1], *reading.UNUSED]])
+        reading.frames(row, self._env.local[tree.bodies[:1]], 1, pose, twist)
         root[:7], root[7:] = pose[0], twist[0]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.model.world import World
-from anysim_pybullet import kernels as K
+from anysim_pybullet import reading
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.client import Env
 from anysim_pybullet.law import Laws
@@ -88,7 +88,7 @@ class Mirror:
                 uid = env.root_ids[number]
                 place, turn = p.getBasePositionAndOrientation(uid, physicsClientId=client)
                 linear, angular = p.getBaseVelocity(uid, physicsClientId=client)
-                numbers += place + turn + linear + angular + K.UNUSED
+                numbers += place + turn + linear + angular + reading.UNUSED
         for number, _ in cast.linked:
             uid, links = env.root_ids[number], env.tree_links[number]
             if everything:
@@ -105,7 +105,7 @@ class Mirror:
         if not everything:
             bodies, roots, joints = cast.links, 0, _NONE
         pose, twist, rates = self.pose[index], self.twist[index], self.velocity[index]
-        K.take(
+        reading.take(
             packed,
             env.local,
             bodies,
@@ -119,7 +119,7 @@ class Mirror:
             self._motor[index],
             self._laws.effort[index],
         )
-        if not K.within(FAR, FAST, pose, twist, rates):
+        if not reading.within(FAR, FAST, pose, twist, rates):
             self.fault[index] = True
 
 
