@@ -10,21 +10,18 @@ from weakref import WeakSet
 
 import numpy as np
 
-from anysim.conventions import WORLD, Array, wxyz_from_xyzw
-from anysim.kinematics.dynamics import gain
+from anysim.conventions import WORLD, Array
 from anysim.model.world import Body, BodyKind, JointType, Solver
 from anysim_sapien.exclusions import Group
-from anysim_sapien.journal import Journal, Op
+from anysim_sapien.journal import Op
 from anysim_sapien.library import physx, sapien
 from anysim_sapien.packing import Packing, pack
+from anysim_sapien.parts import SceneParts, Tree
 from anysim_sapien.recipe import Recipe, Values, tendon_of
-from anysim_sapien.shapes import make_shape, to_pose
+from anysim_sapien.shapes import make_shape
 
 FAST = 1e9
 """Stands for no limit where PhysX has a highest speed: 100 m/s and 50 rad/s by default."""
-
-STICKING = 1e6
-"""Damping of a dry joint [N m s/rad]: what it may exert is bounded by the friction, so it only has to be large."""
 
 COUPLING = 1e6
 """Stiffness of a mimic joint's tendon [N m/rad or N/m], taken implicitly."""
@@ -33,16 +30,6 @@ UNBOUNDED = 3.4e38
 
 _configuring = threading.Lock()
 """PhysX takes the configuration of a scene from a global, at the moment the scene is made."""
-
-
-class Tree(NamedTuple):
-    """An articulation: its handle, its bodies, and its joints in the order of PhysX' degrees of freedom."""
-
-    handle: Any
-    bodies: tuple[int, ...]
-    joints: Array
-    force: Array
-    """(n,) float32, for what joints are given in a substep."""
 
 
 class Left(NamedTuple):
@@ -54,37 +41,23 @@ class Left(NamedTuple):
     """Per articulation those of the joints (n, 6) [N, N m]."""
 
 
-class EnvScene:
+class EnvScene(SceneParts):
     """A scene, and its parts in the World's order."""
 
     alive: ClassVar[WeakSet["EnvScene"]] = WeakSet()
     """Scenes that somebody still holds."""
 
     def __init__(self, recipe: Recipe, values: Values) -> None:
+        super().__init__(recipe)
         world = recipe.world
         EnvScene.alive.add(self)
-        self.recipe = recipe
         self.values = Values(*(np.array(part) for part in values))
         """The parameters that it was built with."""
-        self.journal = Journal()
-        """What was done to it since it was built."""
-        # as PhysX has them: what a snapshot says of them is what was read from PhysX. None is changed in place, so that
-        # what a substep found can be kept without a copy
-        self.mass, self.rubbing = np.zeros(len(world.bodies)), np.zeros(len(world.joints))
-        """Masses (B,) [kg] and dry friction (J,) [N m] or [N] as they are now."""
-        self.com = np.zeros((len(world.bodies), 3))
-        """(B, 3) [m] centres of mass in the bodies' frames, as they are now."""
-        self.slowing = np.zeros((len(world.bodies), 2))
-        """(B, 2) [1/s] what PhysX takes off velocities and rates in a step, over the step."""
         self.gravity = _single(self.values.gravity)
         """[m/s^2], as PhysX has it."""
         self.system = _system(recipe, values.gravity)
         self.scene: Any = sapien.Scene([self.system])
-        self.layout = recipe.layout
-        self.bodies: list[Any] = [None] * len(world.bodies)
-        self.entities: list[Any] = [None] * len(world.bodies)
         self.shapes: list[list[Any]] = [[] for _ in world.geoms]
-        self.dry: dict[int, Any] = {}
         self.copies = recipe.copies(values.geom_friction, values.geom_restitution)
         """What the shapes of each geom that collides must be."""
         self.body_of: dict[Any, int] = {}
@@ -95,10 +68,10 @@ class EnvScene:
             self._enter(WORLD, physx.PhysxRigidStaticComponent(), sapien.Pose())
         for body in recipe.layout.actors:
             self._actor(body)
-        self.trees = [self._tree(members) for members in recipe.layout.trees]
+        for members in recipe.layout.trees:
+            self._add_tree(members)
         self._links = [self.bodies[body] for body in recipe.layout.links]
         self._order: list[Array] | None = None
-        self.joints = self._joints()
         for index in np.flatnonzero((values.joint_friction > 0) & self.layout.joint_there):
             self.set_dry(int(index), float(values.joint_friction[index]))
         self.place_joints(recipe.common.initial, np.zeros(len(world.joints)))
@@ -125,9 +98,7 @@ class EnvScene:
         entity.add_component(component)
         entity.set_pose(pose)
         self.body_of[component] = body
-        if body == WORLD:
-            self._ground = component
-        else:
+        if body != WORLD:
             self.bodies[body], self.entities[body] = component, entity
             if not isinstance(component, physx.PhysxRigidStaticComponent):
                 self.set_inertial(body, self.values.mass[body], self.values.com[body], self.values.inertia[body])
@@ -162,7 +133,7 @@ class EnvScene:
         component.set_max_depenetration_velocity(self.recipe.options.depenetration_velocity if own is None else own)
         component.set_disable_gravity(body.gravity_compensation)
 
-    def _tree(self, members: tuple[int, ...]) -> Tree:
+    def _add_tree(self, members: tuple[int, ...]) -> None:
         recipe, world = self.recipe, self.recipe.world
         made: dict[int, Any] = {}
         for body in members:
@@ -191,7 +162,9 @@ class EnvScene:
         # PhysX sorts the degrees of freedom in its own way: only names tell
         order = np.array([int(joint.name) for joint in handle.active_joints], dtype=int)
         self._tendons(handle, order)
-        return Tree(handle, members, order, np.zeros(len(order), dtype=np.float32))
+        self.trees.append(Tree(handle, members, order, np.zeros(len(order), dtype=np.float32)))
+        for index, joint in zip(order.tolist(), handle.active_joints, strict=True):
+            self.joints[index] = joint
 
     def _join(self, body: int) -> None:
         """Say where a link's joint is, which must follow what moves centres of mass.
@@ -219,124 +192,17 @@ class EnvScene:
                     damping=0.0,
                 )
 
-    def _joints(self) -> list[Any]:
-        joints: list[Any] = [None] * len(self.recipe.world.joints)
-        for tree in self.trees:
-            for index, joint in zip(tree.joints, tree.handle.active_joints, strict=True):
-                joints[int(index)] = joint
-        return joints
+    # ------------------------------------------------------------------ changing and reading
 
-    # ------------------------------------------------------------------ changing
-
-    def _note(self, op: Op, *numbers: Array | float) -> None:
-        """Have the journal know of a change that is about to be made."""
+    def note(self, op: Op, *numbers: Array | float) -> None:
         self.left()
         self._packed = None
-        self.journal.note(op, *numbers)
+        super().note(op, *numbers)
 
     def stepped(self, n: int) -> None:
         """Have the journal know of steps that were made."""
         self._packed = self._left = None
         self.journal.stepped(n)
-
-    def set_inertial(self, body: int, mass: float, com: Array, inertia: Array) -> None:
-        """Mass [kg], centre of mass [m] and inertia about it (6,) [kg m^2], in the body's frame."""
-        self._note(Op.INERTIAL, body, mass, com, inertia)
-        component = self.bodies[body]
-        if self.recipe.layout.fixed[body]:
-            # the root of a fixed articulation: it cannot move, and PhysX wants positive numbers
-            component.set_mass(max(float(mass), 1e-3))
-            component.set_inertia([1e-3, 1e-3, 1e-3])
-            component.set_cmass_local_pose(sapien.Pose())
-            return
-        moments, frame = self.recipe.common.principal(body, inertia)
-        component.set_mass(float(mass))
-        self.mass = _with(self.mass, body, component.mass)  # PhysX keeps its inverse, in single precision
-        component.set_inertia(moments.tolist())
-        component.set_cmass_local_pose(sapien.Pose(com, wxyz_from_xyzw(frame)))
-        self.com = _with(self.com, body, component.cmass_local_pose.p)
-
-    def set_damping(self, body: int, rates: Array) -> None:
-        """Rates (2,) [1/s] at which a free body slows down.
-
-        PhysX takes a share of `damping dt` in each step; this share is that of an exponential.
-        """
-        self._note(Op.DAMPING, body, rates)
-        linear, angular = gain(rates, self.recipe.world.physics.dt).tolist()
-        self.bodies[body].set_linear_damping(linear)
-        self.bodies[body].set_angular_damping(angular)
-        damping = self.bodies[body].linear_damping, self.bodies[body].angular_damping
-        self.slowing = _with(self.slowing, body, damping)
-
-    def set_dry(self, index: int, friction: float) -> None:
-        """Dry friction [N m] or [N] of a joint: a drive to standstill that may exert this much and no more."""
-        world = self.recipe.world
-        spec = world.joints[index]
-        self._note(Op.DRY, index, friction)
-        drive = self.dry.get(index)
-        if drive is None:
-            if friction == 0.0:
-                return  # no drive, no friction
-            drive = physx.PhysxDriveComponent(self.bodies[spec.body])
-            drive.set_parent(self.bodies[world.bodies[spec.body].parent])
-            in_parent, in_child = self.recipe.common.frames[index]
-            drive.set_pose_in_parent(in_parent)
-            drive.set_pose_in_child(in_child)
-            self.entities[spec.body].add_component(drive)
-            self.dry[index] = drive
-        # PhysX bounds the impulse of these drives, not the force
-        bound = friction * world.physics.dt
-        self.rubbing = _with(self.rubbing, index, float(np.float32(bound)) / world.physics.dt)
-        if spec.type is JointType.PRISMATIC:
-            drive.set_drive_property_x(0.0, STICKING, bound, "force")
-        else:
-            drive.set_drive_property_twist(0.0, STICKING, bound, "force")
-
-    def dry_friction(self, index: int) -> float:
-        """The dry friction [N m] or [N] that a joint has."""
-        drive = self.dry.get(index)
-        if drive is None:
-            return 0.0
-        sliding = self.recipe.world.joints[index].type is JointType.PRISMATIC
-        properties = drive.get_drive_property_x() if sliding else drive.get_drive_property_twist()
-        return float(properties[2]) / self.recipe.world.physics.dt
-
-    def set_armature(self, index: int, armature: float) -> None:
-        """Armature [kg m^2] or [kg] of a joint."""
-        self._note(Op.ARMATURE, index, armature)
-        self.joints[index].set_armature(np.array([armature], dtype=np.float32))
-
-    def place_body(self, body: int, pose: Array) -> None:
-        """Write the pose (7,) of a root body's frame."""
-        self._note(Op.POSE, body, pose)
-        self.entities[body].set_pose(to_pose(pose))
-
-    def push_body(self, body: int, linear: Array, rate: Array) -> None:
-        """Write the velocity of a free root's centre of mass [m/s], and its angular rate [rad/s], world axes."""
-        self._note(Op.VELOCITY, body, linear, rate)
-        tree = self.recipe.layout.tree_of[body]
-        if tree >= 0:
-            self.trees[tree].handle.set_root_linear_velocity(linear)
-            self.trees[tree].handle.set_root_angular_velocity(rate)
-        else:
-            self.bodies[body].set_linear_velocity(linear)
-            self.bodies[body].set_angular_velocity(rate)
-
-    def place_joints(self, position: Array | None, velocity: Array | None) -> None:
-        """Write all joint positions and velocities (J,)."""
-        nothing = np.zeros(len(self.recipe.world.joints))
-        self._note(
-            Op.JOINTS,
-            position is not None,
-            velocity is not None,
-            nothing if position is None else position,
-            nothing if velocity is None else velocity,
-        )
-        for tree in self.trees:
-            if position is not None:
-                tree.handle.set_qpos(position[tree.joints].astype(np.float32))
-            if velocity is not None:
-                tree.handle.set_qvel(velocity[tree.joints].astype(np.float32))
 
     def link_order(self) -> list[Array]:
         """Per articulation the World's bodies in PhysX' order of its links."""
@@ -387,13 +253,6 @@ class EnvScene:
 
     def _taken(self, places: Array) -> Array:
         return np.frombuffer(self.packed(), dtype=np.float32).take(places).astype(float)
-
-
-def _with(values: Array, row: int, value: Any) -> Array:
-    """A copy with another row."""
-    values = values.copy()
-    values[row] = value
-    return values
 
 
 def _single(values: Array) -> Array:
