@@ -4,11 +4,13 @@ import os
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from anysim.testing.engines import require_engine
 
+ROOT = Path(__file__).parents[2]
 SUMMARY = re.compile(
     r"anysim contract: engine (\S+) (\S+?)(?: in \d+ shards)?: "
     r"(\d+) passed(?:, (\d+) failed)?, (\d+) skipped(?: \((.*)\))?"
@@ -45,6 +47,12 @@ def test_the_null_engine_passes(tmp_path):
     counts = dict(part.rsplit(": ", 1) for part in why.split(", "))
     assert set(counts) == {"contact points", "dynamics", "external wrenches", "raycast", "render: rgb"}
     assert sum(map(int, counts.values())) == skipped
+
+
+def test_the_smallest_engine_with_one_world_per_env_passes():
+    passed, skipped, _ = _summary(_run(ROOT, "--engine", "tests.engine.drifting:DriftingEngine"))
+    assert passed > 35
+    assert skipped > 400
 
 
 DYNAMIC = {

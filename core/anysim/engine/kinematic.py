@@ -23,10 +23,7 @@ from anysim.engine.presence import Lifecycle
 from anysim.engine.state import Availability, SnapshotLevel
 from anysim.math import pose as P
 from anysim.model.forward_kinematics import forward_kinematics
-from anysim.model.world import BodyKind, JointType, Scenery, World
-
-_UNSEEN = Scenery(background=(0.0, 0.0, 0.0), ambient=(0.0, 0.0, 0.0), shadows=False)
-"""Surroundings of an engine that does not draw."""
+from anysim.model.world import BodyKind, JointType, World
 
 _IGNORED = "ignored: kinematic engine"
 
@@ -95,7 +92,7 @@ class NullEngine(SimEngine):
         self._driven = np.array([a.joint for a in world.actuators], dtype=int)
         self._followers = [(i, j.mimic) for i, j in enumerate(world.joints) if j.mimic is not None]
         self._control: Control | None = None
-        self._table = ParameterTable(world, n, _UNSEEN)
+        self._table = ParameterTable(world, n)
 
     def _free(self) -> None:
         del self._roots, self._twists, self._position, self._velocity, self._table, self._control

@@ -42,7 +42,7 @@ class EngineLifecycle(Primitives):
     parallel: ClassVar[bool] = False
     """Whether it steps its envs on several cores by itself, so that more processes (`shards: auto`) gain nothing."""
     library: ClassVar[LibraryRequirement | None] = None
-    """What it is built on, None for nothing that could be missing."""
+    """What it is built on; an engine without one overrides `availability`."""
     options_type: ClassVar[type[EngineOptions] | None] = None
     audit_allowances: ClassVar[Mapping[str, Allowance]] = {}
     """By quantity of the audit what the engine declares to be off; all else is taken over to single precision."""
@@ -59,7 +59,8 @@ class EngineLifecycle(Primitives):
     @classmethod
     def availability(cls) -> Availability:
         """Whether it can run here, by the installed version of its library. Imports nothing heavy and never raises."""
-        return Availability(True) if cls.library is None else cls.library.availability()
+        unnamed = Availability(False, missing=(f"{cls.name} names no library",))
+        return unnamed if cls.library is None else cls.library.availability()
 
     @classmethod
     def options_model(cls) -> Any:

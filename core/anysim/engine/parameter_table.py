@@ -9,6 +9,9 @@ from anysim.engine.lighting import Looks
 from anysim.engine.parameters import PARAMETERS, nominal
 from anysim.model.world import Scenery, World
 
+UNSEEN = Scenery(background=(0.0, 0.0, 0.0), ambient=(0.0, 0.0, 0.0), shadows=False)
+"""Surroundings of an engine that does not draw."""
+
 
 class ParameterTable:
     """Reads and writes parameters by name; what is given to a library, and what it made of it, is a backend's to add.
@@ -18,7 +21,9 @@ class ParameterTable:
         looks: lights and surroundings, of which a library learns when it draws.
     """
 
-    def __init__(self, world: World, num_envs: int, own: Scenery, kept: Mapping[str, Array] | None = None) -> None:
+    def __init__(
+        self, world: World, num_envs: int, own: Scenery = UNSEEN, kept: Mapping[str, Array] | None = None
+    ) -> None:
         """`own` is what the engine draws where the World says nothing, `kept` the arrays that are made already."""
         self.world, self.looks = world, Looks(world, num_envs, own)
         self._built = {name: nominal(name, world) for name in PARAMETERS if name not in self.looks}
