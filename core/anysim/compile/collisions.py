@@ -12,8 +12,9 @@ from anysim.errors import AssetError, Issues, NameLookupError, listing, suggest
 from anysim.math import pose as P
 from anysim.model.frames import find_bodies
 from anysim.model.hash import split
+from anysim.model.pairs import could_meet
 from anysim.model.slots import members
-from anysim.model.world import BodyKind, Box, Capsule, Cylinder, Geom, Shape, Sphere, World
+from anysim.model.world import Box, Capsule, Cylinder, Geom, Shape, Sphere, World
 from anysim_schemas.collisions import CollisionsSpec
 from anysim_schemas.robot_model import SolidSpec
 
@@ -25,12 +26,13 @@ def with_exclusions(world: World, spec: CollisionsSpec, issues: Issues) -> World
     """The World without the collisions that a spec excludes; `issues` is at the path of `collisions`."""
     groups = {name: _group(world, name, members, issues.at("groups", name)) for name, members in spec.groups.items()}
     pairs: set[tuple[int, int]] = set()
+    meet = could_meet(world, np.append(np.arange(len(world.bodies)), WORLD))  # the world is the last row
     for i, pair in enumerate(spec.exclude):
         first, second = (_members(world, name, groups, issues.at("exclude", i, k)) for k, name in enumerate(pair))
         alone = pair[0] == pair[1] and pair[0] not in groups and len(first) == 1
         for (name, bodies), (other, others) in product(first.items(), second.items()):
             if name != other or alone:
-                pairs |= {(min(a, b), max(a, b)) for a, b in product(bodies, others) if _could_meet(world, a, b)}
+                pairs |= {(min(a, b), max(a, b)) for a, b in product(bodies, others) if meet[a, b]}
     return replace(world, excluded_pairs=world.excluded_pairs | pairs)
 
 
@@ -62,18 +64,6 @@ def _members(world: World, name: str, groups: Mapping[str, Members], issues: Iss
             what = "entity or group" if groups else "entity"
             issues.add("", f"there is no {what} '{owner}'{suggest(owner, [*names, *groups])} ({known})")
         return {}
-
-
-def _could_meet(world: World, a: int, b: int) -> bool:
-    """Whether two bodies collide unless they are excluded."""
-    if a == b:
-        return False
-    fixed = [body == WORLD or world.bodies[body].kind is BodyKind.STATIC for body in (a, b)]
-    related = any(
-        x != WORLD and world.bodies[x].kind is BodyKind.LINK and world.bodies[x].parent == y
-        for x, y in ((a, b), (b, a))
-    )
-    return not (all(fixed) or related)
 
 
 def with_solids(model: ImportedModel, solids: Mapping[str, Sequence[SolidSpec]]) -> ImportedModel:

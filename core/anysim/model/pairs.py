@@ -7,26 +7,29 @@ from anysim.model.parts import BodyKind, ContactSensor
 from anysim.model.world import World
 
 
-def may_meet(world: World, bodies: Array) -> Array:
-    """(K, K) bool: whether geoms on these bodies (K,), -1 for the world's own, can ever touch.
+def could_meet(world: World, bodies: Array) -> Array:
+    """(K, K) bool: whether these bodies (K,), -1 for the world, collide unless they are excluded.
 
-    Not those of one body, of a link and its parent, of two fixed bodies, of an excluded pair, nor those of two entities
-    of one slot, of which at most one is there at a time.
+    One body does not with itself, nor a link with its parent, nor what is fixed with what is fixed.
     """
     parts = [None if body == WORLD else world.bodies[body] for body in bodies.tolist()]
     still = np.array([part is None or part.kind is BodyKind.STATIC for part in parts], dtype=bool)
     parent = np.array([-2 if part is None or part.kind is not BodyKind.LINK else part.parent for part in parts])
+    child = parent[:, None] == bodies
+    return ~((bodies[:, None] == bodies) | (still[:, None] & still) | child | child.T)
+
+
+def may_meet(world: World, bodies: Array) -> Array:
+    """(K, K) bool: `could_meet`, without excluded pairs, and without two entities of one slot: one of them is there."""
     entity = np.append(np.array(world.body_entity, dtype=int), -1)[bodies]
     slot = np.full(len(world.entities) + 1, -1)  # the last one for what belongs to no entity
     for number, one in enumerate(world.slots):
         slot[list(one.entities)] = number
-    child, apart = parent[:, None] == bodies, (bodies[:, None] == bodies) | (still[:, None] & still)
-    apart |= child | child.T
-    apart |= (slot[entity][:, None] == slot[entity]) & (slot[entity] >= 0) & (entity[:, None] != entity)
+    apart = (slot[entity][:, None] == slot[entity]) & (slot[entity] >= 0) & (entity[:, None] != entity)
     excluded = np.zeros((len(world.bodies) + 1,) * 2, dtype=bool)
     for low, high in world.excluded_pairs:
         excluded[low, high] = excluded[high, low] = True  # the world is the last row, by its index of -1
-    return ~(apart | excluded[np.ix_(bodies, bodies)])
+    return could_meet(world, bodies) & ~(apart | excluded[np.ix_(bodies, bodies)])
 
 
 def pair_friction(friction: Array, priority: Array) -> Array:

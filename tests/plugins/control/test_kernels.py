@@ -1,6 +1,4 @@
-"""The kernels one by one: canonical chains, Jacobian, generator, linear solve, compilation without a cache."""
-
-from typing import Any
+"""The kernels one by one: canonical chains, Jacobian, generator, linear solve."""
 
 import numpy as np
 import pytest
@@ -9,7 +7,7 @@ from anysim.kinematics.chain import Chain
 from anysim.math import pose as P
 from anysim.model.world import JointType, World
 from anysim.testing.arms import Link, panda_arm, serial_arm
-from anysim_control.batch import compiled, kernels
+from anysim_control.batch import kernels
 from anysim_control.batch.frames import canonical_frames
 from anysim_control.batch.starts import start_position, uniform
 
@@ -176,24 +174,3 @@ def test_the_kernels_in_use_have_the_starts_of_the_source() -> None:
         assert found.tolist() in starts, "machine code of other starts: delete numba's cache, or touch kernels.py"
         restarted += found.tolist() != starts[0]
     assert restarted > 5
-
-
-def test_kernels_compile_where_no_cache_can_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
-    real = compiled.njit
-
-    def without_a_place(cache: bool = False, **options: Any) -> Any:
-        if cache:
-            raise RuntimeError("cannot cache function 'f': no locator available for file 'f.py'")
-        return real(**options)
-
-    monkeypatch.setattr(compiled, "njit", without_a_place)
-    assert compiled.compiled(lambda x: x + 1)(1) == 2
-
-
-def test_other_compilation_faults_are_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(**options: Any) -> Any:
-        raise RuntimeError("out of order")
-
-    monkeypatch.setattr(compiled, "njit", broken)
-    with pytest.raises(RuntimeError, match="out of order"):
-        compiled.compiled(lambda x: x)

@@ -30,9 +30,7 @@ class Painter(Protocol):
     ) -> dict[str, Array]:
         """Images as `SimEngine.render` says.
 
-        Args:
-            skins: colour (E, G, 4), texture and material (E, G) of the geoms.
-            there: (E, B) bool, the bodies that are there.
+        `skins` are colour (E, G, 4), texture and material (E, G) of the geoms; `there` (E, B) are the bodies there.
         """
         ...
 
@@ -48,13 +46,11 @@ class EnvWorlds(ABC):
     loses its memory when it is built anew calls `last.settle(env)` before.
 
     Attributes:
-        world: the World.
         last: what the last substep of each env left.
         lost: (N,) bool, envs that were given up: they are not stepped until a reset.
         parameters: those of all envs.
     """
 
-    world: World
     last: LastSubstep
     lost: Array
     parameters: ParameterTable
@@ -213,10 +209,13 @@ class OneWorldPerEnv(SimEngine):
 
     def _carry_rows(self) -> CarriedSubstep:
         last = self._envs.last
-        return CarriedSubstep(self._read("body_pose"), self._read("body_twist"), last.efforts(), last.contacts())
+        return CarriedSubstep(self._motion(), last.efforts(), last.contacts())
 
     def _take_rows(self, carried: CarriedSubstep, old: World) -> None:
-        self._envs.last.take(carried, old, self._envs.read("body_pose"), self._envs.read("body_twist"))
+        self._envs.last.take(carried, old, self._motion())
+
+    def _motion(self) -> Array:
+        return np.concatenate([self._read("body_pose"), self._read("body_twist")], axis=-1)
 
     # ------------------------------------------------------------------ sensing
 

@@ -31,14 +31,14 @@ class LastSubstep:
         self.effort = np.zeros((num_envs, len(world.joints)))
         self.contact = np.zeros((num_envs, len(world.contact_sensors), 3))
         self._motion = np.zeros((num_envs, len(world.bodies), 13))
-        self._unknown_effort: set[int] = set()
-        self._unknown_contact: set[int] = set()
+        self._no_effort: set[int] = set()
+        self._no_contact: set[int] = set()
         self._held: set[int] = set()
 
     def stepped(self, env: int) -> None:
         """Everything of this env is new."""
-        self._unknown_effort.add(env)
-        self._unknown_contact.add(env)
+        self._no_effort.add(env)
+        self._no_contact.add(env)
         self._held.discard(env)
 
     def touch(self, env: int) -> None:
@@ -47,38 +47,31 @@ class LastSubstep:
         self._held.discard(env)
 
     def settle(self, env: int) -> None:
-        """Work out what is unknown of this env, before what it follows from is gone."""
-        self._settle_effort(env)
-        self._settle_contact(env)
+        """Work out what is not known yet of this env, before what it follows from is gone."""
+        self._work_out(self._no_effort & {env}, self._no_contact & {env})
 
-    def _settle_effort(self, env: int) -> None:
-        if env in self._unknown_effort:
+    def _work_out(self, efforts: set[int], contacts: set[int]) -> None:
+        for env in efforts:
             self._exerted(env)
-            self._unknown_effort.remove(env)
-
-    def _settle_contact(self, env: int) -> None:
-        if env in self._unknown_contact:
+        for env in contacts:
             self.contact[env] = self._touched(env)
-            self._unknown_contact.remove(env)
+        self._no_effort -= efforts
+        self._no_contact -= contacts
 
     def hold(self, env: int, effort: Array | float, contact: Array | float) -> None:
         """Make these the efforts (J,) and contact forces (S, 3) of the last substep; no motion is held."""
         self.effort[env], self.contact[env] = effort, contact
-        for which in (self._unknown_effort, self._unknown_contact, self._held):
+        for which in (self._no_effort, self._no_contact, self._held):
             which.discard(env)
-
-    # ------------------------------------------------------------------ fields
 
     def efforts(self) -> Array:
         """(N, J), a copy."""
-        for env in tuple(self._unknown_effort):
-            self._settle_effort(env)
+        self._work_out(set(self._no_effort), set())
         return self.effort.copy()
 
     def contacts(self) -> Array:
         """(N, S, 3), a copy."""
-        for env in tuple(self._unknown_contact):
-            self._settle_contact(env)
+        self._work_out(set(), set(self._no_contact))
         return self.contact.copy()
 
     def cover(self, name: str, array: Array) -> Array:
@@ -87,8 +80,6 @@ class LastSubstep:
             held = sorted(self._held)
             array[held] = self._motion[held, :, :7] if name == "body_pose" else self._motion[held, :, 7:]
         return array
-
-    # ------------------------------------------------------------------ snapshots and live editing
 
     def rows(self, ids: Array) -> dict[str, Array]:
         """What a snapshot holds of it; the envs are settled."""
@@ -103,25 +94,22 @@ class LastSubstep:
             self._motion[env] = data["held_motion"][row]
             self._held.add(env)
 
-    def take(self, carried: "CarriedSubstep", old: World, pose: Array, twist: Array) -> None:
-        """Go on with what an old World had, by name, over the poses (N, B, 7) and twists (N, B, 6) that there are."""
-        before, after = paired(old, self._world, "bodies")
-        pose[:, after], twist[:, after] = carried.pose[:, before], carried.twist[:, before]
-        effort, contact = np.zeros_like(self.effort), np.zeros_like(self.contact)
-        before, after = paired(old, self._world, "joints")
-        effort[:, after] = carried.effort[:, before]
-        before, after = paired(old, self._world, "contact_sensors")
-        contact[:, after] = carried.contact[:, before]
-        for env in range(len(pose)):
-            self.hold(env, effort[env], contact[env])
-        self._motion = np.concatenate([pose, twist], axis=-1)
-        self._held = set(range(len(pose)))
+    def take(self, carried: "CarriedSubstep", old: World, motion: Array) -> None:
+        """Go on with what an old World had, by name, over the poses and twists (N, B, 13) that there are now."""
+        self._motion = motion
+        for kind, theirs, ours in (
+            ("bodies", carried.motion, self._motion),
+            ("joints", carried.effort, self.effort),
+            ("contact_sensors", carried.contact, self.contact),
+        ):
+            before, after = paired(old, self._world, kind)
+            ours[:, after] = theirs[:, before]
+        self._no_effort, self._no_contact, self._held = set(), set(), set(range(len(self._motion)))
 
 
 class CarriedSubstep(NamedTuple):
-    """Copies in the order of the old World: poses (N, B, 7), twists (N, B, 6), efforts (N, J), forces (N, S, 3)."""
+    """Copies in the order of the old World: poses and twists (N, B, 13), efforts (N, J), forces (N, S, 3)."""
 
-    pose: Array
-    twist: Array
+    motion: Array
     effort: Array
     contact: Array
