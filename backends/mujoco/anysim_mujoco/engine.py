@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 import mujoco
 import numpy as np
-from mujoco.batch import Batch, SimulationError
+from mujoco.batch import SimulationError
 
 from anysim.conventions import Array, wxyz_from_xyzw, xyzw_from_wxyz
 from anysim.engine.base import SimEngine
@@ -13,34 +13,21 @@ from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Capabilities
 from anysim.engine.control import Control, alternating
 from anysim.engine.doctor import Finding, Health
-from anysim.engine.lighting import Looks
 from anysim.engine.presence import Lifecycle
 from anysim.engine.state import ContactPoints, RayHits, SnapshotLevel
 from anysim.math import pose as P
 from anysim.model.world import World
 from anysim_mujoco import declared
 from anysim_mujoco.audit import geom_volumes, joint_limits
-from anysim_mujoco.build import build, initial_row, silence
+from anysim_mujoco.build import silence
 from anysim_mujoco.carry import carried_rows, take_rows
-from anysim_mujoco.dampers import Dampers
-from anysim_mujoco.drives import Drives
-from anysim_mujoco.geoms import own_scenery
 from anysim_mujoco.options import MujocoOptions
 from anysim_mujoco.parameters import Parameters
-from anysim_mujoco.query import Queries
 from anysim_mujoco.raw import raw_loop
-from anysim_mujoco.retired import Retired
-from anysim_mujoco.state import StateReader
+from anysim_mujoco.simulations import Simulations
 
 _VELOCITY_STAGE = mujoco.mjtStage.mjSTAGE_VEL.value
 """After the last substep frames and velocities are brought up to date, which leaves the trajectory as it is."""
-
-
-_BUILT = (
-    "_model", "_layout", "_batch", "_rows", "_initial", "_qpos", "_qvel", "_mocap_pos", "_mocap_quat", "_wrenches",
-    "_drives", "_dampers", "_looks", "_parameters", "_reader", "_fields", "_queries", "_retired",
-)  # fmt: skip
-"""What `_build` makes and `_free` lets go of."""
 
 
 class MujocoEngine(SimEngine):
@@ -74,174 +61,156 @@ class MujocoEngine(SimEngine):
 
     def _build(self, world: World, num_envs: int) -> None:
         silence()
-        model, layout = build(world, self.options)
-        self._model, self._layout = model, layout
-        self._batch = Batch(model, num_envs, nthread=self.options.thread_count(num_envs))
-        self._rows = self._batch.state
-        self._initial = initial_row(world, model, layout)
-        self._qpos, self._qvel = self._batch.bind("qpos"), self._batch.bind("qvel")
-        self._mocap_pos, self._mocap_quat = self._batch.bind("mocap_pos"), self._batch.bind("mocap_quat")
-        self._wrenches = self._batch.bind("xfrc_applied")
-        self._drives = Drives(self._batch, world, layout)
-        self._dampers = Dampers(self._batch, world, layout)
-        self._looks = Looks(world, num_envs, own_scenery(self.options))
-        self._parameters = Parameters(self._batch, world, layout, self._drives, self._dampers, self._looks)
-        self._reader = StateReader(self._batch, layout)
-        self._fields = self._reader.fields
-        self._queries = Queries(self._batch, layout, self._parameters)
-        self._retired: Retired | None = None
-        if self._presence.varies:
-            self._retired = Retired(self._batch, world, layout, self._parameters)
+        self._sims = Simulations(world, num_envs, self._presence.varies, self.options)
         self._painter: Any = None
 
     def _free(self) -> None:
-        painter = vars(self).pop("_painter", None)
-        if painter is not None:
-            painter.close()
-        for name in _BUILT:
-            vars(self).pop(name, None)
+        if self._painter is not None:
+            self._painter.close()
+        del self._sims, self._painter
 
     def _reset(self, ids: Array) -> None:
-        self._rows[ids] = self._initial
-        if self._retired is not None:
-            self._retired.uncouple(ids)
-        self._reader.clear_faults(ids)
-        self._reader.hold(ids, 0.0, 0.0)
+        self._sims.rows[ids] = self._sims.initial
+        if self._sims.retired is not None:
+            self._sims.retired.uncouple(ids)
+        self._sims.reader.clear_faults(ids)
+        self._sims.reader.hold(ids, 0.0, 0.0)
 
     def _populate(self, ids: Array) -> None:
-        if self._retired is not None:
-            self._retired.populate(ids, self._presence.entities[ids])
+        if self._sims.retired is not None:
+            self._sims.retired.populate(ids, self._presence.entities[ids])
 
     # ------------------------------------------------------------------ stepping
 
     def _step(self, n_steps: int, ids: Array | None) -> None:
-        self._parameters.settle()
+        self._sims.parameters.settle()
         rows = None if ids is None else np.sort(ids)
-        if self._drives.limited or self._dampers.active:
+        if self._sims.drives.limited or self._sims.dampers.active:
             self._step_one_by_one(n_steps, rows)
         else:
             self._advance(rows, n_steps)
-        if self._retired is not None:
-            self._retired.rest()
-        self._reader.stepped(ids)
+        if self._sims.retired is not None:
+            self._sims.retired.rest()
+        self._sims.reader.stepped(ids)
 
     def _step_one_by_one(self, n_steps: int, rows: Array | None) -> None:
         """What depends on the state of each substep and MuJoCo does not have."""
-        held, inertials = self._dampers.hold(), self._parameters.inertials()
+        held, inertials = self._sims.dampers.hold(), self._sims.parameters.inertials()
         for _ in range(n_steps):
-            if self._drives.limited:
-                self._drives.limit()
-            if self._dampers.active:
-                self._dampers.push(held, *inertials)
+            if self._sims.drives.limited:
+                self._sims.drives.limit()
+            if self._sims.dampers.active:
+                self._sims.dampers.push(held, *inertials)
             self._advance(rows, 1)
-        self._dampers.put(held)
+        self._sims.dampers.put(held)
 
     def _advance(self, rows: Array | None, n_steps: int) -> None:
         try:
-            self._batch.step(rows, n_steps, _VELOCITY_STAGE)
+            self._sims.batch.step(rows, n_steps, _VELOCITY_STAGE)
         except SimulationError as error:
-            self._reader.failed[error.ids] = True
+            self._sims.reader.failed[error.ids] = True
 
     def _read(self, name: str) -> Array:
-        self._parameters.settle()
-        return self._fields[name]()
+        self._sims.parameters.settle()
+        return self._sims.fields[name]()
 
     def _apply_control(self, control: Control) -> None:
-        self._drives.apply(control)
+        self._sims.drives.apply(control)
 
     def _apply_wrench(self, wrench: Array | None) -> None:
         if wrench is None:
-            self._wrenches[...] = 0.0
+            self._sims.wrenches[...] = 0.0
         else:
-            self._wrenches[:, self._layout.bodies] = wrench
+            self._sims.wrenches[:, self._sims.layout.bodies] = wrench
 
     # ------------------------------------------------------------------ writing
 
     def _write_joints(self, ids: Array, joints: Array, position: Array | None, velocity: Array | None) -> None:
-        self._reader.touch(ids)
+        self._sims.reader.touch(ids)
         if position is not None:
-            self._qpos[np.ix_(ids, self._layout.joint_q[joints])] = position
+            self._sims.qpos[np.ix_(ids, self._sims.layout.joint_q[joints])] = position
         if velocity is not None:
-            self._qvel[np.ix_(ids, self._layout.joint_v[joints])] = velocity
+            self._sims.qvel[np.ix_(ids, self._sims.layout.joint_v[joints])] = velocity
 
     def _write_bodies(self, ids: Array, bodies: Array, pose: Array | None, twist: Array | None) -> None:
-        self._reader.touch(ids)
+        self._sims.reader.touch(ids)
         rows = ids[:, None, None]
-        static, free = self._layout.static_row[bodies], self._layout.free_row[bodies]
+        static, free = self._sims.layout.static_row[bodies], self._sims.layout.free_row[bodies]
         if pose is not None and (fixed := static >= 0).any():
-            at = np.ix_(ids, self._layout.mocap[static[fixed]])
-            self._mocap_pos[at] = pose[:, fixed, :3]
-            self._mocap_quat[at] = wxyz_from_xyzw(pose[:, fixed, 3:])
+            at = np.ix_(ids, self._sims.layout.mocap[static[fixed]])
+            self._sims.mocap_pos[at] = pose[:, fixed, :3]
+            self._sims.mocap_quat[at] = wxyz_from_xyzw(pose[:, fixed, 3:])
         if not (loose := free >= 0).any():
             return
-        q, v = self._layout.free_q[free[loose]], self._layout.free_v[free[loose]]
+        q, v = self._sims.layout.free_q[free[loose]], self._sims.layout.free_v[free[loose]]
         if pose is not None:
-            self._qpos[rows, q[None, :, :3]] = pose[:, loose, :3]
-            self._qpos[rows, q[None, :, 3:]] = wxyz_from_xyzw(pose[:, loose, 3:])
+            self._sims.qpos[rows, q[None, :, :3]] = pose[:, loose, :3]
+            self._sims.qpos[rows, q[None, :, 3:]] = wxyz_from_xyzw(pose[:, loose, 3:])
         if twist is not None:
-            turned = xyzw_from_wxyz(self._qpos[rows, q[None, :, 3:]])
-            self._qvel[rows, v[None, :, :3]] = twist[:, loose, :3]
+            turned = xyzw_from_wxyz(self._sims.qpos[rows, q[None, :, 3:]])
+            self._sims.qvel[rows, v[None, :, :3]] = twist[:, loose, :3]
             # MuJoCo keeps the angular rate of a free body in its own axes
-            self._qvel[rows, v[None, :, 3:]] = P.rotate_inverse(turned, twist[:, loose, 3:])
+            self._sims.qvel[rows, v[None, :, 3:]] = P.rotate_inverse(turned, twist[:, loose, 3:])
 
     # ------------------------------------------------------------------ parameters and snapshots
 
     def _get_parameter(self, name: str) -> Array:
-        return self._parameters.get(name)
+        return self._sims.parameters.get(name)
 
     def _set_parameter(self, name: str, values: Array, ids: Array, indices: Array) -> None:
-        self._parameters.set(name, values, ids, indices)
-        self._reader.touch(ids)
+        self._sims.parameters.set(name, values, ids, indices)
+        self._sims.reader.touch(ids)
 
     def _default_parameter(self, name: str) -> Array:
-        return self._parameters.default(name)
+        return self._sims.parameters.default(name)
 
     def _snapshot(self, ids: Array, level: SnapshotLevel) -> dict[str, Array]:
-        reader = self._reader
+        reader = self._sims.reader
         return {
-            "rows": self._rows[ids],
+            "rows": self._sims.rows[ids],
             "effort": reader.joint_effort()[ids],
             "contact": reader.contact_force()[ids],
             "fault": reader.fault()[ids],
-            **self._parameters.rows(ids),
+            **self._sims.parameters.rows(ids),
         }
 
     def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:
-        self._rows[ids] = data["rows"]
-        self._parameters.restore_rows(ids, data)
-        self._reader.clear_faults(ids)
-        self._reader.failed[ids] = data["fault"]
-        self._reader.hold(ids, data["effort"], data["contact"])
+        self._sims.rows[ids] = data["rows"]
+        self._sims.parameters.restore_rows(ids, data)
+        self._sims.reader.clear_faults(ids)
+        self._sims.reader.failed[ids] = data["fault"]
+        self._sims.reader.hold(ids, data["effort"], data["contact"])
 
     def _carry_rows(self) -> Any:
-        return self._layout, carried_rows(self._batch, self._layout, self._reader, self._parameters)
+        sims = self._sims
+        return sims.layout, carried_rows(sims.batch, sims.layout, sims.reader, sims.parameters)
 
     def _take_rows(self, carried: Any, old: World) -> None:
-        layout, rows = carried
-        take_rows(rows, old, layout, self.world, self._batch, self._layout, self._reader, self._parameters)
+        (layout, rows), sims = carried, self._sims
+        take_rows(rows, old, layout, self.world, sims.batch, sims.layout, sims.reader, sims.parameters)
 
     def read_back(self) -> Mapping[str, Array]:
         """Limits and volumes as the compiled model has them."""
         with self._lock:
             self._require_world()
-            model, layout = self._model, self._layout
+            model, layout = self._sims.model, self._sims.layout
             return {"joint.limits": joint_limits(model, layout), "geom.volume": geom_volumes(model, layout)}
 
     def handles(self) -> Mapping[str, int]:
         """Simulations, and the fields of the model that envs have for themselves."""
         with self._lock:
             self._require_world()
-            return {"simulations": self._batch.nsim, "fields": len(self._batch._expanded)}  # noqa: SLF001
+            return {"simulations": self._sims.batch.nsim, "fields": len(self._sims.batch._expanded)}  # noqa: SLF001
 
     def raw_loop(self) -> Callable[[int], None]:
         """MuJoCo's own batch, stepped without this engine."""
         with self._lock:
             self._require_world()
-            self._parameters.settle()
+            self._sims.parameters.settle()
             self._flush_control()
             first, second = alternating(self._commands.control)
-            inputs = [self._drives.input_for(control) for control in (second, first)]
-            return raw_loop(self._batch, inputs[::-1])
+            inputs = [self._sims.drives.input_for(control) for control in (second, first)]
+            return raw_loop(self._sims.batch, inputs[::-1])
 
     # ------------------------------------------------------------------ sensing
 
@@ -258,13 +227,13 @@ class MujocoEngine(SimEngine):
         return f"{thread.backend}: {thread.driver()}, {where}, {quality}"
 
     def _raycast(self, origins: Array, directions: Array, ids: Array) -> RayHits:
-        self._parameters.settle()
-        return self._queries.raycast(origins, directions, ids)
+        self._sims.parameters.settle()
+        return self._sims.queries.raycast(origins, directions, ids)
 
     def _contacts(self, ids: Array) -> ContactPoints:
-        self._parameters.settle()
+        self._sims.parameters.settle()
         self._flush_control()
-        return self._queries.contacts(ids)
+        return self._sims.queries.contacts(ids)
 
     def _flush_control(self) -> None:
         """Show MuJoCo commands that wait for the next step."""
@@ -275,7 +244,8 @@ class MujocoEngine(SimEngine):
     def _render(self, view: CameraView, ids: Array, channels: tuple[str, ...]) -> dict[str, Array]:
         from anysim_mujoco.render import Painter
 
-        self._parameters.settle()
+        self._sims.parameters.settle()
         if self._painter is None:
-            self._painter = Painter(self._model, self._layout, self._queries, self._looks, self.options)
+            sims = self._sims
+            self._painter = Painter(sims.model, sims.layout, sims.queries, sims.looks, self.options)
         return self._painter.draw(view, ids, channels)

@@ -52,7 +52,7 @@ class EngineLifecycle(Primitives):
         self.options = arguments.validated_options(self.name, self.options_model(), options)
         self._lock = threading.RLock()
         self._world: World | None = None
-        self._destroyed = False
+        self._built = self._destroyed = False
 
     # ------------------------------------------------------------------ what it is
 
@@ -130,6 +130,7 @@ class EngineLifecycle(Primitives):
             try:
                 self._build_envs()
             except BaseException:
+                self._release()
                 self._world = None
                 raise
             self._reset_rows(self._all)
@@ -150,8 +151,15 @@ class EngineLifecycle(Primitives):
 
     def _build_envs(self) -> None:
         self._build(self.world, self.num_envs)
+        self._built = True
         if self._presence.varies:
             self._populate(self._all)
+
+    def _release(self) -> None:
+        """Free what was built; a build that failed has left nothing."""
+        if self._built:
+            self._built = False
+            self._free()
 
     def _rebuild(self, world: World) -> None:
         """Replace the world, carrying by name all that both worlds have. On failure the old one is built again."""
@@ -167,7 +175,7 @@ class EngineLifecycle(Primitives):
 
     def _build_from(self, world: World, kept: Kept) -> None:
         self._retire_state()
-        self._free()
+        self._release()
         self._install(world, self.num_envs)
         self._presence.carry(kept.records.presence)
         self._build_envs()
@@ -188,7 +196,7 @@ class EngineLifecycle(Primitives):
         with self._lock:
             if self._world is not None:
                 self._retire_state()
-                self._free()
+                self._release()
                 self._world = None
             self._destroyed = True
 

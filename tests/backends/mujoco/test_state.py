@@ -24,9 +24,9 @@ def test_twists_are_mujocos_object_velocities(worlds, make, shake):
     engine = make(worlds.scene(), 2)
     shake(engine)
     twist, velocity = engine.get_state().body_twist, np.zeros(6)
-    model, data = engine._queries.env(1)
+    model, data = engine._sims.queries.env(1)
     mujoco.mj_forward(model, data)
-    for body, number in enumerate(engine._layout.bodies):
+    for body, number in enumerate(engine._sims.layout.bodies):
         mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, number, velocity, 0)
         assert np.allclose(twist[1, body], velocity[[3, 4, 5, 0, 1, 2]], atol=1e-12)
 
