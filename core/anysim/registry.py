@@ -42,7 +42,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-bench": {"commands": "bench"},
     "anysim-control": {
         "controllers": "ackermann_drive batched_ik camera_gimbal camera_motion differential_drive differential_ik"
-        " gripper_multi_finger holonomic_drive mink_ik operational_space pink_ik planar_drive",
+        " gripper_multi_finger holonomic_drive mink_ik operational_space pd pink_ik planar_drive",
         "planners": "numba_ik",
     },
     "anysim-film": {"commands": "render"},

@@ -1,6 +1,6 @@
 """Diagnosis of engines: what is installed, imports, falls, draws, and the remedy for what does not.
 
-Each engine is tried in a process of its own (`anysim.engine.doctor_trial`), so that one that crashes, hangs or prints
+Each engine is tried in a process of its own (`anysim.testing.doctor_trial`), so that one that crashes, hangs or prints
 costs nothing but its own findings.
 """
 
@@ -76,7 +76,7 @@ def _package(name: str) -> str:
 def _try_apart(name: str, timeout: float) -> Examination:
     """The trial in its own process; its death or silence is a finding."""
     what = f"{name}: physics"
-    ended = run_module("anysim.engine.doctor_trial", name, limit=timeout)
+    ended = run_module("anysim.testing.doctor_trial", name, limit=timeout)
     findings, works = _read(ended.out.splitlines())
     if ended.trouble:
         words = "; ".join(["the process " + ended.trouble, *ended.err.strip().splitlines()[-3:]])[-300:]

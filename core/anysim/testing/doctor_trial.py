@@ -1,4 +1,4 @@
-"""Trial of one engine in this process, `python -m anysim.engine.doctor_trial NAME`: a ball falls and is drawn.
+"""Trial of one engine in this process, `python -m anysim.testing.doctor_trial NAME`: a ball falls and is drawn.
 
 Prints one JSON document per finding as soon as it is known: what a crash leaves unprinted is what crashed.
 """
