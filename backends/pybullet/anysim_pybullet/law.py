@@ -179,6 +179,10 @@ class _Gathered:
         self.root = np.zeros(13)
 
 
+_Task = tuple[Tree, int, list[int], _Gathered, Array, Array, Array, "Brake | None"]
+"""An articulation, its Bullet body and links, buffers, and its rows of bodies, drives, memory and damping."""
+
+
 class Pusher:
     """Applies the law in one env, step by step."""
 
@@ -196,7 +200,7 @@ class Pusher:
         pushed = wrench is not None and bool(wrench[self._index, tree.bodies].any())
         return (self._laws.needs[tree.number] or pushed) and (tree.free or len(tree.joints) > 0)
 
-    def _task(self, tree: Tree) -> tuple[Any, ...]:
+    def _task(self, tree: Tree) -> "_Task":
         """All that a step of one articulation needs: names become indices here, once per call of `step`."""
         laws, index = self._laws, self._index
         buffer = laws.gathered[tree.number]
@@ -220,7 +224,7 @@ class Pusher:
             return self._lifter.run(p, steps)
         for _ in range(steps):
             for task in self._work:
-                if not self._push(p, client, *task):
+                if not self._push(p, client, task):
                     return False
             if not self._lifter.push(p):
                 return False
@@ -232,19 +236,8 @@ class Pusher:
                 self._laws.forget(self._index, np.array([tree.number]))
         return True
 
-    def _push(
-        self,
-        p: Any,
-        client: int,
-        tree: Tree,
-        uid: int,
-        links: list[int],
-        buffer: _Gathered,
-        bodies: Array,
-        drives: Array,
-        memory: Array,
-        brake: "Brake | None",
-    ) -> bool:
+    def _push(self, p: Any, client: int, task: "_Task") -> bool:
+        tree, uid, links, buffer, bodies, drives, memory, brake = task
         place: Any = None
         if tree.free:
             place, turn = p.getBasePositionAndOrientation(uid, physicsClientId=client)
@@ -253,7 +246,9 @@ class Pusher:
                 if brake is not None:
                     velocity = p.getBaseVelocity(uid, physicsClientId=client)
                     wrench = wrench + brake.wrench(np.array(turn), *map(np.array, velocity))
-                return self._push_body(p, client, uid, place, bodies[0], wrench)
+                lift = bodies[0, K.MASS] * bodies[0, K.COMPENSATED]
+                self._outer(p, client, uid, place, wrench[:3] - lift * self._laws.gravity[self._index], wrench[3:])
+                return True
             self._free_root(tree, place, turn, p.getBaseVelocity(uid, physicsClientId=client), buffer.root)
         states = p.getJointStates(uid, links, physicsClientId=client)
         buffer.motion[0] = [s[0] for s in states]
@@ -282,11 +277,6 @@ class Pusher:
             force = np.array(out[2 * n : 2 * n + 3])
             arm = np.array(place) - buffer.root[:3]
             self._outer(p, client, uid, place, force, np.array(out[2 * n + 3 :]) - np.cross(arm, force))
-        return True
-
-    def _push_body(self, p: Any, client: int, uid: int, place: Any, body: Array, wrench: Array) -> bool:
-        force = wrench[:3] - body[K.MASS] * body[K.COMPENSATED] * self._laws.gravity[self._index]
-        self._outer(p, client, uid, place, force, wrench[3:])
         return True
 
     @staticmethod

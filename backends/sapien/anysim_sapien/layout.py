@@ -35,8 +35,6 @@ class Layout:
     """(G,) bool: geoms of the world and of static bodies."""
     geom_entity: Array
     """(G,) segmentation id."""
-    body_entity: Array
-    """(B + 1,) segmentation id; the last is the world's."""
 
     @classmethod
     def of(cls, world: World, there: Array | None = None) -> "Layout":
@@ -65,5 +63,4 @@ class Layout:
             links=np.array([i for i, b in enumerate(world.bodies) if b.kind is BodyKind.LINK and there[i]], dtype=int),
             geom_fixed=np.array([g.body == WORLD or fixed[g.body] for g in world.geoms], dtype=bool),
             geom_entity=entity[[g.body for g in world.geoms]] if world.geoms else np.zeros(0, dtype=int),
-            body_entity=entity,
         )

@@ -47,17 +47,9 @@ class Parameters(ParameterTable):
     def of(self, env: int) -> Values:
         """What the scene of an env is built with."""
         w = self.values
-        return Values(
-            w["body.mass"][env],
-            w["body.com"][env],
-            w["body.inertia"][env],
-            np.stack([w[name][env] for name in _DAMPING], axis=-1),
-            w["geom.friction"][env],
-            w["geom.restitution"][env],
-            w["joint.friction"][env],
-            w["joint.armature"][env],
-            w["world.gravity"][env, 0],
-        )
+        damping = np.stack([w[name][env] for name in _DAMPING], axis=-1)
+        rest = (w[name][env] for name in (*_SURFACES, "joint.friction", "joint.armature"))
+        return Values._make([*(w[name][env] for name in _BODIES), damping, *rest, w["world.gravity"][env, 0]])
 
     def rows(self, env: int) -> dict[str, Array]:
         """What scenes are built with, as it was asked for: what is read from PhysX is rounded, and not asked for again.
