@@ -1,6 +1,6 @@
 """Capabilities of engines and needs of worlds. Negotiation fails closed: a mismatch is an error before the build."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import NamedTuple
@@ -81,10 +81,14 @@ class Capabilities:
 
 @dataclass(frozen=True, slots=True)
 class Need:
-    """A world needs `capability` because of `why`: `joint 'wrist' is a mimic (robot 'arm')`."""
+    """A world needs `capability` because of `why`: `joint 'wrist' is a mimic (robot 'arm')`.
+
+    `path` is the key of the spec that asks for it, or the nearest above it, dotted: `world.cameras.front.channels`.
+    """
 
     capability: Capability
     why: str
+    path: str = ""
 
 
 def check(
@@ -93,19 +97,28 @@ def check(
     needs: Sequence[Need],
     source: str = "this world",
     refusals: Sequence[str] = (),
+    place: Callable[[str], str] = str,
 ) -> list[Need]:
     """Raise one CapabilityError that lists every absent need; return the needs met only approximately.
 
-    `refusals` are the engine's own reasons against this world in particular, see `SimEngine.refusals`.
+    `refusals` are the engine's own reasons against this world in particular, see `SimEngine.refusals`. `place` gives
+    `file:line:column` for the path of a need, or the path itself where it is not known.
     """
     absent = [need for need in needs if need.capability not in capabilities]
     if absent or refusals:
-        reasons = "; ".join([*(f"{need.why} ({need.capability})" for need in absent), *refusals])
+        reasons = "; ".join([*(f"{need.why} ({need.capability}){_at(need.path, place)}" for need in absent), *refusals])
         raise CapabilityError(
             f"{engine} cannot run {source}: {reasons}. "
-            f"Choose another engine (`anysim list engines` shows what each can do) or change the lines named."
+            f"Choose another engine (`anysim list engines` shows what each can do) or change what is named."
         )
     return [need for need in needs if not capabilities.supported[need.capability].exact]
+
+
+def _at(path: str, place: Callable[[str], str]) -> str:
+    where = place(path) if path else ""
+    if where == "data":  # a mapping has keys, but no lines
+        return f" at {path}"
+    return f" at {where}" if where and where != path else ""
 
 
 class Matrix(NamedTuple):

@@ -1,13 +1,13 @@
 """Capabilities that a world needs of an engine, each with the name that causes it, and drives that can be followed."""
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from math import isfinite
 
 import numpy as np
 
 from anysim.compile.appearance import DEFAULT_LIGHTS
-from anysim.conventions import Array
+from anysim.conventions import WORLD, Array
 from anysim.engine.capability import Capability as C, Need
 from anysim.errors import EngineError
 from anysim.kinematics.dynamics import coupling, mass_matrix
@@ -18,6 +18,7 @@ from anysim.model.world import (
     BodyKind,
     Camera,
     ControlMode,
+    EntityKind,
     Geom,
     HeightFieldShape,
     Joint,
@@ -30,36 +31,65 @@ Rows = tuple[tuple[C, object, str], ...]
 """A capability, whether it is needed, and why, in words that follow the name of the thing."""
 
 
+_KEYS: Mapping[C, str] = {
+    C.SOLVER_SETTINGS: ".solver",
+    C.BODY_DAMPING: ".damping",
+    C.RESTITUTION: ".restitution",
+    C.CONTACT_OFFSET: ".contact.offset",
+    C.TORSIONAL_FRICTION: ".contact.torsional_friction",
+    C.RENDER_LIGHTS: ".lights",
+    C.RENDER_SHADOWS: ".scenery.shadows",
+}
+"""The key of a thing that asks for a capability; the thing itself asks for the others."""
+
+
 def needs_of(world: World) -> list[Need]:
-    """Every capability the world needs, once, with the first thing that needs it."""
-    found: dict[C, str] = {}
-    for what, rows in _things(world):
+    """Every capability the world needs, once, with the first thing that needs it and the key that asks for it."""
+    found: dict[C, Need] = {}
+    for what, path, rows in _things(world):
         for capability, needed, why in rows:
-            if needed:
-                found.setdefault(capability, f"{what} {why}".strip())
-    return [Need(capability, why) for capability, why in found.items()]
+            if needed and capability not in found:
+                found[capability] = Need(capability, f"{what} {why}".strip(), path + _KEYS.get(capability, ""))
+    return list(found.values())
 
 
-def _things(world: World) -> Iterator[tuple[str, Rows]]:
-    """Everything in a world that may need a capability, by its name."""
-    yield from ((f"body '{body.name}'", _of_body(body)) for body in world.bodies)
-    yield from ((f"joint '{joint.name}'", _of_joint(world, joint)) for joint in world.joints)
-    yield from ((f"drive '{actuator.name}'", _of_drive(actuator)) for actuator in world.actuators)
+def _things(world: World) -> Iterator[tuple[str, str, Rows]]:
+    """Everything in a world that may need a capability, by its name and its path in the spec."""
+    path = _paths(world)
+    links = [joint.body for joint in world.joints]
+    yield from ((f"body '{body.name}'", path[index], _of_body(body)) for index, body in enumerate(world.bodies))
+    yield from ((f"joint '{joint.name}'", path[joint.body], _of_joint(world, joint)) for joint in world.joints)
+    yield from ((f"drive '{a.name}'", path[links[a.joint]], _of_drive(a)) for a in world.actuators)
     if world.actuators:
-        yield "physics.actuation", _of_actuation(world.physics.actuation)
+        yield "physics.actuation", "physics.actuation", _of_actuation(world.physics.actuation)
     if world.physics.velocity_limits:
         for actuator in world.actuators:
             limited = isfinite(world.joints[actuator.joint].velocity_limit)
-            yield f"drive '{actuator.name}'", ((C.VELOCITY_LIMITS, limited, "heeds its joint's velocity limit"),)
-    yield from ((f"geom '{geom.name}'", _of_geom(geom)) for geom in world.geoms if geom.collides)
+            needs = ((C.VELOCITY_LIMITS, limited, "heeds its joint's velocity limit"),)
+            yield f"drive '{actuator.name}'", "physics.velocity_limits", needs
+    yield from ((f"geom '{geom.name}'", path[geom.body], _of_geom(geom)) for geom in world.geoms if geom.collides)
     for slot in world.slots:
-        yield f"'{slot.name}'", ((C.VARYING_ENTITIES, True, "is not the same in every env"),)
+        needs = ((C.VARYING_ENTITIES, True, "is not the same in every env"),)
+        yield f"'{slot.name}'", f"world.objects.{slot.category}", needs
     for sensor in world.contact_sensors:
-        yield f"contact sensor '{sensor.name}'", ((C.CONTACT_SENSORS, True, ""),)
+        needs = ((C.CONTACT_SENSORS, True, ""),)
+        yield f"contact sensor '{sensor.name}'", f"world.contact_sensors.{sensor.name}", needs
     shows = next((camera.name for camera in world.cameras if "rgb" in camera.channels), None)
     if shows is not None:
-        yield f"camera '{shows}'", _of_light(world)
-    yield from ((f"camera '{camera.name}'", _of_camera(world, camera)) for camera in world.cameras)
+        yield f"camera '{shows}'", "world", _of_light(world)
+    for camera in world.cameras:
+        yield f"camera '{camera.name}'", f"world.cameras.{camera.name}.channels", _of_camera(world, camera)
+
+
+def _paths(world: World) -> dict[int, str]:
+    """For each body the path of what it belongs to; the ground's for what is fixed to the world."""
+    found = {WORLD: "world.terrain"}
+    for body, index in enumerate(world.body_entity):
+        entity = world.entities[index]
+        kind = "robots" if entity.kind is EntityKind.ROBOT else "objects"
+        own = f"world.{kind}.{entity.category or entity.name}"
+        found[body] = "world.room" if entity.source.startswith("room:") else own
+    return found
 
 
 def _of_body(body: Body) -> Rows:

@@ -65,4 +65,4 @@ def check_run(
         CapabilityError: lists every need that the engine does not meet.
     """
     refusals = [*engine.refusals(world), *unchangeable(engine, managers, place)]
-    return check(engine.name, engine.capabilities, needs_of(world), source, refusals)
+    return check(engine.name, engine.capabilities, needs_of(world), source, refusals, place)
