@@ -23,6 +23,7 @@ from anysim_schemas.plugin import UnknownPlugin
 
 if TYPE_CHECKING:
     from anysim.engine.base import SimEngine
+    from anysim.engine.capability import Need
     from anysim.model.world import World
     from anysim.task.env import TaskEnv
     from anysim_schemas.run import RunSpec
@@ -147,8 +148,10 @@ def dry_run(loaded: LoadedRun, world: "World") -> None:
         raise located(error, loaded) from None
 
 
-def check_engine(loaded: LoadedRun, world: "World", engine: "type[SimEngine]", source: str) -> None:
+def check_engine(loaded: LoadedRun, world: "World", engine: "type[SimEngine]", source: str) -> "list[Need]":
     """Whether an engine can run a world and change what the spec draws anew in each episode; nothing is built.
+
+    Returns the needs that the engine meets approximately.
 
     Raises:
         SpecError: with file, line and column.
@@ -160,7 +163,7 @@ def check_engine(loaded: LoadedRun, world: "World", engine: "type[SimEngine]", s
         managers = standard_managers(loaded.spec, world, 1)
     except SpecError as error:
         raise located(error, loaded) from None
-    check_run(engine, world, managers, source, lambda path: place_of(loaded, path))
+    return check_run(engine, world, managers, source, lambda path: place_of(loaded, path))
 
 
 def blind_env(loaded: LoadedRun, world: "World", name: str) -> "TaskEnv":

@@ -5,9 +5,11 @@ import sysconfig
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 from anysim import registry
-from anysim.cli.check import check_one
+from anysim.cli.check import check_one, report_on
+from anysim.cli.main import app
 from anysim.errors import listing
 
 BROKEN = Path(__file__).parent / "broken"
@@ -46,3 +48,47 @@ def test_a_world_that_an_engine_cannot_run_is_refused_before_it_is_built() -> No
     faults = check_one("pick_cube", engine="null", all_engines=False, overrides=[])
     assert len(faults) == 1
     assert "null cannot run pick_cube: camera 'front' gives rgb (render: rgb)" in faults[0]
+
+
+def test_an_engine_that_cannot_is_no_fault_where_another_can() -> None:
+    report = report_on("pick_cube", None, all_engines=True, overrides=[])
+    assert report.faults == []
+    able = {answer.engine: not answer.refusal for answer in report.answers}
+    assert able["mujoco"]
+    assert not able["null"]
+    said = CliRunner().invoke(app, ["check", "pick_cube", "--all-engines"])
+    assert said.exit_code == 0
+    able_names = ", ".join(name for name, runs in able.items() if runs)
+    assert f"pick_cube: ok; runs on {able_names}; not on null" in said.stdout
+    assert "camera 'front' gives rgb" in said.stderr
+
+
+def test_a_world_that_no_engine_can_run_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "names", lambda kind: ["null"])
+    said = CliRunner().invoke(app, ["check", "pick_cube", "--all-engines"])
+    assert said.exit_code == 1
+    assert "pick_cube: 1 fault; runs on no engine; not on null" in said.stdout
+
+
+def test_what_is_approximate_is_one_line_with_its_count_and_every_line_on_request() -> None:
+    short = CliRunner().invoke(app, ["check", "pick_cube", "-e", "mujoco"]).stdout.splitlines()
+    long = CliRunner().invoke(app, ["check", "pick_cube", "-e", "mujoco", "-v"]).stdout.splitlines()
+    measured = [line for line in long if line.startswith("mujoco: approximate: ")]
+    assert short[-1] == long[-1] == "pick_cube: ok"
+    assert len(short) == 2
+    assert short[0].startswith(f"approximate on mujoco: {len(measured)} (")
+    assert "`anysim check pick_cube -e mujoco -v`" in short[0]
+    assert any("a stiff soft constraint" in line for line in measured)
+
+
+def test_the_first_screen_of_a_run_has_one_line_on_what_is_approximate(tmp_path: Path) -> None:
+    def first_screen(*more: str) -> list[str]:
+        blind = [f"world.cameras.{name}.channels=[]" for name in ("front", "wrist")]
+        overrides = [word for one in ["record.cameras=[]", *blind] for word in ("-o", one)]
+        words = ["run", "pick_cube", "-e", "mujoco", "--out", str(tmp_path), *overrides, *more]
+        said = CliRunner().invoke(app, words)
+        assert said.exit_code == 0, said.output
+        return said.stdout.partition("trajectories: ")[0].splitlines()
+
+    assert len(first_screen()) == 2
+    assert sum("approximate: " in line for line in first_screen("-v")) >= 2

@@ -1,47 +1,93 @@
 """`anysim check`: read files and say everything that is wrong with them."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from anysim.cli.options import AsJson, Engine, Overrides
+from anysim.cli.options import AsJson, Engine, Overrides, Verbose
 
 if TYPE_CHECKING:
+    from anysim.model.world import World
     from anysim_schemas.load import LoadedRun
+
+
+class Answer(NamedTuple):
+    """Whether one engine can run a file: why not (empty if it can), and what it does only approximately, in sentences.
+
+    `approximate` is the short form, `measured` has a line with the measured error for each.
+    """
+
+    engine: str
+    refusal: str = ""
+    approximate: tuple[str, ...] = ()
+    measured: tuple[str, ...] = ()
+
+
+class Report(NamedTuple):
+    """Every fault of a file, a sentence each, and the answer of each engine that was asked."""
+
+    faults: list[str]
+    answers: tuple[Answer, ...] = ()
 
 
 def check(
     files: Annotated[list[str], typer.Argument(metavar="FILE…", help="YAML files, or installed tasks by name.")],
     engine: Engine = None,
-    all_engines: Annotated[bool, typer.Option("--all-engines", help="Check against every installed engine.")] = False,
+    all_engines: Annotated[bool, typer.Option("--all-engines", help="Ask every installed engine.")] = False,
     override: Overrides = None,
+    verbose: Verbose = False,
     json: AsJson = False,
 ) -> None:
     """Check files: spelling, types and ranges, assets and references, and whether the engine can run the world.
 
     Nothing is built. Exit code 1 if a file has faults. A file's own engine is checked unless --engine or --all-engines
-    says otherwise.
+    says otherwise. With --all-engines a file is at fault only if no engine can run it; which can is said of each.
     """
     from anysim.cli.output import print_json
 
-    reports = {name: check_one(name, engine, all_engines, override or []) for name in files}
+    reports = {name: report_on(name, engine, all_engines, override or []) for name in files}
     if json:
-        print_json({name: {"ok": not faults, "faults": faults} for name, faults in reports.items()})
+        print_json({name: _as_data(report) for name, report in reports.items()})
     else:
-        for name, faults in reports.items():
-            for fault in faults:
-                typer.echo(fault, err=True)
-            typer.echo(f"{name}: {'ok' if not faults else f'{len(faults)} faults'}")
-    if any(reports.values()):
+        for name, report in reports.items():
+            _tell(name, report, all_engines, verbose)
+    if any(report.faults for report in reports.values()):
         raise typer.Exit(1)
+
+
+def _as_data(report: Report) -> dict[str, object]:
+    engines = {a.engine: {"runs": not a.refusal, "why": a.refusal, "approximate": a.measured} for a in report.answers}
+    return {"ok": not report.faults, "faults": report.faults, "engines": engines}
+
+
+def _tell(name: str, report: Report, all_engines: bool, verbose: bool) -> None:
+    for fault in report.faults:
+        typer.echo(fault, err=True)
+    for answer in report.answers:
+        if answer.refusal and answer.refusal not in report.faults:
+            typer.echo(answer.refusal, err=True)
+        for line in answer.measured if verbose else answer.approximate:
+            typer.echo(f"{answer.engine}: {line}" if verbose else line)
+    count = len(report.faults)
+    verdict = f"{count} {'fault' if count == 1 else 'faults'}" if count else "ok"
+    if all_engines and report.answers:
+        able = [answer.engine for answer in report.answers if not answer.refusal]
+        unable = [answer.engine for answer in report.answers if answer.refusal]
+        verdict += f"; runs on {', '.join(able) or 'no engine'}"
+        verdict += f"; not on {', '.join(unable)}" if unable else ""
+    typer.echo(f"{name}: {verdict}")
 
 
 def check_one(name: str, engine: str | None, all_engines: bool, overrides: list[str]) -> list[str]:
     """Every fault of one file, a sentence each; empty if it can be run."""
+    return report_on(name, engine, all_engines, overrides).faults
+
+
+def report_on(name: str, engine: str | None, all_engines: bool, overrides: list[str]) -> Report:
+    """Every fault of one file, and what each engine that is asked says to it."""
     from anysim import registry
-    from anysim.api import check_engine, compile_world, dry_run, load
-    from anysim.engine.factory import engine_class
+    from anysim.api import compile_world, dry_run, load
     from anysim.errors import AnysimError, AssetError, SpecError
 
     try:
@@ -50,20 +96,37 @@ def check_one(name: str, engine: str | None, all_engines: bool, overrides: list[
         if loaded.spec.task is not None:
             dry_run(loaded, world)
             _check_film(loaded)
+        engines = registry.names("engines") if all_engines else [engine or loaded.spec.engine.name]
+        answers = tuple(_ask(one, loaded, world, name) for one in engines)
     except (SpecError, AssetError) as error:
-        return [str(issue) for issue in error.issues] or [f"{name}: {error}"]
+        return Report([str(issue) for issue in error.issues] or [f"{name}: {error}"])
     except AnysimError as error:
-        return [f"{name}: {error}"]
-    engines = registry.names("engines") if all_engines else [engine or loaded.spec.engine.name]
-    faults: list[str] = []
-    for one in engines:
-        try:
-            check_engine(loaded, world, engine_class(one), name)
-        except SpecError as error:
-            return [str(issue) for issue in error.issues]
-        except AnysimError as error:
-            faults.append(f"{name}: {error}")
-    return faults
+        return Report([f"{name}: {error}"])
+    refused = [answer.refusal for answer in answers if answer.refusal]
+    return Report(refused if len(refused) == len(answers) else [], answers)
+
+
+def _ask(engine: str, loaded: "LoadedRun", world: "World", name: str) -> Answer:
+    """Whether an engine can run a world.
+
+    Raises:
+        SpecError: the file is at fault, whatever the engine.
+    """
+    from anysim.api import check_engine
+    from anysim.cli.output import approximations
+    from anysim.engine.factory import engine_class
+    from anysim.errors import AnysimError, SpecError
+
+    try:
+        kind = engine_class(engine)
+        needs = check_engine(loaded, world, kind, name)
+    except SpecError:
+        raise
+    except AnysimError as error:
+        return Answer(engine, f"{name}: {error}")
+    command = f"anysim check {name} -e {engine}"
+    short, long = (approximations(engine, kind.capabilities, needs, all_of_it, command) for all_of_it in (False, True))
+    return Answer(engine, "", tuple(short), tuple(long))
 
 
 def _check_film(loaded: "LoadedRun") -> None:

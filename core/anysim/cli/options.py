@@ -23,6 +23,7 @@ Overrides = Annotated[
         "-o", "--override", metavar="KEY=VALUE", help="Override a value: `-o physics.dt=0.004`. May be repeated."
     ),
 ]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say what is approximate, with each measured error.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document for machines.")]
 
 UNWRAPPED = "\b\n"

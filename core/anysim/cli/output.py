@@ -3,9 +3,12 @@
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import typer
+
+if TYPE_CHECKING:
+    from anysim.engine.capability import Capabilities, Need
 
 
 def interactive() -> bool:
@@ -40,6 +43,19 @@ def print_table(
     for row in cells:
         table.add_row(*(Text(cell, (styles or {}).get(cell, "")) for cell in row))
     Console().print(table)
+
+
+def approximations(
+    engine: str, capabilities: "Capabilities", needs: "Sequence[Need]", verbose: bool, command: str
+) -> list[str]:
+    """The needs that an engine meets approximately: a line with the measured error of each, or one with their count.
+
+    `command` is what prints them all.
+    """
+    if verbose or not needs:
+        return [f"approximate: {n.capability} ({n.why}): {capabilities.supported[n.capability].note}" for n in needs]
+    names = ", ".join(dict.fromkeys(str(need.capability) for need in needs))
+    return [f"approximate on {engine}: {len(needs)} ({names}); `{command} -v` says how far, each measured"]
 
 
 @contextmanager

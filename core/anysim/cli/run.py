@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from anysim.cli.options import AsJson, Engine, NumEnvs, Overrides, Seed, Task
+from anysim.cli.options import AsJson, Engine, NumEnvs, Overrides, Seed, Task, Verbose
 
 if TYPE_CHECKING:
     from anysim.record.collector import EpisodeResult
@@ -27,6 +27,7 @@ def run(
     min_success: Annotated[
         float, typer.Option(min=0.0, max=1.0, help="Exit with 1 if a smaller share succeeds.")
     ] = 0.0,
+    verbose: Verbose = False,
     json: AsJson = False,
 ) -> None:
     """Run a task's expert, and keep the trajectories that succeed.
@@ -47,7 +48,7 @@ def run(
         directory = out or Path("runs") / f"{env.name}-{env.engine.name}-{_run_id(env, seed)}"
         collector = Collector(env, SkillPolicy(env), directory, episodes, seed)
         if not json:
-            _announce(env, directory, episodes, seed, len(collector.recorder.committed()))
+            _announce(env, directory, episodes, seed, len(collector.recorder.committed()), verbose, task)
         results: list[EpisodeResult] = []
         with _progress(episodes, json) as show:
             for result in collector.run():
@@ -68,14 +69,18 @@ def _run_id(env: "TaskEnv", seed: int) -> str:
     return f"seed{seed}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"
 
 
-def _announce(env: "TaskEnv", directory: Path, episodes: int, seed: int, present: int) -> None:
+def _announce(
+    env: "TaskEnv", directory: Path, episodes: int, seed: int, present: int, verbose: bool, task: str
+) -> None:
+    from anysim.cli.output import approximations
+
     typer.echo(
         f"{env.name} on {env.engine.name} {env.engine.version}: {episodes} episodes in {env.num_envs} envs, seed {seed}"
     )
-    for need in env.engine.approximations:
-        typer.echo(
-            f"approximate: {need.capability} ({need.why}): {env.engine.capabilities.supported[need.capability].note}"
-        )
+    engine = env.engine
+    check = f"anysim check {task} -e {engine.name}"
+    for line in approximations(engine.name, engine.capabilities, engine.approximations, verbose, check):
+        typer.echo(line)
     typer.echo(f"trajectories: {directory}" + (f" (resuming: {present} are there already)" if present else ""))
 
 
