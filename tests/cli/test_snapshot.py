@@ -7,7 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 from anysim.cli.main import app
-from anysim.errors import SnapshotError
+from anysim.engine.snapshot_file import read
+from anysim.errors import NameLookupError, SnapshotError
 from tests.runtime import light
 
 
@@ -31,3 +32,31 @@ def test_show_prints_the_stamp(tmp_path: Path) -> None:
     assert isinstance(broken.exception, SnapshotError)
     with pytest.raises(SnapshotError, match="damaged or truncated"):
         raise broken.exception
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of two trajectories."""
+    out = tmp_path_factory.mktemp("run")
+    blind = [word for name in ("front", "wrist") for word in ("-o", f"world.cameras.{name}.channels=[]")]
+    words = ["run", "pick_cube", "-e", "mujoco", "-n", "2", "-k", "2", "--out", str(out), "-o", "record.cameras=[]"]
+    done = CliRunner().invoke(app, [*words, *blind])
+    assert done.exit_code == 0, done.output
+    return out
+
+
+def test_a_moment_of_a_run_is_taken_from_its_first_trajectory_or_the_one_named(recorded: Path, tmp_path: Path) -> None:
+    def take(source: Path, name: str, *more: str) -> str:
+        done = CliRunner().invoke(app, ["snapshot", "take", str(source), str(tmp_path / name), "--step", "3", *more])
+        assert done.exit_code == 0, done.output
+        return done.stdout
+
+    first, second = sorted((recorded / "episodes").iterdir())
+    assert f"step 3 of {first.name} (the first of 2; --trajectory names another)" in take(recorded, "run")
+    assert f"step 3 of {first.name}, on" in take(first, "first")
+    assert f"step 3 of {second.name}, on" in take(recorded, "second", "--trajectory", second.name)
+    seeds = [read(tmp_path / name).stamp["episode_seeds"] for name in ("run", "first", "second")]
+    assert seeds[0] == seeds[1] != seeds[2]
+    wrong = CliRunner().invoke(app, ["snapshot", "take", str(recorded), "x", "--trajectory", first.name[:-1] + "7"])
+    with pytest.raises(NameLookupError, match=f"did you mean '{first.name}'"):
+        raise wrong.exception or AssertionError(wrong.output)

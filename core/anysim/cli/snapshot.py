@@ -53,16 +53,32 @@ def _text(value: object) -> str:
 
 @app.command("take")
 def take(
-    trajectory: Annotated[Path, typer.Argument(metavar="DIR", help="A recorded trajectory.")],
+    trajectory: Annotated[Path, typer.Argument(metavar="DIR", help="A recorded trajectory, or a run with some.")],
     out: Annotated[Path, typer.Argument(metavar="FILE", help="The file to write.")],
     step: Annotated[int, typer.Option("--step", "-t", min=0, help="The control step; 0 is right after the reset.")] = 0,
+    name: Annotated[
+        str | None, typer.Option("--trajectory", help="Which one of a run, by its folder; default the first.")
+    ] = None,
     engine: Engine = None,
 ) -> None:
-    """Replay a trajectory up to a step and write a snapshot, from which any number of runs can go on."""
-    from anysim.errors import RecordError
+    """Replay a trajectory up to a step and write a snapshot, from which any number of runs can go on.
+
+    Examples:
+      anysim snapshot take runs/demo/run moment.snapshot --step 40
+      anysim snapshot take runs/demo/run moment.snapshot --trajectory env_0001_episode_0000
+    """
+    from anysim.errors import NameLookupError, RecordError, listing, suggest
+    from anysim.record.names import find_trajectories
     from anysim.record.reader import open_trajectory
     from anysim.record.replay import begin, rebuild
 
+    found = {path.name: path for path in find_trajectories([trajectory])}
+    if name is not None and name not in found:
+        raise NameLookupError(
+            f"{trajectory} has no trajectory '{name}'{suggest(name, list(found))} (it has {listing(list(found))})"
+        )
+    chosen = name or next(iter(found))
+    trajectory = found[chosen]
     reader = open_trajectory(trajectory)
     if step > reader.manifest.steps:
         raise RecordError(f"{trajectory} has {reader.manifest.steps} steps, so there is no step {step}")
@@ -71,4 +87,5 @@ def take(
         for action in reader.actions[:step]:
             env.step(action[None])
         path = env.snapshot().save(out)
-    typer.echo(f"{path}: step {step} of {trajectory.name}, on {env.engine.name} {env.engine.version}")
+    of = f" (the first of {len(found)}; --trajectory names another)" if name is None and len(found) > 1 else ""
+    typer.echo(f"{path}: step {step} of {chosen}{of}, on {env.engine.name} {env.engine.version}")
