@@ -132,6 +132,17 @@ def place_of(loaded: LoadedRun, path: str) -> str:
     return ""
 
 
+WATCHING: Mapping[str, Any] = {"task": {"observations": {"policy": ["last_action"]}}}
+"""The task of a file that has none: nothing is asked of anybody."""
+
+
+def watched(loaded: LoadedRun) -> LoadedRun:
+    """A run as it is, or a world without a task with one that only watches; places stay those of the files."""
+    if loaded.spec.task is not None:
+        return loaded
+    return replace(load(WATCHING, loaded.data), files=loaded.files, provenance=loaded.provenance)
+
+
 def dry_run(loaded: LoadedRun, world: "World") -> None:
     """Resolve every name the task refers to, without the engine it is for.
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from anysim.api import blind_env, compile_world, load, place_of
+from anysim.api import blind_env, compile_world, load, place_of, watched
 from anysim.randomization.streams import episode_seed
 from anysim_schemas.load import Loaded, LoadedRun
 
@@ -47,10 +47,12 @@ def explain(
 ) -> Explanation:
     """The draws of episode `episode` (counted from 0) of env `env` under a global seed, by default the file's.
 
+    A world needs no task for that.
+
     Draws depend on the seed, the env and the names of streams alone, so no engine is needed: the reset runs on the
     kinematic one, with a single env.
     """
-    loaded = source if isinstance(source, Loaded) else load(source, overrides=overrides)
+    loaded = watched(source if isinstance(source, Loaded) else load(source, overrides=overrides))
     seed = loaded.spec.seed if seed is None else seed
     chosen = episode_seed(seed, env, episode)
     with blind_env(loaded, compile_world(loaded), "explain") as one:

@@ -1,18 +1,14 @@
 """Pictures of a world: its first episodes, drawn by each engine, side by side."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from anysim.api import load, make
+from anysim.api import load, make, watched
 from anysim.cli.montage import montage
 from anysim.conventions import Array
 from anysim.errors import AnysimError, NameLookupError, listing, suggest
 from anysim_schemas.load import Loaded, LoadedRun
-
-WATCHING: Mapping[str, Any] = {"task": {"observations": {"policy": ["last_action"]}}}
-"""The task of a file that has none: nothing is rewarded or required."""
 
 
 class Pictures(NamedTuple):
@@ -55,8 +51,7 @@ def pictures(
         raise NameLookupError(
             f"the world has no camera '{camera}'{suggest(camera, cameras)} (cameras: {listing(cameras)}, and `default`)"
         )
-    if loaded.spec.task is None:
-        loaded = replace(load(WATCHING, loaded.data), files=loaded.files)
+    loaded = watched(loaded)
     chosen = camera or (cameras[0] if cameras else "default")
     found = Pictures({}, {})
     for name in engines:
