@@ -3,10 +3,12 @@ import json
 import pytest
 
 from anysim import registry
-from anysim.errors import RecordError
+from anysim.errors import PluginError, RecordError
 from anysim.record.manifest import read_manifest
 from anysim.record.recorder import Recorder
 from anysim.record.verify import verify, verify_run
+
+INSTALLED = registry.load
 
 
 class ContentReader:
@@ -73,6 +75,21 @@ def test_another_name(committed):
 def test_faults_of_the_content_are_reported(committed, monkeypatch):
     monkeypatch.setattr(ContentReader, "found", ["front.mp4 has 3 frames"])
     assert verify(committed) == ["front.mp4 has 3 frames"]
+
+
+def test_a_missing_reader_is_no_damage(committed, monkeypatch):
+    monkeypatch.setattr(registry, "load", INSTALLED)
+    with pytest.raises(PluginError, match="no reader named 'lines' is installed"):
+        verify(committed)
+
+
+def test_a_missing_library_of_a_reader_is_no_damage(committed, monkeypatch):
+    def faults(self):
+        raise ModuleNotFoundError("No module named 'mcap'", name="mcap")
+
+    monkeypatch.setattr(ContentReader, "faults", faults)
+    with pytest.raises(PluginError, match="needs mcap, which is not installed"):
+        verify(committed)
 
 
 def change(path, **values):

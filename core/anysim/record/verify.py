@@ -14,6 +14,10 @@ def verify(directory: str | Path) -> list[str]:
 
     Finds a manifest that is damaged, missing and additional files, changed bytes, and content that contradicts the
     manifest. The manifest itself carries no signature: who can change everything can change everything.
+
+    Raises:
+        PluginError: the reader of the trajectory, or a library that it needs, is not installed: nothing is known of
+            the content.
     """
     path = Path(directory)
     try:
@@ -25,8 +29,13 @@ def verify(directory: str | Path) -> list[str]:
         return faults
     try:
         return open_trajectory(path).faults()
-    except (RecordError, PluginError) as error:
+    except RecordError as error:
         return [str(error)]
+    except ImportError as error:  # of a library that a reader imports when it reads: nothing is known of the content
+        library = error.name or "a library"
+        raise PluginError(
+            f"the reader '{manifest.writer}' of {path} needs {library}, which is not installed ({error})"
+        ) from error
 
 
 def verify_run(out: str | Path) -> dict[str, list[str]]:
@@ -34,6 +43,7 @@ def verify_run(out: str | Path) -> dict[str, list[str]]:
 
     Raises:
         RecordError: there is no such run.
+        PluginError: a reader is not installed.
     """
     run = Path(out)
     if not (run / EPISODES).is_dir():
