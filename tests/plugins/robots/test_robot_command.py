@@ -51,6 +51,18 @@ def test_a_draft_is_written_read_back_checked_and_drawn(tmp_path: Path) -> None:
     assert (tmp_path / "new.png").read_bytes()[:4] == b"\x89PNG"
 
 
+def test_a_draft_is_written_into_the_current_folder_and_not_beside_the_model(tmp_path: Path) -> None:
+    theirs, mine = tmp_path / "site-packages", tmp_path / "mine"
+    theirs.mkdir()
+    mine.mkdir()
+    shutil.copy(ARM / "third_arm.urdf", theirs / "new_arm.urdf")
+    made = anysim("robot", "import", str(theirs / "new_arm.urdf"), "--json", cwd=mine)
+    assert made.returncode == 0, made.stderr
+    assert json.loads(made.stdout)["file"] == "new_arm.yaml"
+    assert [path.name for path in theirs.iterdir()] == ["new_arm.urdf"]
+    assert f"source: {theirs / 'new_arm.urdf'}" in (mine / "new_arm.yaml").read_text()
+
+
 @pytest.mark.slow
 def test_the_gallery_is_a_page_without_a_network(tmp_path: Path) -> None:
     out = tmp_path / "gallery"

@@ -100,7 +100,7 @@ def import_(
         Path, typer.Argument(metavar="FILE", help="A URDF or MJCF file; FILE.xml#BODY for one of several bodies.")
     ],
     out: Annotated[
-        Path | None, typer.Option("--out", help="The YAML file to write; default NAME.yaml beside the model.")
+        Path | None, typer.Option("--out", help="The YAML file to write; default NAME.yaml in this folder.")
     ] = None,
     name: Annotated[
         str | None, typer.Option("--name", help="Its name in the catalogue; default that of the file.")
@@ -125,7 +125,7 @@ def import_(
     from anysim_robots.drafting.draft import draft
 
     made = draft(file, name)
-    target = out or file.with_name(f"{made.name}.yaml")
+    target = out or Path(f"{made.name}.yaml")  # never beside the model: that is somebody else's folder
     if target.exists() and not force:
         raise AnysimError(f"there is a file {target} already; give another --out, or --force to replace it")
     target.parent.mkdir(parents=True, exist_ok=True)
