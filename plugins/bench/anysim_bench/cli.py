@@ -24,6 +24,9 @@ def step(
     ] = "1,16,64",
     task: Annotated[str, typer.Option(help="The task of the last rows; an empty name leaves them out.")] = "pick_cube",
     rounds: Annotated[int, typer.Option(min=1, help="Interleaved rounds; the best of each side counts.")] = 7,
+    seconds: Annotated[
+        float, typer.Option(min=0.0, help="After this long a row ends, once three rounds are done.")
+    ] = 5.0,
     json: AsJson = False,
 ) -> None:
     """Step through SimEngine and through a whole task, each against the engine's own loop doing the same.
@@ -34,30 +37,34 @@ def step(
 
     A budget is the least ratio that is good enough; a missed one is marked and changes nothing else.
     """
-    from anysim.cli.output import print_json, print_table
+    from collections.abc import Iterator
+
+    from anysim.cli.output import print_json
     from anysim.errors import EngineError
     from anysim.model.world import Actuation
-    from anysim_bench.step import engine_cost, engines_with_raw_loop, env_cost
+    from anysim_bench.rows import Rows
+    from anysim_bench.step import StepCost, engine_cost, engines_with_raw_loop, env_cost
 
     try:
         sizes = [int(n) for n in num_envs.split(",")]
     except ValueError:
         raise EngineError(f"--num-envs takes whole numbers separated by commas, got '{num_envs}'") from None
     names = engines_with_raw_loop() if engine == "all" else [name.strip() for name in engine.split(",")]
-    costs = []
-    for name in names:
-        for n in sizes:
-            typer.echo(f"measuring {n} envs on {name}…", err=True)
-            costs += [engine_cost(name, n, rounds, mode) for mode in (Actuation.NATIVE, Actuation.IMPLICIT_PD)]
-            costs += [env_cost(name, n, task, rounds)] if task else []
-    if json:
-        print_json([c._asdict() | {"missed": c.missed} for c in costs])
-        return
-    print_table(
-        "Physics steps per second, all envs together",
-        ("engine", "loop", "drives", "envs", "anysim", "raw", "ratio (wall)", "ratio (cpu)", "budget (wall)"),
-        [
-            (
+    costs: list[StepCost] = []
+
+    def measured(name: str, n: int) -> Iterator[StepCost]:
+        for mode in (Actuation.NATIVE, Actuation.IMPLICIT_PD):
+            yield engine_cost(name, n, rounds, mode, seconds)
+        if task:
+            yield env_cost(name, n, task, rounds, seconds)
+
+    heads = ("engine", "loop", "drives", "envs", "anysim", "raw", "ratio (wall)", "ratio (cpu)", "budget (wall)")
+    rows = Rows("Physics steps per second, all envs together", heads, (9, 10, 11, 4, 9, 9), quiet=json)
+    for done, (name, n) in enumerate((name, n) for name in names for n in sizes):
+        typer.echo(f"measuring {n} envs on {name} ({done + 1} of {len(names) * len(sizes)})…", err=True)
+        for c in measured(name, n):
+            costs.append(c)
+            rows.add(
                 c.engine,
                 c.what if c.what == "engine" else task,
                 c.actuation,
@@ -68,9 +75,8 @@ def step(
                 f"{c.cpu_ratio:.3f}",
                 "none" if c.budget is None else f"{c.budget:.2f}" + " missed" * c.missed,
             )
-            for c in costs
-        ],
-    )
+    if json:
+        print_json([c._asdict() | {"missed": c.missed} for c in costs])
 
 
 @app.command("shards")
@@ -161,28 +167,26 @@ def collect(
 
     All threads count. Building and a first collection, in which everything is compiled and loaded, do not.
     """
-    from anysim.cli.output import print_json, print_table
+    from anysim.cli.output import print_json
     from anysim.engine.factory import default_engine
     from anysim.errors import EngineError
-    from anysim_bench.collect import ENGINE_SHARE_GOAL, collect_costs, typical
+    from anysim_bench.collect import ENGINE_SHARE_GOAL, CollectCost, collect_costs, typical
+    from anysim_bench.rows import Rows
 
     try:
         numbers = [int(n) for n in present.split(",")]
     except ValueError:
         raise EngineError(f"--present takes whole numbers separated by commas, got '{present}'") from None
-    costs = []
+    costs: list[CollectCost] = []
+    title = f"Collecting {task}; the goal on MuJoCo, without cameras, is an engine's share of {ENGINE_SHARE_GOAL:.0%}"
+    heads = ("engine", "envs", "episodes", "there before", "steps/s", "cpu [s]", "engine's", "recorder's thread")
+    rows = Rows(title, heads, (9,), quiet=json)
     for name in (engine or default_engine()).split(","):
         for number in numbers:
             typer.echo(f"collecting {episodes} episodes in {num_envs} envs on {name}…", err=True)
-            costs.append(typical(collect_costs(name, num_envs, episodes, number, task, cameras, rounds)))
-    if json:
-        print_json([cost._asdict() for cost in costs])
-        return
-    print_table(
-        f"Collecting {task}; the goal on MuJoCo, without cameras, is an engine's share of {ENGINE_SHARE_GOAL:.0%}",
-        ("engine", "envs", "episodes", "there before", "steps/s", "cpu [s]", "engine", "recorder's thread"),
-        [
-            (
+            c = typical(collect_costs(name, num_envs, episodes, number, task, cameras, rounds))
+            costs.append(c)
+            rows.add(
                 c.engine,
                 c.num_envs,
                 c.episodes,
@@ -192,9 +196,8 @@ def collect(
                 f"{c.engine_share:.1%}",
                 f"{c.record_s / c.cpu_s:.1%}",
             )
-            for c in costs
-        ],
-    )
+    if json:
+        print_json([cost._asdict() for cost in costs])
 
 
 @app.command("resets")
@@ -203,7 +206,7 @@ def resets(
         str, typer.Option("--engine", "-e", help="Engines, separated by commas; `all` are those whose entities vary.")
     ] = "all",
     count: Annotated[int, typer.Option("--resets", "-r", min=20, help="Partial resets, each with other entities.")] = (
-        10_000
+        2_000
     ),
     num_envs: Annotated[
         int, typer.Option("--num-envs", "-n", min=1, help="Envs, of which each reset changes one.")
@@ -213,42 +216,40 @@ def resets(
     """Change which objects are present in thousands of partial resets, and see whether anything accumulates.
 
     A Panda, a table and ten things, each a box, a ball, a can or nothing. Memory, open files, threads and what the
-    engine holds of its library are printed on the way; the exit code is 1 where something grew.
+    engine holds of its library are printed on the way; the exit code is 1 where something grew. More resets find
+    smaller leaks.
     """
-    from anysim.cli.output import print_json, print_table
+    from anysim.cli.output import print_json
     from anysim.engine.capability import Capability
     from anysim.engine.factory import runnable
-    from anysim_bench.resets import Sample, reset_cost
+    from anysim_bench.resets import ResetCost, Sample, reset_cost
+    from anysim_bench.rows import Rows
 
     def tell(sample: Sample) -> None:
         typer.echo(f"  {sample.resets} resets: {_held(sample)}", err=True)
 
     able = runnable(Capability.VARYING_ENTITIES)
     names = list(able) if engine == "all" else [name.strip() for name in engine.split(",")]
-    costs = []
+    costs: list[ResetCost] = []
+    title = f"{count:,} partial resets with other entities, {num_envs} envs; processor time of one reset"
+    heads = ("engine", "lifecycle", "first [ms]", "last [ms]", "same entities [ms]", "growth", "early", "late")
+    rows = Rows(title, heads, (9, 22, 0, 0, 0, 6, 60), quiet=json)
     for name in names:
         typer.echo(f"resetting {name} {count:,} times…", err=True)
-        costs.append(reset_cost(name, count, num_envs, tell))
+        c = reset_cost(name, count, num_envs, tell)
+        costs.append(c)
+        rows.add(
+            c.engine,
+            c.lifecycle,
+            f"{c.first_ms:.2f}",
+            f"{c.last_ms:.2f}",
+            f"{c.same_ms:.2f}",
+            "; ".join(c.grown) or "none",
+            _held(c.samples[len(c.samples) // 5]),
+            _held(c.samples[-1]),
+        )
     if json:
         print_json([cost._asdict() | {"samples": [s._asdict() for s in cost.samples]} for cost in costs])
-    else:
-        print_table(
-            f"{count:,} partial resets with other entities, {num_envs} envs; processor time of one reset",
-            ("engine", "lifecycle", "first [ms]", "last [ms]", "same entities [ms]", "early", "late", "growth"),
-            [
-                (
-                    c.engine,
-                    c.lifecycle,
-                    f"{c.first_ms:.2f}",
-                    f"{c.last_ms:.2f}",
-                    f"{c.same_ms:.2f}",
-                    _held(c.samples[len(c.samples) // 5]),
-                    _held(c.samples[-1]),
-                    "; ".join(c.grown) or "none",
-                )
-                for c in costs
-            ],
-        )
     if any(cost.grown for cost in costs):
         raise typer.Exit(1)
 

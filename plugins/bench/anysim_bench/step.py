@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import cycle
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +19,9 @@ from anysim.task.env import TaskEnv
 BOXES = 5
 CHUNK_STEPS = 4000
 """Physics steps of one timed chunk over all envs together, at least ten control steps."""
+
+FEWEST_ROUNDS = 3
+"""Rounds that are measured however long they take."""
 
 
 class StepCost(NamedTuple):
@@ -112,9 +116,11 @@ def engines_with_raw_loop() -> list[str]:
 
 
 def engine_cost(
-    engine_name: str, num_envs: int, rounds: int = 7, actuation: Actuation = Actuation.IMPLICIT_PD
+    engine_name: str, num_envs: int, rounds: int = 7, actuation: Actuation = Actuation.IMPLICIT_PD, seconds: float = inf
 ) -> StepCost:
     """Stepping through SimEngine, writing commands and reading the state every control step, against the raw loop.
+
+    After `seconds` no further round begins, once `FEWEST_ROUNDS` are done.
 
     Raises:
         EngineError: the engine offers no raw loop.
@@ -128,7 +134,7 @@ def engine_cost(
         engine.create_world(world, num_envs)
         substeps = world.physics.substeps
         engine.step(100)
-        return _compare("engine", control_loop(engine, substeps), engine, rounds)
+        return _compare("engine", control_loop(engine, substeps), engine, rounds, seconds)
 
 
 def control_loop(engine: SimEngine, substeps: int) -> Callable[[], None]:
@@ -144,7 +150,9 @@ def control_loop(engine: SimEngine, substeps: int) -> Callable[[], None]:
     return step
 
 
-def env_cost(engine_name: str, num_envs: int, task: str = _BUDGET_TASK, rounds: int = 7) -> StepCost:
+def env_cost(
+    engine_name: str, num_envs: int, task: str = _BUDGET_TASK, rounds: int = 7, seconds: float = inf
+) -> StepCost:
     """A whole task step (action, physics, status, reward, observation) against the raw loop of its world.
 
     Actions are in turn those for the two commands that the raw loop writes; where a controller takes no joint
@@ -162,7 +170,7 @@ def env_cost(engine_name: str, num_envs: int, task: str = _BUDGET_TASK, rounds: 
             actions.append(_action_for(env, control))
             env.step(actions[-1])
         turns = cycle(actions)
-        cost = _compare("env", lambda: env.step(next(turns)), env.engine, rounds)
+        cost = _compare("env", lambda: env.step(next(turns)), env.engine, rounds, seconds)
         return cost if task == _BUDGET_TASK else cost._replace(budget=None)
 
 
@@ -177,13 +185,16 @@ def _action_for(env: TaskEnv, control: Control) -> Array:
     return action
 
 
-def _compare(what: str, ours: Callable[[], Any], engine: SimEngine, rounds: int) -> StepCost:
+def _compare(what: str, ours: Callable[[], Any], engine: SimEngine, rounds: int, seconds: float) -> StepCost:
     num_envs, substeps, raw_loop = engine.num_envs, engine.world.physics.substeps, engine.raw_loop()
     if raw_loop is None:
         raise EngineError(f"engine '{engine.name}' offers no raw loop to compare with")
     calls = max(10, CHUNK_STEPS // (num_envs * substeps))
     best: dict[str, Sequence[float]] = {}
-    for _ in range(rounds):
+    begin = time.perf_counter()
+    for number in range(rounds):
+        if number >= FEWEST_ROUNDS and time.perf_counter() - begin > seconds:
+            break
         for name, call in (("ours", ours), ("raw", lambda: raw_loop(substeps))):
             wall, cpu = time.perf_counter(), time.process_time()
             for _ in range(calls):

@@ -1,5 +1,7 @@
 """The benchmark of steps: its budgets, and that its loops write commands that change."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from anysim import api
 from anysim.engine.base import SimEngine
 from anysim.engine.control import NUDGE
 from anysim.engine.factory import create_simulation
-from anysim_bench import step
+from anysim_bench import cli, step
 
 
 @pytest.mark.parametrize(
@@ -61,3 +63,38 @@ def test_in_a_task_the_targets_of_the_arm_alternate_too(monkeypatch):
     last, before, earlier = seen[-1], seen[-2], seen[-3]
     assert np.allclose(last, earlier, rtol=0, atol=1e-12)
     assert np.allclose(np.abs(last - before), NUDGE)
+
+
+def test_rows_appear_as_they_are_measured(monkeypatch):
+    """Each row is out before the next is measured; with --json nothing but the document is."""
+    costs = [step.StepCost("mujoco", "engine", mode, 1, 1.0, 1.0, 1.0, 1.0, None) for mode in ("native", "implicit_pd")]
+    turns, seen = iter(costs), []
+    out = []
+    monkeypatch.setattr("typer.echo", lambda text, err=False: None if err else out.append(text))
+
+    def measure(*_):
+        seen.append(len(out))
+        return next(turns)
+
+    monkeypatch.setattr(step, "engine_cost", measure)
+    cli.step(engine="mujoco", num_envs="1", task="")
+    assert seen == [1, 2], "the head, and then a row before the second measurement"
+    assert [line.split("\t")[2] for line in out] == ["drives", "native", "implicit_pd"]
+    turns, out[:] = iter(costs), []
+    cli.step(engine="mujoco", num_envs="1", task="", json=True)
+    assert len(json.loads("".join(out))) == 2
+
+
+def test_a_row_ends_after_its_time(monkeypatch):
+    """Three rounds are measured whatever they take, and no more once the time is over."""
+    monkeypatch.setattr(step, "CHUNK_STEPS", 1)
+    calls = []
+
+    def ours():
+        calls[-1] += 1
+
+    monkeypatch.setattr(step, "control_loop", lambda engine, substeps: ours)
+    for seconds in (0.0, 1e9):
+        calls.append(0)
+        step.engine_cost("mujoco", 1, 6, seconds=seconds)
+    assert 0 < calls[1] == 2 * calls[0]
