@@ -1,7 +1,7 @@
 """Tables on a terminal, plain tab-separated lines in a pipe."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -59,17 +59,20 @@ def approximations(
 
 
 @contextmanager
-def working_on(what: str) -> Iterator[None]:
-    """A spinner with a few words while something takes seconds; nothing in a pipe."""
+def working_on(what: str, in_a_pipe: bool = False) -> Iterator[Callable[[str], object]]:
+    """A spinner with a few words while something takes seconds; in a pipe, lines on stderr or nothing.
+
+    What it gives is called with other words when what is done changes.
+    """
     import sys
 
     if not sys.stderr.isatty():
-        yield
+        yield (lambda words: typer.echo(f"{words}…", err=True)) if in_a_pipe else (lambda words: None)
         return
     from rich.console import Console
 
-    with Console(stderr=True).status(f"{what}…"):
-        yield
+    with Console(stderr=True).status(f"{what}…") as status:
+        yield lambda words: status.update(f"{words}…")
 
 
 class Told(Protocol):

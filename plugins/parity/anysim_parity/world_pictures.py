@@ -1,8 +1,10 @@
 """Pictures of a world: its first episodes, drawn by each engine, side by side."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from anysim.api import load, make, watched
 from anysim.cli.montage import montage
@@ -28,6 +30,7 @@ def pictures(
     size: tuple[int, int] | None = None,
     seconds: float = 0.0,
     overrides: Sequence[str] = (),
+    tell: Callable[[str], object] = lambda words: None,
 ) -> Pictures:
     """Start the episodes of a seed on each engine, let them run for a while without action, and draw them.
 
@@ -40,6 +43,7 @@ def pictures(
         size: width and height [px]; the camera's own where not given.
         seconds: simulated time before the image is taken.
         overrides: dotted overrides, as `-o` on the command line.
+        tell: called with a few words whenever something begins that may take long.
 
     Raises:
         SpecError: the file, with line and column.
@@ -56,7 +60,7 @@ def pictures(
     found = Pictures({}, {})
     for name in engines:
         try:
-            found.images[name] = _drawn(loaded, name, num_envs, seed, chosen, size or (None, None), seconds)
+            found.images[name] = _drawn(loaded, name, num_envs, seed, chosen, size or (None, None), seconds, tell)
         except AnysimError as error:
             found.refused[name] = str(error)
     return found
@@ -70,12 +74,21 @@ def _drawn(
     camera: str,
     size: tuple[int | None, int | None],
     seconds: float,
+    tell: Callable[[str], object],
 ) -> Array:
+    tell(f"{engine}: building {num_envs} envs")
     with make(loaded, engine=engine, num_envs=num_envs) as env:
-        env.reset(seed=seed)
+        for number in range(num_envs):  # draws belong to their env: one after the other gives the same as all at once
+            tell(f"{engine}: starting env {number + 1} of {num_envs}")
+            env.reset(seed=seed, mask=np.arange(num_envs) == number)
         if seconds > 0:
+            tell(f"{engine}: {seconds:g} s pass")
             env.engine.step(max(1, round(seconds / env.engine.world.physics.dt)))
-        return env.engine.render(camera, *size)["rgb"]
+        images: list[Array] = []
+        for number in range(num_envs):
+            tell(f"{engine}: drawing env {number + 1} of {num_envs}")
+            images.append(env.engine.render(camera, *size, env_ids=[number])["rgb"])
+        return np.concatenate(images)
 
 
 def sheet(found: Pictures, columns: int | None = None) -> Any:

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from anysim.api import WATCHING as WATCHED, load, make as anysim_make
 from anysim.cli.montage import montage
 from anysim.errors import NameLookupError
 from anysim_parity.world_pictures import pictures
@@ -33,6 +34,9 @@ def test_a_world_without_a_task_is_drawn_and_what_cannot_draw_is_named(world: Pa
     result = anysim("picture", str(world), "-e", "mujoco,null", "--out", str(out))
     assert result.returncode == 0, result.stderr
     assert result.stdout.strip() == str(out)
+    told = ["mujoco: building 4 envs…", *(f"mujoco: starting env {n} of 4…" for n in (1, 2, 3, 4))]
+    assert result.stderr.splitlines()[1:6] == told, "silence for minutes helps nobody"
+    assert "mujoco: drawing env 4 of 4…" in result.stderr
     assert "null took no part: null cannot run 'world': camera 'front' gives rgb" in result.stderr
     assert out.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
 
@@ -42,6 +46,13 @@ def test_each_env_shows_its_own_episode_again(world: Path) -> None:
     assert once.shape == (4, 48, 64, 3)
     assert (once == again).all()
     assert any((once[0] != other).any() for other in once[1:])
+
+
+def test_envs_started_one_by_one_are_those_started_together(world: Path) -> None:
+    with anysim_make(load(WATCHED, world), engine="mujoco", num_envs=4) as env:
+        env.reset(seed=1)
+        together = env.engine.render("front")["rgb"]
+    assert (pictures(world, ["mujoco"], num_envs=4, seed=1).images["mujoco"] == together).all()
 
 
 def test_time_passes_before_the_image(world: Path) -> None:

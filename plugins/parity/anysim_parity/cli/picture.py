@@ -43,10 +43,13 @@ def picture(
     require_matplotlib("the picture needs matplotlib")
     names = [name.strip() for name in engines.split(",")] if engines else list(runnable(Capability.RENDER_RGB))
     file = Path(world)
-    with working_on(f"drawing {world}"):
+    with working_on(f"drawing {world}", in_a_pipe=True) as tell:
+        tell(f"reading {world}")
         loaded = load(file if file.exists() else world, overrides=override or [])
         seed = loaded.spec.seed if seed is None else seed
-        found = pictures(loaded, names, num_envs=num_envs, seed=seed, camera=camera, size=size, seconds=seconds)
+        found = pictures(
+            loaded, names, num_envs=num_envs, seed=seed, camera=camera, size=size, seconds=seconds, tell=tell
+        )
         target = out or Path("runs") / "pictures" / f"{file.stem}-seed{seed}.png"
         figure = sheet(found, columns)
         target.parent.mkdir(parents=True, exist_ok=True)
