@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from anysim_schemas.base import Name, Positive, Spec
+from anysim_schemas.base import Flag, Name, Positive, Spec
 from anysim_schemas.plugin import PluginSlot
 
 
@@ -17,6 +17,9 @@ class RecordSpec(Spec):
     )
     cameras: tuple[Name, ...] = Field(default=(), description="cameras of the world whose images become videos")
     fps: Positive = Field(default=25.0, description="frames per second of the videos; every n-th control step")
+    markers: Flag = Field(
+        default=True, description="goals are marked in the videos; of a camera that is observed, task.images says"
+    )
     keep: Literal["success", "all"] = Field(default="success", description="which trajectories are kept")
     film: Literal["auto", "live", "success"] = Field(
         default="auto",

@@ -4,7 +4,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import ConfigDict, Field, field_validator
 
-from anysim_schemas.base import Integer, Name, NamedByKey, Number, Positive, Spec
+from anysim_schemas.base import Flag, Integer, Name, NamedByKey, Number, Positive, Spec
 from anysim_schemas.errors import KeyFault
 from anysim_schemas.values import FloatValue, WholeValue, unshared
 
@@ -100,6 +100,9 @@ class ImageSpec(Spec):
 
     fps: Positive | None = Field(
         default=None, description="images per second, the latest one holds meanwhile; each control step if not given"
+    )
+    markers: Flag = Field(
+        default=False, description="goals are marked in the observed images, and in the camera's videos"
     )
 
 

@@ -66,7 +66,7 @@ def recorded(env: TaskEnv, steps: int) -> tuple[list[dict[str, Any]], np.ndarray
     for step in range(steps + 1):
         if step:
             env.step(rng.uniform(-1.0, 1.0, (env.num_envs, env.action_dim)))
-        live.append({camera: env.capture.image(camera, everyone) for camera in CAMERAS})
+        live.append({camera: env.capture.picture(camera, everyone) for camera in CAMERAS})
         poses.append(np.array(env.engine.get_state().body_pose))
     return live, np.stack(poses, axis=1)
 

@@ -10,6 +10,7 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.errors import SpecError, SpecIssue, listing, suggest
 from anysim.managers.base import WORLD, Manager, Overridable, random_fields
+from anysim.managers.markers import paint
 from anysim.math import pose as P
 from anysim.model.frames import find_frame
 from anysim.model.slots import ABSENT, active_entity, single
@@ -101,6 +102,7 @@ class CaptureManager(Manager):
     Attributes:
         every: control steps from one recorded image to the next.
         observed: cameras whose images are observed, and the control steps from one to the next.
+        goals: by name the world poses (N, 7) of what the task aims at, kept by the task; they are marked where asked.
     """
 
     name = "capture"
@@ -119,6 +121,8 @@ class CaptureManager(Manager):
                 issues.append(SpecIssue("", path, text))
         if issues:
             raise SpecError(issues)
+        self.goals: Mapping[str, Array] = {}
+        self._marked = {name for name, image in images.items() if image.markers}
         control_dt = world.physics.control_dt
         self.every = interval(control_dt, self.spec.record.fps)
         self.observed = {
@@ -170,7 +174,8 @@ class CaptureManager(Manager):
             self._room(camera)
             new = (self.episodes.elapsed[env_ids] % every == 0) | (self._taken[camera][env_ids] < 0)
             self.image(camera, env_ids[new])
-            found[f"images/{camera}"] = self._latest[camera][env_ids]
+            seen = self._latest[camera][env_ids]
+            found[f"images/{camera}"] = self.mark(seen, camera, env_ids) if camera in self._marked else seen
         return found
 
     def image(self, camera: str, env_ids: Array) -> Array:
@@ -183,13 +188,28 @@ class CaptureManager(Manager):
             taken[missing] = self.episodes.elapsed[missing]
         return latest[env_ids]
 
+    def picture(self, camera: str, env_ids: Array) -> Array:
+        """Images (n, H, W, 3) uint8 as they are recorded: with the goals marked, unless the spec says otherwise."""
+        images = self.image(camera, env_ids)
+        return self.mark(images, camera, env_ids) if self._recorded_with_marks(camera) else images
+
+    def mark(self, images: Array, camera: str, env_ids: Array, body_pose: Array | None = None) -> Array:
+        """A copy of images with the goals marked; `body_pose` (n, B, 7) is where bodies were, if that was earlier."""
+        return paint(images, self.goals, self.engine, camera, env_ids, body_pose)
+
+    def _recorded_with_marks(self, camera: str) -> bool:
+        """What a policy sees is recorded as it sees it; other cameras look on for people."""
+        return camera in self._marked if camera in self.observed else self.spec.record.markers
+
     def image_then(self, camera: str, env: int, tick: int, body_pose: Array) -> Array:
         """The image (H, W, 3) uint8 of a camera at an earlier control step of an env's present episode.
 
-        It is the one that `image` gave or would have given then, if nothing that is seen was changed since the reset
+        It is the one that `picture` gave or would have given then, if nothing that is seen was changed since the reset
         but the poses of the bodies: `body_pose` (B, 7), as the state had them.
         """
-        return self._shoot(camera, np.array([env]), np.array([tick]), body_pose[None])[0]
+        ids, poses = np.array([env]), body_pose[None]
+        image = self._shoot(camera, ids, np.array([tick]), poses)
+        return (self.mark(image, camera, ids, poses) if self._recorded_with_marks(camera) else image)[0]
 
     def _room(self, camera: str) -> None:
         if camera not in self._latest:

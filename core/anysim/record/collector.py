@@ -266,7 +266,7 @@ class Collector:
         images: dict[int, dict[str, Array]] = {i: {} for i in ids.tolist()}
         if len(due):
             for camera in self.env.spec.record.cameras:
-                pictures = self._capture.image(camera, due)
+                pictures = self._capture.picture(camera, due)
                 for row, i in enumerate(due.tolist()):
                     images[i][camera] = pictures[row]
         return list(images.values())

@@ -51,6 +51,7 @@ class TaskEnv:
         self.scene = SceneView(engine, self._episodes, self._manager(TerrainManager))
         self.scene.action_columns = {name: slice(s.start, s.stop) for name, s in self.action_spaces.items()}
         self.mdp = Mdp(spec.task, self.scene, self.streams)
+        self.capture.goals = self.scene.goals
         self.scene.last_action = np.zeros((self.num_envs, self.action_dim))
         self.counterfactuals = Counterfactuals(self.managers, self.mdp, engine, self.streams)
         self._task = spec.task
@@ -333,11 +334,23 @@ class TaskEnv:
         self._store(rows, ids)
         return {g: r.copy() for g, r in rows.items()}
 
-    def render(self, camera: str | None = None, env_ids: Sequence[int] | Array | None = None) -> Array:
-        """Images (E, H, W, 3) uint8 of a camera (default: the world's first, else an overview)."""
+    def render(
+        self,
+        camera: str | None = None,
+        env_ids: Sequence[int] | Array | None = None,
+        *,
+        size: tuple[int | None, int | None] = (None, None),
+        markers: bool = True,
+    ) -> Array:
+        """Images (E, H, W, 3) uint8 of a camera (default: the world's first, else an overview), for people.
+
+        Goals are marked in them unless `markers` is false; `size` is width and height [px] in place of the camera's.
+        """
         cameras = self.engine.world.cameras
         name = camera or (cameras[0].name if cameras else "default")
-        return self.engine.render(name, env_ids=env_ids)["rgb"]
+        images = self.engine.render(name, *size, env_ids=env_ids)["rgb"]
+        ids = np.arange(self.num_envs) if env_ids is None else np.asarray(env_ids, dtype=int)
+        return self.capture.mark(images, name, ids) if markers else images
 
     def close(self) -> None:
         """Free the engine. May be called twice."""

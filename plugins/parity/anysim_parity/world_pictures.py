@@ -87,7 +87,7 @@ def _drawn(
         images: list[Array] = []
         for number in range(num_envs):
             tell(f"{engine}: drawing env {number + 1} of {num_envs}")
-            images.append(env.engine.render(camera, *size, env_ids=[number])["rgb"])
+            images.append(env.render(camera, [number], size=size))
         return np.concatenate(images)
 
 

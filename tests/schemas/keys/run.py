@@ -70,6 +70,7 @@ ROWS: dict[str, Row] = {
         seen="episode",
     ),
     "ImageSpec.fps": row("task.images.eye.fps=25", given=(*OBSERVED, ARM), seen="filmed"),
+    "ImageSpec.markers": row("task.images.eye.markers=true", given=OBSERVED, seen="filmed"),
     "RewardTermSpec.weight": row("task.rewards.close.weight=-2.0", seen="episode"),
     "EventTermSpec.when": row(
         "task.events.polish.when=step",
@@ -81,6 +82,7 @@ ROWS: dict[str, Row] = {
     "RecordSpec.options": row("record.options={crf: 51}", given=FILMED, seen="filmed"),
     "RecordSpec.cameras": row("record.cameras=[eye]", given=SEEING, seen="filmed"),
     "RecordSpec.fps": row("record.fps=10", given=FILMED, seen="filmed"),
+    "RecordSpec.markers": row("record.markers=false", given=FILMED, seen="filmed"),
     "RecordSpec.keep": row("record.keep=all", seen="recorded"),
     "RecordSpec.film": row("record.film=live", given=FILMED, seen="filmed"),
 }

@@ -1,0 +1,74 @@
+"""Goals are marked in pictures and videos on every engine, in observations only where the task asks for it."""
+
+import numpy as np
+import pytest
+
+import anysim
+from anysim import registry
+from anysim.managers.markers import COLORS
+from anysim.task.env import TaskEnv
+from anysim.testing.fixtures import drawing_trouble
+
+LOOK = [
+    "world.cameras.front={from: [1.2, 0.0, 0.6], look_at: [0.3, 0.0, 0.6], fov: 40, size: [120, 80]}",
+    "world.cameras.wrist.channels=[]",
+]
+
+
+def _env(engine: str, *more: str) -> TaskEnv:
+    if trouble := drawing_trouble(registry.load("engines", engine)):
+        pytest.skip(f"{engine} cannot draw here: {trouble}")
+    env = anysim.make("pick_cube", engine=engine, num_envs=2, overrides=[*LOOK, *more])
+    env.reset(seed=1)
+    return env
+
+
+def _goal_pixel(goal: np.ndarray) -> tuple[int, int]:
+    """Row and column of a point in the view of `front`, by hand: it looks along -x from 1.2 m."""
+    focal = 80 / (2 * np.tan(np.radians(20)))
+    away = 1.2 - goal[0]
+    return round(40 - focal * (goal[2] - 0.6) / away - 0.5), round(60 + focal * goal[1] / away - 0.5)
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "pybullet", "sapien"])
+def test_a_goal_is_marked_where_it_is(engine: str) -> None:
+    with _env(engine) as env:
+        marked, plain = env.render("front"), env.render("front", markers=False)
+        for index in range(2):
+            row, column = _goal_pixel(env.scene.goals["goal"][index])
+            rows, columns = np.nonzero((marked[index] != plain[index]).any(axis=-1))
+            assert abs(rows.mean() - row) < 1.0
+            assert abs(columns.mean() - column) < 1.0
+            nearest = np.abs(marked[index].astype(int) - COLORS[0]).sum(axis=-1).min()
+            assert nearest < 60, "its rim has the colour of the first goal"
+        assert env.capture is not None
+        recorded = env.capture.picture("front", np.arange(2))
+        assert np.array_equal(recorded, marked)
+        assert np.array_equal(env.capture.image("front", np.arange(2)), plain)
+
+
+def test_observations_are_marked_only_when_asked_and_videos_show_what_was_observed() -> None:
+    everyone = np.arange(2)
+    for asked in (False, True):
+        with _env("mujoco", f"task.images={{front: {{markers: {str(asked).lower()}}}}}") as env:
+            plain, marked = env.render("front", markers=False), env.render("front")
+            expected = marked if asked else plain
+            assert np.array_equal(env.obs["images/front"], expected)
+            assert np.array_equal(env.capture.picture("front", everyone), expected)
+
+
+def test_videos_without_markers() -> None:
+    with _env("mujoco", "record.markers=false") as env:
+        assert np.array_equal(env.capture.picture("front", np.arange(2)), env.render("front", markers=False))
+
+
+def test_what_is_behind_the_camera_or_beside_the_image_is_not_drawn() -> None:
+    with _env("mujoco") as env:
+        for goal in ([3.0, 0.0, 0.6], [0.3, 5.0, 0.6], [0.3, 0.0, -9.0], [1.2, 0.0, 0.6]):
+            env.scene.goals["goal"][:, :3] = goal
+            assert np.array_equal(env.render("front"), env.render("front", markers=False))
+
+
+def test_the_overview_of_a_world_without_cameras_is_marked_too() -> None:
+    with _env("mujoco", "record.cameras=[]") as env:
+        assert (env.render("default") != env.render("default", markers=False)).any()
