@@ -12,9 +12,10 @@ from anysim_parity.result import Layer, Picture
 from anysim_parity.verdict import findings
 
 _HOW_TO_READ = (
-    "Each layer rests on those above it: what differs in an upper layer explains part of what differs below. A number "
-    "is red where it is further than its tolerance from the analytic answer. A green triangle marks the engine nearest "
-    "to that answer, where it is nearer than another by more than rounding."
+    "Each layer rests on those above it: what differs in an upper layer explains part of what differs below. Numbers "
+    "beyond their tolerance are amber where an engine declares that it is off there, with how far, and red where none "
+    "does: red is what to look into. This is no ranking: a tolerance says what counts as equal, not what a task needs, "
+    "and an engine that is further off in one measure may be the better one for yours."
 )
 
 
@@ -48,9 +49,8 @@ def _versions(comparison: Comparison) -> str:
 
 def _section(layer: Layer, names: list[str], prefix: str) -> list[str]:
     found = findings(layer)
-    beyond = sum(not f.agree for f in found)
     parts = [
-        f'<section><h2 id="{escape(layer.name)}">{escape(layer.name.capitalize())} {badge(beyond, len(found))}</h2>',
+        f'<section><h2 id="{escape(layer.name)}">{escape(layer.name.capitalize())} {badge(found)}</h2>',
         f"<p>{escape(layer.question)}</p>",
     ]
     parts += [

@@ -1,4 +1,4 @@
-"""The top of the page: who agrees with whom in which layer, who is nearest to the answers, what differs and why."""
+"""The top of the page: who agrees with whom in which layer, what differs, and whether that was declared."""
 
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -6,7 +6,7 @@ from itertools import combinations
 
 from anysim_parity.html_tables import badge, number, table
 from anysim_parity.report import Comparison
-from anysim_parity.verdict import ANALYTIC, Finding, between, disagreements, findings, nearest_counts, worst
+from anysim_parity.verdict import ANALYTIC, Finding, between, disagreements, findings, worst
 
 LISTED, SUBJECTS = 12, 6
 """Reasons that the summary tells, and measures of each; the tables have all of them."""
@@ -14,7 +14,7 @@ LISTED, SUBJECTS = 12, 6
 
 def summary(comparison: Comparison) -> list[str]:
     """The sections above the layers."""
-    return [*_agreement(comparison), *_nearest(comparison), *_differences(comparison)]
+    return [*_agreement(comparison), *_differences(comparison)]
 
 
 def _agreement(comparison: Comparison) -> list[str]:
@@ -32,16 +32,19 @@ def _agreement(comparison: Comparison) -> list[str]:
 
 
 def _sentence(comparison: Comparison) -> str:
-    agree, differ = [], []
+    agree, declared, news = [], [], []
     for layer in comparison.layers:
         found = findings(layer)
+        off = [f for f in found if not f.agree]
         if found:
-            (agree if all(f.agree for f in found) else differ).append(layer.name)
+            (agree if not off else declared if all(f.declared for f in off) else news).append(layer.name)
     parts = []
     if agree:
         parts.append(f"Within all tolerances: <b>{', '.join(agree)}</b>.")
-    if differ:
-        parts.append(f"Not everywhere: <b>{', '.join(differ)}</b>.")
+    if declared:
+        parts.append(f"Further apart only where an engine declares it: <b>{', '.join(declared)}</b>.")
+    if news:
+        parts.append(f"With differences that no engine declares: <b>{', '.join(news)}</b>.")
     return f"<p>{' '.join(parts) or 'Nothing could be compared.'}</p>"
 
 
@@ -50,31 +53,10 @@ def _cell(found: Sequence[Finding]) -> str:
         return ""
     top = worst(found)
     assert top is not None
-    text = badge(sum(not f.agree for f in found), len(found))
+    text = badge(found)
     if top.agree:
         return text
     return f'{text}<br/><span class="soft">{escape(top.subject)}: {number(top.gap)} {escape(top.unit)}</span>'
-
-
-def _nearest(comparison: Comparison) -> list[str]:
-    names = list(comparison.engines)
-    counts = {layer.name: nearest_counts(layer, names) for layer in comparison.layers}
-    told = {name: row for name, row in counts.items() if any(row.values())}
-    if not told:
-        return []
-    rows = [
-        f'<tr><th scope="row">{escape(layer)}</th>' + "".join(f'<td class="n">{row[n]}</td>' for n in names) + "</tr>"
-        for layer, row in told.items()
-    ]
-    total = {name: sum(row[name] for row in told.values()) for name in names}
-    rows.append(
-        '<tr><th scope="row">together</th>' + "".join(f'<td class="n"><b>{total[n]}</b></td>' for n in names) + "</tr>"
-    )
-    return [
-        "<h3>Nearest to the analytic answer</h3>",
-        '<p class="soft">In how many measures each engine is nearest to the answer, where that tells them apart.</p>',
-        table(["layer", *names], rows, range(1, 1 + len(names))),
-    ]
 
 
 def _differences(comparison: Comparison) -> list[str]:
@@ -85,14 +67,22 @@ def _differences(comparison: Comparison) -> list[str]:
         reasons: dict[tuple[str, str], dict[str, list[Finding]]] = {}
         for f in found:
             reasons.setdefault((f.layer, f.explanation), {}).setdefault(f.subject, []).append(f)
-        items = [_item(layer, why, subjects) for (layer, why), subjects in list(reasons.items())[:LISTED]]
-        more = len(reasons) - len(items)
-        tail = f'<p class="soft">and {more} more, in the tables below</p>' if more > 0 else ""
-        parts += ["<h3>What differs, and what explains it</h3>", f'<ol class="why">{"".join(items)}</ol>{tail}']
+        for title, wanted in (("What differs, and no engine declares", False), ("What differs as declared", True)):
+            own = [item for item in reasons.items() if _declared(item[1]) is wanted]
+            if not own:
+                continue
+            items = [_item(layer, why, subjects) for (layer, why), subjects in own[:LISTED]]
+            more = len(own) - len(items)
+            tail = f'<p class="soft">and {more} more, in the tables below</p>' if more > 0 else ""
+            parts += [f"<h3>{title}</h3>", f'<ol class="why">{"".join(items)}</ol>{tail}']
     if refused:
         items = [f"<li><b>{escape(layer)}</b>, {escape(name)}: {escape(why)}</li>" for layer, name, why in refused]
         parts += ["<h3>What could not be compared</h3>", f"<ul>{''.join(items)}</ul>"]
     return parts
+
+
+def _declared(subjects: Mapping[str, Sequence[Finding]]) -> bool:
+    return all(f.declared for group in subjects.values() for f in group)
 
 
 def _item(layer: str, why: str, subjects: Mapping[str, Sequence[Finding]]) -> str:
@@ -100,7 +90,7 @@ def _item(layer: str, why: str, subjects: Mapping[str, Sequence[Finding]]) -> st
     told = [_told(subject, group) for subject, group in list(subjects.items())[:SUBJECTS]]
     if len(subjects) > SUBJECTS:
         told.append(f"and {len(subjects) - SUBJECTS} more")
-    reason = escape(why) if why else "Nothing declared explains it."
+    reason = escape(why) if why else "Nothing that is known explains it."
     return f'<li>{escape(layer)}, {"; ".join(told)}.<br/><span class="soft">{reason}</span></li>'
 
 

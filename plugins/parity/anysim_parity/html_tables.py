@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Sequence
 from html import escape
 
-from anysim_parity.judge import nearest
 from anysim_parity.result import Gap, Layer, Measure
+from anysim_parity.verdict import Finding, declares
 
 
 def number(value: float) -> str:
@@ -13,17 +13,22 @@ def number(value: float) -> str:
     return text.replace("e-0", "e-").replace("e+0", "e+")
 
 
-def badge(beyond: int, compared: int) -> str:
-    """`agree` or how many of the comparisons differ."""
-    if not compared:
+def badge(found: Sequence[Finding]) -> str:
+    """How many comparisons agree; how many differ as declared (amber), and how many as nobody declares (red)."""
+    if not found:
         return ""
-    if not beyond:
-        return f'<span class="good">agree ({compared})</span>'
-    return f'<span class="bad">differ in {beyond} of {compared}</span>'
+    off = [f for f in found if not f.agree]
+    if not off:
+        return f'<span class="good">agree ({len(found)})</span>'
+    known = sum(f.declared for f in off)
+    parts = [("bad", len(off) - known, "not declared"), ("known", known, "as declared")]
+    return " ".join(
+        f'<span class="{kind}">{count} of {len(found)} differ, {words}</span>' for kind, count, words in parts if count
+    )
 
 
 def measure_table(layer: Layer, engines: Sequence[str]) -> str:
-    """One row a measure; numbers beyond the tolerance are marked, and the engine nearest to the answer.
+    """One row a measure; numbers beyond the tolerance are marked.
 
     What explains a number stands below the table, once for all that it explains.
     """
@@ -35,8 +40,6 @@ def measure_table(layer: Layer, engines: Sequence[str]) -> str:
 
 
 def _measure_row(measure: Measure, engines: Sequence[str], notes: Sequence[str]) -> str:
-    near = nearest(measure)
-    tells = 0 < len(near) < len(measure.values)
     cells = []
     for name in engines:
         value = measure.values.get(name)
@@ -45,7 +48,7 @@ def _measure_row(measure: Measure, engines: Sequence[str], notes: Sequence[str])
             continue
         away = measure.reference is not None and measure.tolerance is not None
         off = away and abs(value - measure.reference) > measure.tolerance  # pyright: ignore[reportOperatorIssue]
-        classes = " ".join(["n", *(["off"] if off else []), *(["near"] if tells and name in near else [])])
+        classes = _classes(bool(off), measure.explanation, name)
         text = number(value)
         if name in measure.intervals:
             low, high = measure.intervals[name]
@@ -58,6 +61,11 @@ def _measure_row(measure: Measure, engines: Sequence[str], notes: Sequence[str])
         f'<tr><th scope="row">{escape(measure.subject)}{note}</th><td>{escape(measure.unit)}</td>{"".join(cells)}'
         f'<td class="n">{answer}</td><td class="n">{tolerance}</td></tr>'
     )
+
+
+def _classes(off: bool, explanation: str, *engines: str) -> str:
+    """Of a cell with a number: beyond its tolerance as one of the engines declares, or as nobody does."""
+    return "n" if not off else "n known" if declares(explanation, *engines) else "n off"
 
 
 def gap_table(layer: Layer, pairs: Sequence[tuple[str, str]]) -> str:
@@ -82,7 +90,7 @@ def _gap_cell(gaps: Iterable[Gap], pair: tuple[str, str]) -> str:
     if gap is None:
         return '<td class="n"></td>'
     off = gap.tolerance is not None and gap.value > gap.tolerance
-    return f'<td class="{"n off" if off else "n"}">{number(gap.value)}</td>'
+    return f'<td class="{_classes(off, gap.explanation, *pair)}">{number(gap.value)}</td>'
 
 
 def table(heads: Sequence[str], rows: Sequence[str], right: range) -> str:

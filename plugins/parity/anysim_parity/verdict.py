@@ -1,10 +1,11 @@
 """Verdict on a layer: which engines agree, which are near the analytic answer, and what is furthest off."""
 
-from collections.abc import Iterable, Iterator, Sequence
+import re
+from collections.abc import Iterable, Iterator
 from itertools import combinations
 from typing import NamedTuple
 
-from anysim_parity.judge import errors, nearest
+from anysim_parity.judge import errors
 from anysim_parity.result import Layer, Measure
 
 ANALYTIC = "the analytic answer"
@@ -31,6 +32,11 @@ class Finding(NamedTuple):
     def ratio(self) -> float:
         """The gap in units of the tolerance; 1 for shares of episodes that differ, which have none."""
         return self.gap / self.tolerance if self.tolerance > 0 else 1.0
+
+    @property
+    def declared(self) -> bool:
+        """Whether one of the two engines declares what this goes back to; else a difference is news."""
+        return declares(self.explanation, self.first, self.second)
 
 
 def findings(layer: Layer) -> list[Finding]:
@@ -78,15 +84,9 @@ def _of_measure(layer: str, m: Measure, has_gaps: bool) -> Iterator[Finding]:
         yield Finding(layer, m.subject, m.unit, a, b, gap, allowed, agree, m.explanation)
 
 
-def nearest_counts(layer: Layer, engines: Sequence[str]) -> dict[str, int]:
-    """How often each engine is among the nearest, over the measures with an analytic answer; only those that tell."""
-    counts = dict.fromkeys(engines, 0)
-    for measure in layer.measures:
-        near = nearest(measure)
-        if near and len(near) < len(measure.values):
-            for engine in near:
-                counts[engine] += 1
-    return counts
+def declares(explanation: str, *engines: str) -> bool:
+    """Whether an explanation has what one of these engines declares of itself."""
+    return any(re.search(rf"(^|\W){re.escape(engine)} declares\b", explanation) for engine in engines)
 
 
 def between(found: Iterable[Finding], first: str, second: str) -> list[Finding]:

@@ -15,7 +15,7 @@ from anysim_parity.judge import nearest
 from anysim_parity.report import Comparison, as_data
 from anysim_parity.result import Gap, Layer, Measure, Picture, Plot, Series
 from anysim_parity.statistics import wilson
-from anysim_parity.verdict import ANALYTIC, disagreements, findings, nearest_counts
+from anysim_parity.verdict import ANALYTIC, declares, disagreements, findings
 from anysim_parity.write import write
 
 
@@ -57,7 +57,6 @@ def test_findings_hold_engines_against_the_answer_and_each_other() -> None:
     assert [(f.first, f.second) for f in beyond] == [("b", ANALYTIC), ("a", "b")]
     assert nearest(contact.measures[0]) == ("a",)
     assert nearest(contact.measures[1]) == ("a",)
-    assert nearest_counts(contact, ("a", "b")) == {"a": 2, "b": 0}
 
 
 def test_intervals_that_do_not_meet_are_a_difference() -> None:
@@ -96,9 +95,31 @@ def test_the_page_says_what_differs_and_why() -> None:
     words = " ".join(parsed(text).itertext())
     assert "bounce: <apex> & more" in words
     assert "b declares: within 0.1" in words
-    assert "differ in 2 of 6" in words
+    assert "2 of 6 differ, as declared" in words
+    assert "not declared" not in words
     assert "cannot <draw>" in words
     assert "0.75 (0.505 to 0.8982)" in words
+
+
+def test_what_no_engine_declares_is_red_and_what_one_declares_amber() -> None:
+    whole = comparison()
+    contact = whole.layers[0]
+    assert declares("b declares of contacts: soft", "a", "b")
+    assert not declares("ab declares of contacts: soft", "a", "b"), "the name of another engine ends alike"
+    bounce, drop = contact.measures
+    quiet = bounce._replace(explanation="A remark that accuses nobody.")
+    for measure, kind, other in ((bounce, "known", "off"), (quiet, "off", "known")):
+        text = page(whole._replace(layers=(contact._replace(measures=(measure, drop)), *whole.layers[1:])))
+        assert [cell.text for cell in parsed(text).xpath(f"//td[@class='n {kind}']")] == ["0.31"]
+        assert not parsed(text).xpath(f"//td[@class='n {other}']")
+    assert "differ, not declared" in text
+    assert "With differences that no engine declares: <b>contact</b>" in text
+
+
+def test_the_page_ranks_nobody() -> None:
+    text = page(comparison())
+    assert "nearest" not in text.lower()
+    assert "This is no ranking" in text
 
 
 def test_the_page_is_the_same_every_time() -> None:

@@ -86,17 +86,15 @@ def _tell(found: "Comparison") -> None:
     from itertools import combinations
 
     from anysim.cli.output import print_table
-    from anysim_parity.verdict import ANALYTIC, between, findings, nearest_counts
+    from anysim_parity.verdict import ANALYTIC, between, findings
 
     names = list(found.engines)
     pairs = [*combinations(names, 2), *((name, ANALYTIC) for name in names)]
     rows = []
     for layer in found.layers:
         all_of_it = findings(layer)
-        near = {name: count for name, count in nearest_counts(layer, names).items() if count}
-        told = ", ".join(f"{name} {count}" for name, count in near.items())
-        rows.append((layer.name, *(_cell(between(all_of_it, a, b)) for a, b in pairs), told))
-    heads = ["layer", *(f"{a} - {'answer' if b == ANALYTIC else b}" for a, b in pairs), "nearest to the answer"]
+        rows.append((layer.name, *(_cell(between(all_of_it, a, b)) for a, b in pairs)))
+    heads = ["layer", *(f"{a} - {'answer' if b == ANALYTIC else b}" for a, b in pairs)]
     versions = ", ".join(f"{name} {version}" for name, version in found.engines.items())
     print_table(f"{found.name} on {versions}", heads, rows)
     for layer in found.layers:
@@ -113,7 +111,9 @@ def _cell(found: list[Any]) -> str:
     beyond = sum(not f.agree for f in found)
     if not beyond:
         return f"agree ({len(found)})"
-    return f"{beyond} of {len(found)} differ; {top.subject}: {top.gap:.3g} {top.unit}".rstrip()
+    known = sum(f.declared for f in found if not f.agree)
+    how = "as declared" if known == beyond else f"{beyond - known} not declared"
+    return f"{beyond} of {len(found)} differ ({how}); {top.subject}: {top.gap:.3g} {top.unit}".rstrip()
 
 
 @contextmanager
