@@ -47,6 +47,28 @@ def test_the_program_writes_a_picture(run: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "2 of 2 trajectories" in done.stdout
     assert (run / "demo.png").read_bytes().startswith(b"\x89PNG")
+    assert "env_0001_episode_0000/front.mp4: world 2, episode 1: camera front" in done.stdout
+
+
+def test_the_film_moves_to_the_end_and_is_small(run: Path) -> None:
+    from PIL import Image
+
+    demo_picture.film(sorted(run.rglob("front.mp4")), run / "demo.gif")
+    assert (run / "demo.gif").stat().st_size < demo_picture.FILM_BYTES
+    with Image.open(run / "demo.gif") as film:
+        film.seek(film.n_frames - 1)
+        last = np.asarray(film.convert("RGB"))
+        film.seek(0)
+        first = np.asarray(film.convert("RGB"))
+    assert first[: first.shape[0] // 2, : first.shape[1] // 3].mean() < 40
+    assert last[: last.shape[0] // 2, : last.shape[1] // 3].mean() > 200
+
+
+def test_a_film_that_would_be_too_large_is_not_left(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(demo_picture, "FILM_BYTES", 10)
+    with pytest.raises(SystemExit, match="fewer --trajectories"):
+        demo_picture.film(sorted(run.rglob("front.mp4")), run / "demo.gif")
+    assert not (run / "demo.gif").exists()
 
 
 def test_a_run_without_videos_is_an_error_with_a_remedy(tmp_path: Path) -> None:
