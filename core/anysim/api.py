@@ -38,7 +38,8 @@ def task_path(name: str) -> Path:
         PluginError: no such task; lists those installed.
     """
     package = registry.entry("tasks", name).value
-    return Path(str(files(package).joinpath(TASK_FILE)))
+    with registry.using("tasks", name):  # imports the package
+        return Path(str(files(package).joinpath(TASK_FILE)))
 
 
 def source_path(source: str | Path) -> Path:
@@ -200,7 +201,14 @@ def _proposals(loaded: LoadedRun, given: Any) -> Any:
 
 
 def _env(
-    loaded: LoadedRun, world: "World", simulation: "SimEngine", num_envs: int, name: str, proposals: Any = None
+    loaded: LoadedRun,
+    world: "World",
+    simulation: "SimEngine",
+    num_envs: int,
+    name: str,
+    proposals: Any = None,
+    *,
+    strict_observers: bool = False,
 ) -> "TaskEnv":
     """An env on a fresh engine; the engine is destroyed if anything fails."""
     from anysim.managers.standard import check_run, standard_managers
@@ -211,7 +219,7 @@ def _env(
         managers = standard_managers(spec, world, num_envs, proposals)
         check_run(simulation, world, managers, f"'{world.name}'", lambda path: place_of(loaded, path))
         simulation.create_world(world, num_envs)
-        return TaskEnv(spec, simulation, managers, name)
+        return TaskEnv(spec, simulation, managers, name, strict_observers=strict_observers)
     except BaseException:
         simulation.destroy()
         raise
@@ -241,6 +249,7 @@ def make(
     overrides: Sequence[str] = (),
     base: Path | None = None,
     proposals: Any = None,
+    strict_observers: bool = False,
 ) -> "TaskEnv":
     """An env of a task: `env = anysim.make("pick_cube", engine="mujoco", num_envs=16)`.
 
@@ -253,6 +262,7 @@ def make(
         base: the folder that relative asset paths are relative to; that of the file where there is one.
         proposals: poses of objects that come from outside: a mapping, a JSON file, or a callable that takes a
             `anysim.placement.proposals.Request` and gives one; wins over `world.layout_source` of the file.
+        strict_observers: an observer that raises ends the run; otherwise it is told once and counted.
 
     Raises:
         SpecError: the file, with line and column.
@@ -266,7 +276,8 @@ def make(
     world = compile_world(loaded, base=base)
     name = str(source) if isinstance(source, str) and "/" not in str(source) else world.name
     try:
-        env = _env(loaded, world, simulation(spec), spec.num_envs, name, _proposals(loaded, proposals))
+        given = _proposals(loaded, proposals)
+        env = _env(loaded, world, simulation(spec), spec.num_envs, name, given, strict_observers=strict_observers)
     except SpecError as error:
         raise located(error, loaded) from None
     if seed is not None:
@@ -295,9 +306,11 @@ def resolve_options(kind: str, name: str) -> type[BaseModel] | None:
         if (kind, name) == ("controller", DEFAULT_CONTROLLER):
             return _Anything
         if kind in TERM_KINDS:
-            return options_model(find(kind, name))
-        if kind in ("engine", "writer"):
-            return registry.load(f"{kind}s", name).options_model()
-        return options_model(registry.load(f"{kind}s", name))
+            term = find(kind, name)
+            with registry.blaming(f"the signature of the {kind} term '{name}'", registry.origin(term)):
+                return options_model(term)
+        made = registry.load(f"{kind}s", name)
+        with registry.using(f"{kind}s", name):
+            return made.options_model() if kind in ("engine", "writer") else options_model(made)
     except PluginError as error:
         raise UnknownPlugin(str(error)) from error

@@ -13,9 +13,11 @@ __all__ = [
     "AssetError",
     "CapabilityError",
     "EngineError",
+    "EngineFailure",
     "Issues",
     "NameLookupError",
     "PluginError",
+    "PluginFailure",
     "RecordError",
     "SnapshotError",
     "SpecError",
@@ -29,6 +31,10 @@ __all__ = [
 
 class PluginError(AnysimError):
     """A plugin that is unknown, ambiguous, or does not load."""
+
+
+class PluginFailure(PluginError):
+    """The code of a plugin that raised what it must not. Names the plugin, its distribution and the remedy."""
 
 
 class AssetError(AnysimError):
@@ -48,6 +54,10 @@ class CapabilityError(AnysimError):
 
 class EngineError(AnysimError):
     """An engine was misused, or failed."""
+
+
+class EngineFailure(EngineError):
+    """An engine that broke down: its process ended, or its library raised what it must not."""
 
 
 class StaleStateError(EngineError):

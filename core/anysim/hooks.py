@@ -2,16 +2,19 @@
 
 A distribution registers a light module through an entry point of the group `anysim`; a function of it that is marked
 with `hookimpl` takes only the arguments it wants. A module that fails is left out with a warning that names its
-distribution: what only looks on must not stop a run, and less so the command that would say how to repair it.
+distribution: what only looks on must not stop a run, and less so the command that would say how to repair it. What an
+observer raises in a run is told once, counted, and costs the run nothing, unless the env is strict with observers.
 """
 
 import warnings
+from collections import Counter
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pluggy
 
 from anysim import registry
+from anysim.errors import PluginFailure
 
 if TYPE_CHECKING:
     import typer
@@ -64,23 +67,85 @@ def manager() -> pluggy.PluginManager:
     plugins.add_hookspecs(Specs)
     found = {f"{entry.dist.name if entry.dist else 'unknown'}:{entry.name}": entry for entry in registry.observers()}
     for name in sorted(found):
+        plugin = None
         try:
-            plugins.register(found[name].load(), name)
-        except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever a plugin does, the others go on
-            _left_out(name, f"does not load: {type(error).__name__}: {error}")
+            plugin = found[name].load()
+            plugins.register(plugin, name)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # noqa: BLE001 - whatever a plugin does, the others go on
+            if plugin is not None and plugins.is_registered(plugin):
+                plugins.unregister(plugin)  # some of its hooks may have been taken before the wrong one
+            _left_out(name, f"does not load: {registry.in_words(error)}")
     return plugins
 
 
-def stepped(env: "TaskEnv", result: "StepResult", env_ids: "Array | None") -> None:
-    """Call the observers of a control step of these envs (None: of all); without observers nothing is worked out."""
-    hook = manager().hook
-    if hook.after_step.get_hookimpls():
-        hook.after_step(env=env, result=result)
-    for call, happened in ((hook.on_fault, lambda: result.info["fault"]), (hook.after_episode, lambda: result.done)):
-        if call.get_hookimpls():
-            concerned = happened().nonzero()[0] if env_ids is None else env_ids[happened()[env_ids]]
-            if len(concerned):
-                call(env=env, env_ids=concerned)
+class ObserverWarning(RuntimeWarning):
+    """An observer raised in a run, which goes on without what it would have seen."""
+
+
+class Observing:
+    """Calls the observers of one env. An observer that raises hurts neither the env nor the other observers.
+
+    Attributes:
+        strict: raise PluginFailure instead.
+        failures: how often each has failed so far, by its words and the hook.
+    """
+
+    def __init__(self, strict: bool = False) -> None:
+        self.strict = strict
+        self.failures: Counter[tuple[str, str]] = Counter()
+
+    def call(self, hook: str, **arguments: Any) -> None:
+        """Call the observers of a hook, the one registered last first.
+
+        Raises:
+            PluginFailure: one has failed, and the env is strict.
+        """
+        for seen in reversed(getattr(manager().hook, hook).get_hookimpls()):
+            try:
+                if seen.hookwrapper or seen.wrapper:
+                    raise TypeError("it wraps the other observers, and an observer only looks on")
+                seen.function(*(arguments[name] for name in seen.argnames))
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:  # noqa: BLE001 - it only looks on
+                self._failed(_who(seen.plugin_name, seen.plugin), hook, error)
+
+    def stepped(self, env: "TaskEnv", result: "StepResult", env_ids: "Array | None") -> None:
+        """Call those of a control step of these envs (None: of all); without observers nothing is worked out."""
+        hook = manager().hook
+        if hook.after_step.get_hookimpls():
+            self.call("after_step", env=env, result=result)
+        for name, happened in (("on_fault", lambda: result.info["fault"]), ("after_episode", lambda: result.done)):
+            if getattr(hook, name).get_hookimpls():
+                concerned = happened().nonzero()[0] if env_ids is None else env_ids[happened()[env_ids]]
+                if len(concerned):
+                    self.call(name, env=env, env_ids=concerned)
+
+    def closed(self) -> None:
+        """Say how often observers have failed, where it was more than the once that was told."""
+        for (who, hook), count in self.failures.items():
+            if count > 1:
+                warnings.warn(f"{who} failed in {hook} {count} times in this run", ObserverWarning, stacklevel=3)
+
+    def _failed(self, who: tuple[str, str], hook: str, error: BaseException) -> None:
+        named, package = who
+        words = f"{named} failed in {hook}: {registry.in_words(error)}; {registry.remedy(package)}"
+        if self.strict:
+            raise PluginFailure(words) from error
+        self.failures[named, hook] += 1
+        if self.failures[named, hook] == 1:
+            more = "The run goes on; further failures are counted. With strict_observers they end it"
+            warnings.warn(f"{words}. {more}", ObserverWarning, stacklevel=4)
+
+
+def _who(name: str, plugin: object) -> tuple[str, str]:
+    """An observer in words, and its distribution; one that a program registers itself has no name but its type."""
+    package, colon, entry = name.partition(":")
+    if not colon:
+        package, entry = registry.origin(plugin), type(plugin).__name__
+    return f"the observer '{entry}' of {package}", package
 
 
 def add_commands(app: "typer.Typer") -> None:
@@ -90,12 +155,14 @@ def add_commands(app: "typer.Typer") -> None:
         others = [other for other in plugins.get_plugins() if other is not plugin]
         try:
             plugins.subset_hook_caller("add_cli", others)(app=app)
-        except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever a plugin does, the others go on
-            _left_out(name, f"adds no commands: {type(error).__name__}: {error}")
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # noqa: BLE001 - whatever a plugin does, the others go on
+            _left_out(name, f"adds no commands: {registry.in_words(error)}")
 
 
 def _left_out(name: str, what: str) -> None:
     """Warn of an observer, `distribution:entry point`, and say how to be rid of it."""
     distribution, _, entry = name.partition(":")
-    remedy = f"repair the package {distribution}, or remove it: pip uninstall {distribution}"
+    remedy = registry.remedy(distribution)
     warnings.warn(f"the plugin '{entry}' of {distribution} {what}; {remedy}", RuntimeWarning, stacklevel=3)

@@ -1,15 +1,17 @@
 """Kinds: named plugins found through entry points, imported when they are used and not before.
 
 A kind is a group `anysim.<kind>` (engines, tasks, robots, controllers, skills, planners, writers, terms…). Two
-distributions that offer one name are an error that lists both; `dist:name` chooses.
+distributions that offer one name are an error that lists both; `dist:name` chooses. What the code of a plugin raises is
+told with its distribution and the remedy, whatever it is but Ctrl-C: `sys.exit` in a plugin must not end a command.
 """
 
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
 from functools import cache
 from importlib import metadata
-from typing import Any
+from typing import Any, NoReturn
 
-from anysim.errors import PluginError, listing, suggest
+from anysim.errors import AnysimError, PluginError, PluginFailure, listing, suggest
 
 KINDS: Mapping[str, str] = {
     "engines": "physics engines",
@@ -76,7 +78,7 @@ def _entries(kind: str) -> Mapping[str, tuple[metadata.EntryPoint, ...]]:
     table: dict[str, list[metadata.EntryPoint]] = {}
     for entry in _scan().get(f"anysim.{kind}", ()):
         known = table.setdefault(entry.name, [])
-        if not any(_dist(entry) == _dist(other) and entry.value == other.value for other in known):
+        if not any(package_of(entry) == package_of(other) and entry.value == other.value for other in known):
             known.append(entry)
     return {name: tuple(table[name]) for name in sorted(table)}
 
@@ -93,7 +95,8 @@ def participants() -> dict[str, metadata.Distribution]:
     return {dist.name: dist for dist in found.values() if dist is not None}
 
 
-def _dist(entry: metadata.EntryPoint) -> str:
+def package_of(entry: metadata.EntryPoint) -> str:
+    """The name of the distribution that an entry point comes from."""
     return entry.dist.name if entry.dist is not None else "unknown distribution"
 
 
@@ -122,7 +125,7 @@ def entry(kind: str, name: str) -> metadata.EntryPoint:
     dist, _, bare = name.rpartition(":")
     found = list(_entries(kind).get(bare, ()))
     if dist:
-        found = [e for e in found if _dist(e) == dist]
+        found = [e for e in found if package_of(e) == dist]
     if not found:
         installed = names(kind)
         package = INSTALL_HINTS.get((kind, bare))
@@ -132,14 +135,20 @@ def entry(kind: str, name: str) -> metadata.EntryPoint:
             f"(installed: {listing(installed)})"
         )
     if len(found) > 1:
-        offers = ", ".join(f"{_dist(e)}:{bare}" for e in found)
+        offers = ", ".join(f"{package_of(e)}:{bare}" for e in found)
         raise PluginError(f"the {_one(kind)} '{bare}' is offered twice; choose one of {offers}")
     return found[0]
 
 
 def distribution(kind: str, name: str) -> str:
     """The distribution that offers the plugin."""
-    return _dist(entry(kind, name))
+    return package_of(entry(kind, name))
+
+
+def first_package(kind: str, name: str) -> str:
+    """The distribution that offers the plugin; the first one where it is offered twice."""
+    found = _entries(kind).get(name.rpartition(":")[2], ())
+    return package_of(found[0]) if found else "unknown distribution"
 
 
 def load(kind: str, name: str) -> Any:
@@ -151,8 +160,83 @@ def load(kind: str, name: str) -> Any:
     found = entry(kind, name)
     try:
         return found.load()
-    except Exception as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         raise PluginError(
-            f"the {_one(kind)} '{name}' of {_dist(found)} does not load: "
-            f"{type(error).__name__}: {error} (entry point {found.value})"
+            f"the {_one(kind)} '{name}' of {package_of(found)} does not load: "
+            f"{in_words(error)} (entry point {found.value}); {remedy(package_of(found))}"
         ) from error
+
+
+# ---------------------------------------------------------------------- what the code of plugins raises
+
+
+def in_words(error: BaseException) -> str:
+    """The type and the message of an error; for a plugin that ended the program, that it did."""
+    text = str(error)
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def remedy(package: str) -> str:
+    """What to do about a distribution that is at fault."""
+    return f"repair the package {package} (pip install --upgrade {package}), or remove it: pip uninstall {package}"
+
+
+def origin(thing: object) -> str:
+    """The distribution that a function, a class or an object of one comes from, else its module."""
+    while (inner := getattr(thing, "func", None)) is not None:  # of functools.partial
+        thing = inner
+    return _home(str(getattr(thing, "__module__", None) or type(thing).__module__))
+
+
+def culprit(error: BaseException) -> str:
+    """The distribution whose code raised an error: that of the innermost frame that belongs to any of ours."""
+    trace, found = error.__traceback__, ""
+    while trace is not None:
+        home = _home(str(trace.tb_frame.f_globals.get("__name__", "")))
+        found, trace = home if not home.startswith("module ") else found, trace.tb_next
+    return found
+
+
+def _home(module: str) -> str:
+    top = module.partition(".")[0]
+    for entries in _scan().values():
+        for entry in entries:
+            if entry.value.partition(":")[0].strip().partition(".")[0] == top:
+                return package_of(entry)
+    return "anysim" if top in ("anysim", "anysim_schemas") else f"module {module}"
+
+
+def blame(error: BaseException, who: str, package: str, *, prefix: bool = False) -> NoReturn:
+    """Raise what the code of a plugin raised, as a sentence that begins with `who` and names the distribution.
+
+    Ctrl-C and the errors of anysim stay what they are; with `prefix` the latter begin with `who` too.
+    """
+    if isinstance(error, AnysimError):
+        if prefix and not getattr(error, "issues", ()):
+            error.args = (f"{who}: {error}", *error.args[1:])
+        raise error
+    if isinstance(error, KeyboardInterrupt):
+        raise error
+    raise PluginFailure(f"{who} of {package} failed: {in_words(error)}; {remedy(package)}") from error
+
+
+@contextmanager
+def blaming(who: str, package: str) -> Generator[None]:
+    """Call the code of a plugin within it: what that raises is told as `blame` does."""
+    try:
+        yield
+    except BaseException as error:  # noqa: BLE001 - told in a sentence
+        blame(error, who, package)
+
+
+@contextmanager
+def using(kind: str, name: str, passing: tuple[type[Exception], ...] = ()) -> Generator[None]:
+    """As `blaming`, for an installed plugin by kind and name; errors of the types `passing` belong to its contract."""
+    try:
+        yield
+    except passing:
+        raise
+    except BaseException as error:  # noqa: BLE001 - told in a sentence
+        blame(error, f"the {_one(kind)} '{name}'", distribution(kind, name))

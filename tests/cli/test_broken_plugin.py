@@ -11,7 +11,8 @@ import pytest
 BROKEN = Path(__file__).parents[1] / "external" / "anysim-broken"
 SENTENCE = (
     "warning: the plugin 'commands' of anysim-broken does not load: ModuleNotFoundError: No module named "
-    "'warp_drive_gauges'; repair the package anysim-broken, or remove it: pip uninstall anysim-broken\n"
+    "'warp_drive_gauges'; repair the package anysim-broken (pip install --upgrade anysim-broken), or remove it: "
+    "pip uninstall anysim-broken\n"
 )
 
 

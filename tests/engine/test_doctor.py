@@ -65,7 +65,8 @@ def test_an_engine_that_does_not_import_names_itself_and_its_package(install: In
     assert state is Health.BROKEN
     assert "'odd' of odd-engine" in found
     assert "a_module_that_is_not_there" in found
-    assert remedy == "reinstall odd-engine"
+    assert remedy == registry.remedy("odd-engine")
+    assert "pip uninstall odd-engine" in remedy
     assert examine("null").findings[0].state is Health.OK
 
 

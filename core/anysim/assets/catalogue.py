@@ -33,7 +33,8 @@ def load_robot(name: str) -> CatalogueEntry:
         return CatalogueEntry(_read(file), file)
     entry = registry.entry("robots", name)
     package = entry.value
-    spec = util.find_spec(package)
+    with registry.using("robots", name):  # imports what the package is in, if it is in one
+        spec = util.find_spec(package)
     folders = [Path(folder) for folder in (spec.submodule_search_locations or [])] if spec is not None else []
     for folder in folders:
         file = folder / f"{entry.name}.yaml"

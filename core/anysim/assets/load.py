@@ -49,7 +49,9 @@ def import_asset(uri: str, *, base: Path | None = None, scale: float = 1.0) -> I
     file = model_file(uri, base=base)
     if file.kind == "urdf":
         return import_urdf(file.path, root=file.root, scale=scale)
-    return registry.load("importers", file.kind)(file.path, root=file.root, scale=scale, body=file.body)
+    importer = registry.load("importers", file.kind)
+    with registry.using("importers", file.kind):
+        return importer(file.path, root=file.root, scale=scale, body=file.body)
 
 
 def split_body(uri: str) -> tuple[str, str]:

@@ -28,12 +28,14 @@ def build(name: str, params: Mapping[str, Any], *, scale: float = 1.0) -> Import
     """
     builder = registry.load("assets", name)
     try:
-        options = options_model(builder).model_validate(dict(params))
+        with registry.using("assets", name, (ValidationError,)):
+            options = options_model(builder).model_validate(dict(params))
     except ValidationError as error:
         issues = [SpecIssue("", ".".join(map(str, ("params", *e["loc"]))), e["msg"]) for e in error.errors()]
         raise SpecError(issues) from None
     try:
-        model = builder(**{key: getattr(options, key) for key in parameters(builder)})
+        with registry.using("assets", name, (ValueError,)):
+            model = builder(**{key: getattr(options, key) for key in parameters(builder)})
         if isinstance(model, ImportedModel):
             return _scaled(model, scale)
     except ValueError as error:

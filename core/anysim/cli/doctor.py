@@ -21,12 +21,13 @@ VARIABLES = ("ANYSIM_ENGINE", "ANYSIM_CACHE_DIR", "MUJOCO_GL", "VK_DRIVER_FILES"
 
 
 def doctor(json: AsJson = False) -> None:
-    """Check the machine and every installed engine: version, import, physics, rendering, threads.
+    """Check the machine, every installed engine (version, import, physics, rendering, threads), and that plugins load.
 
-    Each fault comes with its remedy. Engines are tried in processes of their own: one that is missing, crashes or hangs
-    costs nothing but its own rows. Exit code 1 if no engine with dynamics works.
+    Each fault comes with its remedy. Engines and plugins are tried in processes of their own: one that is missing,
+    crashes or hangs costs nothing but its own rows. Exit code 1 if no engine with dynamics works.
     """
     from anysim import registry
+    from anysim.cli.doctor_imports import broken
     from anysim.cli.output import print_json, print_table, working_on
     from anysim.engine.doctor import Finding, Health, examine
 
@@ -37,10 +38,12 @@ def doctor(json: AsJson = False) -> None:
             found = examine(name)
         rows += found.findings
         works |= found.works
+    with working_on("loading plugins"):
+        rows += broken()
     rows += [
         Finding(f"{kind.removesuffix('s')}: {name}", Health.MISSING, "not installed", f"pip install {package}")
         for (kind, name), package in sorted(registry.INSTALL_HINTS.items())
-        if name not in registry.names(kind)
+        if package not in registry.participants()
     ]
     if json:
         print_json([row._asdict() for row in rows])

@@ -76,10 +76,11 @@ def _capabilities() -> None:
     declared, lifecycles = {}, {}
     for name in registry.names("engines"):
         try:
-            found = engine_class(name)
+            with registry.using("engines", name):
+                found = engine_class(name)
+                declared[name], lifecycles[name] = found.capabilities, found.lifecycle.words
         except PluginError:
             continue  # its row above says why
-        declared[name], lifecycles[name] = found.capabilities, found.lifecycle.words
     engines, rows, notes = matrix(declared, lifecycles)
     typer.echo()
     print_table("capabilities", ("capability", *engines), rows)
@@ -103,21 +104,28 @@ def _what(kind: str, name: str) -> str:
     from anysim.errors import AnysimError
 
     try:
-        if kind == "engines":
-            from anysim.engine.factory import availability
-
-            here = availability(name)
-            return here.version if here.available else f"not available: {'; '.join(here.missing)}. {here.remedy}"
-        if kind == "tasks":
-            from anysim.api import load, task_path
-
-            task = load(task_path(name)).spec.task
-            return task.description if task else ""
-        if kind == "terms":
-            from anysim.task.term_registry import term_names
-
-            return ", ".join(term_names(name))
-        doc = registry.load(kind, name).__doc__ or ""
+        with registry.using(kind, name):
+            return _line(kind, name)
     except AnysimError as error:
         return f"does not load: {error}"
-    return doc.strip().splitlines()[0] if doc.strip() else ""
+
+
+def _line(kind: str, name: str) -> str:
+    from anysim import registry
+
+    if kind == "engines":
+        from anysim.engine.factory import availability
+
+        here = availability(name)
+        return here.version if here.available else f"not available: {'; '.join(here.missing)}. {here.remedy}"
+    if kind == "tasks":
+        from anysim.api import load, task_path
+
+        task = load(task_path(name)).spec.task
+        return task.description if task else ""
+    if kind == "terms":
+        from anysim.task.term_registry import term_names
+
+        return ", ".join(term_names(name))
+    doc = registry.load(kind, name).__doc__
+    return doc.strip().splitlines()[0] if isinstance(doc, str) and doc.strip() else ""

@@ -119,7 +119,8 @@ def texture(spec: TextureSpec, base: Path | None) -> Texture:
         assert spec.pattern is not None
         pattern: Pattern = registry.load("textures", spec.pattern)
         first, second = (None, None) if spec.colors is None else map(rgb, spec.colors)
-        pixels = pattern.pixels(first, second, spec.seed, spec.resolution)
+        with registry.using("textures", spec.pattern):
+            pixels = pattern.pixels(first, second, spec.seed, spec.resolution)
         # what it is made from: a sine may differ in its last bit between two machines
         content = f"{PATTERN_FORMAT} {json.dumps(spec.to_dict(), sort_keys=True)}".encode()
     pixels.setflags(write=False)

@@ -54,7 +54,8 @@ def add_room(builder: WorldBuilder, content: WorldSpec, issues: Issues) -> None:
     except PluginError as error:
         issues.add("room", str(error))
         return
-    things = build(spec, issues.at("room"))
+    with registry.using("rooms", BUILDER):
+        things = build(spec, issues.at("room"))
     if things:  # the floor is seen in place of the ground, which stays what things touch
         builder.geoms = [replace(geom, visible=False) for geom in builder.geoms]
     for thing in things:

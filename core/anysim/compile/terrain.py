@@ -62,7 +62,8 @@ def _add_generated(builder: WorldBuilder, spec: TerrainSpec, issues: Issues) -> 
     except PluginError as error:
         issues.add("kind", str(error))
         return
-    made = build(spec, issues)
+    with registry.using("terrains", BUILDER):
+        made = build(spec, issues)
     if made is not None:
         _add_field(builder, spec, made.heights, made.size, made.middle, issues)
         builder.tiles = made.tiles

@@ -48,13 +48,12 @@ class Examination(NamedTuple):
 def examine(name: str, timeout: float = TIMEOUT_S) -> Examination:
     """Try an installed engine. Never raises because of the engine."""
     head = f"engine: {name}"
+    from anysim.engine.factory import availability  # which imports the engine's contract, and that this
+
     try:
-        engine = registry.load("engines", name)
-        here = engine.availability()
+        here = availability(name)
     except AnysimError as error:
-        return _failed(head, Health.BROKEN, str(error), f"reinstall {_package(name)}")
-    except Exception as error:  # noqa: BLE001  whatever a stranger's engine does here belongs into its row
-        return _failed(head, Health.BROKEN, f"availability() raised {type(error).__name__}: {error}", "report it")
+        return _failed(head, Health.BROKEN, str(error), registry.remedy(_package(name)))
     if not here.available:
         return _failed(head, Health.UNAVAILABLE, "; ".join(here.missing), here.remedy)
     installed = Finding(head, Health.OK, f"{here.version}, of {_package(name)}")
@@ -78,13 +77,16 @@ def _try_apart(name: str, timeout: float) -> Examination:
     what = f"{name}: physics"
     ended = run_module("anysim.testing.doctor_trial", name, limit=timeout)
     findings, works = _read(ended.out.splitlines())
-    if ended.trouble:
-        words = "; ".join(["the process " + ended.trouble, *ended.err.strip().splitlines()[-3:]])[-300:]
+    trouble = ended.trouble or ("" if findings else "ended without a finding")
+    if trouble:
+        words = "; ".join(["the process " + trouble, *ended.err.strip().splitlines()[-3:]])[-300:]
         died = Finding(
             what if not findings else f"{name}: rendering",
             Health.BROKEN,
             words,
-            f"reinstall {_package(name)}" if not findings else "look at the graphics driver; physics does not need it",
+            registry.remedy(_package(name))
+            if not findings
+            else "look at the graphics driver; physics does not need it",
         )
         findings = (*findings, died)
     return Examination(findings, works)

@@ -43,14 +43,17 @@ def availability(name: str) -> Availability:
     Raises:
         PluginError: as `engine_class`, or it broke its promise to answer; names the distribution and the cause.
     """
-    found = engine_class(name)
+    found, package = engine_class(name), registry.distribution("engines", name)
+    unsure = f"the engine '{name}' of {package} does not know whether it can run here"
     try:
-        return found.availability()
-    except Exception as error:
-        raise PluginError(
-            f"the engine '{name}' of {registry.distribution('engines', name)} does not know whether it can run here: "
-            f"{type(error).__name__}: {error}"
-        ) from error
+        here = found.availability()
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        raise PluginError(f"{unsure}: {registry.in_words(error)}; {registry.remedy(package)}") from error
+    if isinstance(here, Availability):
+        return here
+    raise PluginError(f"{unsure}: availability() returned a {type(here).__name__}; {registry.remedy(package)}")
 
 
 def runnable(*capabilities: Capability) -> tuple[str, ...]:
@@ -94,4 +97,5 @@ def create_simulation(
         count = shard_count(shards, simulation)
         if count != 1:
             simulation = sharded(simulation, count, TIMEOUT_S if shard_timeout is None else shard_timeout)
-    return simulation(**options)
+    with registry.using("engines", chosen):
+        return simulation(**options)

@@ -90,7 +90,10 @@ class ProposalSource:
             self._ready = self._found()
         if isinstance(self._ready, tuple):
             return self._ready
-        return parsed(self._ready(request()), f"what '{_name(self._ready)}' gives", self.path)
+        asked = request()
+        with registry.blaming(f"{self.path}: the proposer '{_name(self._ready)}'", registry.origin(self._ready)):
+            offered = self._ready(asked)
+        return parsed(offered, f"what '{_name(self._ready)}' gives", self.path)
 
     def _found(self) -> tuple[Proposal, ...] | Proposer:
         given = self._given

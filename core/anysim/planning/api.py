@@ -196,4 +196,6 @@ def inverse_kinematics(chain: Chain, solver: str = "numba_ik", **options: Any) -
     Raises:
         PluginError: no solver of that name is installed; the message names the package to install.
     """
-    return registry.load("planners", solver)(chain, **options)
+    made = registry.load("planners", solver)
+    with registry.using("planners", solver, (TypeError,)):  # of an option that it does not have
+        return made(chain, **options)

@@ -94,8 +94,9 @@ def open_trajectory(directory: str | Path) -> TrajectoryReader:
     """
     path = Path(directory)
     manifest = read_manifest(path)
-    reader: TrajectoryReader = registry.load("readers", manifest.writer)(path, manifest)
-    return reader
+    made: type[TrajectoryReader] = registry.load("readers", manifest.writer)
+    with registry.using("readers", manifest.writer):
+        return made(path, manifest)
 
 
 _MOTION = ("body_pose", "body_twist", "joint_pos", "joint_vel")

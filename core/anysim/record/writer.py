@@ -88,4 +88,6 @@ def make_writer(name: str, options: Mapping[str, Any]) -> TrajectoryWriter:
         PluginError: no such writer is installed (says what to install).
         RecordError: an option is wrong.
     """
-    return registry.load("writers", name)(**options)
+    made = registry.load("writers", name)
+    with registry.using("writers", name):
+        return made(**options)

@@ -6,12 +6,12 @@ from typing import Any, Self, TypeVar
 
 import numpy as np
 
-from anysim import hooks
 from anysim.controllers.action_space import ActionSpaces
 from anysim.conventions import Array
 from anysim.engine import arguments
 from anysim.engine.base import SimEngine
 from anysim.errors import TaskError
+from anysim.hooks import Observing
 from anysim.managers.action import ActionManager
 from anysim.managers.base import RESET_ORDER, Manager
 from anysim.managers.camera import CaptureManager
@@ -35,7 +35,15 @@ class TaskEnv:
     alone: not on the number of envs, nor on when the others are reset.
     """
 
-    def __init__(self, spec: RunSpec, engine: SimEngine, managers: Sequence[Manager], name: str = "task") -> None:
+    def __init__(
+        self,
+        spec: RunSpec,
+        engine: SimEngine,
+        managers: Sequence[Manager],
+        name: str = "task",
+        *,
+        strict_observers: bool = False,
+    ) -> None:
         """`engine` has its world, `managers` are configured and built; `anysim.make` does all of this."""
         if spec.task is None:
             raise TaskError("this file has no `task`; a world alone can be run through `create_simulation`")
@@ -62,13 +70,13 @@ class TaskEnv:
         self.physics_seconds = 0.0
         """Wall time [s] of the engine's steps so far, for tables of where time goes; nothing else depends on it."""
         self._obs: Obs = {}
-        self._hooks = hooks.manager().hook
+        self._observers = Observing(strict_observers)
         self.scene.look(None)
         self.observation_sizes = {group: rows.shape[1] for group, rows in self.mdp.observe().items()}
         """Components of each observation group."""
         self.image_shapes = self.capture.image_shapes
         """The shape of each observed image, by `images/CAMERA`."""
-        self._hooks.after_build(env=self)
+        self._observers.call("after_build", env=self)
 
     def _manager(self, kind: type[_Kind]) -> _Kind:
         return next(manager for manager in self.managers if isinstance(manager, kind))
@@ -149,7 +157,7 @@ class TaskEnv:
         self.counterfactuals.mark(ids, plan)
         rows = self._observe(ids)
         self._store(rows, ids)
-        self._hooks.before_episode(env=self, env_ids=ids)
+        self._observers.call("before_episode", env=self, env_ids=ids)
         return {g: r.copy() for g, r in rows.items()}, {k: v[ids] for k, v in self._info().items()}
 
     def retire(self, env_ids: Array) -> None:
@@ -218,7 +226,7 @@ class TaskEnv:
         observed = self._observe(ids)
         self._store(observed, ids)
         result = StepResult(self._full(observed, ids), reward, STATUS_NAMES[self._code], self._info())
-        hooks.stepped(self, result, ids)
+        self._observers.stepped(self, result, ids)
         return result
 
     def _advance(self, ids: Array | None) -> None:
@@ -356,8 +364,11 @@ class TaskEnv:
         """Free the engine. May be called twice."""
         if not self._closed:
             self._closed = True
-            self._hooks.on_close(env=self)
-            self.engine.destroy()
+            try:
+                self._observers.call("on_close", env=self)
+                self._observers.closed()
+            finally:
+                self.engine.destroy()
 
     def __enter__(self) -> Self:
         return self

@@ -12,6 +12,7 @@ import numpy as np
 from anysim import registry
 from anysim.engine.capability import Capability
 from anysim.engine.doctor import Finding, Health
+from anysim.engine.factory import engine_class
 from anysim.errors import AnysimError
 from anysim.model.world import Body, BodyKind, Camera, Entity, EntityKind, Geom, Inertial, Sphere, World
 
@@ -71,26 +72,23 @@ def main(name: str) -> None:
         sys.stdout.flush()
 
     try:
-        engine_class = registry.load("engines", name)
-        with engine_class() as engine:
+        made = engine_class(name)
+        with made() as engine:
             engine.create_world(ball(Capability.RENDER_RGB in engine.capabilities))
             say(*physics(name, engine))
             try:
                 say(rendering(name, engine))
-            except Exception as error:  # noqa: BLE001  as below
+            except BaseException as error:  # noqa: BLE001  as below
                 say(Finding(f"{name}: rendering", Health.BROKEN, _words(error)))
-            for finding in engine_class.findings():
+            for finding in made.findings():
                 say(finding)
-    except Exception as error:  # noqa: BLE001  whatever an engine does here belongs into its row
-        say(
-            Finding(
-                f"{name}: physics", Health.BROKEN, _words(error), f"reinstall {registry.distribution('engines', name)}"
-            )
-        )
+    except BaseException as error:  # noqa: BLE001  whatever an engine does here, sys.exit too, belongs into its row
+        remedy = registry.remedy(registry.distribution("engines", name))
+        say(Finding(f"{name}: physics", Health.BROKEN, _words(error), remedy))
 
 
-def _words(error: Exception) -> str:
-    return str(error) if isinstance(error, AnysimError) else f"{type(error).__name__}: {error}"
+def _words(error: BaseException) -> str:
+    return str(error) if isinstance(error, AnysimError) else registry.in_words(error)
 
 
 if __name__ == "__main__":

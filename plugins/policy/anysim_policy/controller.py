@@ -47,7 +47,8 @@ class Policy(Controller):
         super().__init__(channel, num_envs)
         made = registry.load("policies", policy)
         given = options_model(made).model_validate(options)
-        self._policy: LearnedPolicy = made(channel, **{key: getattr(given, key) for key in parameters(made)})
+        with registry.using("policies", policy, (ValueError,)):
+            self._policy: LearnedPolicy = made(channel, **{key: getattr(given, key) for key in parameters(made)})
         spec, self._layout = self._policy.spec, self._policy.layout
         self.dim, self.labels = len(spec.commands), tuple(c.name for c in spec.commands)
         self.low = np.array([c.low for c in spec.commands], dtype=float)

@@ -73,7 +73,9 @@ def oracle_of(entry: CatalogueEntry, world: World) -> Oracle:
 
 
 def _reader(file: ModelFile) -> Oracle:
-    return registry.load("oracles", file.kind)(file.path, file.root, file.body)
+    made = registry.load("oracles", file.kind)
+    with registry.using("oracles", file.kind):
+        return made(file.path, file.root, file.body)
 
 
 class _Composed:
