@@ -179,7 +179,9 @@ def in_words(error: BaseException) -> str:
 
 
 def remedy(package: str) -> str:
-    """What to do about a distribution that is at fault."""
+    """What to do about a distribution that is at fault, or a module that none offers."""
+    if package.startswith("module "):
+        return f"repair the {package}"
     return f"repair the package {package} (pip install --upgrade {package}), or remove it: pip uninstall {package}"
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anysim.errors import RecordError
+from anysim.errors import PluginFailure, RecordError
 from anysim.record import commit as protocol, committer
 from anysim.record.header import CameraInfo, EpisodeHeader
 from anysim.record.manifest import read_manifest
@@ -157,7 +157,7 @@ def test_a_writer_without_images_says_so(tmp_path, writer, run_header, make_fram
 def test_an_error_of_another_kind_discards_too(tmp_path, writer, run_header, record, monkeypatch):
     with Recorder(tmp_path, writer, run_header) as recorder:
         monkeypatch.setattr(writer, "write", lambda directory, columns, status: 1 // 0)
-        with pytest.raises(ZeroDivisionError):
+        with pytest.raises(PluginFailure, match="env 0, episode 0: the writer 'lines' of .* failed: ZeroDivisionError"):
             record(recorder)
         assert recorder.open_envs == ()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run.json"]

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from math import gcd, isfinite
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -147,7 +147,10 @@ class ActionManager(Manager):
         for s in self.slices:
             self._reset_imperfections(s, env_ids)
             self._set_modes(s.controller, env_ids)
-            s.controller.reset(env_ids, targets[:, s.controller.channel.actuators])
+            try:
+                s.controller.reset(env_ids, targets[:, s.controller.channel.actuators])
+            except BaseException as error:  # noqa: BLE001 - told with the key
+                _blame(error, s)
         self._write(env_ids)
 
     def overridable(self) -> list[Overridable]:
@@ -185,7 +188,10 @@ class ActionManager(Manager):
             self._obeying[number] = obeying
             if obeying is not None and len(obeying) == 0:
                 continue
-            self._take(number, s.controller.apply(rows, obeying), obeying)
+            try:
+                self._take(number, s.controller.apply(rows, obeying), obeying)
+            except BaseException as error:  # noqa: BLE001 - told with the key
+                _blame(error, s)
         if self.slices:
             self._write(None)
 
@@ -196,7 +202,10 @@ class ActionManager(Manager):
             obeying = self._obeying[number]
             if s.steps is None or part * self._tick % s.steps or (obeying is not None and len(obeying) == 0):
                 continue
-            self._take(number, s.controller.update(obeying), obeying)
+            try:
+                self._take(number, s.controller.update(obeying), obeying)
+            except BaseException as error:  # noqa: BLE001 - told with the key
+                _blame(error, s)
         self._write(None)
 
     def _see(self) -> None:
@@ -206,6 +215,8 @@ class ActionManager(Manager):
 
     def _take(self, number: int, command: Command, env_ids: Array | None) -> None:
         """Note what a controller wants of its drives."""
+        if command.__class__ is not Command:
+            raise TaskError(f"a controller returns an anysim.controllers.base.Command, not {type(command).__name__}")
         channel = self.slices[number].controller.channel
         for buffer, values in (
             (self._position, command.position),
@@ -296,6 +307,14 @@ def _make(view: ChannelView, action: ActionSpec, num_envs: int) -> Controller:
         return made(view, num_envs, **{key: getattr(params, key) for key in type(params).model_fields})
     except TaskError as error:
         raise TaskError(f"{where}: {error}") from None
+    except BaseException as error:  # noqa: BLE001 - told with the key
+        registry.blame(error, f"{where}: the controller '{name}'", registry.origin(made))
+
+
+def _blame(error: BaseException, s: ActionSlice) -> NoReturn:
+    """Raise what a controller raised, with its key and its distribution."""
+    who = f"world.robots.{s.robot}.actions.{s.channel}: the controller {type(s.controller).__name__}"
+    registry.blame(error, who, registry.origin(s.controller), prefix=True)
 
 
 def _steps(controller: Controller, dt: float) -> int | None:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
+from anysim import registry
 from anysim.conventions import Array
 from anysim.errors import RecordError
 from anysim.record import commit as protocol
@@ -166,7 +167,8 @@ class Committer:
         """Call what needs a prepared writer."""
         try:
             if self._text is None:
-                self._writer.prepare(self._run)
+                with registry.blaming(f"the writer '{self._writer.name}'", registry.origin(self._writer)):
+                    self._writer.prepare(self._run)
                 self._text = ManifestText(self._run, self._writer.name)
         except BaseException as error:  # noqa: BLE001  raised at the next append or commit
             files.trouble = error

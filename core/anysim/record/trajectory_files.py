@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from threading import Event
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 from anysim.conventions import Array
 from anysim.record import commit as protocol
@@ -17,6 +17,7 @@ from anysim.record.json import dump_json
 from anysim.record.manifest import CameraEntry, Manifest
 from anysim.record.names import MANIFEST_FILE, checked_file_name
 from anysim.record.writer import ImageWriter, TrajectoryWriter, WrittenFile
+from anysim.registry import blame, origin
 
 
 class Ending(NamedTuple):
@@ -142,6 +143,8 @@ class TrajectoryFiles:
             protocol.write_durably(directory / MANIFEST_FILE, manifest)
         except OSError as error:
             raise disk_trouble(f"cannot commit {self.where}", error, self._out) from error
+        except BaseException as error:  # noqa: BLE001 - told in a sentence
+            self._blame(f"cannot commit {self.where}", error)
         return directory
 
     def abort(self) -> None:
@@ -170,7 +173,14 @@ class TrajectoryFiles:
             self.trouble = disk_trouble(what, error, self._out)
             self.trouble.__cause__ = error
         except BaseException as error:  # noqa: BLE001  raised at the next append or commit
-            self.trouble = error
+            try:
+                self._blame(what, error)
+            except BaseException as told:  # noqa: BLE001
+                self.trouble = told
+
+    def _blame(self, what: str, error: BaseException) -> NoReturn:
+        writer = f"{what}: the writer '{self._writer.name}'"
+        blame(error, writer, origin(self._writer))
 
 
 def camera_entries(

@@ -1,5 +1,7 @@
 """SkillPolicy: the task's expert as a policy over all envs, each on its own timeline."""
 
+from collections.abc import Generator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -31,7 +33,10 @@ def bind_skill(spec: ExpertSpec, env: TaskEnv) -> Skill:
             except AnysimError as error:
                 raise SpecError([SpecIssue("", f"task.expert.{name}", str(error))]) from None
         keywords[name] = value
-    return skill_class(env, **keywords)
+    try:
+        return skill_class(env, **keywords)
+    except BaseException as error:  # noqa: BLE001 - told with the key
+        registry.blame(error, f"task.expert: the skill '{spec.skill}'", registry.origin(skill_class))
 
 
 class SkillPolicy:
@@ -46,16 +51,19 @@ class SkillPolicy:
         self.env = env
         self.name = task.expert.skill
         self.skill = bind_skill(task.expert, env)
+        self._who, self._package = f"task.expert: the skill '{self.name}'", registry.origin(self.skill)
         self._still = np.clip(np.zeros(env.action_dim), *env.action_bounds)
 
     def begin(self, env_ids: Array) -> None:
         """These envs have just been reset."""
-        self.skill.begin(env_ids)
+        with self._blaming():
+            self.skill.begin(env_ids)
 
     def act(self, env_ids: Array) -> Array:
         """The action (N, A); only the rows `env_ids` mean anything."""
         action = np.tile(self._still, (self.env.num_envs, 1))
-        self.skill.act(env_ids, action)
+        with self._blaming():
+            self.skill.act(env_ids, action)
         return action
 
     def gave_up(self, env_ids: Array) -> Array:
@@ -65,4 +73,14 @@ class SkillPolicy:
 
     def describe(self, env: int) -> dict[str, object]:
         """What an env is doing, for records and tables."""
-        return {"skill": self.name, **self.skill.describe(env)}
+        try:
+            return {"skill": self.name, **self.skill.describe(env)}
+        except BaseException as error:  # noqa: BLE001 - told with the key
+            registry.blame(error, self._who, self._package)
+
+    @contextmanager
+    def _blaming(self) -> Generator[None]:
+        try:
+            yield
+        except BaseException as error:  # noqa: BLE001 - told with the key
+            registry.blame(error, self._who, self._package, prefix=True)

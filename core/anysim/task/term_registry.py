@@ -55,7 +55,9 @@ def bind(kind: str, spec: TermSpec, scene: SceneView, path: str) -> Callable[...
         SpecError: at `path`, a parameter names nothing in this world.
     """
     function = find(kind, spec.term)
-    values = options_model(function).model_validate(spec.params)
+    with registry.blaming(f"{path}: the signature of the term '{spec.term}'", registry.origin(function)):
+        model = options_model(function)
+    values = model.model_validate(spec.params)
     keywords: dict[str, Any] = {}
     for name, parameter in parameters(function).items():
         value = getattr(values, name)

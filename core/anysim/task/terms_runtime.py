@@ -1,12 +1,13 @@
 """The task's terms, bound to a scene: commands, observations, rewards, success, failure, events."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from math import isfinite
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
+from anysim import registry
 from anysim.conventions import Array
 from anysim.errors import AnysimError, SpecError, SpecIssue, TaskError
 from anysim.managers.base import Overridable
@@ -33,12 +34,18 @@ class Mdp:
         self.held = np.zeros(n, dtype=np.int64)
         """Consecutive control steps for which all success terms were true (N,)."""
         issues: list[SpecIssue] = []
+        self._named: dict[str, tuple[str, str]] = {}
+        """The term at each key of the file, and its distribution."""
+        self._widths: dict[str, tuple[int, ...]] = {}
+        """The components of each observation of a group, as they were at first."""
 
         def terms(kind: str, specs: Mapping[str, Any], section: str) -> dict[str, Term]:
             bound: dict[str, Term] = {}
             for name, term in specs.items():
+                path = f"task.{section}.{name}"
                 try:
-                    bound[name] = bind(kind, term, scene, f"task.{section}.{name}")
+                    bound[name] = bind(kind, term, scene, path)
+                    self._named[path] = (term.term, registry.origin(bound[name]))
                 except SpecError as error:
                     issues.extend(error.issues)
                 except AnysimError as error:
@@ -81,7 +88,13 @@ class Mdp:
         self.held[env_ids] = 0
         self._run_events("reset", 0)
         for name, term in self._commands.items():
-            self.scene.goals[name][env_ids] = term(partial(self._draw, f"command/{name}", 0))
+            path, goals = f"task.command.{name}", self.scene.goals[name]
+            try:
+                goal = term(partial(self._draw, f"command/{name}", 0))
+            except BaseException as error:  # noqa: BLE001 - told with the key
+                self._blame(error, path)
+            self._fit(path, goal, (len(env_ids), goals.shape[1]))
+            goals[env_ids] = goal
         self.scene.moment += 1  # goals have moved
         for term in self._altered:
             term.reset(env_ids)
@@ -93,7 +106,10 @@ class Mdp:
 
     def _run_events(self, when: str, tick: Any) -> None:
         for name, term in self._due[when].items():
-            term(partial(self._draw, f"event/{name}", tick))
+            try:
+                term(partial(self._draw, f"event/{name}", tick))
+            except BaseException as error:  # noqa: BLE001 - told with the key
+                self._blame(error, f"task.events.{name}")
 
     def _draw(self, stream: str, tick: Any, name: str, value: Any, where: Array | None = None) -> Array:
         """Draw for the rows at hand, or for those of them where `where` (n,) is true."""
@@ -106,10 +122,31 @@ class Mdp:
 
     def observe(self) -> Obs:
         """All groups for the rows at hand, float32 (n, D)."""
-        return {
-            group: np.concatenate([term() for term in terms], axis=1, dtype=np.float32, casting="same_kind")
-            for group, terms in self._groups.items()
-        }
+        return {group: self._observed(group, terms) for group, terms in self._groups.items()}
+
+    def _observed(self, group: str, terms: Sequence[Term]) -> Array:
+        values: list[Array] = []
+        for term in terms:
+            try:
+                values.append(term())
+            except BaseException as error:  # noqa: BLE001 - told with the key
+                self._blame(error, f"task.observations.{group}.{len(values)}")
+        try:
+            rows = np.concatenate(values, axis=1, dtype=np.float32, casting="same_kind")
+        except (TypeError, ValueError):
+            self._fit_group(group, values)
+            raise
+        if rows.shape != (len(self.scene.env_ids), sum(self._widths.get(group, (-1,)))):
+            self._fit_group(group, values)
+        return rows
+
+    def _fit_group(self, group: str, values: Sequence[Array]) -> None:
+        """See that observations are rows of as many numbers as they were at first."""
+        count = len(self.scene.env_ids)
+        widths = self._widths.get(group) or tuple(np.shape(value)[-1] if np.ndim(value) == 2 else 1 for value in values)
+        for place, (value, width) in enumerate(zip(values, widths, strict=True)):
+            self._fit(f"task.observations.{group}.{place}", value, (count, width))
+        self._widths[group] = widths
 
     def reward(self, faulted: Array) -> Array:
         """The weighted sum of the reward terms for the rows at hand, float32 (n,); NaN for faulted envs.
@@ -119,9 +156,11 @@ class Mdp:
         """
         total = np.zeros(len(faulted))
         for name, weight, term in self._weighted:
-            value = term()
-            if value.shape != total.shape:
-                raise TaskError(f"reward term '{name}' returned shape {value.shape}, expected {total.shape}")
+            try:
+                value = term()
+            except BaseException as error:  # noqa: BLE001 - told with the key
+                self._blame(error, f"task.rewards.{name}")
+            self._fit(f"task.rewards.{name}", value, total.shape)
             total += weight * value
         if not isfinite(np.vdot(total, total)):  # else all are finite
             wrong = np.flatnonzero(~(np.isfinite(total) | faulted))
@@ -136,12 +175,45 @@ class Mdp:
         rows = self.scene.rows
         held = self.held[rows]
         success = failure = np.zeros(held.shape, dtype=bool)
-        for number, term in enumerate(self._success.values()):
-            success = success & term() if number else term()
-        for term in self._failure.values():
-            failure = failure | term()
+        for number, (name, term) in enumerate(self._success.items()):
+            holds = self._held(f"task.success.{name}", term, held.shape)
+            success = success & holds if number else holds
+        for name, term in self._failure.items():
+            failure = failure | self._held(f"task.failure.{name}", term, held.shape)
         self.held[rows] = held = (held + 1) * success
         return held >= self.spec.hold, failure
+
+    def _held(self, path: str, term: Term, shape: tuple[int, ...]) -> Array:
+        """What a predicate says (n,) bool."""
+        try:
+            value = term()
+        except BaseException as error:  # noqa: BLE001 - told with the key
+            self._blame(error, path)
+        self._fit(path, value, shape, "truth values")
+        return value
+
+    def _fit(self, path: str, value: Any, shape: tuple[int, ...], what: str = "numbers") -> None:
+        """See that a term returned an array of a shape, of numbers or truth values.
+
+        Raises:
+            TaskError: it did not; names the key, the term and its distribution.
+        """
+        right = "biuf" if what == "numbers" else "b"
+        if isinstance(value, np.ndarray) and value.shape == shape and value.dtype.kind in right:
+            return
+        if isinstance(value, np.ndarray | np.generic):
+            found = f"an array of shape {value.shape} of {value.dtype}"
+        else:
+            found = "None" if value is None else f"a {type(value).__name__}"
+        term, package = self._named[path]
+        raise TaskError(
+            f"{path}: the term '{term}' of {package} returned {found}; expected an array of shape {shape} of {what}"
+        )
+
+    def _blame(self, error: BaseException, path: str) -> NoReturn:
+        """Raise what evaluating a term raised, with its key and its distribution."""
+        term, package = self._named[path]
+        registry.blame(error, f"{path}: the term '{term}'", package, prefix=True)
 
     def overridable(self) -> list[Overridable]:
         """The parameters of commands and events that are drawn; those of events in steps may change midway."""
