@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from anysim_schemas.errors import AnysimError, SpecError, SpecIssue
 
 __all__ = [
+    "FAILURES",
     "AnysimError",
     "AssetError",
     "CapabilityError",
@@ -78,6 +79,10 @@ class TaskError(AnysimError):
 
 class RecordError(AnysimError):
     """A record that is incomplete, damaged or of another format."""
+
+
+FAILURES = (EngineFailure, PluginFailure)
+"""Errors that no input explains: something broke."""
 
 
 def listing(names: Iterable[str], limit: int = 12) -> str:

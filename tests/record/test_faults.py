@@ -157,7 +157,7 @@ def test_a_writer_without_images_says_so(tmp_path, writer, run_header, make_fram
 def test_an_error_of_another_kind_discards_too(tmp_path, writer, run_header, record, monkeypatch):
     with Recorder(tmp_path, writer, run_header) as recorder:
         monkeypatch.setattr(writer, "write", lambda directory, columns, status: 1 // 0)
-        with pytest.raises(PluginFailure, match="env 0, episode 0: the writer 'lines' of .* failed: ZeroDivisionError"):
+        with pytest.raises(PluginFailure, match=r"episode 0: the writer 'lines' of .* failed: ZeroDivisionError"):
             record(recorder)
         assert recorder.open_envs == ()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run.json"]

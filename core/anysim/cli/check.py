@@ -88,7 +88,7 @@ def report_on(name: str, engine: str | None, all_engines: bool, overrides: list[
     """Every fault of one file, and what each engine that is asked says to it."""
     from anysim import registry
     from anysim.api import compile_world, dry_run, load
-    from anysim.errors import AnysimError, AssetError, SpecError
+    from anysim.errors import AnysimError, AssetError, PluginFailure, SpecError
 
     try:
         loaded = load(Path(name) if Path(name).exists() else name, overrides=overrides)
@@ -100,6 +100,8 @@ def report_on(name: str, engine: str | None, all_engines: bool, overrides: list[
         answers = tuple(_ask(one, loaded, world, name) for one in engines)
     except (SpecError, AssetError) as error:
         return Report([str(issue) for issue in error.issues] or [f"{name}: {error}"])
+    except PluginFailure:  # which says nothing of the file
+        raise
     except AnysimError as error:
         return Report([f"{name}: {error}"])
     refused = [answer.refusal for answer in answers if answer.refusal]
@@ -115,12 +117,12 @@ def _ask(engine: str, loaded: "LoadedRun", world: "World", name: str) -> Answer:
     from anysim.api import check_engine
     from anysim.cli.output import approximations
     from anysim.engine.factory import engine_class
-    from anysim.errors import AnysimError, SpecError
+    from anysim.errors import AnysimError, PluginFailure, SpecError
 
     try:
         kind = engine_class(engine)
         needs = check_engine(loaded, world, kind, name)
-    except SpecError:
+    except (PluginFailure, SpecError):
         raise
     except AnysimError as error:
         return Answer(engine, f"{name}: {error}")

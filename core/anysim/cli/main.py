@@ -1,16 +1,20 @@
 """`anysim`: the application, its commands, and what errors look like."""
 
 import sys
+import traceback
 import warnings
+from typing import Any
 
 import typer
 
 from anysim import __version__
 from anysim.cli import audit, check, doctor, explain, listing, replay, run, schema, snapshot
-from anysim.cli.options import Commands
+from anysim.cli.options import CommandEnded, Commands
 
 EXIT_CODES = """Exit codes: 0 done; 1 it ran, and the answer is no (a replay that differs, a file with faults, too few
-successes); 2 bad input; 130 interrupted."""
+successes); 2 it could not be done as asked (usage, a file, a missing package); 3 something broke: a plugin, an engine
+or anysim itself; 130 interrupted."""
+BROKE = 3
 
 app = typer.Typer(
     name="anysim",
@@ -60,19 +64,46 @@ def _join_commands() -> None:
         typer.echo(f"warning: {fault.message}", err=True)
 
 
+def _sentences() -> None:
+    """Have the warnings of anysim look like its errors: without the line of Python that gives them."""
+    usual = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *where: Any) -> None:
+        if category.__module__.partition(".")[0] == "anysim":
+            typer.echo(f"warning: {message}", err=True)
+        else:
+            usual(message, category, *where)
+
+    warnings.showwarning = show
+
+
+def _broke(error: BaseException) -> None:
+    """Tell of an error that no input explains: where it came from, and who is to know."""
+    from anysim import registry
+
+    error = error.__cause__ if isinstance(error, CommandEnded) and error.__cause__ else error
+    typer.echo("".join(traceback.format_exception(error)), err=True, nl=False)
+    package = registry.culprit(error) or "anysim"
+    told = f"{registry.in_words(error)}: something broke in {package}; your input is not to blame"
+    typer.echo(f"error: {told}. Report it with the lines above, or {registry.remedy(package)}", err=True)
+
+
 def main() -> None:
-    """Run the command line; errors of anysim become sentences on stderr and exit code 2."""
+    """Run the command line; errors of anysim become sentences on stderr. See `EXIT_CODES`."""
+    from anysim.errors import FAILURES
     from anysim_schemas.errors import AnysimError
 
-    if sys.argv[1:2] != ["--version"]:
-        _join_commands()
     try:
+        _sentences()
+        if sys.argv[1:2] != ["--version"]:
+            _join_commands()
         app()
     except AnysimError as error:
         typer.echo(f"error: {error}", err=True)
-        raise SystemExit(2) from None
-    except BrokenPipeError:
-        raise SystemExit(0) from None
+        raise SystemExit(BROKE if isinstance(error, FAILURES) else 2) from None
+    except Exception as error:  # noqa: BLE001 - a crash has a code of its own
+        _broke(error)
+        raise SystemExit(BROKE) from None
     except KeyboardInterrupt:
         typer.echo("interrupted", err=True)
         raise SystemExit(130) from None

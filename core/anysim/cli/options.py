@@ -1,5 +1,7 @@
 """Options that several commands share, and their help as it is written: whole summaries, examples with their lines."""
 
+import os
+import sys
 from typing import Annotated, Any
 
 import typer
@@ -30,8 +32,22 @@ UNWRAPPED = "\b\n"
 """What a paragraph of help begins with to keep its lines."""
 
 
+class CommandEnded(Exception):
+    """A command was ended from within, by what is its cause."""
+
+
 class Commands(TyperGroup):
     """A group whose list shows the first paragraph of each command; a paragraph with indented lines is not wrapped."""
+
+    def invoke(self, ctx: typer.Context) -> Any:
+        """Run the command. What ends a program without an error in Python is the reader's leave, or a crash here."""
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError:  # as of `| head`: nothing is wrong, and nothing more can be said
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            raise typer.Exit(0) from None
+        except (SystemExit, EOFError) as error:  # raised by a plugin: typer takes them for the end of the command
+            raise CommandEnded(str(error)) from error
 
     def resolve_command(self, ctx: typer.Context, args: list[str]):  # noqa: ANN201
         """The command that is named; one of a package that is not installed is an error that names the package."""

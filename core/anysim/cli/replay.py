@@ -21,22 +21,25 @@ def replay(
 ) -> None:
     """Replay trajectories from their manifests alone, and compare every recorded state.
 
-    On the engine that recorded them they must be equal to the bit (exit code 1 if not). On another engine the same
-    actions lead elsewhere: the drift of every state array is reported, and whether the episodes end alike.
+    On the engine that recorded them they must be equal to the bit; exit code 1 if not, or if one is damaged. On another
+    engine the same actions lead elsewhere: the drift of every state array is reported, and whether the episodes end
+    alike.
     """
     from anysim.cli.output import counting, print_json
-    from anysim.errors import RecordError
     from anysim.record.names import find_trajectories
     from anysim.record.replay import replay as replay_one
     from anysim.record.verify import verify
 
     found = find_trajectories(directories)
     results: dict[str, ReplayResult] = {}
+    damaged: dict[str, list[str]] = {}
     with counting("replays", len(found), quiet=json) as show:
         for path in found:
             faults = verify(path)
             if faults:
-                raise RecordError(f"{path} is damaged: {'; '.join(faults)}")
+                damaged[str(path)] = faults
+                typer.echo(f"error: {path} is damaged: {'; '.join(faults)}", err=True)
+                continue
             result = results[str(path)] = replay_one(path, engine, base)
             notes = "" if result.same_world else " (the rebuilt world is another one)"
             notes += "" if result.same_start else " (it starts from another state)"
@@ -46,15 +49,16 @@ def replay(
         print_json(
             {
                 "replayed": len(results),
+                "damaged": damaged,
                 "identical": same,
                 "same_outcome": sum(map(_same_outcome, results.values())),
                 "drift": [row._asdict() for row in _summary(results)],
                 "trajectories": [_row(path, result) for path, result in results.items()],
             }
         )
-    else:
+    elif results:
         _report(results, same)
-    if engine is None and same < len(results):
+    if damaged or (engine is None and same < len(results)):
         raise typer.Exit(1)
 
 

@@ -27,6 +27,9 @@ def run(
     min_success: Annotated[
         float, typer.Option(min=0.0, max=1.0, help="Exit with 1 if a smaller share succeeds.")
     ] = 0.0,
+    strict_observers: Annotated[
+        bool, typer.Option("--strict-observers", help="End the run where an observer raises, instead of a warning.")
+    ] = False,
     verbose: Verbose = False,
     json: AsJson = False,
 ) -> None:
@@ -43,7 +46,8 @@ def run(
     from anysim.record.collector import Collector
     from anysim.skills.runner import SkillPolicy
 
-    with make(task, engine=engine, num_envs=num_envs, overrides=override or ()) as env:
+    more = override or ()
+    with make(task, engine=engine, num_envs=num_envs, overrides=more, strict_observers=strict_observers) as env:
         seed = env.spec.seed if seed is None else seed
         directory = out or Path("runs") / f"{env.name}-{env.engine.name}-{_run_id(env, seed)}"
         collector = Collector(env, SkillPolicy(env), directory, episodes, seed)

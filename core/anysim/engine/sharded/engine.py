@@ -25,7 +25,7 @@ from anysim.engine.sharded.pool import START_S, Crew, dismiss, hire, importable_
 from anysim.engine.sharded.shared_memory import SharedArrays, state_layout
 from anysim.engine.sharded.worker_handle import WorkerLost
 from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
-from anysim.errors import EngineError
+from anysim.errors import EngineError, EngineFailure
 from anysim.model.world import World
 
 TIMEOUT_S = 300.0
@@ -148,7 +148,7 @@ class ShardedEngine(SimEngine):
                 answers |= more
                 raised |= errors
                 if gone:
-                    raise EngineError(f"{self._who(k)} {gone[k]} in '{name}', and so did the one that replaced it")
+                    raise EngineFailure(f"{self._who(k)} {gone[k]} in '{name}', and so did the one that replaced it")
         if raised:
             raise raised[min(raised)]
         return answers
@@ -187,7 +187,7 @@ class ShardedEngine(SimEngine):
                     raise lost[k]
         except Exception as error:
             self._crew.discard(k)
-            raise EngineError(f"{self._who(k)} {how}, and could not be replaced: {error}") from error
+            raise EngineFailure(f"{self._who(k)} {how}, and could not be replaced: {error}") from error
         warnings.warn(
             f"{self._who(k)} {how}; a new worker holds these envs in their initial state, faulted until reset(); "
             f"the others go on. If it happens again, look for what these envs do that the engine cannot bear, or give "

@@ -14,7 +14,7 @@ from anysim.engine.base import SimEngine
 from anysim.engine.sharded.blocks import Blocks
 from anysim.engine.sharded.shared_memory import SharedArrays
 from anysim.engine.sharded.worker_handle import Worker, WorkerLost
-from anysim.errors import AnysimError, EngineError
+from anysim.errors import AnysimError, EngineError, EngineFailure
 from anysim.model.world import World
 
 START_S = 300.0
@@ -114,7 +114,7 @@ class Crew:
         for k in lost:
             self.discard(k)
         for k in sorted(lost):
-            raise EngineError(f"worker {k} {lost[k]} in '{messages[k][0]}'")
+            raise EngineFailure(f"worker {k} {lost[k]} in '{messages[k][0]}'")
         for k in sorted(raised):
             raise raised[k]
 

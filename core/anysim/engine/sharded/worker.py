@@ -62,7 +62,7 @@ class Host:
                 answer = ("error", type(error).__name__, self._placed(str(error)))
             except Exception as error:  # noqa: BLE001 - whatever an engine raises, the parent shows it
                 text = f"{type(error).__name__}: {error}\nin the worker:\n{traceback.format_exc()}"
-                answer = ("error", "EngineError", text)
+                answer = ("error", "EngineFailure", text)
             try:
                 self._pipe.send(answer)
             except OSError:
