@@ -39,7 +39,7 @@ class CommandEnded(Exception):
 class Commands(TyperGroup):
     """A group whose list shows the first paragraph of each command; a paragraph with indented lines is not wrapped."""
 
-    def invoke(self, ctx: typer.Context) -> Any:
+    def invoke(self, ctx: typer.Context) -> object:
         """Run the command. What ends a program without an error in Python is the reader's leave, or a crash here."""
         try:
             return super().invoke(ctx)
