@@ -11,13 +11,11 @@ from typing import Any, NamedTuple, cast
 
 import yaml
 
+from anysim_schemas.limits import YAML_ALIASED, YAML_DEPTH, YAML_VALUES
 from anysim_schemas.nodes import Fault, Mark, Node, Scalar
 
-MAX_ALIASED = 100_000
-"""How many values the aliases of one file may stand for, together."""
-
-MAX_DEPTH = 100
-"""How deeply mappings and lists may be nested."""
+_READ_TWICE = 1 << 16
+"""Characters of a text that is read again in Python for the sake of its error; longer ones would take seconds."""
 
 TAG = "tag:yaml.org,2002:"
 _PATTERNS = {
@@ -53,20 +51,29 @@ def _compose(text: str) -> yaml.Node | None:
     compose = cast("Any", yaml).compose
     if _C_LOADER is not None:
         try:
-            _check_depth(text)
+            _check_budget(text, _FastLoader)
             return compose(text, Loader=_FastLoader)
         except (yaml.YAMLError, ValueError):
-            pass
+            if len(text) > _READ_TWICE:
+                raise
+    _check_budget(text, _Loader)
     return compose(text, Loader=_Loader)
 
 
-def _check_depth(text: str) -> None:
-    """Raises RecursionError where libyaml would overflow its stack; its stream of events uses none."""
-    depth = 0
-    for event in cast("Any", yaml).parse(text, Loader=_FastLoader):
+def _check_budget(text: str, loader: type) -> None:
+    """Refuses what would overflow libyaml's stack, or the memory; the stream of events needs neither."""
+    depth = values = 0
+    for event in cast("Any", yaml).parse(text, Loader=loader):
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        if depth > MAX_DEPTH:
+        values += isinstance(event, yaml.NodeEvent)
+        if YAML_DEPTH.exceeded(depth):
             raise RecursionError
+        if YAML_VALUES.exceeded(values):
+            raise _TooLargeError
+
+
+class _TooLargeError(Exception):
+    """A text with more values than are read."""
 
 
 class _Fatal(Exception):
@@ -91,6 +98,9 @@ def parse(text: str, source: str, faults: list[Fault]) -> Node | None:
     except yaml.MarkedYAMLError as error:
         faults.append(_syntax_fault(error, source))
     except yaml.reader.ReaderError as error:
+        if not 0 <= error.position < len(text):  # libyaml's count is in bytes
+            faults.append(Fault(Mark(source, 1, 1), "", f"not valid YAML: {error.reason}"))
+            return None
         before = text[: error.position]
         character = ord(text[error.position])
         mark = Mark(source, before.count("\n") + 1, error.position - (before.rfind("\n") + 1) + 1)
@@ -98,7 +108,9 @@ def parse(text: str, source: str, faults: list[Fault]) -> Node | None:
     except ValueError as error:  # an escape beyond Unicode, such as "\U00110000"
         faults.append(Fault(Mark(source, 1, 1), "", f"not valid YAML: {error}"))
     except RecursionError:
-        faults.append(Fault(Mark(source, 1, 1), "", f"mappings and lists are nested more than {MAX_DEPTH} deep"))
+        faults.append(Fault(Mark(source, 1, 1), "", f"the file {YAML_DEPTH.sentence()}"))
+    except _TooLargeError:
+        faults.append(Fault(Mark(source, 1, 1), "", f"the file {YAML_VALUES.sentence()}"))
     except _Fatal as error:
         faults.append(error.fault)
     return None
@@ -145,7 +157,7 @@ class _Builder:
             built = self._sequence(node)
         else:
             built = _Built(Node(self._scalar(cast("yaml.ScalarNode", node)), self._mark(node)), 1, 0)
-        if max(built.depth, len(self._open)) > MAX_DEPTH:
+        if max(built.depth, len(self._open)) > YAML_DEPTH.value:
             raise RecursionError
         self._check_tag(node)
         self._open.discard(identity)
@@ -154,10 +166,8 @@ class _Builder:
 
     def _alias(self, node: yaml.Node, built: _Built) -> _Built:
         self._aliased += built.size
-        if self._aliased > MAX_ALIASED:
-            raise _Fatal(
-                Fault(self._mark(node), "", f"the aliases of this file stand for more than {MAX_ALIASED} values")
-            )
+        if YAML_ALIASED.exceeded(self._aliased):
+            raise _Fatal(Fault(self._mark(node), "", f"the file {YAML_ALIASED.sentence()}"))
         return built
 
     def _sequence(self, node: yaml.SequenceNode) -> _Built:

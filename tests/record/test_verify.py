@@ -1,10 +1,12 @@
 import json
+import os
 
 import pytest
 
 from anysim import registry
 from anysim.errors import PluginError, RecordError
-from anysim.record.manifest import read_manifest
+from anysim.record.manifest import read_manifest, read_run
+from anysim.record.reader import open_trajectory
 from anysim.record.recorder import Recorder
 from anysim.record.verify import verify, verify_run
 
@@ -116,6 +118,34 @@ def test_a_manifest_names_no_file_outside(committed, name):
         read_manifest(committed)
 
 
+@pytest.mark.parametrize("name", ["manifest.json", "run.json"])
+def test_a_pipe_or_a_device_does_not_hang(tmp_path, name):
+    read = read_manifest if name == "manifest.json" else read_run
+    os.mkfifo(tmp_path / name)
+    with pytest.raises(RecordError, match="is a pipe, not a file"):
+        read(tmp_path)
+    (tmp_path / name).unlink()
+    (tmp_path / name).symlink_to("/dev/zero")
+    with pytest.raises(RecordError, match="is a device, not a file"):
+        read(tmp_path)
+
+
+def test_a_member_that_is_a_pipe_does_not_hang(committed):
+    member = committed / sorted(read_manifest(committed).files)[0]
+    member.unlink()
+    os.mkfifo(member)
+    assert verify(committed) == [f"{member} is not a plain file"]
+    with pytest.raises(RecordError, match="is not a plain file"):
+        open_trajectory(committed)
+
+
+def test_a_recorded_spec_extends_nothing(committed):
+    change(committed, spec={"extends": "/dev/zero"})
+    with pytest.raises(RecordError, match="a recorded spec is whole and extends no file"):
+        read_manifest(committed)
+    assert verify(committed) != []
+
+
 def test_a_manifest_names_no_video_outside(committed):
     camera = {"file": "../x.mp4", "frames": 1, "fps": 25.0, "width": 4, "height": 4}
     change(committed, cameras={"front": camera})
@@ -133,7 +163,7 @@ def test_a_manifest_that_is_none(committed, text):
 def test_a_manifest_of_unreasonable_size_is_not_read(committed):
     with (committed / "manifest.json").open("wb") as file:
         file.truncate(1 << 40)
-    with pytest.raises(RecordError, match="larger than 16 MiB"):
+    with pytest.raises(RecordError, match="the limit of a JSON file is 16,777,216 bytes"):
         read_manifest(committed)
 
 

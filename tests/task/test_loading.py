@@ -44,6 +44,7 @@ endsolid t
 def folder(tmp_path: Path) -> Path:
     """A base file with a mesh beside it, extended from another folder."""
     (tmp_path / "base" / "meshes").mkdir(parents=True)
+    (tmp_path / "pyproject.toml").touch()  # one project: its files may extend each other
     (tmp_path / "base" / "meshes" / "t.stl").write_text(TETRAHEDRON)
     (tmp_path / "base" / "base.yaml").write_text("world:\n  objects:\n    t: {source: {mesh: meshes/t.stl}}\n")
     (tmp_path / "child").mkdir()

@@ -117,12 +117,12 @@ def _ask(engine: str, loaded: "LoadedRun", world: "World", name: str) -> Answer:
     from anysim.api import check_engine
     from anysim.cli.output import approximations
     from anysim.engine.factory import engine_class
-    from anysim.errors import AnysimError, PluginFailure, SpecError
+    from anysim.errors import AnysimError, SpecError
 
     try:
         kind = engine_class(engine)
         needs = check_engine(loaded, world, kind, name)
-    except (PluginFailure, SpecError):
+    except SpecError:
         raise
     except AnysimError as error:
         return Answer(engine, f"{name}: {error}")

@@ -15,6 +15,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from anysim.errors import SpecError, SpecIssue, listing, suggest
+from anysim_schemas.files import read_plain
+from anysim_schemas.limits import JSON_BYTES
 from anysim_schemas.proposals import Proposal, Proposals
 
 
@@ -74,7 +76,9 @@ def read_file(path: Path, where: str) -> tuple[Proposal, ...]:
         SpecError: it is missing, no JSON, or of another form; with the path of the key in the spec.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_plain(path, JSON_BYTES).decode()
+    except UnicodeDecodeError as error:
+        raise SpecError([SpecIssue("", where, f"the proposal {path} is not UTF-8 text")]) from error
     except OSError as error:
         raise SpecError([SpecIssue("", where, f"cannot read the proposal {path}: {error.strerror}")]) from error
     return parsed(text, str(path), where)
@@ -91,7 +95,7 @@ def parsed(data: Any, source: str, where: str) -> tuple[Proposal, ...]:
     if isinstance(data, str):
         try:
             data = json.loads(data)
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise SpecError([SpecIssue(source, where, f"the proposal is no JSON: {error}")]) from error
     if isinstance(data, list):
         data = {"proposals": data}

@@ -79,6 +79,13 @@ class RunHeader(Spec):
     spec: dict[str, Any] = Field(default_factory=dict, description="the resolved RunSpec, as plain data")
     packages: dict[str, str] = Field(default_factory=dict, description="versions of the distributions involved")
 
+    @field_validator("spec")
+    @classmethod
+    def _whole(cls, spec: dict[str, Any]) -> dict[str, Any]:
+        if "extends" in spec:
+            raise ValueError("a recorded spec is whole and extends no file; take `extends` out")
+        return spec
+
 
 class EpisodeHeader(Spec):
     """One trajectory of a run: which env, which episode, and what was drawn for it."""

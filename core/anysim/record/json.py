@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from anysim.errors import RecordError
-
-MAX_JSON_BYTES = 16 << 20
-"""Larger JSON files are refused, unread."""
+from anysim_schemas.files import RefusedFileError, read_plain
+from anysim_schemas.limits import JSON_BYTES
 
 
 def plain(value: Any, where: str = "value") -> Any:
@@ -52,18 +51,17 @@ def dump_json(value: Any, where: str = "value") -> bytes:
 
 
 def load_json(path: Path) -> Any:
-    """The data of a JSON file of at most MAX_JSON_BYTES.
+    """The data of a plain JSON file of at most `JSON_BYTES`.
 
     Raises:
-        RecordError: the file is missing, too large, or not JSON.
+        RecordError: the file is missing, a device, too large, or not JSON.
     """
     try:
-        with path.open("rb") as file:
-            data = file.read(MAX_JSON_BYTES + 1)
+        data = read_plain(path, JSON_BYTES)
+    except RefusedFileError as error:
+        raise RecordError(f"{path} {error.strerror}") from error
     except OSError as error:
         raise RecordError(f"{path} cannot be read: {error.strerror or error}") from error
-    if len(data) > MAX_JSON_BYTES:
-        raise RecordError(f"{path} is larger than {MAX_JSON_BYTES >> 20} MiB; it is not what a recorder wrote")
     try:
         return json.loads(data.decode())
     except (ValueError, RecursionError) as error:

@@ -89,11 +89,14 @@ def open_trajectory(directory: str | Path) -> TrajectoryReader:
     """The reader of a committed trajectory, by the writer that its manifest names.
 
     Raises:
-        RecordError: the manifest is missing, damaged or of another format.
+        RecordError: the manifest is missing, damaged or of another format; a file is a pipe or a device.
         PluginError: the reader is not installed (says what to install).
     """
     path = Path(directory)
     manifest = read_manifest(path)
+    for name in manifest.files:
+        if (path / name).is_symlink() or ((path / name).exists() and not (path / name).is_file()):
+            raise RecordError(f"{path / name} is not a plain file; a recorder writes no other")
     made: type[TrajectoryReader] = registry.load("readers", manifest.writer)
     with registry.using("readers", manifest.writer):
         return made(path, manifest)

@@ -1,0 +1,65 @@
+"""Plain files of bounded size: no device, pipe or socket is opened for reading, and no file is read without end."""
+
+import errno
+import os
+import stat
+from pathlib import Path
+
+from anysim_schemas.limits import Limit
+
+_MARKERS = ("pyproject.toml", "package.xml", ".git")
+
+
+class RefusedFileError(OSError):
+    """A file that is not read, whatever it holds; `strerror` continues a sentence that begins with its name."""
+
+    def __init__(self, path: Path, reason: str) -> None:
+        super().__init__(errno.EPERM, reason, str(path))
+
+
+def read_plain(path: Path, limit: Limit) -> bytes:
+    """The content of a plain file.
+
+    Raises:
+        RefusedFileError: it is a device, a pipe, a socket or a directory, or has more bytes than the limit.
+        OSError: it cannot be opened or read.
+    """
+    try:
+        # without blocking: opening a pipe would wait for a writer
+        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
+    except ValueError as error:  # a NUL in its name
+        raise RefusedFileError(path, f"cannot be the name of a file: {error}") from None
+    with os.fdopen(_checked(descriptor, path), "rb") as file:
+        size = os.fstat(descriptor).st_size
+        if limit.exceeded(size):
+            raise RefusedFileError(path, limit.sentence(size))
+        data = file.read(limit.value + 1)
+    if limit.exceeded(len(data)):  # it grew, or is one of /proc, which have no size
+        raise RefusedFileError(path, limit.sentence())
+    return data
+
+
+def _checked(descriptor: int, path: Path) -> int:
+    mode = os.fstat(descriptor).st_mode
+    if stat.S_ISREG(mode):
+        return descriptor
+    os.close(descriptor)
+    kind = "directory" if stat.S_ISDIR(mode) else "pipe" if stat.S_ISFIFO(mode) else "device"
+    raise RefusedFileError(path, f"is a {kind}, not a file")
+
+
+def project_root(folder: Path) -> Path:
+    """The folder that no path in a file of `folder` may leave.
+
+    The outermost Python package around it, else the nearest folder above that holds `pyproject.toml`, `package.xml` or
+    `.git`, else the folder itself.
+    """
+    folder = folder.resolve()
+    package = folder
+    while (package / "__init__.py").is_file() and package != package.parent:
+        package = package.parent
+    if package != folder:
+        inner = folder.relative_to(package).parts[0]
+        return package / inner
+    marked = (above for above in (folder, *folder.parents) if any((above / name).exists() for name in _MARKERS))
+    return next(marked, folder)
