@@ -33,9 +33,9 @@ def read_plain(path: Path, limit: Limit) -> bytes:
         size = os.fstat(descriptor).st_size
         if limit.exceeded(size):
             raise RefusedFileError(path, limit.sentence(size))
-        data = file.read(limit.value + 1)
-    if limit.exceeded(len(data)):  # it grew, or is one of /proc, which have no size
-        raise RefusedFileError(path, limit.sentence())
+        data = file.read(size + 1)  # not the limit: so much memory would be set aside
+    if len(data) > size:  # it grew, or is one of /proc, which have no size
+        raise RefusedFileError(path, "has more bytes than its size says; copy it first")
     return data
 
 

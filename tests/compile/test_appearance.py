@@ -40,7 +40,7 @@ def test_an_image_is_found_as_meshes_are(tmp_path: Path) -> None:
     assert np.abs(found.pixels.astype(int) - [200, 30, 30]).max() <= 1
     assert world.geom_texture[world.geoms.index(next(g for g in world.geoms if g.texture))] == 0
     (tmp_path / "text.png").write_text("no image")
-    with pytest.raises(AssetError, match=r"text\.png' cannot be read"):
+    with pytest.raises(AssetError, match=r"text\.png: cannot be read"):
         texture(TextureSpec(image="text.png"), tmp_path)
     with pytest.raises(AssetError, match=r"label\.png"):
         texture(TextureSpec(image="../label.png"), tmp_path / "inner")

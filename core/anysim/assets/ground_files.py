@@ -1,16 +1,21 @@
 """Heights and meshes from files. Nothing here unpickles anything."""
 
+import io
 import zipfile
+from math import prod
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
 from anysim.assets import meshes
+from anysim.assets.images import opened_image
+from anysim.assets.mesh_budget import bounded, check
 from anysim.conventions import Array
-from anysim.errors import AssetError
+from anysim.errors import AssetError, listing
 from anysim.model.ground import MeshGround
 from anysim.model.world import Mesh
+from anysim_schemas.limits import ARRAY_BYTES, GROUND_CELLS
 
 ARRAYS = (".npy", ".npz")
 IMAGES = (".png", ".tif", ".tiff", ".bmp", ".pgm", ".jpg", ".jpeg")
@@ -44,30 +49,40 @@ def read_heights(path: Path, height_range: tuple[float, float] | None) -> Array:
 
 
 def _array(path: Path) -> Array:
+    """The one array of a file, after its header said how large it is; of an archive, a member of stated size."""
+    data = bounded(path, ARRAY_BYTES)
     try:
-        with path.open("rb") as file:
-            loaded: Any = np.load(file, allow_pickle=False)
-            if not isinstance(loaded, np.ndarray):
-                names = list(loaded.files)
-                if len(names) != 1 and "heights" not in names:
-                    raise AssetError(f"{path}: expected one array, or one called heights; it has {', '.join(names)}")
-                loaded = loaded["heights" if "heights" in names else names[0]]
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        if zipfile.is_zipfile(io.BytesIO(data)):
+            data = _member(path, data)
+        version = np.lib.format.read_magic(io.BytesIO(data))
+        header = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+        shape, _, _ = header[version](io.BytesIO(data[np.lib.format.MAGIC_LEN :]))
+        check(path, GROUND_CELLS, prod(shape))
+        loaded: Any = np.load(io.BytesIO(data), allow_pickle=False)
+    except AssetError:
+        raise
+    except Exception as error:  # damaged archives and headers raise what they like
         raise AssetError(f"{path}: cannot be read as an array: {error}") from error
     return cast("Array", loaded)
 
 
+def _member(path: Path, data: bytes) -> bytes:
+    """The bytes of an archive's only array, or of the one called heights."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
+        if len(members) != 1 and "heights" not in members:
+            raise AssetError(f"{path}: expected one array, or one called heights; it has {listing(members)}")
+        info = members.get("heights") or next(iter(members.values()))
+        check(path, ARRAY_BYTES, info.file_size)
+        return archive.read(info)
+
+
 def _image(path: Path) -> Array:
     """Grey values (rows, cols) in [0, 1], the top row first."""
-    from PIL import Image
-
-    try:
-        with Image.open(path) as image:
-            deep = image.mode.startswith(("I", "F"))
-            values = np.asarray(image if deep else image.convert("L"), dtype=np.float64)
-            whole = float(np.iinfo(np.uint16).max) if image.mode.startswith("I") else 1.0 if deep else 255.0
-    except (OSError, ValueError, SyntaxError) as error:
-        raise AssetError(f"{path}: cannot be read as an image: {error}") from error
+    with opened_image(path, GROUND_CELLS) as image:
+        deep = image.mode.startswith(("I", "F"))
+        values = np.asarray(image if deep else image.convert("L"), dtype=np.float64)
+        whole = float(np.iinfo(np.uint16).max) if image.mode.startswith("I") else 1.0 if deep else 255.0
     if values.ndim != 2 or min(values.shape) < 2:
         raise AssetError(f"{path}: expected an image of at least 2 by 2 pixels, it has the shape {values.shape}")
     return np.clip(values / whole, 0.0, 1.0)

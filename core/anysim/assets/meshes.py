@@ -4,17 +4,21 @@ Processing is deterministic and cached; `Mesh.hash` is the digest of the source 
 parameters, never of the result, so that it is equal on all machines.
 """
 
+import io
 import re
+from math import inf, nan
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from anysim import cache
+from anysim.assets.mesh_budget import bounded, check, mesh_bytes
 from anysim.conventions import Array
 from anysim.errors import AssetError
 from anysim.geometry.tessellate import convex_hull
 from anysim.model.world import Mesh, Vec3
+from anysim_schemas.limits import MESH_BYTES, MESH_FACES
 
 FORMATS = (".stl", ".obj", ".dae", ".glb", ".ply")
 HULL_VERTICES = 64  # what PhysX takes in a convex mesh with margin; enough for grasping at millimetres
@@ -134,11 +138,8 @@ def _key(path: Path, *parameters: object) -> str:
     """Of the file, the material file it names, and the processing."""
     if path.suffix.lower() not in FORMATS:
         raise AssetError(f"{path}: mesh files are {', '.join(FORMATS)}; '{path.suffix}' is not known")
-    try:
-        data = path.read_bytes()
-        materials = b"".join(file.read_bytes() for file in _material_files(path, data))
-    except OSError as error:
-        raise AssetError(f"{path}: cannot be read: {error}") from error
+    data = bounded(path, MESH_BYTES)
+    materials = b"".join(bounded(file, MESH_BYTES) for file in _material_files(path, data))
     return cache.digest(_VERSION, path.suffix.lower(), data, materials, *(repr(p) for p in parameters))
 
 
@@ -163,41 +164,50 @@ def _load(path: Path, scale: Vec3, upright: bool) -> list[_Piece]:
             file = path.parent / Path(str(name)).name
             if file.suffix.lower() != ".mtl":
                 raise ValueError(f"'{name}' is not read")
-            return file.read_bytes()
+            return bounded(file, MESH_BYTES)
 
-    data = path.read_bytes()
+    data = mesh_bytes(path)
     kind = path.suffix.lower()
-    if kind == ".dae" and b"<!ENTITY" in data:
-        raise AssetError(f"{path}: declares XML entities, which are not read")
+    total = 0
     try:
-        with path.open("rb") as file:
-            scene: Any = trimesh.load_scene(file, file_type=kind[1:], resolver=MaterialsOnly(str(path)))
+        scene: Any = trimesh.load_scene(io.BytesIO(data), file_type=kind[1:], resolver=MaterialsOnly(str(path)))
         has_color = kind != ".obj" or bool(_material_files(path, data))
         pieces: list[_Piece] = []
         for node in scene.graph.nodes_geometry:
             matrix, name = scene.graph[node]
             geometry = scene.geometry[name]
             faces = np.asarray(getattr(geometry, "faces", ()), dtype=np.int64)
+            total += len(faces)
+            check(path, MESH_FACES, total)  # a geometry may be there many times
             if len(faces):
                 vertices = np.asarray(geometry.vertices, dtype=float) @ matrix[:3, :3].T + matrix[:3, 3]
                 mirrored = np.linalg.det(matrix[:3, :3]) < 0
                 pieces.append(
                     _Piece(vertices, faces[:, ::-1] if mirrored else faces, _color(geometry) if has_color else None)
                 )
+    except AssetError:
+        raise
     except Exception as error:  # parsers of six formats raise what they like
         raise AssetError(f"{path}: cannot be read as a mesh: {type(error).__name__}: {error}") from error
     if not pieces:
         raise AssetError(f"{path}: holds no triangles")
     if not all(np.isfinite(piece.vertices).all() for piece in pieces):
         raise AssetError(f"{path}: holds vertices that are not finite")
-    turn = np.array(scale)[:, None] * (_upright(kind, data) if upright else np.eye(3)) * _unit(kind, data)
+    unit = _unit(kind, data, path)
+    turn = np.array(scale)[:, None] * (_upright(kind, data) if upright else np.eye(3)) * unit
     flip = np.linalg.det(turn) < 0
     return [_Piece(v @ turn.T, f[:, ::-1] if flip else f, color) for v, f, color in pieces]
 
 
-def _unit(kind: str, data: bytes) -> float:
-    found = re.search(rb'<unit[^>]*\bmeter="([^"]+)"', data) if kind == ".dae" else None
-    return float(found.group(1)) if found else 1.0
+def _unit(kind: str, data: bytes, path: Path) -> float:
+    found = re.search(rb'<unit[^>]*\bmeter="([^"]*)"', data) if kind == ".dae" else None
+    try:
+        unit = float(found.group(1)) if found else 1.0
+    except ValueError:
+        unit = nan
+    if not 0.0 < unit < inf:
+        raise AssetError(f"{path}: <unit meter=…> is not the number of metres of its unit, such as 0.001")
+    return unit
 
 
 def _upright(kind: str, data: bytes) -> Array:

@@ -4,7 +4,6 @@ The names of textures and materials follow from the spec alone.
 """
 
 import hashlib
-import io
 import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
@@ -14,9 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anysim import registry
+from anysim.assets.images import opened_image
 from anysim.assets.uri import locate
 from anysim.conventions import Array
-from anysim.errors import AssetError, Issues
+from anysim.errors import Issues
 from anysim.model.appearance import WHITE, Material, Rgb, Texture, nominal_rgb, rgb
 from anysim.model.world import Light, Scenery
 from anysim.randomization.distributions import nominal
@@ -129,16 +129,12 @@ def texture(spec: TextureSpec, base: Path | None) -> Texture:
 
 def _read(uri: str, base: Path | None) -> Array:
     """The pixels (S, S, 3) uint8 of an image file, stretched to a square; one with transparency is laid on white."""
-    from PIL import Image, UnidentifiedImageError
+    from PIL import Image
 
-    path = locate(uri, base=base).path
-    try:
-        with Image.open(io.BytesIO(path.read_bytes())) as image:
-            side = min(max(image.size), MAX_IMAGE_SIDE)
-            shown = Image.new("RGBA", (side, side), (255, 255, 255, 255))
-            shown.alpha_composite(image.convert("RGBA").resize((side, side)))
-    except (UnidentifiedImageError, OSError, Image.DecompressionBombError) as error:
-        raise AssetError(f"image '{uri}' cannot be read: {error}") from error
+    with opened_image(locate(uri, base=base).path) as image:
+        side = min(max(image.size), MAX_IMAGE_SIDE)
+        shown = Image.new("RGBA", (side, side), (255, 255, 255, 255))
+        shown.alpha_composite(image.convert("RGBA").resize((side, side)))
     return np.array(shown.convert("RGB"), dtype=np.uint8)
 
 
