@@ -44,11 +44,13 @@ YAML_DEPTH = Limit(100, "levels of mappings and lists", "a YAML file", "flatten 
 YAML_FILES = Limit(100, "files", "`extends` of one run", "extend fewer files")
 JSON_BYTES = Limit(16 * MIB, "bytes", "a JSON file", "check that it is what a recorder wrote")
 MODEL_BYTES = Limit(16 * MIB, "bytes of XML", "a model with all that it includes", "split the model")
-MODEL_ELEMENTS = Limit(50_000, "elements", "a model with all that it includes and repeats", "split the model")
-MODEL_DEPTH = Limit(200, "levels of elements", "a file of a model", "flatten the file")
+MODEL_ELEMENTS = Limit(20_000, "elements", "a model with all that it includes and repeats", "split the model")
+MODEL_DEPTH = Limit(256, "levels of elements", "a file of a model", "flatten the file")
 MODEL_INCLUDES = Limit(200, "inclusions", "a model", "include fewer files")
 MODEL_INCLUDE_DEPTH = Limit(20, "levels of inclusion", "a model", "include files more directly")
 MODEL_SIZE = Limit(1_000, "entries", "a size that an MJCF file asks for", "ask for less")
+MODEL_COMPOSITE = Limit(200, "parts", "a <composite> of an MJCF file", "use fewer parts")
+MODEL_OCTREE = Limit(8, "levels", "an octree of an MJCF mesh", "use fewer levels")
 MESH_BYTES = Limit(128 * MIB, "bytes", "a mesh file", "decimate the mesh")
 MESH_FACES = Limit(600_000, "triangles", "a mesh file", "decimate the mesh")
 MESH_NODES = Limit(20_000, "nodes", "the scene of a mesh file", "join its parts")
@@ -62,7 +64,19 @@ POLICY_BYTES = Limit(512 * MIB, "bytes", "a policy's model file", "use a smaller
 _TABLE: Sequence[tuple[str, Sequence[Limit]]] = (
     ("YAML", (YAML_BYTES, YAML_VALUES, YAML_DEPTH, YAML_ALIASED, YAML_FILES)),
     ("JSON: manifests, runs, proposals", (JSON_BYTES,)),
-    ("URDF and MJCF", (MODEL_BYTES, MODEL_ELEMENTS, MODEL_DEPTH, MODEL_INCLUDES, MODEL_INCLUDE_DEPTH, MODEL_SIZE)),
+    (
+        "URDF and MJCF",
+        (
+            MODEL_BYTES,
+            MODEL_ELEMENTS,
+            MODEL_DEPTH,
+            MODEL_INCLUDES,
+            MODEL_INCLUDE_DEPTH,
+            MODEL_SIZE,
+            MODEL_COMPOSITE,
+            MODEL_OCTREE,
+        ),
+    ),
     ("meshes: STL, OBJ, DAE, GLB, PLY", (MESH_BYTES, MESH_FACES, MESH_NODES, ASSET_BYTES)),
     ("images", (IMAGE_BYTES, IMAGE_PIXELS)),
     ("arrays and heightfields", (ARRAY_BYTES, GROUND_CELLS)),

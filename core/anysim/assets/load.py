@@ -11,11 +11,13 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 from anysim import registry
+from anysim.assets.mesh_budget import bounded
 from anysim.assets.model import ImportedModel
 from anysim.assets.procedural import from_uri
 from anysim.assets.urdf import import_urdf
 from anysim.assets.uri import locate
 from anysim.errors import AssetError
+from anysim_schemas.limits import MODEL_BYTES
 from anysim_schemas.object_source import PROCEDURAL
 
 _FORMATS: dict[str, Literal["urdf", "mjcf"]] = {".urdf": "urdf", ".xml": "mjcf", ".mjcf": "mjcf"}
@@ -73,7 +75,7 @@ def model_file(uri: str, *, base: Path | None = None) -> ModelFile:
         raise AssetError(
             f"asset '{uri}': '{file.path.suffix}' is no format of robots and assets ({', '.join(_FORMATS)})"
         )
-    if kind == "mjcf" and file.path.read_bytes()[:4096].lstrip().find(b"<robot") >= 0:
+    if kind == "mjcf" and bounded(file.path, MODEL_BYTES)[:4096].find(b"<robot") >= 0:
         kind = "urdf"  # a URDF that is called .xml
     if body and kind == "urdf":
         raise AssetError(f"asset '{uri}': a URDF is one tree; '#' chooses among the bodies of an MJCF file's world")

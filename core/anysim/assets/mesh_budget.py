@@ -32,6 +32,12 @@ def check(path: Path, limit: Limit, found: int) -> None:
         raise AssetError(f"{path}: {limit.sentence(found)}")
 
 
+def plain_encoding(data: bytes) -> bool:
+    """Whether XML is in an encoding in which every parser finds the same elements and entities."""
+    found = _XML_ENCODING.match(data.removeprefix(b"\xef\xbb\xbf"))
+    return b"\0" not in data[:256] and (found is None or found[1].lower() in _ENCODINGS)
+
+
 def mesh_bytes(path: Path) -> bytes:
     """The content of a mesh file whose triangles and nodes are within their limits, as far as its words say.
 
@@ -83,8 +89,7 @@ def _glb(data: bytes) -> tuple[int, int]:
 
 
 def _dae(data: bytes) -> tuple[int, int]:
-    found = _XML_ENCODING.match(data)
-    if b"\0" in data[:256] or (found is not None and found[1].lower() not in _ENCODINGS):
+    if not plain_encoding(data):
         raise ValueError("its encoding is not UTF-8, in which XML entities could hide")
     if b"<!ENTITY" in data:
         raise ValueError("declares XML entities, which are not read")

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from anysim.assets.xml import xml_root
 from anysim.conventions import Array
 from anysim.errors import AssetError
 from anysim.math import pose as P
@@ -100,26 +101,7 @@ class UrdfFile:
     # ------------------------------------------------------------------ the file
 
     def _tree(self) -> Any:
-        from lxml import etree
-
-        try:
-            data = self.path.read_bytes().rstrip(b"\0 \t\r\n")
-        except OSError as error:
-            raise AssetError(f"{self.path}: cannot be read: {error}") from error
-        parser = etree.XMLParser(
-            resolve_entities=False,
-            load_dtd=False,
-            no_network=True,
-            huge_tree=False,
-            remove_comments=True,
-            remove_pis=True,
-        )
-        try:
-            root = etree.fromstring(data, parser)
-        except etree.XMLSyntaxError as error:
-            raise AssetError(f"{self.path}: not well-formed XML: {error.msg}") from error
-        if root.getroottree().docinfo.internalDTD is not None:
-            raise AssetError(f"{self.path}: has a document type declaration (entities), which a URDF does not need")
+        root, _ = xml_root(self.path)
         if root.tag != "robot":
             raise AssetError(f"{self.path}: a URDF has the root element <robot>, this one has <{root.tag}>")
         return root

@@ -273,7 +273,7 @@ def test_meshes_and_height_fields(load, tmp_path, make: Callable[..., SimEngine]
             "exactly one body in its world; this one has stand, second",
         ),
         (("<geom", "<geon"), "MuJoCo cannot read it: .*geon"),
-        (("</mujoco>", ""), "cannot be read as XML"),
+        (("</mujoco>", ""), "not well-formed XML"),
         (
             ('<compiler angle="degree"/>', '<include file="../secret.xml"/>'),
             "<include> of model.xml, line .* refers to '../secret.xml'",

@@ -7,9 +7,11 @@ from typing import Any
 
 import mujoco
 
+from anysim.assets.mesh_budget import bounded
 from anysim.assets.model import ImportNote
-from anysim.assets.uri import resolve_reference
 from anysim.errors import AssetError, listing, suggest
+from anysim_mujoco.mjcf.budget import MjcfBudget
+from anysim_schemas.limits import MODEL_BYTES
 
 
 def compiled(path: Path, root: Path, body: str = "", notes: list[ImportNote] | None = None) -> Any:
@@ -23,11 +25,12 @@ def compiled(path: Path, root: Path, body: str = "", notes: list[ImportNote] | N
         AssetError: a missing file, a reference that leaves `root`, no such body, or what MuJoCo says against the file.
     """
     path, root = path.resolve(), root.resolve()
-    included: dict[str, bytes] = {}
-    _check_includes(path, path, root, (), included)
+    budget = MjcfBudget(path, root)
     try:
-        spec = _parsed(path, included)
-        _check_assets(spec, path, root)
+        own = budget.check()
+        spec = _parsed(path, budget.included)
+        budget.check_assets(spec, path, own)
+        _without_memory(spec)
         for texture in list(spec.textures):
             spec.delete(texture)
         for skin in list(spec.skins):
@@ -72,33 +75,12 @@ def _parsed(path: Path, included: Mapping[str, bytes]) -> Any:
     """MuJoCo tells formats by the ending and knows no .mjcf: a file that is not called .xml is read as a text."""
     if path.suffix.lower() == ".xml":
         return mujoco.MjSpec.from_file(str(path))
-    spec = mujoco.MjSpec.from_string(path.read_text(encoding="utf-8"), include=dict(included))
+    spec = mujoco.MjSpec.from_string(bounded(path, MODEL_BYTES).decode(), include=dict(included))
     spec.modelfiledir = str(path.parent)
     return spec
 
 
-def _check_includes(path: Path, main: Path, root: Path, above: tuple[Path, ...], included: dict[str, bytes]) -> None:
-    """Follow <include> elements, which MuJoCo resolves against the folder of the main file; keeps what they hold."""
-    import lxml.etree as etree
-
-    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
-    try:
-        tree = etree.parse(str(path), parser)
-    except (OSError, etree.XMLSyntaxError) as error:
-        raise AssetError(f"{path}: cannot be read as XML: {error}") from error
-    for element in tree.iter("include"):
-        asked_by = f"<include> of {path.name}, line {element.sourceline},"
-        found = resolve_reference(element.get("file") or "", file=main, root=root, asked_by=asked_by)
-        if found in (path, *above):
-            raise AssetError(f"{asked_by} includes itself through '{found.name}'")
-        included[element.get("file") or ""] = found.read_bytes()
-        _check_includes(found, main, root, (path, *above), included)
-
-
-def _check_assets(spec: Any, path: Path, root: Path) -> None:
-    for kind, elements in (("mesh", spec.meshes), ("hfield", spec.hfields)):
-        for element in elements:
-            if element.file:
-                reference = Path(element.file).name if spec.strippath else element.file
-                asked_by = f"{kind} '{element.name or element.file}' of {path.name}"
-                resolve_reference(str(Path(spec.meshdir) / reference), file=path, root=root, asked_by=asked_by)
+def _without_memory(spec: Any) -> None:
+    """Take out what only a simulation needs: memory for it, and simulated lengths of muscles."""
+    spec.memory = spec.njmax = spec.nconmax = spec.nstack = -1
+    spec.compiler.LRopt.mode = mujoco.mjtLRMode.mjLRMODE_NONE
