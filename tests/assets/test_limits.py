@@ -15,16 +15,21 @@ import pytest
 from anysim.assets import mesh_budget, meshes
 from anysim.assets.ground_files import read_heights
 from anysim.assets.images import opened_image
+from anysim.assets.urdf import import_urdf
 from anysim.errors import AssetError
 from anysim_schemas.limits import (
     ARRAY_BYTES,
+    ASSET_BYTES,
     GROUND_CELLS,
     IMAGE_BYTES,
     IMAGE_PIXELS,
     MESH_BYTES,
     MESH_FACES,
     MESH_NODES,
+    MODEL_DEPTH,
+    MODEL_ELEMENTS,
     Limit,
+    table,
 )
 
 
@@ -227,3 +232,42 @@ def test_a_geometry_that_is_there_a_thousand_times_counts_so_often(
     monkeypatch.setattr(mesh_budget, "MESH_FACES", MESH_FACES._replace(value=100))
     with pytest.raises(AssetError, match="has 108 triangles"):
         meshes.collision_mesh(tmp_path / "a.glb")
+
+
+def test_a_model_has_a_budget_for_all_its_meshes(tmp_path: Path) -> None:
+    mesh = "<visual><geometry><mesh filename='a.stl' scale='{0} {0} {0}'/></geometry></visual>"
+    links = "".join(f"<link name='l{i}'>{mesh.format(1 + i)}</link>" for i in range(5))
+    joints = "".join(
+        f"<joint name='j{i}' type='fixed'><parent link='l0'/><child link='l{i}'/></joint>" for i in range(1, 5)
+    )
+    (tmp_path / "a.urdf").write_text(f"<robot name='r'>{links}{joints}</robot>")
+    with (tmp_path / "a.stl").open("wb") as file:
+        file.truncate(MESH_BYTES.value + 1)
+    with pytest.raises(AssetError, match=ASSET_BYTES.sentence(4 * (MESH_BYTES.value + 1))):
+        import_urdf(tmp_path / "a.urdf", root=tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("<robot name='r'>" + "<link name='a'/>" * MODEL_ELEMENTS.value + "</robot>", MODEL_ELEMENTS.remedy),
+        ("<robot name='r'>" + "<a>" * 300 + "</a>" * 300 + "</robot>", MODEL_DEPTH.sentence()),
+        ("<?xml version='1.0' encoding='UTF-7'?><robot name='r'/>", "its encoding is not UTF-8"),
+    ],
+    ids=["elements", "depth", "encoding"],
+)
+def test_a_urdf_has_a_budget(tmp_path: Path, text: str, words: str) -> None:
+    (tmp_path / "a.urdf").write_text(text)
+    with pytest.raises(AssetError, match=words):
+        import_urdf(tmp_path / "a.urdf", root=tmp_path)
+
+
+def test_the_page_of_limits_is_the_code() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "limits.md").read_text("utf-8")
+    assert table() in page
+
+
+def test_the_largest_mesh_of_the_catalogue_is_far_below() -> None:
+    """The largest that any installed description has: 351,394 triangles, 29 MB."""
+    assert MESH_FACES.value > 1.5 * 351_394
+    assert MESH_BYTES.value > 4 * 28_766_640

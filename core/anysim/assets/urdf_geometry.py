@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 
 from anysim.assets import urdf_xml
+from anysim.assets.mesh_budget import check
 from anysim.assets.meshes import collision_mesh, visual_parts
 from anysim.assets.model import ImportNote
 from anysim.assets.urdf_xml import LinkElement, UrdfFile
@@ -15,6 +16,7 @@ from anysim.errors import AssetError
 from anysim.math import pose as P
 from anysim.model.hash import split
 from anysim.model.world import Box, Cylinder, Geom, Mesh, MeshShape, Quat, Shape, Sphere, Vec3
+from anysim_schemas.limits import ASSET_BYTES
 
 _GREY = (0.7, 0.7, 0.7, 1.0)
 
@@ -30,6 +32,7 @@ class GeometryReader:
         self.geoms: list[Geom] = []
         self.geom_links: list[str] = []
         self.meshes: dict[str, Mesh] = {}
+        self._read: dict[tuple[Path, Vec3], int] = {}
 
     def read(self, link: LinkElement, body: int, pose: Array) -> None:
         """Add the geometry of a link whose frame has this pose (7,) in the body."""
@@ -89,7 +92,10 @@ class GeometryReader:
 
     def _path(self, link: str, mesh: urdf_xml.Shape) -> Path:
         who = self._file.where("link", link)
-        return resolve_reference(mesh.filename, file=self._file.path, root=self._root, asked_by=who)
+        path = resolve_reference(mesh.filename, file=self._file.path, root=self._root, asked_by=who)
+        self._read[path, self._mesh_scale(mesh)] = path.stat().st_size
+        check(self._file.path, ASSET_BYTES, sum(self._read.values()))
+        return path
 
     def _mesh_scale(self, mesh: urdf_xml.Shape) -> Vec3:
         return (mesh.size[0] * self._scale, mesh.size[1] * self._scale, mesh.size[2] * self._scale)
