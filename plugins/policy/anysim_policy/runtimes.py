@@ -13,6 +13,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import PluginError, TaskError
+from anysim_policy.trust import check_onnx, check_torch
 
 
 class Runtime(Protocol):
@@ -28,7 +29,7 @@ def load_model(path: Path, size: int, outputs: int) -> Runtime:
 
     Raises:
         PluginError: the package that runs it is not installed.
-        TaskError: it is damaged, of an unknown kind, or has other sizes.
+        TaskError: it is damaged, of an unknown kind, not trusted, or has other sizes.
     """
     kinds = {".onnx": _onnx, ".pt": _torch, ".jit": _torch}
     if path.suffix not in kinds:
@@ -50,6 +51,7 @@ def load_model(path: Path, size: int, outputs: int) -> Runtime:
 
 
 def _onnx(path: Path, size: int) -> Runtime:
+    check_onnx(path)
     try:
         import onnxruntime
     except ImportError as error:
@@ -84,6 +86,7 @@ def _onnx(path: Path, size: int) -> Runtime:
 
 
 def _torch(path: Path, size: int) -> Runtime:
+    check_torch(path)
     try:
         import torch  # pyright: ignore[reportMissingImports]
     except ImportError as error:

@@ -14,6 +14,7 @@ from onnx import TensorProto, helper, numpy_helper
 from anysim.conventions import Array
 from anysim.errors import AnysimError, PluginError, TaskError
 from anysim.task.env import TaskEnv
+from anysim_policy.trust import TRUSTED
 from tests.runtime import light
 
 TERMS: list[Any] = [
@@ -199,14 +200,16 @@ def test_without_the_runtime_the_remedy_is_said(tmp_path: Path, monkeypatch: pyt
 
 
 @pytest.mark.skipif(importlib.util.find_spec("torch") is not None, reason="torch is installed")
-def test_without_torch_the_remedy_is_said(tmp_path: Path) -> None:
+def test_without_torch_the_remedy_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(TRUSTED, str(tmp_path))
     (tmp_path / "net.pt").write_bytes(b"")
     with pytest.raises(PluginError, match=r"pip install 'anysim-policy\[torch\]'"):
         made(written(tmp_path, model="net.pt"), engine="null")
 
 
 @pytest.mark.skipif(importlib.util.find_spec("torch") is None, reason="torch is not installed")
-def test_torchscript_gives_what_numpy_gives(tmp_path: Path) -> None:
+def test_torchscript_gives_what_numpy_gives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(TRUSTED, str(tmp_path))
     import torch  # pyright: ignore[reportMissingImports]
 
     a1, b1, a2, b2 = (torch.from_numpy(w) for w in weights())
