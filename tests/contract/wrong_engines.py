@@ -149,8 +149,8 @@ class ParametersForgottenAtReset(Right):
 
     def _reset(self, ids):
         super()._reset(ids)
-        for name, values in self._values.items():
-            values[ids] = self._defaults[name]
+        for name, values in self._table.values.items():
+            values[ids] = self._table.default(name)
 
 
 class SwallowsMisuse(Right):
@@ -171,7 +171,7 @@ class HalfDone(Right):
     caught_by = ("test_parameters.py::test_bounds_are_kept",)
 
     def set_parameters(self, name, values, env_ids=None, indices=None):
-        self._values[name][0, 0] = np.asarray(values, dtype=float).reshape(-1)[0]
+        self._table.values[name][0, 0] = np.asarray(values, dtype=float).reshape(-1)[0]
         super().set_parameters(name, values, env_ids, indices)
 
 
