@@ -15,6 +15,9 @@ from anysim_schemas.shapes import Shape, Shapes, expectation, field_at, inside, 
 from anysim_schemas.values import KINDS, TAG_PREFIX, Drawn
 
 UNKNOWN_KEY = "extra_forbidden"
+MAX_FAULTS = 1_000
+"""How many faults are put into words; for each, the nearest name is looked for."""
+
 LIMITS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
 STRUCTURE = ("missing", UNKNOWN_KEY)
 MISMATCHES = TYPE_ERRORS | {"literal_error", "enum"}
@@ -54,8 +57,11 @@ def locate(
         prefix: dotted path of the root, for slots inside a spec.
         more_keys: keys that exist at the root besides the model's.
     """
-    found = _decide_unions([_follow(details, model, root) for details in error.errors(include_url=False)])
+    details = error.errors(include_url=False)
+    found = _decide_unions([_follow(one, model, root) for one in details[:MAX_FAULTS]])
     faults: list[Fault] = []
+    if len(details) > MAX_FAULTS:
+        faults.append(Fault(root.place, prefix, f"there are {len(details):,} faults; {MAX_FAULTS:,} of them follow"))
     for located in _join_lengths(found):
         short = _is_short_list(located)
         path = ".".join(map(str, located.path[:-1] if short else located.path))

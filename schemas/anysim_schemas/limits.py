@@ -38,7 +38,7 @@ class Limit(NamedTuple):
 
 _SPLIT = "split it, or generate what repeats with `count`"
 YAML_BYTES = Limit(2 * MIB, "bytes", "a YAML file", _SPLIT)
-YAML_VALUES = Limit(200_000, "values", "a YAML file", _SPLIT)
+YAML_VALUES = Limit(100_000, "values", "a YAML file", _SPLIT)
 YAML_ALIASED = Limit(100_000, "values behind aliases", "a YAML file", "write fewer aliases")
 YAML_DEPTH = Limit(100, "levels of mappings and lists", "a YAML file", "flatten it")
 YAML_FILES = Limit(100, "files", "`extends` of one run", "extend fewer files")

@@ -3,6 +3,7 @@
 import io
 import json
 import struct
+import time
 import tracemalloc
 import zipfile
 import zlib
@@ -38,7 +39,7 @@ def little_memory() -> Iterator[None]:
     """A refusal costs next to nothing (a few files here are large themselves)."""
     tracemalloc.start()
     yield
-    _, peak = tracemalloc.get_traced_memory()
+    _, peak = tracemalloc.get_traced_memory()  # zeros where a test has stopped it
     tracemalloc.stop()
     assert peak < 100 << 20
 
@@ -271,3 +272,27 @@ def test_the_largest_mesh_of_the_catalogue_is_far_below() -> None:
     """The largest that any installed description has: 351,394 triangles, 29 MB."""
     assert MESH_FACES.value > 1.5 * 351_394
     assert MESH_BYTES.value > 4 * 28_766_640
+
+
+@pytest.mark.parametrize(
+    ("name", "data"),
+    [
+        ("a.dae", b"<triangles " * 500_000),
+        ("a.dae", b"<unit " * 500_000),
+        ("a.dae", b"<up_axis>" * 500_000),
+        ("a.obj", b"f 1\n" * 2_000_000),
+        ("a.obj", b" v" * 2_000_000),
+        ("a.obj", b"mtllib\n\n" * 500_000),
+        ("a.ply", b"element " * 500_000),
+        ("a.stl", b"facet normal " * 500_000),
+        ("a.glb", b"[" * 4_000_000),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_no_search_is_quadratic(tmp_path: Path, name: str, data: bytes) -> None:
+    tracemalloc.stop()  # it takes most of the time
+    (tmp_path / name).write_bytes(data)
+    start = time.perf_counter()
+    with pytest.raises(AssetError):
+        meshes.visual_parts(tmp_path / name)
+    assert time.perf_counter() - start < 5.0

@@ -1,11 +1,13 @@
 """Files that nobody should read: devices, pipes, foreign and endless ones. None of them is read, or hangs."""
 
 import os
+import time
 from pathlib import Path
 
 import pytest
 
 from anysim_schemas.errors import SpecError
+from anysim_schemas.faults import MAX_FAULTS
 from anysim_schemas.files import RefusedFileError, project_root, read_plain
 from anysim_schemas.limits import YAML_BYTES, YAML_FILES, YAML_VALUES, Limit
 from anysim_schemas.load import load_run
@@ -93,3 +95,12 @@ def test_a_name_that_is_none(inside: Path, name: str) -> None:
 def test_what_grows_while_it_is_read_is_noticed() -> None:
     with pytest.raises(RefusedFileError, match="has more bytes than its size says; copy it first"):
         read_plain(Path("/proc/self/status"), Limit(1 << 20, "bytes", "a thing", "shrink it"))  # says that it has 0
+
+
+def test_of_many_faults_some_are_put_into_words(inside: Path) -> None:
+    (inside / "keys.yaml").write_text("world:\n" + "".join(f"  k{i}: 0\n" for i in range(20_000)))
+    start = time.perf_counter()
+    lines = refused("keys.yaml").splitlines()
+    assert time.perf_counter() - start < 10.0
+    assert lines[0] == f"keys.yaml:1:1: there are 20,000 faults; {MAX_FAULTS:,} of them follow"
+    assert len(lines) == 1 + MAX_FAULTS

@@ -2,13 +2,18 @@
 
 import json
 import re
+from itertools import islice
 from pathlib import Path
 
 from anysim.errors import AssetError
 from anysim_schemas.files import RefusedFileError, read_plain
-from anysim_schemas.limits import MESH_BYTES, MESH_FACES, MESH_NODES, Limit
+from anysim_schemas.limits import JSON_BYTES, MESH_BYTES, MESH_FACES, MESH_NODES, Limit
 
 _ENCODINGS = frozenset({b"utf-8", b"us-ascii", b"ascii", b"iso-8859-1", b"latin1", b"windows-1252"})
+_DAE_FACES = re.compile(
+    # with a bound on what lies between, without which the time of the search is quadratic
+    rb"""<(?:triangles|polylist|polygons|trifans|tristrips)\b[^>]{0,300}?count\s*=\s*["'](\d+)"""
+)
 _XML_ENCODING = re.compile(rb"""\s*<\?xml[^>]*?encoding\s*=\s*["']([^"']*)""")
 
 
@@ -60,13 +65,21 @@ def _stl(data: bytes) -> tuple[int, int]:
     claimed = int.from_bytes(data[80:84], "little")
     if 84 + 50 * claimed == len(data):
         return claimed, 0
-    return data.lower().count(b"endfacet"), data.lower().count(b"endsolid")
+    words = data.lower()
+    return words.count(b"endfacet"), words.count(b"endsolid")
 
 
 def _obj(data: bytes) -> tuple[int, int]:
-    corners = sum(max(0, len(line.split()) - 3) for line in re.findall(rb"^[ \t]*f[ \t][^\r\n]*", data, re.MULTILINE))
-    points = len(re.findall(rb"^[ \t]*v[ \t]", data, re.MULTILINE)) // 3
-    return max(corners, points), len(re.findall(rb"^[ \t]*(?:usemtl|g|o)[ \t]", data, re.MULTILINE))
+    corners = 0
+    for line in re.finditer(rb"^[ \t]*f[ \t][^\r\n]*", data, re.MULTILINE):
+        corners += max(1, len(line[0].split()) - 3)
+        if MESH_FACES.exceeded(corners):
+            break
+    points, groups = (
+        sum(1 for _ in islice(re.finditer(pattern, data, re.MULTILINE), 3 * MESH_FACES.value + 3))
+        for pattern in (rb"^[ \t]*v[ \t]", rb"^[ \t]*(?:usemtl|g|o)[ \t]")
+    )
+    return max(corners, points // 3), groups
 
 
 def _ply(data: bytes) -> tuple[int, int]:
@@ -83,6 +96,8 @@ def _msh(data: bytes) -> tuple[int, int]:
 
 def _glb(data: bytes) -> tuple[int, int]:
     length = int.from_bytes(data[12:16], "little")
+    if JSON_BYTES.exceeded(length):
+        raise ValueError(f"its JSON {JSON_BYTES.sentence(length)}")
     tree = json.loads(data[20 : 20 + length])
     sizes = [int(accessor.get("count", 0)) for accessor in tree.get("accessors", ())]
     return max(sizes, default=0) // 3, len(tree.get("nodes", ())) + len(sizes)
@@ -93,8 +108,8 @@ def _dae(data: bytes) -> tuple[int, int]:
         raise ValueError("its encoding is not UTF-8, in which XML entities could hide")
     if b"<!ENTITY" in data:
         raise ValueError("declares XML entities, which are not read")
-    listed = re.findall(rb"""<(?:triangles|polylist|polygons|trifans|tristrips)\b[^>]*?count\s*=\s*["'](\d+)""", data)
-    return sum(map(int, listed)), _instances(data) if b"instance_node" in data else data.count(b"<node")
+    faces = sum(int(one[1][:18]) for one in _DAE_FACES.finditer(data))
+    return faces, _instances(data) if b"instance_node" in data else data.count(b"<node")
 
 
 def _instances(data: bytes) -> int:

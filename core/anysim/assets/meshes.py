@@ -6,6 +6,7 @@ parameters, never of the result, so that it is equal on all machines.
 
 import io
 import re
+from itertools import islice
 from math import inf, nan
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,6 +25,7 @@ FORMATS = (".stl", ".obj", ".dae", ".glb", ".ply")
 HULL_VERTICES = 64  # what PhysX takes in a convex mesh with margin; enough for grasping at millimetres
 VISUAL_FACES = 2500  # of one visual: a software renderer draws a robot of ten in milliseconds
 VISUAL_COLORS = 6
+MATERIAL_FILES = 100  # of one .obj; what it names beyond is not read
 _VERSION = "anysim-mesh-3"  # change with anything that changes the result
 _ONE: Vec3 = (1.0, 1.0, 1.0)
 Color = tuple[float, float, float, float]
@@ -147,8 +149,8 @@ def _material_files(path: Path, data: bytes) -> list[Path]:
     """The .mtl files of an .obj that lie in its own folder."""
     if path.suffix.lower() != ".obj":
         return []
-    names = [m.decode(errors="replace").strip() for m in re.findall(rb"^mtllib\s+(.+)$", data, re.MULTILINE)]
-    files = [path.parent / Path(name).name for name in names]
+    found = islice(re.finditer(rb"^mtllib[ \t]+(.{1,300})$", data, re.MULTILINE), MATERIAL_FILES)
+    files = [path.parent / Path(name[1].decode(errors="replace").strip()).name for name in found]
     return [file for file in dict.fromkeys(files) if file.is_file()]
 
 
@@ -200,7 +202,7 @@ def _load(path: Path, scale: Vec3, upright: bool) -> list[_Piece]:
 
 
 def _unit(kind: str, data: bytes, path: Path) -> float:
-    found = re.search(rb'<unit[^>]*\bmeter="([^"]*)"', data) if kind == ".dae" else None
+    found = re.search(rb'<unit\b[^>]{0,300}\bmeter="([^"]{0,300})"', data) if kind == ".dae" else None
     try:
         unit = float(found.group(1)) if found else 1.0
     except ValueError:
