@@ -4,6 +4,7 @@ import errno
 import os
 import stat
 from pathlib import Path
+from typing import BinaryIO
 
 from anysim_schemas.limits import Limit
 
@@ -17,20 +18,30 @@ class RefusedFileError(OSError):
         super().__init__(errno.EPERM, reason, str(path))
 
 
-def read_plain(path: Path, limit: Limit) -> bytes:
-    """The content of a plain file.
+def open_plain(path: Path) -> BinaryIO:
+    """A plain file, open for reading.
 
     Raises:
-        RefusedFileError: it is a device, a pipe, a socket or a directory, or has more bytes than the limit.
-        OSError: it cannot be opened or read.
+        RefusedFileError: it is a device, a pipe, a socket or a directory.
+        OSError: it cannot be opened.
     """
     try:
         # without blocking: opening a pipe would wait for a writer
         descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
     except ValueError as error:  # a NUL in its name
         raise RefusedFileError(path, f"cannot be the name of a file: {error}") from None
-    with os.fdopen(_checked(descriptor, path), "rb") as file:
-        size = os.fstat(descriptor).st_size
+    return os.fdopen(_checked(descriptor, path), "rb")
+
+
+def read_plain(path: Path, limit: Limit) -> bytes:
+    """The content of a plain file.
+
+    Raises:
+        RefusedFileError: see `open_plain`; it has more bytes than the limit.
+        OSError: it cannot be opened or read.
+    """
+    with open_plain(path) as file:
+        size = os.fstat(file.fileno()).st_size
         if limit.exceeded(size):
             raise RefusedFileError(path, limit.sentence(size))
         data = file.read(size + 1)  # not the limit: so much memory would be set aside

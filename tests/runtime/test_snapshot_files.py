@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import subprocess
 import sys
 import zipfile
@@ -144,6 +145,22 @@ def test_any_changed_byte_is_noticed(get, tmp_path) -> None:
             EnvSnapshot.load(wrong)
     with pytest.raises(SnapshotError, match="cannot be read: No such file"):
         EnvSnapshot.load(tmp_path / "none.snapshot")
+
+
+def test_nothing_hides_beside_the_members(get, tmp_path) -> None:
+    good = running(get("null", 3)).snapshot().save(tmp_path / "a.snapshot").read_bytes()
+    wrong = tmp_path / "wrong.snapshot"
+    commented = good[:-2] + b"\x03\x00abc"
+    for data in (b"#!/bin/sh\n" + good, good + b"more", commented):
+        wrong.write_bytes(data)
+        with pytest.raises(SnapshotError, match="no snapshot, or a damaged"):
+            EnvSnapshot.load(wrong)
+
+
+def test_a_pipe_is_no_snapshot(tmp_path) -> None:
+    os.mkfifo(tmp_path / "a.snapshot")
+    with pytest.raises(SnapshotError, match="is a pipe, not a file"):
+        EnvSnapshot.load(tmp_path / "a.snapshot")
 
 
 def rewritten(path: Path, out: Path, change, *, compression=zipfile.ZIP_STORED, extra: str = "") -> Path:

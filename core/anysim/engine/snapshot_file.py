@@ -1,8 +1,9 @@
 """The file of a snapshot: one zip of .npy arrays and one JSON header, whole or refused.
 
 The header holds everything that is no array, and for each array its member, size and SHA-256; a third kind of member
-holds the SHA-256 of the header. So one hash covers all, and any changed byte is noticed. Members are stored as they
-are, not compressed: a small file cannot unfold into a large one. Equal content gives equal bytes.
+holds the SHA-256 of the header. So one hash covers all content, of which any changed byte is noticed, and there is
+nothing but members in the file; what the zip says about them beside (dates, systems) counts for nothing. Members are
+stored as they are, not compressed: a small file cannot unfold into a large one. Equal content gives equal bytes.
 
 A file is written aside and renamed, so that under its name it is complete or it is not there.
 
@@ -29,6 +30,7 @@ import numpy as np
 from anysim import __version__
 from anysim.conventions import Array
 from anysim.errors import SnapshotError
+from anysim_schemas.files import open_plain
 
 FORMAT, VERSION = "anysim-snapshot", 1
 HEADER, SEAL = "header.json", "header.sha256"
@@ -125,7 +127,7 @@ def read(path: str | Path) -> Content:
     """
     path = Path(path)
     try:
-        with path.open("rb") as file:
+        with open_plain(path) as file:
             size = file.seek(0, os.SEEK_END)
             with zipfile.ZipFile(file) as archive:
                 return _content(path, archive, size)
@@ -191,6 +193,10 @@ def _content(path: Path, archive: zipfile.ZipFile, size: int) -> Content:
     known = {HEADER, SEAL, *(entry["member"] for entry in table.values())}
     if infos.keys() != known:
         raise ValueError(f"it should hold {len(known)} members, and holds {len(infos)}")
+    # of a member: a local head of 30 bytes, one of 46 in the directory, its name in both; and the end of 22
+    plain = size < 1 << 31 and len(infos) < 1 << 16  # larger ones have more to say of themselves
+    if plain and size != 22 + sum(76 + 2 * len(info.filename.encode()) + info.file_size for info in infos.values()):
+        raise ValueError("there is something between, before or behind its members")
     arrays: dict[str, Array] = {}
     for name, entry in table.items():
         content = _member(archive, infos[entry["member"]], entry["bytes"])
