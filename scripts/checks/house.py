@@ -11,7 +11,7 @@ from checks.tree import Fault, Tree
 
 CORE = Path("core/anysim")
 TESTING = CORE / "testing"
-CORE_LINES, CORE_FILES = 26_600, 210  # grows by what keeps the faults of plugins and processes from a run
+CORE_LINES, CORE_FILES = 27_300, 210
 PACKAGE_LINES, PACKAGE_MODULES = 4_000, 26
 BACKEND_LINES = {"mujoco": 2_300, "pybullet": 3_275, "sapien": 3_620}
 """To come down to 2,500 each, by what engines with one scene per env share."""
