@@ -57,8 +57,12 @@ def _extends(uri: str) -> Path:
     return task_path(name)
 
 
-def load(*sources: str | Path | Mapping[str, Any], overrides: Sequence[str] = ()) -> LoadedRun:
+def load(
+    *sources: str | Path | Mapping[str, Any], overrides: Sequence[str] = (), past: list[SpecIssue] | None = None
+) -> LoadedRun:
     """Load files (or installed tasks by name), merged in order, with dotted overrides such as `physics.dt=0.004`.
+
+    Where `past` is given, faults that leave the rest whole are added to it, and what is loaded is the rest.
 
     Raises:
         SpecError: every fault with file, line and column.
@@ -66,7 +70,9 @@ def load(*sources: str | Path | Mapping[str, Any], overrides: Sequence[str] = ()
     resolved = [s if isinstance(s, Mapping) else source_path(s) for s in sources]
     chosen = os.environ.get(ENGINE_VARIABLE)
     beneath = {"engine": chosen} if chosen else None
-    return load_run(resolved, overrides=overrides, resolver=resolve_options, extends=_extends, base_data=beneath)
+    return load_run(
+        resolved, overrides=overrides, resolver=resolve_options, extends=_extends, base_data=beneath, past=past
+    )
 
 
 def compile_world(

@@ -8,18 +8,22 @@ from typing import Any, Generic, TypeVar, cast
 from pydantic import BaseModel, ValidationError
 
 from anysim_schemas.entries import places
-from anysim_schemas.errors import SpecError
+from anysim_schemas.errors import SpecError, SpecIssue
 from anysim_schemas.faults import locate
 from anysim_schemas.merging import override, override_name
 from anysim_schemas.messages import suggest
 from anysim_schemas.nodes import Fault, Node, from_data, in_order
 from anysim_schemas.plugin import OptionsResolver
 from anysim_schemas.run import RunSpec
+from anysim_schemas.salvage import without
 from anysim_schemas.shapes import Shape
 from anysim_schemas.slots import check_slots
 from anysim_schemas.sources import ExtendsResolver, Reader, Source
 
 M = TypeVar("M", bound=BaseModel)
+
+ROUNDS = 3
+"""How often what is wrong is left out: a section under its right name may have faults of its own."""
 
 
 @dataclass(frozen=True)
@@ -76,9 +80,12 @@ def load_run(
     resolver: OptionsResolver | None = None,
     extends: ExtendsResolver | None = None,
     base_data: Mapping[str, Any] | None = None,
+    past: list[SpecIssue] | None = None,
 ) -> LoadedRun:
     """`load` for the root of a run."""
-    return load(RunSpec, sources, overrides=overrides, resolver=resolver, extends=extends, base_data=base_data)
+    return load(
+        RunSpec, sources, overrides=overrides, resolver=resolver, extends=extends, base_data=base_data, past=past
+    )
 
 
 def load(
@@ -89,6 +96,7 @@ def load(
     resolver: OptionsResolver | None = None,
     extends: ExtendsResolver | None = None,
     base_data: Mapping[str, Any] | None = None,
+    past: list[SpecIssue] | None = None,
 ) -> Loaded[M]:
     """Read, merge and validate a spec.
 
@@ -99,6 +107,8 @@ def load(
         resolver: the models of plugins' options; without it the slots of plugins are not checked.
         extends: turns `scheme:name` in `extends:` into the path of a file.
         base_data: data beneath all files, such as an engine chosen by the environment.
+        past: where given, faults that leave the rest of the data whole, such as an unknown key, are added to it in
+            place of being raised, and the spec is that of the rest: what else is wrong can still be looked for.
 
     Raises:
         SpecError: holds everything that is wrong, in the order of the files.
@@ -114,18 +124,43 @@ def load(
         raise SpecError(in_order([*reader.fatal, *faults], order))
     root = override(reader.merged(nodes), overrides, shapes, faults)
     refused = {fault.mark for fault in faults if fault.mark.line}  # what such a value is taken for says nothing new
-    data = root.plain()
-    spec, invalid = _validated(model, root, data)
-    if resolver is not None:
-        invalid += check_slots(model, root, resolver)
+    spec, invalid = _validated(model, root, resolver)
     if spec is None or faults or invalid:
-        raise SpecError(in_order([*faults, *(fault for fault in invalid if fault.mark not in refused)], order))
+        faults += [fault for fault in invalid if fault.mark not in refused]
+        rest = None if past is None else _rest(model, root, resolver, faults)
+        if rest is None or past is None:
+            raise SpecError(in_order(faults, order))
+        past += in_order(faults, order)
+        root, spec = rest
+    data = root.plain()
     provenance = {path: str(mark) or "data" for path, mark in places(root, shapes)}
     return Loaded(spec, provenance, tuple(reader.files), data)
 
 
-def _validated(model: type[M], root: Node, data: Mapping[str, Any]) -> tuple[M | None, list[Fault]]:
+def _validated(model: type[M], root: Node, resolver: OptionsResolver | None) -> tuple[M | None, list[Fault]]:
+    slots = [] if resolver is None else check_slots(model, root, resolver)
     try:
-        return model.model_validate(data), []
+        return model.model_validate(root.plain()), slots
     except ValidationError as error:
-        return None, locate(error, model, root)
+        return None, [*locate(error, model, root), *slots]
+
+
+def _rest(model: type[M], root: Node, resolver: OptionsResolver | None, faults: list[Fault]) -> tuple[Node, M] | None:
+    """The data without what is wrong, and its spec; faults that only then are seen are added to the others.
+
+    None where that is no spec, or where what was left out is missed: the new faults would be of our making.
+    """
+    found, told = faults, list(faults)
+    for _ in range(ROUNDS):
+        rest = without(root, found, (Shape(model),))
+        if rest is None:
+            return None
+        spec, found = _validated(model, rest, resolver)
+        if spec is not None and not found:
+            faults[:] = told
+            return rest, spec
+        if any(f"{old.path}.".startswith(f"{new.path}.") for old in told for new in found):
+            return None
+        told += found
+        root = rest
+    return None

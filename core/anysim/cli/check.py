@@ -88,24 +88,27 @@ def report_on(name: str, engine: str | None, all_engines: bool, overrides: list[
     """Every fault of one file, and what each engine that is asked says to it."""
     from anysim import registry
     from anysim.api import compile_world, dry_run, load
-    from anysim.errors import AnysimError, AssetError, PluginFailure, SpecError
+    from anysim.errors import AnysimError, AssetError, PluginFailure, SpecError, SpecIssue
 
+    past: list[SpecIssue] = []
     try:
-        loaded = load(Path(name) if Path(name).exists() else name, overrides=overrides)
+        loaded = load(Path(name) if Path(name).exists() else name, overrides=overrides, past=past)
         world = compile_world(loaded)
         if loaded.spec.task is not None:
             dry_run(loaded, world)
             _check_film(loaded)
         engines = registry.names("engines") if all_engines else [engine or loaded.spec.engine.name]
+        if any(issue.path.startswith("engine") for issue in past):
+            engines = []  # which one was meant is not known
         answers = tuple(_ask(one, loaded, world, name) for one in engines)
     except (SpecError, AssetError) as error:
-        return Report([str(issue) for issue in error.issues] or [f"{name}: {error}"])
+        return Report([str(issue) for issue in [*past, *error.issues]] or [f"{name}: {error}"])
     except PluginFailure:  # which says nothing of the file
         raise
     except AnysimError as error:
-        return Report([f"{name}: {error}"])
+        return Report([*map(str, past), f"{name}: {error}"])
     refused = [answer.refusal for answer in answers if answer.refusal]
-    return Report(refused if len(refused) == len(answers) else [], answers)
+    return Report([*map(str, past), *(refused if len(refused) == len(answers) else [])], () if past else answers)
 
 
 def _ask(engine: str, loaded: "LoadedRun", world: "World", name: str) -> Answer:
