@@ -1,6 +1,7 @@
 """Pictures of a world: its first episodes, drawn by each engine, side by side."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -9,6 +10,8 @@ import numpy as np
 from anysim.api import load, make, watched
 from anysim.cli.montage import montage
 from anysim.conventions import Array
+from anysim.engine.capability import Capability
+from anysim.engine.factory import engine_class
 from anysim.errors import AnysimError, NameLookupError, listing, suggest
 from anysim_schemas.load import Loaded, LoadedRun
 
@@ -33,6 +36,8 @@ def pictures(
     tell: Callable[[str], object] = lambda words: None,
 ) -> Pictures:
     """Start the episodes of a seed on each engine, let them run for a while without action, and draw them.
+
+    Things cast shadows where the engine has them and the file says nothing of them.
 
     Args:
         source: a task or a world: an installed task by name, a YAML file, or what `load` returned.
@@ -60,10 +65,21 @@ def pictures(
     found = Pictures({}, {})
     for name in engines:
         try:
-            found.images[name] = _drawn(loaded, name, num_envs, seed, chosen, size or (None, None), seconds, tell)
+            found.images[name] = _drawn(
+                _shaded(loaded, name), name, num_envs, seed, chosen, size or (None, None), seconds, tell
+            )
         except AnysimError as error:
             found.refused[name] = str(error)
     return found
+
+
+def _shaded(loaded: LoadedRun, engine: str) -> LoadedRun:
+    """The same with shadows, if the engine has them and the spec leaves them open."""
+    said = loaded.spec.world.scenery.shadows is not None
+    if said or Capability.RENDER_SHADOWS not in engine_class(engine).capabilities:
+        return loaded
+    shaded = load(loaded.data, overrides=["world.scenery.shadows=true"])
+    return replace(shaded, files=loaded.files, provenance=loaded.provenance)
 
 
 def _drawn(

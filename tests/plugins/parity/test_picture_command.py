@@ -49,10 +49,24 @@ def test_each_env_shows_its_own_episode_again(world: Path) -> None:
 
 
 def test_envs_started_one_by_one_are_those_started_together(world: Path) -> None:
-    with anysim_make(load(WATCHED, world), engine="mujoco", num_envs=4) as env:
+    shadows = ["world.scenery.shadows=true"]
+    with anysim_make(load(WATCHED, world), engine="mujoco", num_envs=4, overrides=shadows) as env:
         env.reset(seed=1)
         together = env.engine.render("front")["rgb"]
     assert (pictures(world, ["mujoco"], num_envs=4, seed=1).images["mujoco"] == together).all()
+
+
+def test_there_are_shadows_where_the_engine_has_them_and_the_file_says_nothing(world: Path) -> None:
+    def drawn(engine: str, *overrides: str) -> np.ndarray:
+        found = pictures(world, [engine], num_envs=1, overrides=overrides)
+        if engine in found.refused:
+            pytest.skip(found.refused[engine])
+        return found.images[engine]
+
+    said, without = (drawn("mujoco", f"world.scenery.shadows={word}") for word in ("true", "false"))
+    assert (drawn("mujoco") == said).all()
+    assert (said != without).any()
+    assert drawn("sapien").any(), "an engine without shadows draws as ever"
 
 
 def test_time_passes_before_the_image(world: Path) -> None:

@@ -7,6 +7,8 @@ import numpy as np
 from anysim.api import compile_world, load, make
 from anysim.assets.catalogue import CatalogueEntry
 from anysim.conventions import Array
+from anysim.engine.capability import Capability
+from anysim.engine.factory import engine_class
 from anysim.geometry.bounds import shape_bounds
 from anysim.math import pose as P
 from anysim.model.world import World
@@ -31,6 +33,8 @@ def portrait(entry: CatalogueEntry, engine: str, size: tuple[int, int] = (320, 3
     # bolted down or floating, a robot that does not reach below the ground is shown on it
     data: dict[str, Any] = stage(entry, ground=bool(low[2] > UNDERGROUND) or None)
     data["world"]["cameras"] = {"portrait": _camera(low, high, size)}
+    if Capability.RENDER_SHADOWS in engine_class(engine).capabilities:
+        data["world"]["scenery"] = {"shadows": True} | data["world"].get("scenery", {})
     with make(data, engine=engine, num_envs=1) as env:
         env.reset(seed=0)
         if seconds > 0:
