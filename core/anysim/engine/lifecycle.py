@@ -13,6 +13,7 @@ from anysim.engine.availability import LibraryRequirement
 from anysim.engine.capability import Allowance, Capabilities, Capability, Need, check
 from anysim.engine.control import CommandBuffer
 from anysim.engine.doctor import Finding
+from anysim.engine.lifetime import EngineLifetime
 from anysim.engine.options import EngineOptions
 from anysim.engine.presence import Lifecycle, Presence, write_present
 from anysim.engine.primitives import Primitives
@@ -30,7 +31,7 @@ Indices = Sequence[int] | Array | None
 """Indices of joints, bodies, actuators and the like: None for all, else unique ones."""
 
 
-class EngineLifecycle(Primitives):
+class EngineLifecycle(EngineLifetime, Primitives):
     """The part of `SimEngine` that builds, steps and frees; see `anysim.engine.base.SimEngine`."""
 
     name: ClassVar[str]
@@ -119,7 +120,7 @@ class EngineLifecycle(Primitives):
         """
         with self._lock:
             if self._destroyed:
-                raise EngineError(f"this {self.name} engine was destroyed; make a new one")
+                raise EngineError(f"this {self.name} engine {self._ended}")
             if self._world is not None:
                 raise EngineError(f"this {self.name} engine has a world already; destroy() it or make another engine")
             if num_envs < 1:
@@ -322,7 +323,7 @@ class EngineLifecycle(Primitives):
 
     def _require_world(self) -> None:
         if self._world is None:
-            state = "was destroyed" if self._destroyed else "has no world; call create_world() first"
+            state = self._ended if self._destroyed else "has no world; call create_world() first"
             raise EngineError(f"this {self.name} engine {state}")
 
     def _require(self, capability: Capability) -> None:
