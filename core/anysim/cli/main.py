@@ -9,12 +9,11 @@ import typer
 
 from anysim import __version__
 from anysim.cli import audit, check, doctor, explain, listing, replay, run, schema, snapshot
-from anysim.cli.options import CommandEnded, Commands
+from anysim.cli.options import BROKE, CommandEnded, Commands
 
 EXIT_CODES = """Exit codes: 0 done; 1 it ran, and the answer is no (a replay that differs, a file with faults, too few
 successes); 2 it could not be done as asked (usage, a file, a missing package); 3 something broke: a plugin, an engine
 or anysim itself; 130 interrupted."""
-BROKE = 3
 
 app = typer.Typer(
     name="anysim",

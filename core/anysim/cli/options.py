@@ -32,6 +32,10 @@ UNWRAPPED = "\b\n"
 """What a paragraph of help begins with to keep its lines."""
 
 
+BROKE = 3
+"""The exit code where something broke, that is neither an answer nor a fault of the input."""
+
+
 class CommandEnded(Exception):
     """A command was ended from within, by what is its cause."""
 

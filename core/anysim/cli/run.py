@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from anysim.cli.options import AsJson, Engine, NumEnvs, Overrides, Seed, Task, Verbose
+from anysim.cli.options import BROKE, AsJson, Engine, NumEnvs, Overrides, Seed, Task, Verbose
 
 if TYPE_CHECKING:
     from anysim.record.collector import EpisodeResult
@@ -60,7 +60,10 @@ def run(
                 show(result)
     results.sort(key=lambda r: (r.env, r.episode))
     _report(results, directory, collector.times.steps, collector.times.parts(), json)
-    if sum(r.success for r in results) < min_success * len(results):
+    run_through = [r for r in results if not r.lost]
+    if len(run_through) < len(results):
+        raise typer.Exit(BROKE)
+    if sum(r.success for r in run_through) < min_success * len(run_through):
         raise typer.Exit(1)
 
 
@@ -114,7 +117,8 @@ def _report(
 ) -> None:
     from anysim.cli.output import print_json, print_table
 
-    good, total = sum(r.success for r in results), len(results)
+    lost, reruns = sum(r.lost for r in results), sum(r.reruns for r in results)
+    good, total = sum(r.success for r in results), len(results) - lost
     wall = sum(parts.values())
     if as_json:
         episodes = [
@@ -128,11 +132,14 @@ def _report(
                 "outcome": r.outcome,
                 "path": str(r.path) if r.path else None,
                 "resumed": r.resumed,
+                "reruns": r.reruns,
+                "lost": r.lost,
             }
             for r in results
         ]
         speed = {"steps": steps, "wall_s": wall, "steps_per_s": steps / wall, "where_s": parts}
-        print_json({"out": str(directory), "attempts": total, "successes": good, "episodes": episodes, "speed": speed})
+        counts = {"attempts": total, "successes": good, "reruns": reruns, "lost": lost}
+        print_json({"out": str(directory), **counts, "episodes": episodes, "speed": speed})
         return
     print_table(
         "Episodes",
@@ -157,6 +164,10 @@ def _report(
             [(part, f"{seconds:.2f}", f"{seconds / wall:.1%}") for part, seconds in parts.items()],
         )
         typer.echo(f"{steps:,} control steps in {wall:.1f} s: {steps / wall:,.0f} steps/s")
+    if reruns:
+        typer.echo(f"{reruns} times an episode lost its worker process and was begun anew: no failures of the task")
+    if lost:
+        typer.echo(f"error: {lost} episodes lost every worker process they had, and were given up", err=True)
     kept = sum(r.path is not None for r in results)
     rate = f"{good / total:.1%}" if total else "none"
     typer.echo(f"{good} of {total} attempts succeeded ({rate}); {kept} trajectories in {directory / 'episodes'}")

@@ -12,6 +12,9 @@ import threading
 import weakref
 from typing import Self
 
+import numpy as np
+
+from anysim.conventions import Array
 from anysim.engine.state import State
 from anysim.model.world import World
 
@@ -39,8 +42,15 @@ class EngineLifetime:
         _living.add(made)
         return made
 
+    num_envs: int
+
     def destroy(self) -> None:
         """Free the world."""
+
+    @property
+    def lost(self) -> Array:
+        """(N,) bool: envs whose worker process was lost since their last reset. Where there are none, none is."""
+        return np.zeros(self.num_envs, dtype=bool)
 
     def abandon(self, owner: int) -> None:
         """In a forked copy: forget the world without freeing it, and refuse to be used from now on."""

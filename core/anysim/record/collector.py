@@ -30,6 +30,10 @@ STATE_FIELDS = ("joint_pos", "joint_vel", "body_pose", "body_twist", "control_po
 """What is recorded of the state in each step."""
 
 
+RERUNS = 3
+"""How often an episode is begun anew whose worker process is lost, before it is given up."""
+
+
 class Policy(Protocol):
     """What drives the envs: `anysim.skills.runner.SkillPolicy`, or anything with the same methods."""
 
@@ -54,7 +58,11 @@ class Policy(Protocol):
 
 @dataclass(frozen=True)
 class EpisodeResult:
-    """How an episode came out. `path` is its trajectory if one was kept; `resumed` says it was there already."""
+    """How an episode came out.
+
+    `path` is its trajectory if one was kept; `resumed` says it was there already. `reruns` is how often it was begun
+    anew because its worker process was lost; `lost` that it was so each time: it did not fail, it was never run.
+    """
 
     env: int
     episode: int
@@ -65,6 +73,8 @@ class EpisodeResult:
     outcome: dict[str, Any]
     path: Path | None = None
     resumed: bool = False
+    reruns: int = 0
+    lost: bool = False
 
     @property
     def success(self) -> bool:
@@ -106,6 +116,9 @@ class Collector:
         self._share = np.array([len(range(i, episodes, env.num_envs)) for i in range(env.num_envs)])
         self._episode = np.full(env.num_envs, -1)
         self._total = np.zeros(env.num_envs)
+        self._reruns = np.zeros(env.num_envs, dtype=int)
+        self._again: dict[int, int] = {}
+        """The seeds of episodes that are to be begun anew, by env."""
         self._pending: deque[tuple[EpisodeResult, PendingCommit]] = deque()
 
     def run(self) -> Iterator[EpisodeResult]:
@@ -153,8 +166,11 @@ class Collector:
         if len(ids) == 0:
             return
         begin = np.zeros(self.env.num_envs, dtype=bool)
-        for i in map(int, ids):
+        again = np.array([int(i) in self._again for i in ids])
+        begin[ids[again]] = True
+        for i in map(int, ids[~again]):
             self._episode[i] += 1
+            self._reruns[i] = 0
             while self._episode[i] < self._share[i] and self.recorder.is_committed(i, int(self._episode[i])):
                 self.env.streams.skip(i, 1)
                 yield self._resumed(i, int(self._episode[i]))
@@ -165,7 +181,7 @@ class Collector:
             return
         fresh = np.flatnonzero(begin)
         with self.times.reset:
-            self.env.reset(mask=begin)
+            self._reset(begin, ids[again])
         seen = self.env.engine.appearance_changes
         with self.times.policy:
             self.policy.begin(fresh)
@@ -175,6 +191,16 @@ class Collector:
                 later = partial(draw_recorded, self.env, i, int(seen[i])) if self._film == "success" else None
                 self.recorder.start(self._header(i), later)
         self._append(fresh, None, self.env.status)
+
+    def _reset(self, begin: Array, again: Array) -> None:
+        """Reset the envs of a mask; those `again` to the episode that they had."""
+        repeated = np.zeros(self.env.num_envs, dtype=bool)
+        repeated[again] = True
+        if (new := begin & ~repeated).any():
+            self.env.reset(mask=new)
+        if len(again):
+            seeds = [self._again.pop(int(i)) for i in np.flatnonzero(repeated)]
+            self.env.reset(mask=repeated, episode_seeds=seeds)
 
     def _header(self, i: int) -> EpisodeHeader:
         env = self.env
@@ -199,15 +225,24 @@ class Collector:
         return EpisodeResult(env, episode, m.episode_seed, m.status, m.steps, reward, outcome, path, resumed=True)
 
     def _finish(self, i: int, status: str) -> Iterator[EpisodeResult]:
-        """Commit or discard an episode; yields it at once where it is not kept."""
+        """Commit or discard an episode; yields it at once where it is not kept, and not if it is to be run again."""
         env = self.env
+        lost = bool(env.info["fault"][i] and env.engine.lost[i])
+        if lost and self._reruns[i] < RERUNS:
+            self._reruns[i] += 1
+            self._again[i] = int(env.streams.episode_seed[i])
+            env.retire(np.array([i]))
+            self.recorder.discard(i)
+            return
         steps, total = int(env.scene.elapsed[i]), float(self._total[i])
         outcome = self.policy.describe(i)
         if status == Status.RUNNING:  # the policy gave up
             status = str(Status.FAILED)
         keep = env.spec.record.keep == "all" or status == Status.SUCCESS
         seed = int(env.streams.episode_seed[i])
-        result = EpisodeResult(i, int(self._episode[i]), seed, status, steps, total, outcome)
+        result = EpisodeResult(
+            i, int(self._episode[i]), seed, status, steps, total, outcome, reruns=int(self._reruns[i]), lost=lost
+        )
         if keep and not env.info["fault"][i]:
             with self.times.record:
                 self._pending.append((result, self.recorder.commit(i, status, outcome | {"total_reward": total})))

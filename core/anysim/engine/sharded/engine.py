@@ -73,6 +73,11 @@ class ShardedEngine(SimEngine):
         """The process ids of the workers, in the order of their blocks of envs; empty without a world."""
         return () if self._crew is None else self._crew.pids
 
+    @property
+    def lost(self) -> Array:
+        """(N,) bool: envs whose worker was lost since their last reset."""
+        return self._lost.copy()
+
     def processor_times(self) -> tuple[float, ...]:
         """Processor time [s] that each worker has spent so far, for benchmarks."""
         with self._lock:
