@@ -1,4 +1,4 @@
-"""Episodes whose worker process is lost: no failures of the task, but begun anew, with the same outcome as undisturbed."""
+"""Episodes whose worker process is lost: they did not fail, and are begun anew, to come out as they would have."""
 
 import os
 import signal

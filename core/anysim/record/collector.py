@@ -5,6 +5,7 @@ does not depend on how fast the others are or how many there are.
 """
 
 import sys
+import weakref
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,9 +18,11 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.errors import RecordError
 from anysim.record.collect_times import CollectTimes
+from anysim.record.commit import disk_trouble
 from anysim.record.film import camera_of, draw_recorded, film_mode
 from anysim.record.frame import NOTHING, FrameBatch, state_batch
 from anysim.record.header import EpisodeHeader, RunHeader, package_versions, state_layout
+from anysim.record.incoming import claim
 from anysim.record.recorder import Recorder
 from anysim.record.trajectory_files import PendingCommit
 from anysim.record.writer import make_writer
@@ -110,7 +113,16 @@ class Collector:
         assert task is not None
         self._film = film_mode(env.spec)
         writer = make_writer(record.writer, record.options)
-        self.recorder = Recorder(out, writer, run_header(env, seed), horizon=task.horizon)
+        try:
+            lock = claim(out)  # before a second run of the same command spends its time on the same episodes
+        except OSError as error:
+            raise disk_trouble(f"cannot record into {out}", error, out) from error
+        self._release = weakref.finalize(self, lock.release)
+        try:
+            self.recorder = Recorder(out, writer, run_header(env, seed), horizon=task.horizon)
+        except BaseException:
+            self._release()
+            raise
         self.times = CollectTimes(env)
         self._capture, self._instruction = env.capture, task.description
         self._share = np.array([len(range(i, episodes, env.num_envs)) for i in range(env.num_envs)])
@@ -158,6 +170,8 @@ class Collector:
         except RecordError:
             if not failing:  # else it is the error that ends the run that is told
                 raise
+        finally:
+            self._release()
 
     # ------------------------------------------------------------------ the beginning and end of an episode
 

@@ -131,8 +131,15 @@ def disk_trouble(what: str, error: OSError, out: Path) -> RecordError:
         remedy = "Allow more open files (ulimit -n), or record fewer cameras at once: each has one in every env"
     elif error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
         remedy = "Make the directory writable, or record into another one"
-    else:
+    elif error.errno in (errno.ENOTDIR, errno.EEXIST):
+        file = next((p for p in (out, *out.parents) if p.exists() and not p.is_dir()), out)
+        return RecordError(f"{what}: {file} is a file, not a directory; name a directory, which is made if needed")
+    elif error.errno in (errno.ENAMETOOLONG, errno.ELOOP, errno.EINVAL, errno.ENOENT):
+        return RecordError(f"{what}: {error.strerror or error} ({error.filename or out}); name another directory")
+    elif error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         remedy = "Make room, or record into another directory, and start it again"
+    else:
+        remedy = "See to the disk, or record into another directory, and start it again"
     path = error.filename or out
     existing = next((p for p in (out, *out.parents) if p.exists()), Path())
     try:

@@ -7,12 +7,14 @@ a process number says less: it is used again, and means nothing on another machi
 
 import fcntl
 import os
+import platform
 import shutil
 from itertools import count
 from pathlib import Path
 from typing import Self
 
-from anysim.record.names import INCOMING, STARTUP_LOCK, attempt_name, owner_of
+from anysim.errors import RecordError
+from anysim.record.names import COLLECTING, INCOMING, STARTUP_LOCK, attempt_name, owner_of
 
 
 class FileLock:
@@ -59,6 +61,29 @@ class FileLock:
 
     def __exit__(self, *_: object) -> None:
         self.release()
+
+
+def claim(run: Path) -> FileLock:
+    """The right to run the episodes of a directory, of one collector at a time.
+
+    Raises:
+        RecordError: another one, alive, has it.
+        OSError: the directory cannot be written.
+    """
+    run.mkdir(parents=True, exist_ok=True)
+    path = run / COLLECTING
+    lock = FileLock.take(path)
+    if lock is None:
+        try:
+            owner = path.read_text().strip()
+        except OSError:
+            owner = ""
+        raise RecordError(
+            f"another run{f' ({owner})' if owner else ''} is recording into {run} now; wait until it has ended and run "
+            "the same command again, which goes on from there, or record into another directory"
+        )
+    path.write_text(f"process {os.getpid()} on {platform.node()}\n")
+    return lock
 
 
 def _is_still(path: Path, descriptor: int) -> bool:

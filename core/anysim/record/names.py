@@ -12,6 +12,7 @@ MANIFEST_FILE = "manifest.json"
 EPISODES = "episodes"
 INCOMING = ".incoming"
 STARTUP_LOCK = "startup.lock"
+COLLECTING = ".collecting.lock"
 
 _TRAJECTORY = re.compile(r"env_(\d{4,9})_episode_(\d{4,9})")
 _ATTEMPT = re.compile(rf"{_TRAJECTORY.pattern}\.(\d+-\d+)")
