@@ -6,8 +6,10 @@ import subprocess
 import sys
 import textwrap
 import time
+from multiprocessing.connection import Connection
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from anysim.engine.kinematic import NullEngine
@@ -222,3 +224,29 @@ def test_workers_are_kept_for_the_next_engine_where_that_is_asked_for():
         assert not set(seen[0]) & set(seen[2]), "a crew with a lost worker is not kept"
         assert children() - before == set(seen[2])
     assert children() == before
+
+
+@pytest.mark.parametrize("sent", [True, False])
+def test_a_call_that_is_interrupted_leaves_no_answer_to_the_next(sent, monkeypatch):
+    """Ctrl-C right after a message was sent, or right before: the next call gets its own answer."""
+    real, armed = Connection.send, []
+
+    def send(connection, message):
+        if sent or not armed:
+            real(connection, message)
+        if armed:
+            armed.clear()
+            raise KeyboardInterrupt
+
+    with NullEngine() as alone, sharded(NullEngine, 2)() as engine:
+        for one in (alone, engine):
+            one.create_world(worlds.scene(), 4)
+        monkeypatch.setattr(Connection, "send", send)
+        armed.append(True)
+        with pytest.raises(KeyboardInterrupt):
+            engine.step(3)
+        assert np.array_equal(engine.get_parameters("body.mass"), alone.get_parameters("body.mass"))
+        for one in (alone, engine):
+            one.reset()
+            one.step(2)
+        assert_same(read(engine), read(alone), "after the interruption")

@@ -176,7 +176,7 @@ def test_misuse_is_explained(tmp_path, writer, run_header, make_frame):
 
 def test_a_directory_that_cannot_be_made_is_explained(tmp_path, writer, run_header):
     (tmp_path / "file").write_text("")
-    with pytest.raises(RecordError, match=r"cannot record into .*file/run: Not a directory .* MiB are free there"):
+    with pytest.raises(RecordError, match=r"cannot record into .*file/run: .*/file is a file, not a directory"):
         Recorder(tmp_path / "file/run", writer, run_header)
 
 

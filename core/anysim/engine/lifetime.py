@@ -19,7 +19,7 @@ from anysim.engine.state import State
 from anysim.model.world import World
 
 FEW = 4
-"""As many engines may wait for the garbage collector; beyond that it is called, when as many again were made."""
+"""As many engines may hold a world; beyond that the garbage collector is called, when twice as many do."""
 
 _enough = FEW
 _living: "weakref.WeakSet[EngineLifetime]" = weakref.WeakSet()
@@ -35,9 +35,9 @@ class EngineLifetime:
 
     def __new__(cls, *_: object, **__: object) -> Self:
         global _enough
-        if len(_living) > _enough:  # engines are parts of cycles, and Python does not see how much they hold
+        if _holding() > _enough:  # engines are parts of cycles, and Python does not see how much they hold
             gc.collect()
-            _enough = max(FEW, 2 * len(_living))
+            _enough = max(FEW, 2 * _holding())
         made = super().__new__(cls)
         _living.add(made)
         return made
@@ -76,6 +76,11 @@ class EngineLifetime:
     def __del__(self) -> None:
         if self._world is not None and not sys.is_finalizing():
             self.destroy()
+
+
+def _holding() -> int:
+    """How many engines hold a world: those that were destroyed do not, and cost nothing until they are collected."""
+    return sum(vars(engine).get("_world") is not None for engine in list(_living))
 
 
 def _after_fork() -> None:

@@ -83,12 +83,12 @@ def _things(world: World) -> Iterator[tuple[str, str, Rows]]:
 
 def _paths(world: World) -> dict[int, str]:
     """For each body the path of what it belongs to; the ground's for what is fixed to the world."""
-    found = {WORLD: "world.terrain"}
-    for body, index in enumerate(world.body_entity):
-        entity = world.entities[index]
+    found = {WORLD: "world.terrain"} | dict.fromkeys(range(len(world.bodies)), "world")
+    for entity in world.entities:
         kind = "robots" if entity.kind is EntityKind.ROBOT else "objects"
         own = f"world.{kind}.{entity.category or entity.name}"
-        found[body] = "world.room" if entity.source.startswith("room:") else own
+        for body in range(entity.body_start, entity.body_stop):
+            found[body] = "world.room" if entity.source.startswith("room:") else own
     return found
 
 

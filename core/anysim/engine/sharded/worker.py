@@ -44,11 +44,11 @@ class Host:
         self._engine: HostedEngine | None = None
 
     def serve(self) -> None:
-        """Answer messages: `("done", result)`, or `("error", type, message)`."""
+        """Answer messages, each by its number: `(number, "done", result)`, or `(number, "error", type, message)`."""
         while True:
             try:
                 self._linger()
-                name, news, *arguments = self._pipe.recv()
+                number, name, news, *arguments = self._pipe.recv()
             except (EOFError, OSError):
                 break
             if name == "stop":
@@ -64,7 +64,7 @@ class Host:
                 text = f"{type(error).__name__}: {error}\nin the worker:\n{traceback.format_exc()}"
                 answer = ("error", "EngineFailure", text)
             try:
-                self._pipe.send(answer)
+                self._pipe.send((number, *answer))
             except OSError:
                 break
         self.free()

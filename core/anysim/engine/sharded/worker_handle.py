@@ -35,11 +35,11 @@ class WorkerLost(Exception):
 
 
 class Worker:
-    """One worker process. Every message is answered; an answer that was not waited for is dropped before the next."""
+    """One worker process. Every message has a number and is answered; an answer to an earlier one is dropped."""
 
     def __init__(self, environment: dict[str, str], timeout_s: float) -> None:
         self._timeout = timeout_s
-        self._owed = 0
+        self._sent = 0
         own, theirs = socket.socketpair()
         lifeline = Lifeline()
         try:
@@ -84,17 +84,17 @@ class Worker:
         Raises:
             WorkerLost: it is gone.
         """
-        while self._owed:  # of a call that was interrupted
-            self._receive(time.perf_counter() + self._timeout)
+        self._sent += 1  # before all else: whatever Ctrl-C interrupts from here on, the number is not used again
         try:
-            self._connection.send(message)
+            while self._arrival.poll(0):  # of calls that were interrupted; their worker may be waiting to write
+                self._connection.recv()
+            self._connection.send((self._sent, *message))
             if descriptor is not None:
                 socket.send_fds(self._socket, [b"+"], [descriptor])
         except BlockingIOError:
             raise WorkerLost(self._hangs(self._timeout)) from None
-        except OSError:
+        except (EOFError, OSError):
             raise WorkerLost(self._how_it_ended()) from None
-        self._owed += 1
 
     def answer(self, deadline: float, limit: float) -> Any:
         """The answer to the last message, by a time of `time.perf_counter()`; `limit` [s] is for the message.
@@ -103,22 +103,22 @@ class Worker:
             WorkerLost: it is gone, or too late and was killed.
             AnysimError: what the engine raised in the worker.
         """
-        kind, *content = self._receive(deadline, limit)
+        number, kind, *content = self._receive(deadline, limit)
+        while number != self._sent:  # of a call that was interrupted: the worker turns to this one only now
+            number, kind, *content = self._receive(time.perf_counter() + limit, limit)
         if kind == "error":
             raise _raised(*content)
         return content[0]
 
-    def _receive(self, deadline: float, limit: float | None = None) -> tuple[Any, ...]:
+    def _receive(self, deadline: float, limit: float) -> tuple[Any, ...]:
         try:
             if not self._arrival.poll(max(0.0, deadline - time.perf_counter()) * 1e3):
-                raise WorkerLost(self._hangs(self._timeout if limit is None else limit))
-            answer = self._connection.recv()
+                raise WorkerLost(self._hangs(limit))
+            return self._connection.recv()
         except BlockingIOError:
             raise WorkerLost(self._hangs(self._timeout)) from None
         except (EOFError, OSError, ValueError):  # ValueError: closed here, when it was lost before
             raise WorkerLost(self._how_it_ended()) from None
-        self._owed -= 1
-        return answer
 
     def _hangs(self, limit: float) -> str:
         self.kill()
@@ -136,7 +136,7 @@ class Worker:
         """Ask it to end, without waiting."""
         try:
             self._socket.settimeout(0.0)
-            self._connection.send(("stop", None))
+            self._connection.send((0, "stop", None))
         except OSError:
             pass
 
