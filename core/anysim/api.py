@@ -140,7 +140,7 @@ def place_of(loaded: LoadedRun, path: str) -> str:
 
 
 WATCHING: Mapping[str, Any] = {"task": {"observations": {"policy": ["last_action"]}}}
-"""The task of a file that has none: nothing is asked of anybody."""
+"""The task of a file that has none: nothing is rewarded or required."""
 
 
 def watched(loaded: LoadedRun) -> LoadedRun:
@@ -313,7 +313,7 @@ def resolve_options(kind: str, name: str) -> type[BaseModel] | None:
             return _Anything
         if kind in TERM_KINDS:
             term = find(kind, name)
-            with registry.blaming(f"the signature of the {kind} term '{name}'", registry.origin(term)):
+            with registry.Blame(f"the signature of the {kind} term '{name}'", registry.origin(term)):
                 return options_model(term)
         made = registry.load(f"{kind}s", name)
         with registry.using(f"{kind}s", name):

@@ -224,18 +224,25 @@ def blame(error: BaseException, who: str, package: str, *, prefix: bool = False)
     raise PluginFailure(f"{who} of {package} failed: {in_words(error)}; {remedy(package)}") from error
 
 
-@contextmanager
-def blaming(who: str, package: str) -> Generator[None]:
-    """Call the code of a plugin within it: what that raises is told as `blame` does."""
-    try:
-        yield
-    except BaseException as error:  # noqa: BLE001 - told in a sentence
-        blame(error, who, package)
+class Blame:
+    """Call the code of a plugin within it: what that raises is told as `blame` does. May be entered again and again."""
+
+    __slots__ = ("package", "prefix", "who")
+
+    def __init__(self, who: str, package: str, *, prefix: bool = False) -> None:
+        self.who, self.package, self.prefix = who, package, prefix
+
+    def __enter__(self) -> None:
+        """Nothing is done where nothing is raised."""
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if error is not None:
+            blame(error, self.who, self.package, prefix=self.prefix)
 
 
 @contextmanager
 def using(kind: str, name: str, passing: tuple[type[Exception], ...] = ()) -> Generator[None]:
-    """As `blaming`, for an installed plugin by kind and name; errors of the types `passing` belong to its contract."""
+    """As `Blame`, for an installed plugin by kind and name; errors of the types `passing` belong to its contract."""
     try:
         yield
     except passing:

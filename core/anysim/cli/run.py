@@ -43,13 +43,13 @@ def run(
       anysim run pick_cube -o world.objects.cube.mass=0.3 --out runs/heavy
     """
     from anysim.api import make
-    from anysim.errors import RecordError
     from anysim.record.collector import Collector
+    from anysim.record.commit import file_at, no_directory
     from anysim.skills.runner import SkillPolicy
 
     more = override or ()
-    if out is not None and (file := next((p for p in (out, *out.parents) if p.exists()), out)).is_file():
-        raise RecordError(f"--out: {file} is a file, not a directory; name a directory, which is made if needed")
+    if out is not None and (file := file_at(out)) is not None:
+        raise no_directory("--out", file)
     with make(task, engine=engine, num_envs=num_envs, overrides=more, strict_observers=strict_observers) as env:
         seed = env.spec.seed if seed is None else seed
         directory = out or Path("runs") / f"{env.name}-{env.engine.name}-{_run_id(env, seed)}"

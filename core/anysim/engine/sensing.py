@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from anysim.conventions import Array
 from anysim.engine import arguments
+from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Capability
 from anysim.engine.lifecycle import EngineLifecycle, EnvIds
 from anysim.engine.state import ContactPoints, RayHits
@@ -42,9 +43,24 @@ class EngineSensing(EngineLifecycle):
                     raise EngineError(f"there is no channel '{channel}' (channels: rgb, depth, segmentation)")
                 self._require(Capability(f"render: {channel}"))
             ids = self._ids(env_ids)
-            poses = self.get_state().body_pose[ids] if body_pose is None else self._recorded(body_pose, ids)
-            view = self._records.rig.view(camera_name, self.index, poses, ids, width, height)
-            return self._render(view, ids, tuple(channels))
+            return self._render(self._seen_from(camera_name, ids, body_pose, width, height), ids, tuple(channels))
+
+    def camera_view(self, camera_name: str, env_ids: EnvIds = None, body_pose: ArrayLike | None = None) -> CameraView:
+        """What `render` would draw from: world poses and lenses of a camera now, or with `body_pose` as there."""
+        with self._lock:
+            self._require_world()
+            return self._seen_from(camera_name, self._ids(env_ids), body_pose)
+
+    def _seen_from(
+        self,
+        camera_name: str,
+        ids: Array,
+        body_pose: ArrayLike | None,
+        width: int | None = None,
+        height: int | None = None,
+    ) -> CameraView:
+        poses = self.get_state().body_pose[ids] if body_pose is None else self._recorded(body_pose, ids)
+        return self._records.rig.view(camera_name, self.index, poses, ids, width, height)
 
     def _recorded(self, body_pose: ArrayLike, ids: Array) -> Array:
         """Poses as they were given, to the bit: no quaternion is normalised, so that the same pixels come of them."""
@@ -54,11 +70,7 @@ class EngineSensing(EngineLifecycle):
 
     def camera_poses(self, camera_name: str, env_ids: EnvIds = None) -> Array:
         """World poses (E, 7) of a camera's optical frame now."""
-        with self._lock:
-            self._require_world()
-            ids = self._ids(env_ids)
-            poses = self.get_state().body_pose[ids]
-            return self._records.rig.view(camera_name, self.index, poses, ids, None, None).pose
+        return self.camera_view(camera_name, env_ids).pose
 
     def set_camera_pose(self, camera_name: str, pose: ArrayLike, env_ids: EnvIds = None) -> None:
         """Place a camera per env: poses (E, 7) in the frame of its body, or of the world where it has none."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from math import gcd, isfinite
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,6 +33,8 @@ class ActionSlice(NamedTuple):
     """What was asked for in the last steps, where it acts late."""
     steps: int | None
     """Physics steps between two updates of the controller; None for none within a control step."""
+    blame: registry.Blame
+    """Names the channel, the controller and its distribution where it raises."""
 
 
 class ActionManager(Manager):
@@ -78,10 +80,10 @@ class ActionManager(Manager):
             controller = _make(view, action, n)
             longest = longest_delay(action.delay)
             line = DelayLine(n, controller.dim, longest) if longest else None
-            stop = start + controller.dim
-            self.slices.append(
-                ActionSlice(robot, view.name, start, stop, controller, action, line, _steps(controller, physics.dt))
-            )
+            stop, steps = start + controller.dim, _steps(controller, physics.dt)
+            who = f"world.robots.{robot}.actions.{view.name}: the controller {type(controller).__name__}"
+            blame = registry.Blame(who, registry.origin(controller), prefix=True)
+            self.slices.append(ActionSlice(robot, view.name, start, stop, controller, action, line, steps, blame))
             start = stop
         self.dim = start
         self.spaces = ActionSpaces({f"{s.robot}.{s.channel}": self._space(s) for s in self.slices})
@@ -147,10 +149,8 @@ class ActionManager(Manager):
         for s in self.slices:
             self._reset_imperfections(s, env_ids)
             self._set_modes(s.controller, env_ids)
-            try:
+            with s.blame:
                 s.controller.reset(env_ids, targets[:, s.controller.channel.actuators])
-            except BaseException as error:  # noqa: BLE001 - told with the key
-                _blame(error, s)
         self._write(env_ids)
 
     def overridable(self) -> list[Overridable]:
@@ -188,10 +188,8 @@ class ActionManager(Manager):
             self._obeying[number] = obeying
             if obeying is not None and len(obeying) == 0:
                 continue
-            try:
+            with s.blame:
                 self._take(number, s.controller.apply(rows, obeying), obeying)
-            except BaseException as error:  # noqa: BLE001 - told with the key
-                _blame(error, s)
         if self.slices:
             self._write(None)
 
@@ -202,10 +200,8 @@ class ActionManager(Manager):
             obeying = self._obeying[number]
             if s.steps is None or part * self._tick % s.steps or (obeying is not None and len(obeying) == 0):
                 continue
-            try:
+            with s.blame:
                 self._take(number, s.controller.update(obeying), obeying)
-            except BaseException as error:  # noqa: BLE001 - told with the key
-                _blame(error, s)
         self._write(None)
 
     def _see(self) -> None:
@@ -309,12 +305,6 @@ def _make(view: ChannelView, action: ActionSpec, num_envs: int) -> Controller:
         raise TaskError(f"{where}: {error}") from None
     except BaseException as error:  # noqa: BLE001 - told with the key
         registry.blame(error, f"{where}: the controller '{name}'", registry.origin(made))
-
-
-def _blame(error: BaseException, s: ActionSlice) -> NoReturn:
-    """Raise what a controller raised, with its key and its distribution."""
-    who = f"world.robots.{s.robot}.actions.{s.channel}: the controller {type(s.controller).__name__}"
-    registry.blame(error, who, registry.origin(s.controller), prefix=True)
 
 
 def _steps(controller: Controller, dt: float) -> int | None:

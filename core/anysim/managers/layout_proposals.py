@@ -91,7 +91,7 @@ class ProposalSource:
         if isinstance(self._ready, tuple):
             return self._ready
         asked = request()
-        with registry.blaming(f"{self.path}: the proposer '{_name(self._ready)}'", registry.origin(self._ready)):
+        with registry.Blame(f"{self.path}: the proposer '{_name(self._ready)}'", registry.origin(self._ready)):
             offered = self._ready(asked)
         return parsed(offered, f"what '{_name(self._ready)}' gives", self.path)
 

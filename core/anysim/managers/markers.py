@@ -9,7 +9,6 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
-from anysim.engine.cameras import CameraRig
 from anysim.math import pose as P
 
 RADIUS = 0.025
@@ -40,25 +39,14 @@ def paint(
     images = images.copy()
     if not goals:
         return images
-    eyes, fov = _lens(engine, camera, ids, body_pose)
-    focal = images.shape[1] / (2.0 * np.tan(np.radians(fov) / 2.0))
+    view = engine.camera_view(camera, ids, body_pose)
+    focal = images.shape[1] / (2.0 * np.tan(np.radians(view.fov) / 2.0))
     for number, poses in enumerate(goals.values()):
-        points = P.compose(P.inverse(eyes), poses[ids])[:, :3]
+        points = P.compose(P.inverse(view.pose), poses[ids])[:, :3]
         color = np.array(COLORS[number % len(COLORS)], dtype=float)
         for image, point, f in zip(images, points, focal, strict=True):
             _disc(image, point, float(f), color)
     return images
-
-
-def _lens(engine: SimEngine, camera: str, ids: Array, body_pose: Array | None) -> tuple[Array, Array]:
-    """World poses (E, 7) of a camera's optical frame, and its vertical fields of view (E,) [degrees]."""
-    poses = engine.get_state().body_pose[ids] if body_pose is None else body_pose
-    if camera not in [known.name for known in engine.world.cameras]:  # the overview, which nobody moves
-        view = CameraRig(engine.world, engine.num_envs).view(camera, engine.index, poses, ids, None, None)
-        return view.pose, view.fov
-    body = engine.world.cameras[engine.index.camera(camera)].body
-    mounts = engine.camera_mounts(camera, ids)
-    return (mounts if body < 0 else P.compose(poses[:, body], mounts)), engine.camera_fov(camera, ids)
 
 
 def _disc(image: Array, point: Array, focal: float, color: Array) -> None:

@@ -132,8 +132,7 @@ def disk_trouble(what: str, error: OSError, out: Path) -> RecordError:
     elif error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
         remedy = "Make the directory writable, or record into another one"
     elif error.errno in (errno.ENOTDIR, errno.EEXIST):
-        file = next((p for p in (out, *out.parents) if p.exists() and not p.is_dir()), out)
-        return RecordError(f"{what}: {file} is a file, not a directory; name a directory, which is made if needed")
+        return no_directory(what, file_at(out) or out)
     elif error.errno in (errno.ENAMETOOLONG, errno.ELOOP, errno.EINVAL, errno.ENOENT):
         return RecordError(f"{what}: {error.strerror or error} ({error.filename or out}); name another directory")
     elif error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
@@ -150,6 +149,16 @@ def disk_trouble(what: str, error: OSError, out: Path) -> RecordError:
         f"{what}: {error.strerror or error} ({path}; {free}). What was unfinished of it is discarded, committed "
         f"trajectories are whole. {remedy}"
     )
+
+
+def file_at(out: Path) -> Path | None:
+    """What keeps a directory from being made: a file of its name, or of that of a folder above it."""
+    return next((p for p in (out, *out.parents) if p.exists() and not p.is_dir()), None)
+
+
+def no_directory(what: str, file: Path) -> RecordError:
+    """The error for a file where a directory should be."""
+    return RecordError(f"{what}: {file} is a file, not a directory; name a directory, which is made if needed")
 
 
 def taken(final: Path) -> str:

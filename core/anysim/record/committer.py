@@ -167,7 +167,7 @@ class Committer:
         """Call what needs a prepared writer."""
         try:
             if self._text is None:
-                with registry.blaming(f"the writer '{self._writer.name}'", registry.origin(self._writer)):
+                with registry.Blame(f"the writer '{self._writer.name}'", registry.origin(self._writer)):
                     self._writer.prepare(self._run)
                 self._text = ManifestText(self._run, self._writer.name)
         except BaseException as error:  # noqa: BLE001  raised at the next append or commit

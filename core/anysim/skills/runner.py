@@ -1,7 +1,5 @@
 """SkillPolicy: the task's expert as a policy over all envs, each on its own timeline."""
 
-from collections.abc import Generator
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -51,18 +49,18 @@ class SkillPolicy:
         self.env = env
         self.name = task.expert.skill
         self.skill = bind_skill(task.expert, env)
-        self._who, self._package = f"task.expert: the skill '{self.name}'", registry.origin(self.skill)
+        self._blame = registry.Blame(f"task.expert: the skill '{self.name}'", registry.origin(self.skill), prefix=True)
         self._still = np.clip(np.zeros(env.action_dim), *env.action_bounds)
 
     def begin(self, env_ids: Array) -> None:
         """These envs have just been reset."""
-        with self._blaming():
+        with self._blame:
             self.skill.begin(env_ids)
 
     def act(self, env_ids: Array) -> Array:
         """The action (N, A); only the rows `env_ids` mean anything."""
         action = np.tile(self._still, (self.env.num_envs, 1))
-        with self._blaming():
+        with self._blame:
             self.skill.act(env_ids, action)
         return action
 
@@ -76,11 +74,4 @@ class SkillPolicy:
         try:
             return {"skill": self.name, **self.skill.describe(env)}
         except BaseException as error:  # noqa: BLE001 - told with the key
-            registry.blame(error, self._who, self._package)
-
-    @contextmanager
-    def _blaming(self) -> Generator[None]:
-        try:
-            yield
-        except BaseException as error:  # noqa: BLE001 - told with the key
-            registry.blame(error, self._who, self._package, prefix=True)
+            registry.blame(error, self._blame.who, self._blame.package)

@@ -55,7 +55,7 @@ def bind(kind: str, spec: TermSpec, scene: SceneView, path: str) -> Callable[...
         SpecError: at `path`, a parameter names nothing in this world.
     """
     function = find(kind, spec.term)
-    with registry.blaming(f"{path}: the signature of the term '{spec.term}'", registry.origin(function)):
+    with registry.Blame(f"{path}: the signature of the term '{spec.term}'", registry.origin(function)):
         model = options_model(function)
     values = model.model_validate(spec.params)
     keywords: dict[str, Any] = {}

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from math import isfinite
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 
@@ -34,8 +34,8 @@ class Mdp:
         self.held = np.zeros(n, dtype=np.int64)
         """Consecutive control steps for which all success terms were true (N,)."""
         issues: list[SpecIssue] = []
-        self._named: dict[str, tuple[str, str]] = {}
-        """The term at each key of the file, and its distribution."""
+        self._blame: dict[str, registry.Blame] = {}
+        """Names the term at each key of the file, and its distribution, where it raises."""
         self._widths: dict[str, tuple[int, ...]] = {}
         """The components of each observation of a group, as they were at first."""
 
@@ -45,11 +45,12 @@ class Mdp:
                 path = f"task.{section}.{name}"
                 try:
                     bound[name] = bind(kind, term, scene, path)
-                    self._named[path] = (term.term, registry.origin(bound[name]))
+                    origin = registry.origin(bound[name])
+                    self._blame[path] = registry.Blame(f"{path}: the term '{term.term}'", origin, prefix=True)
                 except SpecError as error:
                     issues.extend(error.issues)
                 except AnysimError as error:
-                    issues.append(SpecIssue("", f"task.{section}.{name}", str(error)))
+                    issues.append(SpecIssue("", path, str(error)))
             return bound
 
         self._commands = terms("command", spec.command, "command")
@@ -89,10 +90,8 @@ class Mdp:
         self._run_events("reset", 0)
         for name, term in self._commands.items():
             path, goals = f"task.command.{name}", self.scene.goals[name]
-            try:
+            with self._blame[path]:
                 goal = term(partial(self._draw, f"command/{name}", 0))
-            except BaseException as error:  # noqa: BLE001 - told with the key
-                self._blame(error, path)
             self._fit(path, goal, (len(env_ids), goals.shape[1]))
             goals[env_ids] = goal
         self.scene.moment += 1  # goals have moved
@@ -106,10 +105,8 @@ class Mdp:
 
     def _run_events(self, when: str, tick: Any) -> None:
         for name, term in self._due[when].items():
-            try:
+            with self._blame[f"task.events.{name}"]:
                 term(partial(self._draw, f"event/{name}", tick))
-            except BaseException as error:  # noqa: BLE001 - told with the key
-                self._blame(error, f"task.events.{name}")
 
     def _draw(self, stream: str, tick: Any, name: str, value: Any, where: Array | None = None) -> Array:
         """Draw for the rows at hand, or for those of them where `where` (n,) is true."""
@@ -126,11 +123,9 @@ class Mdp:
 
     def _observed(self, group: str, terms: Sequence[Term]) -> Array:
         values: list[Array] = []
-        for term in terms:
-            try:
+        for place, term in enumerate(terms):
+            with self._blame[f"task.observations.{group}.{place}"]:
                 values.append(term())
-            except BaseException as error:  # noqa: BLE001 - told with the key
-                self._blame(error, f"task.observations.{group}.{len(values)}")
         try:
             rows = np.concatenate(values, axis=1, dtype=np.float32, casting="same_kind")
         except (TypeError, ValueError):
@@ -156,11 +151,10 @@ class Mdp:
         """
         total = np.zeros(len(faulted))
         for name, weight, term in self._weighted:
-            try:
+            path = f"task.rewards.{name}"
+            with self._blame[path]:
                 value = term()
-            except BaseException as error:  # noqa: BLE001 - told with the key
-                self._blame(error, f"task.rewards.{name}")
-            self._fit(f"task.rewards.{name}", value, total.shape)
+            self._fit(path, value, total.shape)
             total += weight * value
         if not isfinite(np.vdot(total, total)):  # else all are finite
             wrong = np.flatnonzero(~(np.isfinite(total) | faulted))
@@ -185,10 +179,8 @@ class Mdp:
 
     def _held(self, path: str, term: Term, shape: tuple[int, ...]) -> Array:
         """What a predicate says (n,) bool."""
-        try:
+        with self._blame[path]:
             value = term()
-        except BaseException as error:  # noqa: BLE001 - told with the key
-            self._blame(error, path)
         self._fit(path, value, shape, "truth values")
         return value
 
@@ -205,15 +197,10 @@ class Mdp:
             found = f"an array of shape {value.shape} of {value.dtype}"
         else:
             found = "None" if value is None else f"a {type(value).__name__}"
-        term, package = self._named[path]
+        blame = self._blame[path]
         raise TaskError(
-            f"{path}: the term '{term}' of {package} returned {found}; expected an array of shape {shape} of {what}"
+            f"{blame.who} of {blame.package} returned {found}; expected an array of shape {shape} of {what}"
         )
-
-    def _blame(self, error: BaseException, path: str) -> NoReturn:
-        """Raise what evaluating a term raised, with its key and its distribution."""
-        term, package = self._named[path]
-        registry.blame(error, f"{path}: the term '{term}'", package, prefix=True)
 
     def overridable(self) -> list[Overridable]:
         """The parameters of commands and events that are drawn; those of events in steps may change midway."""
