@@ -204,7 +204,6 @@ def test_overrides_are_checked_like_files() -> None:
 
 
 def test_a_command_of_a_package_that_is_not_installed_names_the_package() -> None:
-    import click
     from typer.main import get_command
 
     from anysim.cli.main import app
@@ -214,4 +213,4 @@ def test_a_command_of_a_package_that_is_not_installed_names_the_package() -> Non
     with pytest.raises(
         PluginError, match="`anysim robot` comes with anysim-robots, which is not installed: pip install"
     ):
-        group.resolve_command(click.Context(group), ["robot", "show"])
+        group.resolve_command(group.context_class(group), ["robot", "show"])
