@@ -9,7 +9,7 @@ from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from importlib import metadata
-from typing import Any, NoReturn
+from typing import Any, NoReturn, Self
 
 from anysim.errors import AnysimError, PluginError, PluginFailure, listing, suggest
 
@@ -238,6 +238,21 @@ class Blame:
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if error is not None:
             blame(error, self.who, self.package, prefix=self.prefix)
+
+
+class Blames:
+    """As `Blame`, for several calls in turn: what is raised is `current`'s."""
+
+    __slots__ = ("current",)
+
+    current: Blame
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if error is not None:
+            self.current.__exit__(kind, error, trace)
 
 
 @contextmanager

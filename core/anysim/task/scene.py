@@ -189,10 +189,6 @@ class Frame(ABC):
 class GoalFrame(Frame):
     """Where a command wants something to be."""
 
-    def _see(self) -> None:
-        self._moment = -1  # goals move without the engine's state
-        super()._see()
-
     def _compute(self) -> Array:
         return self.scene.goals[self.name][self.scene.rows]
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from math import isfinite
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,6 +23,22 @@ from anysim_schemas.task import EventTermSpec, TaskSpec
 Term = Callable[..., Any]
 
 
+class BoundTerm(NamedTuple):
+    """A term at a key of the file. `blame` names it, and its distribution, where it raises."""
+
+    call: Term
+    blame: registry.Blame
+
+
+def _values(terms: Sequence[BoundTerm]) -> list[Any]:
+    """What the terms say now."""
+    values: list[Any] = []
+    with registry.Blames() as blames:  # one for all of them: entering one for each costs as much as the terms
+        for call, blames.current in terms:
+            values.append(call())
+    return values
+
+
 class Mdp:
     """Evaluates a TaskSpec on a SceneView. Holds one slice of state: the goals, and how long success has held."""
 
@@ -34,19 +50,17 @@ class Mdp:
         self.held = np.zeros(n, dtype=np.int64)
         """Consecutive control steps for which all success terms were true (N,)."""
         issues: list[SpecIssue] = []
-        self._blame: dict[str, registry.Blame] = {}
-        """Names the term at each key of the file, and its distribution, where it raises."""
         self._widths: dict[str, tuple[int, ...]] = {}
         """The components of each observation of a group, as they were at first."""
 
-        def terms(kind: str, specs: Mapping[str, Any], section: str) -> dict[str, Term]:
-            bound: dict[str, Term] = {}
+        def terms(kind: str, specs: Mapping[str, Any], section: str) -> dict[str, BoundTerm]:
+            bound: dict[str, BoundTerm] = {}
             for name, term in specs.items():
                 path = f"task.{section}.{name}"
                 try:
-                    bound[name] = bind(kind, term, scene, path)
-                    origin = registry.origin(bound[name])
-                    self._blame[path] = registry.Blame(f"{path}: the term '{term.term}'", origin, prefix=True)
+                    call = bind(kind, term, scene, path)
+                    who = f"{path}: the term '{term.term}'"
+                    bound[name] = BoundTerm(call, registry.Blame(who, registry.origin(call), prefix=True))
                 except SpecError as error:
                     issues.extend(error.issues)
                 except AnysimError as error:
@@ -55,44 +69,44 @@ class Mdp:
 
         self._commands = terms("command", spec.command, "command")
         rewards = terms("reward", spec.rewards, "rewards")
-        self._success = terms("predicate", spec.success, "success")
-        self._failure = terms("predicate", spec.failure, "failure")
+        self._success = list(terms("predicate", spec.success, "success").values())
+        self._failure = list(terms("predicate", spec.failure, "failure").values())
         events = terms("event", spec.events, "events")
-        self._groups: dict[str, list[Term]] = {}
+        self._groups: dict[str, list[BoundTerm]] = {}
         for group, entries in spec.observations.items():
             bound = terms("observation", {str(i): t for i, t in enumerate(entries)}, f"observations.{group}")
-            self._groups[group] = [self._sensed(group, int(i), term) for i, term in bound.items()]
+            self._groups[group] = [term._replace(call=self._sensed(group, int(i), term)) for i, term in bound.items()]
         if issues:
             raise SpecError(issues)
-        self._weighted = [(name, spec.rewards[name].weight, term) for name, term in rewards.items()]
+        self._rewards, self._weights = list(rewards.values()), [spec.rewards[name].weight for name in rewards]
         self._due = {
             when: {name: term for name, term in events.items() if spec.events[name].when == when}
             for when in ("reset", "step")
         }
 
-    def _sensed(self, group: str, place: int, term: Term) -> Term:
+    def _sensed(self, group: str, place: int, term: BoundTerm) -> Term:
         """The term with what its spec says of noise, bias and delay; the term itself where that is nothing."""
         entries = self.spec.observations[group]
         spec = entries[place]
         if not Sensed.alters(spec):
-            return term
+            return term.call
         before = sum(entry.term == spec.term for entry in entries[:place])  # terms of one name are told apart by order
         name = f"task/observations.{group}/{spec.term}{f'~{before}' if before else ''}"
-        return Sensed(term, spec, name, f"task.observations.{group}.{place}", self.scene, self.streams)
+        return Sensed(term.call, spec, name, f"task.observations.{group}.{place}", self.scene, self.streams)
 
     @property
     def _altered(self) -> list[Sensed]:
-        return [term for terms in self._groups.values() for term in terms if isinstance(term, Sensed)]
+        return [call for terms in self._groups.values() for call, _ in terms if isinstance(call, Sensed)]
 
     def reset(self, env_ids: Array) -> None:
         """Reset events, then new goals; the scene must be looking at these rows."""
         self.held[env_ids] = 0
         self._run_events("reset", 0)
         for name, term in self._commands.items():
-            path, goals = f"task.command.{name}", self.scene.goals[name]
-            with self._blame[path]:
-                goal = term(partial(self._draw, f"command/{name}", 0))
-            self._fit(path, goal, (len(env_ids), goals.shape[1]))
+            goals = self.scene.goals[name]
+            with term.blame:
+                goal = term.call(partial(self._draw, f"command/{name}", 0))
+            _fit(term, goal, (len(env_ids), goals.shape[1]))
             goals[env_ids] = goal
         self.scene.moment += 1  # goals have moved
         for term in self._altered:
@@ -102,11 +116,12 @@ class Mdp:
         """Events of the kind `when: step`, for the rows at hand."""
         if self._due["step"]:
             self._run_events("step", self.scene.elapsed[self.scene.rows])
+            self.scene.moment += 1  # whatever they moved is seen
 
     def _run_events(self, when: str, tick: Any) -> None:
         for name, term in self._due[when].items():
-            with self._blame[f"task.events.{name}"]:
-                term(partial(self._draw, f"event/{name}", tick))
+            with term.blame:
+                term.call(partial(self._draw, f"event/{name}", tick))
 
     def _draw(self, stream: str, tick: Any, name: str, value: Any, where: Array | None = None) -> Array:
         """Draw for the rows at hand, or for those of them where `where` (n,) is true."""
@@ -121,11 +136,8 @@ class Mdp:
         """All groups for the rows at hand, float32 (n, D)."""
         return {group: self._observed(group, terms) for group, terms in self._groups.items()}
 
-    def _observed(self, group: str, terms: Sequence[Term]) -> Array:
-        values: list[Array] = []
-        for place, term in enumerate(terms):
-            with self._blame[f"task.observations.{group}.{place}"]:
-                values.append(term())
+    def _observed(self, group: str, terms: Sequence[BoundTerm]) -> Array:
+        values = _values(terms)
         try:
             rows = np.concatenate(values, axis=1, dtype=np.float32, casting="same_kind")
         except (TypeError, ValueError):
@@ -139,8 +151,8 @@ class Mdp:
         """See that observations are rows of as many numbers as they were at first."""
         count = len(self.scene.env_ids)
         widths = self._widths.get(group) or tuple(np.shape(value)[-1] if np.ndim(value) == 2 else 1 for value in values)
-        for place, (value, width) in enumerate(zip(values, widths, strict=True)):
-            self._fit(f"task.observations.{group}.{place}", value, (count, width))
+        for term, value, width in zip(self._groups[group], values, widths, strict=True):
+            _fit(term, value, (count, width))
         self._widths[group] = widths
 
     def reward(self, faulted: Array) -> Array:
@@ -150,11 +162,8 @@ class Mdp:
             TaskError: a term is not finite for an env whose state is.
         """
         total = np.zeros(len(faulted))
-        for name, weight, term in self._weighted:
-            path = f"task.rewards.{name}"
-            with self._blame[path]:
-                value = term()
-            self._fit(path, value, total.shape)
+        for term, weight, value in zip(self._rewards, self._weights, _values(self._rewards), strict=True):
+            _fit(term, value, total.shape)
             total += weight * value
         if not isfinite(np.vdot(total, total)):  # else all are finite
             wrong = np.flatnonzero(~(np.isfinite(total) | faulted))
@@ -168,39 +177,10 @@ class Mdp:
         """(success, failure) (n,) bool for the rows at hand; counts how long success has held."""
         rows = self.scene.rows
         held = self.held[rows]
-        success = failure = np.zeros(held.shape, dtype=bool)
-        for number, (name, term) in enumerate(self._success.items()):
-            holds = self._held(f"task.success.{name}", term, held.shape)
-            success = success & holds if number else holds
-        for name, term in self._failure.items():
-            failure = failure | self._held(f"task.failure.{name}", term, held.shape)
+        success = _combined(np.logical_and, self._success, held.shape)
+        failure = _combined(np.logical_or, self._failure, held.shape)
         self.held[rows] = held = (held + 1) * success
         return held >= self.spec.hold, failure
-
-    def _held(self, path: str, term: Term, shape: tuple[int, ...]) -> Array:
-        """What a predicate says (n,) bool."""
-        with self._blame[path]:
-            value = term()
-        self._fit(path, value, shape, "truth values")
-        return value
-
-    def _fit(self, path: str, value: Any, shape: tuple[int, ...], what: str = "numbers") -> None:
-        """See that a term returned an array of a shape, of numbers or truth values.
-
-        Raises:
-            TaskError: it did not; names the key, the term and its distribution.
-        """
-        right = "biuf" if what == "numbers" else "b"
-        if isinstance(value, np.ndarray) and value.shape == shape and value.dtype.kind in right:
-            return
-        if isinstance(value, np.ndarray | np.generic):
-            found = f"an array of shape {value.shape} of {value.dtype}"
-        else:
-            found = "None" if value is None else f"a {type(value).__name__}"
-        blame = self._blame[path]
-        raise TaskError(
-            f"{blame.who} of {blame.package} returned {found}; expected an array of shape {shape} of {what}"
-        )
 
     def overridable(self) -> list[Overridable]:
         """The parameters of commands and events that are drawn; those of events in steps may change midway."""
@@ -228,5 +208,32 @@ class Mdp:
         self.held[env_ids] = data["held"]
         for name, goal in self.scene.goals.items():
             goal[env_ids] = data[f"goal.{name}"]
+        self.scene.moment += 1
         for term in self._altered:
             term.restore(env_ids, data)
+
+
+def _combined(both: np.ufunc, predicates: Sequence[BoundTerm], shape: tuple[int, ...]) -> Array:
+    """What the predicates say together (n,) bool; false where there are none."""
+    said = np.zeros(shape, dtype=bool)
+    for number, (term, value) in enumerate(zip(predicates, _values(predicates), strict=True)):
+        _fit(term, value, shape, "truth values")
+        said = both(said, value) if number else value
+    return said
+
+
+def _fit(term: BoundTerm, value: Any, shape: tuple[int, ...], what: str = "numbers") -> None:
+    """See that a term returned an array of a shape, of numbers or truth values.
+
+    Raises:
+        TaskError: it did not; names the key, the term and its distribution.
+    """
+    right = "biuf" if what == "numbers" else "b"
+    if isinstance(value, np.ndarray) and value.shape == shape and value.dtype.kind in right:
+        return
+    if isinstance(value, np.ndarray | np.generic):
+        found = f"an array of shape {value.shape} of {value.dtype}"
+    else:
+        found = "None" if value is None else f"a {type(value).__name__}"
+    who, package = term.blame.who, term.blame.package
+    raise TaskError(f"{who} of {package} returned {found}; expected an array of shape {shape} of {what}")
