@@ -128,16 +128,16 @@ class MujocoEngine(SimEngine):
     def _write_joints(self, ids: Array, joints: Array, position: Array | None, velocity: Array | None) -> None:
         self._sims.reader.touch(ids)
         if position is not None:
-            self._sims.qpos[np.ix_(ids, self._sims.layout.joint_q[joints])] = position
+            self._sims.qpos[ids[:, None], self._sims.layout.joint_q[joints]] = position
         if velocity is not None:
-            self._sims.qvel[np.ix_(ids, self._sims.layout.joint_v[joints])] = velocity
+            self._sims.qvel[ids[:, None], self._sims.layout.joint_v[joints]] = velocity
 
     def _write_bodies(self, ids: Array, bodies: Array, pose: Array | None, twist: Array | None) -> None:
         self._sims.reader.touch(ids)
         rows = ids[:, None, None]
         static, free = self._sims.layout.static_row[bodies], self._sims.layout.free_row[bodies]
         if pose is not None and (fixed := static >= 0).any():
-            at = np.ix_(ids, self._sims.layout.mocap[static[fixed]])
+            at = ids[:, None], self._sims.layout.mocap[static[fixed]]
             self._sims.mocap_pos[at] = pose[:, fixed, :3]
             self._sims.mocap_quat[at] = wxyz_from_xyzw(pose[:, fixed, 3:])
         if not (loose := free >= 0).any():

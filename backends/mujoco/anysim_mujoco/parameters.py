@@ -102,7 +102,7 @@ class Parameters:
         if name in self._looks:
             self._looks.set(name, values, ids, indices)
             return
-        at = np.ix_(ids, indices)
+        at = ids[:, None], indices
         if name in ("actuator.kp", "actuator.kd"):
             getattr(self._drives, name.removeprefix("actuator."))[at] = values
             self._drives.refresh()
@@ -120,13 +120,13 @@ class Parameters:
             pair = [column[at] for column in self._skins.pairs(self._rows("geom_matid")[:, self._layout.geoms])]
             pair[_LOOKS[name]] = values
             geoms = self._layout.geoms[indices]
-            self._expand("geom_matid")[np.ix_(ids, geoms)] = self._skins.ids(indices, pair[0], pair[1])
+            self._expand("geom_matid")[ids[:, None], geoms] = self._skins.ids(indices, pair[0], pair[1])
         elif name == "actuator.effort_limit":
             limits = self._expand("actuator_forcerange")
             limits[at] = np.stack([-values, values], axis=-1)
         else:
             field = self._fields[name]
-            _column(self._expand(field.name), field)[np.ix_(ids, field.rows[indices])] = values
+            _column(self._expand(field.name), field)[ids[:, None], field.rows[indices]] = values
             if field.derives:
                 self._mark(ids)
 
@@ -137,8 +137,8 @@ class Parameters:
             [contact_parameters(replace(s, restitution=float(e)), dt) for s, e in zip(surfaces, row, strict=True)]
             for row in values
         ]
-        self._bounce[np.ix_(ids, indices)] = values
-        at = np.ix_(ids, self._layout.geoms[indices])
+        self._bounce[ids[:, None], indices] = values
+        at = ids[:, None], self._layout.geoms[indices]
         self._expand("geom_solref")[at] = [[part.solref for part in row] for row in made]
         self._expand("geom_solmix")[at] = [[part.solmix for part in row] for row in made]
 
@@ -153,7 +153,7 @@ class Parameters:
             for index, (moments, _) in zip(indices, row, strict=True):
                 if moments.any():
                     check_physical(self._world.bodies[index].name, moments)
-        at = np.ix_(ids, self._layout.bodies[indices])
+        at = ids[:, None], self._layout.bodies[indices]
         self._write_inertia(
             at, np.array([[m for m, _ in row] for row in split]), np.array([[q for _, q in row] for row in split])
         )
@@ -170,7 +170,7 @@ class Parameters:
 
     def restore_rows(self, ids: Array, data: Any, bodies: Array | None = None) -> None:
         """Write what `rows` returned (for these World bodies); envs go on sharing the model where it says the same."""
-        at = np.ix_(ids, self._layout.bodies if bodies is None else self._layout.bodies[bodies])
+        at = ids[:, None], self._layout.bodies if bodies is None else self._layout.bodies[bodies]
         moments, frames = data["body_inertia"], data["body_iquat"]
         same = np.array_equal(self._rows("body_inertia")[at], moments) and np.array_equal(
             self._rows("body_iquat")[at], frames

@@ -117,7 +117,7 @@ class SimEngine(EngineSensing):
             self._require(Capability.WRENCHES)
             ids, which = self._ids(env_ids), self._which(bodies, len(self.world.bodies), "body")
             forces = arguments.rows("wrench", wrench, (len(ids), len(which), 6))
-            there = self._presence.bodies[np.ix_(ids, which)]
+            there = self._presence.bodies[ids[:, None], which]
             self._commands.add_wrench(np.where(there[..., None], forces, 0.0), ids, which)
 
     # ------------------------------------------------------------------ parameters
@@ -127,7 +127,7 @@ class SimEngine(EngineSensing):
         with self._lock:
             self._require_world()
             _, ids, which = self._chosen(name, env_ids, indices)
-            return self._get_parameter(name)[np.ix_(ids, which)].copy()
+            return self._get_parameter(name)[ids[:, None], which].copy()
 
     def set_parameters(self, name: str, values: ArrayLike, env_ids: EnvIds = None, indices: Indices = None) -> None:
         """Change a neutral parameter per env, values (E, K, ...); what the engine took is read back and compared.
@@ -146,7 +146,7 @@ class SimEngine(EngineSensing):
             self._records.changed[name] = None
             if name in APPEARANCE:
                 self._records.appearance[ids] += 1
-            arguments.kept(self.name, name, rows, self._get_parameter(name)[np.ix_(ids, which)])
+            arguments.kept(self.name, name, rows, self._get_parameter(name)[ids[:, None], which])
             if name in ("actuator.kp", "actuator.kd"):
                 self._commands.control_changed = True
 

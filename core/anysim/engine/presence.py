@@ -116,7 +116,7 @@ def write_present(
     write: Writer, present: Array, ids: Array, which: Array, first: Array | None, second: Array | None
 ) -> None:
     """Write values of what is there, and nothing of what is not; `present` (N, all) is the mask of bodies or joints."""
-    there = present[np.ix_(ids, which)]
+    there = present[ids[:, None], which]
     if there.all():
         write(ids, which, first, second)
         return

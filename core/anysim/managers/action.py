@@ -316,4 +316,4 @@ def _put(buffer: Array, values: Array, env_ids: Array | None, columns: slice | A
     if env_ids is None:
         buffer[:, columns] = values
     else:
-        buffer[np.ix_(env_ids, indices)] = values
+        buffer[env_ids[:, None], indices] = values

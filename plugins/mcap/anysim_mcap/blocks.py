@@ -2,7 +2,7 @@
 
 A row is all that one frame says, /action, /state, /collect and /tf, each a complete MCAP record. What differs from row
 to row lies at the same places in each, so a block is a template, repeated, and one assignment for each field. Lengths
-change where a varint gets one byte more, with the status, and at words, which follow the frame that they begin with.
+change where a varint gets one byte more and with the status. Words come between: after the frame that they begin with.
 """
 
 import math
@@ -93,7 +93,7 @@ class BlockEncoder:
         sources = self._sources(columns, steps, times) | {"step": step, "seconds": seconds, "nanos": nanos}
         lengths = np.stack([step_length, seconds_length, nanos_length])
         words = _by_row(columns)
-        cuts = {0, count, *(change.row for change in columns.status), *(row + 1 for row in words)}
+        cuts = {0, count, *(change.row for change in columns.status)}
         cuts |= set((1 + np.flatnonzero((np.diff(lengths, axis=1) != 0).any(axis=0))).tolist())
         if columns.first_step == 0:
             cuts.add(1)
@@ -105,9 +105,13 @@ class BlockEncoder:
                 said, following = following.value, next(status)
             numbers: list[int] = lengths[:, begin].tolist()
             key = Lengths(columns.first_step + begin > 0, numbers[0], numbers[1], numbers[2], said)
-            yield self._block(key, sources, begin, end, times)
-            for word in words.get(end - 1, ()):
-                yield self._word(word, columns.first_step + end - 1, int(times[end - 1]))
+            whole, done = self._block(key, sources, begin, end, times), 0
+            for row in (row for row in words if begin <= row < end):
+                yield _part(whole, done, row + 1 - begin, end - begin)
+                done = row + 1 - begin
+                for word in words[row]:
+                    yield self._word(word, columns.first_step + row, int(times[row]))
+            yield _part(whole, done, end - begin, end - begin)
 
     # ------------------------------------------------------------------ blocks
 
@@ -265,10 +269,22 @@ def _row_bytes(rows: Array) -> Array:
     return np.ascontiguousarray(rows).reshape(len(rows), -1).view(np.uint8)
 
 
+def _part(messages: Messages, begin: int, end: int, count: int) -> Messages:
+    """The messages of some of the rows of a block of `count` equal ones."""
+    size, each = len(messages.data) // count, len(messages.ends) // count
+    chosen = slice(begin * each, end * each)
+    return Messages(
+        messages.data[begin * size : end * size],
+        messages.ends[chosen] - begin * size,
+        messages.channels[chosen],
+        messages.times[chosen],
+    )
+
+
 def _by_row(columns: EpisodeColumns) -> dict[int, list[tuple[str, object]]]:
-    """Annotations and words by the row with which they begin."""
+    """Annotations and words by the row with which they begin, in the order of rows."""
     found: dict[int, list[tuple[str, object]]] = {}
     for kind, changes in (("annotations", columns.annotations), ("text", columns.language)):
         for row, value in changes:
             found.setdefault(row, []).append((kind, value))
-    return found
+    return dict(sorted(found.items()))
