@@ -91,7 +91,10 @@ class StateReader:
 
     def touch(self, ids: Array) -> None:
         """The state of these envs was written; their efforts and contact forces stay those of the last substep."""
-        self.hold(ids, self.joint_effort()[ids], self.contact_force()[ids])
+        fresh = ids[~self._held[ids]]  # the others are held already
+        if len(fresh):
+            self.hold(fresh, self.joint_effort()[fresh], self.contact_force()[fresh])
+        self._stale[ids] = self._any_stale = True
 
     def hold(self, ids: Array, effort: Array | float, contact: Array | float) -> None:
         """The state of these envs was written; make these their efforts and contact forces of the last substep."""

@@ -64,7 +64,7 @@ class McapWriter(TrajectoryWriter):
         if self.options.compression == "zstd":
             from zstandard import ZstdCompressor
 
-            # one for all chunks: its tables are made once. Level 1 takes two thirds of level 3's time, for 1 % more bytes
+            # one for all chunks: its tables are made once. Level 1: two thirds of level 3's time, 1 % more bytes
             self._zstd = ZstdCompressor(level=1).compress
 
     def write(self, directory: Path, columns: EpisodeColumns, status: str) -> tuple[WrittenFile, ...]:
