@@ -1,5 +1,6 @@
 """Recording and replaying episodes in which not the same things are there."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -33,5 +34,16 @@ def test_what_was_drawn_is_kept_and_each_episode_replays_to_the_bit(tmp_path: Pa
         toys = [np.array(found.initial_state["body_pose"][bodies.index(f"toy_{i}")]) for i in range(2)]
         away = [toy.tolist() == [0, 0, 0, 0, 0, 0, 1] for toy in toys]
         assert away == [i >= drawn["population/toy/count"] for i in range(2)]
-        assert replay(path).identical
+        again = replay(path)
+        assert again.identical
+        assert again.explanation == ""
     assert len(kinds) > 2
+    _recorded_with(path, linear_algebra="openblas Elsewhere")
+    assert "the linear algebra was openblas Elsewhere and is " in replay(path).explanation
+
+
+def _recorded_with(path: Path, **clock: str) -> None:
+    """Change what a manifest says of the machine."""
+    manifest = json.loads((path / "manifest.json").read_text())
+    manifest["clock"] |= clock
+    (path / "manifest.json").write_text(json.dumps(manifest))

@@ -8,6 +8,7 @@ from anysim.conventions import Array
 from anysim.engine.parameter_table import ParameterTable
 from anysim.errors import EngineError
 from anysim.kinematics.inertia import tensor
+from anysim.math import matrix as M
 from anysim.model.world import Inertial, World
 from anysim_pybullet import kernels as K
 from anysim_pybullet.bullet import bullet
@@ -107,7 +108,7 @@ class Parameters(ParameterTable):
         axes = np.empty((3, 3))
         K.rotation(x, y, z, w, axes)
         xx, yy, zz, xy, xz, yz = inertia.tolist()
-        return axes.T @ tensor(Inertial(1.0, inertia=(xx, yy, zz, xy, xz, yz))) @ axes
+        return M.product(axes.T, tensor(Inertial(1.0, inertia=(xx, yy, zz, xy, xz, yz))), axes)
 
     def _moments(self, index: int, body: int) -> list[float]:
         inertia = self._laws.bodies[index, body, K.INERTIA : K.INERTIA + 6]

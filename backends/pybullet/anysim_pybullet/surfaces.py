@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from anysim.conventions import WORLD, Array
+from anysim.math import pose as P
 from anysim.math.compiled import compiled
 from anysim.model.pairs import may_meet, pair_friction, pair_restitution
 from anysim.model.world import Geom, World
@@ -126,9 +127,9 @@ class PairRules:
         for _ in range(_SWEEPS if len(turning) else 0):
             for i in turning:
                 weight = weights[i] * values
-                below = float(weight @ values)
+                below = float(P.dot(weight, values))
                 if below > 1e-9:
-                    spinning[i] = max(0.0, float(weight @ (wanted[i] - spinning * values[i])) / below)
+                    spinning[i] = max(0.0, float(P.dot(weight, wanted[i] - spinning * values[i])) / below)
         return spinning
 
     def shapes_on(self, bodies: Array) -> dict[int, list[tuple[int, Geom]]]:

@@ -18,6 +18,7 @@ from anysim.assets.mesh_budget import bounded, check, mesh_bytes
 from anysim.conventions import Array
 from anysim.errors import AssetError
 from anysim.geometry.tessellate import convex_hull
+from anysim.math import matrix as M
 from anysim.model.world import Mesh, Vec3
 from anysim_schemas.limits import MESH_BYTES, MESH_FACES
 
@@ -182,8 +183,8 @@ def _load(path: Path, scale: Vec3, upright: bool) -> list[_Piece]:
             total += len(faces)
             check(path, MESH_FACES, total)  # a geometry may be there many times
             if len(faces):
-                vertices = np.asarray(geometry.vertices, dtype=float) @ matrix[:3, :3].T + matrix[:3, 3]
-                mirrored = np.linalg.det(matrix[:3, :3]) < 0
+                vertices = M.product(np.asarray(geometry.vertices, dtype=float), matrix[:3, :3].T) + matrix[:3, 3]
+                mirrored = M.determinant(matrix[:3, :3]) < 0
                 pieces.append(
                     _Piece(vertices, faces[:, ::-1] if mirrored else faces, _color(geometry) if has_color else None)
                 )
@@ -197,8 +198,8 @@ def _load(path: Path, scale: Vec3, upright: bool) -> list[_Piece]:
         raise AssetError(f"{path}: holds vertices that are not finite")
     unit = _unit(kind, data, path)
     turn = np.array(scale)[:, None] * (_upright(kind, data) if upright else np.eye(3)) * unit
-    flip = np.linalg.det(turn) < 0
-    return [_Piece(v @ turn.T, f[:, ::-1] if flip else f, color) for v, f, color in pieces]
+    flip = M.determinant(turn) < 0
+    return [_Piece(M.product(v, turn.T), f[:, ::-1] if flip else f, color) for v, f, color in pieces]
 
 
 def _unit(kind: str, data: bytes, path: Path) -> float:

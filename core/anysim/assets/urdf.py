@@ -26,7 +26,7 @@ from anysim.assets.urdf_xml import InertialElement, JointElement, UrdfFile
 from anysim.conventions import Array
 from anysim.errors import AssetError, listing, suggest
 from anysim.kinematics import inertia
-from anysim.math import pose as P
+from anysim.math import matrix as M, pose as P
 from anysim.model.hash import split, tidy
 from anysim.model.world import Body, BodyKind, Inertial, Joint, JointType, Mimic, Site
 
@@ -285,7 +285,7 @@ class _UrdfImport:
         if mass < 0:
             raise AssetError(f"{self.file.where('link', link)} has a negative mass, {own.mass:g} kg")
         matrix, turn = own.inertia * s**5, P.to_matrix(own.origin[3:])
-        raw = inertia.make(mass, own.origin[:3] * s, turn @ matrix @ turn.T)
+        raw = inertia.make(mass, own.origin[:3] * s, M.product(turn, matrix, turn.T))
         if mass > 0 and not matrix.any():
             return raw  # a point mass, which is fine as a part of a body
         fixed, text = inertia.repaired(raw)

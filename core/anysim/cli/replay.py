@@ -84,6 +84,7 @@ def _row(path: str, result: "ReplayResult") -> dict[str, object]:
         "replayed": result.status,
         "same_world": result.same_world,
         "same_start": result.same_start,
+        "explanation": result.explanation,
     }
 
 
@@ -114,3 +115,5 @@ def _report(results: "dict[str, ReplayResult]", same: int) -> None:
             print_table("Episodes that end otherwise", ("trajectory", "recorded", "replayed"), rows)
         typer.echo(f"{total - len(other)} of {total} episodes end as recorded")
     typer.echo(f"{same} of {total} replays are identical to the bit")
+    if same < total and first.manifest.engine == first.engine.partition(" ")[0] and first.explanation:
+        typer.echo(first.explanation)

@@ -12,7 +12,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.kinematics.inertia import tensor
-from anysim.math import pose as P
+from anysim.math import matrix as M, pose as P
 from anysim.model.world import BodyKind, JointType, World
 
 
@@ -60,9 +60,10 @@ def mass_matrix(world: World, poses: Array) -> Array:
         if body.kind is BodyKind.STATIC:
             continue
         turn = P.to_matrix(pose[3:])
-        linear = jacobian[:3] + np.cross(jacobian[3:], turn @ np.array(body.inertial.com), axis=0)
-        matrix += body.inertial.mass * linear.T @ linear
-        matrix += jacobian[3:].T @ turn @ tensor(body.inertial) @ turn.T @ jacobian[3:]
+        linear = jacobian[:3] + np.cross(jacobian[3:], P.rotate(pose[3:], np.array(body.inertial.com)), axis=0)
+        matrix += body.inertial.mass * M.product(linear.T, linear)
+        angular = M.product(turn.T, jacobian[3:])
+        matrix += M.product(angular.T, tensor(body.inertial), angular)
     armature = [joint.armature for joint in world.joints]
     matrix[range(len(armature)), range(len(armature))] += armature
     return matrix

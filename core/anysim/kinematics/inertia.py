@@ -12,7 +12,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import EngineError
-from anysim.math import pose as P
+from anysim.math import matrix as M, pose as P
 from anysim.model.hash import tidy
 from anysim.model.shapes import solid_moments
 from anysim.model.world import Box, Capsule, Cylinder, Inertial, Mesh, MeshShape, Shape, Sphere
@@ -39,8 +39,8 @@ def make(mass: float, com: Array, matrix: Array) -> Inertial:
 def moved(inertial: Inertial, pose: Array) -> Inertial:
     """The same body seen from a frame in which its own has the pose (7,)."""
     rotation = P.to_matrix(pose[3:])
-    com = pose[:3] + rotation @ np.array(inertial.com)
-    return make(inertial.mass, com, rotation @ tensor(inertial) @ rotation.T)
+    com = pose[:3] + P.rotate(pose[3:], np.array(inertial.com))
+    return make(inertial.mass, com, M.product(rotation, tensor(inertial), rotation.T))
 
 
 def composed(parts: Sequence[Inertial]) -> Inertial:
@@ -52,7 +52,7 @@ def composed(parts: Sequence[Inertial]) -> Inertial:
     total = np.zeros((3, 3))
     for part in parts:
         d = np.array(part.com) - com
-        total += tensor(part) + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
+        total += tensor(part) + part.mass * (P.dot(d, d) * np.eye(3) - np.outer(d, d))
     return make(mass, com, total)
 
 
@@ -64,7 +64,7 @@ def repaired(inertial: Inertial) -> tuple[Inertial, str | None]:
     """
     if inertial.mass <= 0:
         return Inertial(0.0), None if not any(inertial.inertia) else "has inertia and no mass; the inertia is dropped"
-    moments, axes = np.linalg.eigh(_second_moments(tensor(inertial)))
+    moments, axes = M.eigen(_second_moments(tensor(inertial)))
     total = float(moments.sum())
     if total <= 0:
         value = 0.4 * inertial.mass * BALL_RADIUS**2
@@ -74,7 +74,7 @@ def repaired(inertial: Inertial) -> tuple[Inertial, str | None]:
         )
     if moments[0] >= -_NOISE * total:
         return inertial, None
-    clipped = axes * np.maximum(moments, 0.0) @ axes.T
+    clipped = M.product(axes * np.maximum(moments, 0.0), axes.T)
     fixed = make(inertial.mass, np.array(inertial.com), np.trace(clipped) * np.eye(3) - clipped)
     change = float(np.linalg.norm(tensor(fixed) - tensor(inertial)) / np.linalg.norm(tensor(inertial)))
     return fixed, f"has an inertia that no body can have; the nearest possible one differs by {100 * change:.2g} %"
@@ -82,11 +82,11 @@ def repaired(inertial: Inertial) -> tuple[Inertial, str | None]:
 
 def moving(inertial: Inertial) -> Inertial:
     """An inertial that engines accept for a moving body: every second moment at least `_FLOOR` of their sum."""
-    moments, axes = np.linalg.eigh(_second_moments(tensor(inertial)))
+    moments, axes = M.eigen(_second_moments(tensor(inertial)))
     floor = _FLOOR * float(moments.sum())
     if moments[0] >= floor:
         return inertial
-    raised = axes * np.maximum(moments, floor) @ axes.T
+    raised = M.product(axes * np.maximum(moments, floor), axes.T)
     return make(inertial.mass, np.array(inertial.com), np.trace(raised) * np.eye(3) - raised)
 
 
@@ -146,7 +146,7 @@ def principal(moments: Sequence[float] | Array, *, descending: bool = False) -> 
     xx, yy, zz, xy, xz, yz = (float(v) for v in moments)
     if xy == 0.0 and xz == 0.0 and yz == 0.0:
         return Principal(np.array([xx, yy, zz]), np.array([0.0, 0.0, 0.0, 1.0]))
-    values, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    values, axes = M.eigen(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
     if descending:
         values, axes = values[::-1].copy(), axes[:, ::-1].copy()
     for column in range(2):

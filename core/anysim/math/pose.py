@@ -160,7 +160,7 @@ def from_matrix(matrix: Array) -> Array:
         q[j] = m[j, i] + m[i, j]
         q[k] = m[k, i] + m[i, k]
         q[3] = m[k, j] - m[j, k]
-    q /= np.sqrt(q @ q)
+    q /= norm(q)
     return -q if q[3] < 0 else q
 
 

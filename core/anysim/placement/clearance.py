@@ -12,6 +12,7 @@ import numpy as np
 from anysim.conventions import WORLD
 from anysim.geometry.bounds import ground_top
 from anysim.geometry.convex_parts import IDENTITY, Part, Placed, PlacedPart, Pose, Vec, boxed, pose_of, turned
+from anysim.math import pose as P
 from anysim.model.world import Box, Capsule, Cylinder, HeightFieldShape, MeshShape, Plane, Shape, Sphere, World
 
 TOUCH = 1e-4
@@ -160,7 +161,7 @@ def _hull(coal: Any, vertices: Any) -> Any:
         points.append(point)
     for simplex in hull.simplices:
         a, b, c = vertices[simplex]
-        outward = float(np.cross(b - a, c - a) @ (a - middle)) > 0
+        outward = float(P.dot(np.cross(b - a, c - a), a - middle)) > 0
         i, j, k = (int(number[v]) for v in (simplex if outward else simplex[::-1]))
         faces.append(coal.Triangle(i, j, k))
     return coal.Convex(points, faces)

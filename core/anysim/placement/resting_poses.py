@@ -14,7 +14,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.geometry.convex_parts import Part, Solid, turned
-from anysim.math import pose as P
+from anysim.math import matrix as M, pose as P
 from anysim.model.world import Box, Capsule, Cylinder, MeshShape, Sphere, World
 
 ROUND = 32
@@ -77,18 +77,18 @@ def _faces(points: Array, com: Array) -> tuple[list[Array], list[Array], list[fl
     groups: list[tuple[Array, list[int]]] = []
     for number, plane in enumerate(hull.equations):
         for known, members in groups:
-            if known[:3] @ plane[:3] > 1 - 1e-6 and abs(known[3] - plane[3]) < 1e-5:
+            if P.dot(known[:3], plane[:3]) > 1 - 1e-6 and abs(known[3] - plane[3]) < 1e-5:
                 members.append(number)
                 break
         else:
             groups.append((plane, [number]))
     normals, outlines, shares = [], [], []
     for plane, members in groups:
-        normal = plane[:3] / np.linalg.norm(plane[:3])
+        normal = plane[:3] / P.norm(plane[:3])
         corners = points[np.unique(hull.simplices[members])]
         a, b = _plane_axes(normal)
         middle = corners.mean(axis=0)
-        order = np.argsort(np.arctan2((corners - middle) @ b, (corners - middle) @ a))
+        order = np.argsort(np.arctan2(P.dot(corners - middle, b), P.dot(corners - middle, a)))
         normals.append(normal)
         outlines.append(corners[order])
         shares.append(sum(_solid_angle(*(points[i] - com for i in hull.simplices[m])) for m in members) / (4 * pi))
@@ -115,11 +115,11 @@ def _topples_to(face: int, normals: Sequence[Array], outlines: Sequence[Array], 
     following = np.roll(corners, -1, axis=0)
     along = following - corners
     inward = np.cross(normal, along)
-    length = np.linalg.norm(inward, axis=1)
+    length = P.norm(inward)
     keep = length > 1e-12
     depth = np.where(keep, ((com - corners) * inward).sum(axis=1) / np.where(keep, length, 1.0), np.inf)
     worst = int(np.argmin(depth))
-    height = float((corners[0] - com) @ normal)  # of the centre of mass above the face
+    height = float(P.dot(corners[0] - com, normal))  # of the centre of mass above the face
     if depth[worst] > max(height * tan(TILT), INSIDE):
         return None
     edge = {tuple(np.round(corners[worst], 9)), tuple(np.round(following[worst], 9))}
@@ -131,9 +131,9 @@ def _topples_to(face: int, normals: Sequence[Array], outlines: Sequence[Array], 
 
 def _solid_angle(a: Array, b: Array, c: Array) -> float:
     """Of a triangle seen from the origin (van Oosterom and Strackee)."""
-    la, lb, lc = (float(np.linalg.norm(v)) for v in (a, b, c))
-    top = float(a @ np.cross(b, c))
-    return abs(2 * float(np.arctan2(top, la * lb * lc + (a @ b) * lc + (b @ c) * la + (c @ a) * lb)))
+    la, lb, lc = (float(P.norm(v)) for v in (a, b, c))
+    top = float(P.dot(a, np.cross(b, c)))
+    return abs(2 * float(np.arctan2(top, la * lb * lc + P.dot(a, b) * lc + P.dot(b, c) * la + P.dot(c, a) * lb)))
 
 
 def _cylinder(part: Part, com: Array, points: Array) -> tuple[RestingPose, ...]:
@@ -144,7 +144,7 @@ def _cylinder(part: Part, com: Array, points: Array) -> tuple[RestingPose, ...]:
     normals, outlines, shares = _faces(points, com)
     settled = _toppled(normals, outlines, shares, com)
     for normal, share in zip(normals, settled, strict=True):
-        if abs(float(normal @ axis)) > 0.999 and share >= SMALLEST:
+        if abs(float(P.dot(normal, axis))) > 0.999 and share >= SMALLEST:
             poses.append(RestingPose(_onto(normal), share))
     if not poses:
         return (RestingPose(_lying(part), 1.0, _axis(part)),)
@@ -161,7 +161,7 @@ def _lying(part: Part) -> tuple[float, float, float, float]:
     """With the part's axis level."""
     x, y, z = _axis(part)
     side = np.array([x, y, 0.0])
-    level = side / np.linalg.norm(side) if np.linalg.norm(side) > 1e-6 else np.array([1.0, 0.0, 0.0])
+    level = side / P.norm(side) if P.norm(side) > 1e-6 else np.array([1.0, 0.0, 0.0])
     return _between(np.array([x, y, z]), level)
 
 
@@ -172,11 +172,11 @@ def _onto(normal: Array) -> tuple[float, float, float, float]:
 
 def _between(a: Array, b: Array) -> tuple[float, float, float, float]:
     """The least rotation from one unit vector to another; about x where they are opposed."""
-    w = 1.0 + float(a @ b)
+    w = 1.0 + float(P.dot(a, b))
     if w < 1e-9:
         axis = np.array([1.0, 0.0, 0.0]) if abs(a[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
         perpendicular = np.cross(a, axis)
-        q = np.array([*(perpendicular / np.linalg.norm(perpendicular)), 0.0])
+        q = np.array([*(perpendicular / P.norm(perpendicular)), 0.0])
     else:
         q = P.normalize(np.array([*np.cross(a, b), w]))
     x, y, z, w = (float(c) for c in np.round(q, 12) + 0.0)
@@ -185,7 +185,7 @@ def _between(a: Array, b: Array) -> tuple[float, float, float, float]:
 
 def _plane_axes(normal: Array) -> tuple[Array, Array]:
     a = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
-    a = a / np.linalg.norm(a)
+    a = a / P.norm(a)
     return a, np.cross(normal, a)
 
 
@@ -216,7 +216,7 @@ def _points(part: Part) -> Array:
         case _:
             local = np.zeros((1, 3))
     rotation = np.array(part.pose.rotation)
-    return local @ rotation.T + np.array(part.pose.position)
+    return M.product(local, rotation.T) + np.array(part.pose.position)
 
 
 def _ring(radius: float, heights: Sequence[float]) -> Array:

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
@@ -17,6 +18,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import RecordError, listing
+from anysim.math.matrix import blas_kernel
 from anysim.record.columns import ColumnStore, EpisodeColumns, check_columns
 from anysim.record.commit import describe_run, disk_trouble
 from anysim.record.committer import Committer
@@ -112,6 +114,10 @@ class Recorder:
     def is_committed(self, env: int, episode: int) -> bool:
         """Whether a trajectory is there. As quick among ten thousand others as alone."""
         return (self.out / EPISODES / trajectory_name(env, episode)).exists()
+
+    @cached_property
+    def _linear_algebra(self) -> str:
+        return blas_kernel()
 
     # ------------------------------------------------------------------ one trajectory
 
@@ -216,7 +222,8 @@ class Recorder:
             if attempt.episode.film is not None:
                 columns = self._filmed(attempt, columns, attempt.episode.film)
             now = {"created_at": self._now().isoformat(), "wall_s": round(time.monotonic() - attempt.began, 6)}
-            ending = Ending(status, plain(outcome or {}, "outcome"), {**plain(clock or {}, "clock"), **now})
+            here = {"linear_algebra": self._linear_algebra, **now}
+            ending = Ending(status, plain(outcome or {}, "outcome"), {**plain(clock or {}, "clock"), **here})
         except BaseException:
             self.discard(env)
             raise

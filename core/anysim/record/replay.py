@@ -9,6 +9,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import RecordError, listing
+from anysim.math.matrix import blas_kernel
 from anysim.record.frame import state_digest, state_rows
 from anysim.record.manifest import Manifest
 from anysim.record.reader import TrajectoryReader, open_trajectory
@@ -154,6 +155,7 @@ class ReplayResult:
     Attributes:
         manifest: of the recording.
         engine: what it was replayed on, with version.
+        linear_algebra: the BLAS kernel that numpy used meanwhile.
         same_world: the rebuilt world has the recorded hash.
         same_start: the state right after the reset is the recorded one to the bit (true where it was not recorded).
         drift: recorded against replayed states after each step.
@@ -162,6 +164,7 @@ class ReplayResult:
 
     manifest: Manifest
     engine: str
+    linear_algebra: str
     same_world: bool
     same_start: bool
     drift: Drift
@@ -171,6 +174,17 @@ class ReplayResult:
     def recorded_status(self) -> str:
         """How the recorded episode ended."""
         return self.manifest.status
+
+    @property
+    def explanation(self) -> str:
+        """What rounds differently here than where it was recorded, as a sentence; empty where nothing does."""
+        before = {
+            "engine": f"{self.manifest.engine} {self.manifest.engine_version}",
+            "linear algebra": str(self.manifest.clock.get("linear_algebra", self.linear_algebra)),
+        }
+        now = {"engine": self.engine, "linear algebra": self.linear_algebra}
+        others = [f"the {what} was {before[what]} and is {now[what]}" for what in now if before[what] != now[what]]
+        return f"Bits may differ: {'; '.join(others)}." if others else ""
 
     @property
     def identical(self) -> bool:
@@ -194,7 +208,8 @@ def rebuild(manifest: Manifest, engine: str | None = None, base: Path | None = N
 def replay(directory: str | Path, engine: str | None = None, base: Path | None = None) -> ReplayResult:
     """Replay a committed trajectory on the engine it was recorded on, or on another.
 
-    On the same engine, version and machine the states are equal to the bit; elsewhere the drift says how far not.
+    With the same engine, version and linear algebra the states are equal to the bit; elsewhere the drift says how far
+    not, and `explanation` what is another.
 
     Raises:
         RecordError: the trajectory is damaged.
@@ -208,6 +223,7 @@ def replay(directory: str | Path, engine: str | None = None, base: Path | None =
         return ReplayResult(
             reader.manifest,
             f"{env.engine.name} {env.engine.version}",
+            blas_kernel(),
             env.engine.world.hash == reader.manifest.world_hash,
             same_start,
             compare_states(reader.states, states),
