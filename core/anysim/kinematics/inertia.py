@@ -18,6 +18,9 @@ from anysim.model.shapes import solid_moments
 from anysim.model.world import Box, Capsule, Cylinder, Inertial, Mesh, MeshShape, Shape, Sphere
 
 BALL_RADIUS = 0.01  # [m] of the solid ball that stands for a body with mass and without any inertia
+VIRTUAL_SHARE = 1e-3
+"""The share of a body's mass and inertia that a link without any of its own gets, where a joint needs one: nothing
+beside the body, and enough for single precision where axes of a chain fall into line."""
 _FLOOR = 1e-6  # smallest second moment of a moving body, relative to their sum: engines reject exact equality
 _NOISE = 1e-12
 

@@ -98,7 +98,7 @@ def test_the_tree(load):
     assert model.links == {"stand": 0, "flange": 0, "upper": 1, "wrist": 3, "tool": 3}
     assert {s.name: s.body for s in model.sites} == {"flange": 0, "tool": 3, "tip": 3}
     assert model.bodies[0].position == (0.0, 0.0, 0.0)
-    assert "weighs 1 g" in words(model)
+    assert "takes 0.001 of its mass" in words(model)
     assert "1 geoms of the world" in words(model)
 
 
@@ -127,8 +127,8 @@ def test_geoms(load):
 
 
 def test_masks_that_never_meet_are_excluded_pairs(load):
-    """The wrist's sphere meets nothing, but its tool has MuJoCo's usual masks."""
-    assert load(ARM).excluded_pairs == frozenset()
+    """The wrist's sphere meets nothing, but its tool has MuJoCo's usual masks; its own parent it never meets."""
+    assert load(ARM).excluded_pairs == {(1, 3)}
     apart = ARM.replace(
         '<geom type="box" size="0.02 0.01 0.01" mass="0.05"/>', '<inertial mass="1" pos="0 0 0" diaginertia="1 1 1"/>'
     )

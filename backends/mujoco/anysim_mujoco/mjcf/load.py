@@ -4,12 +4,15 @@ Rules where the neutral model is narrower; each use is a note in the report:
 - One kinematic tree, of several the one that is asked for: geoms of the world beside it, cameras, lights and sensors
   stay behind. A tree whose first body has hinges or slides gets a fixed base at the file's origin.
 - Bodies without a joint are lumped into their parent; the frame survives as a site, the inertia is composed exactly.
-- A body with several joints becomes a chain, whose extra links weigh a gram.
+- A body with several joints becomes a chain: each extra link takes a share of `VIRTUAL_SHARE` of its mass and inertia,
+  and the body still collides with neither its parent nor what it did not collide with.
+- Sites and bodies share their names here: a site that is called like a body is found as `<body>.<site>`.
 - Joint positions keep the file's zero, whatever its `ref`. A keyframe `home` gives the initial ones.
 - Joint equalities become mimics (the linear term). Tendons, joint springs and drives that are no position, velocity or
   motor drive of one joint are dropped. Ball joints, connect and weld equalities and flexes are refused.
 """
 
+from collections.abc import Collection
 from dataclasses import replace
 from math import inf
 from pathlib import Path
@@ -23,6 +26,7 @@ from anysim.assets.model import ActuatorHint, ImportedModel, ImportNote
 from anysim.conventions import Array
 from anysim.errors import AssetError, listing
 from anysim.kinematics import inertia
+from anysim.kinematics.inertia import VIRTUAL_SHARE
 from anysim.math import pose as P
 from anysim.model.hash import split, tidy
 from anysim.model.world import Body, BodyKind, Inertial, Joint, JointType, Mimic, Site
@@ -30,8 +34,8 @@ from anysim_mujoco.inertia import full
 from anysim_mujoco.mjcf.drives import drive_hint
 from anysim_mujoco.mjcf.file import compiled
 from anysim_mujoco.mjcf.geoms import GeomReader, pose_of
+from anysim_mujoco.mjcf.pairs import PairReader
 
-VIRTUAL_MASS = 0.001  # [kg] of the extra links of a body with several joints
 _IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 _HINGE, _SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
 
@@ -51,7 +55,9 @@ class _MjcfImport:
 
     def __init__(self, model: Any, path: Path, scale: float, notes: list[ImportNote]) -> None:
         self.model, self.path, self.scale, self.notes = model, path, scale, notes
-        self.links = [model.body(i).name or f"body{i}" for i in range(model.nbody)]
+        self.links = _named([model.body(i).name for i in range(model.nbody)], "body")
+        self.joint_names = _named([model.joint(j).name for j in range(model.njnt)], "joint")
+        self.virtual: dict[int, int] = {}  # neutral body: the one with mass that it is a part of
         self.bodies: list[Body] = []
         self.inertials: list[list[Inertial]] = []
         self.joints: list[Joint] = []
@@ -82,7 +88,9 @@ class _MjcfImport:
             heightfields=tuple(geometry.heightfields.values()),
             links=self.place,
             actuator_hints=self._hints(),
-            excluded_pairs=self._excluded(),
+            excluded_pairs=PairReader(self.model, self.geometry, self.bodies, self.links, self.notes).excluded(
+                self.virtual
+            ),
             report=tuple(self.notes),
         )
 
@@ -130,7 +138,7 @@ class _MjcfImport:
         else:
             if number == top:
                 self._note("info", link, "moves against the world; it gets a fixed base at the file's origin")
-                self._add_body(Body("base" if "base" not in self.links else f"{link}_base", BodyKind.STATIC))
+                self._add_body(Body(_free("base", self.links), BodyKind.STATIC))
             parent, frame = self.frames.get(model.body_parentid[number], (0, _IDENTITY))
             self.frames[number] = self._attach(link, joints, parent, P.compose(frame, rest))
         body, pose = self.frames[number]
@@ -146,21 +154,19 @@ class _MjcfImport:
         if not joints:
             self.sites.append(Site(link, parent, *split(rest)))
             return parent, rest
+        first = len(self.bodies)
         for j in joints:
             last = j == joints[-1]
-            name = link if last else f"{link}.{self._joint_name(j)}"
+            name = (
+                link if last else _free(f"{link}.{self._joint_name(j)}", [*self.links, *(b.name for b in self.bodies)])
+            )
             rest = P.compose(rest, self._motion(j, -float(self.model.qpos0[self.model.jnt_qposadr[j]])))
             compensated = self._compensated(int(self.model.jnt_bodyid[j]))
             body = self._add_body(Body(name, BodyKind.LINK, parent, *split(rest), gravity_compensation=compensated))
-            if not last:
-                ball, _ = inertia.repaired(Inertial(VIRTUAL_MASS))
-                self.inertials[body].append(ball)
-                self._note(
-                    "repaired", name, f"stands for one of the joints of '{link}' and weighs {VIRTUAL_MASS * 1000:g} g"
-                )
             self.number[j] = len(self.joints)
             self.joints.append(self._joint(j, body))
             parent, rest = body, _IDENTITY
+        self.virtual |= dict.fromkeys(range(first, parent), parent)
         return parent, _IDENTITY
 
     def _compensated(self, number: int) -> bool:
@@ -176,8 +182,13 @@ class _MjcfImport:
         return len(self.bodies) - 1
 
     def _inertials(self) -> None:
+        totals = [inertia.composed([part for part in parts if part.mass > 0]) for parts in self.inertials]
         for i, body in enumerate(self.bodies):
-            total = inertia.composed([part for part in self.inertials[i] if part.mass > 0])
+            total = totals[i]
+            if i in self.virtual:
+                total = self._share(i, totals[self.virtual[i]])
+            elif shares := sum(whole == i for whole in self.virtual.values()):
+                total = inertia.scaled(total, 1.0 - shares * VIRTUAL_SHARE)
             if body.kind is not BodyKind.STATIC:
                 total, text = inertia.repaired(total)
                 if text is not None:
@@ -185,14 +196,25 @@ class _MjcfImport:
                 total = inertia.moving(total)
             self.bodies[i] = replace(body, inertial=total)
 
+    def _share(self, virtual: int, whole: Inertial) -> Inertial:
+        """The inertial of an extra link of a body that has this one: as the body lies at the file's zero."""
+        pose, body = _IDENTITY, self.virtual[virtual]
+        for link in range(virtual + 1, body + 1):
+            pose = P.compose(pose, P.pose(self.bodies[link].position, self.bodies[link].quaternion))
+        text = f"stands for one of the joints of '{self.bodies[body].name}', and takes {VIRTUAL_SHARE:g} of its mass"
+        self._note("repaired", self.bodies[virtual].name, f"{text}: {VIRTUAL_SHARE * whole.mass:.3g} kg")
+        return inertia.moved(inertia.scaled(whole, VIRTUAL_SHARE), pose)
+
     def _sites(self) -> None:
-        model, taken = self.model, {site.name for site in self.sites}
-        for s in range(model.nsite):
-            number, name = int(model.site_bodyid[s]), model.site(s).name or f"site{s}"
+        model, taken = self.model, {*self.links, *(body.name for body in self.bodies)}
+        for s, given in enumerate(_named([model.site(s).name for s in range(model.nsite)], "site")):
+            number = int(model.site_bodyid[s])
             if number == 0:
                 continue
             body, frame = self.frames[number]
-            name = name if name not in taken else f"{self.links[number]}.{name}"
+            name = given if given not in taken else _free(f"{self.links[number]}.{given}", taken)
+            if name != given:
+                self._note("info", f"site '{given}'", f"is found as '{name}': a body has its name")
             taken.add(name)
             pose = P.compose(frame, pose_of(model.site_pos[s], model.site_quat[s], self.scale))
             self.sites.append(Site(name, body, *split(pose)))
@@ -200,7 +222,7 @@ class _MjcfImport:
     # ------------------------------------------------------------------ joints
 
     def _joint_name(self, j: int) -> str:
-        return self.model.joint(j).name or f"joint{j}"
+        return self.joint_names[j]
 
     def _unit(self, j: int) -> float:
         return self.scale if self.model.jnt_type[j] == _SLIDE else 1.0
@@ -260,7 +282,7 @@ class _MjcfImport:
             start = multiplier * self.joints[target].initial + offset
             self.joints[own] = replace(self.joints[own], mimic=Mimic(target, multiplier, offset), initial=start)
 
-    # ------------------------------------------------------------------ drives and collisions
+    # ------------------------------------------------------------------ drives
 
     def _hints(self) -> tuple[ActuatorHint, ...]:
         hints = []
@@ -272,25 +294,19 @@ class _MjcfImport:
                 self._note("dropped", f"actuator '{self.model.actuator(a).name or a}'", why)
         return tuple(hints)
 
-    def _excluded(self) -> frozenset[tuple[int, int]]:
-        """Pairs that the file excludes, or whose collision masks never meet."""
-        model, pairs = self.model, set()
-        for signature in model.exclude_signature:
-            ends = [self.frames.get(int(n)) for n in (signature >> 16, signature & 0xFFFF)]
-            if ends[0] is not None and ends[1] is not None:
-                pairs.add((ends[0][0], ends[1][0]))
-        touching: dict[int, list[int]] = {}
-        for geom, number in zip(self.geometry.geoms, self.geometry.numbers, strict=True):
-            if geom.collides:
-                touching.setdefault(geom.body, []).append(number)
-        types, affinities = model.geom_contype, model.geom_conaffinity
-        for low, ours in touching.items():
-            for high, theirs in touching.items():
-                meets = any(types[i] & affinities[k] or types[k] & affinities[i] for i in ours for k in theirs)
-                if low < high and not meets:
-                    pairs.add((low, high))
-        related = {(body.parent, i) for i, body in enumerate(self.bodies)}
-        return frozenset((min(p), max(p)) for p in pairs if p[0] != p[1]) - frozenset(related)
-
     def _note(self, kind: Literal["repaired", "dropped", "info"], where: str, message: str) -> None:
         self.notes.append(ImportNote(kind, where, message))
+
+
+def _named(names: list[str], kind: str) -> list[str]:
+    """The names, and `body3` or the like for those without one, which no other has."""
+    return [name or _free(f"{kind}{i}", names) for i, name in enumerate(names)]
+
+
+def _free(name: str, taken: Collection[str]) -> str:
+    """The name, or the first of `name_1`, `name_2`, … that is not taken."""
+    count, free = 0, name
+    while free in taken:
+        count += 1
+        free = f"{name}_{count}"
+    return free
