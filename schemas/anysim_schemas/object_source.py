@@ -12,6 +12,7 @@ from anysim_schemas.values import TAG_PREFIX, Choice, Range
 SHAPES = ("box", "sphere", "cylinder", "capsule", "mesh", "asset", "procedural")
 PROCEDURAL = "procedural:"
 """What the URI of a procedural asset begins with."""
+PACKAGES = "folders, as URIs, of packages that a URDF refers to as `package://NAME/…`, by NAME"
 MESH_ENDINGS = (".stl", ".obj", ".dae", ".glb", ".ply")
 
 
@@ -22,7 +23,8 @@ class SourceSpec(Spec):
     """
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
-        *((shape, "scale") for shape in SHAPES[:-1]),
+        *((shape, "scale") for shape in SHAPES[:-2]),
+        ("asset", "packages", "scale"),
         ("procedural", "params", "scale"),
     )
 
@@ -34,6 +36,7 @@ class SourceSpec(Spec):
     )
     mesh: str | None = Field(default=None, description="URI of a mesh file; collides as its convex hull")
     asset: str | None = Field(default=None, description="URI of a URDF or MJCF file; FILE.xml#BODY for one of several")
+    packages: dict[str, str] = Field(default_factory=dict, description=PACKAGES)
     procedural: str | None = Field(
         default=None, description="a builder of articulated assets, as in `anysim list assets`"
     )
@@ -62,6 +65,8 @@ class SourceSpec(Spec):
             raise ValueError(f"expected exactly one of {', '.join(SHAPES)}; got {' and '.join(given) or 'none'}")
         if self.params and self.procedural is None:
             raise KeyFault("`params` are for the builder that `procedural` names", "params")
+        if self.packages and self.asset is None:
+            raise KeyFault("`packages` are for the URDF that `asset` names", "packages")
         return self
 
 

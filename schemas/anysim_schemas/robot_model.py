@@ -5,6 +5,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from anysim_schemas.base import Flag, Name, NonNegative, Number, Positive, Spec, Vec3
+from anysim_schemas.object_source import PACKAGES
 from anysim_schemas.objects import ContactSpec
 from anysim_schemas.vehicle import VehicleSpec
 
@@ -147,6 +148,7 @@ class RobotModelSpec(Spec):
         "builder"
     )
     params: dict[str, Any] = Field(default_factory=dict, description="parameters of a procedural source")
+    packages: dict[str, str] = Field(default_factory=dict, description=PACKAGES)
     needs: str | None = Field(
         default=None, description="the package to install for it, where that is not a dependency: `pip install NEEDS`"
     )

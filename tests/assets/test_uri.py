@@ -1,12 +1,17 @@
 """Asset URIs: what they find, what they refuse, and what they say."""
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from anysim.assets.catalogue import load_robot
 from anysim.assets.uri import example_robot_data, locate, resolve_reference
+from anysim.compile.robot import import_robot
+from anysim.compile.world import compile_world
 from anysim.errors import AssetError
+from anysim_schemas.run import WorldSpec
 
 
 def test_example_robot_data_is_found_without_importing() -> None:
@@ -101,7 +106,6 @@ def package(tmp_path: Path) -> Path:
         ("package://arm_description/meshes/link.STL", "arm_description/meshes/link.STL"),
         ("package://hand_description/meshes/hand.stl", "hand_description/meshes/hand.stl"),
         ("package:///arm_description/meshes/link.STL", "arm_description/meshes/link.STL"),
-        ("package://renamed/meshes/link.STL", "arm_description/meshes/link.STL"),
         ("../meshes/link.STL", "arm_description/meshes/link.STL"),
     ],
 )
@@ -109,6 +113,63 @@ def test_references_are_searched_up_to_the_root(package: Path, reference: str, f
     root = package / "outer"
     file = root / "arm_description/urdf/arm.urdf"
     assert resolve_reference(reference, file=file, root=root, asked_by="link 'a'") == root / found
+
+
+def test_a_package_is_never_another_one(package: Path) -> None:
+    """The file's own package has a `meshes/link.STL`, which is not what `other` has, whether that is there or not."""
+    file = package / "outer/arm_description/urdf/arm.urdf"
+    for root in (package / "outer", package / "outer/arm_description"):
+        with pytest.raises(AssetError) as caught:
+            resolve_reference("package://other/meshes/link.STL", file=file, root=root, asked_by="link 'a'")
+        assert "there is no package 'other' (looked for: " in str(caught.value)
+        assert "`packages: {other: FOLDER}`" in str(caught.value)
+        with pytest.raises(AssetError, match=r"hand_description/meshes/link\.STL"):  # it is there, without that file
+            resolve_reference("package://hand_description/meshes/link.STL", file=file, root=root, asked_by="link 'a'")
+
+
+@pytest.mark.parametrize("way", ["beside", "package.xml", "mapping", "ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH", "python"])
+def test_packages_are_found_by_name(package: Path, monkeypatch: pytest.MonkeyPatch, way: str) -> None:
+    root = package / "outer/arm_description"
+    found, packages = package / "outer/other/meshes/link.STL", {}
+    if way == "package.xml":
+        found = root / "meshes/link.STL"
+        (root / "package.xml").write_text("<package><name> other </name></package>")
+    elif way != "beside":
+        found = package / "elsewhere/share/other/meshes/link.STL"
+        folder, packages = found.parents[1], {"other": found.parents[1]} if way == "mapping" else {}
+        if way == "python":
+            monkeypatch.syspath_prepend(folder.parent)
+        elif way != "mapping":
+            monkeypatch.setenv(way, f"/nowhere:{folder.parent if way.startswith('ROS') else folder.parents[1]}")
+    found.parent.mkdir(parents=True, exist_ok=True)
+    found.write_text("x")
+    file = root / "urdf/arm.urdf"
+    reference = "package://other/meshes/link.STL"
+    assert resolve_reference(reference, file=file, root=root, asked_by="link 'a'", packages=packages) == found
+    (found.parent / "link.STL").unlink()
+    (found.parent / "link.STL").symlink_to(package / "stray.stl")
+    with pytest.raises(AssetError, match="leaves the asset's root"):
+        resolve_reference(reference, file=file, root=root, asked_by="link 'a'", packages=packages)
+
+
+def test_a_world_and_an_entry_say_where_packages_are(tmp_path: Path, inertial: Callable[[float], str]) -> None:
+    """Relative to the file that says so."""
+    (tmp_path / "parts/meshes").mkdir(parents=True)
+    corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    (tmp_path / "parts/meshes/part.obj").write_text(corners, encoding="ascii")
+    mesh = '<geometry><mesh filename="package://other/meshes/part.obj"/></geometry>'
+    (tmp_path / "model").mkdir()
+    (tmp_path / "model/thing.urdf").write_text(
+        f'<robot name="t"><link name="a">{inertial(1)}<collision>{mesh}</collision></link></robot>', encoding="utf-8"
+    )
+    source = {"asset": "model/thing.urdf", "packages": {"other": "parts"}}
+    spec = WorldSpec.model_validate({"objects": {"thing": {"source": source}}})
+    assert len(compile_world(spec, base=tmp_path).meshes) == 1
+    with pytest.raises(AssetError, match="no package 'other'"):
+        compile_world(WorldSpec.model_validate({"objects": {"thing": {"source": "model/thing.urdf"}}}), base=tmp_path)
+    entry = "name: thing\ndescription: t\nsource: model/thing.urdf\nlicense: MIT\nlicense_source: me\ncategory: arm\n"
+    (tmp_path / "thing.yaml").write_text(f"{entry}packages: {{other: parts}}\nbase: fixed\nchannels: {{}}\n")
+    assert len(import_robot(load_robot(str(tmp_path / "thing.yaml"))).meshes) == 1
 
 
 def test_references_cannot_leave_the_root(package: Path) -> None:

@@ -86,6 +86,8 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (out / folder).mkdir()
         for number, name in enumerate(names, 1):
             (out / folder / f"{name}.obj").write_text(tetrahedron(0.05 + 0.01 * number))
+        (out / folder / "one.obj").write_text(tetrahedron(0.04 + 0.0005 * ord(folder[0])))
+    (out / "packed.urdf").write_text(PACKED)
     for number, name in enumerate("ab"):
         np.save(out / f"{name}.npy", np.arange(9.0).reshape(3, 3) * (0.1 + number))
     (out / "grey.bmp").write_bytes(grey_image())
@@ -99,6 +101,12 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         text = (HERE / name).read_text().replace("file:../../runtime", f"file:{out}")
         (out / Path(name).name).write_text(text)
     return out
+
+
+PACKED = """<robot name="packed"><link name="it"><inertial><mass value="1"/>
+  <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+  <collision><geometry><mesh filename="package://toys/one.obj"/></geometry></collision></link></robot>
+"""
 
 
 def tetrahedron(edge: float) -> str:

@@ -7,7 +7,9 @@
 """
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Literal, NamedTuple
 
 from anysim import registry
@@ -15,7 +17,7 @@ from anysim.assets.mesh_budget import bounded
 from anysim.assets.model import ImportedModel
 from anysim.assets.procedural import from_uri
 from anysim.assets.urdf import import_urdf
-from anysim.assets.uri import locate
+from anysim.assets.uri import locate, locate_folder
 from anysim.errors import AssetError
 from anysim_schemas.limits import MODEL_BYTES
 from anysim_schemas.object_source import PROCEDURAL
@@ -37,20 +39,24 @@ class ModelFile(NamedTuple):
     body: str
 
 
-def import_asset(uri: str, *, base: Path | None = None, scale: float = 1.0) -> ImportedModel:
+def import_asset(
+    uri: str, *, base: Path | None = None, scale: float = 1.0, packages: Mapping[str, str] = MappingProxyType({})
+) -> ImportedModel:
     """The model behind a URI. `.urdf` is read here; `.xml` and `.mjcf` by the installed importer named `mjcf`.
 
-    `procedural:NAME` is built by the installed builder, with its default parameters.
+    `procedural:NAME` is built by the installed builder, with its default parameters. `packages` are the folders, as
+    URIs, of packages that a URDF refers to as `package://NAME/…`.
 
     Raises:
-        AssetError: see `model_file` and the importers.
+        AssetError: see `model_file`, `anysim.assets.uri.locate_folder` and the importers.
         PluginError: no importer for the format is installed.
     """
     if uri.startswith(PROCEDURAL):
         return from_uri(uri, scale=scale)
     file = model_file(uri, base=base)
     if file.kind == "urdf":
-        return import_urdf(file.path, root=file.root, scale=scale)
+        folders = {name: locate_folder(folder, base=base).path for name, folder in packages.items()}
+        return import_urdf(file.path, root=file.root, scale=scale, packages=folders)
     importer = registry.load("importers", file.kind)
     with registry.using("importers", file.kind):
         return importer(file.path, root=file.root, scale=scale, body=file.body)

@@ -16,6 +16,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from math import inf
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -36,25 +37,27 @@ _TYPES = {"revolute": JointType.REVOLUTE, "continuous": JointType.REVOLUTE, "pri
 _IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 
 
-def import_urdf(path: Path, *, root: Path, scale: float = 1.0) -> ImportedModel:
-    """Read a URDF file; see `anysim.assets.model.Importer` for the arguments.
+def import_urdf(
+    path: Path, *, root: Path, scale: float = 1.0, packages: Mapping[str, Path] = MappingProxyType({})
+) -> ImportedModel:
+    """Read a URDF file; see `anysim.assets.model.Importer` for the arguments, `resolve_reference` for `packages`.
 
     Raises:
         AssetError: a missing or damaged file or mesh, or something the neutral model cannot say.
     """
-    return _UrdfImport(UrdfFile(path), root, scale).run()
+    return _UrdfImport(UrdfFile(path), root, scale, packages).run()
 
 
 class _UrdfImport:
     """One import: walks the tree once, depth first, children in source order."""
 
-    def __init__(self, file: UrdfFile, root: Path, scale: float) -> None:
+    def __init__(self, file: UrdfFile, root: Path, scale: float, packages: Mapping[str, Path]) -> None:
         self.file, self.scale = file, scale
         self.notes: list[ImportNote] = []
         self.links = file.links
         self.children: dict[str, list[JointElement]] = {name: [] for name in self.links}
         self.base = self._structure()
-        self.geometry = GeometryReader(file, root, scale, self.notes)
+        self.geometry = GeometryReader(file, root, scale, packages, self.notes)
         self.bodies: list[Body] = []
         self.inertials: list[list[Inertial]] = []
         self.joints: list[Joint] = []

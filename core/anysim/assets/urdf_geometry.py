@@ -1,5 +1,6 @@
 """The visual and collision geometry of URDF links."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
@@ -27,8 +28,10 @@ class GeometryReader:
     Geoms are named `<link>.collision0`, `<link>.visual0`, and `<link>.visual0_1` where a file has several colours.
     """
 
-    def __init__(self, file: UrdfFile, root: Path, scale: float, notes: list[ImportNote]) -> None:
-        self._file, self._root, self._scale, self._notes = file, root, scale, notes
+    def __init__(
+        self, file: UrdfFile, root: Path, scale: float, packages: Mapping[str, Path], notes: list[ImportNote]
+    ) -> None:
+        self._file, self._root, self._scale, self._packages, self._notes = file, root, scale, packages, notes
         self.geoms: list[Geom] = []
         self.geom_links: list[str] = []
         self.meshes: dict[str, Mesh] = {}
@@ -92,7 +95,9 @@ class GeometryReader:
 
     def _path(self, link: str, mesh: urdf_xml.Shape) -> Path:
         who = self._file.where("link", link)
-        path = resolve_reference(mesh.filename, file=self._file.path, root=self._root, asked_by=who)
+        path = resolve_reference(
+            mesh.filename, file=self._file.path, root=self._root, asked_by=who, packages=self._packages
+        )
         self._read[path, self._mesh_scale(mesh)] = path.stat().st_size
         check(self._file.path, ASSET_BYTES, sum(self._read.values()))
         return path

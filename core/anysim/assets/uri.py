@@ -14,11 +14,18 @@ import difflib
 import glob
 import importlib
 import importlib.util
+import os
+import re
+from collections.abc import Mapping
+from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
+from anysim.assets.mesh_budget import bounded
 from anysim.errors import AssetError, listing, suggest
+from anysim_schemas.limits import MODEL_BYTES
 
 EXAMPLE_ROBOT_DATA = "example-robot-data"
 SCHEMES = (EXAMPLE_ROBOT_DATA, "package", "robot_descriptions", "file")
@@ -97,24 +104,34 @@ def _folder_inside(root: Path, rest: str, uri: str) -> AssetFile:
     return AssetFile(resolved, root)
 
 
-def resolve_reference(reference: str, *, file: Path, root: Path, asked_by: str) -> Path:
+def resolve_reference(
+    reference: str, *, file: Path, root: Path, asked_by: str, packages: Mapping[str, Path] = MappingProxyType({})
+) -> Path:
     """The file that a mesh reference in the URDF or MJCF `file` stands for.
 
-    `package://NAME/rest` (and `model://`) is searched in the folders from the file's own up to `root`: in one that is
-    called NAME, in its child NAME, then without NAME; `package://example-robot-data/…` also in that pip package. All
-    else is relative to the file. `asked_by` names what asks, as in `link 'panda_hand' of panda.urdf`.
+    `package://NAME/rest` (and `model://`) is a file of the package NAME, and of no other: see `_folders_of_package`.
+    All else is relative to the file. `asked_by` names what asks, as in `link 'panda_hand' of panda.urdf`, `packages`
+    the folders of packages by name.
 
     Raises:
         AssetError: missing (says where it was looked for and the nearest name there is), or outside of the root.
     """
-    root = root.resolve()
+    root, package = root.resolve(), ""
     scheme, marker, rest = reference.partition("://")
     if not marker:
         candidates = [(root, file.parent / reference)]
     elif scheme == "file":
         candidates = [(root, Path(rest))]
     elif scheme in ("package", "model"):
-        candidates = _package_candidates(rest, file.resolve(), root)
+        package, _, tail = rest.lstrip("/").partition("/")  # package:///NAME/rest is met, too
+        folders = _folders_of_package(package, file.resolve(), root, packages)
+        candidates = [(limit, folder / tail) for limit, folder in folders if folder.is_dir()]
+        if not candidates:
+            places = listing(dict.fromkeys(str(folder) for _, folder in folders), 4)
+            raise AssetError(
+                f"{asked_by} refers to '{reference}', and there is no package '{package}' (looked for: {places}); "
+                f"say where it is: `packages: {{{package}: FOLDER}}`, or in ROS_PACKAGE_PATH"
+            )
     else:
         raise AssetError(f"{asked_by} refers to '{reference}': only package://, model://, file:// and paths are known")
     outside: Path | None = None
@@ -127,7 +144,7 @@ def resolve_reference(reference: str, *, file: Path, root: Path, asked_by: str) 
     if outside is not None:
         raise AssetError(f"{asked_by} refers to '{reference}', which leaves the asset's root {root}: it is {outside}")
     places = listing(dict.fromkeys(str(candidate) for _, candidate in candidates), 4)
-    near = _nearest(candidates[0][1], root)
+    near = _nearest(candidates[0][1], candidates[0][0])
     raise AssetError(f"{asked_by} refers to '{reference}', which does not exist{near} (looked for: {places})")
 
 
@@ -145,19 +162,43 @@ def example_robot_data() -> Path:
     return folder.resolve()
 
 
-def _package_candidates(rest: str, file: Path, root: Path) -> list[tuple[Path, Path]]:
-    name, _, tail = rest.lstrip("/").partition("/")  # package:///NAME/rest is met, too
-    folders = [folder for folder in file.parents if folder.is_relative_to(root)]
-    found = [(root, folder / tail) for folder in folders if folder.name == name]
-    found += [(root, folder / name / tail) for folder in folders]
-    found += [(root, folder / tail) for folder in folders]
+def _folders_of_package(name: str, file: Path, root: Path, packages: Mapping[str, Path]) -> list[tuple[Path, Path]]:
+    """Where the package `name` may lie, and what no file of it may leave: the first that is there counts.
+
+    What `packages` says; the pip package example-robot-data; a folder from the file's own up to `root` that is called
+    so, or says so in its package.xml; a folder `name` in one of those, or beside `root`; in a folder of
+    ROS_PACKAGE_PATH, or the share of one of AMENT_PREFIX_PATH; an installed Python package, which is not imported.
+    """
+    if name in packages:
+        return [(packages[name].resolve(), packages[name])]
+    if not name.strip(".") or "\0" in name:
+        return []
+    found: list[Path] = []
     if name == EXAMPLE_ROBOT_DATA:
-        try:
-            robots = example_robot_data()
-        except AssetError:
-            return found
-        found.insert(0, (robots, robots.parent / tail))
-    return found
+        with suppress(AssetError):
+            found.append(example_robot_data().parent)
+    above = [folder for folder in file.parents if folder.is_relative_to(root)]
+    inside = [folder for folder in above if folder.name == name or _package_name(folder) == name]
+    inside += [folder / name for folder in above]
+    found.append(root.parent / name)
+    for variable, below in (("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share")):
+        for entry in filter(None, os.environ.get(variable, "").split(os.pathsep)):
+            if Path(entry).name == name or _package_name(Path(entry)) == name:
+                found.append(Path(entry))
+            found.append(Path(entry) / below / name)
+    if name.isidentifier():
+        with suppress(AssetError):
+            found += _package_folders(name, name)
+    return [*((root, folder) for folder in inside), *((folder.resolve(), folder) for folder in found)]
+
+
+def _package_name(folder: Path) -> str:
+    """The name in a folder's package.xml; empty without one."""
+    path = folder / "package.xml"
+    if not path.is_file():
+        return ""
+    named = re.search(rb"<name>\s*([\w.-]+)\s*</name>", bounded(path, MODEL_BYTES))
+    return named[1].decode() if named else ""
 
 
 def _inside(root: Path, rest: str, uri: str) -> AssetFile:

@@ -144,7 +144,7 @@ def _model(
     friction = DEFAULT_FRICTION if spec.friction is None else float(nominal(spec.friction))
     touch = surface(spec.contact or ContactSpec(), friction, float(nominal(spec.restitution or 0.0)))
     if source.asset is not None:
-        model = import_asset(source.asset, base=base, scale=source.scale)
+        model = import_asset(source.asset, base=base, scale=source.scale, packages=source.packages)
         return _asset(spec, source, model, touch, color, issues, key)
     if source.procedural is not None:
         model = build(source.procedural, source.params, scale=source.scale)

@@ -74,7 +74,7 @@ def _read(entry: CatalogueEntry, source: str, params: Mapping[str, Any], where: 
     try:
         if source.startswith(PROCEDURAL):
             return build(source.removeprefix(PROCEDURAL), params)
-        return import_asset(source, base=entry.file.parent)
+        return import_asset(source, base=entry.file.parent, packages=entry.spec.packages)
     except SpecError as error:
         raise AssetError(f"{where} is not valid: {error}") from None
 

@@ -61,6 +61,7 @@ HINGE = "world.objects.red.source={procedural: hinge_box}"
 MANY = *ALONE, "world.objects.red.count=8", "world.objects.red.family=rigid_instancer"
 MESH = "world.objects.red.source={mesh: 'file:$FILES/shapes/a.obj'}"
 FOLDER = "world.objects.red.source={folder: 'file:$FILES/shapes', pattern: '*'}"
+PACKED = "source={asset: 'file:$FILES/packed.urdf', packages: {toys: 'file:$FILES"
 PATTERN = "world.objects.red.texture={pattern: noise}"
 MOUNT = "world.cameras.eye={mount: red, channels: []}"
 DOORS, WINDOWS = ", doors: [{wall: east}]", ", windows: [{wall: north}]"
@@ -213,6 +214,7 @@ ROWS: dict[str, Row] = {
     "SourceSpec.capsule": red("source={capsule: [0.03, 0.06]}", "world.objects.red.source={capsule: [0.03, 0.05]}"),
     "SourceSpec.mesh": red("source={mesh: 'file:$FILES/shapes/b.obj'}", MESH),
     "SourceSpec.asset": red("source={asset: 'file:$FILES/two_link.urdf'}"),
+    "SourceSpec.packages": red(f"{PACKED}/others'}}}}", f"world.objects.red.{PACKED}/shapes'}}}}"),
     "SourceSpec.procedural": red("source={procedural: hinge_box}", VALVE),
     "SourceSpec.params": red("source={procedural: valve, params: {damping: 0.7}}", VALVE),
     "SourceSpec.scale": red("source={mesh: 'file:$FILES/shapes/a.obj', scale: 0.5}", MESH),
