@@ -312,6 +312,34 @@ def test_damaged_files_are_named(tmp_path: Path) -> None:
         import_urdf(tmp_path / "none.urdf", root=tmp_path)
 
 
+@pytest.mark.parametrize(
+    "head",
+    [
+        '<?xml version="0.0"?>',
+        "<?xml version='0.1' encoding='utf-8' ?>",
+        '\n <?xml version="1.0"?>',
+        '<!-- made by hand -->\n<?xml version="1.0"?>\n',
+    ],
+)
+def test_odd_declarations_count_for_nothing(tmp_path: Path, inertial: Text, head: str) -> None:
+    """26 files of pybullet_data say that they are XML 0.0."""
+    (tmp_path / "arm.urdf").write_text(f'{head}<robot name="r">{link("a", inertial(1))}</robot>', encoding="utf-8")
+    assert import_urdf(tmp_path / "arm.urdf", root=tmp_path).bodies[0].inertial.mass == 1
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        ("<deformable name='t'/>", "it is a deformable body of PyBullet"),
+        ("<xacro:macro name='t' xmlns:xacro='http://www.ros.org/wiki/xacro'/>", "it is a xacro source"),
+        ("<sensor name='s'/><gazebo/>", "it holds <sensor>, <gazebo>"),
+    ],
+)
+def test_what_a_file_without_links_is(urdf: Load, body: str, words: str) -> None:
+    with pytest.raises(AssetError, match=f"has no links: {words}"):
+        urdf(body)
+
+
 def test_trailing_null_bytes_and_deep_chains(tmp_path: Path, inertial: Text) -> None:
     count = 1500  # more than Python's recursion limit
     text = "".join(link(f"l{i}", inertial(0.01)) for i in range(count))

@@ -100,7 +100,7 @@ class _UrdfImport:
     def _structure(self) -> str:
         """Fills `children` and returns the root link."""
         if not self.links:
-            raise AssetError(f"{self.file.path}: has no links (a xacro source needs to be expanded first)")
+            raise AssetError(f"{self.file.path}: has no links: {self.file.instead}")
         parent: dict[str, str] = {}
         for joint in self.file.joints:
             here = self.file.where("joint", joint.name)

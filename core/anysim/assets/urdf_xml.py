@@ -15,7 +15,7 @@ import numpy as np
 
 from anysim.assets.xml import xml_root
 from anysim.conventions import Array
-from anysim.errors import AssetError
+from anysim.errors import AssetError, listing
 from anysim.math import pose as P
 
 Rgba = tuple[float, float, float, float]
@@ -91,6 +91,7 @@ class UrdfFile:
             color = material.find("color")
             if color is not None and color.get("rgba") and material.get("name"):
                 self._materials.setdefault(material.get("name"), self._rgba(color))
+        self.instead = _instead([str(element.tag) for element in root])
         self.links = {element.get("name"): self._link(element) for element in root.findall("link")}
         self.joints = [self._joint(element) for element in root.findall("joint")]
 
@@ -240,3 +241,12 @@ class UrdfFile:
 
     def _error(self, element: Any, message: str) -> AssetError:
         return AssetError(f"{self.path}:{element.sourceline}: {message}")
+
+
+def _instead(tags: list[str]) -> str:
+    """What a file without links is."""
+    if "deformable" in tags:
+        return "it is a deformable body of PyBullet, and the neutral model has rigid ones"
+    if any("xacro" in tag for tag in tags):
+        return "it is a xacro source, which needs to be expanded first"
+    return f"it holds {listing(dict.fromkeys(f'<{tag}>' for tag in tags), 6)}"

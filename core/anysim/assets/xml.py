@@ -8,9 +8,18 @@ from anysim.assets.mesh_budget import bounded, check, plain_encoding
 from anysim.errors import AssetError
 from anysim_schemas.limits import MODEL_BYTES, MODEL_DEPTH, MODEL_ELEMENTS
 
+_DECLARATION = re.compile(rb"""<\?xml\s+version\s*=\s*["'][^"'?]*["']([^?>]*)\?>""")
+
+
+def _declared(found: re.Match[bytes]) -> bytes:
+    """An XML declaration of version 1.0 at the beginning, elsewhere spaces."""
+    return b'<?xml version="1.0"' + found[1] + b"?>" if found.start() == 0 else b" " * len(found[0])
+
 
 def xml_root(path: Path) -> tuple[Any, bytes]:
     """The root element (`lxml.etree`) of a file without comments, entities and DTDs; and the file's bytes.
+
+    Files in use declare versions of XML that there are not, or begin with something else: neither counts.
 
     Raises:
         AssetError: see `bounded`; not well-formed, a document type declaration, an encoding that hides elements, too
@@ -26,7 +35,7 @@ def xml_root(path: Path) -> tuple[Any, bytes]:
         raise AssetError(f"{path}: its encoding is not UTF-8; save it as UTF-8")
     check(path, MODEL_ELEMENTS, len(re.findall(rb"<[A-Za-z_]", data)))
     try:
-        root = etree.fromstring(data, parser)
+        root = etree.fromstring(_DECLARATION.sub(_declared, data), parser)
     except etree.XMLSyntaxError as error:
         if "Excessive depth" in str(error):
             raise AssetError(f"{path}: {MODEL_DEPTH.sentence()}") from error
