@@ -18,9 +18,12 @@ class GainSpec(Spec):
     kp: NonNegative = Field(description="stiffness [N m/rad] or [N/m]")
     kd: NonNegative = Field(description="damping [N m s/rad] or [N s/m]")
     effort_limit: Positive | None = Field(
-        default=None, description="largest effort [N m] or [N]; the source's limit where not given"
+        default=None,
+        description="largest effort [N m] or [N]; the source's limit of the joint and of its drive where not given",
     )
-    armature: NonNegative = Field(default=0.0, description="rotor inertia seen at the joint [kg m^2] or [kg]")
+    armature: NonNegative | None = Field(
+        default=None, description="rotor inertia seen at the joint [kg m^2] or [kg]; the source's where not given"
+    )
     damping: NonNegative | None = Field(
         default=None, description="of the joint itself [N m s/rad] or [N s/m]; the source's where not given"
     )
@@ -36,7 +39,7 @@ class ChannelSpec(Spec):
     groups: dict[Name, tuple[str, ...]] = Field(
         default_factory=dict, description="named parts of the channel, as `left` and `right`: some of its joints"
     )
-    gains: GainSpec | None = Field(default=None, description="the drive of every joint of the channel")
+    gains: GainSpec | None = Field(default=None, description="the drive of every joint; the source's where not given")
     joint_gains: dict[str, GainSpec] = Field(
         default_factory=dict, description="drives that differ: by joint name, `*` matches any part; a later one wins"
     )

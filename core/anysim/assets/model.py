@@ -27,7 +27,7 @@ class ImportNote(NamedTuple):
 
 
 class ActuatorHint(NamedTuple):
-    """A drive that the source itself declares, used where no catalogue entry says otherwise; `joint` is local."""
+    """A drive that the source itself declares, for what the catalogue entry leaves open; `joint` is local."""
 
     joint: int
     mode: ControlMode
@@ -65,6 +65,11 @@ class ImportedModel:
     actuator_hints: tuple[ActuatorHint, ...] = ()
     excluded_pairs: frozenset[tuple[int, int]] = frozenset()
     report: tuple[ImportNote, ...] = ()
+
+    def drive_of(self, joint: int) -> ActuatorHint | None:
+        """The drive that the source declares for a joint; None where it declares none, or several."""
+        found = [hint for hint in self.actuator_hints if hint.joint == joint]
+        return found[0] if len(found) == 1 else None
 
     @property
     def frames(self) -> Mapping[str, FixedFrame]:

@@ -223,6 +223,9 @@ def _asset(
     if spec.mass is not None and total > 0:
         factor = float(nominal(spec.mass)) / total
         bodies = tuple(replace(body, inertial=inertia.scaled(body.inertial, factor)) for body in bodies)
+    if model.actuator_hints:
+        text = f"{len(model.actuator_hints)} drives of its file are left out: joints of an object are not driven"
+        model = replace(model, report=(*model.report, ImportNote("dropped", "actuators", text)))
     if not spec.fixed:
         root, text = inertia.repaired(bodies[0].inertial)
         bodies = (replace(bodies[0], inertial=inertia.moving(root)), *bodies[1:])

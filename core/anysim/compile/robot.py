@@ -168,7 +168,7 @@ class _Assembly:
                     if i == index or (joint.mimic is not None and joint.mimic.joint == index):
                         joints[i] = replace(
                             joint,
-                            armature=gains.armature,
+                            armature=joint.armature if gains.armature is None else gains.armature,
                             limit_softness=soft,
                             damping=joint.damping if gains.damping is None else gains.damping,
                             friction=joint.friction if gains.friction is None else gains.friction,
@@ -199,14 +199,18 @@ class _Assembly:
         return joints
 
     def _gains(self, channel: str, joint: str) -> GainSpec:
-        """The drive of a joint: the last of `joint_gains` that matches, else the channel's."""
-        spec = self.entry.channels[channel]
+        """The drive of a joint: the last of `joint_gains` that matches, else the channel's, else the source's."""
+        spec, own = self.entry.channels[channel], self.model.drive_of(self.number[joint])
         matching = [gains for pattern, gains in spec.joint_gains.items() if fnmatchcase(joint, pattern)]
-        if not matching and spec.gains is None:
-            self.own.at("channels", channel).add(
-                "joint_gains", f"no gains for the joint '{joint}'; add them here or give the channel `gains`"
-            )
-        return matching[-1] if matching else spec.gains or GainSpec(kp=0.0, kd=0.0)
+        if matching or spec.gains is not None:
+            return matching[-1] if matching else spec.gains or GainSpec(kp=0.0, kd=0.0)
+        if own is not None and own.mode == spec.mode:
+            return GainSpec(kp=own.kp, kd=own.kd)
+        other = "" if own is None else f" (its source drives it by {own.mode}, the channel by {spec.mode})"
+        self.own.at("channels", channel).add(
+            "joint_gains", f"no gains for the joint '{joint}'; add them here or give the channel `gains`{other}"
+        )
+        return GainSpec(kp=0.0, kd=0.0)
 
     def _known(self, names: Sequence[str], issues: Issues) -> list[int]:
         unknown = [name for name in names if name not in self.number]
@@ -231,7 +235,9 @@ class _Assembly:
                 driven[index] = name
                 gains = self._gains(name, joints[index].name)
                 actuators.append(len(builder.actuators))
-                effort = joints[index].effort_limit if gains.effort_limit is None else gains.effort_limit
+                own, effort = self.model.drive_of(index), joints[index].effort_limit
+                effort = min(effort, own.effort_limit) if own is not None else effort
+                effort = effort if gains.effort_limit is None else gains.effort_limit
                 drive = f"{self.name}.{joints[index].name}"
                 builder.actuators.append(
                     Actuator(drive, entity.joint_start + index, ControlMode(spec.mode), gains.kp, gains.kd, effort)
