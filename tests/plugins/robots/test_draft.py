@@ -114,3 +114,93 @@ def test_one_of_several_bodies_has_a_draft_of_its_own(tmp_path: Path) -> None:
     assert made.name == "right"
     assert 'source: "pair.xml#right"' in made.text(tmp_path)
     assert [joint.name for joint in built(made, tmp_path).joints] == ["robot.right_turn"]
+
+
+def test_drives_and_armature_of_the_file_are_the_drafts(tmp_path: Path) -> None:
+    """A gripper of 20 N stays one of 20 N; what the file leaves open is guessed, and said to be."""
+    (tmp_path / "grip.xml").write_text(
+        """<mujoco><worldbody><body name="arm"><geom size="0.05" mass="1"/>
+        <body name="upper" pos="0 0 0.1"><joint name="turn" axis="0 0 1" armature="0.1" range="-90 90"/>
+          <geom type="box" size="0.02 0.02 0.2" mass="1"/>
+          <body name="finger" pos="0 0 0.3"><joint name="grip" type="slide" axis="1 0 0" range="0 0.0412345678"/>
+            <geom type="box" size="0.01 0.01 0.03" mass="0.05"/></body>
+          <body name="free" pos="0 0 0.2"><joint name="loose" axis="1 0 0" range="10 90"/><geom size="0.01"/></body>
+        </body></body></worldbody>
+        <actuator><position joint="turn" kp="300" kv="30"/><position joint="grip" kp="700" kv="9" forcerange="-20 20"/>
+        </actuator></mujoco>"""
+    )
+    made = draft(tmp_path / "grip.xml")
+    text = made.text(tmp_path)
+    assert "grip: {kp: 700, kd: 9, armature: " in text
+    assert "turn: {kp: 300, kd: 30, effort_limit: " in text
+    assert "}  # the file's: kp and kd, its effort limit" in text
+    assert "}  # the file's: kp and kd, armature" in text
+    world = built(made, tmp_path)
+    drives = {a.name: a for a in world.actuators}
+    assert (drives["robot.grip"].kp, drives["robot.grip"].effort_limit) == (700, 20)
+    assert world.joints[0].armature == 0.1
+    assert "effort limits: the source has none for turn, loose" in text
+
+
+def test_positions_of_a_draft_are_inside_of_the_limits(tmp_path: Path) -> None:
+    """A limit of 2 degrees has more decimals than a draft, and the joint begins there."""
+    (tmp_path / "knee.xml").write_text(
+        '<mujoco><worldbody><body name="b"><geom size="0.1"/><body name="l"><joint name="knee" range="-160 -2"/>'
+        '<geom size="0.1"/></body><body name="f"><joint name="finger" range="0.00001 2.0001"/><geom size="0.1"/></body>'
+        "</body></worldbody></mujoco>"
+    )
+    world = built(draft(tmp_path / "knee.xml"), tmp_path)
+    assert [joint.initial for joint in world.joints] == [
+        joint.upper if i == 0 else joint.lower for i, joint in enumerate(world.joints)
+    ]
+
+
+PLANAR = """<mujoco><worldbody><body name="torso" pos="0 0 0.6">
+  <joint name="rootx" type="slide" axis="1 0 0"/><joint name="rootz" type="slide" axis="0 0 1"/>
+  <joint name="rooty" axis="0 1 0"/><geom type="capsule" fromto="-.3 0 0 .3 0 0" size="0.05"/>
+  {legs}</body></worldbody><actuator>{motors}</actuator></mujoco>"""
+
+
+def test_a_planar_root_does_not_float(tmp_path: Path) -> None:
+    """A cheetah: two legs, and three joints against the world that nothing drives."""
+    leg = (
+        '<body name="{0}thigh" pos="{1} 0 0"><joint name="{0}thigh_joint" axis="0 1 0" range="-30 30"/>'
+        '<geom type="capsule" fromto="0 0 0 0 0 -.25" size="0.03"/><body name="{0}foot" pos="0 0 -.25">'
+        '<joint name="{0}foot_joint" axis="0 1 0" range="-30 30"/>'
+        '<geom type="capsule" fromto="0 0 0 0 0 -.25" size="0.03"/></body></body>'
+    )
+    motor = '<motor joint="{0}thigh_joint" gear="60"/><motor joint="{0}foot_joint" gear="30" ctrlrange="-1 1"/>'
+    sides = (("front", 0.3), ("back", -0.3))
+    (tmp_path / "cheetah.xml").write_text(
+        PLANAR.format(
+            legs="".join(leg.format(*side) for side in sides), motors="".join(motor.format(side[0]) for side in sides)
+        )
+    )
+    made = draft(tmp_path / "cheetah.xml")
+    assert not made.guess.floating
+    assert made.guess.anchored == ("rootx", "rootz", "rooty")
+    assert "base: fixed; its first body moves against the world by rootx, rootz, rooty" in made.guess.reasons
+    world = built(made, tmp_path)
+    assert [a.name for a in world.actuators] == [
+        f"robot.{s}{j}_joint" for s in ("front", "back") for j in ("thigh", "foot")
+    ]
+    assert not any(body.gravity_compensation for body in world.bodies)
+
+
+@pytest.mark.parametrize("chains", [4, 8])
+def test_chains_at_the_corners_are_legs_and_not_fingers(tmp_path: Path, chains: int) -> None:
+    """Whatever they are called, and stretched out flat as many files have them; those of a hand are on one side."""
+    leg = (
+        '<body pos="{0} {1} 0"><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 .2 0 0" size="0.02"/>'
+        '<body pos="0.2 0 0"><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 .2 0 0" size="0.02"/>'
+        "</body></body>"
+    )
+    places = [(x, y * (1 + 0.1 * k)) for x in (0.2, -0.2) for y in (0.1, -0.1) for k in range(chains // 4)]
+    text = '<mujoco><worldbody><body name="b"><geom type="box" size="0.2 0.1 0.05"/>{0}</body></worldbody></mujoco>'
+    (tmp_path / "dog.xml").write_text(text.format("".join(leg.format(*place) for place in places)))
+    made = draft(tmp_path / "dog.xml")
+    assert (made.guess.category, made.guess.floating, len(made.guess.legs)) == ("quadruped", True, chains)
+    built(made, tmp_path)
+    row = [(0.1, 0.03 * i) for i in range(3)] + [(-0.1, 0.0)]
+    (tmp_path / "hand.xml").write_text(text.format("".join(leg.format(*place) for place in row)))
+    assert draft(tmp_path / "hand.xml").guess.category == "hand"

@@ -23,9 +23,13 @@ class PairReader:
     """Reads the pairs of one model; `links` are the names of MuJoCo's bodies."""
 
     def __init__(
-        self, model: mujoco.MjModel, geometry: GeomReader, bodies: Sequence[Body], links: Sequence[str],
+        self,
+        model: mujoco.MjModel,
+        geometry: GeomReader,
+        bodies: Sequence[Body],
+        links: Sequence[str],
         notes: list[ImportNote],
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._model, self._links, self._notes, self._bodies = model, links, notes, bodies
         self._apart = {frozenset((int(n) >> 16, int(n) & 0xFFFF)) for n in model.exclude_signature}
         self._shapes: dict[int, list[int]] = {}

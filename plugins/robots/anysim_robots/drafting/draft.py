@@ -1,15 +1,16 @@
 """A draft of a catalogue entry as YAML that loads and builds, with comments where a person has to decide."""
 
 import re
-from math import isinf
+from math import inf, isinf
 from pathlib import Path
 from typing import NamedTuple
 
 from anysim.assets.load import import_asset, split_body
 from anysim.assets.model import ImportedModel
 from anysim.errors import AssetError
+from anysim.model.world import ControlMode, Joint
 from anysim_robots.drafting.gains import BANDWIDTH, ROTOR, SETTLING, STANDING, Gains, gains
-from anysim_robots.drafting.guess import Guess, guess, home_of
+from anysim_robots.drafting.guess import Guess, guess, home_of, within
 
 NO_LICENCE = "LicenseRef-TODO"
 
@@ -56,41 +57,52 @@ class Draft(NamedTuple):
         channels = {"base": base, "arm": g.arm, "eef": g.eef}
         if not any(channels.values()):
             return ["channels: {}"]
-        lines = [
-            f"# Gains: critically damped at {BANDWIDTH:g} Hz with the inertia that each joint sees at home; armature",
-            f"# is {100 * ROTOR:g} % of that" + (
-                f"; legs: kp at least {STANDING:g} m times the weight, kd {SETTLING:g} s times kp." if legs else "."
-            ),
-            "channels:",
-        ]  # fmt: skip
+        lines = ["# Gains and armature that are not the file's are guessed: critically damped at"]
+        lines += [
+            f"# {BANDWIDTH:g} Hz with the inertia that each joint sees at home; armature is {100 * ROTOR:g} % of that"
+        ]
+        lines[-1] += (
+            f"; legs: kp at least {STANDING:g} m times the weight, kd {SETTLING:g} s times kp." if legs else "."
+        )
+        lines.append("channels:")
         for name, joints in channels.items():
             if not joints:
                 continue
             lines += [f"  {name}:", f"    joints: [{', '.join(map(_quoted, joints))}]", "    joint_gains:"]
-            if set(joints) <= set(g.wheels):
+            velocity = set(joints) <= set(g.wheels)
+            if velocity:
                 lines.insert(-1, "    mode: velocity")
-            for joint in joints:
-                own = self.gains[joint]
-                kp = 0.0 if joint in g.wheels else own.kp
-                values = f"kp: {kp:g}, kd: {own.kd:g}, armature: {own.armature:g}"
-                effort = self._effort(joint)
-                lines.append(f"      {_quoted(joint)}: {{{values}{effort}}}")
+            lines += [
+                self._drive(joint, ControlMode.VELOCITY if velocity else ControlMode.POSITION) for joint in joints
+            ]
             lines += self._controllers(name, joints)
         return lines
 
-    def _effort(self, joint: str) -> str:
-        """A limit where the source has none or nothing that moves."""
-        found = next(j for j in self.model.joints if j.name == joint)
-        if found.effort_limit > 0 and not isinf(found.effort_limit):
-            return ""
-        return f", effort_limit: {float(f'{max(1.0, self.gains[joint].kp):.2g}'):g}"
+    def _drive(self, name: str, mode: ControlMode) -> str:
+        """The line of a joint: what the file says of its drive where that is of this mode, else guesses."""
+        own, joint = self.gains[name], next(j for j in self.model.joints if j.name == name)
+        found = self.model.drive_of(self.model.joints.index(joint))
+        of_file = [] if found is None or isinf(found.effort_limit) else ["its effort limit"]
+        kp, kd = 0.0 if mode is ControlMode.VELOCITY else own.kp, own.kd
+        if found is not None and found.mode is mode and (found.kp or found.kd):
+            kp, kd = found.kp, found.kd
+            of_file.insert(0, "kp and kd")
+        values = [f"kp: {kp:g}", f"kd: {kd:g}"]
+        if joint.armature > 0:
+            of_file.append("armature")
+        else:
+            values.append(f"armature: {own.armature:g}")
+        if _limit(self.model, joint) is None:
+            values.append(f"effort_limit: {float(f'{max(1.0, own.kp):.2g}'):g}")
+        told = f"  # the file's: {', '.join(of_file)}" if of_file else ""
+        return f"      {_quoted(name)}: {{{', '.join(values)}}}{told}"
 
     def _controllers(self, name: str, joints: tuple[str, ...]) -> list[str]:
         if name == "eef":
             ends = [self._ends(joint) for joint in joints]
             if all(end is not None for end in ends):
-                opened = ", ".join(f"{end[0]:g}" for end in ends if end is not None)
-                closed = ", ".join(f"{end[1]:g}" for end in ends if end is not None)
+                opened = ", ".join(repr(end[0]) for end in ends if end is not None)
+                closed = ", ".join(repr(end[1]) for end in ends if end is not None)
                 return [
                     f"    opened: [{opened}]  # the limit that is farther from zero",
                     f"    closed: [{closed}]",
@@ -105,14 +117,14 @@ class Draft(NamedTuple):
         found = next(j for j in self.model.joints if j.name == joint)
         if isinf(found.lower) or isinf(found.upper):
             return None
-        ends = sorted((round(found.lower, 6), round(found.upper, 6)), key=abs)
+        ends = sorted((within(found.lower, found, 6), within(found.upper, found, 6)), key=abs)
         return ends[1], ends[0]
 
     def _rest(self) -> list[str]:
         g, lines = self.guess, []
         home = home_of(self.model)
         if home:
-            lines += ["home:", *(f"  {_quoted(joint)}: {value:g}" for joint, value in home.items())]
+            lines += ["home:", *(f"  {_quoted(joint)}: {value!r}" for joint, value in home.items())]
         if g.tool is not None:
             lines += [
                 "tools:",
@@ -123,7 +135,8 @@ class Draft(NamedTuple):
             for leg in g.legs:
                 joints = ", ".join(map(_quoted, leg.joints))
                 lines.append(f"  {leg.name}: {{joints: [{joints}], foot: {_quoted(leg.foot)}}}")
-        lines += ["self_collision: false", f"gravity_compensation: {'false' if g.floating else 'true'}"]
+        weighed = "false" if g.floating or g.anchored else "true"
+        lines += ["self_collision: false", f"gravity_compensation: {weighed}"]
         return lines
 
 
@@ -155,7 +168,7 @@ def _open(model: ImportedModel, found: Guess) -> list[str]:
     """What could not be inferred."""
     asked = [
         "license: the SPDX expression of the files, and where it is stated; a robot without one is nobody's to use",
-        "gains and armature: guessed from inertia; take the maker's, or identify them",
+        "gains and armature: those that are not said to be the file's are guessed from inertia; take the maker's",
     ]
     followers = [joint.name for joint in model.joints if joint.mimic is not None]
     if followers:
@@ -176,13 +189,22 @@ def _open(model: ImportedModel, found: Guess) -> list[str]:
         asked.append("tools: no frame that tasks could refer to was recognised")
     else:
         asked.append(f"tools: '{found.tool}' was chosen by its name or place; check the direction of its axes")
-    unlimited = [j.name for j in model.joints if j.mimic is None and (isinf(j.effort_limit) or j.effort_limit <= 0)]
+    if found.anchored:
+        asked.append(f"{', '.join(found.anchored)}: move it against the world, and no drive of the file moves them")
+    unlimited = [j.name for j in model.joints if j.mimic is None and _limit(model, j) is None]
     if unlimited:
         asked.append(f"effort limits: the source has none for {', '.join(unlimited[:6])}{'…' * (len(unlimited) > 6)}")
     if not any(geom.collides for geom in model.geoms):
         asked.append("collision shapes: the source has none; the robot passes through everything")
     asked.append("sensors, surfaces and self_collision are not in the file")
     return asked
+
+
+def _limit(model: ImportedModel, joint: Joint) -> float | None:
+    """The largest effort that the source states of a joint or its drive; None without one that moves anything."""
+    drive = model.drive_of(model.joints.index(joint))
+    limit = min(joint.effort_limit, inf if drive is None else drive.effort_limit)
+    return limit if 0 < limit < inf else None
 
 
 def _source(file: Path, folder: Path) -> str:

@@ -27,14 +27,18 @@ class Gains(NamedTuple):
 
 
 def gains(model: ImportedModel, floating: bool, legs: frozenset[str]) -> dict[str, Gains]:
-    """By joint, from the diagonal of the mass matrix at the initial positions: kp = I w^2, kd = 2 I w."""
+    """By joint, from the diagonal of the mass matrix at the initial positions: kp = I w^2, kd = 2 I w.
+
+    A joint with armature in the source keeps it, which the mass matrix has in it.
+    """
+    own = {joint.name: joint.armature for joint in model.joints}
     robot = RobotModel(alone(model, floating), "robot")
     inertia = np.diag(robot.mass_matrix(robot.q(robot.initial)))[6 if floating else 0 :]
     omega = 2 * np.pi * BANDWIDTH
     found: dict[str, Gains] = {}
     for name, seen in zip(robot.joint_names, inertia, strict=True):
-        armature = ROTOR * float(seen)
-        whole = float(seen) + armature
+        armature = own[name] or ROTOR * float(seen)
+        whole = float(seen) + (0.0 if own[name] else armature)
         kp, kd = whole * omega**2, 2 * whole * omega
         if name in legs:
             kp = max(kp, STANDING * robot.mass * 9.81)

@@ -11,7 +11,7 @@ from anysim.compile.builder import WorldBuilder
 from anysim.conventions import Array
 from anysim.geometry.bounds import shape_bounds
 from anysim.math import pose as P
-from anysim.model.world import BodyKind, EntityKind, JointType, World
+from anysim.model.world import BodyKind, EntityKind, Joint, JointType, World
 
 FINGER = re.compile(r"finger|gripper|jaw|thumb|index|middle|ring|pinky|little|knuckle|claw|palm_to", re.IGNORECASE)
 WHEEL = re.compile(r"wheel|caster|castor", re.IGNORECASE)
@@ -45,6 +45,8 @@ class Guess(NamedTuple):
     tool: str | None
     base_height: float
     reasons: tuple[str, ...]
+    anchored: tuple[str, ...] = ()
+    """Joints by which its first body moves against the world, and which no drive of the file moves."""
 
 
 def alone(model: ImportedModel, floating: bool) -> World:
@@ -52,6 +54,12 @@ def alone(model: ImportedModel, floating: bool) -> World:
     builder = WorldBuilder(World(name=model.name))
     builder.add("robot", EntityKind.ROBOT, model, root=BodyKind.FREE if floating else BodyKind.STATIC)
     return builder.build()
+
+
+def within(value: float, joint: Joint, digits: int) -> float:
+    """A position with so many decimals, or as it is where that would be outside of the joint's limits."""
+    near = round(float(value), digits)
+    return near if joint.lower <= near <= joint.upper else float(value)
 
 
 def home_of(model: ImportedModel) -> dict[str, float]:
@@ -62,7 +70,7 @@ def home_of(model: ImportedModel) -> dict[str, float]:
         if not joint.lower <= at <= joint.upper:
             at = (joint.lower + joint.upper) / 2
         if joint.mimic is None and at != 0.0:
-            home[joint.name] = round(float(at), 4)
+            home[joint.name] = within(at, joint, 4)
     return home
 
 
@@ -74,13 +82,22 @@ def guess(model: ImportedModel) -> Guess:
     chains = _chains(model)
     low = _lowest(world)
     legs = _legs(model, chains, low)
+    if len(legs) < len(around := _around(model, chains)):
+        legs = around
+        reasons.append(f"legs: {len(legs)} alike chains, as many at each corner of the base")
+    rails = _rails(model)
+    passive = {j for j in rails if model.actuator_hints and not any(hint.joint == j for hint in model.actuator_hints)}
+    names = {i: model.joints[i].name for i in driven if i not in passive}
     in_legs = {joint for leg in legs for joint in leg.joints}
-    names = {i: model.joints[i].name for i in driven}
-    wheels = [names[i] for i in driven if WHEEL.search(names[i]) and _endless(model, i)]
+    wheels = [names[i] for i in names if WHEEL.search(names[i]) and _endless(model, i)]
     eef = [n for i, n in names.items() if n not in in_legs and n not in wheels and _is_finger(model, i)]
     arm = [n for n in names.values() if n not in {*in_legs, *wheels, *eef}]
-    floating = model.bodies[0].kind is BodyKind.FREE or len(legs) >= 2 or len(wheels) >= 2
-    if model.bodies[0].kind is BodyKind.FREE:
+    planted = bool(rails) and not model.bodies[0].inertial.mass
+    floating = model.bodies[0].kind is BodyKind.FREE or ((len(legs) >= 2 or len(wheels) >= 2) and not planted)
+    if planted and not floating and (passive or len(legs) >= 2 or len(wheels) >= 2):
+        how = ", ".join(model.joints[j].name for j in rails)
+        reasons.append(f"base: fixed; its first body moves against the world by {how}")
+    elif model.bodies[0].kind is BodyKind.FREE:
         reasons.append("base: floating, as the file has it")
     else:
         why = f"{len(legs)} chains that end near the ground" if len(legs) >= 2 else f"{len(wheels)} wheels"
@@ -97,7 +114,16 @@ def guess(model: ImportedModel) -> Guess:
     category = _category(legs, wheels, arm, eef)
     tool = _tool(model, arm, eef)
     return Guess(
-        floating, category, tuple(wheels), tuple(legs), tuple(arm), tuple(eef), tool, round(height, 4), tuple(reasons)
+        floating,
+        category,
+        tuple(wheels),
+        tuple(legs),
+        tuple(arm),
+        tuple(eef),
+        tool,
+        round(height, 4),
+        tuple(reasons),
+        tuple(model.joints[j].name for j in sorted(passive)),
     )
 
 
@@ -166,6 +192,43 @@ def _legs(model: ImportedModel, chains: list[list[int]], low: float) -> list[Leg
     if len({leg.name for leg in found}) < len(found):
         found = [leg._replace(name=f"leg_{i}") for i, leg in enumerate(found)]
     return found
+
+
+def _around(model: ImportedModel, chains: list[list[int]]) -> list[Leg]:
+    """Chains of two joints and more of one length, as many in each of the four corners about their middle: legs."""
+    length = max((len(chain) for chain in chains), key=[len(chain) for chain in chains].count, default=0)
+    chains = [chain for chain in chains if len(chain) == length]
+    words = [model.joints[i].name for chain in chains for i in chain]
+    if (
+        length < 2
+        or len(chains) % 4
+        or len({chain[0] for chain in chains}) < len(chains)
+        or any(map(FINGER.search, words))
+    ):
+        return []
+    begin = np.array([model.bodies[model.joints[chain[0]].body].position for chain in chains])
+    for plane in ([0, 1], [0, 2]):
+        side = np.sign((begin - begin.mean(axis=0))[:, plane].round(4))
+        corners = [tuple(one) for one in side.tolist()]
+        if all(corners.count((x, y)) * 4 == len(chains) for x in (1.0, -1.0) for y in (1.0, -1.0)):
+            break
+    else:
+        return []
+    tips = [model.joints[chain[-1]].body for chain in chains]
+    joints = [tuple(model.joints[i].name for i in chain if model.joints[i].mimic is None) for chain in chains]
+    return [
+        Leg(f"leg_{i}", own, _foot(model, tip)) for i, (own, tip) in enumerate(zip(joints, tips, strict=True)) if own
+    ]
+
+
+def _rails(model: ImportedModel) -> list[int]:
+    """The joints between a root that is nothing but a place in the world, and the first body with a shape."""
+    shaped, parents = {geom.body for geom in model.geoms}, [body.parent for body in model.bodies]
+    found, body = [], 0
+    while body not in shaped and parents.count(body) == 1:
+        body = parents.index(body)
+        found.append(next(i for i, joint in enumerate(model.joints) if joint.body == body))
+    return found if body in shaped else []
 
 
 def _leg_name(joint: str, number: int) -> str:
