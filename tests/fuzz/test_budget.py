@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from anysim.errors import SpecError, TaskError
+from anysim.errors import TaskError
 from tests.fuzz.budget import OverBudgetError, Tally, within
 
 

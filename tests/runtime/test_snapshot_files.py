@@ -125,20 +125,13 @@ def test_rows_are_chosen_and_joined(get, tmp_path) -> None:
 def test_any_changed_byte_is_noticed(get, tmp_path) -> None:
     path = running(get("null", 3)).snapshot().save(tmp_path / "a.snapshot")
     good, wrong = path.read_bytes(), tmp_path / "wrong.snapshot"
-    places = np.linspace(0, len(good) - 1, 150).astype(int)
-    silent = []
-    for place in places:
+    first = {*range(120), *range(len(good) - 400, len(good))}  # the first member's head, and the zip's directory
+    for place in sorted(first | set(np.linspace(0, len(good) - 1, 150).astype(int).tolist())):
         damaged = bytearray(good)
         damaged[place] ^= 0x41
         wrong.write_bytes(bytes(damaged))
-        try:
-            content = EnvSnapshot.load(wrong)
-        except SnapshotError:
-            continue
-        # dates and the like of the zip are no content
-        silent.append(int(place))
-        assert same(content.managers, EnvSnapshot.load(path).managers)
-    assert len(silent) < 15, "nearly every byte counts"
+        with pytest.raises(SnapshotError):
+            EnvSnapshot.load(wrong)
     for length in (0, 10, len(good) // 2, len(good) - 1):
         wrong.write_bytes(good[:length])
         with pytest.raises(SnapshotError, match="damaged or truncated"):
@@ -165,17 +158,23 @@ def test_a_pipe_is_no_snapshot(tmp_path) -> None:
 
 def rewritten(path: Path, out: Path, change, *, compression=zipfile.ZIP_STORED, extra: str = "") -> Path:
     """The file with a changed header, sealed anew: not an accident but somebody's work."""
+
+    def add(name: str, content: bytes) -> None:
+        info = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))
+        info.compress_type = compression
+        other.writestr(info, content)
+
     with zipfile.ZipFile(path) as archive, zipfile.ZipFile(out, "w", compression) as other:
         head = json.loads(archive.read(snapshot_file.HEADER))
         change(head)
         header = json.dumps(head).encode()
-        other.writestr(snapshot_file.HEADER, header)
-        other.writestr(snapshot_file.SEAL, snapshot_file._sha(header))
+        add(snapshot_file.HEADER, header)
+        add(snapshot_file.SEAL, snapshot_file._sha(header).encode())
         for info in archive.infolist():
             if info.filename not in (snapshot_file.HEADER, snapshot_file.SEAL):
-                other.writestr(info.filename, archive.read(info))
+                add(info.filename, archive.read(info))
         if extra:
-            other.writestr(extra, b"x")
+            add(extra, b"x")
     return out
 
 
@@ -247,7 +246,10 @@ def test_a_foreign_snapshot_changes_nothing(get) -> None:
     fewer = {name: data for name, data in ours.managers.items() if name != "robot"}
     refused(EnvSnapshot(ours.engine, fewer, ours.streams, ours.task, ours.spec_hash), "this env has .*robot")
     odd = {**ours.managers, "task": {k: v for k, v in ours.managers["task"].items() if k != "held"}}
-    refused(EnvSnapshot(ours.engine, odd, ours.streams, ours.task, ours.spec_hash), r"state of 'task' .*held")
+    refused(
+        EnvSnapshot(ours.engine, odd, ours.streams, ours.task, ours.spec_hash),
+        r"state of 'task': 'held' is missing; nothing was changed",
+    )
     cut = with_engine(data={k: v for k, v in ours.engine.data.items() if k != "ticks"})
     refused(cut, "'ticks' is missing")
 

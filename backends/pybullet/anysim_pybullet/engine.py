@@ -8,6 +8,8 @@ from anysim.engine.capability import Allowance, Capabilities
 from anysim.engine.doctor import Finding, Health
 from anysim.engine.one_world.base import OneWorldPerEnv
 from anysim.engine.presence import Lifecycle
+from anysim.engine.state import SnapshotLevel
+from anysim.engine.untrusted.rows import refuse_range
 from anysim.model.world import World
 from anysim_pybullet import declared
 from anysim_pybullet.options import PybulletOptions
@@ -23,6 +25,7 @@ class PybulletEngine(OneWorldPerEnv):
     capabilities: ClassVar[Capabilities] = declared.CAPABILITIES
     parameters: ClassVar[frozenset[str]] = declared.PARAMETERS
     lifecycle: ClassVar[Lifecycle] = Lifecycle.P1
+    ragged_rows = frozenset({"bullet"})
     audit_allowances: ClassVar[Mapping[str, Allowance]] = declared.AUDIT_ALLOWANCES
     library = declared.LIBRARY
     options_type = PybulletOptions
@@ -34,6 +37,11 @@ class PybulletEngine(OneWorldPerEnv):
         """Threads."""
         words = "one per process, it keeps the interpreter's lock: `shards` uses more"
         return (Finding("pybullet: threads", Health.NOTE, words),)
+
+    @classmethod
+    def refuse_rows(cls, data: Mapping[str, Array], level: SnapshotLevel, world: World, options: object) -> None:
+        if level is SnapshotLevel.TRAJECTORY:
+            refuse_range("length", data["length"], 1, data["bullet"].shape[1])
 
     def renderer_name(self) -> str:
         """What draws the images."""

@@ -12,9 +12,9 @@ from anysim.engine.state import SnapshotLevel
 from anysim.model.world import World
 from anysim_sapien import declared
 from anysim_sapien.envs import Envs
+from anysim_sapien.journal_checks import refuse_pasts
 from anysim_sapien.meeting import refusals
 from anysim_sapien.options import SapienOptions
-from anysim_sapien.stepping import refuse_pasts
 
 
 class SapienEngine(OneWorldPerEnv):
@@ -24,6 +24,7 @@ class SapienEngine(OneWorldPerEnv):
     capabilities: ClassVar[Capabilities] = declared.CAPABILITIES
     parameters: ClassVar[frozenset[str]] = declared.PARAMETERS
     lifecycle: ClassVar[Lifecycle] = Lifecycle.P1
+    ragged_rows = frozenset({"journal"})
     audit_allowances: ClassVar[Mapping[str, Allowance]] = declared.AUDIT_ALLOWANCES
     library = declared.LIBRARY
     options_type = SapienOptions
@@ -43,9 +44,10 @@ class SapienEngine(OneWorldPerEnv):
         return refusals(world)
 
     @classmethod
-    def refuse_rows(cls, data: Mapping[str, Array], level: SnapshotLevel) -> None:
+    def refuse_rows(cls, data: Mapping[str, Array], level: SnapshotLevel, world: World, options: object) -> None:
         if level is SnapshotLevel.TRAJECTORY:
-            refuse_pasts(data)
+            assert isinstance(options, SapienOptions)
+            refuse_pasts(data, world, options.rebase_steps)
 
     def renderer_name(self) -> str:
         """The Vulkan device, such as `SwiftShader Device (Subzero), in software`."""

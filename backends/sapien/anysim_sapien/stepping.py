@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike
 
 from anysim.conventions import Array
 from anysim.engine.control import Control
-from anysim.errors import SnapshotError
 from anysim_sapien.drives import Drives
 from anysim_sapien.journal import FORMAT, Op, entries
 from anysim_sapien.momentum import Momentum
@@ -90,29 +89,6 @@ def past_of(scene: EnvScene) -> dict[str, ArrayLike]:
     journal = scene.journal.rows()
     past: dict[str, ArrayLike] = {f"base.{name}": part for name, part in scene.values._asdict().items()}
     return past | {"journal": journal, "length": len(journal), "journal_format": FORMAT}
-
-
-def refuse_pasts(data: Mapping[str, Array]) -> None:
-    """Refuse rows that `relive` could not read.
-
-    Raises:
-        SnapshotError: of another format, or damaged.
-    """
-    wanted = {"journal", "length", *(f"base.{name}" for name in Values._fields)}
-    missing = sorted(wanted - data.keys())
-    if missing:
-        raise SnapshotError(f"the snapshot is damaged: it has no '{missing[0]}'; take a new one")
-    other = [int(number) for number in data.get("journal_format", np.zeros(1)) if number != FORMAT]
-    if other:
-        raise SnapshotError(
-            f"the snapshot's journal has format {other[0]}, this anysim-sapien reads {FORMAT}; nothing was changed. "
-            f"Take a new one, replay its episode here from seed and actions, or carry a WorldState over"
-        )
-    for row, length in zip(data["journal"], data["length"], strict=True):
-        if not 0 <= length <= len(row):
-            raise SnapshotError(f"the snapshot is damaged: a journal of {len(row)} numbers says that it has {length}")
-        for _ in entries(row[: int(length)]):
-            pass
 
 
 def relive(recipe: Recipe, past: Mapping[str, Array]) -> tuple[EnvScene, Drives, Momentum]:

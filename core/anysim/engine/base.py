@@ -6,7 +6,8 @@ with its own state. Building, stepping and states are in `anysim.engine.lifecycl
 `anysim.engine.sensing`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -22,8 +23,16 @@ from anysim.engine.presence import write_present
 from anysim.engine.records import below
 from anysim.engine.sensing import EngineSensing
 from anysim.engine.state import Snapshot, SnapshotLevel
-from anysim.engine.world_state import Carried, Missing, WorldState, read_world_state, write_world_state
-from anysim.errors import CapabilityError, EngineError, listing, suggest
+from anysim.engine.untrusted.rows import damaged, mapping_of_arrays, refuse_other_forms, refuse_parameters
+from anysim.engine.world_state import (
+    Carried,
+    Missing,
+    WorldState,
+    read_world_state,
+    refuse_world_state,
+    write_world_state,
+)
+from anysim.errors import AnysimError, CapabilityError, EngineError, listing, suggest
 from anysim.math import pose as P
 from anysim.model.index import Index
 from anysim.model.world import BodyKind, ControlMode
@@ -188,14 +197,62 @@ class SimEngine(EngineSensing):
         A parameter that was changed since, but not when the snapshot was taken, gets its built value back.
 
         Raises:
-            SnapshotError: of another engine, engine version or world, or another number of rows; nothing was changed.
+            SnapshotError: of another engine, engine version or world, another number of rows, or damaged.
+
+        Whatever is raised, nothing was changed; only an env that was given up before is as it is then.
         """
         with self._lock:
             self._require_world()
-            ids, data = self._ids(env_ids), snapshot.data
+            ids = self._ids(env_ids)
+            self.refuse_snapshot(snapshot, ids)
+            with self._or_as_before(ids):
+                self._put(snapshot, ids)
+
+    def refuse_snapshot(self, snapshot: Snapshot, env_ids: EnvIds = None) -> None:
+        """Refuse a snapshot that cannot be put into these envs, as `restore` does before it changes anything.
+
+        Every array is looked at: its name, type and shape, whether it is finite, and the range of its values.
+
+        Raises:
+            SnapshotError: of another engine, engine version or world, another number of rows, or damaged.
+        """
+        with self._lock:
+            self._require_world()
+            ids, level = self._ids(env_ids), snapshot.level
+            data = mapping_of_arrays("the engine's state", snapshot.data)
             arguments.same_stamp(snapshot, self.name, self.version, self.world.hash, len(ids))
-            self._records.refuse_foreign(data)
-            self.refuse_rows(below("engine.", data), snapshot.level)
+            self._require(Capability(f"snapshot: {level}"))
+            own, values = below("engine.", data), below("parameter.", data)
+            rest = {name: rows for name, rows in data.items() if not name.startswith(("engine.", "parameter."))}
+            self._records.refuse_foreign(rest, ids)
+            refuse_parameters(self.world, self.parameters, values, len(ids))
+            if level not in self._row_forms:
+                forms = self._snapshot(self._all[:1], level)
+                self._row_forms[level] = {name: np.empty_like(rows) for name, rows in forms.items()}
+            like, fault = self._row_forms[level], own.get("fault")
+            faulty = fault if fault is not None and fault.shape == ids.shape and fault.dtype == bool else None
+            refuse_other_forms(self.name, own, like, len(ids), ragged=self.ragged_rows, faulty=faulty)
+            self.refuse_rows(own, level, self.world, self.options)
+
+    @contextmanager
+    def _or_as_before(self, ids: Array) -> Generator[None, None, None]:
+        """Write all of a state that was read somewhere, or none of it: an engine may refuse what passed every check."""
+        levels = [s for s in reversed(SnapshotLevel) if Capability(f"snapshot: {s}") in self.capabilities]
+        sound = ids[~self.get_state().fault[ids]]
+        before = self.snapshot(sound, levels[0]) if len(sound) and levels else None
+        try:
+            yield
+        except BaseException as error:
+            if before is not None:
+                self._put(before, sound)
+            if isinstance(error, AnysimError) or not isinstance(error, Exception):
+                raise
+            raise damaged(f"{self.name} cannot read it ({type(error).__name__}: {error})") from error
+
+    def _put(self, snapshot: Snapshot, ids: Array) -> None:
+        """Write the rows of a snapshot that was checked."""
+        with self._lock:
+            data = snapshot.data
             self._retire_state()
             if "present" in data:  # first, with parameters, since an engine's state depends on them
                 self._reset(self._admit(ids, data["present"]))
@@ -225,7 +282,10 @@ class SimEngine(EngineSensing):
         """
         with self._lock:
             self._require_world()
-            carried = write_world_state(self, self._records, state, self._ids(env_ids), missing)
+            ids = self._ids(env_ids)
+            carried = refuse_world_state(self, self._records, state, ids, missing)
+            with self._or_as_before(ids):
+                write_world_state(self, self._records, state, ids)
             self._retire_state()
             return carried
 

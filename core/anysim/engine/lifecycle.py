@@ -149,6 +149,7 @@ class EngineLifecycle(EngineLifetime, Primitives):
         self._all = np.arange(num_envs)
         self._state: State | None = None
         self._records = EnvRecords(world, num_envs)
+        self._row_forms: dict[str, Mapping[str, Array]] = {}
 
     def _build_envs(self) -> None:
         self._build(self.world, self.num_envs)

@@ -21,6 +21,8 @@ class Primitives(ABC):
     """Abstract ones every engine has; the others raise CapabilityError where the capability is not declared."""
 
     name: ClassVar[str]
+    ragged_rows: ClassVar[frozenset[str]] = frozenset()
+    """Names in `_snapshot` whose rows may have any length, which the engine keeps beside."""
 
     @abstractmethod
     def _build(self, world: World, num_envs: int) -> None:
@@ -81,13 +83,17 @@ class Primitives(ABC):
     def _snapshot(self, ids: Array, level: SnapshotLevel) -> dict[str, Array]:
         """Everything beyond commands, parameters and cameras that continuing needs; arrays with leading env axis.
 
-        Each row stands for itself. Rows of one axis may have any length that the engine keeps beside: further zeros at
-        their end are to be passed over, since rows of several engines may be joined.
+        Each row stands for itself. Those that `ragged_rows` names may have any length that the engine keeps beside:
+        further zeros at their end are to be passed over, since rows of several engines may be joined. All others have
+        the same type and shape in every env, whatever is in it.
         """
 
     @classmethod
-    def refuse_rows(cls, data: Mapping[str, Array], level: SnapshotLevel) -> None:
-        """Raise SnapshotError where `_restore` could not read these rows: they may come from a file."""
+    def refuse_rows(cls, data: Mapping[str, Array], level: SnapshotLevel, world: World, options: object) -> None:
+        """Raise SnapshotError where `_restore` could not go on from these rows: they may come from a file.
+
+        Their names, types and shapes are those of `_snapshot`, and they are finite but for rows whose `fault` is true.
+        """
 
     @abstractmethod
     def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:

@@ -7,13 +7,16 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.cameras import CameraRig
-from anysim.engine.control import CommandBuffer, Control
+from anysim.engine.control import MODES, CommandBuffer
 from anysim.engine.parameters import PARAMETERS, count
 from anysim.engine.presence import Presence
 from anysim.engine.state import State
-from anysim.errors import SnapshotError
+from anysim.engine.untrusted.rows import refuse_other_forms, refuse_range, refuse_rotations, told
 from anysim.model.index import paired
 from anysim.model.world import BodyKind, World
+
+_LAST_TICK = 1 << 53
+"""Physics steps after a reset: beyond it a time is no exact number any more."""
 
 
 class EnvRecords:
@@ -51,23 +54,22 @@ class EnvRecords:
             data["present"] = self.presence.entities[ids]
         return data | {f"commands.{name}": rows for name, rows in self.commands.rows(ids).items()}
 
-    def refuse_foreign(self, data: Mapping[str, Array]) -> None:
-        """Refuse the data of a snapshot from which `restore` could not read.
+    def refuse_foreign(self, data: Mapping[str, Array], ids: Array) -> None:
+        """Refuse rows of envs that `snapshot` could not have made in this world.
 
         Raises:
-            SnapshotError: rows are missing, or have other shapes than those of this world.
+            SnapshotError: what differs first.
         """
-        drives, cameras = (len(self.world.actuators),), (len(self.world.cameras),)
-        shapes = {"ticks": (), "cameras": (*cameras, 7), "fov": cameras}
-        shapes |= {f"commands.{name}": drives for name in Control._fields}
-        if self.presence.varies:
-            shapes["present"] = (len(self.world.entities),)
-        for name, shape in shapes.items():
-            if name not in data or data[name].shape[1:] != shape:
-                found = "is missing" if name not in data else f"has rows of shape {data[name].shape[1:]}, not {shape}"
-                raise SnapshotError(f"the snapshot is damaged or not of this world: '{name}' {found}; take a new one")
-        if len({len(rows) for rows in data.values()}) > 1:
-            raise SnapshotError("the snapshot is damaged: its arrays hold different numbers of envs; take a new one")
+        waiting = {"commands.wrench": np.zeros((1, len(self.world.bodies), 6))}
+        like = waiting | self.snapshot(np.array([0]))
+        refuse_other_forms("the engine's state", data, like, len(ids), optional=waiting)
+        refuse_range("ticks", data["ticks"], 0, _LAST_TICK)
+        refuse_range("commands.mode", data["commands.mode"], 0, len(MODES) - 1)
+        refuse_range("fov", data["fov"], 1e-6, 180.0)
+        refuse_rotations("cameras", data["cameras"][..., 3:])
+        if "present" in data:
+            with told():
+                self.presence.checked(data["present"], ids)
 
     def restore(self, ids: Array, data: Mapping[str, Array]) -> None:
         """Write what `snapshot` returned, but for presence, which needs the engine."""

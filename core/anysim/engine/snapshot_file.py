@@ -1,9 +1,10 @@
 """The file of a snapshot: one zip of .npy arrays and one JSON header, whole or refused.
 
 The header holds everything that is no array, and for each array its member, size and SHA-256; a third kind of member
-holds the SHA-256 of the header. So one hash covers all content, of which any changed byte is noticed, and there is
-nothing but members in the file; what the zip says about them beside (dates, systems) counts for nothing. Members are
-stored as they are, not compressed: a small file cannot unfold into a large one. Equal content gives equal bytes.
+holds the SHA-256 of the header. So one hash covers all content. Equal content gives equal bytes, and a file is refused
+that has others, so any changed byte is noticed wherever it is. Members are stored as they are, not compressed: a small
+file cannot unfold into a large one. Who knows the format can make a file with right hashes: what is in it is checked
+where it is used (`anysim.engine.untrusted.rows`).
 
 A file is written aside and renamed, so that under its name it is complete or it is not there.
 
@@ -23,7 +24,7 @@ from collections.abc import Callable, Mapping
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 
@@ -34,9 +35,13 @@ from anysim_schemas.files import open_plain
 
 FORMAT, VERSION = "anysim-snapshot", 1
 HEADER, SEAL = "header.json", "header.sha256"
-MAX_HEADER_BYTES = 256 << 20
+MAX_HEADER_BYTES = 32 << 20
 """Longer headers are refused, unread."""
 _MARK = "~"
+_KINDS = "biufSU"
+"""Of numpy's types, those that arrays in a file may have."""
+_LONGEST = 1 << 16
+"""Bytes of one number or word."""
 _MATTER = ("numpy", "numba")
 """What computes states beside the engine: another version of it may round another last bit."""
 
@@ -78,6 +83,8 @@ def made_with() -> Mapping[str, str]:
 def write(path: str | Path, kind: str, stamp: Mapping[str, Any], data: Any) -> Path:
     """Write a tree of mappings, lists, tuples, arrays and plain values; an existing file is replaced.
 
+    Arrays are written as they are in memory: read again, their types and bytes are the same.
+
     Raises:
         SnapshotError: something in it has no exact form in a file, or the file cannot be written.
     """
@@ -98,16 +105,18 @@ def write(path: str | Path, kind: str, stamp: Mapping[str, Any], data: Any) -> P
         "arrays": table,
         "data": tree,
     }
-    header = json.dumps(head, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()
+    header = json.dumps(head, allow_nan=False, separators=(",", ":")).encode()
+    if len(header) > MAX_HEADER_BYTES:
+        raise SnapshotError(
+            f"{path} would have a header of {len(header):,} bytes, more than the {MAX_HEADER_BYTES:,} that are read "
+            f"again; write fewer envs into a file: snapshot.rows([...])"
+        )
     aside = path.with_name(f".{path.name}.{os.getpid()}-{threading.get_ident()}.partial")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
             with aside.open("wb") as file:
-                with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
-                    for name, content in {HEADER: header, SEAL: _sha(header).encode(), **members}.items():
-                        # a date of its own would make equal content unequal
-                        archive.writestr(zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0)), content)
+                _pack(file, {HEADER: header, SEAL: _sha(header).encode(), **members})
                 file.flush()
                 os.fsync(file.fileno())
             aside.replace(path)
@@ -130,10 +139,12 @@ def read(path: str | Path) -> Content:
         with open_plain(path) as file:
             size = file.seek(0, os.SEEK_END)
             with zipfile.ZipFile(file) as archive:
-                return _content(path, archive, size)
+                return _content(path, archive, size, file)
     except OSError as error:
         raise SnapshotError(f"{path} cannot be read: {error.strerror or error}") from error
-    except (zipfile.BadZipFile, ValueError, KeyError, TypeError, EOFError, RuntimeError, RecursionError) as error:
+    except SnapshotError:
+        raise
+    except Exception as error:  # of any library that reads what anybody may have written
         raise SnapshotError(
             f"{path} is no snapshot, or a damaged or truncated one: {error}; copy it anew, or save it anew"
         ) from error
@@ -171,7 +182,16 @@ ENGINE, ENV, WORLD = "engine snapshot", "env snapshot", "world state"
 _LOADERS = {ENGINE: "Snapshot.load", ENV: "EnvSnapshot.load", WORLD: "WorldState.load"}
 
 
-def _content(path: Path, archive: zipfile.ZipFile, size: int) -> Content:
+def _pack(file: IO[bytes], members: Mapping[str, bytes]) -> None:
+    """Write an archive. Equal members give equal bytes, on every machine."""
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
+        for name, content in members.items():
+            info = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))
+            info.create_system, info.external_attr = 3, 0o600 << 16
+            archive.writestr(info, content)
+
+
+def _content(path: Path, archive: zipfile.ZipFile, size: int, file: IO[bytes]) -> Content:
     infos = {info.filename: info for info in archive.infolist()}
     if HEADER not in infos or SEAL not in infos:
         raise ValueError(f"it has no {HEADER} with a {SEAL}")
@@ -193,19 +213,25 @@ def _content(path: Path, archive: zipfile.ZipFile, size: int) -> Content:
     known = {HEADER, SEAL, *(entry["member"] for entry in table.values())}
     if infos.keys() != known:
         raise ValueError(f"it should hold {len(known)} members, and holds {len(infos)}")
-    # of a member: a local head of 30 bytes, one of 46 in the directory, its name in both; and the end of 22
-    plain = size < 1 << 31 and len(infos) < 1 << 16  # larger ones have more to say of themselves
-    if plain and size != 22 + sum(76 + 2 * len(info.filename.encode()) + info.file_size for info in infos.values()):
-        raise ValueError("there is something between, before or behind its members")
     arrays: dict[str, Array] = {}
+    members = {HEADER: header, SEAL: seal.encode()}
     for name, entry in table.items():
         content = _member(archive, infos[entry["member"]], entry["bytes"])
         if len(content) != entry["bytes"] or _sha(content) != entry["sha256"]:
             raise ValueError(f"'{name}' does not have its hash")
+        members[entry["member"]] = content
         arrays[name] = _array(content, name)
+    again = io.BytesIO()
+    _pack(again, members)
+    file.seek(0)
+    if size != len(again.getbuffer()) or file.read() != again.getbuffer():
+        raise ValueError("there are other bytes in it than its members and the directory that they have")
     shapes = {name: f"{rows.dtype} {rows.shape}" for name, rows in arrays.items()}
+    stamp, made = decode(head["stamp"], {}), head["made_with"]
+    if not isinstance(stamp, dict) or not isinstance(made, dict):
+        raise ValueError("its stamp and `made_with` should be mappings")
     return Content(
-        head["kind"], decode(head["stamp"], {}), head["made_with"], decode(head["data"], arrays), shapes, seal, size
+        head["kind"], stamp, {str(k): str(v) for k, v in made.items()}, decode(head["data"], arrays), shapes, seal, size
     )
 
 
@@ -230,7 +256,12 @@ def _array(content: bytes, name: str) -> Array:
         raise ValueError(f"'{name}' is a .npy file of another version than 1.0")
     shape, fortran, dtype = np.lib.format.read_array_header_1_0(buffer)
     body = memoryview(content)[buffer.tell() :]
-    if dtype.hasobject or fortran or min(shape, default=0) < 0 or int(np.prod(shape)) * dtype.itemsize != len(body):
+    if (
+        dtype.kind not in _KINDS
+        or fortran
+        or min(shape, default=0) < 0
+        or int(np.prod(shape)) * dtype.itemsize != len(body)
+    ):
         raise ValueError(f"'{name}' is not the array that it says")
     return np.frombuffer(body, dtype=dtype).reshape(shape)
 
@@ -251,7 +282,7 @@ def encode(value: Any, arrays: dict[str, Array], where: str = "") -> Any:
     if value is None or isinstance(value, bool | str):
         return value
     if isinstance(value, np.ndarray):
-        if value.dtype.kind not in "biufSU":
+        if value.dtype.kind not in _KINDS:
             raise SnapshotError(f"{where} is an array of {value.dtype}, which has no place in a snapshot's file")
         arrays[where] = value
         return {f"{_MARK}array": where}
@@ -295,7 +326,7 @@ def decode(tree: Any, arrays: Mapping[str, Array]) -> Any:
 def _number(pair: Any, arrays: Mapping[str, Array]) -> np.generic:
     kind, value = pair
     dtype = np.dtype(kind)
-    if dtype.hasobject:
+    if dtype.kind not in _KINDS or dtype.itemsize > _LONGEST:
         raise ValueError(f"{kind} is no type of numbers")
     return dtype.type(decode(value, arrays))
 

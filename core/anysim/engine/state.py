@@ -10,6 +10,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine import snapshot_file
+from anysim.engine.untrusted.rows import mapping_of_arrays
 from anysim.errors import SnapshotError, StaleStateError
 
 
@@ -37,7 +38,7 @@ class Snapshot:
     @property
     def num_envs(self) -> int:
         """How many envs the snapshot holds."""
-        return next((len(rows) for rows in self.data.values()), 0)
+        return next((len(rows) for rows in self.data.values() if rows.ndim), 0)
 
     def rows(self, rows: Sequence[int] | Array) -> "Snapshot":
         """Some of its envs, in this order; one may come several times."""
@@ -70,10 +71,28 @@ def stamp_of(snapshot: Snapshot) -> dict[str, object]:
     }
 
 
-def stamped(stamp: Mapping[str, Any], data: Mapping[str, Array]) -> Snapshot:
-    """The snapshot of a stamp and its data."""
-    level = SnapshotLevel(stamp["level"])
-    return Snapshot(stamp["engine"], stamp["engine_version"], stamp["world_hash"], level, data)
+def stamp_words(stamp: Mapping[str, Any], *names: str) -> list[str]:
+    """Words of a stamp.
+
+    Raises:
+        SnapshotError: one is missing, or something else.
+    """
+    missing = [name for name in names if not isinstance(stamp.get(name), str)]
+    if missing:
+        raise SnapshotError(f"the snapshot is damaged: its stamp says no '{missing[0]}'; take a new one")
+    return [stamp[name] for name in names]
+
+
+def stamped(stamp: Mapping[str, Any], data: object) -> Snapshot:
+    """The snapshot of a stamp and its data, which may come from anywhere.
+
+    Raises:
+        SnapshotError: the stamp is not one, or the data are no arrays by name.
+    """
+    engine, version, world, level = stamp_words(stamp, "engine", "engine_version", "world_hash", "level")
+    if level not in list(SnapshotLevel):
+        raise SnapshotError(f"the snapshot is damaged: there is no level {level!r}; take a new one")
+    return Snapshot(engine, version, world, SnapshotLevel(level), mapping_of_arrays("the engine's state", data))
 
 
 def row_numbers(rows: Sequence[int] | Array, count: int) -> Array:

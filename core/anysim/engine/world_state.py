@@ -19,6 +19,8 @@ from anysim.engine.control import MODES
 from anysim.engine.parameters import PARAMETERS
 from anysim.engine.records import EnvRecords
 from anysim.engine.state import row_numbers
+from anysim.engine.untrusted.rows import refuse_parameters, told
+from anysim.engine.untrusted.world_states import refuse_forms, refuse_values
 from anysim.errors import SnapshotError, listing
 from anysim.model.index import names_of, paired_names
 from anysim.model.world import BodyKind, World
@@ -153,21 +155,14 @@ class WorldState:
 
     @classmethod
     def _of(cls, tree: Mapping[str, Any]) -> "WorldState":
-        parameters = {name: NamedRows(tuple(p["names"]), p["values"]) for name, p in tree["parameters"].items()}
-        given: dict[str, Any] = {f.name: tree[f.name] for f in fields(cls)} | {"parameters": parameters}
+        try:
+            parameters = {name: NamedRows(tuple(p["names"]), p["values"]) for name, p in tree["parameters"].items()}
+            given: dict[str, Any] = {f.name: tree[f.name] for f in fields(cls)} | {"parameters": parameters}
+        except (TypeError, KeyError, AttributeError) as error:
+            raise SnapshotError(f"this is no world state: {type(error).__name__} {error}; make it anew") from error
         given |= {name: tuple(value) for name, value in given.items() if isinstance(value, list)}
         state = cls(**given)
-        shapes = {
-            "present": (len(state.entities),),
-            "body_pose": (len(state.bodies), 7),
-            "body_twist": (len(state.bodies), 6),
-            "joint_pos": (len(state.joints),),
-            "joint_vel": (len(state.joints),),
-        }
-        for name, shape in shapes.items():
-            array: Array = getattr(state, name)
-            if array.shape != (state.num_envs, *shape) and array.size:
-                raise SnapshotError(f"a world state's {name} has shape {array.shape}, not {(state.num_envs, *shape)}")
+        refuse_forms(state)
         return state
 
 
@@ -203,14 +198,16 @@ def read_world_state(engine: "SimEngine", records: EnvRecords, ids: Array) -> Wo
     )
 
 
-def write_world_state(
+def refuse_world_state(
     engine: "SimEngine", records: EnvRecords, state: WorldState, ids: Array, missing: Missing
 ) -> Carried:
-    """Put envs into a state, from a reset on, so that nothing is left of what they did before.
+    """Refuse a state that cannot be written into these envs; returns what differs.
 
     Raises:
-        SnapshotError: names differ and `missing` refuses that, or another number of rows; nothing was changed.
+        SnapshotError: names differ and `missing` refuses that, another number of rows, or values that nothing has.
     """
+    refuse_forms(state)
+    refuse_values(state, engine.world.physics.dt)
     if state.num_envs != len(ids):
         raise SnapshotError(f"the state holds {state.num_envs} envs, {len(ids)} were asked for; pass env_ids")
     carried = _compared(engine, state)
@@ -220,10 +217,20 @@ def write_world_state(
             f"{listing(carried.dropped)}; the world alone has {listing(carried.kept)}. Nothing was changed; pass "
             f"missing='keep' to carry over what both have and leave the rest as it is"
         )
+    present = _merged(names_of(engine.world, "entities"), engine.presence[ids], state.entities, state.present)
+    with told():
+        records.presence.checked(present, ids)
+    refuse_parameters(engine.world, engine.parameters, _parameters(engine, records, state, ids), len(ids))
+    return carried
+
+
+def write_world_state(engine: "SimEngine", records: EnvRecords, state: WorldState, ids: Array) -> None:
+    """Put envs into a state that was checked, from a reset on, so that nothing is left of what they did before."""
     here = read_world_state(engine, records, ids)
     present = _merged(here.entities, here.present, state.entities, state.present)
     engine.reset(ids, present=present if records.presence.varies else None)
-    _write_parameters(engine, records, state, ids)
+    for name, rows in _parameters(engine, records, state, ids).items():
+        engine.set_parameters(name, rows, ids)
     world = engine.world
     pose = _merged(here.bodies, here.body_pose, state.bodies, state.body_pose)
     twist = _merged(here.bodies, here.body_twist, state.bodies, state.body_twist)
@@ -240,7 +247,6 @@ def write_world_state(
     records.rig.poses[ids] = _merged(here.cameras, here.camera_pose, state.cameras, state.camera_pose)
     records.appearance[ids] += 1
     records.ticks[ids] = np.rint(state.time / world.physics.dt)
-    return carried
 
 
 def _compared(engine: "SimEngine", state: WorldState) -> Carried:
@@ -258,9 +264,10 @@ def _compared(engine: "SimEngine", state: WorldState) -> Carried:
     return Carried(tuple(dropped), tuple(kept))
 
 
-def _write_parameters(engine: "SimEngine", records: EnvRecords, state: WorldState, ids: Array) -> None:
+def _parameters(engine: "SimEngine", records: EnvRecords, state: WorldState, ids: Array) -> dict[str, Array]:
     """Those of the state; others that were changed here get their built values back, where the state knows of them."""
     world = engine.world
+    found: dict[str, Array] = {}
     for name, parameter in PARAMETERS.items():
         if name not in engine.parameters or not (name in state.parameters or name in records.changed):
             continue
@@ -272,7 +279,8 @@ def _write_parameters(engine: "SimEngine", records: EnvRecords, state: WorldStat
         if given is not None:
             rows = _merged(ours, rows, given.names, given.values)
         if rows.size:
-            engine.set_parameters(name, rows, ids)
+            found[name] = rows
+    return found
 
 
 def _known(world: World, target: str, state: WorldState) -> Array:

@@ -12,6 +12,7 @@ from anysim.controllers.base import DEFAULT_CONTROLLER, ChannelView, Command, Co
 from anysim.controllers.robot import ControlledRobot
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
+from anysim.engine.untrusted.rows import refuse_range
 from anysim.errors import SpecError, SpecIssue, TaskError, listing, suggest
 from anysim.managers.base import WORLD, Manager, Overridable, random_fields
 from anysim.model.world import ControlMode, World
@@ -269,6 +270,13 @@ class ActionManager(Manager):
                 data[f"delayed.{s.robot}.{s.channel}.rows"] = s.line.rows[env_ids]
             data |= {f"{s.robot}.{s.channel}.{k}": v for k, v in s.controller.snapshot(env_ids).items()}
         return data
+
+    def refuse_rows(self, data: Mapping[str, Array]) -> None:
+        """Delays that no line has."""
+        for s in self.slices:
+            if s.line is not None:
+                name = f"delayed.{s.robot}.{s.channel}.delay"
+                refuse_range(name, data[name], 0, s.line.rows.shape[1] - 1)
 
     def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
         """Write what `snapshot` returned."""

@@ -146,8 +146,11 @@ class Manager(ABC):
         """Copies of the manager's own state, arrays with a leading env axis."""
         return {}
 
+    def refuse_rows(self, data: Mapping[str, Array]) -> None:
+        """Raise SnapshotError for values that no env can have; names, types and shapes are those of `snapshot`."""
+
     def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
-        """Write what `snapshot` returned."""
+        """Write what `snapshot` returned; the engine may still be where it was."""
 
 
 def revert(engine: SimEngine, parameters: Iterable[str], env_ids: Array, indices: Mapping[str, Array]) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
+from anysim.engine.untrusted.rows import refuse_range
 from anysim.errors import SpecError, SpecIssue, listing, suggest
 from anysim.managers.base import WORLD, Manager, Overridable, random_fields
 from anysim.managers.markers import paint
@@ -19,6 +20,9 @@ from anysim.randomization.draw import draw_rows, is_random
 from anysim_schemas.cameras import CameraSpec
 
 _POSE = ("from_", "look_at_offset", "position", "roll_pitch_yaw")
+
+_MOST_LIGHT = 1e6
+"""Exposure and noise of a snapshot beyond this are nonsense."""
 
 
 class CameraManager(Manager):
@@ -247,6 +251,11 @@ class CaptureManager(Manager):
                 data |= {f"latest.{camera}": self._latest[camera][env_ids]}
                 data |= {f"taken.{camera}": self._taken[camera][env_ids]}
         return data
+
+    def refuse_rows(self, data: Mapping[str, Array]) -> None:
+        for name in self._specs:
+            refuse_range(f"exposure.{name}", data[f"exposure.{name}"], 0.0, _MOST_LIGHT)
+            refuse_range(f"noise.{name}", data[f"noise.{name}"], 0.0, _MOST_LIGHT)
 
     def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
         for name in self._specs:

@@ -13,6 +13,7 @@ import numpy as np
 from anysim.compile.room import MAIN, ROOM
 from anysim.conventions import GROUND, WORLD, Array
 from anysim.engine.base import SimEngine
+from anysim.engine.untrusted.rows import refuse_range
 from anysim.errors import TaskError
 from anysim.managers.base import Manager
 from anysim.model.appearance import rgb
@@ -161,6 +162,10 @@ class TerrainManager(Manager):
             "change": self._change[env_ids],
             "origin": self.episodes.origin[env_ids],
         }
+
+    def refuse_rows(self, data: Mapping[str, Array]) -> None:
+        refuse_range("level", data["level"], NEVER, self.rows - 1)
+        refuse_range("column", data["column"], 0, self.columns - 1)
 
     def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
         self.level[env_ids], self.column[env_ids] = data["level"], data["column"]

@@ -49,6 +49,15 @@ def _next_episode(master: np.random.Generator) -> int:
     return int(master.integers(0, 2**63))
 
 
+def _plain(value: object) -> bool:
+    """Whether it is of words, numbers, lists and mappings, as draws are."""
+    if isinstance(value, Mapping):
+        return all(isinstance(key, str) and _plain(item) for key, item in value.items())
+    if isinstance(value, list | tuple):
+        return all(map(_plain, value))
+    return value is None or isinstance(value, bool | int | float | str | np.number | np.bool_)
+
+
 class Streams:
     """The streams of all envs, and the draws of their current episodes.
 
@@ -142,6 +151,38 @@ class Streams:
             "overridden": [dict(self.overridden[i]) for i in env_ids],
             "masters": [master.bit_generator.state for master in masters],
         }
+
+    @staticmethod
+    def fault(data: object, envs: int) -> str:
+        """Why `restore` could not go on from data that may come from a file; empty if it can."""
+        kinds = {"episode_seed": int, "draws": Mapping, "origins": Mapping, "overridden": Mapping, "masters": Mapping}
+        if not isinstance(data, Mapping) or data.keys() != kinds.keys():
+            return f"they should hold {', '.join(kinds)}"
+        for name, kind in kinds.items():
+            rows = data[name]
+            if not isinstance(rows, list) or len(rows) != envs:
+                return f"'{name}' should be a list of {envs}"
+            if not all(isinstance(row, kind) and not isinstance(row, bool) for row in rows):
+                return f"'{name}' should hold a {kind.__name__} for each env"
+        if not all(0 <= seed < 1 << 64 for seed in data["episode_seed"]):
+            return "'episode_seed' has 64 bits"
+        for draws, origins, overridden in zip(data["draws"], data["origins"], data["overridden"], strict=True):
+            if draws.keys() != origins.keys():
+                return "'draws' and 'origins' should have the same names"
+            for origin in origins.values():
+                if not isinstance(origin, tuple) or len(origin) != 2 or not all(isinstance(w, str) for w in origin):
+                    return "'origins' should hold pairs of words"
+            if not all(_plain(value) for value in (*draws.values(), *overridden.values())):
+                return "'draws' and 'overridden' should hold words, numbers, and lists and mappings of them"
+        for state in data["masters"]:
+            generator = np.random.PCG64()
+            try:
+                generator.state = state
+            except (ValueError, TypeError, KeyError, OverflowError):
+                return "'masters' should hold states of PCG64"
+            if generator.state != state:
+                return "'masters' should hold states of PCG64"
+        return ""
 
     def restore(self, env_ids: Array, data: Mapping[str, Any]) -> None:
         """Write what `snapshot` returned."""

@@ -10,7 +10,8 @@ from anysim.controllers.action_space import ActionSpaces
 from anysim.conventions import Array
 from anysim.engine import arguments
 from anysim.engine.base import SimEngine
-from anysim.errors import TaskError
+from anysim.engine.untrusted.rows import damaged, refuse_range
+from anysim.errors import AnysimError, TaskError
 from anysim.hooks import Observing
 from anysim.managers.action import ActionManager
 from anysim.managers.base import RESET_ORDER, Manager
@@ -319,28 +320,51 @@ class TaskEnv:
             SnapshotError: it was taken in another world or task, engine or version, or of another number of envs.
             TaskError: something cannot be overridden, or not in the middle of an episode.
 
-        Whatever is raised before the first row is written: nothing was changed then.
+        Whatever is raised, nothing was changed: all of it is checked before the first row is written.
         """
-        engine = self.engine
-        ids = np.arange(self.num_envs) if env_ids is None else np.asarray(env_ids, dtype=int)
-        arguments.same_stamp(snapshot.engine, engine.name, engine.version, engine.world.hash, len(ids))
-        refuse_foreign(snapshot, self.name, spec_hash(self.spec), self._managed(np.array([0])))
+        ids = arguments.indices(np.arange(self.num_envs) if env_ids is None else env_ids, self.num_envs, "env")
+        self._refuse(snapshot, ids)
         plan = self.counterfactuals.checked(overrides, len(ids), midway=True)
-        engine.restore(snapshot.engine, ids)
-        for manager in self.managers:
-            manager.restore(ids, snapshot.managers[manager.name])
-        task = snapshot.managers["task"]
-        self.mdp.restore(ids, task)
-        self._episodes.elapsed[ids], self.scene.last_action[ids] = task["elapsed"], task["last_action"]
-        self._code[ids], self._fault[ids] = task["code"], task["fault"]
-        self._success[ids] = task["success"]
-        self.streams.restore(ids, snapshot.streams)
+        before, streams = self._managed(ids), self.streams.snapshot(ids)
+        try:
+            self._put(ids, snapshot.managers, snapshot.streams)
+            self.engine.restore(snapshot.engine, ids)
+        except BaseException:
+            self._put(ids, before, streams)
+            raise
         self.counterfactuals.change(ids, plan)
         self.scene.meet()
         self.scene.look(ids)
         rows = self._observe(ids)
         self._store(rows, ids)
         return {g: r.copy() for g, r in rows.items()}
+
+    def _refuse(self, snapshot: EnvSnapshot, ids: Array) -> None:
+        """Refuse what cannot be put into these envs; a snapshot may come from a file that anybody wrote."""
+        self.engine.refuse_snapshot(snapshot.engine, ids)
+        managed = self._managed(np.array([0]))
+        refuse_foreign(snapshot, self.name, spec_hash(self.spec), managed, len(ids))
+        task, streams = snapshot.managers["task"], snapshot.streams
+        refuse_range("elapsed", task["elapsed"], 0, self._task.horizon)
+        refuse_range("code", task["code"], RUNNING - 1, TRUNCATED)
+        self.mdp.refuse_rows(task)
+        for manager in self.managers:
+            manager.refuse_rows(snapshot.managers[manager.name])
+        try:
+            self.counterfactuals.refuse_restored(streams["overridden"])
+        except AnysimError as error:
+            raise damaged(str(error)) from error
+
+    def _put(self, ids: Array, managers: Mapping[str, Mapping[str, Array]], streams: Mapping[str, Any]) -> None:
+        """Write the rows of managers, task and streams."""
+        for manager in self.managers:
+            manager.restore(ids, managers[manager.name])
+        task = managers["task"]
+        self.mdp.restore(ids, task)
+        self._episodes.elapsed[ids], self.scene.last_action[ids] = task["elapsed"], task["last_action"]
+        self._code[ids], self._fault[ids] = task["code"], task["fault"]
+        self._success[ids] = task["success"]
+        self.streams.restore(ids, streams)
 
     def render(
         self,

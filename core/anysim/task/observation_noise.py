@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.engine.untrusted.rows import refuse_range
 from anysim.randomization.draw import DelayLine, draw_rows, is_random, longest_delay, noise_rows, note_noise
 from anysim.randomization.streams import Origin, Streams
 from anysim.task.scene import SceneView
@@ -84,6 +85,11 @@ class Sensed:
         if self._bias is not None:
             data["bias"] = self._bias[env_ids]
         return {f"{self._name}.{key}": value for key, value in data.items()}
+
+    def refuse_rows(self, data: Mapping[str, Array]) -> None:
+        """Raise SnapshotError for a delay that the line has not."""
+        if self._line is not None:
+            refuse_range(f"{self._name}.delay", data[f"{self._name}.delay"], 0, self._line.rows.shape[1] - 1)
 
     def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
         """Write what `snapshot` returned; the scene must be looking at these rows."""

@@ -78,6 +78,19 @@ class Counterfactuals:
             raise TaskError(f"'{entry.path}' can be overridden with one value, not with {value!r}")
         return taken
 
+    def refuse_restored(self, rows: Sequence[Mapping[str, Any]]) -> None:
+        """Refuse overrides (of each env, by path in the spec) that come from a file and that no episode here can have.
+
+        Raises:
+            TaskError: an unknown path, or a value that the spec would not take.
+        """
+        for values in rows:
+            for source, value in values.items():
+                path = self._path(source, midway=False)
+                if self.paths[path].source != source:
+                    raise TaskError(f"'{source}' cannot be overridden; '{self.paths[path].source}' can")
+                self._value(path, value)
+
     def over(self, env_ids: Array) -> None:
         """The episodes of these envs are over: what no reset writes anew is as the spec says again."""
         for env in env_ids:

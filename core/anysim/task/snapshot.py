@@ -15,8 +15,10 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine import snapshot_file
-from anysim.engine.state import Snapshot, joined, joined_rows, row_numbers, stamp_of, stamped
+from anysim.engine.state import Snapshot, joined, joined_rows, row_numbers, stamp_of, stamp_words, stamped
+from anysim.engine.untrusted.rows import SENSIBLE, damaged, mapping_of_arrays, refuse_other_forms
 from anysim.errors import SnapshotError, listing
+from anysim.randomization.streams import Streams
 from anysim_schemas.run import RunSpec
 
 _ELSEWHERE = frozenset({"engine", "num_envs", "record"})
@@ -118,17 +120,22 @@ class EnvSnapshot:
         """
         content = snapshot_file.read(path)
         data, stamp = snapshot_file.expect(content, snapshot_file.ENV, path), content.stamp
-        engine = stamped(stamp, data["engine"])
-        return cls(engine, data["managers"], data["streams"], stamp["task"], stamp["spec_hash"])
+        if not isinstance(data, Mapping) or data.keys() != {"engine", "managers", "streams"}:
+            raise damaged("it should hold the engine's, the managers' and the streams' state")
+        owners = {"": data["managers"]} if not isinstance(data["managers"], Mapping) else data["managers"]
+        managers = {name: mapping_of_arrays(f"'{name}'", rows) for name, rows in owners.items()}
+        task, spec = stamp_words(stamp, "task", "spec_hash")
+        return cls(stamped(stamp, data["engine"]), managers, data["streams"], task, spec)
 
 
 def refuse_foreign(
-    snapshot: EnvSnapshot, task: str, wanted_hash: str, present: Mapping[str, Mapping[str, Array]]
+    snapshot: EnvSnapshot, task: str, wanted_hash: str, present: Mapping[str, Mapping[str, Array]], envs: int
 ) -> None:
-    """Refuse a snapshot of another spec, before anything is changed.
+    """Refuse a snapshot of another spec, or one that this one could not have made, before anything is changed.
 
     Args:
         present: what a snapshot of one env of this task holds of its managers now.
+        envs: how many it should hold.
 
     Raises:
         SnapshotError: another spec or other managers, with what differs and the remedy.
@@ -145,12 +152,10 @@ def refuse_foreign(
             f"the snapshot has the state of {listing(theirs)}, this env has {listing(ours)}; nothing was changed. "
             f"Take a new one"
         )
+    task_rows = mapping_of_arrays("the state of 'task'", snapshot.managers["task"])
+    refuse_other_forms("the state of 'task'", task_rows, present["task"], envs, faulty=np.ones(envs, dtype=bool))
     for owner, data in present.items():
-        shapes = {name: np.shape(rows)[1:] for name, rows in data.items()}
-        theirs = {name: np.shape(rows)[1:] for name, rows in snapshot.managers[owner].items()}
-        if shapes != theirs:
-            other = sorted(name for name in shapes | theirs if shapes.get(name) != theirs.get(name))
-            raise SnapshotError(
-                f"the snapshot holds another state of '{owner}' than this env has (differing: {listing(other)}); "
-                f"nothing was changed. Take a new one"
-            )
+        rows = mapping_of_arrays(f"the state of '{owner}'", snapshot.managers[owner])
+        refuse_other_forms(f"the state of '{owner}'", rows, data, envs, faulty=task_rows["fault"], most=SENSIBLE)
+    if words := Streams.fault(snapshot.streams, envs):
+        raise damaged(f"the random streams: {words}")

@@ -9,6 +9,7 @@ import numpy as np
 
 from anysim import registry
 from anysim.conventions import Array
+from anysim.engine.untrusted.rows import refuse_range
 from anysim.errors import AnysimError, SpecError, SpecIssue, TaskError
 from anysim.managers.base import Overridable
 from anysim.plugin_parameters import options_model
@@ -202,6 +203,12 @@ class Mdp:
         for term in self._altered:
             data |= term.snapshot(env_ids)
         return data
+
+    def refuse_rows(self, data: Mapping[str, Array]) -> None:
+        """Raise SnapshotError for values that no env can have."""
+        refuse_range("held", data["held"], 0, self.spec.horizon)
+        for term in self._altered:
+            term.refuse_rows(data)
 
     def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
         """Write what `snapshot` returned."""

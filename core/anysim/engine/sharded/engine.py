@@ -298,8 +298,8 @@ class ShardedEngine(SimEngine):
         return joined_by_name(((p.rows, answers[p.worker]) for p in parts), len(ids))
 
     @classmethod
-    def refuse_rows(cls, data: Mapping[str, Array], level: SnapshotLevel) -> None:
-        cls.inner.refuse_rows(data, level)
+    def refuse_rows(cls, data: Mapping[str, Array], level: SnapshotLevel, world: World, options: object) -> None:
+        cls.inner.refuse_rows(data, level, world, options)
 
     def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:
         parts = self._blocks.split(ids)
@@ -378,6 +378,7 @@ def sharded(engine_class: type[SimEngine], shards: int, timeout_s: float = TIMEO
         "name": engine_class.name,
         "capabilities": engine_class.capabilities,
         "parameters": engine_class.parameters,
+        "ragged_rows": engine_class.ragged_rows,
         "lifecycle": engine_class.lifecycle,
     }
     return type(f"Sharded{engine_class.__name__}", (ShardedEngine,), body)
