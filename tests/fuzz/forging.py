@@ -20,9 +20,32 @@ Place = tuple[Any, ...]
 """Keys and list numbers from the root of a tree to a value."""
 
 PLAIN: Sequence[Any] = (
-    None, True, -1, 0, 2**31, 2**63, 2**70, -(2**70), 1.5, float("nan"), float("inf"), -float("inf"), 1e300,
-    "", "x", "a" * 5000, "nul\0", "\ud800", [], [[]], {}, {"x": 1}, [1, "x", None], {"": {}}, (1, 2),
-)  # fmt: skip
+    None,
+    True,
+    -1,
+    0,
+    2**31,
+    2**63,
+    2**70,
+    -(2**70),
+    1.5,
+    float("nan"),
+    float("inf"),
+    -float("inf"),
+    1e300,
+    "",
+    "x",
+    "a" * 5000,
+    "nul\0",
+    "\ud800",
+    [],
+    [[]],
+    {},
+    {"x": 1},
+    [1, "x", None],
+    {"": {}},
+    (1, 2),
+)
 """Values that stand where others should."""
 NUMBERS = (np.nan, np.inf, -np.inf, 1e300, -1e300, 1e30, 1e-300, -1.0, 0.0, 2.0**40, 0.5)
 WHOLE = (-1, 0, 1, 2, 7, 100, 2**31 - 1, 2**62, -(2**62))

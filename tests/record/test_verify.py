@@ -24,6 +24,9 @@ class ContentReader:
     def faults(self):
         return self.found
 
+    def nonsense(self):
+        return []
+
 
 @pytest.fixture
 def committed(tmp_path, writer, run_header, record, monkeypatch):

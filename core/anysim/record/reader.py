@@ -84,6 +84,35 @@ class TrajectoryReader(ABC):
     def faults(self) -> list[str]:
         """Everything wrong that only a look into the files shows, as sentences; empty if all is well."""
 
+    def nonsense(self) -> list[str]:
+        """What no recorder writes although every file can be read, as sentences: numbers and steps.
+
+        Raises:
+            RecordError: a file cannot be read.
+        """
+        steps, layout, found = self.manifest.steps, self.manifest.layout, list[str]()
+        shapes = {f"the state '{name}'": (self.states.get(name), shape) for name, shape in layout.state.items()}
+        shapes |= {f"the observation '{name}'": (self.obs.get(name), a.shape) for name, a in layout.obs.items()}
+        shapes |= {"the times": (self.times, ()), "the rewards": (self.rewards, ())}
+        shapes |= {"the actions": (self.actions, (len(layout.action),))}
+        for name, (array, shape) in shapes.items():
+            if array is None or array.shape != (steps, *shape):
+                held = "nothing" if array is None else array.shape
+                found.append(f"{self.directory}: {name} should have the shape {(steps, *shape)}, and hold {held}")
+            elif not name.startswith("the observation") and not np.isfinite(array).all():
+                step = 1 + int(np.argmin(np.isfinite(array).reshape(steps, -1).all(axis=1)))
+                found.append(f"{self.directory}: {name} are not finite at step {step}")
+        times = self.times
+        if (times < 0.0).any() or (np.diff(times) < 0.0).any():
+            step = 2 + int(np.argmin(np.diff(times) >= 0.0)) if (np.diff(times) < 0.0).any() else 1
+            found.append(f"{self.directory}: time goes back at step {step}")
+        counts = {"statuses": self.statuses, "annotations": self.annotations, "instructions": self.language}
+        return found + [
+            f"{self.directory} has {len(rows)} {name} of {steps} steps"
+            for name, rows in counts.items()
+            if len(rows) != steps
+        ]
+
 
 def open_trajectory(directory: str | Path) -> TrajectoryReader:
     """The reader of a committed trajectory, by the writer that its manifest names.

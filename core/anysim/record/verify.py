@@ -12,8 +12,9 @@ from anysim.record.reader import open_trajectory
 def verify(directory: str | Path) -> list[str]:
     """The faults of a trajectory, as sentences; empty if it is whole. Reads every byte.
 
-    Finds a manifest that is damaged, missing and additional files, changed bytes, and content that contradicts the
-    manifest. The manifest itself carries no signature: who can change everything can change everything.
+    Finds a manifest that is damaged, missing and additional files, changed bytes, content that contradicts the
+    manifest, videos that do not decode, and numbers that no recorder writes, also where somebody made the hashes right.
+    The manifest itself carries no signature: who can change everything can change everything.
 
     Raises:
         PluginError: the reader of the trajectory, or a library that it needs, is not installed: nothing is known of
@@ -28,7 +29,8 @@ def verify(directory: str | Path) -> list[str]:
     if faults:
         return faults
     try:
-        return open_trajectory(path).faults()
+        reader = open_trajectory(path)
+        return reader.faults() or reader.nonsense()
     except RecordError as error:
         return [str(error)]
     except ImportError as error:  # of a library that a reader imports when it reads: nothing is known of the content

@@ -105,12 +105,9 @@ class McapReader(TrajectoryReader):
         for entry in self.manifest.cameras.values():
             path = self.directory / entry.file
             try:
-                frames = video.count_frames(path, entry.width, entry.height)
+                video.check(path, entry.width, entry.height, entry.frames, entry.fps)
             except RecordError as error:
                 found.append(str(error))
-                continue
-            if frames != entry.frames:
-                found.append(f"{path} has {frames} frames; the manifest says {entry.frames}")
         return found
 
     # ------------------------------------------------------------------ inside

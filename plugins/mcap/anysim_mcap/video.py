@@ -15,6 +15,7 @@ REPRODUCIBLE = "mbtree=0:rc-lookahead=0"
 """Parameters of x264: its macroblock tree, fed by the look-ahead, depends on uninitialised memory, and equal
 images gave different files."""
 
+CODEC = "h264"
 BT709 = 1
 """The colour space that the file declares, and that images are converted to (value of ITU-T H.273)."""
 
@@ -79,40 +80,63 @@ def images(path: Path, width: int, height: int) -> Iterator[Array]:
     Raises:
         RecordError: it is not a video of this size, or is damaged.
     """
-    import av
-    from av.error import FFmpegError
-
-    try:
-        with av.open(str(path), "r", format="mp4") as container:
-            stream = _stream(path, container, width, height)
-            for frame in container.decode(stream):
-                yield frame.to_ndarray(format="rgb24")[:height, :width]
-    except FFmpegError as error:
-        raise RecordError(f"{path} does not decode: {error.strerror}") from error
+    for frame in _frames(path, width, height):
+        yield frame.to_ndarray(format="rgb24")[:height, :width]
 
 
-def count_frames(path: Path, width: int, height: int) -> int:
-    """How many frames a file has, without decoding them.
+def check(path: Path, width: int, height: int, frames: int, fps: float) -> None:
+    """Decode every frame of a file, and compare their number and times with what they should be.
 
     Raises:
-        RecordError: it is not a video of this size, or is damaged.
+        RecordError: it is not a video of this size, holds other frames, or one is damaged, which is named.
     """
+    count = 0
+    for count, frame in enumerate(_frames(path, width, height), start=1):
+        if count > frames:
+            break
+        if frame.time is None or abs(frame.time * fps - (count - 1)) > 0.01:
+            raise RecordError(
+                f"{path}: frame {count - 1} is at {frame.time} s, and should be at {(count - 1) / fps:g} s"
+            )
+    if count != frames:
+        raise RecordError(f"{path} has {count if count < frames else 'more'} frames; the manifest says {frames}")
+
+
+def _frames(path: Path, width: int, height: int) -> Iterator[Any]:
+    """The decoded frames of a file. What the decoder would conceal is an error."""
     import av
     from av.error import FFmpegError
 
     try:
-        with av.open(str(path), "r", format="mp4") as container:
+        opened = av.open(str(path), "r", format="mp4")
+    except (FFmpegError, ValueError) as error:
+        raise RecordError(f"{path} cannot be read as a video: {getattr(error, 'strerror', None) or error}") from error
+    number = 0
+    try:
+        with opened as container:
             stream = _stream(path, container, width, height)
-            return sum(packet.size > 0 for packet in container.demux(stream))
-    except FFmpegError as error:
-        raise RecordError(f"{path} cannot be read as a video: {error.strerror}") from error
+            size = (stream.width, stream.height)
+            for packet in container.demux(stream):
+                for frame in packet.decode():
+                    if frame.is_corrupt or (frame.width, frame.height) != size:
+                        raise RecordError(f"{path}: frame {number} is damaged")
+                    yield frame
+                    number += 1
+    except (FFmpegError, OverflowError, ValueError, MemoryError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise RecordError(f"{path}: frame {number}, or one soon after it, does not decode: {reason}") from error
 
 
 def _stream(path: Path, container: Any, width: int, height: int) -> Any:
-    """The one video stream, of the expected size: a decoder's memory follows from it."""
-    streams = container.streams.video
+    """The one video stream, of the expected codec and size: a decoder's memory follows from it."""
+    streams = [stream for stream in container.streams.video if stream.codec_context is not None]
     size = (width + width % 2, height + height % 2)
     if len(streams) != 1 or (streams[0].width, streams[0].height) != size:
         found = ", ".join(f"{s.width} x {s.height}" for s in streams) or "none"
         raise RecordError(f"{path} should hold one video of {size[0]} x {size[1]} pixels; it holds {found}")
+    context = streams[0].codec_context
+    if context.name != CODEC:
+        raise RecordError(f"{path} should be encoded in {CODEC}; it is in {context.name}")
+    # one thread, so that an error comes with its frame; and all that the decoder can notice is an error
+    context.thread_count, context.options = 1, {"err_detect": "crccheck+bitstream+buffer+explode"}
     return streams[0]

@@ -86,12 +86,14 @@ def sample() -> Any:
 def record() -> Callable[..., Path]:
     """Record one trajectory into a run's directory."""
 
-    def run(out: Path, steps: int = 8, cameras: Any = CAMERAS, first: int = 0, **options: Any) -> Path:
-        with Recorder(out, make_writer("mcap", options), RUN) as recorder:
-            number = len(recorder.committed())
-            recorder.start(episode(number=number, cameras=cameras))
-            for step in range(first, steps + 1):
-                recorder.append(0, frame(step, cameras))
-            return recorder.commit(0, "success").wait()
+    return recorded
 
-    return run
+
+def recorded(out: Path, steps: int = 8, cameras: Any = CAMERAS, first: int = 0, **options: Any) -> Path:
+    """Record one trajectory into a run's directory."""
+    with Recorder(out, make_writer("mcap", options), RUN) as recorder:
+        number = len(recorder.committed())
+        recorder.start(episode(number=number, cameras=cameras))
+        for step in range(first, steps + 1):
+            recorder.append(0, frame(step, cameras))
+        return recorder.commit(0, "success").wait()

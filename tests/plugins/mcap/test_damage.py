@@ -1,6 +1,8 @@
 """Readers of damaged and hostile files: a sentence, never a crash, never much memory."""
 
+import hashlib
 import json
+import re
 import shutil
 import struct
 
@@ -8,8 +10,11 @@ import numpy as np
 import pytest
 
 from anysim.errors import RecordError
+from anysim.record.columns import Change, ColumnStore, EpisodeColumns
+from anysim.record.header import Header
 from anysim.record.reader import open_trajectory
 from anysim.record.verify import verify
+from anysim.record.writer import make_writer
 from anysim_mcap.chunks import records
 from anysim_mcap.reader import McapReader
 
@@ -130,6 +135,93 @@ def test_frame_counts_and_sizes_of_videos(trajectory):
 def test_a_video_that_is_none(trajectory):
     (trajectory / "front.mp4").write_bytes(b"not a video" * 100)
     reader = open_trajectory(trajectory)
-    with pytest.raises(RecordError, match=r"front\.mp4 does not decode"):
+    with pytest.raises(RecordError, match=r"front\.mp4 cannot be read as a video"):
         list(reader.images("front"))
     assert any("cannot be read as a video" in fault for fault in reader.faults())
+
+
+def sealed(directory):
+    """Make the hashes of all files right."""
+
+    def change(manifest):
+        for name in manifest["files"]:
+            data = (directory / name).read_bytes()
+            manifest["files"][name] = {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+
+    edit(directory, change)
+
+
+def test_a_damaged_frame_is_named_though_the_hashes_are_right(trajectory):
+    file = trajectory / "front.mp4"
+    good = file.read_bytes()
+    start = good.rindex(b"mdat") + 4
+    kept = start + 3 * (len(good) - start) // 4  # the first frame is the largest, and whole
+    file.write_bytes(good[:kept] + bytes(len(good) - kept))
+    sealed(trajectory)
+    (fault,) = verify(trajectory)
+    assert re.search(r"front\.mp4: frame \d+(, or one soon after it, does not decode| is damaged)", fault)
+    with pytest.raises(RecordError, match="frame"):
+        list(open_trajectory(trajectory).images("front"))
+    file.write_bytes(good)
+    sealed(trajectory)
+    assert verify(trajectory) == []
+
+
+def test_a_video_of_another_codec_or_rate_is_none_of_ours(trajectory, sample):
+    import av
+
+    edit(trajectory, lambda d: d["cameras"]["front"].update(fps=10.0))
+    (fault,) = verify(trajectory)
+    assert "frame 1 is at 0.04 s, and should be at 0.1 s" in fault
+    with av.open(str(trajectory / "front.mp4"), "w", format="mp4") as container:
+        stream = container.add_stream("mpeg4", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        frame = av.VideoFrame.from_ndarray(sample.picture(64, 48, 0), format="rgb24")
+        container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+    sealed(trajectory)
+    (fault,) = verify(trajectory)
+    assert "should be encoded in h264; it is in mpeg4" in fault
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda c: c.state["joint_pos"].__setitem__((3, 0), np.nan), "the state 'joint_pos' are not finite at step 3"),
+        (lambda c: c.action.__setitem__(2, np.inf), "the actions are not finite at step 2"),
+        (lambda c: c.reward.__setitem__(8, -np.inf), "the rewards are not finite at step 8"),
+        (lambda c: c.time.__setitem__(4, 0.01), "time goes back at step 4"),
+    ],
+)
+def test_nonsense_in_a_file_that_can_be_read(trajectory, sample, tmp_path, change, says):
+    """Numbers that no recorder writes, in a file whose own checksums and whose hash are right."""
+    store = ColumnStore(sample.LAYOUT, 9)
+    frames = [sample.frame(step) for step in range(9)]
+    for row, f in enumerate(frames):
+        values = {("time", ""): np.array([f.time]), ("reward", ""): np.array([f.reward])}
+        values[("action", "")] = np.zeros((1, 1)) if f.action is None else f.action[None]
+        values |= {("state", k): v[None] for k, v in f.state.items()} | {("obs", k): v[None] for k, v in f.obs.items()}
+        store.write(np.array([store.open() if row == 0 else 0]), np.array([row]), values)
+    taken = store.take(0, 9)
+    parts = {kind: {k: v for (what, k), v in taken.items() if what == kind} for kind in ("state", "obs")}
+    columns = EpisodeColumns(
+        Header(sample.RUN, sample.episode()),
+        0,
+        taken["time", ""],
+        taken["action", ""],
+        parts["state"],
+        taken["reward", ""],
+        parts["obs"],
+        (Change(0, "running"),),
+        (),
+        (),
+        {},
+    )
+    change(columns)
+    writer = make_writer("mcap", {})
+    writer.prepare(sample.RUN)
+    (trajectory / "trajectory.mcap").unlink()
+    writer.write(trajectory, columns, "success")
+    sealed(trajectory)
+    (fault,) = verify(trajectory)
+    assert says in fault
