@@ -50,12 +50,18 @@ class Spoiled(NullEngine):
         self._spoiled = replace(world, bodies=tuple(bodies), joints=tuple(joints))
         super()._build(self._spoiled, num_envs)
 
+    _shown: World | None = None
+
+    @property
+    def world(self) -> World:
+        return self._shown or super().world
+
     def _read(self, name: str):
-        honest, self._world = self._world, self._spoiled
+        self._shown = self._spoiled
         try:
             return super()._read(name)
         finally:
-            self._world = honest
+            self._shown = None
 
 
 def test_a_spoiled_engine_is_found_out(world: World) -> None:

@@ -19,6 +19,7 @@ from anysim.engine.presence import Lifecycle, Presence, write_present
 from anysim.engine.primitives import Primitives
 from anysim.engine.records import EnvRecords, Kept
 from anysim.engine.requirements import check_drives, needs_of
+from anysim.engine.reserved_names import check_class, check_instance
 from anysim.engine.state import Availability, State
 from anysim.errors import CapabilityError, EngineError
 from anysim.model.index import Index
@@ -47,6 +48,11 @@ class EngineLifecycle(EngineLifetime, Primitives):
     options_type: ClassVar[type[EngineOptions] | None] = None
     audit_allowances: ClassVar[Mapping[str, Allowance]] = {}
     """By quantity of the audit what the engine declares to be off; all else is taken over to single precision."""
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        """Raises EngineError where a class takes a name that belongs to the base classes."""
+        super().__init_subclass__(**keywords)
+        check_class(cls)
 
     def __init__(self, **options: Any) -> None:
         """Options are those of `options_model`; a wrong one raises EngineError with what exists."""
@@ -152,8 +158,10 @@ class EngineLifecycle(EngineLifetime, Primitives):
         self._row_forms: dict[str, Mapping[str, Array]] = {}
 
     def _build_envs(self) -> None:
+        kept = {**vars(self), "_built": True}
         self._build(self.world, self.num_envs)
         self._built = True
+        check_instance(self, kept)
         if self._presence.varies:
             self._populate(self._all)
 

@@ -84,10 +84,10 @@ class HostedEngine(SimEngine):
             self._commands.control_changed = True
         if news.wrench is not None:
             if news.wrench:
-                self._flush_control()  # the order of the base class: commands first
+                self.__flush_control()  # the order of the base class: commands first
             self._apply_wrench(self.__shard.shared("wrench").copy() if news.wrench else None)
 
-    def _flush_control(self) -> None:
+    def __flush_control(self) -> None:
         if self._commands.control_changed:
             self._apply_control(self._commands.control)
             self._commands.control_changed = False
@@ -107,7 +107,7 @@ class HostedEngine(SimEngine):
     def on_step(self, n_steps: int, ids: Array | None, fields: Sequence[str]) -> None:
         """Step, and write these fields of the state to the shared memory."""
         self._retire_state()
-        self._flush_control()
+        self.__flush_control()
         self._step(n_steps, ids)
         self.on_read(fields)
 
