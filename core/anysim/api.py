@@ -175,13 +175,16 @@ def check_engine(loaded: LoadedRun, world: "World", engine: "type[SimEngine]", s
         SpecError: with file, line and column.
         CapabilityError: lists every need that the engine does not meet.
     """
+    from anysim.engine.arguments import validated_options
     from anysim.managers.standard import check_run, standard_managers
 
     try:
         managers = standard_managers(loaded.spec, world, 1)
     except SpecError as error:
         raise located(error, loaded) from None
-    return check_run(engine, world, managers, source, lambda path: place_of(loaded, path))
+    given = loaded.spec.engine.options if loaded.spec.engine.name == engine.name else {}
+    options = validated_options(engine.name, engine.options_model(), given)
+    return check_run(engine, world, managers, source, lambda path: place_of(loaded, path), options)
 
 
 def blind_env(loaded: LoadedRun, world: "World", name: str) -> "TaskEnv":
@@ -223,7 +226,8 @@ def _env(
     try:
         spec = loaded.spec
         managers = standard_managers(spec, world, num_envs, proposals)
-        check_run(simulation, world, managers, f"'{world.name}'", lambda path: place_of(loaded, path))
+        place, options = (lambda path: place_of(loaded, path)), simulation.options
+        check_run(simulation, world, managers, f"'{world.name}'", place, options)
         simulation.create_world(world, num_envs)
         return TaskEnv(spec, simulation, managers, name, strict_observers=strict_observers)
     except BaseException:

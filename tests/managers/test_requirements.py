@@ -1,11 +1,16 @@
 """Requirements of a run: what it changes per env is known, and refused, before an engine builds anything."""
 
+from contextlib import nullcontext
+from dataclasses import replace
 from typing import ClassVar
 
 import pytest
+import yaml
 
 from anysim.api import check_engine, compile_world, load, make
 from anysim.engine.kinematic import NullEngine
+from anysim.engine.options import EngineOptions
+from anysim.engine.sharded.engine import sharded
 from anysim.errors import CapabilityError
 
 YAML = """\
@@ -75,3 +80,39 @@ def test_a_joint_that_rubs_anew_in_each_episode_is_refused_too(tmp_path) -> None
     assert "world.objects.cabinet.joints.drawer_1.friction" in str(caught.value)
     assert "cannot change 'joint.friction'" in str(caught.value)
     assert "opened" not in str(caught.value)  # a state, not a parameter
+
+
+class SpatialOptions(EngineOptions):
+    """How many dimensions there are."""
+
+    shaping: ClassVar[tuple[str, ...]] = ("dimensions",)
+    dimensions: int = 3
+
+
+class Spatial(NullEngine):
+    """Refuses worlds by its options."""
+
+    name = "spatial"
+    options_type = SpatialOptions
+
+    @classmethod
+    def refusals(cls, world, options):
+        return [f"'{body.name}' has depth" for body in world.bodies[:1] if options.dimensions < 3]
+
+
+@pytest.mark.parametrize("kind", [Spatial, sharded(Spatial, 2)], ids=["here", "in processes"])
+def test_a_refusal_sees_the_options(kind) -> None:
+    """Those of the file for the engine of the file, those of the engine at a build, and defaults for others."""
+    for dimensions, engine, refused in ((2, "spatial", True), (3, "spatial", False), (2, "null", False)):
+        loaded = load(yaml.safe_load(YAML.replace("engine: mujoco", "engine: {name: 'null'}")))
+        options = {"dimensions": dimensions} if engine == "spatial" else {}
+        spec = loaded.spec.model_copy(
+            update={"engine": loaded.spec.engine.model_copy(update={"name": engine, "options": options})}
+        )
+        world, chosen = compile_world(loaded), replace(loaded, spec=spec)
+        with pytest.raises(CapabilityError, match="'cube' has depth") if refused else nullcontext():
+            check_engine(chosen, world, kind, "cube.yaml")
+        built = kind(**options)
+        with pytest.raises(CapabilityError, match="'cube' has depth") if refused else nullcontext():
+            built.create_world(world)
+        built.destroy()

@@ -1,7 +1,7 @@
 """SAPIEN as a SimEngine: one scene per env, stepped one after the other on the CPU."""
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from anysim.conventions import Array
 from anysim.engine.capability import Allowance, Capabilities
@@ -39,7 +39,7 @@ class SapienEngine(OneWorldPerEnv):
         return findings()
 
     @classmethod
-    def refusals(cls, world: World) -> Sequence[str]:
+    def refusals(cls, world: World, options: Any) -> Sequence[str]:
         """Pairs of surfaces and exclusions that PhysX' filters cannot tell apart."""
         return refusals(world)
 

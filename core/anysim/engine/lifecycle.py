@@ -89,8 +89,11 @@ class EngineLifecycle(EngineLifetime, Primitives):
         return dict(options)
 
     @classmethod
-    def refusals(cls, world: World) -> Sequence[str]:
-        """Why this world in particular cannot be built, beyond capabilities: a reason each. Imports nothing heavy."""
+    def refusals(cls, world: World, options: Any) -> Sequence[str]:
+        """Why this world in particular cannot be built, beyond capabilities: a reason each. Imports nothing heavy.
+
+        `options` are those that the engine will have, of type `options_model`; None of an engine without any.
+        """
         return ()
 
     @property
@@ -144,7 +147,9 @@ class EngineLifecycle(EngineLifetime, Primitives):
             return self
 
     def _check(self, world: World) -> list[Need]:
-        return check(self.name, self.capabilities, needs_of(world), f"'{world.name}'", self.refusals(world))
+        return check(
+            self.name, self.capabilities, needs_of(world), f"'{world.name}'", self.refusals(world, self.options)
+        )
 
     def _install(self, world: World, num_envs: int) -> None:
         """Everything the base class keeps about a world."""

@@ -58,11 +58,14 @@ def check_run(
     managers: Iterable[Manager],
     source: str,
     place: Callable[[str], str] = str,
+    options: object = None,
 ) -> list[Need]:
     """Refuse a world, and what its managers will do with it, in one error; returns the needs met approximately.
+
+    `options` are those that the engine has or will have.
 
     Raises:
         CapabilityError: lists every need that the engine does not meet.
     """
-    refusals = [*engine.refusals(world), *unchangeable(engine, managers, place)]
+    refusals = [*engine.refusals(world, options), *unchangeable(engine, managers, place)]
     return check(engine.name, engine.capabilities, needs_of(world), source, refusals, place)

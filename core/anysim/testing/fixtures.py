@@ -58,7 +58,10 @@ def build(new_engine: Callable[[], SimEngine], engine_class: type[SimEngine]) ->
     def make(world: World, num_envs: int = 1) -> SimEngine:
         for need in needs_of(world):
             _skip_undeclared(engine_class, need.capability)
-        return new_engine().create_world(world, num_envs)
+        engine = new_engine()
+        for reason in engine.refusals(world, engine.options):
+            pytest.skip(f"{engine.name} refuses a world of the suite: {reason.replace(',', ';')}")
+        return engine.create_world(world, num_envs)
 
     return make
 

@@ -11,6 +11,7 @@ from anysim.errors import CapabilityError, EngineError
 from anysim.model.world import World
 from anysim.testing import plugin, tolerances, worlds
 from anysim.testing.compare import assert_close, assert_same, play, quaternions_apart, read, spread, tape
+from anysim.testing.fixtures import skip_without
 
 
 def test_availability_is_a_plain_answer(engine_class):
@@ -47,6 +48,17 @@ def test_create_world_begins_in_the_initial_state(build):
     assert not state.body_twist.any()
     assert not state.joint_vel.any()
     assert not state.fault.any()
+
+
+@pytest.mark.parametrize("world", [worlds.loose, worlds.falling_ball, worlds.drifting], ids=lambda w: w.__name__)
+def test_the_simplest_worlds_are_not_refused(new_engine, engine_class, world):
+    """Whatever `refusals` says of others: free bodies that touch nothing are what every engine of bodies can build."""
+    if not {need.capability for need in needs_of(world())} <= set(engine_class.capabilities):
+        skip_without(engine_class, Capability.RIGID_BODIES)
+        skip_without(engine_class, Capability.CONTACTS)
+    engine = new_engine()
+    assert not list(engine.refusals(world(), engine.options))
+    engine.create_world(world()).step()
 
 
 def test_one_world_per_engine(build):

@@ -180,7 +180,7 @@ def test_worlds_that_filters_cannot_tell_apart_are_refused_before_the_build():
     for i in range(40):
         s.free(f"b{i}", Sphere(0.1), (float(i), 0.0, 0.1), surface=Surface(friction=0.01 * i))
     world = s.world()
-    (reason,) = SapienEngine.refusals(world)
+    (reason,) = SapienEngine.refusals(world, None)
     assert "the 40 different surfaces" in reason
     engine = SapienEngine()
     with pytest.raises(CapabilityError, match="sapien cannot run 'colourful': the 40 different surfaces"):
@@ -196,14 +196,14 @@ def test_what_is_never_there_at_once_may_have_any_surfaces():
         s.free(f"b{i}", Sphere(0.1), (float(i), 0.0, 0.1), surface=Surface(friction=0.01 * i))
     names = tuple(f"b{i}" for i in range(40))
     one = with_slots(s.world(), {"one": names})
-    assert not SapienEngine.refusals(one)
+    assert not SapienEngine.refusals(one, None)
     with SapienEngine().create_world(one) as engine:
         engine.reset(present=having(one, "b39"))
         engine.step()
         assert engine.get_parameters("geom.friction")[0, 39] == pytest.approx(0.39)
-    (reason,) = SapienEngine.refusals(with_slots(s.world(), {"first": names[:20], "second": names[20:]}))
+    (reason,) = SapienEngine.refusals(with_slots(s.world(), {"first": names[:20], "second": names[20:]}), None)
     assert "its 400 combinations of entities are too many to try one by one" in reason
-    (reason,) = SapienEngine.refusals(with_slots(s.world(), {name: (name,) for name in names}))
+    (reason,) = SapienEngine.refusals(with_slots(s.world(), {name: (name,) for name in names}), None)
     assert "the 40 different surfaces" in reason
 
 

@@ -8,7 +8,7 @@ reset, a new worker takes them over, and the rest goes on.
 
 import warnings
 import weakref
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import Any, ClassVar
@@ -62,6 +62,11 @@ class ShardedEngine(SimEngine):
     def options_model(cls) -> Any:
         """That of the engine."""
         return cls.inner.options_model()
+
+    @classmethod
+    def refusals(cls, world: World, options: Any) -> Sequence[str]:
+        """Those of the engine."""
+        return cls.inner.refusals(world, options)
 
     @property
     def version(self) -> str:
