@@ -66,7 +66,7 @@ def test_nothing_falls_and_nothing_touches():
 def test_it_says_what_it_ignores():
     engine = NullEngine().create_world(worlds.scene(sensor=True))
     listed = {need.capability for need in engine.approximations}
-    assert {Capability.CONTACTS, Capability.CONTACT_SENSORS, Capability.EFFORT_LIMITS} <= listed
+    assert {Capability.CONTACTS_STATIC, Capability.CONTACT_SENSORS, Capability.EFFORT_LIMITS} <= listed
     assert Capability.DYNAMICS not in NullEngine.capabilities
 
 

@@ -43,7 +43,6 @@ PLACES = {
     C.RIGID_BODIES: 7,
     C.RESTITUTION: 10,
     C.BODY_DAMPING: 11,
-    C.CONTACT_OFFSET: 13,
     C.TORSIONAL_FRICTION: 5,  # the fingers of the robot come first
     C.SOLVER_SETTINGS: 15,
     C.RENDER_DEPTH: 20,
@@ -79,7 +78,7 @@ def test_a_mapping_has_no_lines() -> None:
 
     class Lacking(NullEngine):
         name = "lacking"
-        capabilities = Capabilities.of(C.CONTACTS)
+        capabilities = Capabilities.of(C.CONTACTS_STATIC)
 
     with pytest.raises(CapabilityError, match=r"is free \(rigid bodies\) at world\.objects\.cube;"):
         check_engine(loaded, compile_world(loaded), Lacking, "a mapping")

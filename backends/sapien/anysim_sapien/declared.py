@@ -1,7 +1,7 @@
 """Declarations of the engine that need no import of SAPIEN: capabilities, with measured errors, and availability."""
 
 from anysim.engine.availability import LibraryRequirement
-from anysim.engine.capability import Allowance, Capabilities, Capability
+from anysim.engine.capability import Allowance, Capabilities, Capability, approximately
 from anysim.engine.parameters import PARAMETERS as ALL
 
 LIBRARY = LibraryRequirement(
@@ -13,25 +13,31 @@ LIBRARY = LibraryRequirement(
 )
 
 _APPROXIMATE = {
-    Capability.CONTACTS: "a cylinder is a prism of many sides: it rolls 11 % slower than a round one down 15 degrees",
+    Capability.CONTACTS_STATIC: approximately(
+        "a cylinder is a prism of many sides: it rolls {rolling:.0%} slower than a round one down 15 degrees",
+        rolling=0.13,
+    ),
     Capability.SHAPE_MESH: (
         "PhysX cooks hulls and drops corners within 0.7 mm of the rest: 0.2 % of a hand's volume, up to 6 % at 3 cm"
     ),
-    Capability.MIMIC_JOINTS: (
-        "a stiff spring: 0.04 mm at 20 N on a gripper's finger; only links with one parent, or a link and its child"
+    Capability.MIMIC_JOINTS: approximately(
+        "a stiff spring: {lag:g} m at 20 N on a gripper's finger; only links with one parent, or a link and its child",
+        lag=5e-5,
     ),
     Capability.ACTUATION_NATIVE: (
         "PhysX takes the stiffness implicitly too: a Panda in free motion within 3.3e-3 rad of the law, 1e-4 at rest; "
         "blocked within 0.6 %. The effort limit bounds a driven joint's own damping with the drive"
     ),
-    Capability.TORSIONAL_FRICTION: (
-        "faces resist through their several points, within 4 % of MuJoCo; where one point touches nothing resists: a "
-        "ball spins on"
+    Capability.TORSIONAL_FRICTION: approximately(
+        "faces resist through their several points, within 4 % of MuJoCo; where one point touches {torsion:.0%} of the "
+        "torque are missing: a ball spins on",
+        torsion=1.0,
     ),
-    Capability.CONTACT_SENSORS: (
-        "friction follows from momentum: within 0.2 % of the net force on a body; on a link above a joint with dry "
-        "friction off by more (0.37 N above a sliding joint of 0.2 N, 0.65 N above a turning one of 0.2 N m); how "
-        "several fixed things share the friction of one body is a guess"
+    Capability.CONTACT_SENSORS: approximately(
+        "friction follows from momentum: within {felt:.1%} of the net force on a body; on a link above a joint with "
+        "dry friction off by more (0.37 N above a sliding joint of 0.2 N, 0.65 N above a turning one of 0.2 N m); how "
+        "several fixed things share the friction of one body is a guess",
+        felt=0.005,
     ),
     Capability.MATERIALS: (
         "the shader `lit`, which `auto` takes without a graphics card, has highlights and mirrors nothing; `trivial` "

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+from types import MappingProxyType
 from typing import NamedTuple
 
 from anysim.errors import CapabilityError
@@ -13,7 +14,8 @@ class Capability(StrEnum):
 
     RIGID_BODIES = "rigid bodies"
     ARTICULATIONS = "articulations"
-    CONTACTS = "contacts"
+    CONTACTS_STATIC = "contacts with static things"
+    CONTACTS_MOVING = "contacts between moving bodies"
     TERRAIN_PLANE = "terrain: plane"
     TERRAIN_HEIGHTFIELD = "terrain: heightfield"
     TERRAIN_TRIMESH = "terrain: triangle mesh (concave)"
@@ -27,7 +29,6 @@ class Capability(StrEnum):
     RESTITUTION = "restitution"
     TORSIONAL_FRICTION = "torsional friction"
     BODY_DAMPING = "damping of free bodies"
-    CONTACT_OFFSET = "contact offset by surface"
     SOLVER_SETTINGS = "solver settings by entity"
     CONTROL_POSITION = "control: position"
     CONTROL_VELOCITY = "control: velocity"
@@ -54,10 +55,22 @@ class Capability(StrEnum):
 
 
 class Support(NamedTuple):
-    """How well: exact, or approximate with the error that was measured."""
+    """How well: exact, or approximate with the error that was measured.
+
+    `errors` are the numbers of the note that the contract suite measures, by the names it has for them.
+    """
 
     exact: bool = True
     note: str = ""
+    errors: Mapping[str, float] = MappingProxyType({})
+
+
+def approximately(note: str, **errors: float) -> Support:
+    """Support with measured errors: `approximately("within {bounce:g} of the coefficient", bounce=0.05)`.
+
+    `anysim.testing.errors.MEASURES` has the names, and the contract suite checks that no error is larger than declared.
+    """
+    return Support(False, note.format(**errors), MappingProxyType(errors))
 
 
 @dataclass(frozen=True)
@@ -67,9 +80,10 @@ class Capabilities:
     supported: Mapping[Capability, Support] = field(default_factory=dict[Capability, Support])
 
     @classmethod
-    def of(cls, *exact: Capability, approximate: Mapping[Capability, str] | None = None) -> "Capabilities":
-        """`Capabilities.of(A, B, approximate={C: "2 mm sink at 40 N"})`."""
-        table = {c: Support() for c in exact} | {c: Support(False, note) for c, note in (approximate or {}).items()}
+    def of(cls, *exact: Capability, approximate: Mapping[Capability, str | Support] | None = None) -> "Capabilities":
+        """`Capabilities.of(A, B, approximate={C: approximately("{sink:g} m of sink", sink=2e-3), D: "ignored"})`."""
+        notes = {c: Support(False, s) if isinstance(s, str) else s for c, s in (approximate or {}).items()}
+        table = {c: Support() for c in exact} | notes
         return cls(dict(sorted(table.items(), key=lambda item: list(Capability).index(item[0]))))
 
     def __contains__(self, capability: object) -> bool:

@@ -49,7 +49,8 @@ class NullEngine(SimEngine):
             C.CONTACT_SENSORS: "read zero: kinematic engine",
             **dict.fromkeys(
                 (
-                    C.CONTACTS,
+                    C.CONTACTS_STATIC,
+                    C.CONTACTS_MOVING,
                     C.TERRAIN_PLANE,
                     C.TERRAIN_HEIGHTFIELD,
                     C.TERRAIN_TRIMESH,
@@ -63,7 +64,6 @@ class NullEngine(SimEngine):
                     C.RESTITUTION,
                     C.TORSIONAL_FRICTION,
                     C.BODY_DAMPING,
-                    C.CONTACT_OFFSET,
                     C.SOLVER_SETTINGS,
                 ),
                 _IGNORED,

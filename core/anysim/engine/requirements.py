@@ -11,6 +11,7 @@ from anysim.conventions import WORLD, Array
 from anysim.engine.capability import Capability as C, Need
 from anysim.errors import EngineError
 from anysim.kinematics.dynamics import coupling, mass_matrix
+from anysim.model.pairs import may_meet
 from anysim.model.world import (
     Actuation,
     Actuator,
@@ -27,6 +28,9 @@ from anysim.model.world import (
     World,
 )
 
+_FEW = 100
+"""So many bodies are asked first whether they can touch each other."""
+
 Rows = tuple[tuple[C, object, str], ...]
 """A capability, whether it is needed, and why, in words that follow the name of the thing."""
 
@@ -35,7 +39,6 @@ _KEYS: Mapping[C, str] = {
     C.SOLVER_SETTINGS: ".solver",
     C.BODY_DAMPING: ".damping",
     C.RESTITUTION: ".restitution",
-    C.CONTACT_OFFSET: ".contact.offset",
     C.TORSIONAL_FRICTION: ".contact.torsional_friction",
     C.RENDER_LIGHTS: ".lights",
     C.RENDER_SHADOWS: ".scenery.shadows",
@@ -67,6 +70,7 @@ def _things(world: World) -> Iterator[tuple[str, str, Rows]]:
             limited = isfinite(world.joints[actuator.joint].velocity_limit)
             needs = ((C.VELOCITY_LIMITS, limited, "heeds its joint's velocity limit"),)
             yield f"drive '{actuator.name}'", "physics.velocity_limits", needs
+    yield from _contacts(world, path)
     yield from ((f"geom '{geom.name}'", path[geom.body], _of_geom(geom)) for geom in world.geoms if geom.collides)
     for slot in world.slots:
         needs = ((C.VARYING_ENTITIES, True, "is not the same in every env"),)
@@ -129,18 +133,32 @@ def _of_actuation(actuation: Actuation) -> Rows:
     )
 
 
+def _contacts(world: World, path: Mapping[int, str]) -> Iterator[tuple[str, str, Rows]]:
+    """What can touch something fixed, and what something that moves: the first of each."""
+    names = {geom.body: geom.name for geom in reversed(world.geoms) if geom.collides}
+    bodies = np.array(sorted(names), dtype=int)
+    fixed = np.array([b == WORLD or world.bodies[b].kind is BodyKind.STATIC for b in bodies.tolist()], dtype=bool)
+    few = np.concatenate([np.flatnonzero(fixed)[:_FEW], np.flatnonzero(~fixed)[:_FEW]])
+    for capability, partner in ((C.CONTACTS_STATIC, fixed), (C.CONTACTS_MOVING, ~fixed)):
+        for some in (few, np.arange(len(bodies))):  # of thousands the first will meet, or were excluded for a reason
+            meet = may_meet(world, bodies[some]) & ~fixed[some][:, None] & partner[some]
+            if meet.any():
+                body, other = (int(bodies[some[i]]) for i in np.argwhere(meet)[0])
+                why = f"collides with '{names[other]}'"
+                yield f"geom '{names[body]}'", path[body], ((capability, True, why),)
+                break
+
+
 def _of_geom(geom: Geom) -> Rows:
     mesh, surface = isinstance(geom.shape, MeshShape), geom.surface
     concave = isinstance(geom.shape, MeshShape) and geom.shape.concave
     instead = "`kind: heightfield` with the same `file` is its heights seen from above"
     return (
-        (C.CONTACTS, True, "collides"),
         (C.TERRAIN_PLANE, isinstance(geom.shape, Plane), "is a plane"),
         (C.TERRAIN_HEIGHTFIELD, isinstance(geom.shape, HeightFieldShape), "is a height field"),
         (C.TERRAIN_TRIMESH, concave, f"is a triangle mesh; {instead}"),
         (C.SHAPE_MESH, mesh and not concave, "is a mesh"),
         (C.RESTITUTION, surface.restitution > 0, "bounces"),
-        (C.CONTACT_OFFSET, surface.contact_offset is not None, "has a contact offset"),
         (C.TORSIONAL_FRICTION, surface.torsional, "has torsional friction"),
     )
 

@@ -14,7 +14,7 @@ from anysim.testing.compare import assert_close
 from anysim.testing.fixtures import needs
 from anysim.testing.sketch import Sketch, inertial
 
-pytestmark = needs(C.DYNAMICS, C.CONTACTS)
+pytestmark = needs(C.DYNAMICS, C.CONTACTS_STATIC, C.CONTACTS_MOVING)
 RADIUS = 0.05
 
 

@@ -55,7 +55,7 @@ def test_the_simplest_worlds_are_not_refused(new_engine, engine_class, world):
     """Whatever `refusals` says of others: free bodies that touch nothing are what every engine of bodies can build."""
     if not {need.capability for need in needs_of(world())} <= set(engine_class.capabilities):
         skip_without(engine_class, Capability.RIGID_BODIES)
-        skip_without(engine_class, Capability.CONTACTS)
+        skip_without(engine_class, Capability.CONTACTS_STATIC)
     engine = new_engine()
     assert not list(engine.refusals(world(), engine.options))
     engine.create_world(world()).step()

@@ -188,7 +188,7 @@ def test_solver_settings_are_taken(build):
     assert abs(engine.get_state().body_pose[0, 0, 2] - 0.1) < tolerances.REST_HEIGHT
 
 
-@needs(C.DYNAMICS, C.CONTACT_OFFSET)
+@needs(C.DYNAMICS)
 def test_a_contact_offset_lifts_nothing(build):
     """Contacts are prepared from the offset on and act from touch on: a box rests on the ground."""
     surface = Surface(contact_offset=0.015)

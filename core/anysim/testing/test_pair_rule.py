@@ -12,7 +12,7 @@ from anysim.testing.compare import assert_close
 from anysim.testing.fixtures import needs
 from anysim.testing.sketch import Sketch
 
-pytestmark = needs(C.DYNAMICS, C.CONTACTS)
+pytestmark = needs(C.DYNAMICS, C.CONTACTS_STATIC)
 G = 9.81
 
 SURFACES = (

@@ -111,7 +111,7 @@ def test_rows_that_no_env_can_have_are_refused(build, engine_class, row, message
 # ---------------------------------------------------------------------- nothing meets it
 
 
-@needs(C.VARYING_ENTITIES, C.DYNAMICS, C.CONTACTS)
+@needs(C.VARYING_ENTITIES, C.DYNAMICS, C.CONTACTS_STATIC, C.CONTACTS_MOVING)
 def test_what_is_there_moves_as_if_the_rest_were_not_in_the_world(build, engine_class):
     """With the rest absent, and in a world without the rest: the same motion, contacts included."""
     whole = varied(engine_class.capabilities)
@@ -133,7 +133,7 @@ def test_what_is_there_moves_as_if_the_rest_were_not_in_the_world(build, engine_
         )
 
 
-@needs(C.VARYING_ENTITIES, C.DYNAMICS, C.CONTACTS, C.CONTACT_POINTS)
+@needs(C.VARYING_ENTITIES, C.DYNAMICS, C.CONTACTS_STATIC, C.CONTACTS_MOVING, C.CONTACT_POINTS)
 def test_nothing_touches_what_is_absent(build, engine_class):
     """What lay on an entity that is absent now falls, and no contact names what is not there."""
     engine = _engine(build, engine_class)
@@ -162,7 +162,7 @@ def test_nothing_touches_what_is_absent(build, engine_class):
     assert_close(engine.get_state().body_pose[1, mug, 2], 0.05, 0.01, "a ball where a cabinet could be")
 
 
-@needs(C.VARYING_ENTITIES, C.DYNAMICS, C.CONTACTS, C.ARTICULATIONS)
+@needs(C.VARYING_ENTITIES, C.DYNAMICS, C.CONTACTS_STATIC, C.CONTACTS_MOVING, C.ARTICULATIONS)
 def test_what_is_there_carries_and_blocks(build, engine_class):
     """Brought in at a reset, a fixed crate carries and a cabinet's frame blocks, as if they had always been there."""
     engine = _engine(build, engine_class, 3)

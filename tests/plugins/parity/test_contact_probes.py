@@ -108,8 +108,8 @@ def test_a_probe_finds_the_engine_that_is_wrong(case: str) -> None:
     assert off > 2 * right
 
 
-SOFT = "declares for contacts: soft"
-MULTIPLIES = "declares for contacts: friction multiplies"
+SOFT = ": soft"
+MULTIPLIES = ": friction multiplies"
 DECLARED = {
     ("mujoco", "bounce: depth of the impact, e = 0"): "declares for restitution",
     ("mujoco", "bounce: depth of the impact, e = 0.3"): "declares for restitution",

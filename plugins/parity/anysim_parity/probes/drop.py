@@ -32,7 +32,7 @@ def drop(dt: float) -> Probe:
     for mass in MASSES:
         quantities.append(Quantity(HEIGHT.format(mass), "m", HALF, T.REST_HEIGHT, remark=SINKS))
     for mass in MASSES:
-        about = (Capability.CONTACT_SENSORS, Capability.CONTACTS)
+        about = (Capability.CONTACT_SENSORS, Capability.CONTACTS_STATIC)
         quantities.append(Quantity(WEIGHT.format(mass), "N", mass * G, T.WEIGHT * mass * G, about))
     quantities.append(Quantity(STILL, "m/s", 0.0, T.CREEP))
     t = np.linspace(0.0, sqrt(2 * GAP / G), CURVE_POINTS)
@@ -81,7 +81,7 @@ APEX, SUNK = "bounce: apex after the impact, e = {:g}", "bounce: depth of the im
 
 def bounce(dt: float) -> Probe:
     """Balls of several restitutions fall from 0.5 m."""
-    about = (Capability.RESTITUTION, Capability.CONTACTS)
+    about = (Capability.RESTITUTION, Capability.CONTACTS_STATIC)
     apex = [
         Quantity(APEX.format(e), "m", e * e * GAP, ((e + T.RESTITUTION) ** 2 - e * e) * GAP, about) for e in BOUNCES
     ]

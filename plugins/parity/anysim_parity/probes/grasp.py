@@ -30,7 +30,7 @@ DROPPED = 0.005
 """[m] in half a second. A grip that is short by the smallest step lets a cube fall by 15 mm."""
 
 HOLDS = "grasp: least grip that holds, in m g / (2 mu)"
-ABOUT = (Capability.CONTACTS, Capability.CONTROL_EFFORT, Capability.ARTICULATIONS)
+ABOUT = (Capability.CONTACTS_MOVING, Capability.CONTROL_EFFORT, Capability.ARTICULATIONS)
 
 
 def grasp(dt: float) -> Probe:
@@ -114,7 +114,7 @@ PLOT = "A cube that slips in the grip"
 
 def lift(dt: float) -> Probe:
     """One gripper closes on a cube, lifts it and holds it."""
-    position = (Capability.CONTACTS, Capability.CONTROL_POSITION)
+    position = (Capability.CONTACTS_MOVING, Capability.CONTROL_POSITION)
     quantities = (
         Quantity(SQUEEZE, "N", GRIP, T.GRIP * GRIP, (Capability.CONTACT_SENSORS, *position)),
         Quantity(LIFTED, "m", 0.0, T.SLIP, position, "Regularised friction creeps under any load."),

@@ -33,7 +33,7 @@ class Quantity(NamedTuple):
     unit: str
     reference: float | None
     tolerance: float | None
-    about: tuple[Capability, ...] = (Capability.CONTACTS,)
+    about: tuple[Capability, ...] = (Capability.CONTACTS_STATIC,)
     remark: str = ""
 
 

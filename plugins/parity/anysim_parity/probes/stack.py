@@ -27,7 +27,7 @@ PLOT = "Where the top of a stack goes"
 def stack(dt: float) -> Probe:
     """Five equal boxes on each other; a heavy box on a light one."""
     top = (2 * COUNT - 1) * HALF
-    sensors = (Capability.CONTACT_SENSORS, Capability.CONTACTS)
+    sensors = (Capability.CONTACT_SENSORS, Capability.CONTACTS_MOVING)
     quantities = [Quantity(TOP, "m", top, T.STACK_HEIGHT), Quantity(DRIFT, "m", 0.0, T.STACK_DRIFT)]
     for i in range(COUNT - 1):
         load = (COUNT - 1 - i) * MASS * G
