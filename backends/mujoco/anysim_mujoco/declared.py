@@ -36,6 +36,7 @@ _APPROXIMATE = {
         bounce=0.07,
         dead=0.13,
     ),
+    Capability.RENDER_LIGHTS: "one with a place shines within 80 degrees of its direction alone",
     Capability.MATERIALS: (
         "one lamp's highlight: as strong as specular or metallic says, as small as it is smooth; nothing is mirrored"
     ),
