@@ -1,6 +1,7 @@
 """URDF import: lumping, sanitising, and what is refused with which words."""
 
 from collections.abc import Callable
+from itertools import pairwise
 from math import inf, pi
 from pathlib import Path
 
@@ -10,10 +11,11 @@ import pytest
 from anysim.assets.catalogue import load_robot
 from anysim.assets.model import ImportedModel
 from anysim.assets.urdf import import_urdf
+from anysim.compile.builder import WorldBuilder
 from anysim.compile.robot import import_robot
 from anysim.errors import AssetError
 from anysim.kinematics import inertia
-from anysim.model.world import BodyKind, Box, Cylinder, JointType, Sphere
+from anysim.model.world import BodyKind, Box, Cylinder, EntityKind, JointType, Sphere, World
 
 Load = Callable[..., ImportedModel]
 Text = Callable[[float], str]
@@ -184,8 +186,48 @@ def test_links_without_mass(urdf: Load, inertial: Text) -> None:
     leaf = next(s for s in model.sites if s.name == "leaf")
     np.testing.assert_allclose(leaf.position, (0.3, 0, 0))  # the limit nearest to zero
     assert model.geoms[0].body == 2
-    assert "link 'virtual' (arm.urdf:3): moves without mass; now 1 g" in notes(model, "repaired")
+    assert "link 'virtual' (arm.urdf:3): moves without mass; now 0.001 kg, 0.001 of what it carries" in notes(
+        model, "repaired"
+    )
     assert "moves no mass (link 'leaf'), so it is frozen" in notes(model, "dropped")
+
+
+@pytest.mark.parametrize("mass", [1e-3, 70.0])
+def test_links_without_mass_get_a_share_of_what_they_carry(urdf: Load, inertial: Text, mass: float) -> None:
+    """Two in a row, x and y of a base: each has a thousandth of the base, not of each other."""
+    place = '<limit lower="-1" upper="1" effort="1" velocity="1"/><origin xyz="0 0 0.5"/>'
+    names = ["world", "x", "y", "base"]
+    links = [link(name, inertial(mass) if name == "base" else "") for name in names]
+    joints = [joint(b, a, b, "prismatic", place) for a, b in pairwise(names)]
+    bodies = urdf("".join([*links, *joints])).bodies
+    assert [b.inertial.mass for b in bodies] == pytest.approx([0, mass / 1000, mass / 1000, mass])
+    assert bodies[1].inertial.com == pytest.approx((0.0, 0.0, 1.0))  # where the base is
+    assert np.array(bodies[2].inertial.inertia) * 1000 == pytest.approx(bodies[3].inertial.inertia)
+
+
+@pytest.mark.parametrize(("moment", "real"), [("4e-18", False), ("1e-12", False), ("1e-8", True), ("1e-6", True)])
+def test_an_inertia_of_nothing_is_none(urdf: Load, inertial: Text, moment: str, real: bool) -> None:
+    """4e-18 kg m^2 at 2.2 kg belong to a body of a few nanometres."""
+    own = inertial(2.2).replace("0.01", moment)
+    model = urdf(link("base", inertial(1)) + link("a", own) + joint("j", "base", "a"))
+    if real:
+        assert model.bodies[1].inertial.inertia[0] == float(moment)
+        assert not model.report
+    else:
+        assert model.bodies[1].inertial.inertia[:3] == pytest.approx((0.4 * 2.2 * 1e-4,) * 3)
+        assert "kg m^2, which is none; taken as a ball of 1 cm radius" in notes(model, "repaired")
+
+
+def test_limits_that_are_far_out_are_none(urdf: Load, inertial: Text) -> None:
+    """1e16 is what generators write for none, and engines each have a number of their own for that."""
+    limit = '<limit lower="-1e16" upper="{0}" effort="1" velocity="1"/>'
+    body = "".join(link(name, inertial(1)) for name in "abc")
+    body += joint("j", "a", "b", content=limit.format("1e16")) + joint("k", "b", "c", content=limit.format("2"))
+    model = urdf(body)
+    assert "has limits [-1e+16, 1e+16], of which those beyond 1e+06 are none" in notes(model, "repaired")
+    builder = WorldBuilder(World("w"))
+    builder.add("it", EntityKind.OBJECT, model, root=BodyKind.STATIC)
+    assert [(j.lower, j.upper) for j in builder.build().joints] == [(-inf, inf), (-inf, 2.0)]
 
 
 def test_a_follower_of_a_frozen_joint_is_frozen(urdf: Load, inertial: Text) -> None:

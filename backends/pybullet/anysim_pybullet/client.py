@@ -15,6 +15,7 @@ from anysim.math import pose as P
 from anysim.model.world import Geom, HeightField, HeightFieldShape, MeshShape, Plane, World
 from anysim_pybullet.bullet import bullet, connect, disconnect
 from anysim_pybullet.cast import Cast
+from anysim_pybullet.declared import LINKS
 from anysim_pybullet.options import PybulletOptions, sweeps
 from anysim_pybullet.surfaces import PairRules
 from anysim_pybullet.tree import Frames, Tree, frames_of, shifted, trees_of
@@ -243,6 +244,11 @@ class Env:
         file = self.plan.urdf_of(tree, self.frames)
         uid = p.loadURDF(file, useFixedBase=0 if tree.free else 1, flags=flags, physicsClientId=client)
         self.plan.forget(file)
+        if p.getNumJoints(uid, physicsClientId=client) > LINKS:
+            name = world.bodies[tree.bodies[0]].name
+            raise EngineError(
+                f"'{name}' needs several shapes a surface, more than the {LINKS} links that Bullet tells of"
+            )
         self.root_ids[tree.number] = uid
         links: dict[str, int] = {body_link(int(tree.bodies[0])): -1}
         joints: dict[str, int] = {}

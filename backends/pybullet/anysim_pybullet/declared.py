@@ -60,6 +60,9 @@ CAPABILITIES = Capabilities.of(
 PARAMETERS = frozenset(ALL) - {"world.shadows"}
 """What can be changed per env."""
 
+LINKS = 127
+"""The most links whose states Bullet tells."""
+
 AUDIT_ALLOWANCES = {
     "volume": Allowance(0.001, "Bullet moves the corners of a hull by up to 1e-4 of its size: 0.05 % less volume")
 }

@@ -1,13 +1,14 @@
 """PyBullet as a SimEngine: a DIRECT client for each env, stepped one after the other."""
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from anysim.conventions import Array
 from anysim.engine.capability import Allowance, Capabilities
 from anysim.engine.doctor import Finding, Health
 from anysim.engine.one_world.base import OneWorldPerEnv
 from anysim.engine.presence import Lifecycle
+from anysim.engine.requirements import crowded
 from anysim.engine.state import SnapshotLevel
 from anysim.engine.untrusted.rows import refuse_range
 from anysim.model.world import World
@@ -37,6 +38,11 @@ class PybulletEngine(OneWorldPerEnv):
         """Threads."""
         words = "one per process, it keeps the interpreter's lock: `shards` uses more"
         return (Finding("pybullet: threads", Health.NOTE, words),)
+
+    @classmethod
+    def refusals(cls, world: World, options: Any) -> Sequence[str]:
+        """More links than Bullet tells the states of; further shapes of a body are links, too."""
+        return crowded(world, declared.LINKS, shapes=True)
 
     @classmethod
     def refuse_rows(cls, data: Mapping[str, Array], level: SnapshotLevel, world: World, options: object) -> None:

@@ -53,6 +53,9 @@ CAPABILITIES = Capabilities.of(
 PARAMETERS = frozenset(ALL) - {"world.shadows"}
 """What can be changed per env."""
 
+JOINTS = 254
+"""The most joints of an articulation of PhysX."""
+
 AUDIT_ALLOWANCES = {
     "volume": Allowance(
         0.07,

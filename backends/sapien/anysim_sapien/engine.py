@@ -8,6 +8,7 @@ from anysim.engine.capability import Allowance, Capabilities
 from anysim.engine.doctor import Finding
 from anysim.engine.one_world.base import OneWorldPerEnv
 from anysim.engine.presence import Lifecycle
+from anysim.engine.requirements import crowded
 from anysim.engine.state import SnapshotLevel
 from anysim.model.world import World
 from anysim_sapien import declared
@@ -40,8 +41,8 @@ class SapienEngine(OneWorldPerEnv):
 
     @classmethod
     def refusals(cls, world: World, options: Any) -> Sequence[str]:
-        """Pairs of surfaces and exclusions that PhysX' filters cannot tell apart."""
-        return refusals(world)
+        """Pairs of surfaces and exclusions that PhysX' filters cannot tell apart; more joints than it takes."""
+        return [*crowded(world, declared.JOINTS, shapes=False), *refusals(world)]
 
     @classmethod
     def refuse_rows(cls, data: Mapping[str, Array], level: SnapshotLevel, world: World, options: object) -> None:

@@ -6,7 +6,7 @@ puts it into a World under an entity's name. Importers of other formats are entr
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal, NamedTuple, Protocol
 
@@ -76,6 +76,11 @@ class ImportedModel:
         """The links and sites by name, each fixed to a body; a site wins over a link that is called the same."""
         links = {name: FixedFrame(body, ORIGIN, IDENTITY_QUATERNION) for name, body in self.links.items()}
         return links | {site.name: FixedFrame(site.body, site.position, site.quaternion) for site in self.sites}
+
+
+def noted(model: ImportedModel, *notes: ImportNote) -> ImportedModel:
+    """The model with more to know of it."""
+    return replace(model, report=(*model.report, *notes))
 
 
 class Importer(Protocol):

@@ -5,7 +5,8 @@ Rules where a source leaves room or is wrong; each use is a note in the report:
 - An inertia that no body can have becomes the nearest possible one (`anysim.kinematics.inertia.repaired`).
 - A revolute joint without limits, or with lower >= upper, is continuous; so is a prismatic one, along its axis. An
   effort or velocity limit of 0 counts as not given.
-- A moving link without mass that carries links with mass is a virtual one: it weighs a gram. One that carries none
+- A moving link without mass that carries links with mass is a virtual one: it gets a share of `VIRTUAL_SHARE` of their
+  mass and inertia. One that carries none
   cannot be simulated: its joint is frozen at zero (or the nearest limit) and it is lumped. A source in which no moving
   link has a mass is refused.
 - A joint that follows a follower follows its leader directly; one that follows a frozen joint is frozen too.
@@ -27,12 +28,12 @@ from anysim.assets.urdf_xml import InertialElement, JointElement, UrdfFile
 from anysim.conventions import Array
 from anysim.errors import AssetError, listing, suggest
 from anysim.kinematics import inertia
+from anysim.kinematics.inertia import VIRTUAL_SHARE
 from anysim.math import matrix as M, pose as P
 from anysim.model.hash import split, tidy
-from anysim.model.world import Body, BodyKind, Inertial, Joint, JointType, Mimic, Site
+from anysim.model.world import FAR, Body, BodyKind, Inertial, Joint, JointType, Mimic, Site
 
 _LIMIT_SLACK = 1e-3  # [rad] or [m] that limits of followers and leaders may differ by, from rounding
-VIRTUAL_MASS = 0.001  # [kg] of a moving link that has none and carries some
 _TYPES = {"revolute": JointType.REVOLUTE, "continuous": JointType.REVOLUTE, "prismatic": JointType.PRISMATIC}
 _IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 
@@ -230,6 +231,9 @@ class _UrdfImport:
         if joint.lower is None or joint.upper is None:
             self._note("info", "joint", joint.name, "has no limits and moves without end")
             return -inf, inf
+        if max(abs(joint.lower), abs(joint.upper)) >= FAR:
+            text = f"has limits [{joint.lower:g}, {joint.upper:g}], of which those beyond {FAR:g} are none"
+            self._note("repaired", "joint", joint.name, text)
         if joint.lower >= joint.upper:
             text = f"has limits [{joint.lower:g}, {joint.upper:g}], which is read as moving without end"
             self._note("repaired", "joint", joint.name, text)
@@ -289,7 +293,7 @@ class _UrdfImport:
             raise AssetError(f"{self.file.where('link', link)} has a negative mass, {own.mass:g} kg")
         matrix, turn = own.inertia * s**5, P.to_matrix(own.origin[3:])
         raw = inertia.make(mass, own.origin[:3] * s, M.product(turn, matrix, turn.T))
-        if mass > 0 and not matrix.any():
+        if mass > 0 and inertia.pointlike(raw):
             return raw  # a point mass, which is fine as a part of a body
         fixed, text = inertia.repaired(raw)
         if text is not None:
@@ -297,16 +301,19 @@ class _UrdfImport:
         return fixed
 
     def _inertials(self) -> None:
-        heavy = [sum(part.mass for part in parts) for parts in self.inertials]
+        totals = [inertia.composed([part for part in parts if part.mass > 0]) for parts in self.inertials]
+        carried: list[list[Inertial]] = [[] for _ in self.bodies]  # of each, what it moves that has a mass of its own
         for i in reversed(range(1, len(self.bodies))):
-            heavy[self.bodies[i].parent] += heavy[i]
+            body, served = self.bodies[i], totals[i]
+            if served.mass <= 0:
+                served = inertia.composed(carried[i])
+                totals[i] = inertia.scaled(served, VIRTUAL_SHARE)
+                text = f"moves without mass; now {totals[i].mass:.3g} kg, {VIRTUAL_SHARE:g} of what it carries"
+                self._note("repaired", "link", body.name, text)
+            carried[body.parent].append(inertia.moved(served, P.pose(body.position, body.quaternion)))
         for i, body in enumerate(self.bodies):
-            total = inertia.composed([part for part in self.inertials[i] if part.mass > 0])
+            total = totals[i]
             if body.kind is BodyKind.LINK:
-                if total.mass <= 0:
-                    ball = Inertial(VIRTUAL_MASS)
-                    total = inertia.repaired(ball)[0]
-                    self._note("repaired", "link", body.name, f"moves without mass; now {VIRTUAL_MASS * 1000:g} g")
                 total, text = inertia.repaired(total)
                 if text is not None:
                     self._note("repaired", "link", body.name, text)

@@ -62,7 +62,7 @@ class GeometryReader:
         try:
             parts = visual_parts(path, self._mesh_scale(visual))
         except AssetError as error:  # the file is there; what cannot be read of it is only not seen
-            self._note("dropped", link, f"is not fully shown: {error}")
+            self._note("dropped", link, f"is not fully shown: {str(error).replace(str(path), path.name)}")
             return
         for i, part in enumerate(parts):
             shape = MeshShape(self._keep(part.mesh))

@@ -2,12 +2,14 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
+from math import copysign, inf
 from typing import Any
 
 from anysim.assets.model import ImportedModel
 from anysim.conventions import IDENTITY_QUATERNION, WORLD
 from anysim.errors import AssetError
 from anysim.model.world import (
+    FAR,
     ORIGIN,
     Body,
     BodyKind,
@@ -43,6 +45,7 @@ class WorldBuilder:
         self._materials = {material.name: material for material in world.materials}
         self.excluded = set(world.excluded_pairs)
         self.tiles = world.tiles
+        self._notes = dict.fromkeys(world.notes)
 
     def build(self) -> World:
         """The World as it is now."""
@@ -61,6 +64,7 @@ class WorldBuilder:
             materials=tuple(self._materials.values()),
             excluded_pairs=frozenset(self.excluded),
             tiles=self.tiles,
+            notes=tuple(self._notes),
         )
 
     def add(
@@ -92,7 +96,9 @@ class WorldBuilder:
             self.bodies.append(moved)
         for part in model.joints:
             mimic = None if part.mimic is None else part.mimic._replace(joint=part.mimic.joint + joint)
-            self.joints.append(replace(part, name=full(part.name), body=part.body + body, mimic=mimic))
+            ends = [x if abs(x) < FAR else copysign(inf, x) for x in (part.lower, part.upper)]
+            part = replace(part, name=full(part.name), body=part.body + body, mimic=mimic)
+            self.joints.append(replace(part, lower=ends[0], upper=ends[1]))
         for part in model.geoms:
             shape: Any = part.shape
             if isinstance(shape, MeshShape):
@@ -100,6 +106,7 @@ class WorldBuilder:
             elif isinstance(shape, HeightFieldShape):
                 shape = HeightFieldShape(full(shape.heightfield))
             self.geoms.append(replace(part, name=full(part.name), body=shift(part.body), shape=shape))
+        self._notes |= dict.fromkeys((category or name, str(note)) for note in model.report)
         self.sites += [replace(part, name=full(part.name), body=shift(part.body)) for part in model.sites]
         self.add_heightfields(replace(field, name=full(field.name)) for field in model.heightfields)
         self.excluded |= {(low + body, high + body) for low, high in model.excluded_pairs}

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from anysim.assets.load import import_asset
 from anysim.assets.meshes import collision_mesh, visual_parts
-from anysim.assets.model import ImportedModel, ImportNote
+from anysim.assets.model import ImportedModel, ImportNote, noted
 from anysim.assets.procedural import build
 from anysim.assets.uri import locate
 from anysim.compile.builder import WorldBuilder
@@ -225,10 +225,10 @@ def _asset(
         bodies = tuple(replace(body, inertial=inertia.scaled(body.inertial, factor)) for body in bodies)
     if model.actuator_hints:
         text = f"{len(model.actuator_hints)} drives of its file are left out: joints of an object are not driven"
-        model = replace(model, report=(*model.report, ImportNote("dropped", "actuators", text)))
+        model = noted(model, ImportNote("dropped", "actuators", text))
     if not spec.fixed:
         root, text = inertia.repaired(bodies[0].inertial)
         bodies = (replace(bodies[0], inertial=inertia.moving(root)), *bodies[1:])
         if text is not None:
-            model = replace(model, report=(*model.report, ImportNote("repaired", f"link '{bodies[0].name}'", text)))
+            model = noted(model, ImportNote("repaired", f"link '{bodies[0].name}'", text))
     return replace(model, geoms=tuple(geoms), bodies=bodies)

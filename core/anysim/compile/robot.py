@@ -11,7 +11,7 @@ import numpy as np
 from anysim.assets.attach import attach
 from anysim.assets.catalogue import CatalogueEntry, load_robot, missing_source
 from anysim.assets.load import import_asset
-from anysim.assets.model import ImportedModel, ImportNote
+from anysim.assets.model import ImportedModel, ImportNote, noted
 from anysim.assets.procedural import build
 from anysim.assets.vehicles import as_vehicle
 from anysim.compile.builder import WorldBuilder
@@ -19,6 +19,7 @@ from anysim.compile.collisions import with_solids
 from anysim.compile.physical import GRIPPER_LIMIT_SOFTNESS, surface
 from anysim.compile.vehicle import check_vehicle
 from anysim.errors import AssetError, Issues, PluginError, SpecError, listing, suggest
+from anysim.kinematics import inertia
 from anysim.math import pose as P
 from anysim.model.hash import split
 from anysim.model.world import (
@@ -96,7 +97,7 @@ def add_robot(builder: WorldBuilder, name: str, spec: RobotSpec, issues: Issues)
         return []
     assembly = _Assembly(name, spec, entry.spec, model, issues, issues.inside(entry.file.name))
     assembly.add_to(builder)
-    return list(model.report)
+    return list(assembly.model.report)
 
 
 class _Assembly:
@@ -113,6 +114,7 @@ class _Assembly:
         check_vehicle(self.entry, self.model, self.own)
         joints = self._joints()
         floating = self.entry.base == "floating"
+        self._weigh(floating)
         bodies = tuple(
             replace(body, gravity_compensation=self.entry.gravity_compensation and (i > 0 or floating))
             for i, body in enumerate(self.model.bodies)
@@ -136,6 +138,18 @@ class _Assembly:
         tools = self._tools(builder, entity)
         self._sensors(builder, entity, tools)
         builder.robots.append(Robot(self.name, self.entry.name, channels, tools, self.entry))
+
+    def _weigh(self, floating: bool) -> None:
+        """Masses and inertias that what moves can have; the base may, which the source has fixed."""
+        bodies = list(self.model.bodies)
+        for i, body in enumerate(bodies[0 if floating else 1 :], 0 if floating else 1):
+            fixed, text = inertia.repaired(body.inertial)
+            if fixed.mass <= 0:
+                self.own.add("base", f"the link '{body.name}' moves and has no mass; add one to the robot's source")
+            elif text is not None:
+                self.model = noted(self.model, ImportNote("repaired", f"link '{body.name}'", text))
+            bodies[i] = replace(body, inertial=inertia.moving(fixed))
+        self.model = replace(self.model, bodies=tuple(bodies))
 
     def _apart(self) -> frozenset[tuple[int, int]]:
         """Pairs of bodies that do not collide: all of them, or those that the entry excludes."""

@@ -18,7 +18,7 @@ from anysim.engine.options import EngineOptions
 from anysim.engine.presence import Lifecycle, Presence, write_present
 from anysim.engine.primitives import Primitives
 from anysim.engine.records import EnvRecords, Kept
-from anysim.engine.requirements import check_drives, needs_of
+from anysim.engine.requirements import check_drives, check_masses, needs_of
 from anysim.engine.reserved_names import check_class, check_instance
 from anysim.engine.state import Availability, State
 from anysim.errors import CapabilityError, EngineError
@@ -135,6 +135,7 @@ class EngineLifecycle(EngineLifetime, Primitives):
             if num_envs < 1:
                 raise EngineError(f"num_envs must be at least 1, got {num_envs}")
             self.approximations: list[Need] = self._check(world)
+            check_masses(world)
             check_drives(world)
             self._install(world, num_envs)
             try:

@@ -1,6 +1,7 @@
 """Capabilities that a world needs of an engine, each with the name that causes it, and drives that can be followed."""
 
 import warnings
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from math import isfinite
 
@@ -178,6 +179,31 @@ def _of_camera(world: World, camera: Camera) -> Rows:
         (C.TEXTURES, rgb and texture, f"sees the texture '{texture[0].name if texture else ''}'"),
         (C.MATERIALS, rgb and material, f"sees the material '{material[0].name if material else ''}'"),
     )
+
+
+def crowded(world: World, most: int, *, shapes: bool) -> list[str]:
+    """Why entities with more joints, and further shapes of a body where those count, are too large: a reason each."""
+    further = Counter(geom.body for geom in world.geoms if geom.collides and shapes)
+    found: list[str] = []
+    for entity in world.entities:
+        joints = entity.joint_stop - entity.joint_start
+        more = sum(max(0, further[body] - 1) for body in range(entity.body_start, entity.body_stop))
+        if joints and joints + more > most:
+            and_shapes = f" and {more} further shapes on its bodies" if more else ""
+            found.append(f"'{entity.name}' has {joints} joints{and_shapes}, {most} at most")
+    return found
+
+
+def check_masses(world: World) -> None:
+    """Refuse bodies that move and have no mass or inertia: engines let them hang, fall through or explode.
+
+    Raises:
+        EngineError: names the first of them.
+    """
+    for body in world.bodies:
+        if body.kind is not BodyKind.STATIC and not (body.inertial.mass > 0 and min(body.inertial.inertia[:3]) > 0):
+            lacks = "mass" if not body.inertial.mass > 0 else "inertia about each axis"
+            raise EngineError(f"body '{body.name}' moves and has no {lacks}; give it some, or make it static")
 
 
 class UnstableGainsWarning(UserWarning):

@@ -21,6 +21,7 @@ BALL_RADIUS = 0.01  # [m] of the solid ball that stands for a body with mass and
 VIRTUAL_SHARE = 1e-3
 """The share of a body's mass and inertia that a link without any of its own gets, where a joint needs one: nothing
 beside the body, and enough for single precision where axes of a chain fall into line."""
+_SMALLEST = 1e-5  # [m] radius of gyration: below, an inertia is a placeholder for none
 _FLOOR = 1e-6  # smallest second moment of a moving body, relative to their sum: engines reject exact equality
 _NOISE = 1e-12
 
@@ -63,17 +64,19 @@ def repaired(inertial: Inertial) -> tuple[Inertial, str | None]:
     """The nearest inertial that a body can have, and what was changed; None where nothing was.
 
     Negative second moments are set to zero (the nearest positive semidefinite matrix in the Frobenius norm). A body
-    with mass and no inertia at all becomes a solid ball of `BALL_RADIUS`.
+    with mass and no inertia at all, or one of a body thinner than a hundredth of a millimetre, becomes a solid ball of
+    `BALL_RADIUS`.
     """
     if inertial.mass <= 0:
         return Inertial(0.0), None if not any(inertial.inertia) else "has inertia and no mass; the inertia is dropped"
     moments, axes = M.eigen(_second_moments(tensor(inertial)))
     total = float(moments.sum())
-    if total <= 0:
+    if total <= 0 or pointlike(inertial):
         value = 0.4 * inertial.mass * BALL_RADIUS**2
+        had = "no inertia" if total <= 0 else f"an inertia of {2 * total / 3:.2g} kg m^2, which is none"
         return (
             Inertial(inertial.mass, inertial.com, (value, value, value, 0.0, 0.0, 0.0)),
-            f"has a mass of {inertial.mass:g} kg and no inertia; taken as a ball of {BALL_RADIUS * 100:g} cm radius",
+            f"has a mass of {inertial.mass:g} kg and {had}; taken as a ball of {BALL_RADIUS * 100:g} cm radius",
         )
     if moments[0] >= -_NOISE * total:
         return inertial, None
@@ -81,6 +84,11 @@ def repaired(inertial: Inertial) -> tuple[Inertial, str | None]:
     fixed = make(inertial.mass, np.array(inertial.com), np.trace(clipped) * np.eye(3) - clipped)
     change = float(np.linalg.norm(tensor(fixed) - tensor(inertial)) / np.linalg.norm(tensor(inertial)))
     return fixed, f"has an inertia that no body can have; the nearest possible one differs by {100 * change:.2g} %"
+
+
+def pointlike(inertial: Inertial) -> bool:
+    """Whether the inertia is none, or one of nothing that has a size; good enough for a part of a body."""
+    return float(np.abs(tensor(inertial)).max()) < inertial.mass * _SMALLEST**2
 
 
 def moving(inertial: Inertial) -> Inertial:

@@ -15,6 +15,10 @@ Quat = tuple[float, float, float, float]
 ORIGIN: Vec3 = (0.0, 0.0, 0.0)
 
 
+FAR = 1e6
+"""[rad] or [m] A limit of a joint that is further out is none: engines each have a number of their own for that."""
+
+
 class BodyKind(StrEnum):
     """How a body may move."""
 

@@ -16,6 +16,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.model.appearance import Material as Material, Texture as Texture
 from anysim.model.parts import (
+    FAR as FAR,
     ORIGIN as ORIGIN,
     Actuation as Actuation,
     Actuator as Actuator,
@@ -61,6 +62,8 @@ if TYPE_CHECKING:
     from anysim.model.ground import Ground
 
 
+NEVER_HASHED = MappingProxyType({"hashed": "never"})
+"""Marks a field that shapes nothing that happens."""
 HASHED_IF_GIVEN = MappingProxyType({"hashed": "if given"})
 """Marks a field that came later: worlds that leave it alone keep their hash."""
 
@@ -96,6 +99,10 @@ class World:
     tiles: tuple[Tile, ...] = ()
     """Pieces of tiled ground, row by row; an env's scene stands on one of them. Empty where there is one ground."""
     scenery: Scenery = field(default=Scenery(), metadata=HASHED_IF_GIVEN)
+    notes: tuple[tuple[str, str], ...] = field(
+        default=(), compare=False, metadata=MappingProxyType({"hashed": "never"})
+    )
+    """The name of a thing, and what its source says that is not so here; see `anysim.assets.model.ImportNote`."""
 
     @cached_property
     def hash(self) -> str:

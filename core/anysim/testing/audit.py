@@ -5,6 +5,7 @@ World's, and its body frames are compared with the neutral forward kinematics at
 finds a wrong order of bodies or joints.
 """
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from anysim.kinematics import inertia
 from anysim.math import pose as P
 from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.shapes import is_ground
-from anysim.model.world import Body, BodyKind, Entity, Inertial, JointType, World
+from anysim.model.world import FAR, Body, BodyKind, Entity, Inertial, JointType, World
 
 CONFIGURATIONS = 20
 INERTIALS = ("body.mass", "body.com", "body.inertia")
@@ -88,9 +89,9 @@ def world_rows(world: World) -> list[AuditRow]:
         rows.append(AuditRow(body.name, "centre of mass", body.inertial.com))
         rows.append(AuditRow(body.name, "principal moments", tuple(float(m) for m in moments)))
     for joint in world.joints:
-        rows.append(AuditRow(joint.name, "limits", (joint.lower, joint.upper)))
+        rows.append(AuditRow(joint.name, "limits", _ends((joint.lower, joint.upper))))
         rows.append(AuditRow(joint.name, "damping", (joint.damping,)))
-        rows.append(AuditRow(joint.name, "friction", (joint.friction,)))
+        rows.append(AuditRow(joint.name, "dry friction", (joint.friction,)))
         rows.append(AuditRow(joint.name, "armature", (joint.armature,)))
     for actuator in world.actuators:
         rows.append(AuditRow(actuator.name, "effort limit", (actuator.effort_limit,)))
@@ -100,6 +101,11 @@ def world_rows(world: World) -> list[AuditRow]:
             rows.append(AuditRow(geom.name, "volume", (inertia.volume(geom.shape, meshes),)))
             rows.append(AuditRow(geom.name, "friction", (geom.surface.friction,)))
     return rows
+
+
+def _ends(limits: Iterable[float]) -> tuple[float, ...]:
+    """Limits that are none as infinite ones."""
+    return tuple(float(x) if abs(x) < FAR or np.isnan(x) else float(np.copysign(np.inf, x)) for x in limits)
 
 
 def moving_bodies(world: World, entity: Entity) -> list[Body]:
@@ -164,7 +170,7 @@ def engine_rows(engine: SimEngine) -> list[AuditRow]:
     joints = [joint.name for joint in world.joints]
     for quantity, parameter in (
         ("damping", "joint.damping"),
-        ("friction", "joint.friction"),
+        ("dry friction", "joint.friction"),
         ("armature", "joint.armature"),
     ):
         if parameter in engine.parameters:
@@ -176,7 +182,7 @@ def engine_rows(engine: SimEngine) -> list[AuditRow]:
     if "geom.friction" in engine.parameters:
         add("friction", geoms, engine.get_parameters("geom.friction", [0])[0])
     if "joint.limits" in more:
-        add("limits", joints, more["joint.limits"])
+        add("limits", joints, np.array([_ends(ends) for ends in more["joint.limits"]]).reshape(-1, 2))
     if "geom.volume" in more:
         add("volume", geoms, more["geom.volume"])
     return rows

@@ -42,9 +42,9 @@ def test_masses_and_inertias_are_the_worlds(worlds, make):
 
 
 def test_a_refusal_carries_mujocos_words_and_the_body(worlds, make):
-    """A moving body without mass: MuJoCo's message, with the World's name."""
-    world = worlds.scene()
-    bodies = (replace(world.bodies[0], name="feather", inertial=Inertial(0.0)), *world.bodies[1:])
+    """A moving body of less mass than MuJoCo takes: its message, with the World's name."""
+    world, feather = worlds.scene(), Inertial(1e-16, inertia=(1e-17, 1e-17, 1e-17, 0.0, 0.0, 0.0))
+    bodies = (replace(world.bodies[0], name="feather", inertial=feather), *world.bodies[1:])
     with pytest.raises(
         EngineError, match=r"cannot build the world 'scene'.*mass and inertia of moving bodies.*'feather'"
     ):
