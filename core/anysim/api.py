@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
@@ -16,6 +16,7 @@ from anysim.controllers.base import DEFAULT_CONTROLLER
 from anysim.conventions import GROUND
 from anysim.engine.factory import ENGINE_VARIABLE, create_simulation, engine_class
 from anysim.errors import AssetError, PluginError, SpecError, SpecIssue, TaskError
+from anysim.math.arrays import shown, whole
 from anysim.plugin_parameters import options_model
 from anysim_schemas.load import Loaded, LoadedRun, load_run
 from anysim_schemas.object_source import Source, SourceChoice, SourceFolder
@@ -44,6 +45,10 @@ def task_path(name: str) -> Path:
 
 def source_path(source: str | Path) -> Path:
     """A file as it is, or the file of an installed task by name."""
+    if not isinstance(cast("object", source), str | Path):
+        raise TaskError(
+            f"a task is given by the name of an installed one, a YAML file or a mapping, got a {type(source).__name__}"
+        )
     text = str(source)
     looks_like_file = isinstance(source, Path) or text.endswith((".yaml", ".yml")) or "/" in text
     return Path(text) if looks_like_file else task_path(text)
@@ -67,12 +72,21 @@ def load(
     Raises:
         SpecError: every fault with file, line and column.
     """
+    _check_texts(overrides)
     resolved = [s if isinstance(s, Mapping) else source_path(s) for s in sources]
     chosen = os.environ.get(ENGINE_VARIABLE)
     beneath = {"engine": chosen} if chosen else None
     return load_run(
         resolved, overrides=overrides, resolver=resolve_options, extends=_extends, base_data=beneath, past=past
     )
+
+
+def _check_texts(overrides: Sequence[str]) -> None:
+    """A text alone is a sequence of texts too: of its letters."""
+    given = cast("object", overrides)
+    if isinstance(given, str) or not isinstance(given, Sequence) or not all(isinstance(one, str) for one in given):
+        found = repr(given) if isinstance(given, str | int | float) else f"a {type(given).__name__}"
+        raise TaskError(f"overrides are a list of texts such as ['physics.dt=0.004'], got {found[:80]}")
 
 
 def compile_world(
@@ -278,9 +292,16 @@ def make(
         SpecError: the file, with line and column.
         CapabilityError: the engine cannot run this world; nothing was built.
     """
-    more = [*overrides, *([f"num_envs={num_envs}"] if num_envs else [])]
+    _check_texts(overrides)
+    if engine is not None and not (isinstance(cast("object", engine), str) and engine):
+        raise TaskError(f"engine is the name of an installed engine, got {shown(engine)}")
+    if num_envs is not None:
+        num_envs = whole("num_envs", num_envs, TaskError, least=1)
+    if seed is not None:  # before the env is built
+        seed = whole("seed", seed, TaskError)
+    more = [*overrides, *([] if num_envs is None else [f"num_envs={num_envs}"])]
     loaded = _loaded(source, more)
-    if engine and loaded.spec.engine.name != engine:  # the options of a file are those of its own engine
+    if engine is not None and loaded.spec.engine.name != engine:  # the options of a file are those of its own engine
         loaded = _loaded(source, [*more, f"engine={json.dumps(engine)}"])
     spec = loaded.spec
     world = compile_world(loaded, base=base)

@@ -18,6 +18,31 @@ class RefusedFileError(OSError):
         super().__init__(errno.EPERM, reason, str(path))
 
 
+LONGEST_NAME, LONGEST_PATH = 255, 4096
+"""Bytes: what file systems take for one name, and for a path."""
+
+
+def name_problem(text: str) -> str:
+    """Why a text cannot be the path of a file on any machine, to follow `which`; empty if it can be one."""
+    try:
+        data = text.encode()
+    except UnicodeEncodeError:
+        return "holds a character that no file name can have"
+    if b"\0" in data:
+        return "holds a NUL, which no file name can have"
+    if len(data) > LONGEST_PATH or any(len(part) > LONGEST_NAME for part in data.split(b"/")):
+        return f"is longer than a file name can be ({LONGEST_NAME} bytes, {LONGEST_PATH:,} for a path)"
+    return ""
+
+
+def exists(path: str | Path) -> bool:
+    """Whether something is there; nothing is where the text is no path at all."""
+    try:
+        return Path(path).exists()
+    except (OSError, ValueError):  # too long for a name, or with a NUL
+        return False
+
+
 def open_plain(path: Path) -> BinaryIO:
     """A plain file, open for reading.
 

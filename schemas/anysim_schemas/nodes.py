@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, cast
 
-from anysim_schemas.errors import SpecIssue
+from anysim_schemas.errors import SpecError, SpecIssue
+from anysim_schemas.limits import YAML_DEPTH
 
 
 class Mark(NamedTuple):
@@ -67,13 +68,20 @@ class Fault(NamedTuple):
     message: str
 
 
-def from_data(value: object, mark: Mark = NOWHERE) -> Node:
-    """A node for data given in Python; keys become text."""
+def from_data(value: object, mark: Mark = NOWHERE, depth: int = 0) -> Node:
+    """A node for data given in Python, `depth` levels down; keys become text.
+
+    Raises:
+        SpecError: it is deeper than a file may be, as a mapping that contains itself is.
+    """
+    if YAML_DEPTH.exceeded(depth):
+        message = f"the data is more than {YAML_DEPTH.value} levels deep, or contains itself; flatten it"
+        raise SpecError([SpecIssue(str(mark), "", message)])
     if isinstance(value, Mapping):
         items = cast("Mapping[object, object]", value).items()
-        return Node({str(key): from_data(child, mark).under(mark) for key, child in items}, mark)
-    if isinstance(value, Sequence) and not isinstance(value, str | bytes):
-        return Node([from_data(child, mark) for child in cast("Sequence[object]", value)], mark)
+        return Node({str(key): from_data(child, mark, depth + 1).under(mark) for key, child in items}, mark)
+    if isinstance(value, Sequence) and not isinstance(value, str | bytes | bytearray | memoryview | range):
+        return Node([from_data(child, mark, depth + 1) for child in cast("Sequence[object]", value)], mark)
     return Node(cast("Scalar", value), mark)
 
 

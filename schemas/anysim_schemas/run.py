@@ -60,7 +60,7 @@ class RunSpec(Spec):
 
     engine: EngineSpec = Field(default=EngineSpec(), description="the engine that runs the world")
     num_envs: Integer = Field(default=1, gt=0, description="number of parallel environments")
-    seed: Integer = Field(default=0, ge=0, description="seed of everything that is drawn")
+    seed: Integer = Field(default=0, ge=0, lt=2**64, description="seed of everything that is drawn")
     physics: PhysicsSpec = Field(default=PhysicsSpec(), description="time steps and gravity")
     world: WorldSpec = Field(default=WorldSpec(), description="what exists, where it goes and what looks at it")
     task: TaskSpec | None = Field(default=None, description="what is observed, rewarded and counted as success")

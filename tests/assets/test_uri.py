@@ -6,11 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from anysim.api import compile_world, load
 from anysim.assets.catalogue import load_robot
-from anysim.assets.uri import example_robot_data, locate, resolve_reference
+from anysim.assets.uri import example_robot_data, locate, locate_folder, resolve_reference
+from anysim.cli.check import report_on
 from anysim.compile.robot import import_robot
-from anysim.compile.world import compile_world
-from anysim.errors import AssetError
+from anysim.errors import AnysimError, AssetError, PluginError, SpecError
 from anysim_schemas.run import WorldSpec
 
 
@@ -193,3 +194,43 @@ def test_a_missing_reference_names_link_places_and_the_nearest_file(package: Pat
     )
     assert "did you mean 'link.STL' in the same folder?" in text
     assert str(root / "arm_description/meshes/link.stl") in text
+
+
+@pytest.mark.parametrize(
+    ("name", "problem"),
+    [
+        ("a" * 300, "longer than a file name can be"),
+        ("x/" * 3000, "longer"),
+        ("a\0b", "holds a NUL"),
+        ("\ud800", "holds a"),
+    ],
+    ids=["name", "path", "nul", "surrogate"],
+)
+def test_what_no_file_can_be_called_is_refused_wherever_a_file_is_named(
+    name: str, problem: str, tmp_path: Path
+) -> None:
+    with pytest.raises(AssetError, match=problem):
+        locate(f"{name}.obj", base=tmp_path)
+    with pytest.raises(AssetError, match=problem):
+        locate_folder(name, base=tmp_path)
+    with pytest.raises(AssetError, match=problem):
+        resolve_reference(name, file=tmp_path / "arm.urdf", root=tmp_path, asked_by="link 'a'")
+    with pytest.raises(PluginError, match="there is no file"):
+        load_robot(f"{name}.yaml")
+    assert report_on(name, None, False, []).faults
+    box = {"box": [0.1, 0.1, 0.1]}
+    for world in (
+        {"objects": {"a": {"source": {"mesh": f"{name}.obj"}}}},
+        {"objects": {"a": {"source": {"folder": name}}}},
+        {"objects": {"a": {"source": box, "texture": f"{name}.png"}}},
+        {"robots": {"a": {"robot": f"{name}.yaml"}}},
+        {"terrain": {"kind": "heightfield", "file": f"{name}.npy"}},
+    ):
+        with pytest.raises(AnysimError):
+            compile_world(load({"world": world}), base=tmp_path)
+
+
+def test_a_layout_of_nothing_is_refused() -> None:
+    for objects in ({}, {"a": {"source": {"sphere": 0.1}}}):
+        with pytest.raises(SpecError, match=r"world.layout.b: there is no object 'b'"):
+            compile_world({"world": {"objects": objects, "layout": {"b": {"position": [0, 0, 0]}}}})

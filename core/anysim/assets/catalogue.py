@@ -7,6 +7,8 @@ from typing import NamedTuple
 from anysim import registry
 from anysim.assets.uri import EXAMPLE_ROBOT_DATA
 from anysim.errors import PluginError
+from anysim.math.arrays import shown
+from anysim_schemas.files import exists
 from anysim_schemas.robot_model import RobotModelSpec
 
 
@@ -28,8 +30,8 @@ def load_robot(name: str) -> CatalogueEntry:
     """
     if name.endswith((".yaml", ".yml")):
         file = Path(name)
-        if not file.is_file():
-            raise PluginError(f"there is no file '{name}' with the entry of a robot (looked in {Path.cwd()})")
+        if not exists(file):
+            raise PluginError(f"there is no file {shown(name)} with the entry of a robot (looked in {Path.cwd()})")
         return CatalogueEntry(_read(file), file)
     entry = registry.entry("robots", name)
     package = entry.value

@@ -25,6 +25,8 @@ from typing import NamedTuple
 
 from anysim.assets.mesh_budget import bounded
 from anysim.errors import AssetError, listing, suggest
+from anysim.math.arrays import shown
+from anysim_schemas.files import name_problem
 from anysim_schemas.limits import MODEL_BYTES
 
 EXAMPLE_ROBOT_DATA = "example-robot-data"
@@ -46,9 +48,7 @@ def locate(uri: str, *, base: Path | None = None) -> AssetFile:
     Raises:
         AssetError: an unknown scheme, a package that is not installed, a path that leaves its root, a missing file.
     """
-    scheme, colon, rest = uri.partition(":")
-    if not colon:
-        scheme, rest = "file", uri
+    scheme, rest = _parts("asset", uri)
     if scheme == EXAMPLE_ROBOT_DATA:
         return _inside(example_robot_data(), rest, uri)
     if scheme == "package":
@@ -74,9 +74,7 @@ def locate_folder(uri: str, *, base: Path | None = None) -> AssetFile:
     Raises:
         AssetError: an unknown scheme, a package that is not installed, a path that leaves its root, no such folder.
     """
-    scheme, colon, rest = uri.partition(":")
-    if not colon:
-        scheme, rest = "file", uri
+    scheme, rest = _parts("folder", uri)
     if scheme == EXAMPLE_ROBOT_DATA:
         return _folder_inside(example_robot_data(), rest, uri)
     if scheme == "package":
@@ -91,6 +89,14 @@ def locate_folder(uri: str, *, base: Path | None = None) -> AssetFile:
     if base is None:
         raise AssetError(f"folder '{uri}': a relative path needs the YAML file it is relative to; give an absolute one")
     return _folder_inside(base, rest, uri)
+
+
+def _parts(what: str, uri: str) -> tuple[str, str]:
+    """The scheme of a URI, and what follows it."""
+    if problem := name_problem(uri):
+        raise AssetError(f"{what} {shown(uri)} {problem}; give the URI of an existing one")
+    scheme, colon, rest = uri.partition(":")
+    return (scheme, rest) if colon else ("file", uri)
 
 
 def _folder_inside(root: Path, rest: str, uri: str) -> AssetFile:
@@ -116,6 +122,8 @@ def resolve_reference(
     Raises:
         AssetError: missing (says where it was looked for and the nearest name there is), or outside of the root.
     """
+    if problem := name_problem(reference):
+        raise AssetError(f"{asked_by} refers to {shown(reference)}, which {problem}")
     root, package = root.resolve(), ""
     scheme, marker, rest = reference.partition("://")
     if not marker:

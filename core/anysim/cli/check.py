@@ -89,10 +89,11 @@ def report_on(name: str, engine: str | None, all_engines: bool, overrides: list[
     from anysim import registry
     from anysim.api import compile_world, dry_run, load
     from anysim.errors import AnysimError, AssetError, PluginFailure, SpecError, SpecIssue
+    from anysim_schemas.files import exists
 
     past: list[SpecIssue] = []
     try:
-        loaded = load(Path(name) if Path(name).exists() else name, overrides=overrides, past=past)
+        loaded = load(Path(name) if exists(name) else name, overrides=overrides, past=past)
         world = compile_world(loaded)
         if loaded.spec.task is not None:
             dry_run(loaded, world)

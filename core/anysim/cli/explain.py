@@ -22,9 +22,10 @@ def explain(
     """
     from anysim.cli.output import print_json, print_table
     from anysim.record.explain import explain as explain_one
+    from anysim_schemas.files import exists
 
     found = explain_one(
-        Path(task) if Path(task).exists() else task, seed=seed, env=env, episode=episode, overrides=override or []
+        Path(task) if exists(task) else task, seed=seed, env=env, episode=episode, overrides=override or []
     )
     if json:
         print_json({"episode_seed": found.episode_seed, "draws": [draw._asdict() for draw in found.draws]})

@@ -8,6 +8,7 @@ import numpy as np
 from anysim.controllers.base import Controller
 from anysim.conventions import Array
 from anysim.errors import TaskError, listing, suggest
+from anysim.math.arrays import numbers
 
 
 class ChannelSpace(NamedTuple):
@@ -82,7 +83,7 @@ class ActionSpaces(Mapping[str, ChannelSpace]):
             )
         flat = np.empty((rows, self.dim))
         for name, space in self._channels.items():
-            part = np.asarray(named[name], dtype=np.float64)
+            part = numbers(f"the action of '{name}'", named[name], TaskError)
             if part.shape != (rows, space.dim):
                 words = listing(list(space.labels), 20)
                 raise TaskError(

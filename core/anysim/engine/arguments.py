@@ -8,12 +8,13 @@ from numpy.typing import ArrayLike
 from anysim.conventions import Array
 from anysim.engine.state import Snapshot
 from anysim.errors import EngineError, SnapshotError, listing, suggest
+from anysim.math import arrays
 from anysim.model.world import BodyKind, World
 
 
 def indices(values: ArrayLike, size: int, kind: str) -> Array:
     """Unique int indices in [0, size) from a sequence, an int array or an int."""
-    array = np.atleast_1d(np.asarray(values))
+    array = np.atleast_1d(arrays.array(f"{kind} indices", values, EngineError))
     if array.dtype.kind == "b" or (array.size and array.dtype.kind not in "iu"):
         raise EngineError(f"{kind} indices must be integers, got {array.dtype} (for a mask pass np.flatnonzero(mask))")
     array = array.astype(np.int64).reshape(-1)
@@ -27,7 +28,7 @@ def indices(values: ArrayLike, size: int, kind: str) -> Array:
 
 def rows(name: str, values: ArrayLike, shape: tuple[int | None, ...]) -> Array:
     """Finite float64 values of the shape (None matches any length); missing leading axes are broadcast."""
-    array = np.asarray(values, dtype=np.float64)
+    array = arrays.numbers(name, values, EngineError)
     if None in shape:
         if array.ndim != len(shape) or any(s is not None and s != a for s, a in zip(shape, array.shape, strict=True)):
             raise EngineError(f"{name} must have shape {_spell(shape)}, got {array.shape}")

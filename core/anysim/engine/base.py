@@ -391,5 +391,5 @@ class SimEngine(EngineSensing):
                 f"(joints: {listing(names)})"
             )
         chosen = [drives[names.index(name)] for name in action]
-        values = np.array([np.broadcast_to(np.asarray(v, dtype=float), self.num_envs) for v in action.values()]).T
-        self.set_control(position=values.reshape(self.num_envs, len(chosen)), actuators=chosen)
+        columns = [arguments.rows(f"the action of '{name}'", v, (self.num_envs,)) for name, v in action.items()]
+        self.set_control(position=np.array(columns).T.reshape(self.num_envs, len(chosen)), actuators=chosen)

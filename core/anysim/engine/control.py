@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike
 
 from anysim.conventions import Array
 from anysim.engine.arguments import rows as checked_rows
+from anysim.errors import EngineError
+from anysim.math.arrays import numbers
 from anysim.model.world import ControlMode, World
 
 MODES = tuple(ControlMode)
@@ -82,7 +84,7 @@ class CommandBuffer:
             if values is None:
                 continue
             if ids is None and which is None:
-                values = np.asarray(values, dtype=np.float64)
+                values = numbers(name, values, EngineError)
                 # a finite sum of squares has finite terms, and is found three times as fast; else each term is checked
                 if values.shape != buffer.shape or not isfinite(np.vdot(values, values)):
                     values = checked_rows(name, values, buffer.shape)

@@ -11,6 +11,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import EngineError
+from anysim.math.arrays import array
 from anysim.model.index import paired
 from anysim.model.world import World
 
@@ -52,7 +53,7 @@ class Presence:
         Raises:
             EngineError: another shape or type, or rows that no env can have.
         """
-        rows, world = np.asarray(present), self.world
+        rows, world = array("present", present, EngineError), self.world
         shape = (len(ids), len(world.entities))
         if rows.dtype != bool or rows.shape != shape:
             raise EngineError(f"present must be a bool array of shape {shape}, got {rows.dtype} {rows.shape}")

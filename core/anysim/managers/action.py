@@ -15,6 +15,7 @@ from anysim.engine.base import SimEngine
 from anysim.engine.untrusted.rows import refuse_range
 from anysim.errors import SpecError, SpecIssue, TaskError, listing, suggest
 from anysim.managers.base import WORLD, Manager, Overridable, random_fields
+from anysim.math import arrays
 from anysim.model.world import ControlMode, World
 from anysim.plugin_parameters import options_model
 from anysim.randomization.draw import DelayLine, draw_rows, longest_delay, noise_rows, note_noise
@@ -129,7 +130,7 @@ class ActionManager(Manager):
         """
         if isinstance(action, Mapping):
             action = self.spaces.flatten(action, self.engine.num_envs)
-        array = np.asarray(action, dtype=np.float64)
+        array = arrays.numbers("the action", action, TaskError)
         if array.shape != (self.engine.num_envs, self.dim):
             raise TaskError(f"the action must have shape ({self.engine.num_envs}, {self.dim}), got {array.shape}")
         clipped = np.minimum(np.maximum(array, self.low), self.high)

@@ -18,6 +18,7 @@ from anysim.placement.proposals import LevelSurface, Proposer, Request, Thing, f
 from anysim.placement.search import Refused
 from anysim.placement.support_surfaces import HEADROOM
 from anysim.randomization.streams import Origin, Streams
+from anysim_schemas.files import exists
 from anysim_schemas.layout import LayoutSourceSpec, RepairSpec
 from anysim_schemas.proposals import Proposal
 
@@ -43,7 +44,7 @@ class ProposalSource:
         self._given = given
         self._ready: tuple[Proposal, ...] | Proposer | None = None
         self._recalled: dict[int, Any] = {}
-        if isinstance(given, Path) and given.is_file():
+        if isinstance(given, Path) and exists(given):
             self._ready = read_file(given, f"{self.path}.proposal")
 
     def recall(self, env: int, drawn: Mapping[str, Any]) -> None:

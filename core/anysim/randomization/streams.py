@@ -15,6 +15,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import TaskError
+from anysim.math.arrays import whole, wholes
 
 
 @cache
@@ -88,15 +89,12 @@ class Streams:
 
     def seed(self, seed: int | Sequence[int], env_ids: Array) -> None:
         """Seed envs: an int seeds env i with (seed, i); a sequence gives one seed to each of `env_ids`."""
-        if isinstance(seed, int | np.integer):
-            entropies = [[int(seed), int(i)] for i in env_ids]
+        if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str | bytes) and np.ndim(seed):
+            entropies = [[s] for s in wholes("seed", seed, len(env_ids), TaskError)]
         else:
-            if len(seed) != len(env_ids):
-                raise TaskError(f"{len(env_ids)} envs need as many seeds, got {len(seed)}")
-            entropies = [[int(s)] for s in seed]
+            one = whole("seed", seed, TaskError)
+            entropies = [[one, int(i)] for i in env_ids]
         for env, entropy in zip(env_ids, entropies, strict=True):
-            if min(entropy) < 0:
-                raise TaskError(f"a seed must not be negative, got {min(entropy)}")
             self._masters[env] = _master(entropy)
 
     def begin(self, env_ids: Array, episode_seeds: Sequence[int] | Array | None = None) -> None:

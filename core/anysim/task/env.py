@@ -11,12 +11,13 @@ from anysim.conventions import Array
 from anysim.engine import arguments
 from anysim.engine.base import SimEngine
 from anysim.engine.untrusted.rows import damaged, refuse_range
-from anysim.errors import AnysimError, TaskError
+from anysim.errors import AnysimError, SnapshotError, TaskError
 from anysim.hooks import Observing
 from anysim.managers.action import ActionManager
 from anysim.managers.base import RESET_ORDER, Manager
 from anysim.managers.camera import CaptureManager
 from anysim.managers.terrain import TerrainManager
+from anysim.math import arrays
 from anysim.task.contract import FAILED, RUNNING, STATUS_NAMES, SUCCESS, TRUNCATED, Obs, StepResult
 from anysim.task.overrides import Counterfactuals
 from anysim.task.scene import SceneView
@@ -138,6 +139,8 @@ class TaskEnv:
         """
         ids = self._chosen(mask)
         plan = self.counterfactuals.checked(overrides, len(ids), midway=False)
+        if episode_seeds is not None:  # before anything moves
+            episode_seeds = arrays.wholes("episode_seeds", episode_seeds, len(ids), TaskError)
         if len(ids) == 0:  # managers need not know how to reset no env
             return {g: r[:0] for g, r in self.mdp.observe().items()}, {k: v[ids] for k, v in self._info().items()}
         if seed is not None:
@@ -169,10 +172,13 @@ class TaskEnv:
     def _chosen(self, mask: Array | None) -> Array:
         if mask is None:
             return np.arange(self.num_envs)
-        mask = np.asarray(mask)
+        mask = arrays.array("mask", mask, TaskError)
         if mask.dtype != bool or mask.shape != (self.num_envs,):
             raise TaskError(f"mask must be a bool array of shape ({self.num_envs},), got {mask.dtype} {mask.shape}")
         return np.flatnonzero(mask)
+
+    def _rows(self, env_ids: Sequence[int] | Array | None) -> Array:
+        return np.arange(self.num_envs) if env_ids is None else arguments.indices(env_ids, self.num_envs, "env")
 
     def _observe(self, ids: Array | None) -> Obs:
         """All groups and images of all envs, or of those in `ids`."""
@@ -322,7 +328,9 @@ class TaskEnv:
 
         Whatever is raised, nothing was changed: all of it is checked before the first row is written.
         """
-        ids = arguments.indices(np.arange(self.num_envs) if env_ids is None else env_ids, self.num_envs, "env")
+        if not isinstance(snapshot, EnvSnapshot):
+            raise SnapshotError(f"reset_to() takes what snapshot() of an env gives, got a {type(snapshot).__name__}")
+        ids = self._rows(env_ids)
         self._refuse(snapshot, ids)
         plan = self.counterfactuals.checked(overrides, len(ids), midway=True)
         before, streams = self._managed(ids), self.streams.snapshot(ids)
@@ -381,7 +389,7 @@ class TaskEnv:
         cameras = self.engine.world.cameras
         name = camera or (cameras[0].name if cameras else "default")
         images = self.engine.render(name, *size, env_ids=env_ids)["rgb"]
-        ids = np.arange(self.num_envs) if env_ids is None else np.asarray(env_ids, dtype=int)
+        ids = self._rows(env_ids)
         return self.capture.mark(images, name, ids) if markers else images
 
     def close(self) -> None:

@@ -10,6 +10,7 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.errors import CapabilityError, TaskError, listing, suggest
 from anysim.managers.base import WORLD, Manager
+from anysim.math.arrays import shown
 from anysim.randomization.draw import is_random
 from anysim.randomization.streams import Streams
 from anysim.task.terms_runtime import Mdp
@@ -39,8 +40,10 @@ class Counterfactuals:
             TaskError: an unknown path, or a value that the spec would not take; nothing was changed.
             CapabilityError: the engine cannot change it.
         """
-        each = [wanted] * count if isinstance(wanted, Mapping) else list(wanted or [{}] * count)
-        if len(each) != count or not all(isinstance(one, Mapping) for one in each):
+        wanted = {} if wanted is None or (isinstance(wanted, list | tuple) and not wanted) else wanted
+        each = [wanted] * count if isinstance(wanted, Mapping) else wanted
+        listed = isinstance(each, list | tuple) and len(each) == count
+        if not listed or not all(isinstance(one, Mapping) for one in each):
             raise TaskError(
                 f"overrides must be a mapping from paths to values, or a list of {count} of them, one for each env"
             )
@@ -51,7 +54,7 @@ class Counterfactuals:
         entry = self.paths.get(path)
         if entry is None:
             raise TaskError(
-                f"'{path}' cannot be overridden{suggest(path, list(self.paths))} What can: "
+                f"'{path}' cannot be overridden{suggest(path, list(self.paths)) or '.'} What can: "
                 f"{listing(self.paths, 40)}. What else a spec says is built into the world: make another env for it"
             )
         if midway and not entry.midway:
@@ -73,9 +76,9 @@ class Counterfactuals:
             taken = getattr(type(entry.holder).model_validate(fields), entry.key)
         except ValidationError as error:
             reasons = "; ".join(dict.fromkeys(e["msg"].removeprefix("Value error, ") for e in error.errors()))
-            raise TaskError(f"'{entry.path}' cannot be {value!r}: {reasons}") from None
+            raise TaskError(f"'{entry.path}' cannot be {shown(value)}: {reasons}") from None
         if taken is None or is_random(taken):
-            raise TaskError(f"'{entry.path}' can be overridden with one value, not with {value!r}")
+            raise TaskError(f"'{entry.path}' can be overridden with one value, not with {shown(value)}")
         return taken
 
     def refuse_restored(self, rows: Sequence[Mapping[str, Any]]) -> None:

@@ -39,13 +39,14 @@ def picture(
     from anysim.engine.factory import runnable
     from anysim_parity.drawing import require_matplotlib
     from anysim_parity.world_pictures import pictures, sheet
+    from anysim_schemas.files import exists
 
     require_matplotlib("the picture needs matplotlib")
     names = [name.strip() for name in engines.split(",")] if engines else list(runnable(Capability.RENDER_RGB))
     file = Path(world)
     with working_on(f"drawing {world}", in_a_pipe=True) as tell:
         tell(f"reading {world}")
-        loaded = load(file if file.exists() else world, overrides=override or [])
+        loaded = load(file if exists(file) else world, overrides=override or [])
         seed = loaded.spec.seed if seed is None else seed
         found = pictures(
             loaded, names, num_envs=num_envs, seed=seed, camera=camera, size=size, seconds=seconds, tell=tell
