@@ -55,7 +55,7 @@ def place_nominally(
     ]
     rows: dict[int, Array] = {}
     count: dict[str, int] = {}
-    for name in [*(n for n in names if entries[n] in order), *loose]:
+    for name in [*(n for n in names if entries.get(n) in order), *loose]:
         entry = entries[name]
         spec = _in_a_row(world, items[name]) if entry is None else layout[entry]
         place, context.by = nominal_place(spec), items[name]
