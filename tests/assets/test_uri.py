@@ -6,11 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from anysim.api import compile_world, load
+from anysim import api
 from anysim.assets.catalogue import load_robot
 from anysim.assets.uri import example_robot_data, locate, locate_folder, resolve_reference
 from anysim.cli.check import report_on
 from anysim.compile.robot import import_robot
+from anysim.compile.world import compile_world
 from anysim.errors import AnysimError, AssetError, PluginError, SpecError
 from anysim_schemas.run import WorldSpec
 
@@ -227,10 +228,10 @@ def test_what_no_file_can_be_called_is_refused_wherever_a_file_is_named(
         {"terrain": {"kind": "heightfield", "file": f"{name}.npy"}},
     ):
         with pytest.raises(AnysimError):
-            compile_world(load({"world": world}), base=tmp_path)
+            api.compile_world(api.load({"world": world}), base=tmp_path)
 
 
 def test_a_layout_of_nothing_is_refused() -> None:
     for objects in ({}, {"a": {"source": {"sphere": 0.1}}}):
         with pytest.raises(SpecError, match=r"world.layout.b: there is no object 'b'"):
-            compile_world({"world": {"objects": objects, "layout": {"b": {"position": [0, 0, 0]}}}})
+            api.compile_world({"world": {"objects": objects, "layout": {"b": {"position": [0, 0, 0]}}}})
