@@ -17,6 +17,7 @@ from anysim import cache
 from anysim.assets.mesh_budget import bounded, check, mesh_bytes
 from anysim.conventions import Array
 from anysim.errors import AssetError
+from anysim.geometry.decimate import FEW, decimated
 from anysim.geometry.tessellate import convex_hull
 from anysim.math import matrix as M
 from anysim.model.world import Mesh, Vec3
@@ -24,10 +25,10 @@ from anysim_schemas.limits import MESH_BYTES, MESH_FACES
 
 FORMATS = (".stl", ".obj", ".dae", ".glb", ".ply")
 HULL_VERTICES = 64  # what PhysX takes in a convex mesh with margin; enough for grasping at millimetres
-VISUAL_FACES = 2500  # of one visual: a software renderer draws a robot of ten in milliseconds
+VISUAL_ERROR = 0.002  # [m] that what is looked at may be off
 VISUAL_COLORS = 6
 MATERIAL_FILES = 100  # of one .obj; what it names beyond is not read
-_VERSION = "anysim-mesh-3"  # change with anything that changes the result
+_VERSION = "anysim-mesh-4"  # change with anything that changes the result
 _ONE: Vec3 = (1.0, 1.0, 1.0)
 Color = tuple[float, float, float, float]
 
@@ -66,7 +67,7 @@ def whole_mesh(path: Path, scale: Vec3 = _ONE, *, upright: bool = False) -> Mesh
         starts = np.cumsum([0, *(len(piece.vertices) for piece in pieces[:-1])])
         faces = np.concatenate([piece.faces + start for piece, start in zip(pieces, starts, strict=True)])
         vertices = np.concatenate([piece.vertices for piece in pieces])
-        joined = _decimate(vertices, faces, len(faces))
+        joined = decimated(vertices, faces, 0.0)
         return {"vertices": joined[0], "faces": joined[1]}
 
     return _mesh(path.stem, key, cache.load_or_make("meshes", key, make))
@@ -83,38 +84,41 @@ def hull_of(name: str, vertices: Array, source: str) -> Mesh:
     return _mesh(name, key, cache.load_or_make("meshes", key, make))
 
 
-def light_mesh(name: str, vertices: Array, faces: Array, source: str) -> Mesh:
-    """Triangles (V, 3), (F, 3) that some parser has read, decimated to `VISUAL_FACES`; `source` as in `hull_of`."""
-    key = cache.digest(_VERSION, "visual of", source, str(VISUAL_FACES))
+def light_mesh(name: str, vertices: Array, faces: Array, source: str, *, error: float = VISUAL_ERROR) -> Mesh:
+    """Triangles (V, 3), (F, 3) that some parser has read, as light as `error` [m] allows; `source` as in `hull_of`."""
+    key = cache.digest(_VERSION, "visual of", source, repr(error))
 
     def make() -> dict[str, Array]:
-        light = _decimate(np.asarray(vertices, dtype=float), np.asarray(faces), VISUAL_FACES)
+        light = decimated(np.asarray(vertices, dtype=float), np.asarray(faces), error)
         return {"vertices": light[0], "faces": light[1]}
 
     return _mesh(name, key, cache.load_or_make("meshes", key, make))
 
 
-def visual_parts(path: Path, scale: Vec3 = _ONE, *, upright: bool = False) -> tuple[VisualPart, ...]:
-    """What a mesh file looks like: one mesh for each of its colours, together about `VISUAL_FACES` faces.
+def visual_parts(
+    path: Path, scale: Vec3 = _ONE, *, upright: bool = False, error: float = VISUAL_ERROR
+) -> tuple[VisualPart, ...]:
+    """What a mesh file looks like: one mesh for each of its colours.
 
     Args:
         path: one of `FORMATS`. The unit that a .dae declares is applied.
         scale: component-wise; a negative one mirrors.
         upright: turn files whose up axis is y (.glb, and .dae that say so) to z up. References in a URDF do not want
             that: there the axes are taken as they are, whatever the file declares.
+        error: [m] that the surface may be off, see `anysim.geometry.decimate`; 0 keeps every triangle.
 
     Raises:
         AssetError: an unknown format, a damaged file, no triangles.
     """
-    key = _key(path, "visual", scale, upright, VISUAL_FACES, VISUAL_COLORS)
+    key = _key(path, "visual", scale, upright, error, VISUAL_COLORS)
 
     def make() -> dict[str, Array]:
         arrays: dict[str, Array] = {}
         groups = _by_color(_load(path, scale, upright))
         total = sum(len(piece.faces) for piece in groups)
         for i, (vertices, faces, color) in enumerate(groups):
-            share = max(60, VISUAL_FACES * len(faces) // total)
-            arrays[f"{i}/vertices"], arrays[f"{i}/faces"] = _decimate(vertices, faces, share)
+            few = max(60, FEW * len(faces) // total)
+            arrays[f"{i}/vertices"], arrays[f"{i}/faces"] = decimated(vertices, faces, error, few)
             arrays[f"{i}/color"] = np.array(color if color is not None else (), dtype=float)
         return arrays
 
@@ -251,18 +255,3 @@ def _by_color(pieces: list[_Piece]) -> list[_Piece]:
         faces = np.concatenate([p.faces + start for p, start in zip(members, starts, strict=True)])
         merged.append(_Piece(np.concatenate([p.vertices for p in members]), faces, color))
     return merged
-
-
-def _decimate(vertices: Array, faces: Array, budget: int) -> tuple[Array, Array]:
-    """Quadric decimation to about `budget` faces, after vertices at one place became one."""
-    import trimesh
-
-    mesh = trimesh.Trimesh(vertices, faces, process=False)
-    mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    mesh.update_faces(mesh.nondegenerate_faces())
-    if len(mesh.faces) == 0:
-        return vertices, faces
-    if len(mesh.faces) > budget:
-        mesh = mesh.simplify_quadric_decimation(face_count=budget)
-    mesh.remove_unreferenced_vertices()
-    return np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int32)
