@@ -184,6 +184,23 @@ def test_a_read_survives_a_lost_worker():
         assert_same(read(engine, [0, 1, 2]), read(alone, [0, 1, 2]), "the others")
 
 
+@pytest.mark.parametrize("worker", [0, 1])
+def test_parameters_are_those_of_their_envs_after_a_loss(worker):
+    """Whichever worker is lost when they are asked for: a lost first one does not put its envs last."""
+    alone, engine = _pair()
+    with alone, engine:
+        values = np.linspace(0.1, 0.5, 5)[:, None]
+        for e in (alone, engine):
+            e.set_parameters("body.mass", values, indices=[0])
+        os.kill(engine.workers[worker], signal.SIGKILL)
+        with pytest.warns(WorkerWarning):
+            found = engine.get_parameters("body.mass", indices=[0])
+        assert np.array_equal(found, values)
+        os.kill(engine.workers[worker], signal.SIGKILL)
+        with pytest.warns(WorkerWarning):
+            engine.set_parameters("body.mass", values[::-1], indices=[0])
+
+
 def test_a_live_edit_keeps_the_fault():
     """An edit rebuilds the world, and does not make a lost episode sound."""
     alone, engine = _pair()

@@ -161,7 +161,7 @@ class ShardedEngine(SimEngine):
                     raise EngineFailure(f"{self._who(k)} {gone[k]} in '{name}', and so did the one that replaced it")
         if raised:
             raise raised[min(raised)]
-        return answers
+        return {k: answers[k] for k in parts if k in answers}  # in their order, also where one took over
 
     def _spent_news(self, k: int) -> News:
         news, self._news[k] = self._news[k], News()
