@@ -41,7 +41,7 @@ class Envs(EnvWorlds):
         """With the entities (N, E) that are there in each env."""
         num_envs = len(present)
         self.world, self.options = world, options
-        self.recipes = Recipes(world, options)
+        self.recipes = Recipes(world, options, num_envs)
         self.scenes: list[EnvScene] = []
         self.last = LastSubstep(world, num_envs, self._exerted, self._touched)
         self.lost = np.zeros(num_envs, dtype=bool)

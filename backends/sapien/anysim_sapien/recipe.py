@@ -19,6 +19,9 @@ from anysim_sapien.packing import Packing
 from anysim_sapien.shapes import to_pose
 from anysim_sapien.surfaces import Copy
 
+_KEPT = 64
+"""Of what follows from values that may be drawn in each reset, this is kept beside what the envs have now."""
+
 
 class Values(NamedTuple):
     """The parameters of one env that its scene is built with."""
@@ -37,15 +40,18 @@ class Values(NamedTuple):
 class Recipes:
     """What all envs of a world are built from: one recipe for each set of entities that are there."""
 
-    def __init__(self, world: World, options: SapienOptions) -> None:
+    def __init__(self, world: World, options: SapienOptions, num_envs: int = 1) -> None:
         self.world, self.options = world, options
         self.layout = Layout.of(world)
         """That of everything that may be there."""
         self.root_pose = [to_pose(np.array([*b.position, *b.quaternion])) for b in world.bodies]
         self.frames = [_joint_frames(world, joint) for joint in world.joints]
         self.initial = np.array([joint.initial for joint in world.joints])
-        self._principal = lru_cache(maxsize=10000)(self._make_principal)
-        self._made = lru_cache(maxsize=64)(self._make)
+        # drawn values never come again: kept are those that all resets share, and the present ones of each env
+        self._principal = lru_cache(maxsize=_KEPT + num_envs * len(world.bodies))(self._make_principal)
+        self._made = lru_cache(maxsize=_KEPT)(self._make)
+        self.copies = lru_cache(maxsize=_KEPT + num_envs)(_copies)
+        """Shapes for (a `Meeting`, friction, restitution), the latter two as bytes."""
         _check(world)
 
     def of(self, present: Array) -> "Recipe":
@@ -73,21 +79,22 @@ class Recipe:
         self.present = present
         """(E,) bool, the entities that are there."""
         self.layout = Layout.of(common.world, bodies_there(common.world, present))
-        self._meeting = Meeting(self.world, self.layout)
-        self.groups = self._meeting.apart.groups
+        self.meeting = Meeting(self.world, self.layout)
+        """What touches what, and with which coefficients."""
+        self.groups = self.meeting.apart.groups
         self.geoms_on: dict[int, list[int]] = {}
-        for i in self._meeting.solid.tolist():
+        for i in self.meeting.solid.tolist():
             self.geoms_on.setdefault(self.world.geoms[i].body, []).append(i)
         self.packing: Packing | None = None
         """Where things are in the packed state of its scenes; that of the first one is looked at."""
-        self._copies = lru_cache(maxsize=64)(self._make_copies)
 
     def copies(self, friction: Array, restitution: Array) -> dict[int, list[Copy]]:
         """The shapes of each geom that collides, for the coefficients in force (G,)."""
-        return self._copies(friction.tobytes(), restitution.tobytes())
+        return self.common.copies(self.meeting, friction.tobytes(), restitution.tobytes())
 
-    def _make_copies(self, friction: bytes, restitution: bytes) -> dict[int, list[Copy]]:
-        return self._meeting.copies(np.frombuffer(friction), np.frombuffer(restitution))
+
+def _copies(meeting: Meeting, friction: bytes, restitution: bytes) -> dict[int, list[Copy]]:
+    return meeting.copies(np.frombuffer(friction), np.frombuffer(restitution))
 
 
 class Tendon(NamedTuple):

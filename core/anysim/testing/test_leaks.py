@@ -5,6 +5,7 @@ import os
 import threading
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from anysim.engine.capability import Capability as C
@@ -77,3 +78,24 @@ def test_resets_do_not_grow(build, engine_class):
     memory = _resident()
     rounds(1000)
     assert _resident() - memory < tolerances.LEAK_BYTES
+
+
+def test_resets_with_drawn_parameters_keep_no_objects(build, engine_class):
+    """Other masses, inertias and frictions in each reset leave no Python objects: what is kept of them is bounded."""
+    engine = build(worlds.everyday(engine_class.capabilities), 2)
+    rng = np.random.default_rng(0)
+    drawn = [name for name in ("body.mass", "body.inertia", "geom.friction") if name in engine_class.parameters]
+
+    def rounds(n):
+        for _ in range(n):
+            scale = rng.uniform(0.8, 1.2, 2)
+            for name in drawn:
+                built = engine.built_parameters(name)
+                engine.set_parameters(name, scale.reshape(2, *(1,) * built.ndim) * built)
+            engine.reset()
+        gc.collect()
+        return len(gc.get_objects())
+
+    before = rounds(100)
+    grown = rounds(60) - before
+    assert grown < 20, f"{grown} more objects after 60 resets; bound what is cached by the values of parameters"
