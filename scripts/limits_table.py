@@ -1,4 +1,4 @@
-"""The table of what every parser accepts at most, from the limits themselves, into docs/limits.md.
+"""The tables of what every parser accepts, and of the bounds of physics, from themselves, into docs/limits.md.
 
     python scripts/limits_table.py [--check]
 
@@ -9,7 +9,11 @@ import sys
 
 from generated import main
 
-from anysim_schemas.limits import table
+from anysim_schemas import bounds, limits
 
 if __name__ == "__main__":
-    sys.exit(main(__doc__, "limits", "limits_table.py", ("docs/limits.md",), lambda: table().rstrip()))
+    codes = [
+        main(__doc__, name, "limits_table.py", ("docs/limits.md",), content)
+        for name, content in (("limits", lambda: limits.table().rstrip()), ("bounds", lambda: bounds.table().rstrip()))
+    ]
+    sys.exit(max(codes))

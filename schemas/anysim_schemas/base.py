@@ -6,6 +6,8 @@ from typing import Annotated, Any, ClassVar, cast
 from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, Strict, model_validator
 from pydantic_core import CoreSchema, core_schema
 
+from anysim_schemas.bounds import DENSITY, LENGTH, MASS, SCALE
+
 
 class Spec(BaseModel):
     """A frozen, closed piece of configuration: an unknown key is an error, a loaded spec never changes."""
@@ -85,6 +87,12 @@ NonNegative = Annotated[float, Strict(), Field(ge=0)]
 Fraction = Annotated[float, Strict(), Field(ge=0, le=1)]
 Bounce = Annotated[float, Strict(), Field(ge=0, lt=1)]
 """A coefficient of restitution: what bounces with 1 never comes to rest."""
+
+Length = Annotated[float, Strict(), Field(ge=LENGTH.low, le=LENGTH.high)]
+"""A size of something that others touch."""
+Scale = Annotated[float, Strict(), Field(ge=SCALE.low, le=SCALE.high)]
+Mass = Annotated[float, Strict(), Field(ge=MASS.low, le=MASS.high)]
+Density = Annotated[float, Strict(), Field(ge=DENSITY.low, le=DENSITY.high)]
 
 Vec3 = tuple[Number, Number, Number]
 Color = Annotated[

@@ -2,9 +2,10 @@
 
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, Strict, model_validator
 
 from anysim_schemas.base import Positive, Spec
+from anysim_schemas.bounds import EXTENT, TIME_STEP
 from anysim_schemas.errors import KeyFault
 from anysim_schemas.plugin import PluginSlot
 from anysim_schemas.values import Vec3Value
@@ -42,7 +43,9 @@ class EngineSpec(Spec):
 class PhysicsSpec(Spec):
     """Time steps and gravity. `control_dt` must be a whole multiple of `dt`."""
 
-    dt: Positive = Field(default=0.002, description="physics time step [s]")
+    dt: Annotated[float, Strict(), Field(ge=TIME_STEP.low, le=TIME_STEP.high)] = Field(
+        default=0.002, description="physics time step [s]"
+    )
     control_dt: Positive = Field(default=0.02, description="time between two actions [s]")
     gravity: Vec3Value = Field(default=(0.0, 0.0, -9.81), description="gravity [m/s^2], world axes, z up")
     friction_cone: Literal["elliptic", "pyramidal"] = Field(
@@ -53,6 +56,11 @@ class PhysicsSpec(Spec):
         description="ratio of frictional to normal contact impedance; above 1 reduces creep of grasped objects",
     )
 
+    extent: Annotated[float, Strict(), Field(ge=EXTENT.low, le=EXTENT.high)] | None = Field(
+        default=None,
+        description="a body farther than this from the origin along an axis has left the world: its env is faulted "
+        "[m]; 10,000 where not given",
+    )
     actuation: Literal["implicit_pd", "explicit_pd", "native"] = Field(
         default="implicit_pd",
         description="implicit_pd: the drive law with its damping taken implicitly, the same on every engine; "

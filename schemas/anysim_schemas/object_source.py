@@ -4,7 +4,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Discriminator, Field, Strict, Tag, model_validator
 
-from anysim_schemas.base import Name, Positive, Spec
+from anysim_schemas.base import Length, Name, Scale, Spec
 from anysim_schemas.errors import KeyFault
 from anysim_schemas.plugin import PluginSlot
 from anysim_schemas.values import TAG_PREFIX, Choice, Range
@@ -28,10 +28,10 @@ class SourceSpec(Spec):
         ("procedural", "params", "scale"),
     )
 
-    box: tuple[Positive, Positive, Positive] | None = Field(default=None, description="edge lengths x, y, z [m]")
-    sphere: Positive | None = Field(default=None, description="radius [m]")
-    cylinder: tuple[Positive, Positive] | None = Field(default=None, description="radius, height along z [m]")
-    capsule: tuple[Positive, Positive] | None = Field(
+    box: tuple[Length, Length, Length] | None = Field(default=None, description="edge lengths x, y, z [m]")
+    sphere: Length | None = Field(default=None, description="radius [m]")
+    cylinder: tuple[Length, Length] | None = Field(default=None, description="radius, height along z [m]")
+    capsule: tuple[Length, Length] | None = Field(
         default=None, description="radius, length of the straight part along z [m]"
     )
     mesh: str | None = Field(default=None, description="URI of a mesh file; collides as its convex hull")
@@ -43,7 +43,7 @@ class SourceSpec(Spec):
     params: Annotated[dict[str, Any], PluginSlot("asset", "procedural")] = Field(
         default_factory=dict, description="parameters owned by the builder"
     )
-    scale: Positive = Field(default=1.0, description="scale of this source; the object's own `scale` multiplies it")
+    scale: Scale = Field(default=1.0, description="scale of this source; the object's own `scale` multiplies it")
 
     @classmethod
     def from_text(cls, text: str) -> dict[str, Any]:
@@ -83,7 +83,7 @@ class SourceFolder(Spec):
 
     folder: str = Field(description="URI of a folder: relative to this file, or such as `package:my_assets/mugs`")
     pattern: str = Field(default="*", description="which files of it, such as `*.obj` or `*/model.urdf`")
-    scale: Positive = Field(default=1.0, description="scale of each of them")
+    scale: Scale = Field(default=1.0, description="scale of each of them")
     shared: Name | None = Field(default=None, description="fields that share a name share one draw in each episode")
 
     @model_validator(mode="after")

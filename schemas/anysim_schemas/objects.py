@@ -9,7 +9,16 @@ from anysim_schemas.errors import KeyFault
 from anysim_schemas.joints import ObjectJointSpec
 from anysim_schemas.matter import DampingSpec, MaterialValue, SolverSpec, TextureValue
 from anysim_schemas.object_source import Count, Source, SourceSpec as SourceSpec, most
-from anysim_schemas.values import BounceValue, ColorValue, NonNegativeValue, PositiveValue, Vec3Value
+from anysim_schemas.values import (
+    BounceValue,
+    ColorValue,
+    DensityValue,
+    MassValue,
+    NonNegativeValue,
+    PositiveValue,
+    ScaleValue,
+    Vec3Value,
+)
 
 Columns = Annotated[int, Strict(), Field(gt=0)]
 
@@ -41,7 +50,7 @@ class ObjectSpec(Spec):
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("mass",), ("density",))
 
     source: Source = Field(description="its shape: a primitive, a mesh or an asset; or several to draw from")
-    scale: PositiveValue = Field(
+    scale: ScaleValue = Field(
         default=1.0, description="multiplies all its lengths; a range is drawn from as many sizes as `sizes` says"
     )
     sizes: Annotated[int, Strict(), Field(ge=2, le=64)] = Field(
@@ -60,8 +69,8 @@ class ObjectSpec(Spec):
         default=None, description="with rigid_instancer: free space between neighbours [m]; a tenth of their size"
     )
     fixed: Flag = Field(default=False, description="welded to the world; may still be placed anew at each reset")
-    mass: PositiveValue | None = Field(default=None, description="mass [kg]; exclusive with density")
-    density: PositiveValue | None = Field(
+    mass: MassValue | None = Field(default=None, description="mass [kg]; exclusive with density")
+    density: DensityValue | None = Field(
         default=None, description="density [kg/m^3]; 1000 where neither it nor mass is given"
     )
     com_offset: Vec3Value | None = Field(

@@ -4,7 +4,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from anysim_schemas.base import Flag, Name, NonNegative, Number, Positive, Spec, Vec3
+from anysim_schemas.base import Flag, Length, Name, NonNegative, Number, Positive, Spec, Vec3
 from anysim_schemas.object_source import PACKAGES
 from anysim_schemas.objects import ContactSpec
 from anysim_schemas.vehicle import VehicleSpec
@@ -113,10 +113,10 @@ class SolidSpec(Spec):
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("box",), ("sphere",), ("cylinder",), ("capsule",))
 
-    box: tuple[Positive, Positive, Positive] | None = Field(default=None, description="edge lengths x, y, z [m]")
-    sphere: Positive | None = Field(default=None, description="radius [m]")
-    cylinder: tuple[Positive, Positive] | None = Field(default=None, description="radius, height along z [m]")
-    capsule: tuple[Positive, Positive] | None = Field(
+    box: tuple[Length, Length, Length] | None = Field(default=None, description="edge lengths x, y, z [m]")
+    sphere: Length | None = Field(default=None, description="radius [m]")
+    cylinder: tuple[Length, Length] | None = Field(default=None, description="radius, height along z [m]")
+    capsule: tuple[Length, Length] | None = Field(
         default=None, description="radius, length of the straight part along z [m]"
     )
     position: Vec3 = Field(default=(0.0, 0.0, 0.0), description="place of its middle in the link's frame [m]")

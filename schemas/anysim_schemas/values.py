@@ -13,12 +13,15 @@ from anysim_schemas.base import (
     Bounce,
     Color,
     Degrees,
+    Density,
     Flag,
     Fraction,
+    Mass,
     Name,
     NonNegative,
     Number,
     Positive,
+    Scale,
     Spec,
     Vec3,
     Whole,
@@ -49,7 +52,7 @@ def _check_order(low: object, high: object, what: str) -> None:
 
 _LABELS: tuple[tuple[Any, str], ...] = (
     (Number, "number"), (Positive, "positive"), (NonNegative, "non_negative"), (Fraction, "fraction"),
-    (Bounce, "bounce"),
+    (Bounce, "bounce"), (Scale, "scale"), (Mass, "mass"), (Density, "density"),
     (Vec3, "vector"), (Color, "color"), (Whole, "whole"), (Flag, "flag"), (Degrees, "degrees"),
 )  # fmt: skip
 
@@ -213,6 +216,9 @@ FractionValue = Value[Fraction]
 Vec3Value = Value[Vec3]
 ColorValue = Value[Color]
 BounceValue = Value[Bounce]
+ScaleValue = Value[Scale]
+MassValue = Value[Mass]
+DensityValue = Value[Density]
 WholeValue = Value[Whole]
 
 if TYPE_CHECKING:

@@ -1,5 +1,6 @@
 """Exit codes of the command line: 1 is an answer, 2 a request that cannot be met, 3 something that broke."""
 
+import json
 import os
 import subprocess
 import sys
@@ -152,6 +153,16 @@ def test_a_damaged_recording_is_an_answer(tmp_path: Path) -> None:
     done = anysim("replay", str(trajectory), cwd=tmp_path)
     assert done.returncode == 1
     assert "is damaged" in done.stderr
+
+
+def test_a_body_that_leaves_the_world_is_counted_apart(tmp_path: Path) -> None:
+    place = "world.layout.cube={position: {range: [[0.2, 0, 1], [1.6, 0, 1]]}}"
+    done = anysim("run", "pick_cube", *FAST, "-o", "physics.extent=1.1", "-o", place, "-k", "6", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    reasons = [episode["fault"] for episode in told["episodes"]]
+    assert 0 < told["faults"] == sum(bool(reason) for reason in reasons) < 6
+    assert all(not reason or reason.startswith("'cube' has left the world at 0.02") for reason in reasons)
 
 
 def test_a_reader_that_leaves_is_no_error(tmp_path: Path) -> None:

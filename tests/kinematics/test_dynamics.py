@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anysim.engine.requirements import damping_ratio, speed_bound
+from anysim.engine.conditioning import damping_ratio
+from anysim.engine.requirements import speed_bound
 from anysim.kinematics.dynamics import coupling, frame_jacobians, mass_matrix
 from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.world import ControlMode

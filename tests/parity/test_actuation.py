@@ -10,8 +10,8 @@ import pytest
 
 from anysim.conventions import Array
 from anysim.engine.capability import Capability
+from anysim.engine.conditioning import UnstableGainsWarning
 from anysim.engine.factory import create_simulation, runnable
-from anysim.engine.requirements import UnstableGainsWarning
 from anysim.model.world import Actuation, Actuator, World
 from anysim.testing import tolerances
 from tests.parity.pressing import Press, arm_joint, fingers, panda

@@ -25,10 +25,11 @@ class Answer(NamedTuple):
 
 
 class Report(NamedTuple):
-    """Every fault of a file, a sentence each, and the answer of each engine that was asked."""
+    """Every fault of a file, a sentence each, the answer of each engine that was asked, and what is ill-conditioned."""
 
     faults: list[str]
     answers: tuple[Answer, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 def check(
@@ -58,12 +59,14 @@ def check(
 
 def _as_data(report: Report) -> dict[str, object]:
     engines = {a.engine: {"runs": not a.refusal, "why": a.refusal, "approximate": a.measured} for a in report.answers}
-    return {"ok": not report.faults, "faults": report.faults, "engines": engines}
+    return {"ok": not report.faults, "faults": report.faults, "warnings": report.warnings, "engines": engines}
 
 
 def _tell(name: str, report: Report, all_engines: bool, verbose: bool) -> None:
     for fault in report.faults:
         typer.echo(fault, err=True)
+    for warning in report.warnings:
+        typer.echo(f"warning: {warning}", err=True)
     for answer in report.answers:
         if answer.refusal and answer.refusal not in report.faults:
             typer.echo(answer.refusal, err=True)
@@ -87,7 +90,8 @@ def check_one(name: str, engine: str | None, all_engines: bool, overrides: list[
 def report_on(name: str, engine: str | None, all_engines: bool, overrides: list[str]) -> Report:
     """Every fault of one file, and what each engine that is asked says to it."""
     from anysim import registry
-    from anysim.api import compile_world, dry_run, load
+    from anysim.api import compile_world, dry_run, load, place_of
+    from anysim.engine.conditioning import doubts
     from anysim.errors import AnysimError, AssetError, PluginFailure, SpecError, SpecIssue
     from anysim_schemas.files import exists
 
@@ -98,6 +102,7 @@ def report_on(name: str, engine: str | None, all_engines: bool, overrides: list[
         if loaded.spec.task is not None:
             dry_run(loaded, world)
             _check_film(loaded)
+        warnings = tuple(str(SpecIssue(place_of(loaded, doubt.path), *doubt[:2])) for doubt in doubts(world))
         engines = registry.names("engines") if all_engines else [engine or loaded.spec.engine.name]
         if any(issue.path.startswith("engine") for issue in past):
             engines = []  # which one was meant is not known
@@ -109,7 +114,8 @@ def report_on(name: str, engine: str | None, all_engines: bool, overrides: list[
     except AnysimError as error:
         return Report([*map(str, past), f"{name}: {error}"])
     refused = [answer.refusal for answer in answers if answer.refusal]
-    return Report([*map(str, past), *(refused if len(refused) == len(answers) else [])], () if past else answers)
+    faults = [*map(str, past), *(refused if len(refused) == len(answers) else [])]
+    return Report(faults, () if past else answers, warnings)
 
 
 def _ask(engine: str, loaded: "LoadedRun", world: "World", name: str) -> Answer:

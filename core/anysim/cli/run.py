@@ -121,6 +121,7 @@ def _report(
     from anysim.cli.output import print_json, print_table
 
     lost, reruns = sum(r.lost for r in results), sum(r.reruns for r in results)
+    faults = [r for r in results if r.fault]
     good, total = sum(r.success for r in results), len(results) - lost
     wall = sum(parts.values())
     if as_json:
@@ -137,11 +138,12 @@ def _report(
                 "resumed": r.resumed,
                 "reruns": r.reruns,
                 "lost": r.lost,
+                "fault": r.fault,
             }
             for r in results
         ]
         speed = {"steps": steps, "wall_s": wall, "steps_per_s": steps / wall, "where_s": parts}
-        counts = {"attempts": total, "successes": good, "reruns": reruns, "lost": lost}
+        counts = {"attempts": total, "successes": good, "reruns": reruns, "lost": lost, "faults": len(faults)}
         print_json({"out": str(directory), **counts, "episodes": episodes, "speed": speed})
         return
     print_table(
@@ -169,6 +171,9 @@ def _report(
         typer.echo(f"{steps:,} control steps in {wall:.1f} s: {steps / wall:,.0f} steps/s")
     if reruns:
         typer.echo(f"{reruns} times an episode lost its worker process and was begun anew: no failures of the task")
+    if faults:
+        first = f"env {faults[0].env} episode {faults[0].episode}: {faults[0].fault}"
+        typer.echo(f"{len(faults)} of the attempts ended in a fault of the simulation; the first: {first}", err=True)
     if lost:
         typer.echo(f"error: {lost} episodes lost every worker process they had, and were given up", err=True)
     kept = sum(r.path is not None for r in results)

@@ -12,6 +12,7 @@ from anysim.assets.uri import locate
 from anysim.compile.builder import WorldBuilder
 from anysim.compile.joints import with_joints
 from anysim.compile.physical import surface, with_matter
+from anysim.compile.plausibility import inertial_problem, size_problem
 from anysim.compile.variants import INSTANCER, KeyedSource, source_text
 from anysim.conventions import IDENTITY_QUATERNION
 from anysim.errors import AssetError, Issues, PluginError, SpecError, listing
@@ -155,10 +156,16 @@ def _model(
         geoms = [Geom("shape", 0, solid, color=(*color, 1.0), surface=touch, collides=spec.collides)]
     else:
         geoms, solid = _mesh_geoms(spec, source, touch, color, meshes, base)
+    if problem := size_problem(solid, meshes):
+        issues.add(key, problem)
+        return None
     if inertia.volume(solid, meshes) <= 0:
         issues.add(key, "the mesh encloses no volume, so it cannot have a mass")
         return None
     body = Body("", BodyKind.FREE, inertial=_inertial(spec, solid, meshes))
+    if not spec.fixed and (problem := inertial_problem(body.inertial)):
+        issues.add("mass" if spec.mass is not None else "density" if spec.density is not None else key, problem)
+        return None
     links = {"": 0}
     return ImportedModel(
         name, (body,), geoms=tuple(geoms), geom_links=("",) * len(geoms), meshes=tuple(meshes.values()), links=links

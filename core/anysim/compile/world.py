@@ -14,6 +14,7 @@ from anysim.compile.appearance import compile_lights, compile_scenery
 from anysim.compile.builder import WorldBuilder
 from anysim.compile.collisions import with_exclusions
 from anysim.compile.dynamics import with_dynamics
+from anysim.compile.plausibility import check_places
 from anysim.compile.population import add_population, check_names
 from anysim.compile.robot import add_robot
 from anysim.compile.room import add_room
@@ -26,6 +27,7 @@ from anysim.model.world import Actuation, Physics, Slot, World
 from anysim.placement.nominal import place_nominally
 from anysim.placement.order import check_layout
 from anysim.randomization.distributions import nominal
+from anysim_schemas.bounds import DEFAULT_EXTENT
 from anysim_schemas.engine import PhysicsSpec
 from anysim_schemas.rooms import furniture_names
 from anysim_schemas.run import RunSpec, WorldSpec
@@ -96,6 +98,7 @@ def compile_with_report(
         issues.raise_if_any()
     world = with_dynamics(world, content.robots, issues.at("robots"))
     world = place_nominally(world, content.layout, order, issues.at("layout"), content.regions)
+    check_places(world, issues)
     world = with_exclusions(world, content.collisions, issues.at("collisions"))
     world = with_sensors(world, content.cameras, content.contact_sensors, issues)
     issues.raise_if_any()
@@ -116,4 +119,5 @@ def neutral_physics(spec: PhysicsSpec) -> Physics:
         spec.impratio,
         Actuation(spec.actuation),
         spec.velocity_limits == "enforce",
+        DEFAULT_EXTENT if spec.extent is None else spec.extent,
     )

@@ -1,6 +1,7 @@
 """Lifecycle of an engine: what it declares, its World from build to destruction, resets, steps and states."""
 
 import threading
+import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from typing import Any, ClassVar, Self
@@ -11,8 +12,10 @@ from anysim.conventions import Array
 from anysim.engine import arguments
 from anysim.engine.availability import LibraryRequirement
 from anysim.engine.capability import Allowance, Capabilities, Capability, Need, check
+from anysim.engine.conditioning import doubts
 from anysim.engine.control import CommandBuffer
 from anysim.engine.doctor import Finding
+from anysim.engine.extent import Extent
 from anysim.engine.lifetime import EngineLifetime
 from anysim.engine.options import EngineOptions
 from anysim.engine.presence import Lifecycle, Presence, write_present
@@ -137,6 +140,8 @@ class EngineLifecycle(EngineLifetime, Primitives):
             self.approximations: list[Need] = self._check(world)
             check_masses(world)
             check_drives(world)
+            for doubt in doubts(world):
+                warnings.warn(str(doubt), doubt.category, stacklevel=2)
             self._install(world, num_envs)
             try:
                 self._build_envs()
@@ -162,6 +167,7 @@ class EngineLifecycle(EngineLifetime, Primitives):
         self._state: State | None = None
         self._records = EnvRecords(world, num_envs)
         self._row_forms: dict[str, Mapping[str, Array]] = {}
+        self._extent = Extent(world)
 
     def _build_envs(self) -> None:
         kept = {**vars(self), "_built": True}
@@ -319,7 +325,18 @@ class EngineLifecycle(EngineLifetime, Primitives):
             array, presence = self._read(name), self._records.presence
             if presence.varies:
                 presence.blank(name, array)
+            if name == "fault" and self._extent.watched and self._state is not None:
+                array = self._extent.with_those_outside(array, self._state.body_pose)
             return array
+
+    def fault_reason(self, env: int) -> str:
+        """Why an env is faulted now, in a sentence that names the body, where it is and when; empty if it is not."""
+        state = self.get_state()
+        if not state.fault[env]:
+            return ""
+        return self._extent.reason(state.body_pose[env], float(state.time[env])) or (
+            f"the state of env {env} is not finite, or {self.name} gave up on it, at {state.time[env]:.3f} s"
+        )
 
     def _retire_state(self) -> None:
         if self._state is not None:

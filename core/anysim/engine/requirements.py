@@ -1,6 +1,5 @@
 """Capabilities that a world needs of an engine, each with the name that causes it, and drives that can be followed."""
 
-import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from math import isfinite
@@ -11,7 +10,6 @@ from anysim.compile.appearance import DEFAULT_LIGHTS
 from anysim.conventions import WORLD, Array
 from anysim.engine.capability import Capability as C, Need
 from anysim.errors import EngineError
-from anysim.kinematics.dynamics import coupling, mass_matrix
 from anysim.model.pairs import may_meet
 from anysim.model.world import (
     Actuation,
@@ -206,12 +204,8 @@ def check_masses(world: World) -> None:
             raise EngineError(f"body '{body.name}' moves and has no {lacks}; give it some, or make it static")
 
 
-class UnstableGainsWarning(UserWarning):
-    """Explicit drives that are too stiff for the time step."""
-
-
 def check_drives(world: World) -> None:
-    """Warn of explicit drives that cannot be stable, and refuse velocity limits that no drive can keep.
+    """Refuse velocity limits that no drive can keep.
 
     Raises:
         EngineError: velocity limits are enforced on a position drive without damping, which asks for no velocity.
@@ -224,37 +218,9 @@ def check_drives(world: World) -> None:
                     f"drive '{actuator.name}' has kd = 0 and cannot keep the velocity limit of {limit:g}; give it "
                     f"damping, or set physics.velocity_limits: ignore"
                 )
-    if world.physics.actuation is Actuation.EXPLICIT_PD and (ratio := damping_ratio(world)) > 1:
-        warnings.warn(
-            f"explicit drives of '{world.name}' are too stiff for dt = {world.physics.dt:g} s: the largest eigenvalue "
-            f"of dt Kd / M at the initial pose is {ratio:.3g} (up to 1 is well damped, above 2 diverges); lower kd or "
-            f"dt, or use physics.actuation: implicit_pd",
-            UnstableGainsWarning,
-            stacklevel=3,
-        )
 
 
 def speed_bound(damping: Array, limit: Array) -> Array:
     """Bound on |kp (q* - q) + kd qd*|: kd times the velocity limit; none without damping or without a limit."""
     bound = np.full(np.broadcast_shapes(damping.shape, limit.shape), np.inf)
     return np.multiply(damping, limit, out=bound, where=damping > 0)
-
-
-def damping_ratio(world: World) -> float:
-    """The largest eigenvalue of dt Kd inv(M) at the initial pose: what a step takes off the fastest motion.
-
-    An explicit step multiplies that motion by 1 - this number, so that it alternates above 1 and grows above 2.
-    """
-    mass = mass_matrix(world, world.initial_body_pose)
-    damping = np.zeros(len(mass))
-    for actuator in world.actuators:
-        if actuator.mode is not ControlMode.EFFORT:
-            damping[actuator.joint] += actuator.kd
-    together = coupling(world)
-    matrix = together.T @ mass @ together
-    drag = together.T @ np.diag(damping) @ together
-    if not len(matrix) or not drag.any():
-        return 0.0
-    if np.linalg.matrix_rank(matrix) < len(matrix):
-        return float("inf")
-    return float(world.physics.dt * np.abs(np.linalg.eigvals(np.linalg.solve(matrix, drag))).max())

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.errors import EngineError
+from anysim.errors import AssetError, EngineError
 from anysim.math import matrix as M, pose as P
 from anysim.model.hash import tidy
 from anysim.model.shapes import solid_moments
@@ -34,6 +34,8 @@ def tensor(inertial: Inertial) -> Array:
 
 def make(mass: float, com: Array, matrix: Array) -> Inertial:
     """An Inertial from arrays; what is only rounding noise becomes zero, so that hashes do not depend on it."""
+    if not (np.isfinite(mass) and np.isfinite(matrix).all()):
+        raise AssetError(f"a body with a mass of {mass:.3g} kg and an inertia that is not finite; check its sizes")
     noise = _NOISE * max(float(np.trace(matrix)), 0.0)
     moments = (matrix[0, 0], matrix[1, 1], matrix[2, 2], matrix[0, 1], matrix[0, 2], matrix[1, 2])
     xx, yy, zz, xy, xz, yz = (float(m) if abs(m) > noise else 0.0 for m in moments)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from anysim.conventions import IDENTITY_QUATERNION, WORLD
 from anysim.model.shapes import ORDINARY, Shape, Surface, Vec3
+from anysim_schemas.bounds import DEFAULT_EXTENT
 from anysim_schemas.robot_model import RobotModelSpec
 
 Quat = tuple[float, float, float, float]
@@ -318,6 +319,8 @@ class Physics:
     impratio: float = 1.0
     actuation: Actuation = Actuation.IMPLICIT_PD
     velocity_limits: bool = False
+    extent: float = field(default=DEFAULT_EXTENT, metadata=MappingProxyType({"hashed": "if given"}))
+    """Distance from the origin along an axis [m] beyond which a body has left the world."""
 
     @property
     def substeps(self) -> int:

@@ -65,6 +65,7 @@ class EpisodeResult:
 
     `path` is its trajectory if one was kept; `resumed` says it was there already. `reruns` is how often it was begun
     anew because its worker process was lost; `lost` that it was so each time: it did not fail, it was never run.
+    `fault` says why the simulation ended it, as of a body that left the world; empty where nothing did.
     """
 
     env: int
@@ -78,6 +79,7 @@ class EpisodeResult:
     resumed: bool = False
     reruns: int = 0
     lost: bool = False
+    fault: str = ""
 
     @property
     def success(self) -> bool:
@@ -257,6 +259,8 @@ class Collector:
         result = EpisodeResult(
             i, int(self._episode[i]), seed, status, steps, total, outcome, reruns=int(self._reruns[i]), lost=lost
         )
+        if env.info["fault"][i] and not lost:
+            result = replace(result, fault=env.engine.fault_reason(i))
         if keep and not env.info["fault"][i]:
             with self.times.record:
                 self._pending.append((result, self.recorder.commit(i, status, outcome | {"total_reward": total})))

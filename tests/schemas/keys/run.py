@@ -34,6 +34,7 @@ ROWS: dict[str, Row] = {
     "PhysicsSpec.gravity": row("physics.gravity=[0, 0, -1.6]"),
     "PhysicsSpec.friction_cone": row("physics.friction_cone=pyramidal"),
     "PhysicsSpec.impratio": row("physics.impratio=10.0"),
+    "PhysicsSpec.extent": row("physics.extent=5.0"),
     "PhysicsSpec.actuation": row("physics.actuation=native", given=ARM),
     "PhysicsSpec.velocity_limits": row("physics.velocity_limits=enforce", given=ARM),
     "TaskSpec.description": row("task.description=stack them", given="record.keep=all", seen="recorded"),
