@@ -12,6 +12,13 @@ from anysim.math import arrays
 from anysim.model.world import BodyKind, World
 
 
+def named(kind: str, name: object) -> str:
+    """A name, as it is."""
+    if isinstance(name, str):
+        return name
+    raise EngineError(f"a {kind} is given by its name, got {arrays.shown(name)}")
+
+
 def indices(values: ArrayLike, size: int, kind: str) -> Array:
     """Unique int indices in [0, size) from a sequence, an int array or an int."""
     array = np.atleast_1d(arrays.array(f"{kind} indices", values, EngineError))

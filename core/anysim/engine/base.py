@@ -167,7 +167,7 @@ class SimEngine(EngineSensing):
             return self._default_parameter(name).copy()
 
     def _chosen(self, name: str, env_ids: EnvIds, indices: Indices) -> tuple[Parameter, Array, Array]:
-        parameter = PARAMETERS.get(name)
+        parameter = PARAMETERS.get(arguments.named("parameter", name))
         if parameter is None:
             raise EngineError(f"there is no parameter '{name}' (parameters: {listing(PARAMETERS, 20)})")
         if name not in self.parameters:

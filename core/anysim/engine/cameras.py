@@ -6,10 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.engine.arguments import named
 from anysim.errors import EngineError
 from anysim.math import pose as P
+from anysim.math.arrays import whole
 from anysim.model.index import Index, paired
 from anysim.model.world import Camera, World
+
+LARGEST = 8192
+"""Pixels along an edge of an image."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +74,7 @@ class CameraRig:
         `default` is an overview unless a camera has that name.
         """
         names = [c.name for c in self.world.cameras]
-        if name == "default" and name not in names:
+        if named("camera", name) == "default" and name not in names:
             camera = self._overview()
             local = np.tile([*camera.position, *camera.quaternion], (len(ids), 1))
             fov = np.full(len(ids), camera.fov)
@@ -78,9 +83,8 @@ class CameraRig:
             camera = self.world.cameras[number]
             local, fov = self.poses[ids, number], self.fov[ids, number]
         pose = local if camera.body < 0 else P.compose(body_pose[:, camera.body], local)
-        size = (width or camera.width, height or camera.height)
-        if min(size) < 1 or max(size) > 8192:
-            raise EngineError(f"an image of {size[0]} x {size[1]} pixels cannot be drawn; 1 to 8192 expected")
+        wide, high = camera.width if width is None else width, camera.height if height is None else height
+        size = (whole("width", wide, EngineError, 1, LARGEST + 1), whole("height", high, EngineError, 1, LARGEST + 1))
         return CameraView(name, pose, fov, body_pose, *size, camera.near, camera.far)
 
     def _overview(self) -> Camera:

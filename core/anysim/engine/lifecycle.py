@@ -25,6 +25,7 @@ from anysim.engine.requirements import check_drives, check_masses, needs_of
 from anysim.engine.reserved_names import check_class, check_instance
 from anysim.engine.state import Availability, State
 from anysim.errors import CapabilityError, EngineError
+from anysim.math.arrays import whole
 from anysim.model.index import Index
 from anysim.model.world import World
 
@@ -291,8 +292,8 @@ class EngineLifecycle(EngineLifetime, Primitives):
         """
         with self._lock:
             self._require_world()
-            if n_steps < 1:
-                raise EngineError(f"n_steps must be at least 1, got {n_steps}")
+            if n_steps.__class__ is not int or n_steps < 1:
+                n_steps = whole("n_steps", n_steps, EngineError, least=1)
             ids = None if env_ids is None else self._ids(env_ids)
             self._retire_state()
             records, commands = self._records, self._records.commands

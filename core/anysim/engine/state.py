@@ -12,6 +12,7 @@ from anysim.conventions import Array
 from anysim.engine import snapshot_file
 from anysim.engine.untrusted.rows import mapping_of_arrays
 from anysim.errors import SnapshotError, StaleStateError
+from anysim.math.arrays import array
 
 
 class SnapshotLevel(StrEnum):
@@ -101,7 +102,7 @@ def row_numbers(rows: Sequence[int] | Array, count: int) -> Array:
     Raises:
         SnapshotError: one is not in it.
     """
-    which = np.asarray(rows)
+    which = array("rows", rows, SnapshotError)
     if which.ndim != 1 or (which.size and not np.issubdtype(which.dtype, np.integer)):
         raise SnapshotError(f"rows of a snapshot are chosen by their numbers, got {which.dtype} {which.shape}")
     if which.size and not 0 <= which.min() <= which.max() < count:

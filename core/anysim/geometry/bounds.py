@@ -55,11 +55,11 @@ class EntityShape:
     """
 
     def __init__(self, world: World, name: str) -> None:
-        entity = next((e for e in world.entities if e.name == name), None)
-        if entity is None:
+        number = world.entity_numbers.get(name)
+        if number is None:
             names = [e.name for e in world.entities]
             raise NameLookupError(f"there is no entity '{name}'{suggest(name, names)} (entities: {listing(names)})")
-        self.name = name
+        self.name, entity = name, world.entities[number]
         self._meshes = {mesh.name: mesh for mesh in world.meshes}
         start, stop = entity.body_start, entity.body_stop
         poses = {start: np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])}
@@ -72,7 +72,8 @@ class EntityShape:
             body, joint = world.bodies[i], world.body_joint[i]
             rest = P.compose(poses[body.parent], P.pose(body.position, body.quaternion))
             poses[i] = P.compose(rest, joint_pose(world, joint, np.array(world.joints[joint].initial)))
-        shown = [g for g in world.geoms if start <= g.body < stop and not is_ground(g.shape)]
+        own = sorted(index for body in range(start, stop) for index in world.body_geoms[body])
+        shown = [g for g in (world.geoms[index] for index in own) if not is_ground(g.shape)]
         chosen: list[Geom] = [g for g in shown if g.collides] or shown
         self.collides = any(g.collides for g in shown)
         self.owned = tuple(

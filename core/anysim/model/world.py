@@ -135,6 +135,20 @@ class World:
         return tuple(table)
 
     @cached_property
+    def body_geoms(self) -> tuple[tuple[int, ...], ...]:
+        """For each body its geoms; those of the world itself are not among them."""
+        table: list[list[int]] = [[] for _ in self.bodies]
+        for index, geom in enumerate(self.geoms):
+            if geom.body >= 0:
+                table[geom.body].append(index)
+        return tuple(map(tuple, table))
+
+    @cached_property
+    def entity_numbers(self) -> Mapping[str, int]:
+        """The number of each entity by its name."""
+        return {entity.name: number for number, entity in enumerate(self.entities)}
+
+    @cached_property
     def logical_objects(self) -> Mapping[str, Slot]:
         """Every logical object by name, robots too; what is the same in every env is a slot of one entity."""
         from anysim.model.slots import logical_objects

@@ -226,7 +226,7 @@ def _ring(radius: float, heights: Sequence[float]) -> Array:
 
 def _center_of_mass(world: World, solid: Solid) -> Array:
     """Of an entity in its root frame, joints at their initial positions; of its box where it has no mass."""
-    entity = next(e for e in world.entities if e.name == solid.name)
+    entity = world.entities[world.entity_numbers[solid.name]]
     root = P.inverse(world.initial_body_pose[entity.root])
     total, weighted = 0.0, np.zeros(3)
     for body in range(entity.body_start, entity.body_stop):

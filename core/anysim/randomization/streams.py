@@ -89,7 +89,8 @@ class Streams:
 
     def seed(self, seed: int | Sequence[int], env_ids: Array) -> None:
         """Seed envs: an int seeds env i with (seed, i); a sequence gives one seed to each of `env_ids`."""
-        if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str | bytes) and np.ndim(seed):
+        several = isinstance(seed, Sequence) and not isinstance(seed, str | bytes)
+        if several or (isinstance(seed, np.ndarray) and seed.ndim):
             entropies = [[s] for s in wholes("seed", seed, len(env_ids), TaskError)]
         else:
             one = whole("seed", seed, TaskError)

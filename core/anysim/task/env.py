@@ -387,8 +387,10 @@ class TaskEnv:
         Goals are marked in them unless `markers` is false; `size` is width and height [px] in place of the camera's.
         """
         cameras = self.engine.world.cameras
-        name = camera or (cameras[0].name if cameras else "default")
-        images = self.engine.render(name, *size, env_ids=env_ids)["rgb"]
+        name = (cameras[0].name if cameras else "default") if camera is None else camera
+        if not isinstance(size, Sequence) or len(size) != 2:
+            raise TaskError("size is a width and a height [px], such as (640, 480), or None for that of the camera")
+        images = self.engine.render(name, size[0], size[1], env_ids=env_ids)["rgb"]
         ids = self._rows(env_ids)
         return self.capture.mark(images, name, ids) if markers else images
 
