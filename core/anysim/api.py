@@ -2,6 +2,7 @@
 
 import json
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.resources import files
@@ -15,11 +16,11 @@ from anysim import registry
 from anysim.controllers.base import DEFAULT_CONTROLLER
 from anysim.conventions import GROUND
 from anysim.engine.factory import ENGINE_VARIABLE, create_simulation, engine_class
-from anysim.errors import AssetError, PluginError, SpecError, SpecIssue, TaskError
+from anysim.errors import AnysimError, AssetError, PluginError, SpecError, SpecIssue, TaskError, listing
 from anysim.math.arrays import shown, whole
 from anysim.plugin_parameters import options_model
 from anysim_schemas.load import Loaded, LoadedRun, load_run
-from anysim_schemas.object_source import Source, SourceChoice, SourceFolder
+from anysim_schemas.object_source import Source, SourceChoice, SourceFolder, most
 from anysim_schemas.plugin import UnknownPlugin
 
 if TYPE_CHECKING:
@@ -292,7 +293,12 @@ def make(
         SpecError: the file, with line and column.
         CapabilityError: the engine cannot run this world; nothing was built.
     """
+    from anysim.task.cost import MANY, announce, measured
+
     _check_texts(overrides)
+    if base is not None and not isinstance(cast("object", base), str | Path):
+        raise TaskError(f"base is the folder that relative asset paths are relative to, got a {type(base).__name__}")
+    base = None if base is None else Path(base)
     if engine is not None and not (isinstance(cast("object", engine), str) and engine):
         raise TaskError(f"engine is the name of an installed engine, got {shown(engine)}")
     if num_envs is not None:
@@ -304,8 +310,13 @@ def make(
     if engine is not None and loaded.spec.engine.name != engine:  # the options of a file are those of its own engine
         loaded = _loaded(source, [*more, f"engine={json.dumps(engine)}"])
     spec = loaded.spec
+    _announce_instances(loaded, base)
     world = compile_world(loaded, base=base)
     name = str(source) if isinstance(source, str) and "/" not in str(source) else world.name
+    if spec.num_envs >= MANY:
+        alone = replace(loaded, spec=spec.model_copy(update={"engine": spec.engine.model_copy(update={"shards": 1})}))
+        each = measured(lambda count: _env(alone, world, simulation(alone.spec), count, name, _proposals(loaded, None)))
+        announce(f"envs of '{name}' on {spec.engine.name}", spec.num_envs, each, "lower num_envs")
     try:
         given = _proposals(loaded, proposals)
         env = _env(loaded, world, simulation(spec), spec.num_envs, name, given, strict_observers=strict_observers)
@@ -314,6 +325,29 @@ def make(
     if seed is not None:
         env.streams.seed(seed, np.arange(spec.num_envs))
     return env
+
+
+def _announce_instances(loaded: LoadedRun, base: Path | None) -> None:
+    """Say what the instances of objects cost where they are very many, from what fewer of them do."""
+    from anysim.task.cost import CROWD, announce, grown
+
+    counts = {name: most(thing.count) for name, thing in loaded.spec.world.objects.items() if thing.count is not None}
+    total = sum(counts.values())
+    if total < CROWD:
+        return
+
+    def build(number: int) -> "SimEngine":
+        fewer = [f"world.objects.{name}.count={max(1, count * number // total)}" for name, count in counts.items()]
+        smaller = _loaded(loaded, fewer)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of what the whole world will be warned of
+            return simulation(smaller.spec).create_world(compile_world(smaller, base=base))
+
+    try:
+        cost = grown(build, total)
+    except AnysimError:  # what is wrong with fewer of them is no fault of the file
+        return
+    announce(f"instances of {listing(counts)} on {loaded.spec.engine.name}", total, cost, "lower `count`")
 
 
 TERM_KINDS = ("observation", "reward", "predicate", "command", "event")

@@ -1,7 +1,7 @@
 """`anysim run`: collect episodes of a task with its expert."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -43,14 +43,18 @@ def run(
       anysim run pick_cube -o world.objects.cube.mass=0.3 --out runs/heavy
     """
     from anysim.api import make
+    from anysim.cli.output import working_on
     from anysim.record.collector import Collector
     from anysim.record.commit import file_at, no_directory
     from anysim.skills.runner import SkillPolicy
+    from anysim.task.cost import MANY
 
     more = override or ()
     if out is not None and (file := file_at(out)) is not None:
         raise no_directory("--out", file)
-    with make(task, engine=engine, num_envs=num_envs, overrides=more, strict_observers=strict_observers) as env:
+    with working_on(f"building {task}") if (num_envs or 1) >= MANY else nullcontext():
+        made = make(task, engine=engine, num_envs=num_envs, overrides=more, strict_observers=strict_observers)
+    with made as env:
         seed = env.spec.seed if seed is None else seed
         directory = out or Path("runs") / f"{env.name}-{env.engine.name}-{_run_id(env, seed)}"
         collector = Collector(env, SkillPolicy(env), directory, episodes, seed)

@@ -292,8 +292,8 @@ class EngineLifecycle(EngineLifetime, Primitives):
         """
         with self._lock:
             self._require_world()
-            if n_steps.__class__ is not int or n_steps < 1:
-                n_steps = whole("n_steps", n_steps, EngineError, least=1)
+            if n_steps.__class__ is not int or not 1 <= n_steps < 2**31:
+                n_steps = whole("n_steps", n_steps, EngineError, 1, 2**31)
             ids = None if env_ids is None else self._ids(env_ids)
             self._retire_state()
             records, commands = self._records, self._records.commands

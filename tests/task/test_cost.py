@@ -1,0 +1,70 @@
+"""Costs that are said before a build begins."""
+
+import warnings
+from contextlib import AbstractContextManager, contextmanager
+
+import pytest
+
+import anysim
+from anysim.errors import EngineError
+from anysim.task import cost
+from anysim.task.cost import Cost, CostWarning, announce, available, grown, measured
+from tests.task.helpers import BLOCKS, blocks
+
+
+def test_more_envs_than_fit_are_refused_before_they_are_built() -> None:
+    with pytest.raises(
+        EngineError, match=r"1,000,000,000 envs of 'blocks' on null take about .* measured with \d+\)"
+    ) as told:
+        blocks(10**9)
+    assert "lower num_envs" in str(told.value)
+
+
+def test_the_memory_of_an_env_is_about_what_many_take() -> None:
+    each = measured(lambda count: blocks(count))
+    assert 500 < each.bytes < 50_000
+    assert each.envs >= 4
+
+
+@pytest.mark.parametrize(("seconds", "size", "told"), [(1e-4, 10, False), (1e-2, 10, True)])
+def test_what_takes_long_is_said(seconds: float, size: float, told: bool) -> None:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        announce("envs", 10_000, Cost(seconds, size, 4), "lower num_envs")
+    assert [str(one.message) for one in caught] == (
+        ["building 10,000 envs takes about 100 s and 9.3e-05 GiB (0.00977 KiB and 10 ms each, measured with 4)"]
+        if told
+        else []
+    )
+
+
+def test_seconds_may_grow_faster_than_instances(monkeypatch: pytest.MonkeyPatch) -> None:
+    took = {cost.CROWD // 8: (1.0, 100.0), cost.CROWD // 4: (4.0, 200.0)}
+    monkeypatch.setattr(cost, "_of", lambda _build, number: took[number])
+
+    @contextmanager
+    def nothing(_number: int):
+        yield
+
+    def build(number: int) -> AbstractContextManager[object]:
+        return nothing(number)
+
+    assert grown(build, 4 * cost.CROWD).seconds * 4 * cost.CROWD == pytest.approx(4.0 * 16**2)
+
+
+def test_many_instances_are_announced(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cost, "CROWD", 80)
+    monkeypatch.setattr(cost, "_WORTH_A_WORD", 0.0)
+    ball = {"source": {"sphere": 0.03}, "count": 100}
+    spec = BLOCKS | {"world": BLOCKS["world"] | {"objects": BLOCKS["world"]["objects"] | {"many": ball}}}
+    with (
+        pytest.warns(CostWarning, match=r"building 100 instances of many on null takes about"),
+        anysim.make(spec) as env,
+    ):
+        assert len(env.engine.world.entities) == 103
+
+
+def test_what_is_free_is_known_here() -> None:
+    free = available()
+    assert free is not None
+    assert free > 1 << 20
