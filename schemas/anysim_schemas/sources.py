@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from anysim_schemas.errors import AnysimError
-from anysim_schemas.files import RefusedFileError, project_root, read_plain
+from anysim_schemas.files import RefusedFileError, exists, project_root, read_plain
 from anysim_schemas.limits import YAML_BYTES, YAML_FILES
 from anysim_schemas.merging import merge
 from anysim_schemas.messages import describe
@@ -139,6 +139,10 @@ class Reader:
         asked = Fault(item.place, where, "")
         if not _URI.match(item.value):
             path = folder / item.value
+            if not exists(path) and self._names_a_task(item.value):
+                message = f"there is no file '{_relative(path)}'; did you mean 'task:{item.value}'?"
+                self.fatal.append(asked._replace(message=message))
+                return None
             return self._read_file(path, _relative(path), asked, root)
         if self._extends is None:
             message = f"'{item.value}' is not a path, and nothing here can look it up; give the path of a file"
@@ -151,6 +155,13 @@ class Reader:
             self.fatal.append(asked._replace(message=f"'{item.value}' cannot be looked up: {detail}"))
             return None
         return self._read_file(path, _relative(path), asked, project_root(path.parent))
+
+    def _names_a_task(self, name: str) -> bool:
+        """Whether what is extended as a file is the name of an installed task."""
+        try:
+            return self._extends is not None and bool(self._extends(f"task:{name}"))
+        except (AnysimError, LookupError, OSError):
+            return False
 
 
 def _relative(path: Path) -> str:

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import anysim
-from anysim.errors import AssetError
+from anysim.errors import AssetError, SpecError
 
 TETRAHEDRON = """solid t
 facet normal 0 0 -1
@@ -71,3 +71,15 @@ def test_several_files_are_merged_in_order(folder: Path) -> None:
     assert spec.world.objects["t"].mass == 0.3
     world = anysim.compile_world(anysim.load(folder / "child" / "child.yaml", more))
     assert len(world.entities) == 2
+
+
+def test_a_task_that_is_extended_like_a_file_is_suggested(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text("extends: pick_cube\n")
+    with pytest.raises(
+        SpecError, match=r"mine\.yaml:1:10: extends: there is no file .*; did you mean 'task:pick_cube'\?"
+    ):
+        anysim.load(file)
+    file.write_text("extends: pick_cubes\n")
+    with pytest.raises(SpecError, match="does not exist"):
+        anysim.load(file)
