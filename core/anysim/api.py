@@ -5,6 +5,7 @@ import os
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -154,6 +155,12 @@ def place_of(loaded: LoadedRun, path: str) -> str:
     return ""
 
 
+def _located_path(loaded: LoadedRun, path: str) -> str:
+    """`pick.yaml:14:7: task.rewards.reach`; the path alone for data without a file."""
+    place = place_of(loaded, path)
+    return path if place in ("", "data") else f"{place}: {path}"
+
+
 WATCHING: Mapping[str, Any] = {"task": {"observations": {"policy": ["last_action"]}}}
 """The task of a file that has none: nothing is rewarded or required."""
 
@@ -244,7 +251,8 @@ def _env(
         place, options = (lambda path: place_of(loaded, path)), simulation.options
         check_run(simulation, world, managers, f"'{world.name}'", place, options)
         simulation.create_world(world, num_envs)
-        return TaskEnv(spec, simulation, managers, name, strict_observers=strict_observers)
+        located = partial(_located_path, loaded)
+        return TaskEnv(spec, simulation, managers, name, strict_observers=strict_observers, located=located)
     except BaseException:
         simulation.destroy()
         raise

@@ -1,8 +1,10 @@
 """Terms, controllers and skills that raise or return what does not fit: key, name and distribution are told."""
 
+import json
 import re
 import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -204,3 +206,21 @@ def _act_and_describe(policy: SkillPolicy) -> None:
     policy.begin(np.array([0]))
     policy.act(np.array([0]))
     policy.describe(0)
+
+
+def test_what_fails_is_told_with_the_line_of_its_file(odd: Installed, tmp_path: Path) -> None:
+    def raising(*_: Any) -> None:
+        raise ZeroDivisionError("no way")
+
+    odd(terms=term("reward", raising))
+    file = tmp_path / "blocks.yaml"
+    file.write_text(json.dumps(BLOCKS, indent=1).replace('"close": {', '"odd": {"term": "odd.odd"},\n    "close": {'))
+    line = next(i for i, text in enumerate(file.read_text().splitlines(), 1) if "odd.odd" in text)
+    with anysim.make(file) as env:
+        env.reset(seed=0)
+        with pytest.raises(PluginFailure, match=rf"blocks\.yaml:{line}:\d+: task\.rewards\.odd: the term"):
+            env.step(NOTHING[:1])
+    with anysim.make(BLOCKS, overrides=["task.rewards.odd={term: odd.odd}"]) as env:
+        env.reset(seed=0)
+        with pytest.raises(PluginFailure, match=r"^-o task\.rewards\.odd=.*: task\.rewards\.odd: the term"):
+            env.step(NOTHING[:1])

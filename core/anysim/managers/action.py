@@ -83,7 +83,8 @@ class ActionManager(Manager):
             longest = longest_delay(action.delay)
             line = DelayLine(n, controller.dim, longest) if longest else None
             stop, steps = start + controller.dim, _steps(controller, physics.dt)
-            who = f"world.robots.{robot}.actions.{view.name}: the controller {type(controller).__name__}"
+            key = self.located(f"world.robots.{robot}.actions.{view.name}")
+            who = f"{key}: the controller {type(controller).__name__}"
             blame = registry.Blame(who, registry.origin(controller), prefix=True)
             self.slices.append(ActionSlice(robot, view.name, start, stop, controller, action, line, steps, blame))
             start = stop

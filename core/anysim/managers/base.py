@@ -9,7 +9,7 @@ says which manager comes before which.
 """
 
 from abc import ABC
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -102,6 +102,8 @@ class Manager(ABC):
     streams: Streams
     episodes: Episodes
     engine: SimEngine
+    located: Callable[[str], str] = str
+    """A dotted path with the file, line and column of its key before it, where the spec came from a file."""
 
     def configure(self, spec: RunSpec, streams: Streams, episodes: Episodes | None = None) -> Self:
         """Take the spec; check what can be checked without a world. Managers of one env share streams and episodes."""

@@ -34,7 +34,7 @@ def bind_skill(spec: ExpertSpec, env: TaskEnv) -> Skill:
     try:
         return skill_class(env, **keywords)
     except BaseException as error:  # noqa: BLE001 - told with the key
-        registry.blame(error, f"task.expert: the skill '{spec.skill}'", registry.origin(skill_class))
+        registry.blame(error, f"{env.located('task.expert')}: the skill '{spec.skill}'", registry.origin(skill_class))
 
 
 class SkillPolicy:
@@ -49,7 +49,9 @@ class SkillPolicy:
         self.env = env
         self.name = task.expert.skill
         self.skill = bind_skill(task.expert, env)
-        self._blame = registry.Blame(f"task.expert: the skill '{self.name}'", registry.origin(self.skill), prefix=True)
+        self._blame = registry.Blame(
+            f"{env.located('task.expert')}: the skill '{self.name}'", registry.origin(self.skill), prefix=True
+        )
         self._still = np.clip(np.zeros(env.action_dim), *env.action_bounds)
 
     def begin(self, env_ids: Array) -> None:

@@ -1,7 +1,7 @@
 """TaskEnv: the loop. No autoreset here; gymnasium's modes and other dialects are views on it."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Self, TypeVar
 
 import numpy as np
@@ -45,22 +45,28 @@ class TaskEnv:
         name: str = "task",
         *,
         strict_observers: bool = False,
+        located: Callable[[str], str] = str,
     ) -> None:
-        """`engine` has its world, `managers` are configured and built; `anysim.make` does all of this."""
+        """`engine` has its world, `managers` are configured and built; `anysim.make` does all of this.
+
+        `located` puts the file, line and column of its key before a dotted path, for what terms and controllers raise.
+        """
         if spec.task is None:
             raise TaskError("this file has no `task`; a world alone can be run through `create_simulation`")
         self.spec, self.engine, self.name = spec, engine, name
         self.num_envs = engine.num_envs
         order = {manager: place for place, manager in enumerate(RESET_ORDER)}
         self.managers = sorted(managers, key=lambda m: order[m.name])
+        self.located = located
         for manager in self.managers:
+            manager.located = located
             manager.bind(engine)
         self.streams, self._episodes = self.managers[0].streams, self.managers[0].episodes
         self.actions, self.capture = self._manager(ActionManager), self._manager(CaptureManager)
         self.action_dim = self.actions.dim
         self.scene = SceneView(engine, self._episodes, self._manager(TerrainManager))
         self.scene.action_columns = {name: slice(s.start, s.stop) for name, s in self.action_spaces.items()}
-        self.mdp = Mdp(spec.task, self.scene, self.streams)
+        self.mdp = Mdp(spec.task, self.scene, self.streams, located)
         self.capture.goals = self.scene.goals
         self.scene.last_action = np.zeros((self.num_envs, self.action_dim))
         self.counterfactuals = Counterfactuals(self.managers, self.mdp, engine, self.streams)

@@ -43,7 +43,8 @@ def _values(terms: Sequence[BoundTerm]) -> list[Any]:
 class Mdp:
     """Evaluates a TaskSpec on a SceneView. Holds one slice of state: the goals, and how long success has held."""
 
-    def __init__(self, spec: TaskSpec, scene: SceneView, streams: Streams) -> None:
+    def __init__(self, spec: TaskSpec, scene: SceneView, streams: Streams, located: Callable[[str], str] = str) -> None:
+        """`located` puts the place of its key before a dotted path."""
         self.spec, self.scene, self.streams = spec, scene, streams
         n = scene.engine.num_envs
         for name in spec.command:
@@ -60,7 +61,7 @@ class Mdp:
                 path = f"task.{section}.{name}"
                 try:
                     call = bind(kind, term, scene, path)
-                    who = f"{path}: the term '{term.term}'"
+                    who = f"{located(path)}: the term '{term.term}'"
                     bound[name] = BoundTerm(call, registry.Blame(who, registry.origin(call), prefix=True))
                 except SpecError as error:
                     issues.extend(error.issues)
