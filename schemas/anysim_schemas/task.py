@@ -145,4 +145,6 @@ class TaskSpec(Spec):
     ) -> dict[str, tuple[ObservationTermSpec, ...]]:
         if not groups.get("policy"):
             raise KeyFault("the group `policy` is required and needs at least one term", "policy")
+        if empty := next((name for name, terms in groups.items() if not terms), None):
+            raise KeyFault(f"the group `{empty}` has no term; give it one, or leave it out", empty)
         return groups

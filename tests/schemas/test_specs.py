@@ -127,3 +127,9 @@ def test_importing_the_package_imports_nothing_heavy():
     code = "import anysim_schemas, anysim_schemas.errors, sys; print({'pydantic', 'yaml', 'numpy'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"
+
+
+def test_a_group_without_terms_is_refused():
+    groups = {"policy": ["last_action"], "privileged": []}
+    with pytest.raises(ValidationError, match="the group `privileged` has no term"):
+        RunSpec.model_validate({"task": {"observations": groups}})
