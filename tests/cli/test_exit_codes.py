@@ -107,6 +107,46 @@ def test_answers_and_requests_that_cannot_be_met(code: int, words: list[str], tm
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [
+        (0, ["doctor"]),
+        (2, ["doctor", "--nothing-like-it"]),
+        (0, ["compare", "pick_cube", "--engines", "null"]),
+        (2, ["compare", "no_such_task"]),
+        (2, ["compare", "pick_cube", "--engines", "warp_drive"]),
+        (2, ["bench", "no_such_bench"]),
+        (2, ["bench", "step", "--engine", "warp_drive"]),
+        (2, ["gallery", "--nothing-like-it"]),
+        (2, ["render", "nowhere"]),
+        (0, ["robot", "franka_panda"]),
+        (2, ["robot", "no_such_robot"]),
+        (2, ["robot", "import", "no_such_file.urdf"]),
+        (2, ["picture", "no_such_task"]),
+    ],
+    ids=lambda value: value if isinstance(value, int) else " ".join(value[:2]),
+)
+def test_commands_of_plugins_keep_the_table(code: int, words: list[str], tmp_path: Path) -> None:
+    done = anysim(*words, cwd=tmp_path)
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.slow
+def test_a_robot_that_fails_its_checks_is_an_answer(tmp_path: Path) -> None:
+    """It hangs in the air, on drives that are too weak to hold it."""
+    here = Path(__file__).parents[1]
+    urdf = (here / "runtime" / "two_link.urdf").read_text().replace('axis xyz="0 0 1"', 'axis xyz="0 1 0"')
+    (tmp_path / "two_link.urdf").write_text(urdf)
+    entry = (here / "schemas" / "keys" / "two_link.yaml").read_text().replace("../../runtime", str(tmp_path))
+    weak = entry.replace("kp: 40, kd: 4", "kp: 0.01, kd: 0.01") + "gravity_compensation: false\n"
+    for code, text in ((0, entry), (1, weak)):
+        (tmp_path / "two_link.yaml").write_text(text)
+        done = anysim("robot", "two_link.yaml", "--check", "--engine", "mujoco", cwd=tmp_path)
+        assert done.returncode == code, done.stderr
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
