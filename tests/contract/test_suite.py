@@ -55,6 +55,16 @@ def test_the_smallest_engine_with_one_world_per_env_passes():
     assert skipped > 400
 
 
+def test_an_honest_limited_engine_passes():
+    """Spheres on a plane, without joints, pictures and parameters: green, and it is said what was skipped for what."""
+    passed, skipped, why = _summary(_run(ROOT, "--engine", "tests.contract.limited_engine:MarbleEngine"))
+    assert passed > 30
+    assert skipped > 400
+    assert {"articulations", "render: rgb", "contacts between moving bodies", "marbles refuses 'slope'"} <= {
+        part.rpartition(": ")[0] for part in why.split(", ")
+    }
+
+
 DYNAMIC = {
     "mujoco": {"render: rgb", "solver settings by entity", "terrain: triangle mesh (concave)"},
     "pybullet": {"render: rgb", "solver settings by entity", "parameter world.shadows"},

@@ -11,11 +11,57 @@ from pathlib import Path
 
 import pytest
 
+from anysim.engine.capability import Capability
+
 pytestmark = pytest.mark.xdist_group("wrong engines")  # one worker runs them, once, for all tests
 
 HERE = Path(__file__).parent
 KINEMATIC = ("wrong_engines", "wrong_states")
-PHYSICAL = ("wrong_physics",)
+PHYSICAL, CLAIMING = ("wrong_physics",), ("wrong_claims", "wrong_magnitudes")
+CLAIMED = {
+    Capability.RIGID_BODIES: ("ClaimsRigidBodies",),
+    Capability.ARTICULATIONS: ("ClaimsArticulations",),
+    Capability.CONTACTS_STATIC: ("ClaimsStaticContacts",),
+    Capability.CONTACTS_MOVING: ("ClaimsMovingContacts",),
+    Capability.TERRAIN_PLANE: ("ClaimsPlanes",),
+    Capability.TERRAIN_HEIGHTFIELD: ("ClaimsHeightFields", "TurnedField"),
+    Capability.TERRAIN_TRIMESH: ("ClaimsTriangles",),
+    Capability.SHAPE_MESH: ("ClaimsMeshes", "CentredMesh"),
+    Capability.MIMIC_JOINTS: ("ClaimsMimics", "MimicsStayBehind"),
+    Capability.JOINT_FRICTION: ("ClaimsJointFriction",),
+    Capability.ARMATURE: ("StoredArmature", "NoArmature"),
+    Capability.JOINT_LIMITS: ("ClaimsJointLimits",),
+    Capability.EFFORT_LIMITS: ("NoEffortLimit", "StoredLimits"),
+    Capability.GRAVITY_COMPENSATION: ("ClaimsCompensation", "CompensatesLinksAlone"),
+    Capability.RESTITUTION: ("NoBounce", "StoredRestitution"),
+    Capability.TORSIONAL_FRICTION: ("ClaimsTorsionalFriction",),
+    Capability.BODY_DAMPING: ("ClaimsBodyDamping",),
+    Capability.SOLVER_SETTINGS: ("ClaimsSolverSettings",),
+    Capability.CONTROL_POSITION: ("ClaimsPositionControl", "WeakDrives"),
+    Capability.CONTROL_VELOCITY: ("ClaimsVelocityControl",),
+    Capability.CONTROL_EFFORT: ("ClaimsEffortControl",),
+    Capability.ACTUATION_EXPLICIT: ("ClaimsExplicitActuation",),
+    Capability.ACTUATION_NATIVE: ("ClaimsNativeActuation",),
+    Capability.VELOCITY_LIMITS: ("ClaimsVelocityLimits",),
+    Capability.WRENCHES: ("ClaimsWrenches",),
+    Capability.CONTACT_SENSORS: ("ClaimsContactSensors",),
+    Capability.CONTACT_POINTS: ("ClaimsContactPoints",),
+    Capability.RAYCAST: ("ClaimsRays", "BlindRays"),
+    Capability.RENDER_RGB: ("ClaimsColour",),
+    Capability.RENDER_DEPTH: ("ClaimsDepth",),
+    Capability.RENDER_SEGMENTATION: ("ClaimsSegmentation",),
+    Capability.RENDER_SHADOWS: ("ClaimsShadows",),
+    Capability.RENDER_LIGHTS: ("ClaimsSeveralLights", "ClaimsLamps"),
+    Capability.TEXTURES: ("ClaimsTextures",),
+    Capability.MATERIALS: ("ClaimsMaterials",),
+    Capability.SNAPSHOT_STATE: ("ClaimsSnapshots",),
+    Capability.SNAPSHOT_TRAJECTORY: ("ClaimsExactSnapshots",),
+    Capability.VARYING_ENTITIES: ("Ghosts", "ClaimsToDelete"),
+    Capability.PARAMETERS_PER_ENV: ("StoredMass", "ParametersOfAll"),
+    Capability.DYNAMICS: ("ClaimsDynamics",),
+}
+"""By capability the wrong engines that declare it and do not have it."""
+
 HAS_MUJOCO = importlib.util.find_spec("mujoco") is not None
 
 
@@ -33,7 +79,7 @@ def _wrong(modules):
 with pytest.MonkeyPatch.context() as patch:
     patch.syspath_prepend(HERE)  # the modules are known to the child process by these names, too
     DEFECTS = _wrong(KINEMATIC)
-    PHYSICS = _wrong(PHYSICAL) if HAS_MUJOCO else {}
+    PHYSICS, CLAIMS = (_wrong(modules) if HAS_MUJOCO else {} for modules in (PHYSICAL, CLAIMING))
 
 
 def _outcomes(jobs, right, folder):
@@ -90,3 +136,35 @@ def test_wrong_physics_is_caught(physical, name):
 @needs_mujoco
 def test_right_physics_passes_the_same_tests(physical):
     _check(physical["wrong_physics:Right"], {test for tests in PHYSICS.values() for test in tests}, "passed")
+
+
+# ---------------------------------------------------------------------- false declarations and impossible states
+
+
+@pytest.fixture(scope="module")
+def claiming(tmp_path_factory):
+    return _outcomes(CLAIMS, "wrong_physics:Right", tmp_path_factory.mktemp("claiming"))
+
+
+@needs_mujoco
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CLAIMS)
+def test_a_false_claim_is_caught(claiming, name):
+    _check(claiming[name], CLAIMS[name], "failed")
+
+
+@needs_mujoco
+@pytest.mark.slow
+def test_right_physics_claims_what_it_does(claiming):
+    claimed = {*CLAIMS["wrong_claims:ClaimsSolverSettings"]}
+    passed = {test for tests in CLAIMS.values() for test in tests} - claimed
+    _check(claiming["wrong_physics:Right"], passed, "passed")
+    _check(claiming["wrong_physics:Right"], claimed, "skipped")
+
+
+@needs_mujoco
+def test_every_capability_is_claimed_by_a_wrong_engine():
+    """A capability that can be declared falsely without a test that fails would be worth nothing."""
+    wrong = {name.rpartition(":")[2] for name in (*DEFECTS, *PHYSICS, *CLAIMS)}
+    assert set(CLAIMED) == set(Capability)
+    assert {name for names in CLAIMED.values() for name in names} <= wrong

@@ -89,4 +89,4 @@ def run_elsewhere(name: str, options: Mapping[str, Any]) -> dict[str, Array]:
     from anysim.testing.plugin import load_engine
 
     with load_engine(name)(**options) as engine:
-        return run_and_read(engine, worlds.everyday(engine.capabilities))
+        return run_and_read(engine, worlds.buildable(engine))

@@ -13,6 +13,7 @@ from anysim.engine.sharded.pool import keeping_workers
 from anysim.errors import EngineError
 from anysim.model.world import World
 from anysim.testing import plugin
+from anysim.testing.watch import watch
 
 DRAWING = (Capability.RENDER_RGB, Capability.RENDER_DEPTH, Capability.RENDER_SEGMENTATION)
 
@@ -37,13 +38,20 @@ def _workers() -> Iterator[None]:
 
 
 @pytest.fixture
-def new_engine(engine_class: type[SimEngine], pytestconfig: pytest.Config) -> Iterator[Callable[[], SimEngine]]:
-    """Makes engines without a world, with the options of the command line; all are destroyed after the test."""
+def new_engine(
+    engine_class: type[SimEngine], pytestconfig: pytest.Config, request: pytest.FixtureRequest
+) -> Iterator[Callable[[], SimEngine]]:
+    """Makes engines without a world, with the options of the command line; all are destroyed after the test.
+
+    All that is read of them is looked at, see `anysim.testing.watch`.
+    """
+    energy = request.node.get_closest_marker(plugin.OVERLAPS) is None
     options: dict[str, Any] = plugin.engine_options(pytestconfig)
     made: list[SimEngine] = []
 
     def make() -> SimEngine:
         made.append(engine_class(**options))
+        watch(made[-1], energy)
         return made[-1]
 
     yield make
@@ -59,8 +67,8 @@ def build(new_engine: Callable[[], SimEngine], engine_class: type[SimEngine]) ->
         for need in needs_of(world):
             _skip_undeclared(engine_class, need.capability)
         engine = new_engine()
-        for reason in engine.refusals(world, engine.options):
-            pytest.skip(f"{engine.name} refuses a world of the suite: {reason.replace(',', ';')}")
+        if engine.refusals(world, engine.options):
+            pytest.skip(f"{engine.name} refuses '{world.name}'")
         return engine.create_world(world, num_envs)
 
     return make

@@ -15,6 +15,7 @@ import pytest
 
 HERE = Path(__file__).parent
 NEEDS = "anysim_needs"
+OVERLAPS = "anysim_overlaps"
 _SUITE = pytest.StashKey[frozenset[str]]()
 _ABSENT = re.compile(r"does not declare '([^']+)'")
 
@@ -38,6 +39,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     """Register the marker; with an engine to test, look whether it can run here, and register the fixtures."""
     config.addinivalue_line("markers", f"{NEEDS}(*capabilities): skip where the engine does not declare them all")
+    config.addinivalue_line("markers", f"{OVERLAPS}: begins inside of something, which makes energy: it is not counted")
     name = config.getoption("engine")
     if not name:
         return

@@ -35,6 +35,7 @@ def test_a_compensated_free_body_hovers(build):
     assert_ratio(state.body_twist[0, 1, 2], -G * 0.5, tolerances.MOTION, "the other one")
 
 
+@pytest.mark.anysim_overlaps
 @needs(C.DYNAMICS, C.SOLVER_SETTINGS)
 def test_depenetration_speed_is_per_body(build):
     """A body that begins 5 cm deep in the ground comes out no faster than its own setting says, and gets out."""

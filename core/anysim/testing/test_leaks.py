@@ -19,7 +19,7 @@ _PROC = Path("/proc/self")
 def _cycle(new_engine, rounds, render=False):
     for _ in range(rounds):
         engine = new_engine()
-        engine.create_world(worlds.everyday(engine.capabilities, cameras=render), 2)
+        engine.create_world(worlds.buildable(engine, cameras=render), 2)
         engine.step(2)
         _ = engine.get_state().body_pose
         if render:

@@ -50,9 +50,9 @@ def test_create_world_begins_in_the_initial_state(build):
     assert not state.fault.any()
 
 
-@pytest.mark.parametrize("world", [worlds.loose, worlds.falling_ball, worlds.drifting], ids=lambda w: w.__name__)
+@pytest.mark.parametrize("world", [worlds.falling_ball, worlds.spinning_ball], ids=lambda w: w.__name__)
 def test_the_simplest_worlds_are_not_refused(new_engine, engine_class, world):
-    """Whatever `refusals` says of others: free bodies that touch nothing are what every engine of bodies can build."""
+    """Whatever `refusals` says of others: one ball that touches nothing is what every engine of bodies can build."""
     if not {need.capability for need in needs_of(world())} <= set(engine_class.capabilities):
         skip_without(engine_class, Capability.RIGID_BODIES)
         skip_without(engine_class, Capability.CONTACTS_STATIC)

@@ -91,10 +91,10 @@ def test_the_same_run_twice(build):
 def test_the_same_run_in_another_process(new_engine, pytestconfig):
     """A run is the same, bit for bit, in another process."""
     arguments = (pytestconfig.getoption("engine"), plugin.engine_options(pytestconfig))
+    engine = new_engine()
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         there = pool.submit(run_elsewhere, *arguments)
-        engine = new_engine()
-        here = run_and_read(engine, worlds.everyday(engine.capabilities))
+        here = run_and_read(engine, worlds.buildable(engine))
         assert_same(there.result(timeout=300), here, "the other process")
 
 

@@ -114,7 +114,7 @@ def test_images_from_another_thread(build):
 def test_an_engine_made_in_a_thread_serves_another(new_engine):
     """An engine built in one thread is stepped and freed in another."""
     engine = new_engine()
-    world = worlds.everyday(engine.capabilities)
+    world = worlds.buildable(engine)
     builder = threading.Thread(target=lambda: engine.create_world(world))
     builder.start()
     builder.join(timeout=60)

@@ -94,3 +94,9 @@ Solvers sum over other rows and stop by other scales; most engines are equal to 
 
 ABSENT_FORCE = 1e-2
 """[N] on forces of some 10 N, likewise: stiff contacts make much of a difference of 1e-9 m."""
+
+MADE = 5e-2
+"""Relative to what was turned over: mechanical energy that may appear where nothing acts but gravity and contacts."""
+
+MADE_AT_REST = 2e-2
+"""[J], likewise: soft contacts that begin a little inside each other push bodies of 1 kg up by 1 or 2 mm."""

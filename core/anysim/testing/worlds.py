@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import WORLD
+from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capabilities
 from anysim.engine.requirements import needs_of
 from anysim.math import pose as P
@@ -137,6 +138,12 @@ def everyday(capabilities: Capabilities, cameras: bool = False) -> World:
     """The scene, or the loose bodies for an engine that lacks joints or contacts."""
     whole = scene(cameras)
     return whole if all(need.capability in capabilities for need in needs_of(whole)) else loose()
+
+
+def buildable(engine: SimEngine, cameras: bool = False) -> World:
+    """The everyday world of an engine, or a falling ball for one that refuses that world for reasons of its own."""
+    whole = everyday(engine.capabilities, cameras)
+    return falling_ball() if engine.refusals(whole, engine.options) else whole
 
 
 def spinning_ball(dt: float = 0.002) -> World:
