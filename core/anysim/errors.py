@@ -57,6 +57,10 @@ class EngineError(AnysimError):
     """An engine was misused, or failed."""
 
 
+class CannotDraw(EngineError):
+    """This machine lacks what an engine needs to draw: a driver, a library. Whatever else fails is another error."""
+
+
 class EngineFailure(EngineError):
     """An engine that broke down: its process ended, or its library raised what it must not."""
 

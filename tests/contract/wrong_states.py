@@ -9,6 +9,7 @@ from anysim.conventions import wxyz_from_xyzw, xyzw_from_wxyz
 from anysim.engine.capability import Capability
 from anysim.engine.presence import Lifecycle
 from anysim.engine.state import RayHits
+from anysim.errors import EngineError
 from anysim.math import pose as P
 
 
@@ -188,6 +189,16 @@ class ClaimsRays(Right):
 
     capabilities = also(Capability.RAYCAST)
     caught_by = ("test_errors.py::test_declared_is_done_and_undeclared_is_refused",)
+
+
+class ClaimsPictures(Right):
+    """Declares pictures; each attempt to draw one is an error, which is no lack of the machine's."""
+
+    capabilities = also(Capability.RENDER_RGB)
+    caught_by = ("test_sensing.py::test_the_default_camera_shows_the_world",)
+
+    def _render(self, view, ids, channels):
+        raise EngineError("the canvas is torn; it cannot draw")
 
 
 class ClaimsDynamics(Right):

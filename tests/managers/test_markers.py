@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 import anysim
-from anysim import registry
 from anysim.managers.markers import COLORS
 from anysim.task.env import TaskEnv
-from anysim.testing.fixtures import drawing_trouble
+from anysim.testing.engines import require_drawing
 
 LOOK = [
     "world.cameras.front={from: [1.2, 0.0, 0.6], look_at: [0.3, 0.0, 0.6], fov: 40, size: [120, 80]}",
@@ -16,8 +15,7 @@ LOOK = [
 
 
 def _env(engine: str, *more: str) -> TaskEnv:
-    if trouble := drawing_trouble(registry.load("engines", engine)):
-        pytest.skip(f"{engine} cannot draw here: {trouble}")
+    require_drawing(engine)
     env = anysim.make("pick_cube", engine=engine, num_envs=2, overrides=[*LOOK, *more])
     env.reset(seed=1)
     return env

@@ -9,9 +9,10 @@ import pytest
 import anysim
 from anysim.api import check_engine, compile_world, load
 from anysim.engine.factory import engine_class
-from anysim.errors import CapabilityError, EngineError, SpecError
+from anysim.errors import CapabilityError, SpecError
 from anysim.record.explain import explain
 from anysim.task.env import TaskEnv
+from anysim.testing.engines import require_drawing
 
 ENGINES = ("mujoco", "pybullet", "sapien")
 SCENE: dict[str, Any] = {
@@ -48,12 +49,8 @@ def changed(**world: Any) -> dict[str, Any]:
 
 def started(env: TaskEnv, seed: int = 0) -> dict[str, np.ndarray]:
     """The first observation; skips where this machine draws no images."""
-    try:
-        return env.reset(seed=seed)[0]
-    except EngineError as error:
-        if "draw" in str(error):
-            pytest.skip(f"no image can be drawn here: {error}")
-        raise
+    require_drawing(env.engine.name)
+    return env.reset(seed=seed)[0]
 
 
 def drawn(env: TaskEnv, name: str) -> Any:

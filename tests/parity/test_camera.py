@@ -7,8 +7,7 @@ from anysim import api
 from anysim.engine.factory import create_simulation
 from anysim.math import pose as P
 from anysim.model.world import Box, Camera, Capsule, Cylinder, Sphere, World
-from anysim.testing.engines import require_engine
-from anysim.testing.fixtures import drawing_trouble
+from anysim.testing.engines import require_drawing
 from anysim.testing.sketch import Sketch
 from anysim_parity.camera import DEPTH, OVERLAP, camera_layer
 from anysim_parity.judge import agreement
@@ -41,8 +40,7 @@ def clutter() -> World:
 @pytest.mark.parametrize("make", [pick_cube, clutter])
 def test_three_engines_see_the_same(make) -> None:
     for name in ENGINES:
-        if trouble := drawing_trouble(require_engine(name)):
-            pytest.skip(f"{name} cannot draw here: {trouble}")
+        require_drawing(name)
     layer = camera_layer(make(), {name: lambda name=name: create_simulation(name) for name in ENGINES}, size=(320, 240))
     assert not layer.refused
     assert DEPTH <= 5e-3

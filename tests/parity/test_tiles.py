@@ -5,8 +5,7 @@ import pytest
 
 import anysim
 from anysim.engine.capability import Capability
-from anysim.testing.engines import require_engine
-from anysim.testing.fixtures import drawing_trouble
+from anysim.testing.engines import require_drawing, require_engine
 
 SPEC = {
     "world": {
@@ -46,8 +45,7 @@ def test_robots_stand_on_their_tiles(name: str) -> None:
 @pytest.mark.parametrize("name", ["mujoco", "pybullet", "sapien"])
 def test_fixed_cameras_see_the_same_scene_on_every_tile(name: str) -> None:
     """What is fixed to the world moves with the tile: the robot is at the same place in all pictures."""
-    if trouble := drawing_trouble(require_engine(name)):
-        pytest.skip(trouble.replace(",", ";"))
+    require_drawing(name)
     with anysim.make(SPEC, engine=name, num_envs=4) as env:
         env.reset(seed=2)
         seen = env.engine.render("fixed", channels=("segmentation",))["segmentation"] == 1

@@ -29,7 +29,7 @@ from anysim.record.writer import TrajectoryWriter
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
 from anysim.task.terms import events
-from anysim.testing.fixtures import drawing_trouble
+from anysim.testing.engines import require_drawing
 
 ENGINES = ("mujoco", "pybullet", "sapien")
 CAMERAS = ("front", "wrist")
@@ -52,8 +52,7 @@ SEEN = (
 
 def filmed_env(engine: str, num_envs: int, *more: str) -> TaskEnv:
     """pick_cube with looks that differ between episodes, and shadows where the engine casts any."""
-    if trouble := drawing_trouble(registry.load("engines", engine)):
-        pytest.skip(f"{engine} cannot draw here: {trouble}")
+    require_drawing(engine)
     shadows = [] if engine == "sapien" else ["world.scenery.shadows=true"]
     return anysim.make("pick_cube", engine=engine, num_envs=num_envs, overrides=[*SEEN, *shadows, *more])
 

@@ -12,7 +12,6 @@ import pytest
 from pydantic import BaseModel
 
 import anysim
-from anysim import registry
 from anysim.api import compile_world, load
 from anysim.errors import AnysimError
 from anysim.record.collector import Collector
@@ -20,7 +19,7 @@ from anysim.record.manifest import read_manifest
 from anysim.record.names import trajectories
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
-from anysim.testing.fixtures import drawing_trouble
+from anysim.testing.engines import require_drawing
 from anysim_schemas.base import Spec
 from anysim_schemas.run import RunSpec
 from tests.schemas.keys import layout, run, world
@@ -217,8 +216,7 @@ def counted(call: Callable[..., Any], name: str, asked: Counter[str]) -> Callabl
 
 def filmed_of(spec: Any, out: Path) -> Any:
     """The same on an engine that draws, and the images that are observed."""
-    if trouble := drawing_trouble(registry.load("engines", "mujoco")):
-        pytest.skip(f"mujoco cannot draw here: {trouble}")
+    require_drawing("mujoco")
     seen = recorded_of(spec, out)
     with anysim.make(spec) as env:
         obs = [env.reset(seed=0)[0], *(env.step(np.full((1, env.action_dim), 1.0)).obs for _ in range(3))]

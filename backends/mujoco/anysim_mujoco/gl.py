@@ -15,7 +15,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any, TypeVar
 
-from anysim.errors import EngineError
+from anysim.errors import CannotDraw, EngineError
 
 T = TypeVar("T")
 BACKENDS = ("egl", "osmesa")
@@ -105,7 +105,7 @@ class GlThread:
             # after MuJoCo's own exit function was registered, hence run before it
             atexit.register(self.close)
             return
-        raise EngineError(f"MuJoCo cannot draw here ({'; '.join(reasons)}); {REMEDY}")
+        raise CannotDraw(f"MuJoCo cannot draw here ({'; '.join(reasons)}); {REMEDY}")
 
 
 def _order(preference: str) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from anysim.c_output import quiet
-from anysim.errors import EngineError
+from anysim.errors import CannotDraw, EngineError
 from anysim_sapien.library import sapien
 
 REMEDY = (
@@ -116,7 +116,7 @@ def open_device(option: str) -> Device:
         if _opened is None:
             _opened = _open(icd)
         if isinstance(_opened, str):
-            raise EngineError(f"SAPIEN cannot draw here ({_opened}); {REMEDY}")
+            raise CannotDraw(f"SAPIEN cannot draw here ({_opened}); {REMEDY}")
         if option != "auto" and _opened.icd != icd:
             raise EngineError(
                 f"this process draws with {_opened.icd or _opened.name} already; use that one or another process"

@@ -1,7 +1,6 @@
 """The fixtures of the contract suite: the engine under test, with worlds built on demand and freed afterwards."""
 
 from collections.abc import Callable, Iterator
-from functools import cache
 from typing import Any, Protocol
 
 import pytest
@@ -10,9 +9,9 @@ from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capability
 from anysim.engine.requirements import needs_of
 from anysim.engine.sharded.pool import keeping_workers
-from anysim.errors import EngineError
 from anysim.model.world import World
 from anysim.testing import plugin
+from anysim.testing.engines import require_drawing
 from anysim.testing.watch import watch
 
 DRAWING = (Capability.RENDER_RGB, Capability.RENDER_DEPTH, Capability.RENDER_SEGMENTATION)
@@ -85,25 +84,13 @@ def _declared(request: pytest.FixtureRequest) -> None:
 def skip_without(engine_class: type[SimEngine], capability: Capability) -> None:
     """Skip the running test, naming the capability; one that draws also where this machine lacks what drawing needs."""
     _skip_undeclared(engine_class, capability)
-    if capability in DRAWING and (trouble := drawing_trouble(engine_class)):
-        pytest.skip(f"{engine_class.name} cannot draw here: {trouble.replace(',', ';')}")
+    if capability in DRAWING:
+        require_drawing(engine_class)
 
 
 def _skip_undeclared(engine_class: type[SimEngine], capability: Capability) -> None:
     if capability not in engine_class.capabilities:
         pytest.skip(f"{engine_class.name} does not declare '{capability}'")
-
-
-@cache
-def drawing_trouble(engine_class: type[SimEngine]) -> str:
-    """Why the engine cannot draw on this machine (a driver is missing…), or nothing if it can."""
-    with engine_class() as engine:
-        engine.create_world(World())
-        try:
-            engine.render(width=16, height=16)
-        except EngineError as error:
-            return str(error)
-    return ""
 
 
 def needs(*capabilities: Capability) -> pytest.MarkDecorator:

@@ -9,20 +9,12 @@ import pytest
 from anysim.errors import EngineError
 from anysim.math import pose as P
 from anysim.model.world import Body, BodyKind, Box, Camera, Geom, Light, Plane, World
+from anysim.testing.engines import require_drawing
 
 
-def _gl_reason() -> str:
-    """Why nothing can be drawn here, or an empty string."""
-    from anysim_mujoco.gl import gl_thread
-
-    try:
-        gl_thread().open("auto")
-    except EngineError as error:
-        return str(error)
-    return ""
-
-
-pytestmark = pytest.mark.skipif("_gl_reason()", reason="no OpenGL without a screen on this machine")
+@pytest.fixture(scope="module", autouse=True)
+def _draws() -> None:
+    require_drawing("mujoco")
 
 
 def _looking_down(height: float = 2.0) -> tuple[float, float, float, float]:

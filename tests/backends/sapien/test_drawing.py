@@ -11,6 +11,7 @@ import pytest
 from anysim.compile.world import compile_world
 from anysim.errors import EngineError
 from anysim.testing import worlds
+from anysim.testing.engines import require_drawing
 from anysim_sapien import diagnosis, vulkan
 from anysim_sapien.engine import SapienEngine
 from anysim_sapien.options import OWN_SCENERY
@@ -117,11 +118,9 @@ def test_the_doctor_names_the_driver_and_how_to_choose_it(monkeypatch, tmp_path)
 
 def test_a_driver_in_software_gets_the_cheap_shader(make):
     """SwiftShader does not call itself a CPU; SAPIEN's own shader takes half a minute to its first image there."""
+    require_drawing("sapien")
     engine = make(worlds.scene(cameras=True))
-    try:
-        where = engine.renderer_name().rpartition(", ")[2]
-    except EngineError as error:
-        pytest.skip(f"no image can be drawn here: {error}")
+    where = engine.renderer_name().rpartition(", ")[2]
     device = vulkan.open_device("auto")
     computes = any(word in device.name.lower() for word in ("swiftshader", "llvmpipe"))
     assert device.is_cpu == computes
@@ -138,11 +137,9 @@ def test_faces_are_as_bright_as_light_falls_on_them():
         "lights": {"sun": {"direction": [0.0, 0.6, -0.8]}},
         "cameras": {"front": {"from": [0.0, -0.6, 0.7], "look_at": "box", "size": [120, 120]}},
     }  # fmt: skip
+    require_drawing("sapien")
     with SapienEngine(shader="lit").create_world(compile_world(WorldSpec.model_validate(spec))) as engine:
-        try:
-            images = engine.render("front", channels=("rgb", "segmentation"))
-        except EngineError as error:
-            pytest.skip(f"no image can be drawn here: {error}")
+        images = engine.render("front", channels=("rgb", "segmentation"))
     image, seen = images["rgb"][0], images["segmentation"][0]
     assert (image[seen == 0] == np.rint(np.array(OWN_SCENERY.background) * 255)).all()
     side, top = np.unique(image[seen == 1][:, 0])  # the side that the sun is behind is not in the picture
@@ -152,24 +149,19 @@ def test_faces_are_as_bright_as_light_falls_on_them():
 
 def test_drawing_leaves_the_environment_alone(make):
     """The driver's name is in the environment only while it is loaded."""
+    require_drawing("sapien")
     before = dict(os.environ)
-    engine = make(worlds.scene(cameras=True))
-    try:
-        engine.render("front")
-    except EngineError as error:
-        pytest.skip(f"no image can be drawn here: {error}")
+    make(worlds.scene(cameras=True)).render("front")
     assert dict(os.environ) == before
 
 
 def test_one_scene_draws_all_envs(make):
     """Envs in different states and colours look different, in any order."""
+    require_drawing("sapien")
     engine = make(worlds.scene(cameras=True), 2)
     box = engine.index.body("box")
     engine.set_body_state(pose=[0.8, 0.0, 0.5, 0.0, 0.0, 0.0, 1.0], env_ids=[1], bodies=[box])
-    try:
-        both = engine.render("front", channels=("rgb", "segmentation"))
-    except EngineError as error:
-        pytest.skip(f"no image can be drawn here: {error}")
+    both = engine.render("front", channels=("rgb", "segmentation"))
     assert not np.array_equal(both["segmentation"][0], both["segmentation"][1])
     swapped = engine.render("front", env_ids=[1, 0], channels=("rgb", "segmentation"))
     assert np.array_equal(swapped["rgb"], both["rgb"][::-1])
@@ -179,10 +171,8 @@ def test_one_scene_draws_all_envs(make):
 @pytest.mark.slow
 def test_drawing_says_nothing(make):
     """The first image of a process writes nothing to its standard error: software drivers warn of what they lack."""
-    try:
-        make(worlds.scene(cameras=True)).render("front")
-    except EngineError as error:
-        pytest.skip(f"no image can be drawn here: {error}")
+    require_drawing("sapien")
+    make(worlds.scene(cameras=True)).render("front")
     code = """
         from anysim.engine.factory import create_simulation
         from anysim.testing import worlds

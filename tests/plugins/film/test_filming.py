@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import anysim
-from anysim import registry
 from anysim.errors import RecordError
 from anysim.record.collector import Collector
 from anysim.record.incoming import FileLock
@@ -19,7 +18,7 @@ from anysim.record.names import MANIFEST_FILE, trajectories
 from anysim.record.reader import open_trajectory
 from anysim.record.verify import verify
 from anysim.skills.runner import SkillPolicy
-from anysim.testing.fixtures import drawing_trouble
+from anysim.testing.engines import require_drawing
 from anysim_film import commit
 from anysim_film.episode import moments_for
 from anysim_film.filmer import Filmer, FilmOrder, film_targets
@@ -33,8 +32,7 @@ BOTH = FilmOrder(("front", "wrist"))
 
 def collect(out: Path, engine: str, *more: str) -> list[Path]:
     """Two short episodes with looks of their own."""
-    if trouble := drawing_trouble(registry.load("engines", engine)):
-        pytest.skip(f"{engine} cannot draw here: {trouble}")
+    require_drawing(engine)
     with anysim.make("pick_cube", engine=engine, num_envs=2, overrides=[*SHORT, *more]) as env:
         list(Collector(env, SkillPolicy(env), out, 2, 0).run())
     return trajectories(out)

@@ -11,7 +11,7 @@ from anysim.engine.kinematic import NullEngine
 from anysim.math import pose as P
 from anysim.model.world import Box, Camera, Capsule, Cylinder, Geom, Sphere, World
 from anysim.testing import worlds
-from anysim.testing.fixtures import drawing_trouble
+from anysim.testing.engines import require_drawing
 from anysim_mujoco.engine import MujocoEngine
 from anysim_parity.camera import alone, bent, camera_layer, middle
 from anysim_parity.judge import agreement, outside
@@ -42,8 +42,7 @@ class Behind(MujocoEngine):
 
 @pytest.fixture
 def drawn() -> None:
-    if trouble := drawing_trouble(MujocoEngine):
-        pytest.skip(f"mujoco cannot draw here: {trouble}")
+    require_drawing(MujocoEngine)
 
 
 def zoo() -> World:
