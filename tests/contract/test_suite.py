@@ -65,6 +65,16 @@ def test_an_honest_limited_engine_passes():
     }
 
 
+@pytest.mark.slow
+def test_the_articulated_example_passes():
+    """Joints with drives and limits, in a package of its own; nothing touches anything, so most worlds are skipped."""
+    folder = ROOT / "tests" / "external" / "anysim-linkage"
+    passed, skipped, why = _summary(_run(folder, "--engine", "anysim_linkage.engine:LinkageEngine"))
+    assert passed > 40
+    assert "rigid bodies: " in why
+    assert skipped > 400
+
+
 DYNAMIC = {
     "mujoco": {"render: rgb", "solver settings by entity", "terrain: triangle mesh (concave)"},
     "pybullet": {"render: rgb", "solver settings by entity", "parameter world.shadows"},

@@ -20,7 +20,7 @@ BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 EXCERPT = re.compile(r"^```(\w+) (\S+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FENCE = re.compile(r"^```(\w+)$", re.MULTILINE)
 EXTERNAL = ROOT / "tests" / "external"
-SOURCES = (*(EXTERNAL / f"anysim-{name}" for name in ("ballistic", "thirdarm", "starter")), EXTERNAL, ROOT)
+SOURCES = (*(EXTERNAL / f"anysim-{name}" for name in ("ballistic", "linkage", "thirdarm", "starter")), EXTERNAL, ROOT)
 """Folders in which the file at the head of an excerpt is looked for."""
 
 

@@ -121,8 +121,8 @@ def test_num_envs_must_be_positive(new_engine):
     """`num_envs` below 1 is an error, and the engine can still be used."""
     engine = new_engine()
     with pytest.raises(EngineError, match="num_envs must be at least 1, got 0"):
-        engine.create_world(worlds.falling_ball(), 0)
-    engine.create_world(worlds.falling_ball(), 1)
+        engine.create_world(worlds.buildable(engine), 0)
+    engine.create_world(worlds.buildable(engine), 1)
 
 
 def test_unknown_options_are_refused(engine_class):

@@ -8,7 +8,7 @@ import numpy as np
 
 from anysim.conventions import WORLD
 from anysim.engine.base import SimEngine
-from anysim.engine.capability import Capabilities
+from anysim.engine.capability import Capabilities, Capability
 from anysim.engine.requirements import needs_of
 from anysim.math import pose as P
 from anysim.model.world import (
@@ -141,7 +141,9 @@ def everyday(capabilities: Capabilities, cameras: bool = False) -> World:
 
 
 def buildable(engine: SimEngine, cameras: bool = False) -> World:
-    """The everyday world of an engine, or a falling ball for one that refuses that world for reasons of its own."""
+    """The everyday world; for an engine that refuses it a falling ball, and for one without free bodies a pendulum."""
+    if Capability.RIGID_BODIES not in engine.capabilities:
+        return pendulum()
     whole = everyday(engine.capabilities, cameras)
     return falling_ball() if engine.refusals(whole, engine.options) else whole
 

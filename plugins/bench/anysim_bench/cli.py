@@ -27,6 +27,9 @@ def step(
     seconds: Annotated[
         float, typer.Option(min=0.0, help="After this long a row ends, once three rounds are done.")
     ] = 5.0,
+    world: Annotated[
+        str, typer.Option(help="A world file for the first rows, for engines without a Panda's joints or contacts.")
+    ] = "",
     json: AsJson = False,
 ) -> None:
     """Step through SimEngine and through a whole task, each against the engine's own loop doing the same.
@@ -40,6 +43,8 @@ def step(
     from collections.abc import Iterator
 
     from anysim.cli.output import print_json
+    from anysim.engine.capability import Capability
+    from anysim.engine.factory import engine_class
     from anysim.errors import EngineError
     from anysim.model.world import Actuation
     from anysim_bench.rows import Rows
@@ -53,8 +58,9 @@ def step(
     costs: list[StepCost] = []
 
     def measured(name: str, n: int) -> Iterator[StepCost]:
-        for mode in (Actuation.NATIVE, Actuation.IMPLICIT_PD):
-            yield engine_cost(name, n, rounds, mode, seconds)
+        native = Capability.ACTUATION_NATIVE in engine_class(name).capabilities
+        for mode in (Actuation.NATIVE, Actuation.IMPLICIT_PD) if native else (Actuation.IMPLICIT_PD,):
+            yield engine_cost(name, n, rounds, mode, seconds, world)
         if task:
             yield env_cost(name, n, task, rounds, seconds)
 

@@ -116,11 +116,17 @@ def engines_with_raw_loop() -> list[str]:
 
 
 def engine_cost(
-    engine_name: str, num_envs: int, rounds: int = 7, actuation: Actuation = Actuation.IMPLICIT_PD, seconds: float = inf
+    engine_name: str,
+    num_envs: int,
+    rounds: int = 7,
+    actuation: Actuation = Actuation.IMPLICIT_PD,
+    seconds: float = inf,
+    world_file: str = "",
 ) -> StepCost:
     """Stepping through SimEngine, writing commands and reading the state every control step, against the raw loop.
 
-    After `seconds` no further round begins, once `FEWEST_ROUNDS` are done.
+    The world is that of a file, or a Panda with five boxes, to which alone budgets belong. After `seconds` no further
+    round begins, once `FEWEST_ROUNDS` are done.
 
     Raises:
         EngineError: the engine offers no raw loop.
@@ -128,13 +134,14 @@ def engine_cost(
     from anysim.api import compile_world
     from anysim.engine.factory import create_simulation
 
-    world = compile_world(panda_and_boxes())
+    world = compile_world(world_file or panda_and_boxes())
     world = replace(world, physics=replace(world.physics, actuation=actuation))
     with create_simulation(engine_name) as engine:
         engine.create_world(world, num_envs)
         substeps = world.physics.substeps
         engine.step(100)
-        return _compare("engine", control_loop(engine, substeps), engine, rounds, seconds)
+        cost = _compare("engine", control_loop(engine, substeps), engine, rounds, seconds)
+        return cost._replace(budget=None) if world_file else cost
 
 
 def control_loop(engine: SimEngine, substeps: int) -> Callable[[], None]:

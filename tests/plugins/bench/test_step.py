@@ -98,3 +98,15 @@ def test_a_row_ends_after_its_time(monkeypatch):
         calls.append(0)
         step.engine_cost("mujoco", 1, 6, seconds=seconds)
     assert 0 < calls[1] == 2 * calls[0]
+
+
+def test_any_world_can_be_stepped(tmp_path, monkeypatch):
+    """For an engine that holds no Panda: one ball that falls, without drives, and without a budget."""
+    monkeypatch.setattr(step, "CHUNK_STEPS", 1)
+    file = tmp_path / "ball.yaml"
+    file.write_text(
+        "world: {terrain: none, objects: {ball: {source: {sphere: 0.1}}}, layout: {ball: {position: [0, 0, 9]}}}\n"
+    )
+    cost = step.engine_cost("mujoco", 1, 1, world_file=str(file))
+    assert cost.ours > 0
+    assert cost.budget is None

@@ -192,7 +192,7 @@ def test_an_optional_source_that_is_not_installed_is_absent(tmp_path: Path) -> N
 
 def test_a_developers_tool_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "yourdfpy", None)
-    with pytest.raises(PluginError, match="pip install yourdfpy"):
+    with pytest.raises(PluginError, match=r"pip install .anysim-robots\[check\]"):
         qualify(str(ARM / "third_arm.yaml"), "mujoco", SHORT)
 
 

@@ -187,7 +187,7 @@ def _yourdfpy(path: Path):
         import yourdfpy
     except ImportError as error:
         raise PluginError(
-            f"URDFs are held against yourdfpy, a developers' tool that is not installed ({error}): pip install yourdfpy"
+            f"URDFs are held against yourdfpy, which is not installed ({error}): pip install 'anysim-robots[check]'"
         ) from None
     import logging
 

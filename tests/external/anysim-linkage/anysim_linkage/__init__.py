@@ -1,0 +1,3 @@
+"""Articulated mechanisms as an engine of anysim."""
+
+__version__ = "0.1.0"
