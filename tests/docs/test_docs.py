@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -131,3 +132,38 @@ def test_links_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\(([^)#]+?)(?:#[^)]*)?\)", page.read_text()):
         if "://" not in target:
             assert (page.parent / target).exists(), f"{page}: {target}"
+
+
+def _table(marker: str) -> list[list[str]]:
+    """The cells of a table of the guide that stands between a marker and the end."""
+    text = (
+        (ROOT / "docs" / "write_an_engine.md").read_text().partition(f"<!-- {marker} -->")[2].partition("<!-- end")[0]
+    )
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("|")]
+    return rows[2:]
+
+
+def test_the_fields_of_the_guide_are_those_of_the_state() -> None:
+    """Names, and shapes in an engine that has all of them and in the words of `State`."""
+    from anysim.engine.kinematic import NullEngine
+    from anysim.engine.state import FIELDS, State
+    from anysim.testing import worlds
+
+    rows = {cells[0].strip("`"): cells[1] for cells in _table("fields of _read")}
+    assert tuple(rows) == FIELDS
+    with NullEngine() as engine:
+        engine.create_world(worlds.scene(sensor=True), 3)
+        world, state = engine.world, engine.get_state()
+        sizes = {"N": 3, "B": len(world.bodies), "J": len(world.joints), "S": len(world.contact_sensors)}
+        for name, shape in rows.items():
+            numbers = [sizes[part] if part in sizes else int(part) for part in re.findall(r"\w+", shape)]
+            assert list(getattr(state, name).shape) == numbers, name
+            assert shape in str(getattr(State, name).__doc__), name
+
+
+def test_the_helpers_of_the_guide_exist() -> None:
+    names = [name for cells in _table("helpers") for name in re.findall(r"`(anysim\.[\w.]+)`", cells[0])]
+    assert len(names) > 20
+    for name in names:
+        module, _, attribute = name.rpartition(".")
+        assert find_spec(name) if name == "anysim.math.pose" else hasattr(import_module(module), attribute), name
