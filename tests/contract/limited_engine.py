@@ -118,7 +118,8 @@ class MarbleEngine(SimEngine):
         if name in ("body_pose", "body_twist"):
             return (self._pose if name == "body_pose" else self._twist).copy()
         if name == "fault":
-            return ~np.isfinite(np.concatenate([self._pose, self._twist], axis=-1)).all(axis=(1, 2))
+            state = np.concatenate([self._pose, self._twist], axis=-1)
+            return np.asarray(~np.isfinite(state).all(axis=(1, 2)))
         return np.zeros((self.num_envs, 0, 3) if name == "contact_force" else (self.num_envs, 0))
 
     def _write_joints(self, ids: Array, joints: Array, position: Array | None, velocity: Array | None) -> None:

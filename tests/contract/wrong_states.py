@@ -191,6 +191,30 @@ class ClaimsRays(Right):
     caught_by = ("test_errors.py::test_declared_is_done_and_undeclared_is_refused",)
 
 
+class FliesAway(Right):
+    """After some steps a free body is at 1e68 m, in every run alike."""
+
+    caught_by = ("test_stepping.py::test_the_same_run_twice", "test_loose_bodies.py::test_steps_add_up")
+
+    def _read(self, name):
+        values = super()._read(name)
+        if name == "body_pose" and self._records.ticks.max(initial=0) > 10:
+            values[:, -1, 1] = 1e68
+        return values
+
+
+class HidesFaults(Right):
+    """An env that is not finite is not marked."""
+
+    caught_by = ("test_loose_bodies.py::test_steps_add_up",)
+
+    def _read(self, name):
+        values = super()._read(name)
+        if name == "body_twist" and self._records.ticks.max(initial=0) > 10:
+            values[:, -1] = np.nan
+        return np.zeros_like(values) if name == "fault" else values
+
+
 class ClaimsPictures(Right):
     """Declares pictures; each attempt to draw one is an error, which is no lack of the machine's."""
 
