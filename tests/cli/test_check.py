@@ -75,7 +75,9 @@ def test_what_is_approximate_is_one_line_with_its_count_and_every_line_on_reques
     long = CliRunner().invoke(app, ["check", "pick_cube", "-e", "mujoco", "-v"]).stdout.splitlines()
     measured = [line for line in long if line.startswith("mujoco: approximate: ")]
     assert short[-1] == long[-1] == "pick_cube: ok"
-    assert len(short) == 2
+    assert len(short) == 3
+    imported = [line for line in long if line.startswith("imported: panda: ")]
+    assert short[1].startswith(f"imported: {len(imported)} notes of what sources say and the world does not (panda); `")
     assert short[0].startswith(f"approximate on mujoco: {len(measured)} (")
     assert "`anysim check pick_cube -e mujoco -v`" in short[0]
     assert any("a stiff soft constraint" in line for line in measured)

@@ -54,7 +54,7 @@ class _UrdfImport:
 
     def __init__(self, file: UrdfFile, root: Path, scale: float, packages: Mapping[str, Path]) -> None:
         self.file, self.scale = file, scale
-        self.notes: list[ImportNote] = []
+        self.notes: list[ImportNote] = [*file.unheld]
         self.links = file.links
         self.children: dict[str, list[JointElement]] = {name: [] for name in self.links}
         self.base = self._structure()

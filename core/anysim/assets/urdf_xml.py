@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from anysim.assets.unheld import notes_of
 from anysim.assets.xml import xml_root
 from anysim.conventions import Array
 from anysim.errors import AssetError, listing
@@ -91,6 +92,7 @@ class UrdfFile:
             color = material.find("color")
             if color is not None and color.get("rgba") and material.get("name"):
                 self._materials.setdefault(material.get("name"), self._rgba(color))
+        self.unheld = notes_of(root)
         self.instead = _instead([str(element.tag) for element in root])
         self.links = {element.get("name"): self._link(element) for element in root.findall("link")}
         self.joints = [self._joint(element) for element in root.findall("joint")]

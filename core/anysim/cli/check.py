@@ -25,11 +25,12 @@ class Answer(NamedTuple):
 
 
 class Report(NamedTuple):
-    """Every fault of a file, a sentence each, the answer of each engine that was asked, and what is ill-conditioned."""
+    """Every fault of a file, the answer of each engine that was asked, what is ill-conditioned, and the world."""
 
     faults: list[str]
     answers: tuple[Answer, ...] = ()
     warnings: tuple[str, ...] = ()
+    world: "World | None" = None
 
 
 def check(
@@ -59,10 +60,19 @@ def check(
 
 def _as_data(report: Report) -> dict[str, object]:
     engines = {a.engine: {"runs": not a.refusal, "why": a.refusal, "approximate": a.measured} for a in report.answers}
-    return {"ok": not report.faults, "faults": report.faults, "warnings": report.warnings, "engines": engines}
+    notes = [] if report.world is None else [f"{thing}: {note}" for thing, note in report.world.notes]
+    return {
+        "ok": not report.faults,
+        "faults": report.faults,
+        "warnings": report.warnings,
+        "engines": engines,
+        "notes": notes,
+    }
 
 
 def _tell(name: str, report: Report, all_engines: bool, verbose: bool) -> None:
+    from anysim.cli.output import import_notes
+
     for fault in report.faults:
         typer.echo(fault, err=True)
     for warning in report.warnings:
@@ -72,6 +82,8 @@ def _tell(name: str, report: Report, all_engines: bool, verbose: bool) -> None:
             typer.echo(answer.refusal, err=True)
         for line in answer.measured if verbose else answer.approximate:
             typer.echo(f"{answer.engine}: {line}" if verbose else line)
+    for line in [] if report.world is None else import_notes(report.world, verbose, f"anysim check {name}"):
+        typer.echo(line)
     count = len(report.faults)
     verdict = f"{count} {'fault' if count == 1 else 'faults'}" if count else "ok"
     if all_engines and report.answers:
@@ -115,7 +127,7 @@ def report_on(name: str, engine: str | None, all_engines: bool, overrides: list[
         return Report([*map(str, past), f"{name}: {error}"])
     refused = [answer.refusal for answer in answers if answer.refusal]
     faults = [*map(str, past), *(refused if len(refused) == len(answers) else [])]
-    return Report(faults, () if past else answers, warnings)
+    return Report(faults, () if past else answers, warnings, world)
 
 
 def _ask(engine: str, loaded: "LoadedRun", world: "World", name: str) -> Answer:

@@ -9,6 +9,7 @@ import typer
 
 if TYPE_CHECKING:
     from anysim.engine.capability import Capabilities, Need
+    from anysim.model.world import World
 
 
 def interactive() -> bool:
@@ -56,6 +57,17 @@ def approximations(
         return [f"approximate: {n.capability} ({n.why}): {capabilities.supported[n.capability].note}" for n in needs]
     names = ", ".join(dict.fromkeys(str(need.capability) for need in needs))
     return [f"approximate on {engine}: {len(needs)} ({names}); `{command} -v` says how far, each measured"]
+
+
+def import_notes(world: "World", verbose: bool, command: str) -> list[str]:
+    """What sources of a world say that is not so in it: a line each, or one with their count.
+
+    `command` is what prints them all.
+    """
+    if verbose or not world.notes:
+        return [f"imported: {thing}: {note}" for thing, note in world.notes]
+    names = ", ".join(dict.fromkeys(thing for thing, _ in world.notes))
+    return [f"imported: {len(world.notes)} notes of what sources say and the world does not ({names}); `{command} -v`"]
 
 
 @contextmanager

@@ -142,7 +142,7 @@ def without_entity(world: World, name: str) -> World:
             (bodies[a], bodies[b]) for a, b in world.excluded_pairs if a in bodies and b in bodies
         ),
         slots=_slots(world, names.index(name)),
-        notes=tuple(note for note in world.notes if note[0] in left),
+        notes=tuple(note for note in world.notes if note[0] in {e.category for e in world.entities if e.name != name}),
     )
 
 

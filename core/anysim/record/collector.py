@@ -102,6 +102,7 @@ def run_header(env: TaskEnv, seed: int) -> RunHeader:
         layout=state_layout(world, STATE_FIELDS, action, example),
         spec=env.spec.to_dict(),
         packages=package_versions(),
+        notes=tuple(f"{thing}: {note}" for thing, note in world.notes),
     )
 
 

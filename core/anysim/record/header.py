@@ -78,6 +78,7 @@ class RunHeader(Spec):
     layout: StateLayout
     spec: dict[str, Any] = Field(default_factory=dict, description="the resolved RunSpec, as plain data")
     packages: dict[str, str] = Field(default_factory=dict, description="versions of the distributions involved")
+    notes: tuple[str, ...] = Field(default=(), description="what the world's sources say that is not so in it")
 
     @field_validator("spec")
     @classmethod

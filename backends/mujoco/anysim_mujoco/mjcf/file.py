@@ -10,6 +10,7 @@ import mujoco
 from anysim.assets.mesh_budget import bounded
 from anysim.assets.model import ImportNote
 from anysim.errors import AssetError, listing, suggest
+from anysim_mujoco.mjcf import unheld
 from anysim_mujoco.mjcf.budget import MjcfBudget
 from anysim_schemas.limits import MODEL_BYTES
 
@@ -19,7 +20,7 @@ def compiled(path: Path, root: Path, body: str = "", notes: list[ImportNote] | N
 
     Textures and skins are left out: the neutral model has colours only. No body is fused, no visual geom discarded.
     With `body`, all other bodies of the world are taken out, and with them whatever refers to them; `notes` gets what
-    tied them to it.
+    tied them to it, and all else that the file says in vain.
 
     Raises:
         AssetError: a missing file, a reference that leaves `root`, no such body, or what MuJoCo says against the file.
@@ -31,6 +32,7 @@ def compiled(path: Path, root: Path, body: str = "", notes: list[ImportNote] | N
         spec = _parsed(path, budget.included)
         budget.check_assets(spec, path, own)
         _without_memory(spec)
+        said = unheld.early(spec)
         for texture in list(spec.textures):
             spec.delete(texture)
         for skin in list(spec.skins):
@@ -40,8 +42,9 @@ def compiled(path: Path, root: Path, body: str = "", notes: list[ImportNote] | N
         spec.compiler.fusestatic = False
         if body:
             left_out = _keep(spec, path, body)
-            if notes is not None:
-                notes += left_out
+            said += left_out
+        if notes is not None:
+            notes += [*said, *unheld.late(spec)]
         return spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         raise AssetError(f"{path}: MuJoCo cannot read it: {' '.join(str(error).split())}") from error

@@ -124,6 +124,8 @@ class _MjcfImport:
             raise AssetError(f"{self.path}: an asset has exactly one body in its world; this one has {names}{say}")
         if model.body_geomnum[0]:
             self._note("dropped", "world", f"{model.body_geomnum[0]} geoms of the world beside the model are left out")
+        if sites := int((model.site_bodyid == 0).sum()):
+            self._note("dropped", "world", f"{sites} sites of the world beside the model are left out")
         return tops[0]
 
     def _body(self, number: int, top: int) -> None:
@@ -245,6 +247,8 @@ class _MjcfImport:
         start = model.key_qpos[home[0]] if home else model.qpos0
         initial = float(start[model.jnt_qposadr[j]]) * unit
         softness = float(model.jnt_solref[j, 0])
+        if not lower <= initial <= upper:
+            self._note("repaired", name, f"starts at {initial:g}, outside of [{lower:g}, {upper:g}]; now at the limit")
         return Joint(
             name=name,
             body=body,

@@ -1,0 +1,255 @@
+"""Notes of what an MJCF file says and the neutral model does not hold.
+
+The tables name every field of MuJoCo's elements that the importer reads, and those that cannot matter here. Any other
+that is not at its default becomes a note, so that none is dropped in silence, whatever a later MuJoCo adds.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any
+
+import mujoco
+
+from anysim.assets.model import ImportNote
+from anysim.errors import listing
+
+BOOKKEEPING = frozenset(
+    "id info signature compiler name classname parent frame childclass group element authored "
+    "bodies cameras frames geoms joints lights sites".split()
+)
+"""What every element has for MuJoCo's own use; `group` is a switch of its viewer."""
+
+_POSE = "pos quat alt"
+READ: Mapping[str, frozenset[str]] = {
+    kind: frozenset(fields.split())
+    for kind, fields in {
+        "body": f"{_POSE} mass ipos iquat ialt inertia fullinertia explicitinertial gravcomp",
+        "joint": "type pos axis range limited armature frictionloss ref actfrclimited springdamper springref",
+        "geom": f"{_POSE} type fromto size priority friction mass density typeinertia material rgba hfieldname "
+        "meshname fitscale",
+        "site": f"{_POSE} fromto",
+        "mesh": "file content_type inertia maxhullvert needsdf octree_maxdepth refpos refquat scale smoothnormal "
+        "userface userfacenormal userfacetexcoord usernode usernormal usertet usertexcoord uservert material",
+        "hfield": "file content_type ncol nrow size userdata",
+        "material": "rgba",
+        "equality": "name1 name2 objtype type data",
+        "actuator": "actdim actlimited actrange biasprm biastype ctrllimited dynprm dyntype forcelimited gainprm "
+        "gaintype gear target trntype type velrange ctrlspec",
+        "key": "name",
+    }.items()
+}
+"""The fields that are read, or of which a note is made elsewhere."""
+HARMLESS: Mapping[str, frozenset[str]] = {
+    kind: frozenset(fields.split())
+    for kind, fields in {
+        "body": "simple fuse sleep",
+        "joint": "align",
+        "site": "type size rgba material meshname",
+        "material": "texrepeat texuniform textures",
+        "actuator": "lengthrange inheritrange cranklength refsite slidersite",
+        "key": "time",
+    }.items()
+}
+"""The fields that cannot matter: of how MuJoCo computes, or of what is noted as a whole or left out anyway."""
+
+PARTLY: Mapping[tuple[str, str], Callable[[Any], str]] = {
+    ("geom", "solref"): lambda geom: _solref(geom.solref),
+    ("geom", "solimp"): lambda geom: "its width, midpoint and power are left out" if _bent(geom.solimp) else "",
+    ("geom", "condim"): lambda geom: _CONDIM.get(int(geom.condim), ""),
+    ("geom", "contype"): lambda geom: _masked(geom),
+    ("geom", "conaffinity"): lambda geom: "",  # with contype
+    ("joint", "damping"): lambda joint: _polynomial(joint, "damping"),
+    ("joint", "stiffness"): lambda joint: _polynomial(joint, "stiffness"),
+    ("joint", "solref_limit"): lambda joint: _solref(joint.solref_limit),
+    ("joint", "actfrcrange"): lambda joint: _lopsided(joint.actfrcrange),
+    ("actuator", "forcerange"): lambda drive: _lopsided(drive.forcerange),
+    ("actuator", "ctrlrange"): lambda drive: _lopsided(drive.ctrlrange) if _motor(drive) else "",
+    ("equality", "active"): lambda tie: "" if tie.active else "is inactive, and left out",
+    ("key", "qpos"): lambda key: "" if key.name == "home" else "are not kept: only the keyframe 'home' is",
+}
+"""The fields that are read in part, with what is not; empty where all is."""
+
+LEFT_OUT = {
+    "texture": "are left out: surfaces have plain colours",
+    "skin": "are left out: bodies are drawn by their geoms",
+    "camera": "are left out: those of a world are its own",
+    "light": "are left out: those of a world are its own",
+    "pair": "are left out: geoms meet by their masks, with the friction of both",
+    "sensor": "are left out: those of a world are its own",
+    "numeric": "are left out: MuJoCo itself makes nothing of them",
+    "text": "are left out: MuJoCo itself makes nothing of them",
+    "tuple": "are left out: MuJoCo itself makes nothing of them",
+    "plugin": "are left out: they are MuJoCo's alone",
+}
+"""The elements that are left out whole; tendons and flexes have words of their own."""
+
+EFFECTS: Mapping[str, str] = {
+    "geom.margin": "contacts begin where surfaces touch",
+    "geom.gap": "contacts begin where surfaces touch",
+    "geom.solmix": "contacts mix by the pair rule",
+    "geom.fluid_ellipsoid": "there is no fluid",
+    "geom.surfacevel": "surfaces do not move by themselves",
+    "joint.margin": "limits act at the limit",
+    "joint.solimp_limit": "limits are as soft as the engine has them",
+    "body.mocap": "it stays where it is",
+    "option.timestep": "the world's `physics` has it",
+    "option.gravity": "the world's `physics` has it",
+    "option.cone": "the world's `physics` has it",
+    "option.impratio": "the world's `physics` has it",
+    "option.density": "there is no fluid",
+    "option.viscosity": "there is no fluid",
+    "option.wind": "there is no fluid",
+}
+"""What it means that a field is left out, where that can be told in general."""
+
+_CONDIM = {
+    1: "contacts have friction where either surface has: a frictionless one is `friction: 0`",
+    6: "rolling friction is not simulated on every engine",
+}
+_EARLY = ("texture", "skin", "material", "camera", "light")
+
+
+def early(spec: mujoco.MjSpec) -> list[ImportNote]:
+    """Notes of elements that are taken out before the file is compiled."""
+    return [note for kind in _EARLY for note in _of_kind(spec, kind)]
+
+
+def late(spec: mujoco.MjSpec) -> list[ImportNote]:
+    """Notes of all others, and of the options."""
+    kinds = [kind for kind in (*READ, *LEFT_OUT) if kind not in _EARLY]
+    return [*_options(spec), *(note for kind in kinds for note in _of_kind(spec, kind))]
+
+
+def fields_of(element: Any) -> list[str]:
+    """The fields of an element of MuJoCo that a file can set."""
+    names = [name for name in dir(element) if not name.startswith("_") and name not in BOOKKEEPING]
+    return [name for name in names if not callable(getattr(element, name))]
+
+
+def pristine(kind: str) -> Any:
+    """A new element with MuJoCo's defaults."""
+    spec = mujoco.MjSpec()
+    if kind in ("body", "joint", "geom", "site", "camera", "light"):
+        body = spec.worldbody.add_body()
+        return body if kind == "body" else getattr(body, f"add_{kind}")()
+    return getattr(spec, f"add_{kind}")()
+
+
+def _of_kind(spec: mujoco.MjSpec, kind: str) -> Iterator[ImportNote]:
+    plural = {"body": "bodies", "mesh": "meshes", "equality": "equalities"}.get(kind, f"{kind}s")
+    elements = [one for one in getattr(spec, plural) if not _of_the_world(kind, one)]
+    if not elements:
+        return
+    if kind in LEFT_OUT:
+        yield ImportNote("dropped", f"{kind}s", _named(elements, LEFT_OUT[kind]))
+        return
+    fresh = pristine(kind)
+    for field in fields_of(fresh):
+        if field in READ[kind] or field in HARMLESS.get(kind, ()):
+            continue
+        usual = value_of(fresh, field)
+        told: dict[str, list[Any]] = {}
+        for one in elements:
+            value = value_of(one, field)
+            if value == usual and (kind, field) not in {("equality", "active"), ("geom", "contype")}:
+                continue
+            partly = PARTLY.get((kind, field))
+            effect = _left_out(kind, field, value) if partly is None else partly(one)
+            if effect:
+                told.setdefault(effect, []).append(one)
+        for effect, ones in told.items():
+            yield ImportNote("dropped", f"{kind} {field}", _named(ones, effect))
+    if kind == "joint":
+        yield from _of_free_joints(elements)
+
+
+def _of_the_world(kind: str, element: Any) -> bool:
+    """Whether it is the world's body, or fixed to it: that is left out as a whole."""
+    return element.name == "world" if kind == "body" else kind in ("geom", "site") and element.parent.name == "world"
+
+
+def _of_free_joints(joints: Iterable[Any]) -> Iterator[ImportNote]:
+    free = [joint for joint in joints if joint.type == mujoco.mjtJoint.mjJNT_FREE]
+    for field in ("damping", "armature", "frictionloss", "stiffness"):
+        ones = [joint for joint in free if any(_numbers(getattr(joint, field)))]
+        if ones:
+            yield ImportNote("dropped", f"joint {field}", _named(ones, "a free joint has none here"))
+
+
+def _options(spec: mujoco.MjSpec) -> Iterator[ImportNote]:
+    fresh, own = mujoco.MjSpec().option, spec.option
+    for field in fields_of(fresh):
+        value = value_of(own, field)
+        if value == value_of(fresh, field):
+            continue
+        if field in ("disableflags", "enableflags"):
+            kind = mujoco.mjtDisableBit if field == "disableflags" else mujoco.mjtEnableBit
+            named = {name.partition("_")[2].lower(): int(bit) for name, bit in kind.__members__.items() if "_" in name}
+            flags = ", ".join(name for name, bit in named.items() if value & bit)
+            yield ImportNote("dropped", f"option flag {field[:-5]}", f"{flags}: is left out, they are MuJoCo's alone")
+        else:
+            yield ImportNote("dropped", f"option {field}", _left_out("option", field, value))
+
+
+def value_of(element: Any, field: str) -> Any:
+    """The value of a field as plain data, equal where it means the same."""
+    value = getattr(element, field)
+    if isinstance(value, str | bool | int):
+        return value
+    if hasattr(value, "plugin_name"):
+        return (value.name, value.plugin_name, bool(value.active))
+    numbers = _numbers(value)
+    return tuple("unset" if isinstance(v, float) and v != v else v for v in numbers)
+
+
+def _numbers(value: Any) -> tuple[Any, ...]:
+    try:
+        return tuple(value.tolist() if hasattr(value, "tolist") else value)
+    except TypeError:
+        return (value,)
+
+
+def _left_out(kind: str, field: str, value: Any) -> str:
+    effect = EFFECTS.get(f"{kind}.{field}", "")
+    shown = " ".join(f"{v:g}" if isinstance(v, float) else str(v) for v in value) if isinstance(value, tuple) else value
+    shown = str(shown)
+    return f"{shown if len(shown) <= 40 else shown[:37] + '…'} is left out" + (f": {effect}" if effect else "")
+
+
+def _named(elements: list[Any], effect: str) -> str:
+    names = [one.name for one in elements if one.name]
+    who = listing(names, 3) if names else "without a name"
+    return f"{effect} ({len(elements)}: {who})"
+
+
+# ------------------------------------------------------------------ fields that are read in part
+
+
+def _solref(value: Any) -> str:
+    if value[0] <= 0:
+        return f"{value[0]:g} {value[1]:g} is a stiffness and a damping, and left out"
+    return "" if value[1] == 1.0 else f"the damping ratio of {value[1]:g} is left out"
+
+
+def _bent(solimp: Any) -> bool:
+    return tuple(solimp[2:]) != (0.001, 0.5, 2.0)
+
+
+def _masked(geom: Any) -> str:
+    kept = geom.contype or geom.conaffinity
+    if not kept or (geom.contype & 1 and geom.conaffinity & 1):
+        return ""
+    return f"{geom.contype} and conaffinity {geom.conaffinity} hold inside of the model; it meets all that is not of it"
+
+
+def _polynomial(joint: Any, field: str) -> str:
+    more = tuple(getattr(joint, field)[1:])
+    return f"is a polynomial; its linear part alone is kept, without {more[0]:g} {more[1]:g}" if any(more) else ""
+
+
+def _lopsided(limits: Any) -> str:
+    low, high = (float(v) for v in limits)
+    return "" if low == -high else f"[{low:g}, {high:g}] is one-sided; the larger end limits both"
+
+
+def _motor(drive: Any) -> bool:
+    return drive.biastype == mujoco.mjtBias.mjBIAS_NONE and bool(drive.ctrllimited)

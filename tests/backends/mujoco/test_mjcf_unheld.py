@@ -1,0 +1,177 @@
+"""Notes of an MJCF import: what a file says is read, noted, or in a table of what cannot matter."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from anysim.assets.model import ImportedModel
+from anysim_mujoco.mjcf import unheld
+from anysim_mujoco.mjcf.load import import_mjcf
+
+ROBOT = """<mujoco><option {option}>{flag}</option>{asset}
+<default><default class="soft">{default}</default></default>
+<worldbody>{world}<body name="base" {base}>{top}<geom name="trunk" size="0.1" mass="1" {trunk}/>
+  <body name="arm" pos="0 0 0.3"><joint name="turn" {joint}/><geom name="rod" size="0.05" mass="1" {rod}/>
+    <body name="hand" pos="0 0 0.3"><joint name="grip"/><geom name="fist" size="0.05" mass="1"/>{inner}</body>
+  </body></body></worldbody>{rest}</mujoco>"""
+PLACES = ("option", "flag", "asset", "default", "world", "base", "top", "trunk", "joint", "rod", "inner", "rest")
+KINDS = sorted(unheld.READ)
+
+
+@pytest.fixture
+def load(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., ImportedModel]:
+    """`load(joint='…')`: the robot with these additions, imported."""
+    monkeypatch.setenv("ANYSIM_CACHE_DIR", str(tmp_path / "cache"))
+
+    def read(**parts: str) -> ImportedModel:
+        path = tmp_path / "model.xml"
+        path.write_text(ROBOT.format(**(dict.fromkeys(PLACES, "") | parts)), encoding="utf-8")
+        return import_mjcf(path, root=tmp_path)
+
+    return read
+
+
+def test_a_plain_file_has_no_notes(load: Callable[..., ImportedModel]) -> None:
+    assert load().report == ()
+
+
+@pytest.mark.parametrize(
+    ("place", "text", "words"),
+    [
+        ("option", 'density="1.2"', "option density: 1.2 is left out: there is no fluid"),
+        ("option", 'viscosity="1e-5"', "option viscosity: 1e-05 is left out"),
+        ("option", 'wind="0 1 0"', "option wind: 0 1 0 is left out"),
+        ("option", 'gravity="0 0 -1"', "option gravity: 0 0 -1 is left out: the world's `physics` has it"),
+        ("option", 'timestep="0.01"', "option timestep: 0.01 is left out: the world's `physics` has it"),
+        ("option", 'o_margin="0.1"', "option o_margin: 0.1 is left out"),
+        ("flag", '<flag gravity="disable" contact="disable"/>', "option flag disable: contact, gravity: is left out"),
+        ("flag", '<flag filterparent="disable"/>', "option flag disable: filterparent"),
+        ("flag", '<flag override="enable"/>', "option flag enable: override"),
+        ("rest", '<contact><pair name="p" geom1="trunk" geom2="fist"/></contact>', "pairs: are left out"),
+        ("trunk", 'contype="2" conaffinity="4"', "geom contype: 2 and conaffinity 4 hold inside of the model"),
+        ("trunk", 'condim="1"', "geom condim: contacts have friction where either surface has"),
+        ("trunk", 'condim="6"', "geom condim: rolling friction is not simulated on every engine"),
+        ("rod", 'margin="0.002"', "geom margin: 0.002 is left out: contacts begin where surfaces touch (1: rod)"),
+        ("rod", 'solref="0.02 0.5"', "geom solref: the damping ratio of 0.5 is left out"),
+        ("rod", 'solref="-100 -5"', "geom solref: -100 -5 is a stiffness and a damping, and left out"),
+        ("rod", 'solimp="0.9 0.95 0.01"', "geom solimp: its width, midpoint and power are left out"),
+        ("joint", 'range="-9 9" solreflimit="0.02 0.7"', "joint solref_limit: the damping ratio of 0.7 is left out"),
+        ("joint", 'range="-9 9" solimplimit="0.5 0.6"', "joint solimp_limit: 0.5 0.6"),
+        ("joint", 'range="10 90"', "turn: starts at 0, outside of [0.174533, 1.5708]; now at the limit (repaired)"),
+        ("joint", 'damping="0.1 0.2 0.3"', "joint damping: is a polynomial; its linear part alone is kept"),
+        ("joint", 'actuatorfrcrange="-1 5"', "joint actfrcrange: [-1, 5] is one-sided; the larger end limits both"),
+        ("joint", 'stiffness="5"', "turn: has a spring of 5"),
+        ("top", '<joint name="free" type="free" damping="2" armature="0.1"/>', "joint armature: a free joint has none"),
+        ("top", '<joint name="free" type="free" damping="2"/>', "joint damping: a free joint has none here (1: free)"),
+        (
+            "rest",
+            '<keyframe><key name="up" qpos="1 0"/></keyframe>',
+            "key qpos: are not kept: only the keyframe 'home'",
+        ),
+        ("rest", '<keyframe><key name="home" qpos="1 0" qvel="1 0"/></keyframe>', "key qvel: 1 0 is left out"),
+        ("asset", '<asset><texture name="t" builtin="flat" type="2d" width="4" height="4"/></asset>', "textures: are"),
+        ("inner", '<camera name="eye"/>', "cameras: are left out: those of a world are its own (1: eye)"),
+        ("inner", "<light/>", "lights: are left out"),
+        ("rest", '<sensor><jointpos name="s" joint="turn"/></sensor>', "sensors: are left out"),
+        ("rest", '<actuator><motor joint="turn" ctrlrange="-1 2"/></actuator>', "actuator ctrlrange: [-1, 2] is one-"),
+        ("rest", '<actuator><position joint="turn" kp="1" delay="0.1" nsample="9"/></actuator>', "actuator delay: 0.1"),
+        ("rest", '<equality><joint joint1="grip" active="false"/></equality>', "equality active: is inactive"),
+        ("rest", '<equality><joint joint1="grip" joint2="turn" solref="0.1 1"/></equality>', "equality solref: 0.1 1"),
+        ("world", '<site name="goal"/>', "world: 1 sites of the world beside the model are left out"),
+        ("base", 'mocap="true"', "body mocap: True is left out: it stays where it is"),
+        ("rest", '<custom><numeric name="n" data="1"/></custom>', "numerics: are left out"),
+        ("trunk", 'user="1 2"', "geom userdata: 1 2 is left out"),
+    ],
+)
+def test_what_is_left_out_is_named(load: Callable[..., ImportedModel], place: str, text: str, words: str) -> None:
+    found = [str(note) for note in load(**{place: text}).report]
+    assert any(words in note for note in found), found
+
+
+def test_defaults_count_where_they_are_used(load: Callable[..., ImportedModel]) -> None:
+    """A class sets a margin; two geoms are of it, of which one says otherwise."""
+    model = load(default='<geom margin="0.001"/>', trunk='class="soft"', rod='class="soft" margin="0"')
+    assert [str(note) for note in model.report] == [
+        "geom margin: 0.001 is left out: contacts begin where surfaces touch (1: trunk) (dropped)"
+    ]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_field_of_mujoco_is_read_or_noted(kind: str) -> None:
+    """Each field of each element is set to what is not its default: there is a note, or a table has it."""
+    spec = mujoco.MjSpec()
+    usual = unheld.pristine(kind)
+    for field in unheld.fields_of(usual):
+        if field in unheld.READ[kind] or field in unheld.HARMLESS.get(kind, ()) or (kind, field) in unheld.PARTLY:
+            continue
+        element = _element(spec, kind)
+        before = unheld.value_of(element, field)
+        _change(element, field)
+        if unheld.value_of(element, field) == before:
+            pytest.fail(f"{kind}.{field} cannot be changed by this test; put it into a table, or change it here")
+        noted = {note.where for note in [*unheld.early(spec), *unheld.late(spec)]}
+        assert f"{kind} {field}" in noted
+        spec.delete(element)
+
+
+def _element(spec: mujoco.MjSpec, kind: str) -> object:
+    if kind in ("joint", "geom", "site"):
+        body = next((b for b in spec.bodies if b.name == "own"), None) or spec.worldbody.add_body(name="own")
+        return getattr(body, f"add_{kind}")()
+    return spec.worldbody.add_body() if kind == "body" else getattr(spec, f"add_{kind}")()
+
+
+def _change(element: object, field: str) -> None:
+    value = getattr(element, field)
+    if isinstance(value, np.ndarray):
+        setattr(element, field, np.where(np.isnan(value), 0.0, value) + 1)
+    elif isinstance(value, bool):
+        setattr(element, field, not value)
+    elif isinstance(value, int | float):
+        setattr(element, field, type(value)(2 if value != value else value + 2))
+    elif isinstance(value, str):
+        setattr(element, field, "x")
+    elif hasattr(value, "plugin_name"):
+        value.active, value.plugin_name = True, "mujoco.pid"
+    else:
+        setattr(element, field, [1.0])
+
+
+def test_every_option_of_mujoco_is_noted() -> None:
+    usual = mujoco.MjSpec().option
+    for field in unheld.fields_of(usual):
+        spec = mujoco.MjSpec()
+        value = getattr(spec.option, field)
+        setattr(spec.option, field, value + 1)
+        assert [note.where.split()[0] for note in unheld.late(spec)] == ["option"], field
+
+
+ELEMENTS = {
+    "read by MuJoCo before": "include default frame replicate attach composite flexcomp joint geom edge pin skin "
+    "plugin orientation config model compiler lengthrange size elasticity contact",
+    "read": "mujoco option worldbody body inertial freejoint site asset mesh hfield material layer exclude equality "
+    "actuator motor position velocity general keyframe key",
+    "refused": "weld connect flex flexvert flexstrain deformable",
+    "noted": "flag pair camera light texture sensor custom numeric text tuple element tendon fixed spatial pulley "
+    "intvelocity damper cylinder muscle adhesion dcmotor pid extension instance",
+    "harmless": "visual global quality headlight map scale rgba statistic bone user",
+}
+"""The elements of MJCF, and what becomes of them here."""
+SENSORS = re.compile(
+    r"touch|accelerometer|velocimeter|gyro|force|torque|magnetometer|rangefinder|camprojection|contact|tactile|clock|user|"
+    r"(joint|tendon|actuator|ball|frame|subtree|insidesite|distance|normal|fromto|e_)\w*"
+)
+"""The sensors of MJCF, of which none is read."""
+
+
+def test_every_element_of_mujoco_is_in_a_table() -> None:
+    """MuJoCo's own schema, whose new elements need a decision."""
+    known = {tag for tags in ELEMENTS.values() for tag in tags.split()}
+    lines = mujoco.mj_printSchema(False, False).splitlines()
+    tags = {found[1] for line in lines if (found := re.match(r"\s*(\w+) \(", line))}
+    assert len(tags) > 60
+    assert {tag for tag in tags - known if not SENSORS.fullmatch(tag)} == set()
