@@ -136,6 +136,7 @@ def test_geoms_hints_and_pairs_come_along(arm: ImportedModel, hand: ImportedMode
     assert names(both.bodies) == ["stand", "upper", "fore", "h_left", "h_right", "side"]
     assert [h.joint for h in both.actuator_hints] == [4, 2]
     assert both.excluded_pairs == {(1, 5), (3, 4)}
+    assert [str(note) for note in both.report] == ["palm: passes through what 'upper' does (dropped)"]
     box = both.geoms[1]
     assert (box.body, both.geom_links) == (1, ("upper", "h_palm"))
     assert same(P.pose(box.position, box.quaternion), P.compose(POSE, P.pose((0, 0, 0.02), (0, 0, 0, 1))))

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from anysim.assets.model import ActuatorHint, ImportedModel
+from anysim.assets.model import ActuatorHint, ImportedModel, ImportNote
 from anysim.conventions import Array
 from anysim.errors import AssetError, listing, suggest
 from anysim.kinematics import inertia
@@ -75,8 +75,18 @@ class _Attachment:
             | {self._named(k): self.part_body[b] for k, b in part.links.items()},
             actuator_hints=(*_hints(model.actuator_hints, self.joint), *_hints(part.actuator_hints, self.part_joint)),
             excluded_pairs=_pairs(model.excluded_pairs, self.body) | _pairs(part.excluded_pairs, self.part_body),
-            report=(*model.report, *part.report),
+            report=(*model.report, *part.report, *self._spread()),
         )
+
+    def _spread(self) -> list[ImportNote]:
+        """Bodies that pass through one of the two that become one, and now through both."""
+        ends = ((self.model, self.carrier, self.part, 0), (self.part, 0, self.model, self.carrier))
+        return [
+            ImportNote("dropped", other.bodies[there].name, f"passes through what '{own.bodies[here].name}' does")
+            for own, here, other, there in ends
+            if any(here in pair for pair in own.excluded_pairs)
+            and any(geom.body == there and geom.collides for geom in other.geoms)
+        ]
 
     def _frame(self, link: str) -> tuple[int, Array]:
         """The body that carries a link or frame, and where that is in the body."""
