@@ -59,6 +59,9 @@ IMAGE_BYTES = Limit(128 * MIB, "bytes", "an image file", "make the image smaller
 IMAGE_PIXELS = Limit(8192 * 8192, "pixels", "an image", "make the image smaller")
 GROUND_CELLS = Limit(4096 * 4096, "heights", "a ground or a heightfield", "use fewer rows and columns")
 ARRAY_BYTES = Limit(256 * MIB, "bytes", "an array file, packed or not,", "use fewer rows and columns")
+_FEWER = "write fewer envs into a file: snapshot.rows([...])"
+SNAPSHOT_BYTES = Limit(1024 * MIB, "bytes", "a snapshot's file", _FEWER)
+SNAPSHOT_HEADER_BYTES = Limit(32 * MIB, "bytes", "the header of a snapshot's file", _FEWER)
 POLICY_BYTES = Limit(512 * MIB, "bytes", "a policy's model file", "use a smaller model")
 
 _TABLE: Sequence[tuple[str, Sequence[Limit]]] = (
@@ -80,6 +83,7 @@ _TABLE: Sequence[tuple[str, Sequence[Limit]]] = (
     ("meshes: STL, OBJ, DAE, GLB, PLY", (MESH_BYTES, MESH_FACES, MESH_NODES, ASSET_BYTES)),
     ("images", (IMAGE_BYTES, IMAGE_PIXELS)),
     ("arrays and heightfields", (ARRAY_BYTES, GROUND_CELLS)),
+    ("snapshots and world states", (SNAPSHOT_BYTES, SNAPSHOT_HEADER_BYTES)),
     ("policies", (POLICY_BYTES,)),
 )
 

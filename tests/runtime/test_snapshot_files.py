@@ -150,6 +150,19 @@ def test_nothing_hides_beside_the_members(get, tmp_path) -> None:
             EnvSnapshot.load(wrong)
 
 
+def test_a_file_of_unreasonable_size_is_not_read_or_written(get, tmp_path, monkeypatch) -> None:
+    with (tmp_path / "a.snapshot").open("wb") as file:
+        file.truncate(1 << 40)
+    with pytest.raises(SnapshotError, match="the limit of a snapshot's file is 1,073,741,824 bytes: write fewer envs"):
+        EnvSnapshot.load(tmp_path / "a.snapshot")
+    snapshot = running(get("null", 3)).snapshot()
+    small = snapshot_file.SNAPSHOT_HEADER_BYTES._replace(value=1000)
+    monkeypatch.setattr(snapshot_file, "SNAPSHOT_HEADER_BYTES", small)
+    with pytest.raises(SnapshotError, match=r"would not be read again: it has .* header"):
+        snapshot.save(tmp_path / "b.snapshot")
+    assert not (tmp_path / "b.snapshot").exists()
+
+
 def test_a_pipe_is_no_snapshot(tmp_path) -> None:
     os.mkfifo(tmp_path / "a.snapshot")
     with pytest.raises(SnapshotError, match="is a pipe, not a file"):

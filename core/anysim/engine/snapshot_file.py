@@ -32,11 +32,10 @@ from anysim import __version__
 from anysim.conventions import Array
 from anysim.errors import SnapshotError
 from anysim_schemas.files import open_plain
+from anysim_schemas.limits import SNAPSHOT_BYTES, SNAPSHOT_HEADER_BYTES
 
 FORMAT, VERSION = "anysim-snapshot", 1
 HEADER, SEAL = "header.json", "header.sha256"
-MAX_HEADER_BYTES = 32 << 20
-"""Longer headers are refused, unread."""
 _MARK = "~"
 _KINDS = "biufSU"
 """Of numpy's types, those that arrays in a file may have."""
@@ -106,11 +105,12 @@ def write(path: str | Path, kind: str, stamp: Mapping[str, Any], data: Any) -> P
         "data": tree,
     }
     header = json.dumps(head, allow_nan=False, separators=(",", ":")).encode()
-    if len(header) > MAX_HEADER_BYTES:
-        raise SnapshotError(
-            f"{path} would have a header of {len(header):,} bytes, more than the {MAX_HEADER_BYTES:,} that are read "
-            f"again; write fewer envs into a file: snapshot.rows([...])"
-        )
+    for limit, size in (
+        (SNAPSHOT_HEADER_BYTES, len(header)),
+        (SNAPSHOT_BYTES, len(header) + sum(map(len, members.values()))),
+    ):
+        if limit.exceeded(size):
+            raise SnapshotError(f"{path} would not be read again: it {limit.sentence(size)}")
     aside = path.with_name(f".{path.name}.{os.getpid()}-{threading.get_ident()}.partial")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -138,6 +138,8 @@ def read(path: str | Path) -> Content:
     try:
         with open_plain(path) as file:
             size = file.seek(0, os.SEEK_END)
+            if SNAPSHOT_BYTES.exceeded(size):
+                raise SnapshotError(f"{path} {SNAPSHOT_BYTES.sentence(size)}")
             with zipfile.ZipFile(file) as archive:
                 return _content(path, archive, size, file)
     except OSError as error:
@@ -195,7 +197,7 @@ def _content(path: Path, archive: zipfile.ZipFile, size: int, file: IO[bytes]) -
     infos = {info.filename: info for info in archive.infolist()}
     if HEADER not in infos or SEAL not in infos:
         raise ValueError(f"it has no {HEADER} with a {SEAL}")
-    header = _member(archive, infos[HEADER], MAX_HEADER_BYTES)
+    header = _member(archive, infos[HEADER], SNAPSHOT_HEADER_BYTES.value)
     seal = _sha(header)
     if _member(archive, infos[SEAL], 64).decode() != seal:
         raise ValueError(f"{HEADER} does not have the hash in {SEAL}")
