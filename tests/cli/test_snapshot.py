@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from anysim.cli.main import app
-from anysim.engine.snapshot_file import read
+from anysim.engine.snapshots.file import read
 from anysim.errors import NameLookupError, SnapshotError
 from tests.runtime import light
 

@@ -5,7 +5,7 @@ import pytest
 
 import anysim
 from anysim.engine.base import SimEngine
-from anysim.engine.world_state import WorldState
+from anysim.engine.snapshots.world_state import WorldState
 from anysim.errors import SnapshotError
 from tests.runtime import light
 

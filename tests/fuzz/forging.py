@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from anysim.engine import snapshot_file
+from anysim.engine.snapshots import file as snapshot_file
 
 Place = tuple[Any, ...]
 """Keys and list numbers from the root of a tree to a value."""

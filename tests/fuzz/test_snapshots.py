@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from anysim.engine import snapshot_file
-from anysim.engine.snapshot_file import ENGINE, ENV, FORMAT, VERSION, WORLD, encode, made_with
+from anysim.engine.snapshots import file as snapshot_file
+from anysim.engine.snapshots.file import ENGINE, ENV, FORMAT, VERSION, WORLD, encode, made_with
+from anysim.engine.snapshots.world_state import WorldState
 from anysim.engine.state import Snapshot, stamp_of
-from anysim.engine.world_state import WorldState
 from anysim.errors import AnysimError, SnapshotError
 from anysim.task.env import TaskEnv
 from anysim.task.snapshot import EnvSnapshot

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anysim.engine import snapshot_file
-from anysim.engine.snapshot_file import decode, encode
+from anysim.engine.snapshots import file as snapshot_file
+from anysim.engine.snapshots.file import decode, encode
+from anysim.engine.snapshots.world_state import WorldState
 from anysim.engine.state import Snapshot
-from anysim.engine.world_state import WorldState
 from anysim.errors import SnapshotError
 from anysim.randomization.streams import Origin
 from anysim.task.snapshot import EnvSnapshot

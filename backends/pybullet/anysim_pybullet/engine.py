@@ -9,8 +9,8 @@ from anysim.engine.doctor import Finding, Health
 from anysim.engine.one_world.base import OneWorldPerEnv
 from anysim.engine.presence import Lifecycle
 from anysim.engine.requirements import crowded
+from anysim.engine.snapshots.row_checks import refuse_range
 from anysim.engine.state import SnapshotLevel
-from anysim.engine.untrusted.rows import refuse_range
 from anysim.model.world import World
 from anysim_pybullet import declared
 from anysim_pybullet.options import PybulletOptions

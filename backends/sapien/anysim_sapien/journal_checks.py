@@ -7,7 +7,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.engine.control import MODES
 from anysim.engine.parameters import PARAMETERS
-from anysim.engine.untrusted.rows import damaged, refuse_parameters, refuse_range, refuse_rotations
+from anysim.engine.snapshots.row_checks import damaged, refuse_parameters, refuse_range, refuse_rotations
 from anysim.errors import SnapshotError
 from anysim.model.world import BodyKind, World
 from anysim_sapien.journal import FORMAT, Op, entries

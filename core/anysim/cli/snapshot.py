@@ -22,7 +22,7 @@ def show(
 ) -> None:
     """Check a file against its hashes, and print what it belongs to and what it holds."""
     from anysim.cli.output import print_json, print_table
-    from anysim.engine.snapshot_file import made_with, read
+    from anysim.engine.snapshots.file import made_with, read
 
     content = read(file)
     if json:

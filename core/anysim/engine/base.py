@@ -22,9 +22,8 @@ from anysim.engine.parameters import APPEARANCE, PARAMETERS, Parameter, check_va
 from anysim.engine.presence import write_present
 from anysim.engine.records import below
 from anysim.engine.sensing import EngineSensing
-from anysim.engine.state import Snapshot, SnapshotLevel
-from anysim.engine.untrusted.rows import damaged, mapping_of_arrays, refuse_other_forms, refuse_parameters
-from anysim.engine.world_state import (
+from anysim.engine.snapshots.row_checks import damaged, mapping_of_arrays, refuse_other_forms, refuse_parameters
+from anysim.engine.snapshots.world_state import (
     Carried,
     Missing,
     WorldState,
@@ -32,6 +31,7 @@ from anysim.engine.world_state import (
     refuse_world_state,
     write_world_state,
 )
+from anysim.engine.state import Snapshot, SnapshotLevel
 from anysim.errors import AnysimError, CapabilityError, EngineError, listing, suggest
 from anysim.math import pose as P
 from anysim.model.index import Index

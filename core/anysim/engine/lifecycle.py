@@ -93,7 +93,7 @@ class EngineLifecycle(EngineLifetime, Primitives):
         return dict(options)
 
     @classmethod
-    def refusals(cls, world: World, options: Any) -> Sequence[str]:
+    def refusals(cls, world: World, options: object) -> Sequence[str]:
         """Why this world in particular cannot be built, beyond capabilities: a reason each. Imports nothing heavy.
 
         `options` are those that the engine will have, of type `options_model`; None of an engine without any.

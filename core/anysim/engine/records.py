@@ -10,8 +10,8 @@ from anysim.engine.cameras import CameraRig
 from anysim.engine.control import MODES, CommandBuffer
 from anysim.engine.parameters import PARAMETERS, count
 from anysim.engine.presence import Presence
+from anysim.engine.snapshots.row_checks import refuse_other_forms, refuse_range, refuse_rotations, told
 from anysim.engine.state import State
-from anysim.engine.untrusted.rows import refuse_other_forms, refuse_range, refuse_rotations, told
 from anysim.model.index import paired
 from anysim.model.world import BodyKind, World
 

@@ -34,7 +34,7 @@ def check_class(engine: type) -> None:
                 _refuse(engine, assigned, taken[assigned], f"assigns, in {name}(),")
 
 
-def check_instance(engine: object, kept: Mapping[str, Any]) -> None:
+def check_instance(engine: object, kept: Mapping[str, object]) -> None:
     """Refuse an engine that has replaced an attribute of the base classes since `kept`, its attributes then.
 
     Raises:

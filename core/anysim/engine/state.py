@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine import snapshot_file
-from anysim.engine.untrusted.rows import mapping_of_arrays
+from anysim.engine.snapshots import file as snapshot_file
+from anysim.engine.snapshots.row_checks import mapping_of_arrays
 from anysim.errors import SnapshotError, StaleStateError
 from anysim.math.arrays import array
 

@@ -12,7 +12,7 @@ from anysim.controllers.base import DEFAULT_CONTROLLER, ChannelView, Command, Co
 from anysim.controllers.robot import ControlledRobot
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
-from anysim.engine.untrusted.rows import refuse_range
+from anysim.engine.snapshots.row_checks import refuse_range
 from anysim.errors import SpecError, SpecIssue, TaskError, listing, suggest
 from anysim.managers.base import WORLD, Manager, Overridable, random_fields
 from anysim.math import arrays

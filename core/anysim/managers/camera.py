@@ -8,7 +8,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
-from anysim.engine.untrusted.rows import refuse_range
+from anysim.engine.snapshots.row_checks import refuse_range
 from anysim.errors import SpecError, SpecIssue, listing, suggest
 from anysim.managers.base import WORLD, Manager, Overridable, random_fields
 from anysim.managers.markers import paint

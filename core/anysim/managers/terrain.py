@@ -13,7 +13,7 @@ import numpy as np
 from anysim.compile.room import MAIN, ROOM
 from anysim.conventions import GROUND, WORLD, Array
 from anysim.engine.base import SimEngine
-from anysim.engine.untrusted.rows import refuse_range
+from anysim.engine.snapshots.row_checks import refuse_range
 from anysim.errors import TaskError
 from anysim.managers.base import Manager
 from anysim.model.appearance import rgb

@@ -10,7 +10,7 @@ import numpy as np
 from anysim import registry
 from anysim.conventions import Array
 from anysim.engine.control import Control
-from anysim.engine.world_state import WorldState
+from anysim.engine.snapshots.world_state import WorldState
 from anysim.errors import RecordError, listing
 from anysim.record.manifest import Manifest, read_manifest
 

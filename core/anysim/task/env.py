@@ -10,7 +10,7 @@ from anysim.controllers.action_space import ActionSpaces
 from anysim.conventions import Array
 from anysim.engine import arguments
 from anysim.engine.base import SimEngine
-from anysim.engine.untrusted.rows import damaged, refuse_range
+from anysim.engine.snapshots.row_checks import damaged, refuse_range
 from anysim.errors import AnysimError, SnapshotError, TaskError
 from anysim.hooks import Observing
 from anysim.managers.action import ActionManager

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.untrusted.rows import refuse_range
+from anysim.engine.snapshots.row_checks import refuse_range
 from anysim.randomization.draw import DelayLine, draw_rows, is_random, longest_delay, noise_rows, note_noise
 from anysim.randomization.streams import Origin, Streams
 from anysim.task.scene import SceneView

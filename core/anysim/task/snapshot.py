@@ -1,6 +1,6 @@
 """Envs at one moment, in memory and in files: what a snapshot holds, what it belongs to, and how rows are put together.
 
-A file is one container of arrays and JSON (`anysim.engine.snapshot_file`): no code is stored or run.
+A file is one container of arrays and JSON (`anysim.engine.snapshots.file`): no code is stored or run.
 """
 
 import hashlib
@@ -14,9 +14,9 @@ from typing import Any, Self
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine import snapshot_file
+from anysim.engine.snapshots import file as snapshot_file
+from anysim.engine.snapshots.row_checks import SENSIBLE, damaged, mapping_of_arrays, refuse_other_forms
 from anysim.engine.state import Snapshot, joined, joined_rows, row_numbers, stamp_of, stamp_words, stamped
-from anysim.engine.untrusted.rows import SENSIBLE, damaged, mapping_of_arrays, refuse_other_forms
 from anysim.errors import SnapshotError, listing
 from anysim.randomization.streams import Streams
 from anysim_schemas.run import RunSpec

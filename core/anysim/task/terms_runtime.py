@@ -9,7 +9,7 @@ import numpy as np
 
 from anysim import registry
 from anysim.conventions import Array
-from anysim.engine.untrusted.rows import refuse_range
+from anysim.engine.snapshots.row_checks import refuse_range
 from anysim.errors import AnysimError, SpecError, SpecIssue, TaskError
 from anysim.managers.base import Overridable
 from anysim.plugin_parameters import options_model

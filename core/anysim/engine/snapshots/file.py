@@ -4,7 +4,7 @@ The header holds everything that is no array, and for each array its member, siz
 holds the SHA-256 of the header. So one hash covers all content. Equal content gives equal bytes, and a file is refused
 that has others, so any changed byte is noticed wherever it is. Members are stored as they are, not compressed: a small
 file cannot unfold into a large one. Who knows the format can make a file with right hashes: what is in it is checked
-where it is used (`anysim.engine.untrusted.rows`).
+where it is used (`anysim.engine.snapshots.row_checks`).
 
 A file is written aside and renamed, so that under its name it is complete or it is not there.
 

@@ -6,11 +6,11 @@ import numpy as np
 
 from anysim.engine.control import MODES
 from anysim.engine.parameters import PARAMETERS
-from anysim.engine.untrusted.rows import refuse_rotations
+from anysim.engine.snapshots.row_checks import refuse_rotations
 from anysim.errors import SnapshotError
 
 if TYPE_CHECKING:
-    from anysim.engine.world_state import WorldState
+    from anysim.engine.snapshots.world_state import WorldState
 
 _ROWS = {
     "entities": {"present": ()},

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine import snapshot_file
 from anysim.engine.control import MODES
 from anysim.engine.parameters import PARAMETERS
 from anysim.engine.records import EnvRecords
+from anysim.engine.snapshots import file as snapshot_file
+from anysim.engine.snapshots.row_checks import refuse_parameters, told
+from anysim.engine.snapshots.world_state_checks import refuse_forms, refuse_values
 from anysim.engine.state import row_numbers
-from anysim.engine.untrusted.rows import refuse_parameters, told
-from anysim.engine.untrusted.world_states import refuse_forms, refuse_values
 from anysim.errors import SnapshotError, listing
 from anysim.model.index import names_of, paired_names
 from anysim.model.world import BodyKind, World

@@ -1,0 +1,1 @@
+"""Snapshots: their files, states by name for any engine, and checks of both before anything of them is written."""

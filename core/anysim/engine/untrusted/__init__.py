@@ -1,1 +1,0 @@
-"""Checks of states that come from files or from other programs, before anything of them is written."""
