@@ -292,7 +292,7 @@ def test_the_largest_mesh_of_the_catalogue_is_far_below() -> None:
 def test_no_search_is_quadratic(tmp_path: Path, name: str, data: bytes) -> None:
     tracemalloc.stop()  # it takes most of the time
     (tmp_path / name).write_bytes(data)
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(AssetError):
         meshes.visual_parts(tmp_path / name)
-    assert time.perf_counter() - start < 5.0
+    assert time.process_time() - start < 5.0

@@ -125,7 +125,7 @@ def test_pads_shapes_and_colours(panda: World) -> None:
     colors = {g.color[:3] for g in panda.geoms if g.visible}
     assert (1.0, 1.0, 1.0) in colors
     assert any(max(c) < 0.3 for c in colors)
-    assert max(len(m.faces) for m in panda.meshes) <= 2500
+    assert max(len(m.faces) for m in panda.meshes) < 7_500  # of 15,074 in its heaviest file
 
 
 def test_flags(panda: World) -> None:

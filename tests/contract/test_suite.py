@@ -78,7 +78,7 @@ def test_the_articulated_example_passes():
 DYNAMIC = {
     "mujoco": {"render: rgb", "solver settings by entity", "terrain: triangle mesh (concave)"},
     "pybullet": {"render: rgb", "solver settings by entity", "parameter world.shadows"},
-    "sapien": {"render: rgb", "parameter world.shadows"},
+    "sapien": {"render: rgb", "render: shadows", "parameter world.shadows"},
 }
 """The engines of the repository that move things, and for want of what a test of theirs may be skipped."""
 

@@ -13,8 +13,8 @@ NAN = float("nan")
 
 MISUSE = {
     # name: (what is done, the error's type, what its message must say)
-    "no-steps": (lambda e: e.step(0), EngineError, r"at least 1, got 0"),
-    "steps-backwards": (lambda e: e.step(-3), EngineError, r"at least 1, got -3"),
+    "no-steps": (lambda e: e.step(0), EngineError, r"n_steps must be (at least|from) 1"),
+    "steps-backwards": (lambda e: e.step(-3), EngineError, r"n_steps must be (at least|from) 1"),
     "env-too-high": (lambda e: e.step(env_ids=[2]), EngineError, r"env index 2 is out of range; there are 2"),
     "env-negative": (lambda e: e.reset([-1]), EngineError, r"env index -1 is out of range"),
     "env-twice": (lambda e: e.reset([1, 1]), EngineError, r"env indices repeat: \[1, 1\]"),
@@ -174,7 +174,7 @@ def test_wrong_pictures_are_refused(build, engine_class, arguments):
     if "channels" not in arguments:
         skip_without(engine_class, C.RENDER_RGB)
     engine = build(worlds.scene(), 1)
-    with pytest.raises(AnysimError, match=r"channels: rgb, depth|no camera named 'frnt'|cannot be drawn"):
+    with pytest.raises(AnysimError, match=r"channels: rgb, depth|no camera named 'frnt'|cannot be drawn|width must be"):
         engine.render(**{"camera_name": "default"} | arguments)
 
 
