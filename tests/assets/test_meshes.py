@@ -59,6 +59,40 @@ def test_the_unit_of_a_dae_is_applied(folder: Path) -> None:
     np.testing.assert_allclose(np.ptp(hull.vertices, axis=0), (0.02, 0.04, 0.06), atol=1e-7)
 
 
+@pytest.mark.parametrize(
+    "unit",
+    [
+        "<unit meter='0.01'/>",
+        '<unit meter = "0.01"></unit>',
+        '<unit name="a > b" meter="0.01"/>',
+        f'<unit name="{400 * "x"}" meter="0.01"/>',
+        '<!-- <unit meter="5"/> --><unit meter="0.01"/>',
+        '<unit meter="&#48;.01"/>',
+    ],
+)
+def test_the_unit_of_a_dae_is_read_however_it_is_written(folder: Path, unit: str) -> None:
+    path = dae(folder)
+    path.write_text(path.read_text().replace('<unit name="u" meter="1"/>', unit))
+    hull = meshes.collision_mesh(path)
+    np.testing.assert_allclose(np.ptp(hull.vertices, axis=0), (0.02, 0.04, 0.06), atol=1e-7)
+
+
+@pytest.mark.parametrize("unit", ["abc", "", "nan", "-1", "0", "inf", "0,01", "1 2", "\u00e9", 5000 * "a"])
+def test_a_unit_that_is_no_number_ends_in_a_sentence(folder: Path, unit: str) -> None:
+    path = dae(folder, unit=unit)
+    for read in (meshes.collision_mesh, meshes.whole_mesh, meshes.visual_parts):
+        with pytest.raises(AssetError, match=r"box\.dae: <unit meter='.{0,30}'> is not the number of metres") as told:
+            read(path)
+        assert "such as 0.001" in str(told.value)
+
+
+def test_a_dae_without_a_unit_is_in_metres_and_one_of_a_part_is_none(folder: Path) -> None:
+    path = dae(folder)
+    text = path.read_text().replace('<unit name="u" meter="1"/>', "")
+    path.write_text(text.replace("<library_geometries>", '<library_geometries><asset><unit meter="9"/></asset>'))
+    np.testing.assert_allclose(np.ptp(meshes.collision_mesh(path).vertices, axis=0), (2, 4, 6), atol=1e-6)
+
+
 @pytest.mark.parametrize(("up", "size"), [("Z_UP", (2, 4, 6)), ("Y_UP", (2, 6, 4)), ("X_UP", (4, 6, 2))])
 def test_the_up_axis_counts_for_objects_and_not_in_urdfs(folder: Path, up: str, size: tuple[float, ...]) -> None:
     path = dae(folder, up=up)

@@ -43,6 +43,14 @@ def plain_encoding(data: bytes) -> bool:
     return b"\0" not in data[:256] and (found is None or found[1].lower() in _ENCODINGS)
 
 
+def plain_xml(data: bytes) -> None:
+    """Raises ValueError where XML declares entities, or could hide them in its encoding."""
+    if not plain_encoding(data):
+        raise ValueError("its encoding is not UTF-8, in which XML entities could hide")
+    if b"<!ENTITY" in data:
+        raise ValueError("declares XML entities, which are not read")
+
+
 def mesh_bytes(path: Path) -> bytes:
     """The content of a mesh file whose triangles and nodes are within their limits, as far as its words say.
 
@@ -104,10 +112,7 @@ def _glb(data: bytes) -> tuple[int, int]:
 
 
 def _dae(data: bytes) -> tuple[int, int]:
-    if not plain_encoding(data):
-        raise ValueError("its encoding is not UTF-8, in which XML entities could hide")
-    if b"<!ENTITY" in data:
-        raise ValueError("declares XML entities, which are not read")
+    plain_xml(data)
     faces = sum(int(one[1][:18]) for one in _DAE_FACES.finditer(data))
     return faces, _instances(data) if b"instance_node" in data else data.count(b"<node")
 

@@ -7,13 +7,13 @@ parameters, never of the result, so that it is equal on all machines.
 import io
 import re
 from itertools import islice
-from math import inf, nan
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from anysim import cache
+from anysim.assets.collada import Declared, declared
 from anysim.assets.mesh_budget import bounded, check, mesh_bytes
 from anysim.conventions import Array
 from anysim.errors import AssetError
@@ -147,7 +147,14 @@ def _key(path: Path, *parameters: object) -> str:
         raise AssetError(f"{path}: mesh files are {', '.join(FORMATS)}; '{path.suffix}' is not known")
     data = bounded(path, MESH_BYTES)
     materials = b"".join(bounded(file, MESH_BYTES) for file in _material_files(path, data))
+    unit = _declared(path, data).metres
+    if unit != 1.0:
+        parameters = (*parameters, unit)
     return cache.digest(_VERSION, path.suffix.lower(), data, materials, *(repr(p) for p in parameters))
+
+
+def _declared(path: Path, data: bytes) -> Declared:
+    return declared(path, data) if path.suffix.lower() == ".dae" else Declared()
 
 
 def _material_files(path: Path, data: bytes) -> list[Path]:
@@ -200,29 +207,17 @@ def _load(path: Path, scale: Vec3, upright: bool) -> list[_Piece]:
         raise AssetError(f"{path}: holds no triangles")
     if not all(np.isfinite(piece.vertices).all() for piece in pieces):
         raise AssetError(f"{path}: holds vertices that are not finite")
-    unit = _unit(kind, data, path)
-    turn = np.array(scale)[:, None] * (_upright(kind, data) if upright else np.eye(3)) * unit
+    unit, up = _declared(path, data)
+    turn = np.array(scale)[:, None] * (_upright(kind, up) if upright else np.eye(3)) * unit
     flip = M.determinant(turn) < 0
     return [_Piece(M.product(v, turn.T), f[:, ::-1] if flip else f, color) for v, f, color in pieces]
 
 
-def _unit(kind: str, data: bytes, path: Path) -> float:
-    found = re.search(rb'<unit\b[^>]{0,300}\bmeter="([^"]{0,300})"', data) if kind == ".dae" else None
-    try:
-        unit = float(found.group(1)) if found else 1.0
-    except ValueError:
-        unit = nan
-    if not 0.0 < unit < inf:
-        raise AssetError(f"{path}: <unit meter=…> is not the number of metres of its unit, such as 0.001")
-    return unit
-
-
-def _upright(kind: str, data: bytes) -> Array:
-    axis = re.search(rb"<up_axis>\s*([XYZ])_UP", data) if kind == ".dae" else None
-    up = axis.group(1) if axis else b"Y" if kind in (".dae", ".glb") else b"Z"
-    if up == b"Y":
+def _upright(kind: str, up: str) -> Array:
+    """The turn (3, 3) to z up; a .glb has y up, a .dae what it declares."""
+    if kind == ".glb" or (kind == ".dae" and up == "Y"):
         return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-    if up == b"X":
+    if kind == ".dae" and up == "X":
         return np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
     return np.eye(3)
 
