@@ -1,6 +1,7 @@
 """Declared objects and what they become: entities, slots and categories."""
 
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from anysim.compile.edit import without_entity
+from anysim.compile.population import grid
 from anysim.compile.variants import counts, sizes
 from anysim.errors import AssetError, NameLookupError, SpecError
 from anysim.geometry.bounds import EntityShape
@@ -286,6 +288,26 @@ def test_instances_stand_on_a_grid_around_the_first(world: Make) -> None:
     flat = grains(world, grid=[10, 10], gap=0.01).initial_body_pose[1:, :3]
     assert np.unique(flat[:, 2].round(9)).size == 1
     assert np.ptp(flat[:, 0]) == pytest.approx(9 * 0.03)
+
+
+@pytest.mark.parametrize("columns", [(1 << 70, 2), (2, 1 << 70), (1 << 70, 1 << 70), (1 << 20, 1 << 20), (1, 10**250)])
+def test_columns_that_no_instance_stands_in_cost_nothing(world: Make, columns: tuple[int, int]) -> None:
+    """They stand as in the smallest layer that has room for as many in its middle."""
+    few = tuple(number if number < 200 else 200 + number % 2 for number in columns)
+    assert np.array_equal(grid(100, np.ones(3), columns), grid(100, np.ones(3), (few[0], few[1])))
+    assert len(grains(world, grid=list(columns)).bodies) == 101
+
+
+def test_the_layers_of_a_grid_are_filled_from_the_middle() -> None:
+    """Against all columns in the order of their distance."""
+    for nx, ny in product((1, 2, 3, 7, 30), (1, 2, 5, 30)):
+        x, y = np.meshgrid(np.arange(nx) - nx // 2, np.arange(ny) - ny // 2, indexing="ij")
+        near = np.argsort((x**2 + y**2).ravel(), kind="stable")
+        for count in (1, 3, 40, 100):
+            layer, number = np.divmod(np.arange(count), nx * ny)
+            aside = 0.25 * (layer % 2)
+            wanted = np.stack([x.ravel()[near[number]] + aside, y.ravel()[near[number]] + aside, layer], axis=1)
+            assert np.array_equal(grid(count, np.ones(3), (nx, ny)), wanted)
 
 
 def test_an_instancer_can_have_several_sources(world: Make) -> None:

@@ -37,12 +37,26 @@ def grid(count: int, cell: Array, columns: tuple[int, int] | None = None) -> Arr
     """
     side = max(1, round(count ** (1 / 3)))
     nx, ny = columns or (side, ceil(count / (side * side)))
-    x, y = (index.ravel() for index in np.meshgrid(np.arange(nx), np.arange(ny), indexing="ij"))
-    layer = np.stack([x - nx // 2, y - ny // 2], axis=1).astype(float)
-    order = np.argsort((layer**2).sum(axis=1), kind="stable")
+    layer = _middle_of_layer(count, nx, ny)
     number = np.arange(count)
     height = (number // len(layer))[:, None]
-    return np.concatenate([layer[order][number % len(layer)] + 0.25 * (height % 2), height], axis=1) * cell
+    return np.concatenate([layer[number % len(layer)] + 0.25 * (height % 2), height], axis=1) * cell
+
+
+def _middle_of_layer(count: int, nx: int, ny: int) -> Array:
+    """The `count` columns (≤ count, 2) nearest the middle of a layer of nx by ny, nearest first; all if it has fewer.
+
+    Time and memory are those of `count`, whatever the layer has: only a square around the middle is looked at, and it
+    grows until the circle within holds enough.
+    """
+    half = 1
+    while True:
+        x, y = (np.arange(max(-(n // 2), -half), min(n - n // 2 - 1, half) + 1) for n in (nx, ny))
+        square = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2).astype(float)
+        away = (square**2).sum(axis=1)
+        if len(square) == nx * ny or (away <= half**2).sum() >= count:
+            return square[np.argsort(away, kind="stable")[:count]]
+        half *= 2
 
 
 def instanced(
