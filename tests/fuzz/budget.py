@@ -35,7 +35,8 @@ def within(seconds: float = SECONDS, size: int = BYTES) -> Iterator[None]:
     """Run the body in this process within a time [s] and a growth of memory [bytes].
 
     Raises:
-        OverBudgetError: it took longer, and was interrupted, or its peak of resident memory grew by more.
+        OverBudgetError: it took longer, and was interrupted, or its peak of resident memory grew by more; also where
+            the body made an error of its own of the interrupt, as what tells of a plugin's faults does.
     """
 
     def late(*_: object) -> None:
@@ -55,9 +56,13 @@ def within(seconds: float = SECONDS, size: int = BYTES) -> Iterator[None]:
         signal.signal(signal.SIGALRM, handler)
         resource.setrlimit(resource.RLIMIT_AS, limits)
         faulthandler.cancel_dump_traceback_later()
-    if (took := time.monotonic() - began) > seconds:  # somebody caught the interrupt
-        raise OverBudgetError(f"took {took:.1f} s")
-    if (grown := _status("VmHWM") - before) > size:
+        _spent(time.monotonic() - began, seconds, _status("VmHWM") - before, size)
+
+
+def _spent(took: float, seconds: float, grown: int, size: int) -> None:
+    if took > seconds:
+        raise OverBudgetError(f"took more than {seconds:g} s: {took:.2f} s")
+    if grown > size:
         raise OverBudgetError(f"took {grown / (1 << 20):.0f} MiB")
 
 

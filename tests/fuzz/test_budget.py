@@ -33,8 +33,23 @@ def test_an_interrupt_that_was_caught_still_counts() -> None:
         except BaseException:  # noqa: BLE001
             return
 
-    with pytest.raises(OverBudgetError, match=r"took 0\.\d s"), within(0.1):
+    with pytest.raises(OverBudgetError, match=r"took more than 0.1 s: 0\.\d+ s"), within(0.1):
         stubborn()
+
+
+def test_an_interrupt_of_which_an_error_was_made_is_no_refusal() -> None:
+    """As `anysim.registry.Blame` makes one of whatever comes out of a plugin."""
+
+    def blaming() -> None:
+        try:
+            _busy(1.0)
+        except BaseException as error:
+            raise TaskError("the plugin failed") from error
+
+    tally = Tally("calls", 0.1)
+    tally.run("blaming", blaming)
+    assert (tally.refused, len(tally.faults)) == (0, 1)
+    assert "blaming: OverBudgetError: took more than 0.1 s" in tally.faults[0]
 
 
 def test_inputs_are_counted() -> None:
