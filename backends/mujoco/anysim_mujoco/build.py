@@ -61,18 +61,6 @@ def initial_row(world: World, model: Any, layout: Layout) -> Array:
     return row
 
 
-def silence() -> None:
-    """Keep MuJoCo from writing MUJOCO_LOG.TXT into the working directory, and to the terminal, in this process.
-
-    Faults are in `State.fault`, compile errors are exceptions. A log file of another name was
-    somebody's choice and stays.
-    """
-    config = mujoco.MjLogConfig.get()
-    config.logto_console = False
-    config.logto_file = config.logto_file and config.logfile != "MUJOCO_LOG.TXT"
-    mujoco.MjLogConfig.set(config)
-
-
 def body_name(world: World, body: int) -> str:
     """The name of a body in the MjSpec: its own, but for one called `world`, which is taken."""
     name = "world" if body == WORLD else world.bodies[body].name

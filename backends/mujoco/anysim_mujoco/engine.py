@@ -19,8 +19,8 @@ from anysim.math import pose as P
 from anysim.model.world import World
 from anysim_mujoco import declared
 from anysim_mujoco.audit import geom_volumes, joint_limits
-from anysim_mujoco.build import silence
 from anysim_mujoco.carry import carried_rows, take_rows
+from anysim_mujoco.log import silence
 from anysim_mujoco.options import MujocoOptions
 from anysim_mujoco.parameters import Parameters
 from anysim_mujoco.raw import raw_loop

@@ -57,6 +57,33 @@ def test_a_fault_writes_no_log_and_no_word(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+NAN = '<mujoco><worldbody><body name="it"><geom size="0.1" {}/></body></worldbody></mujoco>'
+
+
+@pytest.mark.parametrize("attribute", ['pos="nan 0 0"', 'mass="nan"', 'rgba="1 1 1 nan"', 'user="nan"'])
+def test_a_file_with_nan_leaves_no_log_and_no_word(tmp_path, attribute):
+    """Read by the importer and by what robots are held against; no engine was made before."""
+    (tmp_path / "it.xml").write_text(NAN.format(attribute))
+    done = _run(
+        """
+    from pathlib import Path
+    from anysim.assets.load import import_asset
+    from anysim.errors import AnysimError
+    from anysim_mujoco.oracle import Mjcf
+    file = Path("it.xml").resolve()
+    for read in (lambda: import_asset(str(file)), lambda: Mjcf(file, file.parent)):
+        try:
+            read()
+        except AnysimError:
+            pass
+    """,
+        tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout + done.stderr == ""
+    assert [path.name for path in tmp_path.iterdir()] == ["it.xml"]
+
+
 @pytest.mark.parametrize("ending", ["", "engine.destroy()", "os._exit is None", "raise SystemExit(0)"])
 def test_drawing_leaves_the_environment_and_the_exit_clean(tmp_path, ending):
     """No environment variable is set, and no traceback comes out of a destructor at exit."""

@@ -10,6 +10,7 @@ import mujoco
 from anysim.assets.mesh_budget import bounded
 from anysim.assets.model import ImportNote
 from anysim.errors import AssetError, listing, suggest
+from anysim_mujoco.log import silence
 from anysim_mujoco.mjcf import unheld
 from anysim_mujoco.mjcf.budget import MjcfBudget
 from anysim_schemas.limits import MODEL_BYTES
@@ -25,6 +26,7 @@ def compiled(path: Path, root: Path, body: str = "", notes: list[ImportNote] | N
     Raises:
         AssetError: a missing file, a reference that leaves `root`, no such body, or what MuJoCo says against the file.
     """
+    silence()  # MuJoCo logs each NaN of a file; where one matters, the World refuses it
     path, root = path.resolve(), root.resolve()
     budget = MjcfBudget(path, root)
     try:
