@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 
 from anysim import registry
 from anysim.assets.mesh_budget import bounded
-from anysim.assets.model import ImportedModel
+from anysim.assets.model import ImportedModel, strange_number
 from anysim.assets.procedural import from_uri
 from anysim.assets.urdf import import_urdf
 from anysim.assets.uri import locate, locate_folder
@@ -48,9 +48,16 @@ def import_asset(
     URIs, of packages that a URDF refers to as `package://NAME/…`.
 
     Raises:
-        AssetError: see `model_file`, `anysim.assets.uri.locate_folder` and the importers.
+        AssetError: see `model_file`, `anysim.assets.uri.locate_folder` and the importers; a number that is none.
         PluginError: no importer for the format is installed.
     """
+    model = _read(uri, base, scale, packages)
+    if found := strange_number(model):
+        raise AssetError(f"{uri}: {found}; write a finite number (limits may be infinite)")
+    return model
+
+
+def _read(uri: str, base: Path | None, scale: float, packages: Mapping[str, str]) -> ImportedModel:
     if uri.startswith(PROCEDURAL):
         return from_uri(uri, scale=scale)
     file = model_file(uri, base=base)

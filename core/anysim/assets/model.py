@@ -5,8 +5,9 @@ puts it into a World under an entity's name. Importers of other formats are entr
 `anysim.importers`, functions with the signature of `Importer`.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from math import isinf, isnan
 from pathlib import Path
 from typing import Literal, NamedTuple, Protocol
 
@@ -81,6 +82,37 @@ class ImportedModel:
 def noted(model: ImportedModel, *notes: ImportNote) -> ImportedModel:
     """The model with more to know of it."""
     return replace(model, report=(*model.report, *notes))
+
+
+_MAY_BE_INFINITE = frozenset({"lower", "upper", "velocity_limit", "effort_limit"})
+
+
+def strange_number(model: ImportedModel) -> str:
+    """The first number of a model that is none, in words such as `joint 'elbow': its damping is nan`; empty if all are.
+
+    Only limits may be infinite. Arrays of meshes and heights are not looked at: who makes them does.
+    """
+    named = {"body": model.bodies, "joint": model.joints, "geom": model.geoms, "site": model.sites}
+    for kind, parts in named.items():
+        for number, part in enumerate(parts):
+            for name, value in _strange(part):
+                return f"{kind} '{part.name or number}': its {name} is {value}"
+    for hint in model.actuator_hints:
+        for name, value in _strange(hint):
+            return f"the drive of joint '{model.joints[hint.joint].name}': its {name} is {value}"
+    return ""
+
+
+def _strange(part: object, name: str = "value") -> Iterator[tuple[str, float]]:
+    if isinstance(part, float):
+        if isnan(part) or (isinf(part) and name not in _MAY_BE_INFINITE):
+            yield name, part
+    elif isinstance(part, tuple):
+        for key, value in zip(getattr(part, "_fields", (name,) * len(part)), part, strict=True):
+            yield from _strange(value, key)
+    elif is_dataclass(part):
+        for one in fields(part):
+            yield from _strange(getattr(part, one.name), one.name)
 
 
 class Importer(Protocol):

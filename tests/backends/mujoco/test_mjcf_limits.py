@@ -1,12 +1,17 @@
 """MJCF that reaches outside of its root, or unfolds to far more than it is, is refused before MuJoCo reads it."""
 
+import re
 import struct
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
+from math import inf
 from pathlib import Path
 
 import pytest
 
+from anysim.assets.load import import_asset
+from anysim.assets.model import strange_number
 from anysim.errors import AssetError
 from anysim_mujoco.mjcf.budget import MjcfBudget
 from anysim_mujoco.mjcf.load import import_mjcf
@@ -177,3 +182,36 @@ def test_what_is_attached_is_mjcf(root: Path) -> None:
 def test_memory_for_a_simulation_is_not_set_aside(root: Path) -> None:
     (root / "model.xml").write_text(f'<mujoco><size memory="900G"/>{world(BODY)}</mujoco>')
     assert len(import_mjcf(root / "model.xml", root=root).bodies) == 1
+
+
+@pytest.mark.parametrize(
+    ("inner", "words"),
+    [
+        ('<geom size="0.1" pos="nan 0 0"/>', "geom 'it.collision0': its position is nan"),
+        ('<geom size="0.1" friction="1 nan 0"/>', "geom 'it.collision0': its torsional_friction is nan"),
+        ('<geom size="0.1" rgba="1 nan 1 1"/>', "geom 'it.collision0': its color is nan"),
+        ('<joint axis="nan 0 1"/><geom size="0.1"/>', "is nan"),
+        ('<joint name="turn" damping="nan"/><geom size="0.1"/>', "joint 'turn': its damping is nan"),
+        ('<joint name="turn" armature="inf"/><geom size="0.1"/>', "joint 'turn': its armature is inf"),
+        ('<joint name="turn" frictionloss="nan"/><geom size="0.1"/>', "joint 'turn': its friction is nan"),
+        ('<geom size="0.1"/><site name="tip" pos="0 nan 0"/>', "site 'tip': its position is nan"),
+    ],
+)
+def test_a_number_that_is_none_does_not_enter_a_world(root: Path, inner: str, words: str) -> None:
+    """MuJoCo compiles it, with a warning in its log."""
+    (root / "it.xml").write_text(f'<mujoco><worldbody><body name="it">{inner}</body></worldbody></mujoco>')
+    with pytest.raises(AssetError, match=re.escape(words)):
+        import_asset("it.xml", base=root)
+
+
+def test_limits_may_be_infinite_and_drives_are_named(root: Path) -> None:
+    text = """<mujoco><worldbody><body name="it"><joint name="turn"/><geom size="0.1"/></body></worldbody>
+        <actuator><position joint="turn" kp="5" kv="{}" forcerange="-3 3"/></actuator></mujoco>"""
+    (root / "it.xml").write_text(text.format("1"))
+    model = import_asset("it.xml", base=root)
+    assert model.joints[0].upper == inf
+    assert strange_number(model) == ""
+    hints = (model.actuator_hints[0]._replace(effort_limit=inf),)
+    assert strange_number(replace(model, actuator_hints=hints)) == ""
+    hints = (model.actuator_hints[0]._replace(kp=inf),)
+    assert strange_number(replace(model, actuator_hints=hints)) == "the drive of joint 'turn': its kp is inf"
