@@ -138,7 +138,8 @@ def resolve_reference(
             places = listing(dict.fromkeys(str(folder) for _, folder in folders), 4)
             raise AssetError(
                 f"{asked_by} refers to '{reference}', and there is no package '{package}' (looked for: {places}); "
-                f"say where it is: `packages: {{{package}: FOLDER}}`, or in ROS_PACKAGE_PATH"
+                f"say where it is: `packages: {{{package}: FOLDER}}` beside the source, or in ROS_PACKAGE_PATH; "
+                f"`anysim robot import` takes --package {package}=FOLDER"
             )
     else:
         raise AssetError(f"{asked_by} refers to '{reference}': only package://, model://, file:// and paths are known")

@@ -1,11 +1,15 @@
 """`anysim robot` and `anysim gallery`."""
 
 import json
+import re
 import shutil
 from pathlib import Path
 
 import pytest
 
+from anysim.assets.catalogue import load_robot
+from anysim.assets.load import import_asset
+from anysim_robots.drafting.draft import draft
 from tests.cli.test_cli import anysim
 
 ARM = Path(__file__).parents[2] / "external" / "anysim-thirdarm" / "anysim_thirdarm"
@@ -61,6 +65,65 @@ def test_a_draft_is_written_into_the_current_folder_and_not_beside_the_model(tmp
     assert json.loads(made.stdout)["file"] == "new_arm.yaml"
     assert [path.name for path in theirs.iterdir()] == ["new_arm.urdf"]
     assert f"source: {theirs / 'new_arm.urdf'}" in (mine / "new_arm.yaml").read_text()
+
+
+TETRAHEDRON = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+@pytest.fixture
+def elsewhere(tmp_path: Path) -> Path:
+    """A folder with an arm, one of whose meshes is in a package in another folder."""
+    text = (ARM / "third_arm.urdf").read_text()
+    shape = re.search(r"<(?:box|cylinder|sphere) [^>]*/>", text)
+    assert shape is not None
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "far" / "away").mkdir(parents=True)
+    (tmp_path / "far" / "away" / "tetra.obj").write_text(TETRAHEDRON)
+    mesh = '<mesh filename="package://nice_meshes/tetra.obj"/>'
+    (tmp_path / "mine" / "new_arm.urdf").write_text(text.replace(shape[0], mesh))
+    return tmp_path / "mine"
+
+
+def test_a_package_that_is_elsewhere_can_be_named(elsewhere: Path) -> None:
+    """The error says how, and the draft has it."""
+    lost = anysim("robot", "import", "new_arm.urdf", cwd=elsewhere)
+    assert lost.returncode == 2
+    assert "--package nice_meshes=FOLDER" in lost.stderr
+    made = anysim("robot", "import", "new_arm.urdf", "--package", "nice_meshes=../far/away", "--json", cwd=elsewhere)
+    assert made.returncode == 0, made.stderr
+    audits = json.loads(made.stdout)["audit"].values()
+    assert audits
+    assert all(words.startswith("audit: passed") for words in audits), audits
+    assert load_robot(str(elsewhere / "new_arm.yaml")).spec.packages == {
+        "nice_meshes": str(elsewhere.parent / "far" / "away")
+    }
+    assert "source: new_arm.urdf\n" in (elsewhere / "new_arm.yaml").read_text()
+
+
+def test_a_package_below_the_draft_is_named_as_it_lies(elsewhere: Path) -> None:
+    below = (elsewhere.parent / "far").rename(elsewhere / "far") / "away"
+    made = draft(elsewhere / "new_arm.urdf", packages={"nice_meshes": below, "unused": elsewhere.parent})
+    assert f"packages:\n  nice_meshes: far/away\n  unused: {elsewhere.parent}\n" in made.text(elsewhere)
+    (elsewhere / "new_arm.yaml").write_text(made.text(elsewhere))
+    entry = load_robot(str(elsewhere / "new_arm.yaml"))
+    assert import_asset(entry.spec.source, base=entry.file.parent, packages=entry.spec.packages).meshes
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (["nice_meshes"], "expected NAME=FOLDER"),
+        (["=far"], "expected NAME=FOLDER"),
+        (["nice_meshes=nowhere"], "there is no folder nowhere"),
+        (["a=.", "a=.."], "a is . already"),
+    ],
+)
+def test_a_package_that_is_none_ends_in_a_sentence(elsewhere: Path, given: list[str], words: str) -> None:
+    options = [word for one in given for word in ("--package", one)]
+    refused = anysim("robot", "import", "new_arm.urdf", *options, cwd=elsewhere)
+    assert refused.returncode == 2
+    assert words in " ".join(refused.stderr.split())
+    assert not (elsewhere / "new_arm.yaml").exists()
 
 
 @pytest.mark.slow

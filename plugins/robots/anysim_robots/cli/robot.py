@@ -94,6 +94,23 @@ def _engines(text: str | None) -> list[str]:
     return [part.strip() for part in text.split(",") if part.strip()]
 
 
+def _packages(given: list[str]) -> dict[str, Path]:
+    """Folders by name, of `NAME=FOLDER`."""
+    from anysim.errors import AnysimError
+
+    found: dict[str, Path] = {}
+    for words in given:
+        name, _, folder = words.partition("=")
+        if not name or not folder:
+            raise AnysimError(f"--package {words}: expected NAME=FOLDER, such as my_meshes=../my_meshes")
+        if name in found:
+            raise AnysimError(f"--package {words}: {name} is {found[name]} already; give each package once")
+        if not Path(folder).is_dir():
+            raise AnysimError(f"--package {words}: there is no folder {folder}; it is the one with what follows NAME/")
+        found[name] = Path(folder)
+    return found
+
+
 @app.command("import")
 def import_(
     file: Annotated[
@@ -104,6 +121,12 @@ def import_(
     ] = None,
     name: Annotated[
         str | None, typer.Option("--name", help="Its name in the catalogue; default that of the file.")
+    ] = None,
+    package: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=FOLDER", help="Where the package is that a URDF calls package://NAME/…; may be given again."
+        ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
     json: AsJson = False,
@@ -117,6 +140,7 @@ def import_(
     Examples:
       anysim robot import my_arm.urdf
       anysim robot import robot.xml --out my_robot.yaml --name my_robot
+      anysim robot import my_arm.urdf --package my_meshes=../my_meshes
     """
     from anysim.assets.catalogue import load_robot
     from anysim.cli.output import print_json
@@ -124,7 +148,7 @@ def import_(
     from anysim_robots.cli.robot_work import audited
     from anysim_robots.drafting.draft import draft
 
-    made = draft(file, name)
+    made = draft(file, name, _packages(package or []))
     target = out or Path(f"{made.name}.yaml")  # never beside the model: that is somebody else's folder
     if target.exists() and not force:
         raise AnysimError(f"there is a file {target} already; give another --out, or --force to replace it")

@@ -1,8 +1,10 @@
 """A draft of a catalogue entry as YAML that loads and builds, with comments where a person has to decide."""
 
 import re
+from collections.abc import Mapping
 from math import inf, isinf
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 from anysim.assets.load import import_asset, split_body
@@ -16,7 +18,10 @@ NO_LICENCE = "LicenseRef-TODO"
 
 
 class Draft(NamedTuple):
-    """What is known of a model. `open` is what nobody but a person can say; `notes` are the importer's."""
+    """What is known of a model. `open` is what nobody but a person can say; `notes` are the importer's.
+
+    `packages` are the folders of what the file refers to as `package://NAME/…`, absolute, by NAME.
+    """
 
     name: str
     file: Path
@@ -25,6 +30,7 @@ class Draft(NamedTuple):
     gains: dict[str, Gains]
     open: tuple[str, ...]
     notes: tuple[str, ...]
+    packages: Mapping[str, Path] = MappingProxyType({})
 
     def text(self, folder: Path) -> str:
         """The YAML, for a file in this folder."""
@@ -33,7 +39,7 @@ class Draft(NamedTuple):
     # ------------------------------------------------------------------ parts of the file
 
     def _head(self, folder: Path) -> list[str]:
-        g, source = self.guess, _source(self.file, folder)
+        g, source = self.guess, _source(self.file, folder, self.packages)
         lines = [f"# Draft of {self.file.name}, made by `anysim robot import`. What begins with TODO needs a person."]
         lines += [f"# TODO {words}" for words in self.open]
         lines += [f"# Importer: {' '.join(words.split())}" for words in self.notes]
@@ -42,6 +48,7 @@ class Draft(NamedTuple):
             f"name: {self.name}",
             f"description: {len(self.model.joints)} joints, from {self.file.name}  # TODO one line for people",
             f"source: {_quoted(source)}",
+            *self._packages(folder),
             f"license: {NO_LICENCE}",
             "license_source: TODO",
             f"category: {g.category}",
@@ -49,6 +56,17 @@ class Draft(NamedTuple):
             f"base: {'floating' if g.floating else 'fixed'}",
             *([f"base_height: {g.base_height}  # lowest shape at the initial joint positions"] if g.floating else []),
         ]
+
+    def _packages(self, folder: Path) -> list[str]:
+        """The folders below that of the file as they lie there, all others absolute."""
+        if not self.packages:
+            return []
+        folder = folder.resolve()
+        places = {
+            name: str(place.relative_to(folder) if place.is_relative_to(folder) else place)
+            for name, place in self.packages.items()
+        }
+        return ["packages:", *(f"  {_quoted(name)}: {_quoted(place)}" for name, place in places.items())]
 
     def _channels(self) -> list[str]:
         g = self.guess
@@ -140,28 +158,32 @@ class Draft(NamedTuple):
         return lines
 
 
-def draft(file: Path, name: str | None = None) -> Draft:
+def draft(file: Path, name: str | None = None, packages: Mapping[str, Path] = MappingProxyType({})) -> Draft:
     """Look at a model file.
 
     Args:
         file: URDF or MJCF; `FILE.xml#BODY` for one of several bodies.
         name: in the catalogue; that of the body or the file where not given.
+        packages: folders of what a URDF refers to as `package://NAME/…`, by NAME.
 
     Raises:
-        AssetError: there is no such file, or it cannot be imported.
+        AssetError: there is no such file or folder, or it cannot be imported.
     """
     whole, body = split_body(str(file))
     if not Path(whole).is_file():
         raise AssetError(f"there is no file {whole}; `anysim robot import` takes a URDF or MJCF file")
     path = file.resolve()
-    model = import_asset(str(path))
+    folders = {package: folder.resolve() for package, folder in packages.items()}
+    model = import_asset(str(path), packages=_named(folders))
     found = guess(model)
     legs = frozenset(joint for leg in found.legs for joint in leg.joints)
     chosen = re.sub(r"\W+", "_", name or body or path.stem).strip("_").lower()
     if not chosen or not chosen[0].isalpha():
         chosen = f"robot_{chosen}".rstrip("_")
     notes = tuple(str(note) for note in model.report)
-    return Draft(chosen, path, model, found, gains(model, found.floating, legs), tuple(_open(model, found)), notes)
+    return Draft(
+        chosen, path, model, found, gains(model, found.floating, legs), tuple(_open(model, found)), notes, folders
+    )
 
 
 def _open(model: ImportedModel, found: Guess) -> list[str]:
@@ -207,13 +229,17 @@ def _limit(model: ImportedModel, joint: Joint) -> float | None:
     return limit if 0 < limit < inf else None
 
 
-def _source(file: Path, folder: Path) -> str:
+def _named(packages: Mapping[str, Path]) -> dict[str, str]:
+    return {name: str(folder) for name, folder in packages.items()}
+
+
+def _source(file: Path, folder: Path, packages: Mapping[str, Path]) -> str:
     """The file as the entry names it: relative where all that it refers to is below, else absolute."""
     folder = folder.resolve()
     if file.is_relative_to(folder):
         relative = str(file.relative_to(folder))
         try:
-            import_asset(relative, base=folder)
+            import_asset(relative, base=folder, packages=_named(packages))
         except AssetError:
             return str(file)
         return relative
