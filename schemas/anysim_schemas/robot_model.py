@@ -152,6 +152,10 @@ class RobotModelSpec(Spec):
     )
     params: dict[str, Any] = Field(default_factory=dict, description="parameters of a procedural source")
     packages: dict[str, str] = Field(default_factory=dict, description=PACKAGES)
+    visual_error: NonNegative | None = Field(
+        default=None,
+        description="[m] that 99 % of its looks may be off, in every world; that of the world where not given",
+    )
     needs: str | None = Field(
         default=None, description="the package to install for it, where that is not a dependency: `pip install NEEDS`"
     )

@@ -4,7 +4,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from anysim_schemas.base import Integer, Name, Spec
+from anysim_schemas.base import Integer, Name, NonNegative, Spec
 from anysim_schemas.cameras import CameraSpec
 from anysim_schemas.collisions import CollisionsSpec
 from anysim_schemas.contact_sensors import ContactSensorSpec
@@ -41,6 +41,10 @@ class WorldSpec(Spec):
     scenery: ScenerySpec = Field(default=ScenerySpec(), description="background, ambient light and shadows")
     contact_sensors: dict[Name, ContactSensorSpec] = Field(default_factory=dict, description="contact sensors by name")
     collisions: CollisionsSpec = Field(default=CollisionsSpec(), description="what passes through what")
+    visual_error: NonNegative | None = Field(
+        default=None,
+        description="[m] that 99 % of what meshes look like may be off; 0 keeps every triangle, 0.002 where not given",
+    )
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> Self:

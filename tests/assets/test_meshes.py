@@ -5,11 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+import yaml
 
 from anysim import cache
 from anysim.assets import meshes
+from anysim.compile.world import compile_world
 from anysim.errors import AssetError
 from anysim.geometry.tessellate import convex_hull
+from anysim_schemas.run import WorldSpec
 
 
 @pytest.fixture(autouse=True)
@@ -125,6 +128,37 @@ def test_colours_are_kept_apart_and_merged_when_many(folder: Path) -> None:
     np.testing.assert_allclose(reds, np.arange(6) / 10, atol=1 / 255)
     assert sum(len(part.mesh.faces) for part in parts) == 24
     assert len(parts[-1].mesh.faces) == 3 + 2 * 3  # the three rarest colours joined the nearest
+
+
+def test_a_world_and_a_catalogue_entry_say_how_far_looks_may_be_off(folder: Path) -> None:
+    write(folder / "ball.stl", trimesh.creation.icosphere(5, 0.1))
+    (folder / "ball.urdf").write_text(
+        '<robot name="b"><link name="b"><visual><geometry><mesh filename="ball.stl"/></geometry></visual></link>'
+        '<link name="c"><inertial><mass value="1"/>'
+        '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+        '</link><joint name="j" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/>'
+        '<limit lower="-1" upper="1" effort="9" velocity="1"/></joint></robot>'
+    )
+    entry = {"name": "b", "description": "a ball", "source": "ball.urdf", "license": "MIT", "license_source": "here"}
+    entry |= {
+        "category": "arm",
+        "base": "fixed",
+        "home": {"j": 0.0},
+        "channels": {"arm": {"joints": ["j"], "gains": {"kp": 1.0, "kd": 1.0}}},
+    }
+    for name, more in (("follows", {}), ("coarse", {"visual_error": 0.01}), ("whole", {"visual_error": 0})):
+        (folder / f"{name}.yaml").write_text(yaml.safe_dump({**entry, **more}))
+
+    def faces(robot: str, **world: object) -> int:
+        spec = {"robots": {"b": {"robot": str(folder / f"{robot}.yaml")}}, **world}
+        (mesh,) = compile_world(WorldSpec.model_validate(spec)).meshes
+        return len(mesh.faces)
+
+    assert (
+        faces("follows") <= 3_000 < faces("follows", visual_error=0.0001) < faces("follows", visual_error=0) == 20_480
+    )
+    assert faces("coarse") == faces("coarse", visual_error=0) <= 3_000
+    assert faces("whole") == 20_480
 
 
 def test_the_material_file_is_part_of_the_hash(folder: Path) -> None:

@@ -14,6 +14,7 @@ from typing import Literal, NamedTuple
 
 from anysim import registry
 from anysim.assets.mesh_budget import bounded
+from anysim.assets.meshes import VISUAL_ERROR
 from anysim.assets.model import ImportedModel, strange_number
 from anysim.assets.procedural import from_uri
 from anysim.assets.urdf import import_urdf
@@ -40,33 +41,40 @@ class ModelFile(NamedTuple):
 
 
 def import_asset(
-    uri: str, *, base: Path | None = None, scale: float = 1.0, packages: Mapping[str, str] = MappingProxyType({})
+    uri: str,
+    *,
+    base: Path | None = None,
+    scale: float = 1.0,
+    packages: Mapping[str, str] = MappingProxyType({}),
+    visual_error: float = VISUAL_ERROR,
 ) -> ImportedModel:
     """The model behind a URI. `.urdf` is read here; `.xml` and `.mjcf` by the installed importer named `mjcf`.
 
     `procedural:NAME` is built by the installed builder, with its default parameters. `packages` are the folders, as
-    URIs, of packages that a URDF refers to as `package://NAME/…`.
+    URIs, of packages that a URDF refers to as `package://NAME/…`. `visual_error` [m] is how far its looks may be off.
 
     Raises:
         AssetError: see `model_file`, `anysim.assets.uri.locate_folder` and the importers; a number that is none.
         PluginError: no importer for the format is installed.
     """
-    model = _read(uri, base, scale, packages)
+    model = _read(uri, base, scale, packages, visual_error)
     if found := strange_number(model):
         raise AssetError(f"{uri}: {found}; write a finite number (limits may be infinite)")
     return model
 
 
-def _read(uri: str, base: Path | None, scale: float, packages: Mapping[str, str]) -> ImportedModel:
+def _read(
+    uri: str, base: Path | None, scale: float, packages: Mapping[str, str], visual_error: float
+) -> ImportedModel:
     if uri.startswith(PROCEDURAL):
         return from_uri(uri, scale=scale)
     file = model_file(uri, base=base)
     if file.kind == "urdf":
         folders = {name: locate_folder(folder, base=base).path for name, folder in packages.items()}
-        return import_urdf(file.path, root=file.root, scale=scale, packages=folders)
+        return import_urdf(file.path, root=file.root, scale=scale, packages=folders, visual_error=visual_error)
     importer = registry.load("importers", file.kind)
     with registry.using("importers", file.kind):
-        return importer(file.path, root=file.root, scale=scale, body=file.body)
+        return importer(file.path, root=file.root, scale=scale, body=file.body, visual_error=visual_error)
 
 
 def split_body(uri: str) -> tuple[str, str]:

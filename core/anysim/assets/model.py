@@ -118,9 +118,13 @@ def _strange(part: object, name: str = "value") -> Iterator[tuple[str, float]]:
 class Importer(Protocol):
     """Reads one file. `root` is the folder that no reference in the file may leave; `scale` multiplies all lengths.
 
+    `visual_error` [m] is how far what is only looked at may be off, `anysim.assets.meshes.light_mesh` keeps it.
+
     `body` names one of several trees in the file, all others and what refers to them stay behind; empty: there is one.
     Masses scale with the cube of `scale` and inertias with its fifth power (the density stays). Raises AssetError for a
     file that is missing or holds what the neutral model cannot say, naming the file and the element.
     """
 
-    def __call__(self, path: Path, *, root: Path, scale: float = 1.0, body: str = "") -> ImportedModel: ...
+    def __call__(
+        self, path: Path, *, root: Path, scale: float = 1.0, body: str = "", visual_error: float = ...
+    ) -> ImportedModel: ...

@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from anysim.assets.meshes import VISUAL_ERROR
 from anysim.assets.model import ImportedModel, ImportNote
 from anysim.assets.urdf_geometry import GeometryReader
 from anysim.assets.urdf_xml import InertialElement, JointElement, UrdfFile
@@ -39,26 +40,33 @@ _IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 
 
 def import_urdf(
-    path: Path, *, root: Path, scale: float = 1.0, packages: Mapping[str, Path] = MappingProxyType({})
+    path: Path,
+    *,
+    root: Path,
+    scale: float = 1.0,
+    packages: Mapping[str, Path] = MappingProxyType({}),
+    visual_error: float = VISUAL_ERROR,
 ) -> ImportedModel:
     """Read a URDF file; see `anysim.assets.model.Importer` for the arguments, `resolve_reference` for `packages`.
 
     Raises:
         AssetError: a missing or damaged file or mesh, or something the neutral model cannot say.
     """
-    return _UrdfImport(UrdfFile(path), root, scale, packages).run()
+    return _UrdfImport(UrdfFile(path), root, scale, packages, visual_error).run()
 
 
 class _UrdfImport:
     """One import: walks the tree once, depth first, children in source order."""
 
-    def __init__(self, file: UrdfFile, root: Path, scale: float, packages: Mapping[str, Path]) -> None:
+    def __init__(
+        self, file: UrdfFile, root: Path, scale: float, packages: Mapping[str, Path], visual_error: float
+    ) -> None:
         self.file, self.scale = file, scale
         self.notes: list[ImportNote] = [*file.unheld]
         self.links = file.links
         self.children: dict[str, list[JointElement]] = {name: [] for name in self.links}
         self.base = self._structure()
-        self.geometry = GeometryReader(file, root, scale, packages, self.notes)
+        self.geometry = GeometryReader(file, root, scale, packages, visual_error, self.notes)
         self.bodies: list[Body] = []
         self.inertials: list[list[Inertial]] = []
         self.joints: list[Joint] = []

@@ -29,9 +29,16 @@ class GeometryReader:
     """
 
     def __init__(
-        self, file: UrdfFile, root: Path, scale: float, packages: Mapping[str, Path], notes: list[ImportNote]
+        self,
+        file: UrdfFile,
+        root: Path,
+        scale: float,
+        packages: Mapping[str, Path],
+        visual_error: float,
+        notes: list[ImportNote],
     ) -> None:
         self._file, self._root, self._scale, self._packages, self._notes = file, root, scale, packages, notes
+        self._visual_error = visual_error
         self.geoms: list[Geom] = []
         self.geom_links: list[str] = []
         self.meshes: dict[str, Mesh] = {}
@@ -60,7 +67,7 @@ class GeometryReader:
             return
         path = self._path(link, visual)
         try:
-            parts = visual_parts(path, self._mesh_scale(visual))
+            parts = visual_parts(path, self._mesh_scale(visual), error=self._visual_error)
         except AssetError as error:  # the file is there; what cannot be read of it is only not seen
             self._note("dropped", link, f"is not fully shown: {str(error).replace(str(path), path.name)}")
             return

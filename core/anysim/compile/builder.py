@@ -5,6 +5,7 @@ from dataclasses import replace
 from math import copysign, inf
 from typing import Any
 
+from anysim.assets.meshes import VISUAL_ERROR
 from anysim.assets.model import ImportedModel
 from anysim.conventions import IDENTITY_QUATERNION, WORLD
 from anysim.errors import AssetError
@@ -30,8 +31,9 @@ from anysim.model.world import (
 class WorldBuilder:
     """A World under construction. Starts from an existing one, which is not changed."""
 
-    def __init__(self, world: World) -> None:
-        self._world = world
+    def __init__(self, world: World, visual_error: float = VISUAL_ERROR) -> None:
+        """`visual_error` [m] is how far meshes that are only looked at may be off."""
+        self._world, self.visual_error = world, visual_error
         self.bodies: list[Body] = list(world.bodies)
         self.joints: list[Joint] = list(world.joints)
         self.geoms: list[Geom] = list(world.geoms)

@@ -60,7 +60,7 @@ def add_object(
     if not isinstance(spec.source, SourceSpec) or isinstance(spec.scale, Drawn) or spec.count is not None:
         issues.add("", "an object that is added to a world has one source, one scale and no count; add each by its own")
         return []
-    model = object_model(name, spec, KeyedSource(spec.source, "source"), spec.scale, issues, base)
+    model = object_model(name, spec, KeyedSource(spec.source, "source"), spec.scale, issues, base, builder.visual_error)
     if model is None:
         return []
     try:
@@ -105,12 +105,18 @@ def source_name(source: SourceSpec) -> str:
 
 
 def object_model(
-    name: str, spec: ObjectSpec, origin: KeyedSource, size: float, issues: Issues, base: Path | None
+    name: str,
+    spec: ObjectSpec,
+    origin: KeyedSource,
+    size: float,
+    issues: Issues,
+    base: Path | None,
+    visual_error: float,
 ) -> ImportedModel | None:
     """An object as one of its sources makes it, `size` times as large; None where that fails, which `issues` says."""
     source = origin.source.model_copy(update={"scale": origin.source.scale * size})
     try:
-        model = _model(name, spec, source, issues, origin.key, base)
+        model = _model(name, spec, source, issues, origin.key, base, visual_error)
     except (AssetError, PluginError) as error:
         issues.asset(origin.key, AssetError(str(error)))
         return None
@@ -139,13 +145,15 @@ def _of_family(spec: ObjectSpec, source: SourceSpec, model: ImportedModel, issue
 
 
 def _model(
-    name: str, spec: ObjectSpec, source: SourceSpec, issues: Issues, key: str, base: Path | None
+    name: str, spec: ObjectSpec, source: SourceSpec, issues: Issues, key: str, base: Path | None, visual_error: float
 ) -> ImportedModel | None:
     color = nominal_rgb(spec.color, DEFAULT_COLOR, issues)
     friction = DEFAULT_FRICTION if spec.friction is None else float(nominal(spec.friction))
     touch = surface(spec.contact or ContactSpec(), friction, float(nominal(spec.restitution or 0.0)))
     if source.asset is not None:
-        model = import_asset(source.asset, base=base, scale=source.scale, packages=source.packages)
+        model = import_asset(
+            source.asset, base=base, scale=source.scale, packages=source.packages, visual_error=visual_error
+        )
         return _asset(spec, source, model, touch, color, issues, key)
     if source.procedural is not None:
         model = build(source.procedural, source.params, scale=source.scale)
@@ -155,7 +163,7 @@ def _model(
         solid = _primitive(source)
         geoms = [Geom("shape", 0, solid, color=(*color, 1.0), surface=touch, collides=spec.collides)]
     else:
-        geoms, solid = _mesh_geoms(spec, source, touch, color, meshes, base)
+        geoms, solid = _mesh_geoms(spec, source, touch, color, meshes, base, visual_error)
     if problem := size_problem(solid, meshes):
         issues.add(key, problem)
         return None
@@ -192,7 +200,13 @@ def _inertial(spec: ObjectSpec, solid: Shape, meshes: Mapping[str, Mesh]) -> ine
 
 
 def _mesh_geoms(
-    spec: ObjectSpec, source: SourceSpec, touch: Surface, color: Rgb, meshes: dict[str, Mesh], base: Path | None
+    spec: ObjectSpec,
+    source: SourceSpec,
+    touch: Surface,
+    color: Rgb,
+    meshes: dict[str, Mesh],
+    base: Path | None,
+    visual_error: float,
 ) -> tuple[list[Geom], Shape]:
     """The hull to collide (also the solid that has the mass), and the coloured parts to look at; z up."""
     path = locate(source.mesh or "", base=base).path
@@ -201,7 +215,7 @@ def _mesh_geoms(
     hull = replace(hull, name=f"{hull.name}_hull")
     meshes[hull.name] = hull
     geoms = [Geom("hull", 0, MeshShape(hull.name), surface=touch, collides=spec.collides, visible=False)]
-    for i, part in enumerate(visual_parts(path, scale, upright=True)):
+    for i, part in enumerate(visual_parts(path, scale, upright=True, error=visual_error)):
         meshes[part.mesh.name] = part.mesh
         shown = part.color if part.color is not None and spec.color is None else (*color, 1.0)
         geoms.append(Geom(f"visual{i}", 0, MeshShape(part.mesh.name), color=shown, collides=False))

@@ -128,7 +128,7 @@ def add_population(
         )
         return [], []
     forms = list(product(origins, scales.values))
-    models = [object_model(name, spec, origin, size, issues, base) for origin, size in forms]
+    models = [object_model(name, spec, origin, size, issues, base, builder.visual_error) for origin, size in forms]
     whole = [_whole(spec, model) for model in models if model is not None]
     if len(whole) < len(forms):
         return [], []

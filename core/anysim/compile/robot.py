@@ -11,6 +11,7 @@ import numpy as np
 from anysim.assets.attach import attach
 from anysim.assets.catalogue import CatalogueEntry, load_robot, missing_source
 from anysim.assets.load import import_asset
+from anysim.assets.meshes import VISUAL_ERROR
 from anysim.assets.model import ImportedModel, ImportNote, noted
 from anysim.assets.procedural import build
 from anysim.assets.vehicles import as_vehicle
@@ -42,8 +43,10 @@ from anysim_schemas.robot_model import ChannelSpec, GainSpec, RobotModelSpec, Se
 from anysim_schemas.robots import RobotSpec
 
 
-def import_robot(entry: CatalogueEntry) -> ImportedModel:
+def import_robot(entry: CatalogueEntry, visual_error: float = VISUAL_ERROR) -> ImportedModel:
     """The model of a catalogue entry: its source, with its parts fixed to it and its `collision` in place.
+
+    `visual_error` [m] holds where the entry has none of its own.
 
     Raises:
         AssetError: a source is missing or damaged, says what to install where it comes with another package; or a part
@@ -51,10 +54,12 @@ def import_robot(entry: CatalogueEntry) -> ImportedModel:
         PluginError: no importer or builder for it is installed.
     """
     spec = entry.spec
+    if spec.visual_error is not None:
+        visual_error = spec.visual_error
     try:
-        model = _read(entry, spec.source, spec.params, f"the source of robot '{spec.name}'")
+        model = _read(entry, spec.source, spec.params, visual_error, f"the source of robot '{spec.name}'")
         brought = [
-            _read(entry, part.source, part.params, f"the source of parts.{i} of robot '{spec.name}'")
+            _read(entry, part.source, part.params, visual_error, f"the source of parts.{i} of robot '{spec.name}'")
             for i, part in enumerate(spec.parts)
         ]
     except AssetError as error:
@@ -70,12 +75,14 @@ def import_robot(entry: CatalogueEntry) -> ImportedModel:
     return with_solids(model, spec.collision)
 
 
-def _read(entry: CatalogueEntry, source: str, params: Mapping[str, Any], where: str) -> ImportedModel:
+def _read(
+    entry: CatalogueEntry, source: str, params: Mapping[str, Any], visual_error: float, where: str
+) -> ImportedModel:
     """The model of one source of an entry."""
     try:
         if source.startswith(PROCEDURAL):
             return build(source.removeprefix(PROCEDURAL), params)
-        return import_asset(source, base=entry.file.parent, packages=entry.spec.packages)
+        return import_asset(source, base=entry.file.parent, packages=entry.spec.packages, visual_error=visual_error)
     except SpecError as error:
         raise AssetError(f"{where} is not valid: {error}") from None
 
@@ -91,7 +98,7 @@ def add_robot(builder: WorldBuilder, name: str, spec: RobotSpec, issues: Issues)
         issues.add("robot", f"the catalogue entry is not valid: {error}")
         return []
     try:
-        model = as_vehicle(import_robot(entry), entry.spec)
+        model = as_vehicle(import_robot(entry, builder.visual_error), entry.spec)
     except (AssetError, PluginError) as error:
         issues.asset("robot", AssetError(f"robot '{spec.robot}': {error}"))
         return []

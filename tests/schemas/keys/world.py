@@ -86,6 +86,7 @@ ROWS: dict[str, Row] = {
     "WorldSpec.lights": row("world.lights.lamp={intensity: 0.5}"),
     "WorldSpec.scenery": row("world.scenery={ambient: [0.1, 0.2, 0.3]}"),
     "WorldSpec.contact_sensors": row("world.contact_sensors.touch={body: red}"),
+    "WorldSpec.visual_error": row("world.visual_error=0.02", given="world.robots.panda={robot: franka_panda}"),
     "WorldSpec.collisions": row("world.collisions={exclude: [[red, ball]]}"),
     "ReliefSpec.amplitude": relief("rough", "amplitude=0.5"),
     "ReliefSpec.grain": relief("rough", "grain=0.9"),

@@ -42,7 +42,8 @@ class GeomReader:
     where its link has none that is there to be looked at; a mesh that does both is drawn as it is, beside its hull.
     """
 
-    def __init__(self, model: Any, source: str, scale: float, notes: list[ImportNote]) -> None:
+    def __init__(self, model: Any, source: str, scale: float, visual_error: float, notes: list[ImportNote]) -> None:
+        self._visual_error = visual_error
         self._model, self._source, self._scale, self._notes = model, source, scale, notes
         self._taken = {model.geom(i).name for i in range(model.ngeom)}
         self.geoms: list[Geom] = []
@@ -128,7 +129,9 @@ class GeomReader:
         faces = np.asarray(model.mesh_face[first : first + count], dtype=np.int32)
         name = model.mesh(number).name
         source = cache.digest(self._source, name, repr(self._scale), mujoco.__version__)
-        return self._keep(hull_of(name, vertices, source) if collides else light_mesh(name, vertices, faces, source))
+        if collides:
+            return self._keep(hull_of(name, vertices, source))
+        return self._keep(light_mesh(name, vertices, faces, source, error=self._visual_error))
 
     def _keep(self, mesh: Mesh) -> MeshShape:
         name = f"{mesh.name}_{mesh.hash[:8]}"

@@ -22,6 +22,7 @@ import mujoco
 import numpy as np
 
 from anysim import cache
+from anysim.assets.meshes import VISUAL_ERROR
 from anysim.assets.model import ActuatorHint, ImportedModel, ImportNote
 from anysim.conventions import Array
 from anysim.errors import AssetError, listing
@@ -40,20 +41,22 @@ _IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 _HINGE, _SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
 
 
-def import_mjcf(path: Path, *, root: Path, scale: float = 1.0, body: str = "") -> ImportedModel:
+def import_mjcf(
+    path: Path, *, root: Path, scale: float = 1.0, body: str = "", visual_error: float = VISUAL_ERROR
+) -> ImportedModel:
     """Read an MJCF file; see `anysim.assets.model.Importer` for the arguments.
 
     Raises:
         AssetError: a missing or damaged file, a reference that leaves `root`, something the neutral model cannot say.
     """
     notes: list[ImportNote] = []
-    return _MjcfImport(compiled(path, root, body, notes), path, scale, notes).run()
+    return _MjcfImport(compiled(path, root, body, notes), path, scale, visual_error, notes).run()
 
 
 class _MjcfImport:
     """One import: walks MuJoCo's bodies, which are depth first with children in source order."""
 
-    def __init__(self, model: Any, path: Path, scale: float, notes: list[ImportNote]) -> None:
+    def __init__(self, model: Any, path: Path, scale: float, visual_error: float, notes: list[ImportNote]) -> None:
         self.model, self.path, self.scale, self.notes = model, path, scale, notes
         self.links = _named([model.body(i).name for i in range(model.nbody)], "body")
         self.joint_names = _named([model.joint(j).name for j in range(model.njnt)], "joint")
@@ -66,7 +69,7 @@ class _MjcfImport:
         self.frames: dict[int, tuple[int, Array]] = {}  # MuJoCo body: neutral body, pose in it
         self.number: dict[int, int] = {}  # MuJoCo joint: neutral joint
         source = cache.digest(path.read_bytes(), model.mesh_vert.tobytes(), model.mesh_face.tobytes())
-        self.geometry = GeomReader(model, source, scale, self.notes)
+        self.geometry = GeomReader(model, source, scale, visual_error, self.notes)
 
     def run(self) -> ImportedModel:
         self._refuse_the_unsayable()
