@@ -63,9 +63,7 @@ def import_asset(
     return model
 
 
-def _read(
-    uri: str, base: Path | None, scale: float, packages: Mapping[str, str], visual_error: float
-) -> ImportedModel:
+def _read(uri: str, base: Path | None, scale: float, packages: Mapping[str, str], visual_error: float) -> ImportedModel:
     if uri.startswith(PROCEDURAL):
         return from_uri(uri, scale=scale)
     file = model_file(uri, base=base)
