@@ -139,7 +139,7 @@ def test_worlds_it_cannot_run_are_refused_before_they_are_built(here):
     done = here.anysim("check", "box.yaml", "--engine", "ballistic", ok=False)
     assert done.returncode == 1
     assert (
-        "ballistic cannot run box.yaml: geom 'box' collides with 'terrain' (contacts with static things)" in done.stderr
+        "ballistic cannot run box.yaml: geom 'box.shape' collides with 'terrain' (contacts with static things)" in done.stderr
     )
 
 
