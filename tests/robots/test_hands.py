@@ -57,7 +57,7 @@ GRASPS = {
     "allegro_right power": rod("allegro_right", (0.0415, 0.0, -0.014)),
     "allegro_left power": rod("allegro_left", (0.0415, 0.0, -0.014)),
     "allegro_right pinch": block("allegro_right", (0.08, 0.022, 0.02)),
-    "allegro_left pinch": block("allegro_left", (0.08, -0.022, 0.02)),
+    "allegro_left pinch": block("allegro_left", (0.079, -0.0225, 0.02)),
     # upright between the three finger tips
     "dclaw power": Grasp(
         "dclaw", 0.009, "power", {"cylinder": [0.03, 0.12]}, 0.06, 0.2, (0.0, 0.0, 0.19), 0.01, held=True
