@@ -245,13 +245,14 @@ class Blames:
 
     __slots__ = ("current",)
 
-    current: Blame
+    def __init__(self) -> None:
+        self.current: Blame | None = None  # none while no call has begun: Ctrl-C then stays what it is
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if error is not None:
+        if self.current is not None:
             self.current.__exit__(kind, error, trace)
 
 

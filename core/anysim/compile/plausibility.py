@@ -8,6 +8,7 @@ from anysim.conventions import IDENTITY_QUATERNION
 from anysim.errors import Issues
 from anysim.geometry.bounds import shape_bounds
 from anysim.kinematics.inertia import Inertial, tensor
+from anysim.math import matrix as M
 from anysim.model.shapes import is_ground
 from anysim.model.world import BodyKind, EntityKind, Mesh, Shape, World
 from anysim_schemas.bounds import LENGTH, MASS, MOMENT
@@ -32,7 +33,7 @@ def inertial_problem(inertial: Inertial) -> str:
     matrix = tensor(inertial)
     if not np.isfinite(matrix).all():
         return "its inertia is not finite"
-    wrong = [moment for moment in np.linalg.eigvalsh(matrix).tolist() if not MOMENT.holds(moment)]
+    wrong = [moment for moment in M.eigen(matrix)[0].tolist() if not MOMENT.holds(moment)]
     return f"one of its moments of inertia {MOMENT.sentence(wrong[0])}" if wrong else ""
 
 
