@@ -78,6 +78,13 @@ def anysim(*words: str, cwd: Path, plugins: Path | None = None) -> subprocess.Co
     return subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment, cwd=cwd, check=False)
 
 
+def ends_with(code: int, words: list[str], folder: Path) -> None:
+    """The command's exit code is that of the table, and there is no traceback."""
+    done = anysim(*words, cwd=folder)
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
+
+
 @pytest.mark.parametrize(
     ("code", "words"),
     [
@@ -102,9 +109,7 @@ def anysim(*words: str, cwd: Path, plugins: Path | None = None) -> subprocess.Co
     ids=lambda value: value if isinstance(value, int) else " ".join(value[:2]),
 )
 def test_answers_and_requests_that_cannot_be_met(code: int, words: list[str], tmp_path: Path) -> None:
-    done = anysim(*words, cwd=tmp_path)
-    assert done.returncode == code, done.stderr
-    assert "Traceback" not in done.stderr
+    ends_with(code, words, tmp_path)
 
 
 @pytest.mark.slow
@@ -128,9 +133,7 @@ def test_answers_and_requests_that_cannot_be_met(code: int, words: list[str], tm
     ids=lambda value: value if isinstance(value, int) else " ".join(value[:2]),
 )
 def test_commands_of_plugins_keep_the_table(code: int, words: list[str], tmp_path: Path) -> None:
-    done = anysim(*words, cwd=tmp_path)
-    assert done.returncode == code, done.stderr
-    assert "Traceback" not in done.stderr
+    ends_with(code, words, tmp_path)
 
 
 @pytest.mark.slow
