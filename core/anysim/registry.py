@@ -9,6 +9,7 @@ from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from importlib import metadata
+from types import MappingProxyType
 from typing import Any, NoReturn, Self
 
 from anysim.errors import AnysimError, PluginError, PluginFailure, listing, suggest
@@ -88,11 +89,12 @@ def observers() -> tuple[metadata.EntryPoint, ...]:
     return _scan().get("anysim", ())
 
 
-def participants() -> dict[str, metadata.Distribution]:
+@cache
+def participants() -> Mapping[str, metadata.Distribution]:
     """The installed distributions that offer something to anysim, itself among them, by name."""
     entries = (entry for entries in _scan().values() for entry in entries)
     found = {id(entry.dist): entry.dist for entry in entries}  # a name is read from a file: once for each of them
-    return {dist.name: dist for dist in found.values() if dist is not None}
+    return MappingProxyType({dist.name: dist for dist in found.values() if dist is not None})
 
 
 def package_of(entry: metadata.EntryPoint) -> str:
@@ -107,6 +109,7 @@ def _one(kind: str) -> str:
 
 def refresh() -> None:
     """Forget what was found; the next look-up reads the installed distributions again."""
+    participants.cache_clear()
     _entries.cache_clear()
     _scan.cache_clear()
 

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from importlib import metadata
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -165,7 +166,13 @@ def package_versions() -> dict[str, str]:
 
     Extras are left out; what is not installed is not listed.
     """
-    known = {_normal(name): dist for name, dist in registry.participants().items()}
+    return dict(_versions(tuple(registry.participants())))
+
+
+@cache
+def _versions(participants: tuple[str, ...]) -> dict[str, str]:
+    """Versions of these distributions and of their requirements: once for all runs of a process."""
+    known = {_normal(name): registry.participants()[name] for name in participants}
     names = set(known)
     for dist in [*known.values(), _installed("anysim-schemas")]:
         for requirement in (dist.requires if dist else None) or []:

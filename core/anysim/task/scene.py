@@ -149,26 +149,28 @@ class Frame(ABC):
 
     def _see(self) -> None:
         """Work the pose out, once a moment."""
-        if self._moment != self.scene.moment:
-            self._pose, self._moment = self._compute(), self.scene.moment
-            self._position, self._quaternion = self._pose[:, :3], self._pose[:, 3:]
+        self._pose, self._moment = self._compute(), self.scene.moment
+        self._position, self._quaternion = self._pose[:, :3], self._pose[:, 3:]
 
     @property
     def pose(self) -> Array:
         """(n, 7) in the world frame."""
-        self._see()
+        if self._moment != self.scene.moment:
+            self._see()
         return self._pose
 
     @property
     def position(self) -> Array:
         """(n, 3) [m]."""
-        self._see()
+        if self._moment != self.scene.moment:
+            self._see()
         return self._position
 
     @property
     def quaternion(self) -> Array:
         """(n, 4) xyzw."""
-        self._see()
+        if self._moment != self.scene.moment:
+            self._see()
         return self._quaternion
 
     @property

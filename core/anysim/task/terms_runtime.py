@@ -1,7 +1,7 @@
 """The task's terms, bound to a scene: commands, observations, rewards, success, failure, events."""
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from functools import partial, reduce
 from math import isfinite
 from typing import Any, NamedTuple
 
@@ -223,11 +223,12 @@ class Mdp:
 
 def _combined(both: np.ufunc, predicates: Sequence[BoundTerm], shape: tuple[int, ...]) -> Array:
     """What the predicates say together (n,) bool; false where there are none."""
-    said = np.zeros(shape, dtype=bool)
-    for number, (term, value) in enumerate(zip(predicates, _values(predicates), strict=True)):
+    if not predicates:
+        return np.zeros(shape, dtype=bool)
+    values = _values(predicates)
+    for term, value in zip(predicates, values, strict=True):
         _fit(term, value, shape, "truth values")
-        said = both(said, value) if number else value
-    return said
+    return reduce(both, values)
 
 
 def _fit(term: BoundTerm, value: Any, shape: tuple[int, ...], what: str = "numbers") -> None:

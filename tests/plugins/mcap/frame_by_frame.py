@@ -1,12 +1,12 @@
 """The same trajectory.mcap written slowly: frame by frame, field by field, by the writer of the package `mcap`."""
 
 import struct
-from functools import partial
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
 import zstandard
+from mcap.records import Chunk
 from mcap.writer import CompressionType, Writer
 
 import anysim_mcap
@@ -15,10 +15,19 @@ from anysim.record.json import dump_json
 from anysim_mcap import messages as m
 
 
+def _without_second_checksum(**fields: Any) -> Chunk:
+    return Chunk(**fields | ({"uncompressed_crc": 0} if fields["compression"] else {}))
+
+
 def write_slowly(path: Path, columns: EpisodeColumns, status: str, options: Any) -> None:
     """Write an episode without cameras, with the options of the writer `mcap`."""
-    fast = partial(zstandard.compress, level=1)  # as anysim_mcap does; the package has no parameter for it
-    with path.open("xb") as file, patch("mcap.writer.zstandard.compress", fast):
+    # as anysim_mcap does; the package has no parameters for it
+    fast = zstandard.ZstdCompressor(level=1, write_checksum=True).compress
+    with (
+        path.open("xb") as file,
+        patch("mcap.writer.zstandard.compress", fast),
+        patch("mcap.writer.Chunk", _without_second_checksum),
+    ):
         compression = CompressionType.ZSTD if options.compression == "zstd" else CompressionType.NONE
         writer = Writer(file, options.chunk_size, compression, enable_crcs=True, enable_data_crcs=True)
         writer.start(library=f"anysim-mcap {anysim_mcap.__version__}")
