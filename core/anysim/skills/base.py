@@ -2,7 +2,6 @@
 
 from abc import ABC, abstractmethod
 from enum import StrEnum
-from typing import ClassVar
 
 import numpy as np
 
@@ -22,6 +21,11 @@ class Outcome(StrEnum):
     TIMEOUT = "timeout"
     CONTROLLER = "controller"
     ADVERSE_STATE = "adverse_state"
+    NO_PATH = "no_path"
+    WRONG_OBJECT = "wrong_object"
+    JAMMED = "jammed"
+    LOST = "lost"
+    UNREACHABLE_BASE = "unreachable_base"
 
 
 OUTCOMES = tuple(Outcome)
@@ -38,7 +42,7 @@ class Skill(ABC):
         attempts: (N,) how often the env has started the skill anew, 1 at first.
     """
 
-    phases: ClassVar[tuple[str, ...]]
+    phases: tuple[str, ...]
 
     def __init__(self, env: TaskEnv) -> None:
         self.env = env

@@ -56,9 +56,10 @@ def test_a_cube_out_of_reach_is_no_ik() -> None:
     with arm(1, "world.layout.cube.x=0.84", "world.layout.cube.y=0.68", engine="mujoco") as env:
         env.reset(seed=0)
         policy = SkillPolicy(env)
-        rollout(env, policy, 5)
+        rollout(env, policy, 300)
         assert OUTCOMES[policy.skill.outcome[0]] is Outcome.NO_IK
         assert policy.describe(0)["outcome"] == "no_ik"
+        assert policy.describe(0)["ladder"] == ["no_ik -> back_off", "no_ik -> give up"]
 
 
 def test_a_cube_that_is_taken_away_is_tried_again_and_given_up() -> None:
@@ -72,7 +73,7 @@ def test_a_cube_that_is_taken_away_is_tried_again_and_given_up() -> None:
             if policy.gave_up(np.array([0]))[0]:
                 break
             env.step(policy.act(np.array([0])))
-            if policy.describe(0)["phase"] == "carry":
+            if policy.describe(0)["phase"] == "bring: carry":
                 env.engine.set_body_state(home[:, None], np.zeros((1, 1, 6)), bodies=[cube])
         assert OUTCOMES[policy.skill.outcome[0]] is Outcome.UNSTABLE_GRASP
         assert policy.skill.attempts[0] == 3

@@ -1,0 +1,159 @@
+"""An arm with its gripper, as skills drive it: a tool pose to go to for each env, and how the fingers are.
+
+Skills of all kinds write `target`, `speed` and `closed` of the envs they act in; the arm then moves all of them at
+once, each along a straight line, with inverse kinematics solved for the commanded pose. It never leads the real tool by
+more than `lead`, which bounds the force with which it presses on what it cannot pass.
+"""
+
+from typing import Self
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.kinematics.chain import Chain
+from anysim.math import pose as P
+from anysim.planning.api import inverse_kinematics
+from anysim.task.env import TaskEnv
+from anysim.task.scene import RobotView
+
+ARRIVED = 0.004
+"""[m] distance of the tool at which a straight move counts as done."""
+TURNED = 0.04
+"""[rad] the same for its rotation."""
+LEAD = 0.05
+"""[m] the commanded tool runs at most this far ahead of the real one where nothing is to be pressed."""
+TURN_RATE = 5.0
+"""[rad/m] rotation allowed for each metre of a step; position and rotation arrive together."""
+
+_ARMS: WeakKeyDictionary[TaskEnv, dict[tuple[str, str, str, str], "Arm"]] = WeakKeyDictionary()
+
+
+class Arm:
+    """One arm and gripper of a robot in all envs.
+
+    Attributes:
+        tool: the frame that is moved.
+        chain: its joints.
+        target: (N, 7) where the tool is to go.
+        speed: (N,) [m/s] of the commanded tool.
+        lead: (N,) [m] bound of the distance from the tool to its command.
+        closed: (N,) bool, whether the gripper is told to close.
+        command: (N, 7) where the tool is told to be now.
+        joints: (N, K) what the joints are told.
+        stuck: (N,) bool: the last step towards the target had no inverse kinematics.
+    """
+
+    def __init__(self, env: TaskEnv, robot: RobotView, channel: str, gripper: str, tool: str, solver: str) -> None:
+        self.env, self.robot = env, robot
+        self.tool = robot.tool(tool)
+        self.chain = Chain.from_world(env.engine.world, robot.name, channel, tool)
+        self.solver = inverse_kinematics(self.chain, solver)
+        self._arm, self._eef = env.actions.slice_of(robot.name, channel), env.actions.slice_of(robot.name, gripper)
+        self._dt = env.engine.world.physics.control_dt
+        self._fingers = np.array(env.engine.index.robot(robot.name).channels[gripper].joints, dtype=int)
+        n = env.num_envs
+        self.target, self.command = np.zeros((n, 7)), np.zeros((n, 7))
+        self.speed, self.lead = np.zeros(n), np.full(n, LEAD)
+        self.closed, self.stuck = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+        self.joints = np.zeros((n, len(self.chain)))
+        self._fresh = np.ones(n, dtype=bool)
+
+    @classmethod
+    def of(
+        cls,
+        env: TaskEnv,
+        robot: RobotView,
+        *,
+        channel: str = "arm",
+        gripper: str = "eef",
+        tool: str = "tool",
+        solver: str = "numba_ik",
+    ) -> Self:
+        """The arm of an env, shared by all skills that drive it.
+
+        Raises:
+            NameLookupError, TaskError: the robot has no such channels or tool, or they have no controllers.
+        """
+        arms = _ARMS.setdefault(env, {})
+        key = (robot.name, channel, gripper, tool)
+        if key not in arms:
+            arms[key] = cls(env, robot, channel, gripper, tool, solver)
+        return arms[key]  # pyright: ignore[reportReturnType]
+
+    # ------------------------------------------------------------------ what skills ask and say; the scene looks at ids
+
+    def renew(self, ids: Array) -> None:
+        """These envs have just been reset: whatever was commanded is forgotten."""
+        self._fresh[ids] = True
+
+    def prepare(self, ids: Array) -> None:
+        """Begin from where the arm is, in envs that have been reset; the scene looks at `ids`."""
+        fresh = self._fresh[ids]
+        if not fresh.any():
+            return
+        pose, ids = self.tool.pose[fresh], ids[fresh]
+        self._fresh[ids] = False
+        self.command[ids] = self.target[ids] = pose
+        self.joints[ids] = self.env.scene.state.joint_pos[np.ix_(ids, self.chain.joints)]
+        self.speed[ids], self.lead[ids], self.closed[ids], self.stuck[ids] = 0.2, LEAD, False, False
+
+    def go(self, ids: Array, target: Array, speed: float, lead: float = LEAD) -> None:
+        """Move towards tool poses (n, 7) at a speed [m/s]."""
+        self.target[ids], self.speed[ids], self.lead[ids] = target, speed, lead
+
+    def stay(self, ids: Array) -> None:
+        """Hold the commanded pose."""
+        self.target[ids] = self.command[ids]
+
+    def arrived(self, ids: Array, at: Array, distance: float = ARRIVED, angle: float = TURNED) -> Array:
+        """(n,) bool: the tool is at its target. `at` are the rows of these envs in the scene."""
+        tool, target = self.tool.pose[at], self.target[ids]
+        there = P.norm(target[:, :3] - tool[:, :3]) < distance
+        if there.any():
+            there[there] = P.angle_between(tool[there, 3:], target[there, 3:]) < angle
+        return there
+
+    def ahead(self, ids: Array, at: Array) -> Array:
+        """(n,) [m] how far the command is ahead of the tool: what is in the way makes it grow."""
+        return P.norm(self.command[ids, :3] - self.tool.position[at])
+
+    def finger_speed(self, ids: Array) -> Array:
+        """(n,) [rad/s, m/s] of the fastest joint of the gripper."""
+        return np.abs(self.env.scene.state.joint_vel[np.ix_(ids, self._fingers)]).max(axis=1)
+
+    def reach(self, ids: Array, targets: Array) -> tuple[Array, Array]:
+        """Inverse kinematics of many tool poses (n, g, 7) from the live configuration, without restarts.
+
+        Returns:
+            joint_pos (n, g, K) and the largest joint motion (n, g) to get there; infinite where there is no solution.
+        """
+        n, g = targets.shape[:2]
+        seeds = np.repeat(self.env.scene.state.joint_pos[np.ix_(ids, self.chain.joints)], g, axis=0)
+        keys = np.repeat(self.env.streams.episode_seed[ids], g)
+        base = np.repeat(self._base(ids), g, axis=0)
+        found = self.solver.solve(targets.reshape(-1, 7), base, seeds, random_restarts=0, rng_seeds=keys)
+        moved = np.where(found.converged, np.abs(found.joint_pos - seeds).max(axis=1), np.inf)
+        return found.joint_pos.reshape(n, g, -1), moved.reshape(n, g)
+
+    def _base(self, ids: Array) -> Array:
+        return self.env.scene.state.body_pose[ids, self.chain.root]
+
+    # ------------------------------------------------------------------ moving
+
+    def act(self, ids: Array, action: Array) -> None:
+        """Write the action of these envs, which the scene looks at: one step towards their targets."""
+        free = P.norm(self.command[ids, :3] - self.tool.position) < self.lead[ids]
+        rows = ids[free]
+        if len(rows):
+            distance = self.speed[rows] * self._dt
+            self.command[rows] = P.step_toward(self.command[rows], self.target[rows], distance, TURN_RATE * distance)
+        keys = self.env.streams.episode_seed[ids]
+        found = self.solver.solve(
+            self.command[ids], self._base(ids), self.joints[ids], random_restarts=0, rng_seeds=keys
+        )
+        self.stuck[ids] = ~found.converged
+        solved = ids[found.converged]
+        self.joints[solved] = found.joint_pos[found.converged]
+        action[ids, self._arm.start : self._arm.stop] = self._arm.controller.action_for(self.joints[ids], ids)
+        action[ids, self._eef.start : self._eef.stop] = np.where(self.closed[ids], -1.0, 1.0)[:, None]

@@ -1,0 +1,62 @@
+"""Bring: move a held object through the air to a goal, with the loop closed on where the object is."""
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from anysim.conventions import Array
+from anysim.math import pose as P
+from anysim.skills.base import OUTCOMES, Outcome
+from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill
+from anysim.task.env import TaskEnv
+from anysim.task.scene import Frame, ObjectView, RobotView
+from anysim_skills.arm import Arm
+from anysim_skills.grasping.grasp import Metres, Speed, holds
+
+STILL = 0.05
+"""[m/s] an object that moves slower has come to rest in the air."""
+
+
+class Bring(PhasedSkill):
+    """Bring the held `object` to `goal` and hold it there."""
+
+    def __init__(
+        self,
+        env: TaskEnv,
+        *,
+        robot: RobotView,
+        object: ObjectView,
+        goal: Frame,
+        tool: str = "tool",
+        solver: str = "numba_ik",
+        speed: Speed = 0.4,
+        tolerance: Metres = 0.01,
+        hold: Annotated[int, Field(ge=1, description="control steps")] = 10,
+        steps: Annotated[int, Field(ge=1, description="control steps that the way may take")] = 400,
+    ) -> None:
+        self.arm = Arm.of(env, robot, tool=tool, solver=solver)
+        self._object, self._goal, self._speed, self._tolerance = object, goal, speed, tolerance
+        self._hold, self._late = hold, steps
+        self._held = np.zeros(env.num_envs, dtype=np.int64)
+        super().__init__(env, [self.arm])
+
+    def make_phases(self) -> Sequence[Phase]:
+        return (Phase("carry", self._enter, self._carry, self._late),)
+
+    def _enter(self, ids: Array, at: Array) -> None:
+        del at
+        self._held[ids] = 0
+
+    def _carry(self, ids: Array, at: Array) -> Array:
+        thing, goal = self._object.root.position[at], self._goal.position[at]
+        target = np.concatenate([goal + (self.arm.tool.position[at] - thing), self.arm.target[ids, 3:]], axis=1)
+        self.arm.go(ids, target, self._speed)
+        there = (P.norm(goal - thing) < self._tolerance) & (P.norm(self._object.root.twist[at, :3]) < STILL)
+        self._held[ids] = (self._held[ids] + 1) * there
+        lost = ~holds(self.arm, self._object, at)
+        return np.where(lost, _UNSTABLE, np.where(self._held[ids] >= self._hold, GO_ON, STAY))
+
+
+_UNSTABLE = OUTCOMES.index(Outcome.UNSTABLE_GRASP)

@@ -1,0 +1,167 @@
+"""Grasp: close the gripper on an object, and lift it."""
+
+from collections.abc import Callable, Sequence
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from anysim.conventions import Array
+from anysim.math import pose as P
+from anysim.skills.base import OUTCOMES, Outcome
+from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
+from anysim.task.env import TaskEnv
+from anysim.task.scene import ObjectView, RobotView
+from anysim_skills.arm import Arm
+from anysim_skills.grasping.candidates import DOWN, TOP_DOWN, from_above
+
+SLIPPED = 0.05
+"""[m] an object further than this from the tool is not held."""
+CLOSING_STEPS = 20
+SETTLED = 0.02
+"""[rad/s, m/s] a gripper whose joints are slower has closed on something, or on nothing."""
+
+Metres = Annotated[float, Field(gt=0, description="[m]")]
+Speed = Annotated[float, Field(gt=0, description="[m/s] of the tool")]
+Further = Callable[[Array, Array, Array], Array]
+"""Of envs (n,), their rows in the scene (n,) and grasps (n, g, 7): more tool poses (n, g, m, 7) to be reached."""
+
+
+class Grasp(PhasedSkill):
+    """Grasp `object` with `robot`, of the candidates the one that needs the least motion; then lift it."""
+
+    def __init__(
+        self,
+        env: TaskEnv,
+        further: Further | None = None,
+        *,
+        robot: RobotView,
+        object: ObjectView,
+        tool: str = "tool",
+        solver: str = "numba_ik",
+        hover: Metres = 0.1,
+        lift: Annotated[float, Field(ge=0, description="[m]; 0 leaves that to the next skill")] = 0.1,
+        speed: Speed = 0.4,
+        descend_speed: Speed = 0.2,
+        phase_steps: Annotated[int, Field(ge=1, description="control steps that a move may take")] = 150,
+    ) -> None:
+        """`further` gives what the next command wants of a grasp: candidates that do not reach it are not chosen."""
+        self.arm = Arm.of(env, robot, tool=tool, solver=solver)
+        self._object, self._further, self._lift = object, further, lift
+        self._speed, self._descend_speed, self._steps = speed, descend_speed, phase_steps
+        self._back = np.array([*(-hover * DOWN), 0.0, 0.0, 0.0, 0.0])
+        n = env.num_envs
+        self.turn = np.zeros((n, 4))
+        """(N, 4) the tool's orientation in the chosen grasp."""
+        self._order = np.zeros((n, TOP_DOWN), dtype=np.int64)
+        self._reachable = np.zeros(n, dtype=np.int64)
+        self.candidate = np.zeros(n, dtype=np.int64)
+        """(N,) how many better candidates have been given up."""
+        self._rest = np.zeros(n)
+        super().__init__(env, [self.arm])
+
+    def make_phases(self) -> Sequence[Phase]:
+        late = self._steps
+        phases = [
+            Phase("back off", self._open, self._backing_off, late),
+            Phase("choose", self._choose, self._chosen, 1),
+            Phase("approach", self._nothing, self._approach, late),
+            Phase("descend", self._nothing, self._descend, late),
+            Phase("close", self._close, self._closing, CLOSING_STEPS + 1),
+        ]
+        if self._lift:
+            phases.append(Phase("lift", self._note_height, self._lifting, late))
+        return phases
+
+    def start(self, env_ids: Array) -> None:
+        super().start(env_ids)
+        self.candidate[env_ids] = 0
+        self.phase[env_ids] = 1
+
+    def retry(self, rung: Rung, env: int) -> int | None:
+        """The next candidate where one is left; else away from the object, and all of them again."""
+        if rung is Rung.CANDIDATE and self.candidate[env] + 1 < self._reachable[env]:
+            self.candidate[env] += 1
+            return 0
+        if rung is Rung.BACK_OFF:
+            self.candidate[env] = 0
+            return 0
+        return None
+
+    # ------------------------------------------------------------------ phases
+
+    def _nothing(self, ids: Array, at: Array) -> None:
+        del ids, at
+
+    def _open(self, ids: Array, at: Array) -> None:
+        self.arm.closed[ids] = False
+        self.arm.go(ids, self.arm.tool.pose[at] + self._back, self._speed)
+
+    def _backing_off(self, ids: Array, at: Array) -> Array:
+        done = self.arm.arrived(ids, at) | (self.steps[ids] >= self._steps)
+        return np.where(done, GO_ON, STAY)
+
+    def _choose(self, ids: Array, at: Array) -> None:
+        """Candidates by the least motion to pre-grasp, grasp and whatever comes next."""
+        grasps = from_above(self._object.root.pose[at])
+        targets = np.stack([grasps + self._back, grasps], axis=2)
+        if self._further is not None:
+            targets = np.concatenate([targets, self._further(ids, at, grasps)], axis=2)
+        n, g, m = targets.shape[:3]
+        effort = self.arm.reach(ids, targets.reshape(n, g * m, 7))[1].reshape(n, g, m).max(axis=2)
+        self._order[ids] = np.argsort(effort, axis=1, kind="stable")
+        self._reachable[ids] = np.isfinite(effort).sum(axis=1)
+        chosen = self._order[ids, np.minimum(self.candidate[ids], g - 1)]
+        self.turn[ids] = grasps[np.arange(n), chosen, 3:]
+
+    def _chosen(self, ids: Array, at: Array) -> Array:
+        absent, none = ~self._object.present[at], self._reachable[ids] <= self.candidate[ids]
+        return np.where(absent, _ABSENT, np.where(none, _NO_IK, GO_ON))
+
+    def _grasp(self, ids: Array, at: Array) -> Array:
+        return np.concatenate([self._object.root.position[at], self.turn[ids]], axis=1)
+
+    def _approach(self, ids: Array, at: Array) -> Array:
+        self.arm.go(ids, self._grasp(ids, at) + self._back, self._speed)
+        return np.where(self.arm.arrived(ids, at), GO_ON, STAY)
+
+    def _descend(self, ids: Array, at: Array) -> Array:
+        self.arm.go(ids, self._grasp(ids, at), self._descend_speed)
+        return np.where(self.arm.arrived(ids, at), GO_ON, STAY)
+
+    def _close(self, ids: Array, at: Array) -> None:
+        del at
+        self.arm.closed[ids] = True
+        self.arm.go(ids, np.concatenate([self.arm.command[ids, :3], self.turn[ids]], axis=1), self._speed)
+
+    def _closing(self, ids: Array, at: Array) -> Array:
+        del at
+        steps = self.steps[ids]
+        done = steps >= CLOSING_STEPS
+        settled = steps >= 5
+        if settled.any():
+            done[settled] |= self.arm.finger_speed(ids[settled]) < SETTLED
+        return np.where(done, GO_ON, STAY)
+
+    def _note_height(self, ids: Array, at: Array) -> None:
+        self._rest[ids] = self._object.root.position[at, 2]
+        self.arm.go(ids, self.arm.command[ids] + np.array([0, 0, self._lift, 0, 0, 0, 0.0]), self._descend_speed)
+
+    def _lifting(self, ids: Array, at: Array) -> Array:
+        held = holds(self.arm, self._object, at)
+        return np.where(~held, _UNSTABLE, np.where(self.arm.arrived(ids, at), GO_ON, STAY))
+
+    def succeeded(self, env_ids: Array, at: Array) -> Array:
+        if not self._lift:
+            return super().succeeded(env_ids, at)
+        risen = self._object.root.position[at, 2] - self._rest[env_ids] > 0.5 * self._lift
+        return np.where(risen, GO_ON, _MISSED)
+
+
+def holds(arm: Arm, object: ObjectView, at: Array) -> Array:
+    """(n,) bool: the object is where the tool is."""
+    return ~(P.norm(object.root.position[at] - arm.tool.position[at]) > SLIPPED)
+
+
+_NO_IK, _ABSENT = OUTCOMES.index(Outcome.NO_IK), OUTCOMES.index(Outcome.ADVERSE_STATE)
+_UNSTABLE, _MISSED = OUTCOMES.index(Outcome.UNSTABLE_GRASP), OUTCOMES.index(Outcome.MISSED_CONTACT)
