@@ -23,6 +23,9 @@ TURNED = 0.04
 """[rad] the same for its rotation."""
 LEAD = 0.05
 """[m] the commanded tool runs at most this far ahead of the real one where nothing is to be pressed."""
+AT_REST = 0.02
+"""[m/s] a tool that moves slower, while its command is ahead of it, is held up by something."""
+_PRESSED = 0.8
 TURN_RATE = 5.0
 """[rad/m] rotation allowed for each metre of a step; position and rotation arrive together."""
 
@@ -117,6 +120,11 @@ class Arm:
     def ahead(self, ids: Array, at: Array) -> Array:
         """(n,) [m] how far the command is ahead of the tool: what is in the way makes it grow."""
         return P.norm(self.command[ids, :3] - self.tool.position[at])
+
+    def touching(self, ids: Array, at: Array) -> Array:
+        """(n,) bool: something holds the tool up: the command is as far ahead as it may be, and the tool rests."""
+        still = P.norm(self.tool.twist[at, :3]) < AT_REST
+        return still & (self.ahead(ids, at) > _PRESSED * self.lead[ids])
 
     def finger_speed(self, ids: Array) -> Array:
         """(n,) [rad/s, m/s] of the fastest joint of the gripper."""

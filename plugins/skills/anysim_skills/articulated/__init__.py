@@ -1,0 +1,1 @@
+"""Skills for parts that move on joints: drawers, doors, lids, buttons."""

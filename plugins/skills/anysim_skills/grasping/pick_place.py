@@ -1,0 +1,46 @@
+"""Pick and place: grasp an object and put it down on another."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from anysim.conventions import Array
+from anysim.skills.base import Outcome
+from anysim.skills.sequence import SkillSequence
+from anysim.task.env import TaskEnv
+from anysim.task.scene import Frame, ObjectView, RobotView
+from anysim_skills.grasping.grasp import Grasp, Metres, Speed
+from anysim_skills.grasping.place import Place
+
+
+class PickPlace(SkillSequence):
+    """Grasp `object` with `robot` and put it down on `target`; what falls is grasped again."""
+
+    def __init__(
+        self,
+        env: TaskEnv,
+        *,
+        robot: RobotView,
+        object: ObjectView,
+        target: Frame,
+        tool: str = "tool",
+        solver: str = "numba_ik",
+        hover: Metres = 0.1,
+        speed: Speed = 0.4,
+        tolerance: Annotated[float, Field(gt=0, description="[m] horizontally, once it rests")] = 0.03,
+        max_attempts: Annotated[int, Field(ge=1)] = 3,
+    ) -> None:
+        def over_target(ids: Array, at: Array, grasps: Array) -> Array:
+            """Candidates have to reach the place too."""
+            del ids
+            poses = grasps[:, :, None].copy()
+            poses[..., :2] = target.position[at][:, None, None, :2]
+            return poses
+
+        arm = {"robot": robot, "object": object, "tool": tool, "solver": solver, "speed": speed}
+        members = {
+            "grasp": Grasp(env, over_target, **arm, hover=hover, lift=0.0),
+            "place": Place(env, **arm, target=target, tolerance=tolerance),
+        }
+        again = {("place", why): "grasp" for why in (Outcome.UNSTABLE_GRASP, Outcome.LOST)}
+        super().__init__(env, members, back=again, max_attempts=max_attempts)
