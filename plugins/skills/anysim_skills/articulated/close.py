@@ -1,0 +1,42 @@
+"""Close: push a drawer, a door or a lid shut, with the open hand astride its handle."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.skills.base import OUTCOMES, Outcome
+from anysim.skills.phases import GO_ON, STAY, Phase
+from anysim.task.env import TaskEnv
+from anysim_skills.articulated.handle import AtHandle, Share
+
+
+class Close(AtHandle):
+    """Close `part` with `robot`: the fingers on both sides of its handle push until its opening is at most `fraction`."""
+
+    share = 0.0
+
+    def __init__(self, env: TaskEnv, *, fraction: Share = 0.03, **options: object) -> None:
+        self._fraction = fraction
+        super().__init__(env, **options)  # pyright: ignore[reportArgumentType]
+
+    def make_phases(self) -> Sequence[Phase]:
+        return (
+            *self.approach_phases(),
+            Phase("push", self.take, self._push, 3 * self.late),
+            *self.phases_away(),
+        )
+
+    def depth(self, ids: Array) -> Array:
+        return np.full(len(ids), 0.02)  # the finger tips come close to the front
+
+    def _push(self, ids: Array, at: Array) -> Array:
+        self.follow(ids, at)
+        self.arm.closed[ids] = False
+        return np.where(self.part.joint.opening[at] <= self._fraction, GO_ON, STAY)
+
+    def succeeded(self, env_ids: Array, at: Array) -> Array:
+        return np.where(self.part.joint.opening[at] <= self._fraction + 0.02, GO_ON, _MISSED)
+
+
+_MISSED = OUTCOMES.index(Outcome.MISSED_CONTACT)

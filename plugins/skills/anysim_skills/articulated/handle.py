@@ -1,0 +1,181 @@
+"""A hand at a handle: what opening and closing have in common."""
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from anysim.conventions import Array
+from anysim.errors import TaskError
+from anysim.math import pose as P
+from anysim.skills.base import OUTCOMES, Outcome
+from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
+from anysim.task.env import TaskEnv
+from anysim.task.joints import RangedJointView
+from anysim.task.scene import RobotView
+from anysim_skills.arm import Arm
+from anysim_skills.articulated.bar_grasps import TURNS, bar_grasps
+from anysim_skills.articulated.part import Part
+from anysim_skills.grasping.grasp import Speed
+
+STATIONS = 5
+"""Points of the part's way at which a grasp must be reachable."""
+CLEAR = 0.1
+"""[m] the hand is before the handle when it comes, and after it has gone."""
+
+Share = Annotated[float, Field(ge=0, le=1, description="of the joint's range; 0 is closed")]
+
+
+class AtHandle(PhasedSkill):
+    """A skill that moves a part by its handle, whose frame is `<part>.handle`.
+
+    Of ten grasps of the bar the one is chosen that reaches the way to the handle and the whole way of the part with the
+    least motion.
+    """
+
+    share: float
+    """Where the part is to go."""
+
+    def __init__(
+        self,
+        env: TaskEnv,
+        *,
+        robot: RobotView,
+        part: RangedJointView,
+        tool: str = "tool",
+        solver: str = "numba_ik",
+        speed: Speed = 0.3,
+        part_speed: Annotated[float, Field(gt=0, description="[m/s] of the handle")] = 0.1,
+        lead: Annotated[float, Field(gt=0, description="[m] the command is at most this far ahead of the hand")] = 0.05,
+        steps: Annotated[int, Field(ge=1, description="control steps that a move may take")] = 200,
+    ) -> None:
+        if len(part.found) > 1:
+            raise TaskError(f"'{part.name}' is a joint of several objects; a handle is found on one alone")
+        self.arm = Arm.of(env, robot, tool=tool, solver=solver)
+        self.part = Part(env.scene, part)
+        self.handle = env.scene.frame(f"{env.engine.world.bodies[self.part.body].name}.handle")
+        self.speed, self.part_speed, self.lead, self.late = speed, part_speed, lead, steps
+        n = env.num_envs
+        self._order, self._reachable = np.zeros((n, len(TURNS)), dtype=np.int64), np.zeros(n, dtype=np.int64)
+        self.candidate = np.zeros(n, dtype=np.int64)
+        self._turn = np.zeros((n, 4))
+        """The chosen orientation in the handle's frame."""
+        self._grip = np.zeros((n, 7))
+        """The tool in the part's frame when the part begins to move."""
+        super().__init__(env, [self.arm])
+
+    def start(self, env_ids: Array) -> None:
+        super().start(env_ids)
+        self.candidate[env_ids] = 0
+        self.phase[env_ids] = 1
+
+    def retry(self, rung: Rung, env: int) -> int | None:
+        if rung is Rung.CANDIDATE and self.candidate[env] + 1 < self._reachable[env]:
+            self.candidate[env] += 1
+            return 0
+        if rung is Rung.RESAMPLE or rung is Rung.BACK_OFF:
+            return 0
+        return None
+
+    def approach_phases(self) -> list[Phase]:
+        """Away from the part, choose, before the handle, to the handle."""
+        return [
+            Phase("back off", self._leave_handle, self.leaving, self.late),
+            Phase("choose", self._choose, self._chosen, 1),
+            Phase("approach", self.nothing, self._approach, self.late),
+            Phase("reach in", self.nothing, self._reach_in, self.late),
+        ]
+
+    def depth(self, ids: Array) -> Array:
+        """(n,) [m] how far beyond the handle's middle the tool goes."""
+        return np.zeros(len(ids))
+
+    def nothing(self, ids: Array, at: Array) -> None:
+        """Nothing to do on entering."""
+        del ids, at
+
+    # ------------------------------------------------------------------ to the handle and away from it
+
+    def _leave_handle(self, ids: Array, at: Array) -> None:
+        self.arm.closed[ids] = False
+        away = P.compose(self.arm.tool.pose[at], np.array([[0.0, 0.0, -CLEAR, 0.0, 0.0, 0.0, 1.0]]))
+        self.arm.command[ids] = self.arm.tool.pose[at]
+        self.arm.go(ids, away, self.speed)
+
+    def leaving(self, ids: Array, at: Array) -> Array:
+        """Until the hand is clear, or as far as it gets."""
+        waiting = self.steps[ids] < 10  # the fingers open first
+        self.arm.speed[ids] = np.where(waiting, 0.0, self.speed)
+        return np.where(self.arm.arrived(ids, at, 0.01, 0.1) | (self.steps[ids] >= self.late - 1), GO_ON, STAY)
+
+    def _choose(self, ids: Array, at: Array) -> None:
+        handle = self.handle.pose[at]
+        grasps = bar_grasps(handle)
+        grasps[..., :3] += (self.depth(ids)[:, None] * _into(handle))[:, None]
+        n, g = grasps.shape[:2]
+        clear = grasps - CLEAR * np.concatenate([_along(grasps), np.zeros((n, g, 4))], axis=-1)
+        to_go = self.part.closed + self.share * self.part.span - self.part.position(at)
+        way = [
+            self.part.moved(at, grasps, np.repeat((share * to_go)[:, None], g, axis=1))
+            for share in np.linspace(0.0, 1.0, STATIONS)
+        ]
+        targets = np.stack([clear, *way], axis=2)
+        effort = self.arm.reach(ids, targets.reshape(n, -1, 7))[1].reshape(n, g, -1).max(axis=2)
+        self._order[ids] = np.argsort(effort, axis=1, kind="stable")
+        self._reachable[ids] = np.isfinite(effort).sum(axis=1)
+        self._turn[ids] = TURNS[self._order[ids, np.minimum(self.candidate[ids], g - 1)]]
+
+    def _chosen(self, ids: Array, at: Array) -> Array:
+        del at
+        return np.where(self._reachable[ids] <= self.candidate[ids], _NO_IK, GO_ON)
+
+    def _at_handle(self, ids: Array, at: Array, short_of: float) -> Array:
+        """Tool poses (n, 7) at the handle, or short of it along the tool's z [m]."""
+        handle = self.handle.pose[at]
+        grasp = np.concatenate([handle[:, :3], P.multiply(handle[:, 3:], self._turn[ids])], axis=1)
+        grasp[:, :3] += self.depth(ids)[:, None] * _into(handle) - short_of * _along(grasp)
+        return grasp
+
+    def _approach(self, ids: Array, at: Array) -> Array:
+        self.arm.go(ids, self._at_handle(ids, at, CLEAR), self.speed)
+        return np.where(self.arm.arrived(ids, at), GO_ON, STAY)
+
+    def _reach_in(self, ids: Array, at: Array) -> Array:
+        self.arm.go(ids, self._at_handle(ids, at, 0.0), self.speed / 2, 0.02)
+        there = self.arm.arrived(ids, at, 0.006, 0.06)
+        return np.where(there | ((self.steps[ids] >= 10) & self.arm.touching(ids, at)), GO_ON, STAY)
+
+    # ------------------------------------------------------------------ with the part
+
+    def take(self, ids: Array, at: Array) -> None:
+        """From here on the hand goes where the part takes it."""
+        self._grip[ids] = P.compose(P.inverse(self.part.pose(at)), self.arm.tool.pose[at])
+
+    def follow(self, ids: Array, at: Array) -> Array:
+        """Move the part on by its handle; (n,) [m] how far the hand has slipped from it."""
+        here = self.part.position(at)
+        goal = self.part.closed + self.share * self.part.span
+        tool = P.compose(self.part.pose(at), self._grip[ids])
+        reach = np.maximum(self.part.reach(tool[:, :3], at), 1e-3)
+        ahead = np.clip(goal - here, -self.lead / reach, self.lead / reach)
+        target = self.part.moved(at, tool[:, None], ahead[:, None])[:, 0]
+        self.arm.go(ids, target, self.part_speed, self.lead)
+        return P.norm(self.arm.tool.position[at] - tool[:, :3])
+
+    def phases_away(self) -> Sequence[Phase]:
+        """Let go, and away from the part."""
+        return (Phase("retreat", self._leave_handle, self.leaving, self.late),)
+
+
+def _into(handle: Array) -> Array:
+    """(n, 3) from handles (n, 7) into their fronts."""
+    return P.rotate(handle[:, 3:], np.broadcast_to(np.array([-1.0, 0.0, 0.0]), (len(handle), 3)))
+
+
+def _along(tools: Array) -> Array:
+    """(..., 3) the z axis of tool poses (..., 7)."""
+    return P.rotate(tools[..., 3:], np.broadcast_to(np.array([0.0, 0.0, 1.0]), (*tools.shape[:-1], 3)))
+
+
+_NO_IK = OUTCOMES.index(Outcome.NO_IK)

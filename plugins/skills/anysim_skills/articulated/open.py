@@ -1,0 +1,55 @@
+"""Open: pull a drawer, a door or a lid open by its handle."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.skills.base import OUTCOMES, Outcome
+from anysim.skills.phases import GO_ON, STAY, Phase
+from anysim.task.env import TaskEnv
+from anysim_skills.articulated.handle import AtHandle, Share
+from anysim_skills.grasping.grasp import CLOSING_STEPS, SETTLED
+
+SLIP = 0.04
+"""[m] a hand that is further than this from where it took hold of the part has lost it."""
+OVERSHOOT = 0.05
+"""Of the range: how much further the hand is commanded than asked, so that a drive's yielding does not fall short."""
+
+
+class Open(AtHandle):
+    """Open `part` with `robot` by its handle, up to a share of its range."""
+
+    def __init__(self, env: TaskEnv, *, fraction: Share = 0.8, **options: object) -> None:
+        self._fraction = fraction
+        self.share = min(1.0, fraction + OVERSHOOT)
+        super().__init__(env, **options)  # pyright: ignore[reportArgumentType]
+
+    def make_phases(self) -> Sequence[Phase]:
+        return (
+            *self.approach_phases(),
+            Phase("close", self._close, self._closing, CLOSING_STEPS + 1),
+            Phase("pull", self.take, self._pull, 3 * self.late),
+            *self.phases_away(),
+        )
+
+    def _close(self, ids: Array, at: Array) -> None:
+        del at
+        self.arm.closed[ids] = True
+        self.arm.stay(ids)
+
+    def _closing(self, ids: Array, at: Array) -> Array:
+        del at
+        settled = (self.steps[ids] >= 5) & (self.arm.finger_speed(ids) < SETTLED)
+        return np.where(settled | (self.steps[ids] >= CLOSING_STEPS), GO_ON, STAY)
+
+    def _pull(self, ids: Array, at: Array) -> Array:
+        slip = self.follow(ids, at)
+        opened = self.part.joint.opening[at] >= self._fraction
+        return np.where(opened, GO_ON, np.where(slip > self.lead + SLIP, _UNSTABLE, STAY))
+
+    def succeeded(self, env_ids: Array, at: Array) -> Array:
+        return np.where(self.part.joint.opening[at] >= self._fraction - 0.02, GO_ON, _MISSED)
+
+
+_UNSTABLE, _MISSED = OUTCOMES.index(Outcome.UNSTABLE_GRASP), OUTCOMES.index(Outcome.MISSED_CONTACT)
