@@ -27,5 +27,7 @@ TURNS = _turns()
 
 def bar_grasps(handle: Array) -> Array:
     """Tool poses (n, 10, 7) at the middle of handles (n, 7), tool z towards the front; those without tilt first."""
-    turns = P.multiply(np.repeat(handle[:, None, 3:], len(TURNS), axis=1), np.broadcast_to(TURNS, (len(handle), *TURNS.shape)))
+    turns = P.multiply(
+        np.repeat(handle[:, None, 3:], len(TURNS), axis=1), np.broadcast_to(TURNS, (len(handle), *TURNS.shape))
+    )
     return np.concatenate([np.repeat(handle[:, None, :3], len(TURNS), axis=1), turns], axis=-1)

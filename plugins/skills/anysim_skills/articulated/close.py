@@ -21,11 +21,7 @@ class Close(AtHandle):
         super().__init__(env, **options)  # pyright: ignore[reportArgumentType]
 
     def make_phases(self) -> Sequence[Phase]:
-        return (
-            *self.approach_phases(),
-            Phase("push", self.take, self._push, 3 * self.late),
-            *self.phases_away(),
-        )
+        return (*self.approach_phases(), Phase("push", self.take, self._push, 3 * self.late), *self.phases_away())
 
     def depth(self, ids: Array) -> Array:
         return np.full(len(ids), 0.02)  # the finger tips come close to the front

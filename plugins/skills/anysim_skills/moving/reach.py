@@ -60,5 +60,7 @@ class Reach(PhasedSkill):
         self._held[ids] = (self._held[ids] + 1) * there
         self._stuck[ids] = (self._stuck[ids] + 1) * self.arm.stuck[ids]
         return np.where(
-            self._stuck[ids] > STUCK, OUTCOMES.index(Outcome.NO_IK), np.where(self._held[ids] >= self._hold, GO_ON, STAY)
+            self._stuck[ids] > STUCK,
+            OUTCOMES.index(Outcome.NO_IK),
+            np.where(self._held[ids] >= self._hold, GO_ON, STAY),
         )

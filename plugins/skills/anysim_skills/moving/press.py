@@ -1,0 +1,124 @@
+"""Press: push a button or a switch along its normal, and let go of it."""
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from anysim.conventions import Array
+from anysim.math import pose as P
+from anysim.skills.base import OUTCOMES, Outcome
+from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
+from anysim.task.env import TaskEnv
+from anysim.task.joints import RangedJointView
+from anysim.task.scene import Frame, RobotView
+from anysim_skills.arm import Arm
+from anysim_skills.grasping.grasp import Speed
+
+TURNS = 8
+"""Orientations of the hand about the normal that are tried."""
+_CLOSING = 20
+
+
+class Press(PhasedSkill):
+    """Press `button`, whose frame's z points out of it, with the closed fingers of `robot` until `part` has moved."""
+
+    def __init__(
+        self,
+        env: TaskEnv,
+        *,
+        robot: RobotView,
+        button: Frame,
+        part: RangedJointView,
+        tool: str = "tool",
+        solver: str = "numba_ik",
+        fraction: Annotated[float, Field(gt=0, le=1, description="of the joint's range that counts as pressed")] = 0.8,
+        clear: Annotated[float, Field(gt=0, description="[m] before the button, before and afterwards")] = 0.06,
+        beyond: Annotated[float, Field(gt=0, description="[m] how far below the button the tool is commanded")] = 0.03,
+        speed: Speed = 0.3,
+        press_speed: Speed = 0.08,
+        hold: Annotated[int, Field(ge=1, description="control steps")] = 5,
+    ) -> None:
+        self.arm = Arm.of(env, robot, tool=tool, solver=solver)
+        self._button, self._part, self._fraction = button, part, fraction
+        self._clear, self._beyond, self._speed, self._press_speed, self._hold = clear, beyond, speed, press_speed, hold
+        n = env.num_envs
+        self._turn = np.zeros((n, 4))
+        self._order, self._reachable = np.zeros((n, TURNS), dtype=np.int64), np.zeros(n, dtype=np.int64)
+        self._candidate, self._held = np.zeros((2, n), dtype=np.int64)
+        super().__init__(env, [self.arm])
+
+    def make_phases(self) -> Sequence[Phase]:
+        return (
+            Phase("choose", self._choose, self._chosen, 1),
+            Phase("approach", self._nothing, self._approach, 200),
+            Phase("press", self._forget, self._press, 120),
+            Phase("retreat", self._nothing, self._retreat, 100),
+        )
+
+    def start(self, env_ids: Array) -> None:
+        super().start(env_ids)
+        self._candidate[env_ids] = 0
+
+    def retry(self, rung: Rung, env: int) -> int | None:
+        if rung in (Rung.CANDIDATE, Rung.RESAMPLE) and self._candidate[env] + 1 < self._reachable[env]:
+            self._candidate[env] += 1
+            return 0
+        return 0 if rung is Rung.BACK_OFF else None
+
+    def _nothing(self, ids: Array, at: Array) -> None:
+        del ids, at
+
+    def _at(self, at: Array, turn: Array, out: float) -> Array:
+        """Tool poses (n, 7), `out` [m] above the button along its normal."""
+        button = self._button.pose[at]
+        normal = P.rotate(button[:, 3:], np.broadcast_to(np.array([0.0, 0.0, 1.0]), (len(button), 3)))
+        return np.concatenate([button[:, :3] + out * normal, turn], axis=1)
+
+    def _choose(self, ids: Array, at: Array) -> None:
+        button = self._button.pose[at]
+        angle = 2 * np.pi / TURNS * np.arange(TURNS)
+        half = 0.5 * angle
+        against = np.stack([np.cos(half), np.sin(half), 0 * half, 0 * half], axis=1)  # z against the normal
+        turns = P.multiply(
+            np.repeat(button[:, None, 3:], TURNS, axis=1), np.broadcast_to(against, (len(ids), TURNS, 4))
+        )
+        targets = np.stack(
+            [
+                np.stack([self._at(at, turns[:, k], out) for out in (self._clear, -self._beyond)], axis=1)
+                for k in range(TURNS)
+            ],
+            axis=1,
+        )
+        effort = self.arm.reach(ids, targets.reshape(len(ids), -1, 7))[1].reshape(len(ids), TURNS, 2).max(axis=2)
+        self._order[ids] = np.argsort(effort, axis=1, kind="stable")
+        self._reachable[ids] = np.isfinite(effort).sum(axis=1)
+        chosen = self._order[ids, np.minimum(self._candidate[ids], TURNS - 1)]
+        self._turn[ids] = turns[np.arange(len(ids)), chosen]
+        self.arm.closed[ids] = True
+
+    def _chosen(self, ids: Array, at: Array) -> Array:
+        del at
+        return np.where(self._reachable[ids] <= self._candidate[ids], OUTCOMES.index(Outcome.NO_IK), GO_ON)
+
+    def _approach(self, ids: Array, at: Array) -> Array:
+        self.arm.go(ids, self._at(at, self._turn[ids], self._clear), self._speed)
+        return np.where(self.arm.arrived(ids, at) & (self.steps[ids] >= _CLOSING), GO_ON, STAY)
+
+    def _forget(self, ids: Array, at: Array) -> None:
+        del at
+        self._held[ids] = 0
+
+    def _press(self, ids: Array, at: Array) -> Array:
+        self.arm.go(ids, self._at(at, self._turn[ids], -self._beyond), self._press_speed, 0.04)
+        self._held[ids] = (self._held[ids] + 1) * (self._part.opening[at] >= self._fraction)
+        missed = (self.steps[ids] >= 20) & self.arm.arrived(ids, at)
+        return np.where(self._held[ids] >= self._hold, GO_ON, np.where(missed, _MISSED, STAY))
+
+    def _retreat(self, ids: Array, at: Array) -> Array:
+        self.arm.go(ids, self._at(at, self._turn[ids], self._clear), self._speed)
+        return np.where(self.arm.arrived(ids, at, 0.01, 0.1), GO_ON, STAY)
+
+
+_MISSED = OUTCOMES.index(Outcome.MISSED_CONTACT)

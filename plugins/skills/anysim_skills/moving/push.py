@@ -1,0 +1,149 @@
+"""Push: move an object across its support with the closed fingers."""
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from anysim.conventions import Array
+from anysim.math import pose as P
+from anysim.skills.base import OUTCOMES, Outcome
+from anysim.skills.phases import FIRST_RUNGS, GO_ON, STAY, Phase, PhasedSkill, Rung
+from anysim.task.env import TaskEnv
+from anysim.task.scene import Frame, ObjectView, RobotView
+from anysim_skills.arm import Arm
+from anysim_skills.grasping.grasp import Metres, Speed
+
+ASTRAY = np.deg2rad(35.0)
+"""[rad] the object is pushed off its way when the goal lies further to the side of the stroke than this."""
+
+
+class Push(PhasedSkill):
+    first_rungs: ClassVar[Mapping[Outcome, Rung]] = FIRST_RUNGS | {Outcome.LOST: Rung.REPLAN}
+
+    """Push `object` with `robot` until it lies within `tolerance` of `goal`, horizontally."""
+
+    def __init__(
+        self,
+        env: TaskEnv,
+        *,
+        robot: RobotView,
+        object: ObjectView,
+        goal: Frame,
+        tool: str = "tool",
+        solver: str = "numba_ik",
+        tolerance: Metres = 0.02,
+        height: Annotated[float, Field(description="[m] of the tool above the object's origin")] = 0.0,
+        clearance: Annotated[float, Field(gt=0, description="[m] from the object before the stroke")] = 0.04,
+        hover: Metres = 0.12,
+        speed: Speed = 0.4,
+        stroke_speed: Speed = 0.1,
+    ) -> None:
+        self.arm = Arm.of(env, robot, tool=tool, solver=solver)
+        self._object, self._goal = object, goal
+        self._tolerance, self._height, self._clearance, self._hover = tolerance, height, clearance, hover
+        self._speed, self._stroke_speed = speed, stroke_speed
+        shape = env.scene.entity_shape(object.entity.name)
+        low, high = shape.bounds(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]))
+        self._radius = float(np.max(np.maximum(np.abs(low), np.abs(high))[:2]))
+        n = env.num_envs
+        self._way = np.zeros((n, 3))
+        """(N, 3) the direction of the stroke."""
+        self._turn = np.zeros((n, 4))
+        super().__init__(env, [self.arm])
+
+    def make_phases(self) -> Sequence[Phase]:
+        return (
+            Phase("rise", self._rise, self._rising, 100),
+            Phase("above", self._aim, self._above, 200),
+            Phase("descend", self._nothing, self._descend, 150),
+            Phase("stroke", self._nothing, self._stroke, 400),
+            Phase("retreat", self._rise, self._rising, 100),
+        )
+
+    def retry(self, rung: Rung, env: int) -> int | None:
+        """From behind the object again, where it is now."""
+        del env
+        return 0 if rung is not Rung.RECOVER else None
+
+    def _nothing(self, ids: Array, at: Array) -> None:
+        del ids, at
+
+    def _to_goal(self, at: Array) -> Array:
+        """(n, 3) from the object to the goal, horizontally."""
+        way = self._goal.position[at] - self._object.root.position[at]
+        way[:, 2] = 0.0
+        return way
+
+    def _rise(self, ids: Array, at: Array) -> None:
+        pose = self.arm.tool.pose[at]
+        low = self._object.root.position[at, 2] + self._hover
+        pose[:, 2] = np.maximum(pose[:, 2], low)
+        self.arm.closed[ids] = True
+        self.arm.go(ids, pose, self._speed)
+
+    def _rising(self, ids: Array, at: Array) -> Array:
+        done = (self._object.root.position[at, 2] + 0.7 * self._hover) < self.arm.tool.position[at, 2]
+        return np.where(done, GO_ON, STAY)
+
+    def _aim(self, ids: Array, at: Array) -> None:
+        """Stroke towards the goal, the hand's fingers across it: of the two turns the one nearer to the present."""
+        way = self._to_goal(at)
+        length = P.norm(way)
+        self._way[ids] = way / np.maximum(length, 1e-9)[:, None]
+        yaw = np.arctan2(way[:, 1], way[:, 0])
+        turns = np.stack([_down(yaw), _down(yaw + np.pi)], axis=1)
+        behind = self._behind(ids, at)
+        targets = np.concatenate([np.repeat(behind[:, None], 2, axis=1), turns], axis=-1)
+        goal = targets.copy()
+        goal[..., :2] = (self._goal.position[at, :2] - self._radius * self._way[ids, :2])[:, None]
+        effort = self.arm.reach(ids, np.stack([targets, goal], axis=2).reshape(len(ids), 4, 7))[1]
+        self._cost = effort.reshape(len(ids), 2, 2).max(axis=2)
+        self._turn[ids] = turns[np.arange(len(ids)), np.argmin(self._cost, axis=1)]
+        self._blocked = ids[~np.isfinite(self._cost.min(axis=1))]
+
+    def _behind(self, ids: Array, at: Array) -> Array:
+        """(n, 3) behind the object, seen from the goal."""
+        place = self._object.root.position[at] - (self._radius + self._clearance) * self._way[ids]
+        place[:, 2] = self._object.root.position[at, 2] + self._height
+        return place
+
+    def _above(self, ids: Array, at: Array) -> Array:
+        place = self._behind(ids, at)
+        place[:, 2] += self._hover
+        self.arm.go(ids, np.concatenate([place, self._turn[ids]], axis=1), self._speed)
+        fresh = self.steps[ids] == 0
+        blocked = fresh & np.isin(ids, self._blocked)
+        return np.where(blocked, _NO_IK, np.where(self.arm.arrived(ids, at, 0.01, 0.1), GO_ON, STAY))
+
+    def _descend(self, ids: Array, at: Array) -> Array:
+        self.arm.go(ids, np.concatenate([self._behind(ids, at), self._turn[ids]], axis=1), self._speed / 2)
+        return np.where(self.arm.arrived(ids, at, 0.006, 0.1), GO_ON, STAY)
+
+    def _stroke(self, ids: Array, at: Array) -> Array:
+        """Push on along the line; sideways corrections would drag the object along by friction, the wrong way."""
+        thing, way = self._object.root.position[at], self._to_goal(at)
+        left = P.norm(way)
+        line = self._way[ids]
+        ahead = P.dot(way, line)
+        reach = np.minimum(np.maximum(ahead, 0.0), 0.03)
+        target = thing - self._radius * line + (reach - 0.002)[:, None] * line
+        target[:, 2] = thing[:, 2] + self._height
+        self.arm.go(ids, np.concatenate([target, self._turn[ids]], axis=1), self._stroke_speed)
+        there = left < self._tolerance
+        astray = (left > 2 * self._tolerance) & (ahead < np.cos(ASTRAY) * left)
+        return np.where(there, GO_ON, np.where(astray, _LOST, STAY))
+
+    def succeeded(self, env_ids: Array, at: Array) -> Array:
+        return np.where(P.norm(self._to_goal(at)) < 1.5 * self._tolerance, GO_ON, _LOST)
+
+
+def _down(yaw: Array) -> Array:
+    """Tool orientations (n, 4) with z down, whose y (across the fingers) is turned by yaw + 90 degrees."""
+    half = 0.5 * yaw
+    zero = np.zeros_like(half)
+    return np.stack([np.cos(half), np.sin(half), zero, zero], axis=1)
+
+
+_NO_IK, _LOST = OUTCOMES.index(Outcome.NO_IK), OUTCOMES.index(Outcome.LOST)
