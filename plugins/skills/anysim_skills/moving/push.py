@@ -20,9 +20,9 @@ ASTRAY = np.deg2rad(35.0)
 
 
 class Push(PhasedSkill):
-    first_rungs: ClassVar[Mapping[Outcome, Rung]] = FIRST_RUNGS | {Outcome.LOST: Rung.REPLAN}
-
     """Push `object` with `robot` until it lies within `tolerance` of `goal`, horizontally."""
+
+    first_rungs: ClassVar[Mapping[Outcome, Rung]] = {**FIRST_RUNGS, Outcome.LOST: Rung.REPLAN}
 
     def __init__(
         self,
@@ -51,6 +51,7 @@ class Push(PhasedSkill):
         self._way = np.zeros((n, 3))
         """(N, 3) the direction of the stroke."""
         self._turn = np.zeros((n, 4))
+        self._blocked = np.zeros(n, dtype=bool)
         super().__init__(env, [self.arm])
 
     def make_phases(self) -> Sequence[Phase]:
@@ -99,9 +100,9 @@ class Push(PhasedSkill):
         goal = targets.copy()
         goal[..., :2] = (self._goal.position[at, :2] - self._radius * self._way[ids, :2])[:, None]
         effort = self.arm.reach(ids, np.stack([targets, goal], axis=2).reshape(len(ids), 4, 7))[1]
-        self._cost = effort.reshape(len(ids), 2, 2).max(axis=2)
-        self._turn[ids] = turns[np.arange(len(ids)), np.argmin(self._cost, axis=1)]
-        self._blocked = ids[~np.isfinite(self._cost.min(axis=1))]
+        cost = effort.reshape(len(ids), 2, 2).max(axis=2)
+        self._turn[ids] = turns[np.arange(len(ids)), np.argmin(cost, axis=1)]
+        self._blocked[ids] = ~np.isfinite(cost.min(axis=1))
 
     def _behind(self, ids: Array, at: Array) -> Array:
         """(n, 3) behind the object, seen from the goal."""
@@ -113,9 +114,7 @@ class Push(PhasedSkill):
         place = self._behind(ids, at)
         place[:, 2] += self._hover
         self.arm.go(ids, np.concatenate([place, self._turn[ids]], axis=1), self._speed)
-        fresh = self.steps[ids] == 0
-        blocked = fresh & np.isin(ids, self._blocked)
-        return np.where(blocked, _NO_IK, np.where(self.arm.arrived(ids, at, 0.01, 0.1), GO_ON, STAY))
+        return np.where(self._blocked[ids], _NO_IK, np.where(self.arm.arrived(ids, at, 0.01, 0.1), GO_ON, STAY))
 
     def _descend(self, ids: Array, at: Array) -> Array:
         self.arm.go(ids, np.concatenate([self._behind(ids, at), self._turn[ids]], axis=1), self._speed / 2)
