@@ -12,7 +12,7 @@ from anysim_skills.articulated.handle import AtHandle, Share
 
 
 class Close(AtHandle):
-    """Close `part` with `robot`: the fingers on both sides of its handle push until it is open by at most `fraction`."""
+    """Close `part` with `robot`: the fingers astride its handle push until it is open by at most `fraction`."""
 
     share = 0.0
 
