@@ -29,10 +29,12 @@ class Close(AtHandle):
     def _push(self, ids: Array, at: Array) -> Array:
         self.follow(ids, at)
         self.arm.closed[ids] = False
-        return np.where(self.part.joint.opening[at] <= self._fraction, GO_ON, STAY)
+        shut = self.part.joint.opening[at] <= self._fraction
+        return np.where(shut, GO_ON, np.where(self.jammed(ids, at), _JAMMED, STAY))
 
     def succeeded(self, env_ids: Array, at: Array) -> Array:
         return np.where(self.part.joint.opening[at] <= self._fraction + 0.02, GO_ON, _MISSED)
 
 
+_JAMMED = OUTCOMES.index(Outcome.JAMMED)
 _MISSED = OUTCOMES.index(Outcome.MISSED_CONTACT)

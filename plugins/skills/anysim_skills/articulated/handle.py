@@ -1,7 +1,7 @@
 """A hand at a handle: what opening and closing have in common."""
 
-from collections.abc import Sequence
-from typing import Annotated
+from collections.abc import Mapping, Sequence
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -10,7 +10,7 @@ from anysim.conventions import Array
 from anysim.errors import TaskError
 from anysim.math import pose as P
 from anysim.skills.base import OUTCOMES, Outcome
-from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
+from anysim.skills.phases import FIRST_RUNGS, GO_ON, STAY, Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.joints import RangedJointView
 from anysim.task.scene import RobotView
@@ -24,6 +24,11 @@ STATIONS = 5
 CLEAR = 0.1
 """[m] the hand is before the handle when it comes, and after it has gone."""
 
+STALLED = 50
+"""Control steps in which a part that is moved does not get on by `PROGRESS` before it counts as jammed."""
+PROGRESS = 0.005
+"""Of the joint's range."""
+
 Share = Annotated[float, Field(ge=0, le=1, description="of the joint's range; 0 is closed")]
 
 
@@ -34,6 +39,7 @@ class AtHandle(PhasedSkill):
     least motion.
     """
 
+    first_rungs: ClassVar[Mapping[Outcome, Rung]] = {**FIRST_RUNGS, Outcome.JAMMED: Rung.BACK_OFF}
     share: float
     """Where the part is to go."""
 
@@ -63,6 +69,8 @@ class AtHandle(PhasedSkill):
         """The chosen orientation in the handle's frame."""
         self._grip = np.zeros((n, 7))
         """The tool in the part's frame when the part begins to move."""
+        self._left, self._since = np.zeros(n), np.zeros(n, dtype=np.int64)
+        """What was left of the way at the last progress, and the control steps since then."""
         super().__init__(env, [self.arm])
 
     def start(self, env_ids: Array) -> None:
@@ -151,6 +159,7 @@ class AtHandle(PhasedSkill):
     def take(self, ids: Array, at: Array) -> None:
         """From here on the hand goes where the part takes it."""
         self._grip[ids] = P.compose(P.inverse(self.part.pose(at)), self.arm.tool.pose[at])
+        self._left[ids], self._since[ids] = np.inf, 0
 
     def follow(self, ids: Array, at: Array) -> Array:
         """Move the part on by its handle; (n,) [m] how far the hand has slipped from it."""
@@ -162,6 +171,14 @@ class AtHandle(PhasedSkill):
         target = self.part.moved(at, tool[:, None], ahead[:, None])[:, 0]
         self.arm.go(ids, target, self.part_speed, self.lead)
         return P.norm(self.arm.tool.position[at] - tool[:, :3])
+
+    def jammed(self, ids: Array, at: Array) -> Array:
+        """(n,) bool: the part has not got on for a while."""
+        left = np.abs(self.part.joint.opening[at] - self.share)
+        on = left < self._left[ids] - PROGRESS
+        self._left[ids] = np.where(on, left, self._left[ids])
+        self._since[ids] = np.where(on, 0, self._since[ids] + 1)
+        return self._since[ids] > STALLED
 
     def phases_away(self) -> Sequence[Phase]:
         """Let go, and away from the part."""

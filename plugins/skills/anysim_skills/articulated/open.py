@@ -46,10 +46,12 @@ class Open(AtHandle):
     def _pull(self, ids: Array, at: Array) -> Array:
         slip = self.follow(ids, at)
         opened = self.part.joint.opening[at] >= self._fraction
-        return np.where(opened, GO_ON, np.where(slip > self.lead + SLIP, _UNSTABLE, STAY))
+        said = np.where(self.jammed(ids, at), _JAMMED, np.where(slip > self.lead + SLIP, _UNSTABLE, STAY))
+        return np.where(opened, GO_ON, said)
 
     def succeeded(self, env_ids: Array, at: Array) -> Array:
         return np.where(self.part.joint.opening[at] >= self._fraction - 0.02, GO_ON, _MISSED)
 
 
+_JAMMED = OUTCOMES.index(Outcome.JAMMED)
 _UNSTABLE, _MISSED = OUTCOMES.index(Outcome.UNSTABLE_GRASP), OUTCOMES.index(Outcome.MISSED_CONTACT)
