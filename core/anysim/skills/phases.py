@@ -80,11 +80,53 @@ class Phase(NamedTuple):
     steps: int
 
 
-class PhasedSkill(Skill):
-    """A skill that is a table of phases.
+class MovingSkill(Skill):
+    """A skill that says where its movers are to go, so that several can share them in one control step.
 
     Attributes:
         movers: what it moves.
+    """
+
+    movers: tuple[Mover, ...]
+
+    @abstractmethod
+    def start(self, env_ids: Array) -> None:
+        """Begin where another skill has ended: what moves goes on from where it is told to be."""
+
+    @abstractmethod
+    def decide(self, ids: Array, at: Array) -> None:
+        """Say what is to move where in these envs; `at` are their rows among those that the scene looks at."""
+
+    def history(self, env: int) -> tuple[tuple[str, str], ...]:
+        """The failures of an env since it was started, each with what was tried next."""
+        del env
+        return ()
+
+    def begin(self, env_ids: Array) -> None:
+        self.start(env_ids)
+        for mover in self.movers:
+            mover.renew(env_ids)
+
+    def act(self, env_ids: Array, action: Array) -> None:
+        ids = env_ids[self.outcome[env_ids] <= GO_ON]  # what has succeeded is held until the episode ends
+        if len(ids) == 0:
+            return
+        self.env.scene.look(ids)
+        for mover in self.movers:
+            mover.prepare(ids)
+        self.decide(ids, np.arange(len(ids)))
+        for mover in self.movers:
+            mover.act(ids, action)
+
+    def describe(self, env: int) -> dict[str, object]:
+        climbed = [f"{outcome} -> {rung}" for outcome, rung in self.history(env)]
+        return super().describe(env) | ({"ladder": climbed} if climbed else {})
+
+
+class PhasedSkill(MovingSkill):
+    """A skill that is a table of phases.
+
+    Attributes:
         steps: (N,) control steps in the present phase.
         used: (N, rungs) how often each rung of the ladder was used since `begin`.
         climbs: for each env the failures so far, each with the rung that was tried next.
@@ -115,32 +157,14 @@ class PhasedSkill(Skill):
         del at
         return np.full(len(env_ids), GO_ON)
 
-    def begin(self, env_ids: Array) -> None:
-        self.start(env_ids)
-        for mover in self.movers:
-            mover.renew(env_ids)
-
     def start(self, env_ids: Array) -> None:
-        """Begin where another skill has ended: what moves goes on from where it is told to be."""
-        super().begin(env_ids)
+        Skill.begin(self, env_ids)
         self.used[env_ids] = 0
         for i in env_ids.tolist():
             self.climbs[i] = ()
         self._go(env_ids, 0)
 
-    def act(self, env_ids: Array, action: Array) -> None:
-        ids = env_ids[self.outcome[env_ids] <= GO_ON]  # what has succeeded is held until the episode ends
-        if len(ids) == 0:
-            return
-        self.env.scene.look(ids)
-        for mover in self.movers:
-            mover.prepare(ids)
-        self.decide(ids, np.arange(len(ids)))
-        for mover in self.movers:
-            mover.act(ids, action)
-
     def decide(self, ids: Array, at: Array) -> None:
-        """Say what is to move where in these envs; `at` are their rows among those that the scene looks at."""
         for number, phase in enumerate(self.table):
             here = (self.phase[ids] == number) & (self.outcome[ids] == STAY)
             if not here.any():
@@ -159,9 +183,8 @@ class PhasedSkill(Skill):
             for env, code in zip(own[failed].tolist(), said[failed].tolist(), strict=True):
                 self._climb(env, OUTCOMES[code])
 
-    def describe(self, env: int) -> dict[str, object]:
-        climbed = [f"{outcome} -> {rung}" for outcome, rung in self.climbs[env]]
-        return super().describe(env) | ({"ladder": climbed} if climbed else {})
+    def history(self, env: int) -> tuple[tuple[str, str], ...]:
+        return self.climbs[env]
 
     def _leave(self, number: int, ids: Array, at: Array) -> None:
         if number + 1 < len(self.table):
