@@ -63,6 +63,11 @@ class Skill(ABC):
         Reads live state only; never writes state. May set `outcome` of a row, which ends the skill there.
         """
 
+    def moment(self, env: int) -> tuple[int, ...]:
+        """Numbers that change whenever `describe` says something else; empty if that cannot be told."""
+        del env
+        return ()
+
     def describe(self, env: int) -> dict[str, object]:
         """What an env is doing, for records and tables."""
         return {

@@ -118,6 +118,9 @@ class MovingSkill(Skill):
         for mover in self.movers:
             mover.act(ids, action)
 
+    def moment(self, env: int) -> tuple[int, ...]:
+        return int(self.phase[env]), int(self.outcome[env]), int(self.attempts[env])
+
     def describe(self, env: int) -> dict[str, object]:
         climbed = [f"{outcome} -> {rung}" for outcome, rung in self.history(env)]
         return super().describe(env) | ({"ladder": climbed} if climbed else {})

@@ -52,6 +52,7 @@ class SkillPolicy:
         self._blame = registry.Blame(
             f"{env.located('task.expert')}: the skill '{self.name}'", registry.origin(self.skill), prefix=True
         )
+        self._told: list[tuple[tuple[int, ...], dict[str, object]]] = [((), {})] * env.num_envs
         self._still = np.clip(np.zeros(env.action_dim), *env.action_bounds)
 
     def begin(self, env_ids: Array) -> None:
@@ -74,6 +75,9 @@ class SkillPolicy:
     def describe(self, env: int) -> dict[str, object]:
         """What an env is doing, for records and tables."""
         try:
-            return {"skill": self.name, **self.skill.describe(env)}
+            moment = self.skill.moment(env)
+            if not moment or moment != self._told[env][0]:  # it is asked in every step, and mostly says the same
+                self._told[env] = moment, {"skill": self.name, **self.skill.describe(env)}
+            return self._told[env][1]
         except BaseException as error:  # noqa: BLE001 - told with the key
             registry.blame(error, self._blame.who, self._blame.package)

@@ -94,6 +94,9 @@ class SkillSequence(MovingSkill):
     def history(self, env: int) -> tuple[tuple[str, str], ...]:
         return (*self._past[env], *self.members[self.phase[env]].history(env))
 
+    def moment(self, env: int) -> tuple[int, ...]:
+        return *super().moment(env), *self.members[self.phase[env]].moment(env)
+
     def describe(self, env: int) -> dict[str, object]:
         said = super().describe(env)
         now = self.members[self.phase[env]].describe(env)
