@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple
 
 Status = Literal["qualified", "failed", "absent", "refused"]
-"""All checks passed; one did not; the robot's files are not installed; the engine says that it cannot."""
+"""All that was asked passed; a check did not; the robot's files are not installed; the engine says that it cannot."""
 
 
 class Check(NamedTuple):
@@ -62,7 +62,7 @@ class Facts(NamedTuple):
 
 
 class Qualification(NamedTuple):
-    """A robot on an engine. `oracle` says whom its kinematics were compared with, `why` what it is not for."""
+    """A robot on an engine. `oracle` says whom its kinematics were compared with, `why` what was not done."""
 
     robot: str
     engine: str

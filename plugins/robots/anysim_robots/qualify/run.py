@@ -10,7 +10,7 @@ from anysim.assets.catalogue import CatalogueEntry, load_robot, missing_source
 from anysim.compile.edit import unseen
 from anysim.compile.world import Compiled, compile_with_report
 from anysim.engine.factory import availability, create_simulation
-from anysim.errors import AnysimError, CapabilityError
+from anysim.errors import AnysimError, CapabilityError, PluginError
 from anysim_robots.qualify.motion import hold_check, random_checks
 from anysim_robots.qualify.oracle import Oracle, oracle_of
 from anysim_robots.qualify.result import CHECKS, Check, Facts, Qualification, Status
@@ -42,10 +42,11 @@ def qualify(
 
     Returns:
         A verdict with a figure for each check. What breaks in one of them is its cause; the others are run all the same
-        where that makes sense.
+        where that makes sense. Where the reader that the source is held against is not installed, the checks that need
+        it are not asked, and say how to get it.
 
     Raises:
-        PluginError: there is no such robot or engine, or a developers' tool is missing; says what to install.
+        PluginError: there is no such robot or engine.
         SpecError: the entry is not valid.
     """
     begun = time.perf_counter()
@@ -69,24 +70,39 @@ def qualify(
     except AnysimError as error:
         return ended("failed", [Check("build", False, words=f"no world can be made of it: {error}")])
     facts, notes = facts_of(compiled.world), compiled.report["robot"]
-    oracle = oracle_of(entry, compiled.world)
+    oracle, lacking = _oracle(entry, compiled)
+    reader = "" if oracle is None else oracle.name
     try:
         checks += _static(compiled, engine, oracle, tell)
     except CapabilityError as error:
-        return ended("refused", [], str(error), oracle.name, facts)
+        return ended("refused", [], str(error), reader, facts)
     except Exception as error:  # noqa: BLE001  whatever breaks is the answer to the question
         checks.append(Check("build", False, words=_words(error)))
-    tell("source")
-    with _noted(checks, "source"):
-        checks.append(source_check(compiled.world, oracle, notes))
+    if oracle is None:
+        checks += [Check(name, None, words=lacking) for name in ("source", "kinematics")]
+    else:
+        tell("source")
+        with _noted(checks, "source"):
+            checks.append(source_check(compiled.world, oracle, notes))
     if checks[0].passed:
         checks += _moving(entry, engine, durations, tell)
     order = list(CHECKS)
     checks.sort(key=lambda check: order.index(check.name))
-    return ended("failed" if any(c.passed is False for c in checks) else "qualified", checks, "", oracle.name, facts)
+    status: Status = "failed" if any(c.passed is False for c in checks) else "qualified"
+    return ended(
+        status, checks, "" if oracle is not None else f"source and kinematics are not asked: {lacking}", reader, facts
+    )
 
 
-def _static(compiled: Compiled, engine: str, oracle: Oracle, tell: Callable[[str], object]) -> list[Check]:
+def _oracle(entry: CatalogueEntry, compiled: Compiled) -> tuple[Oracle | None, str]:
+    """Whom the source is held against; None and how to get it where that is not installed."""
+    try:
+        return oracle_of(entry, compiled.world), ""
+    except PluginError as error:
+        return None, str(error)
+
+
+def _static(compiled: Compiled, engine: str, oracle: Oracle | None, tell: Callable[[str], object]) -> list[Check]:
     found: list[Check] = []
     with create_simulation(engine) as simulation:
         simulation.create_world(unseen(compiled.world))
@@ -94,9 +110,10 @@ def _static(compiled: Compiled, engine: str, oracle: Oracle, tell: Callable[[str
         tell("audit")
         with _noted(found, "audit"):
             found.append(audit_check(simulation))
-        tell("kinematics")
-        with _noted(found, "kinematics"):
-            found.append(kinematics_check(simulation, oracle))
+        if oracle is not None:
+            tell("kinematics")
+            with _noted(found, "kinematics"):
+                found.append(kinematics_check(simulation, oracle))
     return found
 
 
