@@ -178,12 +178,12 @@ def dry_run(loaded: LoadedRun, world: "World") -> None:
     Raises:
         SpecError: with file, line and column.
     """
-    from anysim.skills.runner import bind_skill
+    from anysim.skills.runner import bind_expert
 
     try:
         with blind_env(loaded, world, "check") as env:
-            if env.spec.task is not None and env.spec.task.expert is not None:
-                bind_skill(env.spec.task.expert, env)
+            if env.spec.collect is not None or (env.spec.task is not None and env.spec.task.expert is not None):
+                bind_expert(env)
     except SpecError as error:
         raise located(error, loaded) from None
 

@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from anysim_schemas.base import Integer, Name, NonNegative, Spec
 from anysim_schemas.cameras import CameraSpec
+from anysim_schemas.collect import CollectSpec
 from anysim_schemas.collisions import CollisionsSpec
 from anysim_schemas.contact_sensors import ContactSensorSpec
 from anysim_schemas.engine import EngineSpec, PhysicsSpec
@@ -68,4 +69,7 @@ class RunSpec(Spec):
     physics: PhysicsSpec = Field(default=PhysicsSpec(), description="time steps and gravity")
     world: WorldSpec = Field(default=WorldSpec(), description="what exists, where it goes and what looks at it")
     task: TaskSpec | None = Field(default=None, description="what is observed, rewarded and counted as success")
+    collect: CollectSpec | None = Field(
+        default=None, description="commands of an episode that is collected; the task's expert where not given"
+    )
     record: RecordSpec = Field(default=RecordSpec(), description="what is written, and by whom")

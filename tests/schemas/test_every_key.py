@@ -162,9 +162,19 @@ def engine_of(spec: Any, _out: Path) -> Any:
         return engine.name, engine.num_envs, workers, repr(getattr(engine, "options", None))
 
 
-def expert_of(spec: Any, _out: Path) -> Any:
+def expert_of(spec: Any, out: Path) -> Any:
+    """Who solves the task, and what it says it does in a few control steps."""
+    del out
     with anysim.make(spec) as env:
-        return SkillPolicy(env).name
+        policy, said = SkillPolicy(env), []
+        env.reset(seed=0)
+        policy.begin(np.array([0]))
+        for _ in range(8):
+            if not env.running[0]:
+                break
+            env.step(policy.act(np.array([0])))
+            said.append(policy.describe(0))
+        return policy.name, said
 
 
 class Still:

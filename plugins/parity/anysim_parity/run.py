@@ -59,7 +59,7 @@ def _no_expert(plan: _Plan) -> str:
     task = plan.loaded.spec.task
     if task is None:
         return "this is a world without a task"
-    return "" if task.expert is not None else "the task has no expert"
+    return "" if task.expert is not None or plan.loaded.spec.collect is not None else "the task has no expert"
 
 
 def _task(plan: _Plan) -> Layer:

@@ -131,7 +131,7 @@ class Arm:
         return np.abs(self.env.scene.state.joint_vel[np.ix_(ids, self._fingers)]).max(axis=1)
 
     def reach(self, ids: Array, targets: Array) -> tuple[Array, Array]:
-        """Inverse kinematics of many tool poses (n, g, 7) from the live configuration, without restarts.
+        """Inverse kinematics of many tool poses (n, g, 7): from the live configuration, else from where it began.
 
         Returns:
             joint_pos (n, g, K) and the largest joint motion (n, g) to get there; infinite where there is no solution.
@@ -142,7 +142,16 @@ class Arm:
         base = np.repeat(self._base(ids), g, axis=0)
         found = self.solver.solve(targets.reshape(-1, 7), base, seeds, random_restarts=0, rng_seeds=keys)
         moved = np.where(found.converged, np.abs(found.joint_pos - seeds).max(axis=1), np.inf)
-        return found.joint_pos.reshape(n, g, -1), moved.reshape(n, g)
+        joints, left = found.joint_pos, np.flatnonzero(~found.converged)
+        if len(left):
+            home = np.repeat(self.chain.initial[None], len(left), axis=0)
+            again = self.solver.solve(
+                targets.reshape(-1, 7)[left], base[left], home, random_restarts=0, rng_seeds=keys[left]
+            )
+            won = left[again.converged]
+            joints[won] = again.joint_pos[again.converged]
+            moved[won] = np.abs(joints[won] - seeds[won]).max(axis=1)
+        return joints.reshape(n, g, -1), moved.reshape(n, g)
 
     def _base(self, ids: Array) -> Array:
         return self.env.scene.state.body_pose[ids, self.chain.root]

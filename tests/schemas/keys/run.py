@@ -14,6 +14,7 @@ EXPERT = (
     "world.robots.panda={robot: franka_panda, position: [0, 0, 0.4]}",
     "world.robots.panda.actions={arm: joint_position, eef: gripper_binary}",
 )
+COMMANDS = (*EXPERT[1:], "collect={commands: [{do: pick, object: red, goal: goal}]}")
 
 ROWS: dict[str, Row] = {
     "RunSpec.engine": row("engine=mujoco", seen="engine"),
@@ -54,6 +55,13 @@ ROWS: dict[str, Row] = {
         "task.ended=error", given=(SOME, "task.ended=hold"), seen="stepped", error="cannot be stepped"
     ),
     "TaskSpec.expert": row("task.expert=null", given=EXPERT, seen="expert", error="has no expert"),
+    "RunSpec.collect": row("collect=null", given=COMMANDS, seen="expert", error="has no expert"),
+    "CollectSpec.commands": row("collect.commands=[{do: reach, goal: goal}]", given=COMMANDS, seen="expert"),
+    "CommandSpec.do": row("collect.commands.0.do=bring", given=COMMANDS, seen="expert"),
+    "CommandSpec.timeout": row("collect.commands.0.timeout=0.02", given=COMMANDS, seen="expert"),
+    "CommandSpec.required": row(
+        "collect.commands.0.required=false", given=(*COMMANDS, "collect.commands.0.timeout=0.02"), seen="expert"
+    ),
     "TermSpec.term": row("task.rewards.close.term=tanh_distance", seen="episode"),
     "ObservationTermSpec.noise": row(
         "task.observations.policy=[{term: frame_pose, frame: red, noise: {normal: {mean: 0, std: 0.1}}}]",

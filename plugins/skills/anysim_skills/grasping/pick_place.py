@@ -27,6 +27,7 @@ class PickPlace(SkillSequence):
         solver: str = "numba_ik",
         hover: Metres = 0.1,
         speed: Speed = 0.4,
+        above: Annotated[float, Field(gt=0, description="[m] over the place on the way there and back")] = 0.06,
         tolerance: Annotated[float, Field(gt=0, description="[m] horizontally, once it rests")] = 0.03,
         max_attempts: Annotated[int, Field(ge=1)] = 3,
     ) -> None:
@@ -40,7 +41,7 @@ class PickPlace(SkillSequence):
         arm = {"robot": robot, "object": object, "tool": tool, "solver": solver, "speed": speed}
         members = {
             "grasp": Grasp(env, over_target, **arm, hover=hover, lift=0.0),
-            "place": Place(env, **arm, target=target, tolerance=tolerance),
+            "place": Place(env, **arm, target=target, above=above, retreat=max(above, 0.1), tolerance=tolerance),
         }
         again = {("place", why): "grasp" for why in (Outcome.UNSTABLE_GRASP, Outcome.LOST)}
         super().__init__(env, members, back=again, max_attempts=max_attempts)
