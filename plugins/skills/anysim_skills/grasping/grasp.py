@@ -39,6 +39,7 @@ class Grasp(PhasedSkill):
         object: ObjectView,
         tool: str = "tool",
         solver: str = "numba_ik",
+        height: Annotated[float, Field(description="[m] of the grasp over the object's origin")] = 0.0,
         hover: Metres = 0.1,
         lift: Annotated[float, Field(ge=0, description="[m]; 0 leaves that to the next skill")] = 0.1,
         speed: Speed = 0.4,
@@ -49,6 +50,7 @@ class Grasp(PhasedSkill):
         self.arm = Arm.of(env, robot, tool=tool, solver=solver)
         self._object, self._further, self._lift = object, further, lift
         self._speed, self._descend_speed, self._steps = speed, descend_speed, phase_steps
+        self._up = np.array([0.0, 0.0, height])
         self._back = np.array([*(-hover * DOWN), 0.0, 0.0, 0.0, 0.0])
         n = env.num_envs
         self.turn = np.zeros((n, 4))
@@ -104,6 +106,7 @@ class Grasp(PhasedSkill):
     def _choose(self, ids: Array, at: Array) -> None:
         """Candidates by the least motion to pre-grasp, grasp and whatever comes next."""
         grasps = from_above(self._object.root.pose[at])
+        grasps[..., :3] += self._up
         targets = np.stack([grasps + self._back, grasps], axis=2)
         if self._further is not None:
             targets = np.concatenate([targets, self._further(ids, at, grasps)], axis=2)
@@ -119,7 +122,7 @@ class Grasp(PhasedSkill):
         return np.where(absent, _ABSENT, np.where(none, _NO_IK, GO_ON))
 
     def _grasp(self, ids: Array, at: Array) -> Array:
-        return np.concatenate([self._object.root.position[at], self.turn[ids]], axis=1)
+        return np.concatenate([self._object.root.position[at] + self._up, self.turn[ids]], axis=1)
 
     def _approach(self, ids: Array, at: Array) -> Array:
         self.arm.go(ids, self._grasp(ids, at) + self._back, self._speed)

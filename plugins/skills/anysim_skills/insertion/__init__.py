@@ -1,0 +1,1 @@
+"""Skills that put things into things that fit."""
