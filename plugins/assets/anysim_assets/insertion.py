@@ -1,0 +1,96 @@
+"""Pegs and the blocks with a hole that they fit into, square and round."""
+
+from math import cos, pi, sin, tan
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from anysim.assets.model import ImportedModel
+from anysim.model.world import Box, Cylinder
+from anysim_assets.assembly import Assembly, turned
+from anysim_schemas.base import Color, Positive
+from anysim_schemas.errors import KeyFault
+
+Section = Literal["square", "round"]
+
+
+def peg(
+    *,
+    section: Section = "square",
+    width: Positive = 0.03,
+    length: Positive = 0.1,
+    density: Positive = 1100.0,
+    color: Color = (0.85, 0.55, 0.15),
+) -> ImportedModel:
+    """A peg along z, its frame in its middle. Frames: `tip` in the middle of its lower end, `head` of its upper one.
+
+    Args:
+        section: of the peg.
+        width: edge length of a square peg, diameter of a round one [m].
+        length: [m].
+        density: [kg/m^3].
+        color: of the peg.
+    """
+    body = Assembly("peg")
+    half = width / 2
+    shape = Box((half, half, length / 2)) if section == "square" else Cylinder(half, length / 2)
+    body.solid(0, "shaft", shape, (0.0, 0.0, 0.0), density, color)
+    body.site(0, "tip", (0.0, 0.0, -length / 2))
+    body.site(0, "head", (0.0, 0.0, length / 2))
+    return body.model()
+
+
+def hole_block(
+    *,
+    section: Section = "square",
+    width: Positive = 0.03,
+    clearance: Positive = 0.003,
+    size: Positive = 0.1,
+    height: Positive = 0.05,
+    pieces: Annotated[int, Field(ge=8, le=48, description="boxes of a round hole's ring")] = 12,
+    density: Positive = 1100.0,
+    color: Color = (0.35, 0.42, 0.55),
+) -> ImportedModel:
+    """A block with a hole through it for a peg; its frame is in the middle of its bottom, where the hole ends.
+
+    Boxes around the hole, so that each engine has the same hole. Frames: `hole`, the lower end of the hole, and
+    `mouth`, its upper end, both with z out of it.
+
+    Args:
+        section: of the hole.
+        width: that of the peg: edge length, or diameter [m].
+        clearance: between the peg in the middle and the hole, on each side [m]; of a ring to the middle of a box.
+        size: outer edge length of the block, or diameter of the ring [m].
+        height: [m].
+        pieces: boxes around a round hole.
+        density: [kg/m^3].
+        color: of the block.
+
+    Raises:
+        KeyFault: the hole is not smaller than the block.
+    """
+    inner, outer = width / 2 + clearance, size / 2
+    if inner >= 0.9 * outer:
+        raise KeyFault(f"a hole of {2 * inner:g} m leaves no walls in a block of {size:g} m", "size")
+    body = Assembly("hole_block")
+    if section == "square":
+        for name, low, high in (
+            ("back", (-outer, -outer, 0.0), (-inner, outer, height)),
+            ("front", (inner, -outer, 0.0), (outer, outer, height)),
+            ("right", (-inner, -outer, 0.0), (inner, -inner, height)),
+            ("left", (-inner, inner, 0.0), (inner, outer, height)),
+        ):
+            body.board(0, name, low, high, density, color)
+    else:
+        # boxes that meet at their inner edges: what they overlap by outside counts once, by the sector's mean width
+        wall, middle = outer - inner, (inner + outer) / 2
+        wide = Box((wall / 2, outer * tan(pi / pieces), height / 2))
+        sector = Box((wall / 2, middle * tan(pi / pieces), height / 2))
+        for i in range(pieces):
+            angle = 2 * pi * i / pieces
+            place = (middle * cos(angle), middle * sin(angle), height / 2)
+            turn = turned((0.0, 0.0, 1.0), angle)
+            body.solid(0, f"piece_{i + 1}", wide, place, density, color, turn, filled=sector)
+    body.site(0, "hole", (0.0, 0.0, 0.0))
+    body.site(0, "mouth", (0.0, 0.0, height))
+    return body.model()

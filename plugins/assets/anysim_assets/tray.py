@@ -1,0 +1,37 @@
+"""An open tray or bin: a floor and four walls."""
+
+from anysim.assets.model import ImportedModel
+from anysim_assets.assembly import Assembly
+from anysim_assets.parameters import Size
+from anysim_schemas.base import Color, Positive
+from anysim_schemas.errors import KeyFault
+
+
+def tray(
+    *, size: Size = (0.3, 0.2, 0.1), wall: Positive = 0.01, density: Positive = 700.0, color: Color = (0.45, 0.55, 0.62)
+) -> ImportedModel:
+    """A tray, open at the top; its frame is in the middle of its bottom. Frame: `inside`, the middle of its floor.
+
+    Args:
+        size: outer length, width and height [m].
+        wall: thickness of the floor and the walls [m].
+        density: [kg/m^3].
+        color: of the tray.
+
+    Raises:
+        KeyFault: the walls leave nothing inside.
+    """
+    x, y, z = size[0] / 2, size[1] / 2, size[2]
+    if min(x, y) <= wall or z <= wall:
+        raise KeyFault(f"walls of {wall:g} m leave nothing of the size", "size")
+    body = Assembly("tray")
+    for name, low, high in (
+        ("floor", (-x, -y, 0.0), (x, y, wall)),
+        ("back", (-x, -y, wall), (-x + wall, y, z)),
+        ("front", (x - wall, -y, wall), (x, y, z)),
+        ("right", (-x + wall, -y, wall), (x - wall, -y + wall, z)),
+        ("left", (-x + wall, y - wall, wall), (x - wall, y, z)),
+    ):
+        body.board(0, name, low, high, density, color)
+    body.site(0, "inside", (0.0, 0.0, wall))
+    return body.model()

@@ -1,0 +1,75 @@
+"""Pegs, holes, buttons and trays: what fits into what, with the clearance that was asked for."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from anysim.assets.load import import_asset
+from anysim.assets.procedural import build
+from anysim.geometry.bounds import EntityShape
+from anysim.math import pose as P
+from anysim.model.world import Box
+from tests.plugins.assets.test_procedural import complaints, world_of
+
+UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+def free_radius(params: dict[str, Any], turns: int = 72) -> float:
+    """How far from the axis the nearest surface of a block is, by its boxes' faces."""
+    nearest = np.inf
+    for geom in build("hole_block", params).geoms:
+        assert isinstance(geom.shape, Box)
+        half = np.array(geom.shape.half_size)
+        for angle in np.linspace(0.0, 2 * np.pi, turns, endpoint=False):
+            for radius in np.linspace(0.0, 0.03, 301):
+                point = np.array([radius * np.cos(angle), radius * np.sin(angle), geom.position[2]])
+                local = P.rotate_inverse(np.array(geom.quaternion), point - np.array(geom.position))
+                if (np.abs(local) <= half).all():
+                    nearest = min(nearest, radius)
+                    break
+    return float(nearest)
+
+
+@pytest.mark.parametrize("section", ["square", "round"])
+@pytest.mark.parametrize("clearance", [0.003, 0.001])
+def test_a_hole_has_the_clearance_on_each_side(section: str, clearance: float) -> None:
+    found = free_radius({"section": section, "clearance": clearance}, turns=24)
+    assert found == pytest.approx(0.015 + clearance, abs=2e-4)
+
+
+def test_a_peg_stands_on_its_tip() -> None:
+    world = world_of({"procedural": "peg", "params": {"width": 0.02, "length": 0.08}})
+    low, high = EntityShape(world, "it").bounds(np.concatenate([np.zeros(3), UPRIGHT]))
+    assert np.allclose(high - low, [0.02, 0.02, 0.08])
+    sites = {site.name: site.position for site in import_asset("procedural:peg").sites}
+    assert sites == {"tip": (0.0, 0.0, -0.05), "head": (0.0, 0.0, 0.05)}
+
+
+def test_a_ring_weighs_what_a_ring_weighs() -> None:
+    model = build("hole_block", {"section": "round", "pieces": 48, "density": 1000.0})
+    ring = np.pi * (0.05**2 - 0.018**2) * 0.05 * 1000.0
+    assert model.bodies[0].inertial is not None
+    assert model.bodies[0].inertial.mass == pytest.approx(ring, rel=5e-3)
+
+
+def test_a_button_is_pressed_down() -> None:
+    [joint] = build("button", {"travel": 0.01}).joints
+    assert (joint.axis, joint.lower, joint.upper) == ((0.0, 0.0, -1.0), 0.0, 0.01)
+
+
+def test_a_tray_is_open_at_the_top() -> None:
+    model = build("tray", {"size": [0.3, 0.2, 0.1], "wall": 0.01})
+    volume = 0.3 * 0.2 * 0.1 - 0.28 * 0.18 * 0.09
+    assert model.bodies[0].inertial is not None
+    assert model.bodies[0].inertial.mass == pytest.approx(700 * volume)
+
+
+def test_what_leaves_nothing_is_said_with_its_key() -> None:
+    for name, params, key in (
+        ("hole_block", {"size": 0.03}, "size"),
+        ("button", {"radius": 0.06}, "radius"),
+        ("tray", {"wall": 0.2}, "size"),
+    ):
+        [text] = complaints(source={"procedural": name, "params": params})
+        assert text.startswith(f"objects.it.source.params.{key}: ")
