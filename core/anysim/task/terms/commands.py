@@ -4,15 +4,16 @@
 """
 
 from collections.abc import Callable
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field
 
 from anysim.conventions import Array
 from anysim.task.scene import Frame, ObjectView, SceneView
 from anysim_schemas.values import FloatValue, Vec3Value
 
-__all__ = ["goal_above", "goal_at"]
+__all__ = ["goal_above", "goal_at", "goal_beside"]
 
 Draw = Callable[[str, Any], Array]
 
@@ -53,3 +54,17 @@ def goal_above(
         axis=1,
     )
     return _upright(position)
+
+
+def goal_beside(
+    scene: SceneView,
+    draw: Draw,
+    *,
+    frame: Frame,
+    distance: FloatValue,
+    direction: Annotated[FloatValue, Field(description="from the world's x axis [rad]")] = 0.0,
+) -> Array:
+    """A point at the height of a frame and `distance` [m] from it, where it is when the episode begins."""
+    far, angle = draw("distance", distance), draw("direction", direction)
+    way = np.stack([np.cos(angle), np.sin(angle), np.zeros(len(angle))], axis=1)
+    return _upright(frame.position + far[:, None] * way)

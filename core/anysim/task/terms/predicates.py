@@ -9,21 +9,24 @@ from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.joints import JointView, RangedJointView
 from anysim.task.scene import Frame, ObjectView, RobotView, SceneView
+from anysim_schemas.base import Number
 
 __all__ = [
-    "at_rest", "below", "closed", "further_than", "joint_above", "joint_below", "joint_still", "near", "opened",
-    "present",
+    "above", "at_rest", "below", "closed", "further_than", "inside", "joint_above", "joint_below", "joint_still",
+    "near", "opened", "present", "still", "upright",
 ]  # fmt: skip
 
+Metres = Annotated[float, Field(gt=0, description="[m]")]
+Corner = tuple[Number, Number, Number]
+_UP = np.array([0.0, 0.0, 1.0])
 
-def near(scene: SceneView, *, a: Frame, b: Frame, tolerance: Annotated[float, Field(gt=0, description="[m]")]) -> Array:
+
+def near(scene: SceneView, *, a: Frame, b: Frame, tolerance: Metres) -> Array:
     """The origins of two frames are at most `tolerance` apart."""
     return P.norm(b.position - a.position) <= tolerance
 
 
-def further_than(
-    scene: SceneView, *, a: Frame, b: Frame, distance: Annotated[float, Field(gt=0, description="[m]")]
-) -> Array:
+def further_than(scene: SceneView, *, a: Frame, b: Frame, distance: Metres) -> Array:
     """The origins of two frames are more than `distance` apart."""
     return P.norm(b.position - a.position) > distance
 
@@ -38,6 +41,46 @@ def at_rest(
 def below(scene: SceneView, *, frame: Frame, height: float) -> Array:
     """The frame's origin is lower than `height` [m] in the world."""
     return frame.position[:, 2] < height
+
+
+def above(
+    scene: SceneView,
+    *,
+    a: Frame,
+    b: Frame,
+    height: Annotated[float, Field(description="of a's origin over b's, along the world's z [m]")] = 0.0,
+    tolerance: Annotated[float, Field(gt=0, description="of the height [m]")] = 0.005,
+    distance: Annotated[float, Field(gt=0, description="at most so far apart horizontally [m]")] = 0.03,
+) -> Array:
+    """The origin of a is a height above that of b, and not far to the side: a stack, a thing on a pad."""
+    apart = a.position - b.position
+    return (np.abs(apart[:, 2] - height) <= tolerance) & (P.norm(apart[:, :2]) <= distance)
+
+
+def inside(scene: SceneView, *, a: Frame, b: Frame, low: Corner, high: Corner) -> Array:
+    """The origin of a is in a box between two corners, in the axes of b [m]: a bin, a drawer, the end of a hole."""
+    place = P.rotate_inverse(b.quaternion, a.position - b.position)
+    return np.logical_and.reduce((place >= np.array(low)) & (place <= np.array(high)), axis=1)
+
+
+def upright(
+    scene: SceneView, *, frame: Frame, tolerance: Annotated[float, Field(gt=0, description="[rad]")] = 0.1
+) -> Array:
+    """The frame's z axis points up."""
+    axis = P.rotate(frame.quaternion, np.broadcast_to(_UP, (len(frame.pose), 3)))
+    return np.arctan2(P.norm(axis[:, :2]), axis[:, 2]) <= tolerance
+
+
+def still(
+    scene: SceneView,
+    *,
+    frame: Frame,
+    speed: Annotated[float, Field(gt=0, description="[m/s]")] = 0.01,
+    rate: Annotated[float, Field(gt=0, description="[rad/s]")] = 0.5,
+) -> Array:
+    """What the frame is fixed to moves no faster than `speed` there and turns no faster than `rate`."""
+    twist = frame.twist
+    return (P.norm(twist[:, :3]) <= speed) & (P.norm(twist[:, 3:]) <= rate)
 
 
 def opened(
