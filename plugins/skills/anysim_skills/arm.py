@@ -13,9 +13,10 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.kinematics.chain import Chain
 from anysim.math import pose as P
+from anysim.model.world import JointType
 from anysim.planning.api import inverse_kinematics
 from anysim.task.env import TaskEnv
-from anysim.task.scene import RobotView
+from anysim.task.scene import Frame, RobotView
 
 ARRIVED = 0.004
 """[m] distance of the tool at which a straight move counts as done."""
@@ -23,6 +24,8 @@ TURNED = 0.04
 """[rad] the same for its rotation."""
 LEAD = 0.05
 """[m] the commanded tool runs at most this far ahead of the real one where nothing is to be pressed."""
+SLIPPED = 0.05
+"""[m] what has moved further in the hand is not held any more."""
 AT_REST = 0.02
 """[m/s] a tool that moves slower, while its command is ahead of it, is held up by something."""
 _PRESSED = 0.8
@@ -44,6 +47,8 @@ class Arm:
         closed: (N,) bool, whether the gripper is told to close.
         command: (N, 7) where the tool is told to be now.
         joints: (N, K) what the joints are told.
+        grip: (N, 3) [m] where what is held was in the tool's frame when it was taken.
+        aperture: [m] how wide the gripper opens; infinite where its fingers turn.
         stuck: (N,) bool: the last step towards the target had no inverse kinematics.
     """
 
@@ -55,10 +60,12 @@ class Arm:
         self._arm, self._eef = env.actions.slice_of(robot.name, channel), env.actions.slice_of(robot.name, gripper)
         self._dt = env.engine.world.physics.control_dt
         self._fingers = np.array(env.engine.index.robot(robot.name).channels[gripper].joints, dtype=int)
+        self.aperture = _aperture(env, robot, gripper)
         n = env.num_envs
         self.target, self.command = np.zeros((n, 7)), np.zeros((n, 7))
         self.speed, self.lead = np.zeros(n), np.full(n, LEAD)
         self.closed, self.stuck = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+        self.grip = np.zeros((n, 3))
         self.joints = np.zeros((n, len(self.chain)))
         self._fresh = np.ones(n, dtype=bool)
 
@@ -126,6 +133,18 @@ class Arm:
         still = P.norm(self.tool.twist[at, :3]) < AT_REST
         return still & (self.ahead(ids, at) > _PRESSED * self.lead[ids])
 
+    def take(self, ids: Array, at: Array, thing: Frame) -> None:
+        """From here on `thing` is held as it is now."""
+        self.grip[ids] = self._in_tool(at, thing)
+
+    def holds(self, ids: Array, at: Array, thing: Frame) -> Array:
+        """(n,) bool: `thing` has not slipped from where it was taken."""
+        return ~(P.norm(self._in_tool(at, thing) - self.grip[ids]) > SLIPPED)
+
+    def _in_tool(self, at: Array, thing: Frame) -> Array:
+        tool = self.tool.pose[at]
+        return P.rotate_inverse(tool[:, 3:], thing.position[at] - tool[:, :3])
+
     def finger_speed(self, ids: Array) -> Array:
         """(n,) [rad/s, m/s] of the fastest joint of the gripper."""
         return np.abs(self.env.scene.state.joint_vel[np.ix_(ids, self._fingers)]).max(axis=1)
@@ -174,3 +193,12 @@ class Arm:
         self.joints[solved] = found.joint_pos[found.converged]
         action[ids, self._arm.start : self._arm.stop] = self._arm.controller.action_for(self.joints[ids], ids)
         action[ids, self._eef.start : self._eef.stop] = np.where(self.closed[ids], -1.0, 1.0)[:, None]
+
+
+def _aperture(env: TaskEnv, robot: RobotView, gripper: str) -> float:
+    channel, joints = robot.channel(gripper), env.engine.world.joints
+    fingers = [joints[j] for j in channel.joints]
+    if channel.opened is None or any(finger.type is not JointType.PRISMATIC for finger in fingers):
+        return float("inf")
+    ends = zip(channel.opened, fingers, strict=False)
+    return float(sum(abs(opened - finger.lower) for opened, finger in ends))

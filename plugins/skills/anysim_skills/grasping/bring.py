@@ -9,11 +9,11 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.skills.base import OUTCOMES, Outcome
-from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill
+from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.arm import Arm
-from anysim_skills.grasping.grasp import Metres, Speed, holds
+from anysim_skills.grasping.grasp import Metres, Speed
 
 STILL = 0.05
 """[m/s] an object that moves slower has come to rest in the air."""
@@ -45,8 +45,13 @@ class Bring(PhasedSkill):
     def make_phases(self) -> Sequence[Phase]:
         return (Phase("carry", self._enter, self._carry, self._late),)
 
+    def retry(self, rung: Rung, env: int) -> int | None:
+        """None: what is not held any more has to be grasped again."""
+        del rung, env
+        return None
+
     def _enter(self, ids: Array, at: Array) -> None:
-        del at
+        self.arm.take(ids, at, self._object.root)
         self._held[ids] = 0
 
     def _carry(self, ids: Array, at: Array) -> Array:
@@ -55,7 +60,7 @@ class Bring(PhasedSkill):
         self.arm.go(ids, target, self._speed)
         there = (P.norm(goal - thing) < self._tolerance) & (P.norm(self._object.root.twist[at, :3]) < STILL)
         self._held[ids] = (self._held[ids] + 1) * there
-        lost = ~holds(self.arm, self._object, at)
+        lost = ~self.arm.holds(ids, at, self._object.root)
         return np.where(lost, _UNSTABLE, np.where(self._held[ids] >= self._hold, GO_ON, STAY))
 
 

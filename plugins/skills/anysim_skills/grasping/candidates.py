@@ -19,3 +19,8 @@ def from_above(object_pose: Array) -> Array:
     poses[..., :3] = object_pose[:, None, :3]
     poses[..., 3], poses[..., 4] = np.cos(half), np.sin(half)
     return poses
+
+
+def across(size: Array) -> Array:
+    """(4,) [m] what the fingers have to span in each candidate, of an object of a size (3,) [m] along its axes."""
+    return np.array([size[1], size[0], size[1], size[0]])

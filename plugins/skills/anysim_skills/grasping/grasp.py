@@ -13,14 +13,17 @@ from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import ObjectView, RobotView
 from anysim_skills.arm import Arm
-from anysim_skills.grasping.candidates import DOWN, TOP_DOWN, from_above
+from anysim_skills.grasping.candidates import DOWN, TOP_DOWN, across, from_above
 
-SLIPPED = 0.05
-"""[m] an object further than this from the tool is not held."""
+ROOM = 0.004
+"""[m] the gripper must open wider than the object by this."""
 CLOSING_STEPS = 20
 SETTLED = 0.02
 """[rad/s, m/s] a gripper whose joints are slower has closed on something, or on nothing."""
 
+Offset = Annotated[
+    tuple[float, float, float], Field(description="[m] from the object's origin to the grasp, in the object's frame")
+]
 Metres = Annotated[float, Field(gt=0, description="[m]")]
 Speed = Annotated[float, Field(gt=0, description="[m/s] of the tool")]
 Further = Callable[[Array, Array, Array], Array]
@@ -39,7 +42,7 @@ class Grasp(PhasedSkill):
         object: ObjectView,
         tool: str = "tool",
         solver: str = "numba_ik",
-        height: Annotated[float, Field(description="[m] of the grasp over the object's origin")] = 0.0,
+        offset: Offset = (0.0, 0.0, 0.0),
         hover: Metres = 0.1,
         lift: Annotated[float, Field(ge=0, description="[m]; 0 leaves that to the next skill")] = 0.1,
         speed: Speed = 0.4,
@@ -50,7 +53,7 @@ class Grasp(PhasedSkill):
         self.arm = Arm.of(env, robot, tool=tool, solver=solver)
         self._object, self._further, self._lift = object, further, lift
         self._speed, self._descend_speed, self._steps = speed, descend_speed, phase_steps
-        self._up = np.array([0.0, 0.0, height])
+        self._offset = np.array(offset)
         self._back = np.array([*(-hover * DOWN), 0.0, 0.0, 0.0, 0.0])
         n = env.num_envs
         self.turn = np.zeros((n, 4))
@@ -60,6 +63,9 @@ class Grasp(PhasedSkill):
         self.candidate = np.zeros(n, dtype=np.int64)
         """(N,) how many better candidates have been given up."""
         self._rest = np.zeros(n)
+        shape = env.scene.entity_shape(object.entity.name)
+        low, high = shape.bounds(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]))
+        self._widths = across(high - low)
         super().__init__(env, [self.arm])
 
     def make_phases(self) -> Sequence[Phase]:
@@ -105,13 +111,15 @@ class Grasp(PhasedSkill):
 
     def _choose(self, ids: Array, at: Array) -> None:
         """Candidates by the least motion to pre-grasp, grasp and whatever comes next."""
-        grasps = from_above(self._object.root.pose[at])
-        grasps[..., :3] += self._up
+        self.arm.closed[ids] = False
+        grasps, widths = from_above(self._object.root.pose[at]), self._widths
+        grasps[..., :3] = self._place(at)[:, None]
         targets = np.stack([grasps + self._back, grasps], axis=2)
         if self._further is not None:
             targets = np.concatenate([targets, self._further(ids, at, grasps)], axis=2)
         n, g, m = targets.shape[:3]
         effort = self.arm.reach(ids, targets.reshape(n, g * m, 7))[1].reshape(n, g, m).max(axis=2)
+        effort[:, widths > self.arm.aperture - ROOM] = np.inf
         self._order[ids] = np.argsort(effort, axis=1, kind="stable")
         self._reachable[ids] = np.isfinite(effort).sum(axis=1)
         chosen = self._order[ids, np.minimum(self.candidate[ids], g - 1)]
@@ -121,8 +129,15 @@ class Grasp(PhasedSkill):
         absent, none = ~self._object.present[at], self._reachable[ids] <= self.candidate[ids]
         return np.where(absent, _ABSENT, np.where(none, _NO_IK, GO_ON))
 
+    def _place(self, at: Array) -> Array:
+        """(n, 3) where the object is grasped."""
+        thing = self._object.root.pose[at]
+        if not self._offset.any():
+            return thing[:, :3]
+        return thing[:, :3] + P.rotate(thing[:, 3:], np.broadcast_to(self._offset, (len(at), 3)))
+
     def _grasp(self, ids: Array, at: Array) -> Array:
-        return np.concatenate([self._object.root.position[at] + self._up, self.turn[ids]], axis=1)
+        return np.concatenate([self._place(at), self.turn[ids]], axis=1)
 
     def _approach(self, ids: Array, at: Array) -> Array:
         self.arm.go(ids, self._grasp(ids, at) + self._back, self._speed)
@@ -148,10 +163,11 @@ class Grasp(PhasedSkill):
 
     def _note_height(self, ids: Array, at: Array) -> None:
         self._rest[ids] = self._object.root.position[at, 2]
+        self.arm.take(ids, at, self._object.root)
         self.arm.go(ids, self.arm.command[ids] + np.array([0, 0, self._lift, 0, 0, 0, 0.0]), self._descend_speed)
 
     def _lifting(self, ids: Array, at: Array) -> Array:
-        held = holds(self.arm, self._object, at)
+        held = self.arm.holds(ids, at, self._object.root)
         return np.where(~held, _UNSTABLE, np.where(self.arm.arrived(ids, at), GO_ON, STAY))
 
     def succeeded(self, env_ids: Array, at: Array) -> Array:
@@ -159,11 +175,6 @@ class Grasp(PhasedSkill):
             return super().succeeded(env_ids, at)
         risen = self._object.root.position[at, 2] - self._rest[env_ids] > 0.5 * self._lift
         return np.where(risen, GO_ON, _MISSED)
-
-
-def holds(arm: Arm, object: ObjectView, at: Array) -> Array:
-    """(n,) bool: the object is where the tool is."""
-    return ~(P.norm(object.root.position[at] - arm.tool.position[at]) > SLIPPED)
 
 
 _NO_IK, _ABSENT = OUTCOMES.index(Outcome.NO_IK), OUTCOMES.index(Outcome.ADVERSE_STATE)

@@ -9,11 +9,11 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.skills.base import OUTCOMES, Outcome
-from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill
+from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.arm import Arm
-from anysim_skills.grasping.grasp import Metres, Speed, holds
+from anysim_skills.grasping.grasp import Metres, Speed
 from anysim_skills.grasping.release import OPENING_STEPS
 
 GENTLE = 0.015
@@ -64,6 +64,11 @@ class Place(PhasedSkill):
             Phase("settle", self._nothing, self._settling, SETTLING_STEPS + 1),
         )
 
+    def retry(self, rung: Rung, env: int) -> int | None:
+        """None: what is not held any more has to be grasped again."""
+        del rung, env
+        return None
+
     # ------------------------------------------------------------------ phases
 
     def _nothing(self, ids: Array, at: Array) -> None:
@@ -71,6 +76,7 @@ class Place(PhasedSkill):
 
     def _measure(self, ids: Array, at: Array) -> None:
         """How high the object's origin is to be above the target's when it rests there."""
+        self.arm.take(ids, at, self._object.root)
         pose = self._object.root.pose[at]
         below = pose[:, 2] - self._shape.bounds(pose)[0][..., 2]
         on = 0.0
@@ -90,8 +96,8 @@ class Place(PhasedSkill):
         """(n,) [m] how far the object is from over the target, horizontally."""
         return P.norm((self._object.root.position[at] - self._target.position[at])[:, :2])
 
-    def _held(self, at: Array, said: Array) -> Array:
-        return np.where(holds(self.arm, self._object, at), said, _UNSTABLE)
+    def _held(self, ids: Array, at: Array, said: Array) -> Array:
+        return np.where(self.arm.holds(ids, at, self._object.root), said, _UNSTABLE)
 
     def _transport(self, ids: Array, at: Array) -> Array:
         """Up first where the object is lower than it is to pass, then across."""
@@ -102,19 +108,19 @@ class Place(PhasedSkill):
         goal[straight_up, :2] = self.arm.command[ids[straight_up], :2]
         self.arm.go(ids, goal, self._speed)
         near = ~far & (np.abs(self.arm.tool.position[at, 2] - goal[:, 2]) < 0.02)
-        return self._held(at, np.where(near, GO_ON, STAY))
+        return self._held(ids, at, np.where(near, GO_ON, STAY))
 
     def _aligning(self, ids: Array, at: Array) -> Array:
         self.arm.go(ids, self._goal(ids, at, self._above), self._speed / 4)
         ready = (self._off(at) < self._align) & (P.norm(self._object.root.twist[at, :3]) < RESTING)
-        return self._held(at, np.where(ready | (self.steps[ids] >= 50), GO_ON, STAY))
+        return self._held(ids, at, np.where(ready | (self.steps[ids] >= 50), GO_ON, STAY))
 
     def _lowering(self, ids: Array, at: Array) -> Array:
         goal = self._goal(ids, at, -2 * GENTLE)  # beyond contact, which is what ends it
         self.arm.go(ids, goal, self._lower_speed, GENTLE)
         low = self._object.root.position[at, 2] - self._target.position[at, 2] - self._height[ids] < 0.001
         down = (self.steps[ids] >= 5) & (self.arm.touching(ids, at) | low)
-        return self._held(at, np.where(down, GO_ON, STAY))
+        return self._held(ids, at, np.where(down, GO_ON, STAY))
 
     def _open(self, ids: Array, at: Array) -> None:
         pose = self.arm.tool.pose[at]

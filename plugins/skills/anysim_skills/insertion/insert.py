@@ -9,11 +9,11 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.skills.base import OUTCOMES, Outcome
-from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill
+from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.arm import Arm
-from anysim_skills.grasping.grasp import Metres, Speed, holds
+from anysim_skills.grasping.grasp import Metres, Speed
 from anysim_skills.grasping.place import RESTING
 from anysim_skills.grasping.release import OPENING_STEPS
 
@@ -63,7 +63,7 @@ class Insert(PhasedSkill):
 
     def make_phases(self) -> Sequence[Phase]:
         return (
-            Phase("transport", self._nothing, self._transport, self._late),
+            Phase("transport", self._take, self._transport, self._late),
             Phase("align", self._nothing, self._aligning, ALIGNING_STEPS + 1),
             Phase("lower", self._nothing, self._lowering, self._late),
             Phase("search", self._touch, self._searching, SEARCHING_STEPS + 1),
@@ -72,7 +72,15 @@ class Insert(PhasedSkill):
             Phase("retreat", self._retreat, self._retreating, self._late),
         )
 
+    def retry(self, rung: Rung, env: int) -> int | None:
+        """From above again where it jammed; what is not held any more has to be grasped again."""
+        del env
+        return 0 if rung is Rung.REPLAN else None
+
     # ------------------------------------------------------------------ where the tip is, and is to be
+
+    def _take(self, ids: Array, at: Array) -> None:
+        self.arm.take(ids, at, self._object.root)
 
     def _nothing(self, ids: Array, at: Array) -> None:
         del ids, at
@@ -100,8 +108,8 @@ class Insert(PhasedSkill):
         deep = P.norm(self._hole.position[at] - self._mouth.position[at])
         return -self._found(at)[:, 2] / np.maximum(deep, 1e-9)
 
-    def _held(self, at: Array, said: Array) -> Array:
-        return np.where(holds(self.arm, self._object, at), said, _UNSTABLE)
+    def _held(self, ids: Array, at: Array, said: Array) -> Array:
+        return np.where(self.arm.holds(ids, at, self._object.root), said, _UNSTABLE)
 
     # ------------------------------------------------------------------ phases
 
@@ -114,7 +122,7 @@ class Insert(PhasedSkill):
         rise = far & (found[:, 2] < self._above)
         goal[rise, :2], goal[rise, 3:] = self.arm.command[ids[rise], :2], self.arm.command[ids[rise], 3:]
         self.arm.go(ids, goal, self._speed)
-        return self._held(at, np.where(~far & ~rise, GO_ON, STAY))
+        return self._held(ids, at, np.where(~far & ~rise, GO_ON, STAY))
 
     def _aligning(self, ids: Array, at: Array) -> Array:
         over = np.zeros((len(ids), 3))
@@ -123,7 +131,7 @@ class Insert(PhasedSkill):
         off = P.norm(self._found(at)[:, :2])
         still = P.norm(self._object.root.twist[at, :3]) < RESTING / 3
         ready = (self.steps[ids] >= 10) & (off < self._align) & still
-        return self._held(at, np.where(ready | (self.steps[ids] >= ALIGNING_STEPS), GO_ON, STAY))
+        return self._held(ids, at, np.where(ready | (self.steps[ids] >= ALIGNING_STEPS), GO_ON, STAY))
 
     def _down(self, ids: Array, at: Array, aside: Array) -> None:
         """Press down along the axis, with the tip at offsets (n, 2) from it."""
@@ -135,7 +143,7 @@ class Insert(PhasedSkill):
         self._down(ids, at, np.zeros((len(ids), 2)))
         inside = self._found(at)[:, 2] < -FOUND
         touching = (self.steps[ids] >= 10) & self.arm.touching(ids, at)
-        return self._held(at, np.where(inside | touching, GO_ON, STAY))
+        return self._held(ids, at, np.where(inside | touching, GO_ON, STAY))
 
     def _touch(self, ids: Array, at: Array) -> None:
         self._touched[ids] = self._found(at)[:, 2]
@@ -150,13 +158,13 @@ class Insert(PhasedSkill):
         found = depth < np.minimum(self._touched[ids], 0.0) - FOUND
         inside = depth < -FOUND
         said = np.where(found | inside, GO_ON, np.where(radius > self._reach, _JAMMED, STAY))
-        return self._held(at, said)
+        return self._held(ids, at, said)
 
     def _seating(self, ids: Array, at: Array) -> Array:
         self._down(ids, at, np.zeros((len(ids), 2)))
         deep = self._depth_of(at) >= self._depth
         stuck = (self.steps[ids] >= 40) & self.arm.touching(ids, at)
-        return self._held(at, np.where(deep, GO_ON, np.where(stuck, _JAMMED, STAY)))
+        return self._held(ids, at, np.where(deep, GO_ON, np.where(stuck, _JAMMED, STAY)))
 
     def _open(self, ids: Array, at: Array) -> None:
         pose = self.arm.tool.pose[at]

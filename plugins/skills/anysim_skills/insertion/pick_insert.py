@@ -8,12 +8,12 @@ from anysim.skills.base import Outcome
 from anysim.skills.sequence import SkillSequence
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
-from anysim_skills.grasping.grasp import Grasp, Metres, Speed
+from anysim_skills.grasping.grasp import Grasp, Metres, Offset, Speed
 from anysim_skills.insertion.insert import Insert
 
 
 class PickInsert(SkillSequence):
-    """Grasp `object` with `robot` `height` above its origin, and put it into the hole; what falls is grasped again."""
+    """Grasp `object` with `robot`, and put it into the hole; what falls is grasped again."""
 
     def __init__(
         self,
@@ -26,7 +26,7 @@ class PickInsert(SkillSequence):
         mouth: Frame,
         tool: str = "tool",
         solver: str = "numba_ik",
-        height: Annotated[float, Field(description="[m] of the grasp over the object's origin")] = 0.0,
+        offset: Offset = (0.0, 0.0, 0.0),
         hover: Metres = 0.1,
         speed: Speed = 0.4,
         symmetry: Annotated[int, Field(ge=1, description="turns about the axis in which the object fits")] = 4,
@@ -34,7 +34,7 @@ class PickInsert(SkillSequence):
     ) -> None:
         arm = {"robot": robot, "object": object, "tool": tool, "solver": solver, "speed": speed}
         members = {
-            "grasp": Grasp(env, **arm, height=height, hover=hover, lift=0.0),
+            "grasp": Grasp(env, **arm, offset=offset, hover=hover, lift=0.0),
             "insert": Insert(env, **arm, tip=tip, hole=hole, mouth=mouth, symmetry=symmetry),
         }
         again = {("insert", why): "grasp" for why in (Outcome.UNSTABLE_GRASP, Outcome.LOST)}
