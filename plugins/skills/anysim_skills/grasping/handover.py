@@ -1,0 +1,44 @@
+"""Handover: one arm grasps an object and holds it out, the other takes it, and the first lets go."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from anysim.skills.base import Outcome
+from anysim.skills.sequence import SkillSequence
+from anysim.task.env import TaskEnv
+from anysim.task.scene import Frame, ObjectView, RobotView
+from anysim_skills.grasping.bring import Bring
+from anysim_skills.grasping.grasp import Grasp, Metres, Offset, Speed
+from anysim_skills.grasping.release import Release
+
+
+class Handover(SkillSequence):
+    """Pass `object` from `robot` to `receiver` at `meeting`; each grasps it at an offset of its own."""
+
+    def __init__(
+        self,
+        env: TaskEnv,
+        *,
+        robot: RobotView,
+        receiver: RobotView,
+        object: ObjectView,
+        meeting: Frame,
+        give: Offset = (0.0, 0.0, 0.0),
+        take: Offset = (0.0, 0.0, 0.0),
+        tool: str = "tool",
+        solver: str = "numba_ik",
+        hover: Metres = 0.12,
+        retreat: Metres = 0.15,
+        speed: Speed = 0.3,
+        max_attempts: Annotated[int, Field(ge=1)] = 3,
+    ) -> None:
+        both = {"object": object, "tool": tool, "solver": solver}
+        members = {
+            "grasp": Grasp(env, **both, robot=robot, offset=give, hover=hover, lift=0.05, speed=speed),
+            "hold out": Bring(env, **both, robot=robot, goal=meeting, speed=speed),
+            "take": Grasp(env, **both, robot=receiver, offset=take, hover=hover, lift=0.0, speed=speed),
+            "let go": Release(env, robot=robot, tool=tool, solver=solver, retreat=retreat),
+        }
+        again = {("hold out", Outcome.UNSTABLE_GRASP): "grasp"}
+        super().__init__(env, members, back=again, max_attempts=max_attempts)
