@@ -1,0 +1,1 @@
+"""Push a cube across a table to a disc."""
