@@ -1,0 +1,1 @@
+"""Push the top drawer of a cabinet shut."""

@@ -1,0 +1,1 @@
+"""Pull the top drawer of a cabinet open by its handle."""
