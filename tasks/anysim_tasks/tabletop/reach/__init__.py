@@ -1,0 +1,1 @@
+"""Bring the tool to a random point and come to rest."""
