@@ -1,0 +1,1 @@
+"""Put a cube down on a round pad and let go of it."""
