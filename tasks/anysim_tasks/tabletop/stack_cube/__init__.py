@@ -1,0 +1,1 @@
+"""Put one cube on another and let go of it."""
