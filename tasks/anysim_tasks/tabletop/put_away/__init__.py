@@ -1,0 +1,1 @@
+"""Put a cube into a drawer that is closed before and afterwards."""
