@@ -1,0 +1,1 @@
+"""Pass a bar from one arm to another."""
