@@ -1,0 +1,195 @@
+"""States of the tasks on a table, from the beginning of an episode to its goal: what the catalogue's tests set."""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+import anysim
+from anysim.conventions import Array
+from anysim.math import pose as P
+from anysim.model.world import BodyKind
+from anysim.task.env import TaskEnv
+from anysim.task.joints import RangedJointView
+
+BLIND = ("record.cameras=[]", "world.cameras.front.channels=[]", "world.cameras.wrist.channels=[]")
+
+
+def blind(task: str, engine: str, num_envs: int = 2, *overrides: str) -> TaskEnv:
+    """A task without its cameras."""
+    return anysim.make(task, engine=engine, num_envs=num_envs, overrides=[*BLIND, *overrides])
+
+
+def put(env: TaskEnv, name: str, pose: Array) -> None:
+    """Put an object at poses (N, 7), at rest."""
+    root = env.engine.index.entity(name).root
+    moves = env.engine.world.bodies[root].kind is BodyKind.FREE
+    env.engine.set_body_state(pose[:, None], np.zeros((len(pose), 1, 6)) if moves else None, None, [root])
+    env.scene.look(None)
+
+
+def set_opening(env: TaskEnv, name: str, share: float) -> None:
+    """Open a joint by a share of its range, at rest."""
+    joint = RangedJointView(env.scene, name)
+    number = env.engine.world.joints.index(joint.found[0])
+    low, high = joint.found[0].lower, joint.found[0].upper
+    column = np.full((env.num_envs, 1), low + share * (high - low))
+    env.engine.set_joint_state(column, np.zeros_like(column), None, [number])
+    env.scene.look(None)
+
+
+def seen(env: TaskEnv, frame: str) -> Array:
+    """The poses (N, 7) of a frame."""
+    env.scene.look(None)
+    return env.scene.frame(frame).pose.copy()
+
+
+def offset(pose: Array, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Array:
+    """The poses moved in the world's axes."""
+    return pose + np.array([x, y, z, 0.0, 0.0, 0.0, 0.0])
+
+
+def level(pose: Array, like: Array) -> Array:
+    """Positions of the one, orientations of the other."""
+    return np.concatenate([pose[:, :3], like[:, 3:]], axis=1)
+
+
+def judged(env: TaskEnv) -> Array:
+    """(N,) whether the episode would be a success, had this state held as long as it must."""
+    assert env.spec.task is not None
+    env.scene.look(None)
+    env.mdp.held[:] = 0
+    for _ in range(env.spec.task.hold):
+        success, _ = env.mdp.judge()
+    env.mdp.held[:] = 0
+    return success
+
+
+def failed(env: TaskEnv) -> Array:
+    """(N,) whether the episode would end as a failure."""
+    env.scene.look(None)
+    return env.mdp.judge()[1]
+
+
+def rewarded(env: TaskEnv) -> Array:
+    """(N,) the reward of this state."""
+    env.scene.look(None)
+    return env.mdp.reward(np.zeros(env.num_envs, dtype=bool))
+
+
+class Case(NamedTuple):
+    """A task, its way to the goal, and states beside the goal."""
+
+    path: Callable[[TaskEnv, float], None]
+    """Puts the world at a share of the way from the beginning (0) to the goal (1)."""
+    wrong: Sequence[Callable[[TaskEnv], None]]
+    """Changes of the goal's state, each of which makes it none."""
+    unheld: tuple[str, ...] = ("reach",)
+    """Rewards for where the hand is, which stays at home on the way."""
+
+
+def _towards(thing: str, goal: Callable[[TaskEnv], Array]) -> Callable[[TaskEnv, float], None]:
+    """An object from where it is to a goal, in a straight line."""
+    start: dict[int, Array] = {}
+
+    def path(env: TaskEnv, share: float) -> None:
+        if share == 0.0:
+            start[id(env)] = seen(env, thing)
+        first, last = start[id(env)], goal(env)
+        place = first[:, :3] + share * (last[:, :3] - first[:, :3])
+        put(env, thing, np.concatenate([place, last[:, 3:]], axis=1))
+
+    return path
+
+
+def _shifted(thing: str, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Callable[[TaskEnv], None]:
+    return lambda env: put(env, thing, offset(seen(env, thing), x, y, z))
+
+
+def _tilted(thing: str, angle: float) -> Callable[[TaskEnv], None]:
+    turn = P.from_roll_pitch_yaw(np.array([angle, 0.0, 0.0]))
+    return lambda env: put(env, thing, P.compose(seen(env, thing), np.array([[0.0, 0.0, 0.0, *turn]])))
+
+
+def _moving(thing: str) -> Callable[[TaskEnv], None]:
+    def push(env: TaskEnv) -> None:
+        root, twist = env.engine.index.entity(thing).root, np.zeros((env.num_envs, 1, 6))
+        twist[:, 0, 0] = 0.1
+        env.engine.set_body_state(None, twist, None, [root])
+
+    return push
+
+
+def _in_reach_of_the_hand(thing: str, tool: str = "panda.tool") -> Callable[[TaskEnv, float], None]:
+    return _towards(thing, lambda env: seen(env, tool))
+
+
+def _opening(joint: str, first: float, last: float) -> Callable[[TaskEnv, float], None]:
+    return lambda env, share: set_opening(env, joint, first + share * (last - first))
+
+
+def _reach(env: TaskEnv, share: float) -> None:
+    tool = seen(env, "panda.tool")
+    env.scene.goals["goal"][:] = offset(tool, x=0.3 * (1.0 - share))
+    env.scene.moment += 1
+
+
+def _off_goal(env: TaskEnv) -> None:
+    env.scene.goals["goal"][:, 0] += 0.011
+    env.scene.moment += 1
+
+
+_DRAWER = "cabinet.drawer_1"
+
+
+def _in_drawer(env: TaskEnv) -> Array:
+    return level(offset(seen(env, f"{_DRAWER}.inside"), z=0.021), seen(env, "cube"))
+
+
+_CARRY = _towards("cube", _in_drawer)
+
+
+def _put_away(env: TaskEnv, share: float) -> None:
+    """Open, put in, close: a third of the way each."""
+    set_opening(env, _DRAWER, min(3.0 * share, 1.0) if share < 2 / 3 else 3.0 * (1.0 - share))
+    if share <= 1 / 3:
+        _CARRY(env, 0.0)
+    elif share < 2 / 3:
+        _CARRY(env, 3.0 * share - 1.0)
+    else:
+        _CARRY(env, 1.0)
+
+
+_PEG = Case(
+    _towards("peg", lambda env: level(offset(seen(env, "block.hole"), z=0.051), seen(env, "block"))),
+    [_shifted("peg", z=0.02), _shifted("peg", x=0.01), _tilted("peg", 0.15), _moving("peg")],
+)
+CASES: dict[str, Case] = {
+    "reach": Case(_reach, [_off_goal], ()),
+    "push_cube": Case(
+        _towards("cube", lambda env: level(seen(env, "goal"), seen(env, "cube"))),
+        [_shifted("cube", y=0.11), _shifted("cube", z=0.02), _moving("cube")],
+    ),
+    "place_on_pad": Case(
+        _towards("cube", lambda env: offset(seen(env, "pad"), z=0.019)),
+        [_shifted("cube", x=0.05), _shifted("cube", z=0.01), _moving("cube")],
+    ),
+    "stack_cube": Case(
+        _towards("cube", lambda env: offset(seen(env, "base"), z=0.04)),
+        [_shifted("cube", x=0.04), _shifted("cube", z=0.01), _moving("cube")],
+    ),
+    "open_drawer": Case(_opening(_DRAWER, 0.0, 0.8), [lambda env: set_opening(env, _DRAWER, 0.7)]),
+    "close_drawer": Case(_opening(_DRAWER, 0.7, 0.02), [lambda env: set_opening(env, _DRAWER, 0.1)]),
+    "peg_in_hole": _PEG,
+    "peg_in_hole_2mm": _PEG,
+    "peg_in_hole_1mm": _PEG,
+    "press_button": Case(_opening("button.cap", 0.0, 0.9), [lambda env: set_opening(env, "button.cap", 0.7)]),
+    "put_away": Case(
+        _put_away, [lambda env: set_opening(env, _DRAWER, 0.2), _shifted("cube", z=0.1), _moving("cube")], ()
+    ),
+    "handover": Case(
+        _in_reach_of_the_hand("bar", "partner.tool"),
+        [lambda env: put(env, "bar", seen(env, "panda.tool")), _shifted("bar", z=-0.25), _moving("bar")],
+        ("give",),
+    ),
+}

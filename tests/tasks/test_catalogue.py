@@ -1,0 +1,110 @@
+"""The tasks on a table: their worlds on each engine, and what counts as success, failure and progress in them."""
+
+from importlib.metadata import entry_points
+
+import numpy as np
+import pytest
+
+from anysim.task.env import TaskEnv
+from anysim.testing.engines import require_engine
+from tests.tasks.states import CASES, blind, failed, judged, put, rewarded, seen, set_opening
+
+NEAR = 1e-5
+"""[m, rad] engines keep poses in single precision."""
+ENGINES = ["mujoco", pytest.param("pybullet", marks=pytest.mark.slow), pytest.param("sapien", marks=pytest.mark.slow)]
+
+
+def placed(env: TaskEnv) -> dict[str, np.ndarray]:
+    """Where everything is that has a place of its own."""
+    names = [*env.engine.world.entities]
+    return {entity.name: seen(env, entity.name) for entity in names}
+
+
+def test_every_task_of_the_catalogue_is_here() -> None:
+    packages = {entry.value: entry.name for entry in entry_points(group="anysim.tasks")}
+    ours = {name for value, name in packages.items() if value.startswith("anysim_tasks.tabletop.")}
+    assert ours == {*CASES, "pick_cube"}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("task", CASES)
+def test_a_task_is_the_same_on_each_engine_and_knows_its_goal(task: str, engine: str) -> None:
+    """One engine a case: its layout is the kinematic one's, its goal is one and what is beside it is not."""
+    require_engine(engine)
+    case = CASES[task]
+    with blind(task, "null") as model:
+        model.reset(seed=5)
+        nominal = placed(model)
+    with blind(task, engine) as env:
+        env.reset(seed=5)
+        for name, pose in placed(env).items():
+            assert np.allclose(pose, nominal[name], atol=NEAR), name
+        assert not judged(env).any()
+        assert not failed(env).any()
+        case.path(env, 0.0)
+        case.path(env, 1.0)
+        assert judged(env).all()
+        for number, change in enumerate(case.wrong):
+            case.path(env, 1.0)
+            change(env)
+            assert not judged(env).any(), number
+
+
+@pytest.mark.parametrize("task", CASES)
+def test_the_reward_grows_on_the_way_to_the_goal(task: str) -> None:
+    case = CASES[task]
+    with blind(task, "null", 2, *(f"task.rewards.{name}.weight=0.0" for name in case.unheld)) as env:
+        env.reset(seed=5)
+        rewards = []
+        for share in np.linspace(0.0, 1.0, 13):
+            case.path(env, float(share))
+            rewards.append(rewarded(env))
+    assert (np.diff(rewards, axis=0) > -1e-6).all(), np.round(rewards, 3)
+    assert (rewards[-1] > rewards[0] + 0.3).all()
+
+
+@pytest.mark.parametrize("task", CASES)
+def test_nothing_random_solves_a_task_or_falls_at_once(task: str) -> None:
+    """Things stay where they are put, no arm begins inside of one, and random actions do not reach a goal."""
+    require_engine("mujoco")
+    with blind(task, "mujoco", 16) as env:
+        env.reset(seed=9)
+        before, joints = placed(env), env.engine.get_state().joint_pos.copy()
+        env.step(np.zeros((16, env.action_dim)))
+        for name, pose in placed(env).items():
+            assert np.allclose(pose[:, :3], before[name][:, :3], atol=2e-3), name
+        assert np.allclose(env.engine.get_state().joint_pos, joints, atol=2e-3)
+        random = np.random.default_rng(0)
+        for _ in range(30):
+            env.step(random.uniform(-1, 1, (16, env.action_dim)), env.running)
+        assert "success" not in env.status.tolist()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_button_comes_back(engine: str) -> None:
+    require_engine(engine)
+    with blind("press_button", engine) as env:
+        env.reset(seed=0)
+        set_opening(env, "button.cap", 0.5)
+        opening = []
+        for _ in range(20):
+            env.step(np.zeros((2, env.action_dim)))
+            opening.append(env.engine.get_state().joint_pos[:, env.engine.index.joint("button.cap")])
+    assert (opening[-1] < 1e-4).all(), opening
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["mujoco", "pybullet", "sapien"])
+@pytest.mark.parametrize("task", ["peg_in_hole", "peg_in_hole_2mm", "peg_in_hole_1mm"])
+def test_a_peg_falls_to_the_bottom_of_its_hole(task: str, engine: str) -> None:
+    """The hole is open on each engine: no convex hull fills it."""
+    require_engine(engine)
+    with blind(task, engine) as env:
+        env.reset(seed=3)
+        pose = seen(env, "block")
+        pose[:, 2] = seen(env, "block.mouth")[:, 2] + 0.05 - 0.02
+        put(env, "peg", pose)
+        for _ in range(50):
+            env.step(np.zeros((2, env.action_dim)), env.running)
+        depth = seen(env, "peg.tip")[:, 2] - seen(env, "block.hole")[:, 2]
+        assert env.status.tolist() == ["success"] * 2, depth

@@ -1,0 +1,22 @@
+"""The experts of the tasks on a table: each solves its task on every engine, from a seed that nothing was tuned to."""
+
+import pytest
+
+from anysim.skills.runner import SkillPolicy
+from anysim.testing.engines import require_engine
+from tests.plugins.skills.test_pick import rollout
+from tests.tasks.states import blind
+
+TASKS = ["reach", "place_on_pad", "stack_cube", "push_cube", "open_drawer", "close_drawer", "press_button"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["mujoco", "pybullet", "sapien"])
+@pytest.mark.parametrize("task", TASKS)
+def test_the_expert_solves_the_task(task: str, engine: str) -> None:
+    require_engine(engine)
+    with blind(task, engine, 8) as env:
+        assert env.spec.task is not None
+        env.reset(seed=4001)
+        words = rollout(env, SkillPolicy(env), env.spec.task.horizon)
+    assert words.count("success") >= 7, words
