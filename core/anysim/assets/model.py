@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Literal, NamedTuple, Protocol
 
 from anysim.conventions import IDENTITY_QUATERNION
+from anysim.model.affordances import Affordance
 from anysim.model.frames import FixedFrame
 from anysim.model.world import ORIGIN, Body, ControlMode, Geom, HeightField, Joint, Material, Mesh, Site, Texture
 
@@ -66,6 +67,7 @@ class ImportedModel:
     actuator_hints: tuple[ActuatorHint, ...] = ()
     excluded_pairs: frozenset[tuple[int, int]] = frozenset()
     report: tuple[ImportNote, ...] = ()
+    affordances: tuple[Affordance, ...] = ()
 
     def drive_of(self, joint: int) -> ActuatorHint | None:
         """The drive that the source declares for a joint; None where it declares none, or several."""

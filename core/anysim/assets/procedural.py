@@ -77,6 +77,9 @@ def _scaled(model: ImportedModel, factor: float) -> ImportedModel:
         joints=tuple(_joint(joint, model.joints, factor) for joint in model.joints),
         geoms=tuple(_geom(geom, factor) for geom in model.geoms),
         sites=tuple(_site(site, factor) for site in model.sites),
+        affordances=tuple(
+            replace(a, depth=a.depth * factor, clearance=a.clearance * factor) for a in model.affordances
+        ),
     )
 
 

@@ -125,6 +125,7 @@ class WorldBuilder:
             category=category or name,
             instance=instance,
             family=family or ("articulation" if model.joints else "rigid"),
+            affordances=model.affordances,
         )
         self.entities.append(entity)
         return entity

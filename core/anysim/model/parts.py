@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from anysim.conventions import IDENTITY_QUATERNION, WORLD
+from anysim.model.affordances import Affordance
 from anysim.model.shapes import ORDINARY, Shape, Surface, Vec3
 from anysim_schemas.bounds import DEFAULT_EXTENT
 from anysim_schemas.robot_model import RobotModelSpec
@@ -242,6 +243,8 @@ class Entity:
     category: str = ""
     instance: int = 0
     family: str = "rigid"
+    affordances: tuple[Affordance, ...] = field(default=(), metadata=MappingProxyType({"hashed": "never"}))
+    """Where it is taken hold of, in local names. No engine reads them: they shape nothing that happens by itself."""
 
     @property
     def root(self) -> int:

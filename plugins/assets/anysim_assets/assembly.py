@@ -9,6 +9,7 @@ from anysim.assets.model import ImportedModel
 from anysim.conventions import IDENTITY_QUATERNION
 from anysim.kinematics import inertia
 from anysim.math import pose as P
+from anysim.model.affordances import Affordance
 from anysim.model.appearance import rgb
 from anysim.model.hash import split, tidy
 from anysim.model.world import (
@@ -40,6 +41,7 @@ class Assembly:
         self._geoms: list[Geom] = []
         self._sites: list[Site] = []
         self._masses: list[list[Inertial]] = [[]]
+        self._affordances: list[Affordance] = []
 
     def link(
         self,
@@ -128,6 +130,10 @@ class Assembly:
         """A named frame on a link."""
         self._sites.append(Site(name, body, *split(np.array([*position, *quaternion]))))
 
+    def afford(self, affordance: Affordance) -> None:
+        """Where a hand may take hold of what has been put together; in the names of its links, sites and geoms."""
+        self._affordances.append(affordance)
+
     def model(self) -> ImportedModel:
         """What has been put together."""
         bodies = tuple(
@@ -142,6 +148,7 @@ class Assembly:
             tuple(bodies[g.body].name for g in self._geoms),
             tuple(self._sites),
             links={body.name: i for i, body in enumerate(bodies)},
+            affordances=tuple(self._affordances),
         )
 
 

@@ -2,6 +2,7 @@
 
 from math import pi
 
+from anysim.model.affordances import Affordance, AffordanceKind
 from anysim.model.world import Capsule, Cylinder, Vec3
 from anysim_assets.assembly import Assembly, Colour, turned
 from anysim_assets.parameters import Handle
@@ -10,6 +11,7 @@ from anysim_schemas.errors import KeyFault
 _ALONG_X = turned((0.0, 1.0, 0.0), pi / 2)
 _ALONG_Y = turned((1.0, 0.0, 0.0), -pi / 2)
 _POST = 0.6  # radius of a post or stem, in radii of the bar
+_TILT = 0.7  # [rad] of a hand about a bar, to each side
 _KNOB = 2.0  # radius of a knob's disc, in radii of the handle
 
 
@@ -26,7 +28,8 @@ def add_handle(
 ) -> None:
     """A handle on a face whose outward normal is the link's +x, around the point `at` of the link.
 
-    The frame `LINK.handle` lies in the middle of the bar or disc: x points away from the face, z along the bar.
+    The frame `LINK.handle` lies in the middle of the bar or disc: x points away from the face, z along the bar. The
+    affordance of the same name is taken hold of from the front.
 
     Args:
         assembly: what it is added to.
@@ -85,3 +88,19 @@ def add_handle(
             body, "bar", bar, middle, handle.density, color, turned((0.0, 0.0, 1.0), 0.0) if vertical else _ALONG_Y
         )
     assembly.site(body, f"{link}.handle", middle, turned((1.0, 0.0, 0.0), 0.0) if along_z else _ALONG_Y)
+    # a bar is taken from the front, tilted about itself as far as the fingers stay clear of the face
+    approach = (-1.0, 0.0, 0.0)
+    piece = f"{link}.knob" if knob else f"{link}.bar"
+    roll = (0.0, 0.0) if knob else (-_TILT, _TILT)
+    assembly.afford(
+        Affordance(
+            f"{link}.handle",
+            AffordanceKind.HANDLE,
+            f"{link}.handle",
+            (piece,),
+            ("open", "close"),
+            (approach,),
+            roll,
+            link,
+        )
+    )

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from anysim.assets.model import ImportedModel
 from anysim.math import pose as P
+from anysim.model.affordances import Affordance, AffordanceKind
 from anysim.model.world import Box, Capsule, Cylinder, JointType, Shape
 from anysim_assets.assembly import Assembly, turned
 from anysim_schemas.base import Color, NonNegative, Number, Positive
@@ -104,4 +105,16 @@ def valve(
             middle = (radius * cos(angle), radius * sin(angle))
             rod(f"rim_{i + 1}", middle, half, angle + pi / 2, Cylinder(thickness, half))  # its round ends overlap
     body.site(link, "wheel.handle", (radius, 0.0, 0.0))
+    lever = style == "lever"
+    body.afford(
+        Affordance(
+            "wheel.handle",
+            AffordanceKind.LEVER if lever else AffordanceKind.RIM,
+            "wheel.handle",
+            ("wheel.spoke_1",) if lever else tuple(f"wheel.rim_{i + 1}" for i in range(_SEGMENTS)),
+            ("turn",),
+            ((0.0, 0.0, -1.0),),
+            joint="wheel",
+        )
+    )
     return body.model()

@@ -1,0 +1,80 @@
+"""Affordances of a World by name, with indices in place of their assets' names.
+
+A free rigid object of which nothing is said has the affordance `body`: all that it collides with.
+"""
+
+from typing import NamedTuple
+
+from anysim.errors import NameLookupError, listing, suggest
+from anysim.model.affordances import Affordance, AffordanceKind
+from anysim.model.frames import FixedFrame, find_frame
+from anysim.model.slots import members
+from anysim.model.world import BodyKind, Entity, World
+
+BODY = "body"
+"""The affordance of a free rigid object of which nothing was said."""
+
+
+class FoundAffordance(NamedTuple):
+    """An affordance of one entity of a World: indices of its geoms and of its joint (-1: none), and its frame."""
+
+    entity: int
+    spec: Affordance
+    frame: FixedFrame
+    geoms: tuple[int, ...]
+    joint: int
+
+
+def affordances_of(world: World, entity: int) -> tuple[Affordance, ...]:
+    """What an entity affords: what its asset declares, and `body` for a free rigid object that declares none of these.
+
+    `entity` is an index into `World.entities`.
+    """
+    owner = world.entities[entity]
+    declared = owner.affordances
+    whole = owner.joint_start == owner.joint_stop and world.bodies[owner.root].kind is BodyKind.FREE
+    if not whole or any(one.kind is AffordanceKind.BODY for one in declared):
+        return declared
+    pieces = tuple(_local(world.geoms[i].name, owner) for i in world.body_geoms[owner.root] if world.geoms[i].collides)
+    return (*declared, Affordance(BODY, AffordanceKind.BODY, pieces=pieces, use=("carry",))) if pieces else declared
+
+
+def find_affordance(world: World, name: str) -> FoundAffordance:
+    """An affordance by name, such as `cabinet.drawer_1.handle` or `cube.body`.
+
+    The bare name of an entity stands for the only affordance that it has.
+
+    Raises:
+        NameLookupError: there is no such entity or affordance, or several; lists those that there are.
+    """
+    owner, _, local = name.partition(".")
+    slots = members(world, owner)
+    entities = [e for slot in slots for e in slot.entities]
+    if len(entities) != 1:
+        known = [e.name for e in world.entities]
+        why = f"stands for {len(entities)} entities; name one of them" if entities else "is no entity"
+        among = [world.entities[e].name for e in entities] or known
+        raise NameLookupError(f"'{owner}' {why}{suggest(owner, among)} (entities: {listing(among)})")
+    owned = affordances_of(world, entities[0])
+    found = [one for one in owned if one.name == local or (not local and len(owned) == 1)]
+    if not found:
+        names = [one.name for one in owned]
+        has = f"affordances: {listing(names, 20)}" if names else "it has none; its asset declares them"
+        wanted = f"has no affordance '{local}'" if local else f"has {len(names)} affordances; name one of them"
+        raise NameLookupError(f"'{owner}' {wanted}{suggest(local, names)} ({has})")
+    return _resolved(world, entities[0], found[0])
+
+
+def _resolved(world: World, entity: int, spec: Affordance) -> FoundAffordance:
+    owner = world.entities[entity]
+    frame = find_frame(world, f"{owner.name}.{spec.frame}" if spec.frame else owner.name)
+    wanted = {f"{owner.name}.{piece}" if piece else owner.name for piece in spec.pieces}
+    own = range(owner.body_start, owner.body_stop)
+    geoms = tuple(i for i, geom in enumerate(world.geoms) if geom.body in own and geom.name in wanted)
+    joints = range(owner.joint_start, owner.joint_stop)
+    joint = next((i for i in joints if world.joints[i].name == f"{owner.name}.{spec.joint}"), -1)
+    return FoundAffordance(entity, spec, frame, geoms, joint)
+
+
+def _local(name: str, owner: Entity) -> str:
+    return name.removeprefix(owner.name).removeprefix(".")

@@ -1,0 +1,78 @@
+"""Affordances: every builder of things to handle declares them, and a World gives them back with indices."""
+
+import numpy as np
+import pytest
+
+from anysim.api import compile_world
+from anysim.compile.edit import without_entity
+from anysim.errors import NameLookupError
+from anysim.model.affordance_lookup import affordances_of, find_affordance
+from anysim.model.affordances import AffordanceKind
+from anysim.model.world import Capsule, World
+
+OBJECTS = {
+    "first": {"source": {"box": [0.04, 0.06, 0.1]}},
+    "cabinet": {"source": "procedural:cabinet", "fixed": True},
+    "chest": {"source": {"procedural": "hinge_box", "scale": 2.0}, "fixed": True},
+    "valve": {"source": "procedural:valve", "fixed": True},
+    "tap": {"source": {"procedural": "valve", "params": {"style": "lever"}}, "fixed": True},
+    "ball": {"source": {"sphere": 0.03}},
+    "post": {"source": {"cylinder": [0.03, 0.2]}, "fixed": True},
+}
+
+
+@pytest.fixture(scope="module")
+def world() -> World:
+    return compile_world({"world": {"objects": OBJECTS}})
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "joint"),
+    [
+        ("cabinet.drawer_1.handle", AffordanceKind.HANDLE, "cabinet.drawer_1"),
+        ("cabinet.door_1.handle", AffordanceKind.HANDLE, "cabinet.door_1"),
+        ("chest", AffordanceKind.HANDLE, "chest.lid"),
+        ("valve.wheel.handle", AffordanceKind.RIM, "valve.wheel"),
+        ("tap.wheel.handle", AffordanceKind.LEVER, "tap.wheel"),
+    ],
+)
+def test_builders_declare_what_is_taken_hold_of(world: World, name: str, kind: AffordanceKind, joint: str) -> None:
+    found = find_affordance(world, name)
+    assert found.spec.kind is kind
+    assert world.joints[found.joint].name == joint
+    assert found.geoms
+    assert {world.geoms[g].body for g in found.geoms} == {world.joints[found.joint].body} == {found.frame.body}
+
+
+def test_the_frame_of_a_bar_has_its_z_along_it(world: World) -> None:
+    found = find_affordance(world, "cabinet.drawer_2.handle")
+    (bar,) = found.geoms
+    assert isinstance(world.geoms[bar].shape, Capsule)
+    np.testing.assert_allclose(world.geoms[bar].position, found.frame.position)
+    np.testing.assert_allclose(np.abs(np.dot(world.geoms[bar].quaternion, found.frame.quaternion)), 1.0)
+
+
+def test_plain_free_shapes_are_taken_hold_of_as_a_whole(world: World) -> None:
+    found = find_affordance(world, "ball")
+    assert found.spec.name == "body"
+    assert [world.geoms[g].name for g in found.geoms] == ["ball.shape"]
+    assert affordances_of(world, world.entity_numbers["post"]) == ()
+
+
+def test_names_that_do_not_exist_are_told_with_those_that_do(world: World) -> None:
+    with pytest.raises(NameLookupError, match=r"cabinet.*drawer_9.*drawer_1\.handle, drawer_2\.handle"):
+        find_affordance(world, "cabinet.drawer_9.handle")
+    with pytest.raises(NameLookupError, match="'cabinet' has 4 affordances; name one"):
+        find_affordance(world, "cabinet")
+    with pytest.raises(NameLookupError, match=r"'post' has no affordance 'body' .*its asset declares them"):
+        find_affordance(world, "post.body")
+    with pytest.raises(NameLookupError, match=r"'cabin' is no entity.*cabinet"):
+        find_affordance(world, "cabin.handle")
+
+
+def test_they_survive_the_removal_of_what_stands_before_them(world: World) -> None:
+    less = without_entity(world, "first")
+    for name in ("cabinet.door_1.handle", "ball.body"):
+        before, after = find_affordance(world, name), find_affordance(less, name)
+        assert [world.geoms[g].name for g in before.geoms] == [less.geoms[g].name for g in after.geoms]
+        assert world.bodies[before.frame.body].name == less.bodies[after.frame.body].name
