@@ -42,6 +42,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
         "terrains": "generated",
         "textures": "brick checker dots gradient noise stripes wood",
     },
+    "anysim-banks": {"commands": "bank"},
     "anysim-bench": {"commands": "bench"},
     "anysim-control": {
         "controllers": "ackermann_drive batched_ik camera_gimbal camera_motion differential_drive differential_ik"

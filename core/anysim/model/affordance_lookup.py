@@ -62,15 +62,26 @@ def find_affordance(world: World, name: str) -> FoundAffordance:
         has = f"affordances: {listing(names, 20)}" if names else "it has none; its asset declares them"
         wanted = f"has no affordance '{local}'" if local else f"has {len(names)} affordances; name one of them"
         raise NameLookupError(f"'{owner}' {wanted}{suggest(local, names)} ({has})")
-    return _resolved(world, entities[0], found[0])
+    return resolve_affordance(world, entities[0], found[0])
 
 
-def _resolved(world: World, entity: int, spec: Affordance) -> FoundAffordance:
+def resolve_affordance(world: World, entity: int, spec: Affordance) -> FoundAffordance:
+    """An affordance on an entity by its index, whether the entity's asset declares it or not.
+
+    Raises:
+        NameLookupError: the entity has no such link, site or geom.
+    """
     owner = world.entities[entity]
     frame = find_frame(world, f"{owner.name}.{spec.frame}" if spec.frame else owner.name)
     wanted = {f"{owner.name}.{piece}" if piece else owner.name for piece in spec.pieces}
     own = range(owner.body_start, owner.body_stop)
     geoms = tuple(i for i, geom in enumerate(world.geoms) if geom.body in own and geom.name in wanted)
+    if lost := sorted(wanted - {world.geoms[i].name for i in geoms}):
+        names = [_local(geom.name, owner) for geom in world.geoms if geom.body in own and geom.collides]
+        part = _local(lost[0], owner)
+        raise NameLookupError(
+            f"'{owner.name}' has no geom '{part}'{suggest(part, names)} (geoms: {listing(names, 20)})"
+        )
     joints = range(owner.joint_start, owner.joint_stop)
     joint = next((i for i in joints if world.joints[i].name == f"{owner.name}.{spec.joint}"), -1)
     return FoundAffordance(entity, spec, frame, geoms, joint)

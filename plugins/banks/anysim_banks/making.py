@@ -1,0 +1,113 @@
+"""The making of a bank: sample, filter, try in physics, keep what differs, and try that on the other engines."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from time import process_time
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.engine.factory import availability
+from anysim.errors import AssetError
+from anysim.math import pose as P
+from anysim.skills.bank import Bank
+from anysim_banks.collision import CollisionFilter
+from anysim_banks.diversity import diverse
+from anysim_banks.gripper import Gripper
+from anysim_banks.sampling import Candidates, sample
+from anysim_banks.subject import Subject
+from anysim_banks.trial import HARDEST, SHIFT, TURN, Trial
+
+Say = Callable[[str], object]
+_POSE_DIGITS = 9
+
+
+@dataclass(frozen=True)
+class Order:
+    """How many grasps are sampled, how many are kept, and the seed of the sampling."""
+
+    raw: int = 2000
+    keep: int = 64
+    seed: int = 0
+
+
+def made(
+    subject: Subject, gripper: Gripper, engine: str, order: Order, say: Say, about: Mapping[str, object] | None = None
+) -> tuple[Bank, float]:
+    """A new bank, tried on one engine, and how many raw candidates were judged per CPU second.
+
+    `about` is added to its provenance.
+
+    Raises:
+        AssetError: nothing that was sampled could be held; says what became of it.
+    """
+    began = process_time()
+    rng = np.random.default_rng([order.seed, int(subject.hash[:8], 16)])
+    found = sample(subject.pieces, subject.affordance, subject.frame, order.raw, gripper.max_width, rng)
+    if subject.region is not None:
+        point, radius = subject.region
+        there = P.rotate(subject.frame[3:], np.array(point)) + subject.frame[:3]
+        found = found.take(np.flatnonzero(P.norm(found.pose[:, :3] - there) <= radius))
+    raw = len(found.width)
+    free = found.take(np.flatnonzero(CollisionFilter(gripper, subject.around).free(found.pose)))
+    say(f"{len(free.width)} of {raw} are free of collision")
+    with Trial(gripper, subject, engine) as trial:
+        verdicts = trial.run(free)
+    held = np.flatnonzero(verdicts.margin >= 1.0)
+    rate = raw / max(process_time() - began, 1e-9)
+    say(f"{len(held)} held on {engine}, {int(verdicts.missed.sum())} missed")
+    if len(held) == 0:
+        wide = f"nothing there is narrower than {gripper.max_width:g} m" if raw == 0 else f"{raw} grasps were sampled"
+        raise AssetError(
+            f"no grasp of {subject.asset} {subject.affordance.name} was held: {wide}, {len(free.width)} free of "
+            "collision; another gripper, or an affordance with other pieces or approaches, may do"
+        )
+    kept = held[diverse(free.take(held), verdicts.margin[held], order.keep)]
+    counts: dict[str, object] = {
+        "raw": raw,
+        "free": len(free.width),
+        "held": len(held),
+        "kept": len(kept),
+        "seed": order.seed,
+        "asked": [order.raw, order.keep],
+        "test": {"hardest": HARDEST, "shift": SHIFT, "turn": TURN},
+        **(about or {}),
+    }
+    bank = Bank(
+        subject.asset,
+        subject.affordance.name,
+        gripper.name,
+        subject.hash,
+        gripper.hash,
+        np.round(free.pose[kept], _POSE_DIGITS),
+        np.round(free.width[kept], _POSE_DIGITS),
+        tuple(str(kind) for kind in free.kind[kept]),
+        np.round(verdicts.margin[kept], 3),
+        {stamp(engine): np.ones(len(kept), dtype=bool)},
+        counts,
+    )
+    return _best_first(bank), rate
+
+
+def tried_on(bank: Bank, subject: Subject, gripper: Gripper, engines: Sequence[str], say: Say) -> Bank:
+    """The bank with marks of what is held on more engines; those that it was tried on already are passed over."""
+    for engine in engines:
+        if stamp(engine) in bank.passed:
+            continue
+        width = bank.width
+        grasps = Candidates(bank.pose, width, np.array(bank.kind), np.zeros(len(width), dtype=int))
+        with Trial(gripper, subject, engine) as trial:
+            margin = trial.run(grasps).margin
+        passed: dict[str, Array] = {**bank.passed, stamp(engine): margin >= 1.0}
+        bank = replace(bank, margin=np.round(np.minimum(bank.margin, margin), 3), passed=passed)
+        say(f"{int((margin >= 1.0).sum())} of {len(width)} held on {engine}")
+    return _best_first(bank)
+
+
+def stamp(engine: str) -> str:
+    """An engine with its version: `mujoco 3.3.7`."""
+    return f"{engine} {availability(engine).version}"
+
+
+def _best_first(bank: Bank) -> Bank:
+    return bank.take(np.argsort(-bank.margin, kind="stable"))

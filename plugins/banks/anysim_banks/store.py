@@ -1,0 +1,36 @@
+"""Files of banks: one for each affordance and gripper, written whole or not at all."""
+
+import json
+import re
+from pathlib import Path
+
+from anysim.errors import AssetError
+from anysim.skills.bank import Bank, read_bank
+from anysim_banks.gripper import Gripper
+from anysim_banks.making import Order
+from anysim_banks.subject import Subject
+
+
+def bank_path(folder: Path, name: str, subject: Subject, gripper: Gripper) -> Path:
+    """Where the bank of an affordance is, `name` being what its asset is called."""
+    parts = (name, subject.affordance.name, gripper.name)
+    return folder / (".".join(re.sub(r"[^\w.=-]+", "_", part).strip("_") for part in parts) + ".json")
+
+
+def stored(path: Path, subject: Subject, gripper: Gripper, order: Order) -> Bank | None:
+    """The bank that is there already, if it is of this very subject, gripper and order; else None."""
+    try:
+        bank = read_bank(path)
+    except AssetError:
+        return None
+    same = (bank.asset_hash, bank.gripper_hash) == (subject.hash, gripper.hash)
+    ordered = bank.provenance.get("asked") == [order.raw, order.keep] and bank.provenance.get("seed") == order.seed
+    return bank if same and ordered else None
+
+
+def write(path: Path, bank: Bank) -> None:
+    """Write a bank over whatever is there."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    aside = path.with_suffix(".part")
+    aside.write_text(json.dumps(bank.document(), indent=1) + "\n")
+    aside.replace(path)

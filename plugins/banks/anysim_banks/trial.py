@@ -1,0 +1,166 @@
+"""Trials of grasps in physics: a gripper that is fixed, the thing free in it, and loads on the thing.
+
+The fingers close without gravity; then loads act on the thing from each direction, one after the other, each from the
+state just after closing. The easy test admits a grasp: the thing's own weight, both ways along each axis of the hand.
+The hard test ranks: a load that grows to `HARDEST` times that, one way along each axis, as friction gives way alike in
+both. What is moved by its joint is pulled instead, both ways along its path, with a line of force through the
+affordance, as its guides would let it.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from anysim.assets.model import ImportedModel
+from anysim.compile.builder import WorldBuilder
+from anysim.conventions import Array
+from anysim.engine.base import SimEngine
+from anysim.engine.factory import create_simulation
+from anysim.math import pose as P
+from anysim.model.world import Actuator, BodyKind, ControlMode, EntityKind, Physics, World
+from anysim_banks.gripper import SPARE, Gripper
+from anysim_banks.sampling import Candidates
+from anysim_banks.subject import Subject
+
+HARDEST = 12.0
+"""The largest load of the hard test, in loads of the easy one."""
+PULL = 10.0
+"""[N] the load of the easy test on what is moved by its joint: a stiff drawer."""
+SHIFT, TURN = 0.003, 0.1
+"""[m], [rad] by which the thing may move in the fingers under a load: what slips does not stop there."""
+DISPLACED = 0.01, 0.2
+"""[m], [rad] by which it may move while they close."""
+MISSED = 0.6
+"""Fingers that come closer than this share of the expected width have closed on something else."""
+ENVS = {"mujoco": 64}
+"""How many grasps are tried at once; of engines with a scene for each env fewer."""
+
+_GRAVITY = 9.81
+_DT, _SUBSTEPS = 0.002, 10
+_CLOSING = 6  # control steps; the fingers start 2 mm away
+_HOLD, _RAMP = 3, 6  # control steps of the easy and of the hard test: in the first what is let go falls 18 mm
+_KP, _KD = 1000.0, 300.0
+
+
+class Verdicts(NamedTuple):
+    """Of each grasp: the load that it held in the end, in loads of the easy test, 0 where it failed that.
+
+    `missed` (n,) bool are those whose fingers closed on nothing, or on something else.
+    """
+
+    margin: Array
+    missed: Array
+
+
+class Trial:
+    """An engine with a gripper and a subject in each env. Close it, or use it in `with`."""
+
+    def __init__(self, gripper: Gripper, subject: Subject, engine: str, envs: int | None = None) -> None:
+        self._gripper, self._subject = gripper, subject
+        self._n = envs or ENVS.get(engine, 16)
+        self.world = _world(gripper, subject)
+        self._sim: SimEngine = create_simulation(engine).create_world(self.world, self._n)
+        self._thing = next(i for i, b in enumerate(self.world.bodies) if b.name == "thing")
+        self._loads = _loads(subject)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the engine."""
+        self._sim.destroy()
+
+    def run(self, candidates: Candidates) -> Verdicts:
+        """Try grasps; their order does not matter to their verdicts."""
+        n = len(candidates.width)
+        margin, missed = np.zeros(n), np.zeros(n, dtype=bool)
+        for first in range(0, n, self._n):
+            rows = np.arange(first, min(first + self._n, n))
+            margin[rows], missed[rows] = self._try(candidates.pose[rows], candidates.width[rows])
+        return Verdicts(margin, missed)
+
+    def _try(self, pose: Array, width: Array) -> tuple[Array, Array]:
+        sim, ids = self._sim, np.arange(len(width))
+        sim.reset(ids)
+        at = P.compose(self._gripper.tool, P.inverse(pose))
+        sim.set_body_state(at[:, None], np.zeros((len(ids), 1, 6)), ids, [self._thing])
+        upper = self.world.joints[0].upper
+        apart = np.minimum(0.5 * (width + SPARE), upper)
+        sim.set_joint_state(np.repeat(apart[:, None], 2, axis=1), np.zeros((len(ids), 2)), ids)
+        closed = -1.25 * self._gripper.force / _KP  # beyond touching: a finger presses with all its force at any width
+        sim.set_control(position=np.full((len(ids), 2), closed), env_ids=ids)
+        for _ in range(_CLOSING):
+            sim.step(_SUBSTEPS, ids)
+        state = sim.get_state()
+        held = state.body_pose[ids, self._thing].copy()
+        grip = state.joint_pos[ids].sum(axis=1)
+        missed = (grip < MISSED * width) | (state.fault[ids] != 0)
+        moved = P.norm(held[:, :3] - at[:, :3]) > DISPLACED[0]
+        gone = missed | moved | (P.angle_between(held[:, 3:], at[:, 3:]) > DISPLACED[1])
+        start = sim.snapshot(ids)
+        margin = np.where(gone, 0.0, HARDEST)
+        for number, load in enumerate(self._loads):
+            alive = np.flatnonzero(margin >= 1.0)
+            if len(alive) == 0:
+                break
+            sim.restore(start.rows(alive), alive)
+            margin[alive] = np.minimum(margin[alive], self._loaded(alive, held[alive], load, number % 2 == 0))
+        return margin, missed
+
+    def _loaded(self, ids: Array, held: Array, load: Array, hard: bool) -> Array:
+        """(n,) the largest multiple of a load that these envs held, 0 below one; one that is not `hard` is no bound."""
+        wrench = _in_world(load, held, self._subject)
+        reached, left = np.zeros(len(ids)), np.arange(len(ids))
+        for step in range(_HOLD + _RAMP if hard else _HOLD):
+            grown = max(0, step + 1 - _HOLD) / _RAMP
+            times = 1.0 + (HARDEST - 1.0) * grown
+            sim, rows = self._sim, ids[left]
+            sim.apply_wrench(times * wrench[left, None], [self._thing], rows)
+            sim.step(_SUBSTEPS, rows)
+            now = sim.get_state().body_pose[rows, self._thing]
+            shift = P.norm(now[:, :3] - held[left, :3])
+            turn = P.angle_between(now[:, 3:], held[left, 3:])
+            left = left[(shift <= SHIFT) & (turn <= TURN)]  # a state that is no number is not held either
+            if step + 1 >= _HOLD:
+                reached[left] = times if hard else HARDEST
+            if len(left) == 0:
+                break
+        return reached
+
+
+def _world(gripper: Gripper, subject: Subject) -> World:
+    physics = Physics(dt=_DT, control_dt=_DT * _SUBSTEPS, gravity=(0.0, 0.0, 0.0), impratio=1.0)
+    builder = WorldBuilder(World("trial", physics=physics))
+    builder.add("gripper", EntityKind.ROBOT, gripper.model, root=BodyKind.STATIC)
+    own = subject.world
+    names = tuple("" for _ in own.geoms)
+    numbered = tuple(replace(g, name=f"piece{i}") for i, g in enumerate(own.geoms))
+    model = ImportedModel("thing", (subject.body,), geoms=numbered, geom_links=names, meshes=own.meshes, links={"": 0})
+    builder.add("thing", EntityKind.OBJECT, model, root=BodyKind.FREE)
+    builder.actuators += [
+        Actuator(joint.name, number, ControlMode.POSITION, _KP, _KD, gripper.force)
+        for number, joint in enumerate(builder.joints)
+    ]
+    return builder.build()
+
+
+def _loads(subject: Subject) -> list[Array]:
+    """Forces [N] of the easy test, in the thing's frame where it is pulled, else in the world's."""
+    if subject.pull is not None:
+        return [PULL * subject.pull, -PULL * subject.pull]
+    weight = subject.body.inertial.mass * _GRAVITY
+    return [weight * sign * axis for axis in np.eye(3) for sign in (1.0, -1.0)]
+
+
+def _in_world(load: Array, held: Array, subject: Subject) -> Array:
+    """Wrenches (n, 6) at the centres of mass of things at poses (n, 7)."""
+    turn = held[:, 3:]
+    if subject.pull is None:
+        return np.broadcast_to(np.concatenate([load, np.zeros(3)]), (len(held), 6))
+    arm = subject.frame[:3] - np.array(subject.body.inertial.com)
+    force = P.rotate(turn, np.broadcast_to(load, (len(held), 3)))
+    return np.concatenate([force, P.cross(P.rotate(turn, np.broadcast_to(arm, force.shape)), force)], axis=1)
