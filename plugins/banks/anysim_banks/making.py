@@ -19,6 +19,8 @@ from anysim_banks.subject import Subject
 from anysim_banks.trial import HARDEST, SHIFT, TURN, Trial
 
 Say = Callable[[str], object]
+FEW = 3
+"""The hard test is for so many times as many as are kept, as different as they can be."""
 _POSE_DIGITS = 9
 
 
@@ -52,17 +54,20 @@ def made(
     free = found.take(np.flatnonzero(CollisionFilter(gripper, subject.around).free(found.pose)))
     say(f"{len(free.width)} of {raw} are free of collision")
     with Trial(gripper, subject, engine) as trial:
-        verdicts = trial.run(free)
-    held = np.flatnonzero(verdicts.margin >= 1.0)
+        easy = trial.run(free, hard=False)
+        held = np.flatnonzero(easy.margin >= 1.0)
+        tried = held[diverse(free.take(held), easy.margin[held], FEW * order.keep)]
+        margin = trial.run(free.take(tried)).margin
     rate = raw / max(process_time() - began, 1e-9)
-    say(f"{len(held)} held on {engine}, {int(verdicts.missed.sum())} missed")
+    say(f"{len(held)} held on {engine}, {int(easy.missed.sum())} missed")
     if len(held) == 0:
         wide = f"nothing there is narrower than {gripper.max_width:g} m" if raw == 0 else f"{raw} grasps were sampled"
         raise AssetError(
             f"no grasp of {subject.asset} {subject.affordance.name} was held: {wide}, {len(free.width)} free of "
             "collision; another gripper, or an affordance with other pieces or approaches, may do"
         )
-    kept = held[diverse(free.take(held), verdicts.margin[held], order.keep)]
+    best = diverse(free.take(tried), margin, order.keep)
+    kept = tried[best]
     counts: dict[str, object] = {
         "raw": raw,
         "free": len(free.width),
@@ -82,7 +87,7 @@ def made(
         np.round(free.pose[kept], _POSE_DIGITS),
         np.round(free.width[kept], _POSE_DIGITS),
         tuple(str(kind) for kind in free.kind[kept]),
-        np.round(verdicts.margin[kept], 3),
+        np.round(margin[best], 3),
         {stamp(engine): np.ones(len(kept), dtype=bool)},
         counts,
     )
