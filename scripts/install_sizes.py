@@ -23,6 +23,7 @@ WORDS = {
     "": "the core: worlds, tasks, the command line, an engine without physics",
     "all": "everything below",
     "assets": "cabinets, lids, valves, wheeled bases, a gripper, a flying camera, rooms, ground, patterns",
+    "banks": "`anysim bank`: grasps sampled on assets and tried in physics",
     "bench": "`anysim bench`: what anysim costs on top of an engine",
     "control": "tools by inverse kinematics and operational space, vehicles, hands, cameras",
     "film": "`anysim render`: videos of recorded episodes, with other sizes, looks or engines",

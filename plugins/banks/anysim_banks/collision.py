@@ -1,4 +1,4 @@
-"""The collision filter: whether the open gripper is inside of what it is put around, or of what stands beside it.
+"""The collision filter: whether the gripper, from open to almost closed, is inside of what is there.
 
 Bounding balls first, for all grasps at once; exact convex queries by Coal for the boxes and pieces that are near.
 """
@@ -11,7 +11,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.model.world import Box, Capsule, Cylinder, Sphere
-from anysim_banks.gripper import Gripper
+from anysim_banks.gripper import SPARE, Gripper
 from anysim_banks.pieces import Piece, bounding_radius
 
 MARGIN = 1e-4
@@ -25,35 +25,50 @@ class CollisionFilter:
         import coal  # pyright: ignore[reportMissingImports]  (found by its .pth file)
 
         self._coal: Any = coal
-        self._boxes, half = gripper.boxes
-        self._reach = np.linalg.norm(half, axis=1)
-        self._shapes = [coal.Box(*(2 * h).tolist()) for h in half]
+        self._boxes, self._half = gripper.boxes
+        self._side = np.where(np.abs(self._boxes[:, 1]) > 1e-9, np.sign(self._boxes[:, 1]), 0.0)
+        self._stroke = gripper.stroke
         self._pieces = [(_geometry(coal, piece), self._transform(piece.pose)) for piece in pieces]
         self._middle = np.array([piece.pose[:3] for piece in pieces]).reshape(-1, 3)
         self._radius = np.array([bounding_radius(piece) for piece in pieces])
 
-    def free(self, pose: Array) -> Array:
-        """(n,) bool: of tool poses (n, 7), those in which the open gripper touches nothing."""
+    def free(self, pose: Array, width: Array) -> Array:
+        """(n,) bool: of tool poses (n, 7), those in which the gripper touches nothing.
+
+        It is open, and its fingers may close until they are `SPARE` further apart than `width` (n,) [m].
+        """
         coal = self._coal
         request, result = coal.CollisionRequest(), coal.CollisionResult()
         request.security_margin = MARGIN
-        placed = P.compose(pose[:, None, :], self._boxes[None])
+        half, boxes = self._swept(width)
+        placed = P.compose(pose[:, None, :], boxes)
         apart = np.linalg.norm(placed[:, :, None, :3] - self._middle, axis=-1)
-        near = apart < self._reach[None, :, None] + self._radius + MARGIN
+        near = apart < np.linalg.norm(half, axis=-1)[..., None] + self._radius + MARGIN
         turn = P.to_matrix(placed[..., 3:])
         free = np.ones(len(pose), dtype=bool)
         at = (-1, -1)
         where: Any = None
+        shape: Any = None
         for row, box, number in zip(*(index.tolist() for index in np.nonzero(near)), strict=True):
             if not free[row]:
                 continue
             if at != (row, box):
                 at, where = (row, box), coal.Transform3s(turn[row, box], placed[row, box, :3])
+                shape = coal.Box(*(2 * half[row, box]).tolist())
             geometry, there = self._pieces[number]
             result.clear()
-            if coal.collide(self._shapes[box], where, geometry, there, request, result):
+            if coal.collide(shape, where, geometry, there, request, result):
                 free[row] = False
         return free
+
+    def _swept(self, width: Array) -> tuple[Array, Array]:
+        """Half sizes (n, K, 3) and poses (n, K, 7) of what the parts sweep: fingers slide along y."""
+        way = 0.5 * np.maximum(self._stroke - width - SPARE, 0.0)[:, None] * np.abs(self._side)
+        half = np.tile(self._half, (len(width), 1, 1))
+        boxes = np.tile(self._boxes, (len(width), 1, 1))
+        half[..., 1] += 0.5 * way
+        boxes[..., 1] -= 0.5 * way * self._side
+        return half, boxes
 
     def _transform(self, pose: Array) -> Any:
         return self._coal.Transform3s(P.to_matrix(pose[3:]), pose[:3])

@@ -39,7 +39,7 @@ ENVS = {"mujoco": 64}
 _GRAVITY = 9.81
 _DT, _SUBSTEPS = 0.002, 10
 _CLOSING = 6  # control steps; the fingers start 2 mm away
-_HOLD, _RAMP = 4, 8  # control steps of the easy and of the hard test: in the first what is let go falls 3 cm
+_HOLD, _RAMP = 3, 8  # control steps of the easy and of the hard test: in the first what is let go falls 18 mm
 _KP, _KD = 1000.0, 300.0
 
 

@@ -108,7 +108,7 @@ def test_a_hull_is_grasped_as_the_box_that_it_is(tmp_path: Path) -> None:
 def test_the_filter_agrees_with_points_inside_of_the_grippers_boxes() -> None:
     hand, box = gripper(), Box((0.02, 0.03, 0.05))
     grasps = sampled(box, 400)
-    free = CollisionFilter(hand, [Piece(box, ORIGIN)]).free(grasps.pose)
+    free = CollisionFilter(hand, [Piece(box, ORIGIN)]).free(grasps.pose, grasps.width)
     assert 0.2 < free.mean() < 0.9
     axis = [np.linspace(-h, h, 25) for h in box.half_size]
     points = np.stack(np.meshgrid(*axis, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -120,6 +120,16 @@ def test_the_filter_agrees_with_points_inside_of_the_grippers_boxes() -> None:
             local = P.rotate_inverse(place[3:], points - place[:3])
             hit |= bool((np.abs(local) < half - 0.002).all(axis=1).any())
         assert not (hit and free[number]), f"grasp {number} is in collision, and passed"
+
+
+def test_fingers_do_not_close_through_what_stands_beside() -> None:
+    """A plate of 2 mm between the open finger and the box is in the way, though neither end of the way touches it."""
+    hand, box = gripper(), Piece(Box((0.02, 0.01, 0.03)), ORIGIN)
+    beside = Piece(Box((0.02, 0.001, 0.03)), np.array([0.0, 0.03, 0.0, 0.0, 0.0, 0.0, 1.0]))
+    down = np.array([[0.0, 0.0, 0.02, 1.0, 0.0, 0.0, 0.0]])
+    assert CollisionFilter(hand, [box]).free(down, np.array([0.02])).tolist() == [True]
+    assert CollisionFilter(hand, [box, beside]).free(down, np.array([0.02])).tolist() == [False]
+    assert CollisionFilter(hand, [box, beside]).free(down, np.array([0.07])).tolist() == [True]
 
 
 def test_a_diverse_choice_takes_from_every_bin_and_is_spread() -> None:

@@ -1,0 +1,95 @@
+"""`anysim bank`: banks of assets and tasks, what is there already, anchors, and inputs that are wrong."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from anysim.errors import AssetError
+from anysim.skills.bank import read_bank
+from anysim_banks.cli import app
+
+FEW = ("--raw", "40", "--keep", "6")
+BOX = "{box: [0.04, 0.06, 0.1]}"
+
+
+def anysim(*arguments: str) -> Result:
+    return CliRunner().invoke(app, list(arguments))
+
+
+def built(*arguments: str) -> list[dict[str, Any]]:
+    result = anysim("build", *arguments, *FEW, "--json")
+    assert result.exit_code == 0, result.output
+    return json.loads(result.stdout)["banks"]
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def test_a_bank_is_built_completed_and_shown() -> None:
+    [row] = built(BOX)
+    path = Path(str(row["file"]))
+    bank = read_bank(path)
+    assert (bank.asset, bank.affordance, len(bank)) == ("object", "body", 6)
+    [again] = built(BOX)
+    assert (again["version"], again["raw_per_cpu_second"]) == (row["version"], 0.0), "it was there already"
+    [more] = built(BOX, "-e", "mujoco,pybullet")
+    assert [name.split(" ")[0] for name in more["passed"]] == ["mujoco", "pybullet"]
+    assert more["raw_per_cpu_second"] == 0.0
+    [other] = built(BOX, "--seed", "7")
+    assert other["version"] != row["version"]
+    shown = anysim("show", str(path), "-k", "2")
+    assert shown.exit_code == 0
+    assert "6 candidates; held: 6 on mujoco" in shown.stdout
+
+
+def test_a_task_has_a_bank_for_what_can_be_grasped() -> None:
+    rows = built("pick_cube")
+    assert [row["affordance"] for row in rows] == ["cube.body"]
+
+
+def test_anchors_become_banks_by_trial(tmp_path: Path) -> None:
+    anchor = {"name": "top", "point": [0, 0, 0.035], "radius": 0.015, "approach": [[0, 0, -1]], "prior": 0.5}
+    path = tmp_path / "anchors.json"
+    path.write_text(json.dumps({"format": "anysim-anchors-1", "source": "a person", "anchors": [anchor]}))
+    result = anysim("build", BOX, "--anchors", str(path), "--raw", "400", "--keep", "6", "--json")
+    assert result.exit_code == 0, result.output
+    [row] = json.loads(result.stdout)["banks"]
+    bank = read_bank(Path(str(row["file"])))
+    assert (row["anchors"], row["prior"], bank.affordance) == ("a person", 0.5, "top")
+    assert (bank.approach[:, 2] < -0.9).all()
+    assert (((bank.pose[:, :3] - [0, 0, 0.035]) ** 2).sum(axis=1) <= 0.015**2 + 1e-9).all()
+
+
+@pytest.mark.parametrize(
+    ("document", "message"),
+    [
+        ("{", "is no JSON document"),
+        ('{"format": "anysim-anchors-1"}', "anchors: Field required"),
+        ('{"format": "anysim-anchors-1", "anchors": [{"name": "a", "prior": 2}]}', r"anchors\.0\.prior"),
+        ('{"format": "anysim-anchors-1", "anchors": [{"name": "a", "pieces": ["lid"]}]}', "anchor 'a'.*no geom 'lid'"),
+        ('{"format": "anysim-anchors-1", "anchors": [{"name": "a", "link": "lid"}]}', "anchor 'a'.*no link"),
+        ('{"format": "anysim-anchors-1", "anchors": [{"name": "a", "kind": "button"}]}', "fingers do not close on"),
+    ],
+)
+def test_wrong_anchors_are_refused(tmp_path: Path, document: str, message: str) -> None:
+    path = tmp_path / "anchors.json"
+    path.write_text(document)
+    result = anysim("build", BOX, "--anchors", str(path))
+    assert result.exit_code != 0
+    with pytest.raises(AssetError, match=message):
+        raise result.exception or AssertionError("no error")
+
+
+def test_what_cannot_be_grasped_says_why() -> None:
+    result = anysim("build", "{box: [0.3, 0.3, 0.3]}", "--raw", "10")
+    assert result.exit_code != 0
+    assert "narrower than" in str(result.exception)
+    result = anysim("build", BOX, "--gripper", "cabinet")
+    assert "no parallel gripper" in str(result.exception)
+    result = anysim("build", BOX, "--gripper", "parallel_gripper:stroke=wide")
+    assert "stroke=wide" in str(result.exception)
