@@ -37,7 +37,7 @@ KINDS: Mapping[str, str] = {
 
 _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-assets": {
-        "assets": "cabinet hinge_box parallel_gripper valve",
+        "assets": "cabinet hinge_box mug parallel_gripper valve",
         "rooms": "furnished",
         "terrains": "generated",
         "textures": "brick checker dots gradient noise stripes wood",

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from anysim.api import compile_world
+from anysim.assets.procedural import build
 from anysim.compile.edit import without_entity
-from anysim.errors import NameLookupError
+from anysim.errors import NameLookupError, SpecError
 from anysim.model.affordance_lookup import affordances_of, find_affordance
 from anysim.model.affordances import AffordanceKind
 from anysim.model.world import Capsule, World
@@ -76,3 +77,31 @@ def test_they_survive_the_removal_of_what_stands_before_them(world: World) -> No
         before, after = find_affordance(world, name), find_affordance(less, name)
         assert [world.geoms[g].name for g in before.geoms] == [less.geoms[g].name for g in after.geoms]
         assert world.bodies[before.frame.body].name == less.bodies[after.frame.body].name
+
+
+def test_a_mug_is_held_by_its_handle_its_rim_or_as_a_whole() -> None:
+    world = compile_world({"world": {"objects": {"mug": {"source": "procedural:mug"}}}})
+    assert [one.name for one in affordances_of(world, 0)] == ["handle", "rim", "body"]
+    rim, handle = find_affordance(world, "mug.rim"), find_affordance(world, "mug.handle")
+    assert len(rim.geoms) == 16
+    assert {g for g in range(len(world.geoms)) if world.geoms[g].name == "mug.base.bar"} == set(handle.geoms)
+    assert handle.frame.position[0] > 0.038
+    # a ring: every direction from the axis meets a board
+    for angle in np.linspace(0, 2 * np.pi, 100):
+        assert any(
+            np.cos(angle) * world.geoms[g].position[0] + np.sin(angle) * world.geoms[g].position[1] > 0.035
+            for g in rim.geoms
+        )
+    # 16 boards of a ring 4 mm thick, a bottom of 6 mm and a handle, of ceramics
+    ring = np.pi * (0.038**2 - 0.034**2) * 0.084
+    bottom = np.pi * 0.038**2 * 0.006
+    assert world.bodies[0].inertial.mass == pytest.approx(2400 * (ring + bottom), rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("params", "path"),
+    [({"wall": 0.03}, "wall"), ({"bottom": 0.06}, "bottom"), ({"handle_radius": 0.02}, "handle_radius")],
+)
+def test_a_mug_that_does_not_fit_is_refused(params: dict[str, float], path: str) -> None:
+    with pytest.raises(SpecError, match=rf"params\.{path}: a "):
+        build("mug", params)
