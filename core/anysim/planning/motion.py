@@ -1,0 +1,248 @@
+"""Motion plans as skills ask for them: requests, the scene they are planned in, answers, and planners found by name.
+
+An answer depends on the request and on the scene that came with it alone: not on what was planned before or beside it,
+nor on the number of threads. A deadline is a net under a search that is bounded by its own counts; the one answer that
+may differ between two machines is `timeout`.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from threading import Event
+from time import perf_counter
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from anysim import registry
+from anysim.conventions import Array
+from anysim.errors import AnysimError, PluginError
+from anysim.model.world import World
+from anysim.planning.api import ALL_AXES
+
+
+class PlanStatus(StrEnum):
+    """How a plan, or one candidate of a goal set, ended; `failed` says that the planner itself broke."""
+
+    OK = "ok"
+    NO_IK = "no_ik"
+    START_IN_COLLISION = "start_in_collision"
+    NO_PATH = "no_path"
+    TIMEOUT = "timeout"
+    CANCELLED = "cancelled"
+    FAILED = "failed"
+
+
+class Pairing(StrEnum):
+    """How several tools choose: all the same candidate, or each its own."""
+
+    PAIRED = "paired"
+    INDEPENDENT = "independent"
+
+
+@dataclass(frozen=True, eq=False)
+class ToolGoal:
+    """A goal set of one tool.
+
+    Attributes:
+        robot, tool: names; the tool moves by those of the request's joints that lie between the root and it.
+        poses: (G, 7) candidates, world poses of the tool.
+        rotation_weight: (3,) about the tool's axes; 0 leaves that rotation free.
+        position_tolerance: [m]
+        rotation_tolerance: [rad]
+        enabled: one that is not counts for nothing, but keeps its place.
+    """
+
+    robot: str
+    tool: str
+    poses: Array
+    rotation_weight: tuple[float, float, float] = ALL_AXES
+    position_tolerance: float = 1e-4
+    rotation_tolerance: float = 1e-4
+    enabled: bool = True
+
+
+class Attachment(NamedTuple):
+    """A held object: it moves with a body. `offset` (7,) is the measured pose of the object's root in that body."""
+
+    entity: str
+    body: str
+    offset: Array
+
+
+@dataclass(frozen=True, eq=False)
+class PlanRequest:
+    """A motion that is wanted: to the poses of tools, or to joint positions.
+
+    Attributes:
+        joints: (K) names of the World's joints that may move; all others stay as the scene has them. A base is free if
+            its joints are among them, else locked.
+        start: (K,) where the motion begins.
+        goals: one or several tools, or none with a `joint_goal`.
+        pairing: how several tools choose among their candidates.
+        joint_goal: (K,)
+        straight: [m] how far the tools may leave the straight line to their pose; None for any path.
+        attached: what is held.
+        allowed: pairs of names, of bodies or of entities, that may touch.
+        padding: [m] distance kept from what is not a robot.
+        velocity_scale: part of the joints' velocity limits that is used.
+        acceleration: [rad/s^2] or [m/s^2] limit of each joint.
+        seed: all that is random is drawn from it.
+        deadline: [s] of the planner's own time.
+    """
+
+    joints: tuple[str, ...]
+    start: Array
+    goals: tuple[ToolGoal, ...] = ()
+    pairing: Pairing = Pairing.PAIRED
+    joint_goal: Array | None = None
+    straight: float | None = None
+    attached: tuple[Attachment, ...] = ()
+    allowed: tuple[tuple[str, str], ...] = ()
+    padding: float = 0.0
+    velocity_scale: float = 1.0
+    acceleration: float = 10.0
+    seed: int = 0
+    deadline: float = 5.0
+
+    def check(self) -> None:
+        """Look for what no planner can answer.
+
+        Raises:
+            AnysimError: shapes that do not fit, values that are not finite, no goal or two kinds of goals.
+        """
+        used = [goal for goal in self.goals if goal.enabled]
+        if bool(used) == (self.joint_goal is not None):
+            raise AnysimError("a plan needs either goals of tools or a joint_goal; give one of the two")
+        arrays = {"start": (self.start, (len(self.joints),)), "joint_goal": (self.joint_goal, (len(self.joints),))}
+        arrays |= {f"poses of '{goal.tool}'": (goal.poses, (len(goal.poses), 7)) for goal in used}
+        arrays |= {f"offset of '{held.entity}'": (held.offset, (7,)) for held in self.attached}
+        for name, (value, shape) in arrays.items():
+            if value is not None and (np.shape(value) != shape or not np.isfinite(value).all()):
+                raise AnysimError(f"{name}: expected finite numbers of shape {shape}, got shape {np.shape(value)}")
+        widths = {len(goal.poses) for goal in used}
+        if 0 in widths or (self.pairing is Pairing.PAIRED and len(widths) > 1):
+            raise AnysimError(
+                f"goal sets of {sorted(widths)} poses: expected some, as many for each tool that is paired"
+            )
+        if not (self.deadline > 0 and self.padding >= 0 and self.acceleration > 0 and 0 < self.velocity_scale <= 1):
+            raise AnysimError("expected deadline and acceleration > 0, padding >= 0, velocity_scale above 0, at most 1")
+
+
+class Scene(NamedTuple):
+    """One env at one time; see `anysim.planning.scenes`.
+
+    Attributes:
+        version: counts the times that something other than a robot has moved.
+        body_pose: (B, 7) world poses.
+        present: (E,) bool, which entities are there.
+    """
+
+    version: int
+    body_pose: Array
+    present: Array
+
+
+class Trajectory(NamedTuple):
+    """Times (T,) [s] from 0, joint positions (T, K) and velocities (T, K), in the order of the request's joints."""
+
+    times: Array
+    joint_pos: Array
+    joint_vel: Array
+
+
+@dataclass(frozen=True, eq=False)
+class PlanAnswer:
+    """What became of a request.
+
+    Attributes:
+        status: of the whole.
+        goal_status: (G) of each candidate of the (first) goal set; what was not tried is the status of the whole.
+        chosen: for each goal the index of its candidate, -1 where there is none.
+        trajectory: None unless `ok`.
+        margins: by name: distance to the nearest joint limit, clearance at the goal.
+        timings: [s] by stage; measured, so not part of what is reproducible.
+        solver: the planner's name and version.
+        world_version: of the scene that it was planned in.
+        message: a sentence where it is not `ok`.
+    """
+
+    status: PlanStatus
+    goal_status: tuple[PlanStatus, ...] = ()
+    chosen: tuple[int, ...] = ()
+    trajectory: Trajectory | None = None
+    margins: Mapping[str, float] = field(default_factory=dict)
+    timings: Mapping[str, float] = field(default_factory=dict)
+    solver: str = ""
+    world_version: int = 0
+    message: str = ""
+
+
+class Budget:
+    """The time of one request and the wish to stop it. The planner looks at `spent` in its loops."""
+
+    def __init__(self, deadline: float) -> None:
+        self._deadline, self._end, self._cancelled = deadline, float("inf"), Event()
+
+    def begin(self) -> None:
+        """Start the clock; the service does it for each request when its turn comes."""
+        self._end = perf_counter() + self._deadline
+
+    def cancel(self) -> None:
+        """Ask the planner to stop; from any thread."""
+        self._cancelled.set()
+
+    @property
+    def spent(self) -> PlanStatus | None:
+        """`cancelled`, `timeout`, or None to go on."""
+        if self._cancelled.is_set():
+            return PlanStatus.CANCELLED
+        return PlanStatus.TIMEOUT if perf_counter() > self._end else None
+
+
+class MotionPlanner(ABC):
+    """Collision-free motion in one World. Each thread has an object of its own; `plan` is given checked requests.
+
+    Attributes:
+        name, version: for answers and manifests.
+        capabilities: of `straight`, `paired`, `independent`, `attached`, `joint_goal`: what it can do.
+    """
+
+    name: ClassVar[str]
+    version: ClassVar[str]
+    capabilities: ClassVar[frozenset[str]]
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+
+    @abstractmethod
+    def plan(self, request: PlanRequest, scene: Scene, budget: Budget) -> PlanAnswer:
+        """Search. Not finding a motion is a status, not an exception."""
+
+    @abstractmethod
+    def is_free(self, request: PlanRequest, scene: Scene, joint_pos: Array) -> bool:
+        """Whether a path (T, K), straight between its rows, is free in a scene, 0.005 rad by 0.005 rad."""
+
+    def plan_all(
+        self, requests: Sequence[PlanRequest], scenes: Sequence[Scene], budgets: Sequence[Budget]
+    ) -> list[PlanAnswer]:
+        """Requests of one tick together; a planner overrides it if that saves time. Each answer is as if alone."""
+        answers: list[PlanAnswer] = []
+        for request, scene, budget in zip(requests, scenes, budgets, strict=True):
+            budget.begin()
+            answers.append(self.plan(request, scene, budget))
+        return answers
+
+
+def motion_planner(world: World, planner: str = "rrt", **options: object) -> MotionPlanner:
+    """A planner by name for a world.
+
+    Raises:
+        PluginError: no planner of that name is installed, or what has that name solves inverse kinematics only.
+    """
+    made = registry.load("planners", planner)
+    if not (isinstance(made, type) and issubclass(made, MotionPlanner)):
+        raise PluginError(f"'{planner}' is no planner of motion: it solves inverse kinematics; try 'rrt'")
+    with registry.using("planners", planner, (TypeError,)):  # of an option that it does not have
+        return made(world, **options)
