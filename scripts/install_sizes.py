@@ -32,6 +32,7 @@ WORDS = {
     "mcap": "recordings: MCAP files and videos",
     "mujoco": "the engine MuJoCo, and MJCF files",
     "parity": "`anysim compare` and `anysim picture`",
+    "planning": "collision-free motion, planned beside the simulation",
     "policy": "learned policies (ONNX) as controllers",
     "pybullet": "the engine PyBullet",
     "robots": "the robot catalogue with its files, `anysim robot`, `anysim gallery`",

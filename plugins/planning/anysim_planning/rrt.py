@@ -1,0 +1,144 @@
+"""The planner of motion `rrt`: own goal sets, the straight line first, RRT-Connect, a time law, and a last check."""
+
+from collections import OrderedDict
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.model.world import World
+from anysim.planning.motion import Budget, MotionPlanner, PlanAnswer, PlanRequest, PlanStatus, Scene, Trajectory
+from anysim_planning.goals import GoalSolver, Reached
+from anysim_planning.lines import straight_line
+from anysim_planning.scene import PlanningWorld, topology
+from anysim_planning.search import connect, dense, edge_check, shortened
+from anysim_planning.time_law import timed
+
+CHECKED = 0.005
+"""[rad] or [m] between the configurations of the last check."""
+ATTEMPTS = ((0.02, 0.15), (0.005, 0.0))
+"""Steps of the search, and how far corners are cut: the second where the last check finds fault with the first."""
+CANDIDATES = 3
+"""Goal configurations that a path is looked for, the nearest first."""
+KEPT = 12
+"""Worlds that are kept, the last ones used."""
+
+
+class RrtPlanner(MotionPlanner):
+    """RRT-Connect with edges checked in batches by Coal."""
+
+    name = "rrt"
+    version = "1"
+    capabilities = frozenset({"attached", "independent", "joint_goal", "paired", "straight"})
+
+    def __init__(self, world: World, solver: str = "numba_ik") -> None:
+        """`solver`: of inverse kinematics, by name."""
+        super().__init__(world)
+        self._goals = GoalSolver(world, solver)
+        self._worlds: OrderedDict[object, PlanningWorld] = OrderedDict()
+        self._shapes: dict[object, Any] = {}
+
+    def world_of(self, request: PlanRequest, scene: Scene) -> PlanningWorld:
+        """The collision checks of a request, everything where the scene has it."""
+        key = topology(request)
+        if key not in self._worlds:
+            self._worlds[key] = PlanningWorld(self.world, request, self._shapes)
+            if len(self._worlds) > KEPT:
+                self._worlds.popitem(last=False)
+        self._worlds.move_to_end(key)
+        self._worlds[key].take(scene, request.attached)
+        return self._worlds[key]
+
+    def is_free(self, request: PlanRequest, scene: Scene, joint_pos: Array) -> bool:
+        """Whether a path (T, K) is free, 0.005 rad by 0.005 rad."""
+        return _free(self.world_of(request, scene), joint_pos)
+
+    def plan(self, request: PlanRequest, scene: Scene, budget: Budget) -> PlanAnswer:
+        """Search."""
+        request.check()
+        clock, timings = perf_counter(), dict[str, float]()
+        world = self.world_of(request, scene)
+        start = np.asarray(request.start, dtype=float)
+        width = next((len(goal.poses) for goal in request.goals if goal.enabled), 1)
+
+        def answer(status: PlanStatus, message: str = "", **more: Any) -> PlanAnswer:
+            more.setdefault("goal_status", (status,) * width)
+            who = f"{self.name} {self.version}"
+            return PlanAnswer(status, timings=timings, solver=who, world_version=scene.version, message=message, **more)
+
+        def passed(stage: str) -> None:
+            nonlocal clock
+            now = perf_counter()
+            timings[stage] = timings.get(stage, 0.0) + now - clock
+            clock = now
+
+        if world.hits(start[None])[0]:
+            pairs = ", ".join(f"'{a}' with '{b}'" for a, b in world.touching(start)[:4])
+            return answer(PlanStatus.START_IN_COLLISION, f"the motion would begin in a collision of {pairs}")
+        passed("scene")
+        if request.joint_goal is not None:
+            q = np.asarray(request.joint_goal, dtype=float)
+            found, statuses = [Reached((0,), q)], [PlanStatus.OK]
+            if world.hits(q[None])[0] or (q < world.lower - 1e-9).any() or (q > world.upper + 1e-9).any():
+                return answer(PlanStatus.NO_IK, "the joint positions asked for collide, or are beyond a joint's limit")
+        else:
+            found, reachable = self._goals.reach(request, scene, world)
+            free = {one.chosen[next(t for t, c in enumerate(one.chosen) if c >= 0)] for one in found}
+            statuses = [PlanStatus.OK if g in free else PlanStatus.NO_IK for g in range(width)]
+            if not found:
+                why = f"{int(reachable.sum())} of {width} candidates can be reached, all of them in collision"
+                return answer(PlanStatus.NO_IK, why)
+        passed("ik")
+        for one in found[:CANDIDATES]:
+            trajectory = self._motion(request, scene, world, one, budget, passed)
+            if spent := budget.spent:
+                return answer(spent, "it was stopped before a path was found")
+            first = next(c for c in one.chosen if c >= 0)
+            if trajectory is not None:
+                whole = tuple(PlanStatus.OK if g == first else status for g, status in enumerate(statuses))
+                q = trajectory.joint_pos
+                margins = {
+                    "joint_limit": float(np.minimum(q - world.lower, world.upper - q).min()),
+                    "clearance": world.clearance(q[-1]),
+                }
+                passed("margins")
+                return answer(
+                    PlanStatus.OK, goal_status=whole, chosen=one.chosen, trajectory=trajectory, margins=margins
+                )
+            statuses[first] = PlanStatus.NO_PATH
+        kind = "straight line" if request.straight is not None else "path"
+        tried = tuple(PlanStatus.NO_PATH if status is PlanStatus.OK else status for status in statuses)
+        return answer(
+            PlanStatus.NO_PATH, f"no free {kind} to the nearest {CANDIDATES} configurations", goal_status=tried
+        )
+
+    def _motion(
+        self, request: PlanRequest, scene: Scene, world: PlanningWorld, goal: Reached, budget: Budget, passed: Any
+    ) -> Trajectory | None:
+        start = np.asarray(request.start, dtype=float)
+        velocity = np.minimum(world.velocity_limit, 1e3) * request.velocity_scale
+        for attempt, (step, blend) in enumerate(ATTEMPTS):
+            rng = np.random.default_rng([request.seed, 1 + attempt, *(c + 1 for c in goal.chosen)])
+            if request.straight is not None and request.joint_goal is None:
+                candidate = next(c for c in goal.chosen if c >= 0)
+                path, blend = straight_line(self._goals, request, scene, candidate), 1.0  # the points are dense
+            else:
+                free = edge_check(world, step)
+                path = connect(start, goal.joint_pos, world.lower, world.upper, free, rng, budget)
+                path = path if path is None else shortened(path, free, rng, budget)
+            passed("search")
+            if path is None or budget.spent:
+                return None
+            trajectory = timed(path, velocity, request.acceleration, blend)
+            passed("time_law")
+            good = _free(world, trajectory.joint_pos)
+            passed("check")
+            if good:
+                return trajectory
+        return None
+
+
+def _free(world: PlanningWorld, joint_pos: Array) -> bool:
+    rows = dense(np.asarray(joint_pos, dtype=float), CHECKED)
+    return not any(world.hits(rows[i : i + 64], stop=True).any() for i in range(0, len(rows), 64))
