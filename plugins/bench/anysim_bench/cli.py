@@ -206,6 +206,49 @@ def collect(
         print_json([cost._asdict() for cost in costs])
 
 
+@app.command("plan")
+def plan(
+    planner: Annotated[str, typer.Option("--planner", "-p", help="The planner of motion.")] = "rrt",
+    requests: Annotated[int, typer.Option("--requests", "-r", min=2, help="Requests, planned together.")] = 50,
+    goals: Annotated[int, typer.Option("--goals", "-g", min=1, help="Candidates of each goal set.")] = 16,
+    task: Annotated[str, typer.Option(help="The task, whose first robot is an arm.")] = "pick_cube",
+    engine: Annotated[str | None, typer.Option("--engine", "-e", help="The engine that steps meanwhile.")] = None,
+    json: AsJson = False,
+) -> None:
+    """Plan motions alone and in a service, and step 16 envs while requests are in flight.
+
+    The exit code is 1 where a path is not free when it is looked at again, or a service gives other answers than its
+    planner alone.
+    """
+    from anysim.cli.output import print_json
+    from anysim_bench.plan import IK_GOAL, RATIO_GOAL, STALL_GOAL_MS, plan_cost
+    from anysim_bench.rows import Rows
+
+    c = plan_cost(planner, task, requests, goals, engine)
+    rows = Rows(
+        f"{requests} plans by {planner} for {task}, {goals} candidates each", ("", "is", "goal"), (44, 24), json
+    )
+    rows.add("solved", f"{c.solved:.0%}", "")
+    rows.add("paths that are free at 0.005 rad", f"{c.free:.0%}", "100%")
+    rows.add("mean length [rad]", f"{c.length:.2f}", "")
+    rows.add("a plan [ms], median and 95th percentile", f"{c.plan_ms:.1f}, {c.plan_p95_ms:.1f}", "")
+    rows.add("the first plan [ms]", f"{c.first_ms:.0f}", "")
+    rows.add("plans/s of the planner alone", f"{c.alone:.1f}", "")
+    for threads, rate in c.services.items():
+        rows.add(f"plans/s of the service, threads: {threads}", f"{rate:.1f} ({rate / c.alone:.2f})", f"{RATIO_GOAL:g}")
+    rows.add("the same answers", "yes" if c.same else "no", "yes")
+    rows.add("inverse kinematics/s", f"{c.ik:,.0f}", f"{IK_GOAL:,}")
+    rows.add(
+        "99th percentile of a step [ms], idle and busy",
+        f"{c.step_p99_ms:.2f}, {c.busy_p99_ms:.2f}",
+        f"{c.step_p99_ms + STALL_GOAL_MS:.2f} ({c.busy_steps} steps)",
+    )
+    if json:
+        print_json(c._asdict())
+    if c.free < 1.0 or not c.same:
+        raise typer.Exit(1)
+
+
 @app.command("resets")
 def resets(
     engine: Annotated[

@@ -1,0 +1,24 @@
+"""The benchmark of planners."""
+
+import pytest
+
+from anysim.errors import PluginError
+from anysim.testing.engines import require_engine
+from anysim_bench.plan import plan_cost
+
+
+@pytest.mark.slow
+def test_paths_are_free_and_services_answer_as_their_planner_does():
+    require_engine("mujoco")
+    cost = plan_cost("rrt", "pick_cube", requests=4, goals=2, engine="mujoco")
+    assert cost.solved == cost.free == 1.0
+    assert cost.same
+    assert set(cost.services) == {"1", "2"}
+    assert 0.0 < cost.step_p99_ms
+    assert cost.busy_steps > 0
+
+
+def test_a_planner_that_is_not_installed_is_refused():
+    require_engine("mujoco")
+    with pytest.raises(PluginError, match="no planner named 'rrrt'"):
+        plan_cost("rrrt", requests=2, engine="mujoco")
