@@ -23,13 +23,13 @@ def between(start: Array, end: Array, parts: Array) -> Array:
     return np.concatenate([position, P.multiply(np.tile(start[3:], (len(parts), 1)), turns)], axis=1)
 
 
-def straight_line(solver: GoalSolver, request: PlanRequest, scene: Scene, candidate: int) -> Array | None:
+def straight_line(solver: GoalSolver, request: PlanRequest, scene: Scene, chosen: tuple[int, ...]) -> Array | None:
     """(T, K) joint positions on which every tool goes straight to its pose; None if no posture follows the line."""
     deviation = request.straight or 0.0
     for steps in STEPS:
         path = np.tile(np.asarray(request.start, dtype=float), (steps + 1, 1))
         worst = 0.0
-        for goal in request.goals:
+        for goal, candidate in zip(request.goals, chosen, strict=True):
             if not goal.enabled:
                 continue
             arm = solver.arm(request, goal)

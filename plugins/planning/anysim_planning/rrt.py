@@ -121,8 +121,7 @@ class RrtPlanner(MotionPlanner):
         for attempt, (step, blend) in enumerate(ATTEMPTS):
             rng = np.random.default_rng([request.seed, 1 + attempt, *(c + 1 for c in goal.chosen)])
             if request.straight is not None and request.joint_goal is None:
-                candidate = next(c for c in goal.chosen if c >= 0)
-                path, blend = straight_line(self._goals, request, scene, candidate), 1.0  # the points are dense
+                path, blend = straight_line(self._goals, request, scene, goal.chosen), 1.0  # the points are dense
             else:
                 free = edge_check(world, step)
                 path = connect(start, goal.joint_pos, world.lower, world.upper, free, rng, budget)
