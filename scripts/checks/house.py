@@ -11,9 +11,9 @@ from checks.tree import Fault, Tree
 
 CORE = Path("core/anysim")
 TESTING = CORE / "testing"
-CORE_LINES, CORE_FILES = 30_000, 226
-"""4,000 lines and 30 files of them are contracts: input ends in a sentence, snapshots and models are read right, plans
-and skills have one interface."""
+CORE_LINES, CORE_FILES = 30_500, 228
+"""4,500 lines and 32 files of them are contracts: input ends in a sentence, snapshots and models are read right, plans,
+skills, affordances and banks of grasps have one interface."""
 PACKAGE_LINES, PACKAGE_MODULES = 4_000, 26
 BACKEND_LINES = {"mujoco": 2_310, "pybullet": 3_300, "sapien": 3_700}
 """To come down to 2,500 each, by what engines with one scene per env share."""
@@ -24,7 +24,14 @@ ANY_IN_SIGNATURES = 75
 """How many parameters and results of core's public functions may be `Any`; the number only falls."""
 
 SENTENCE = re.compile(r"(What|Who|Whose|Where|How|Whether|When|Why|From|Whoever)\b")
-PUBLIC = frozenset({"anysim.adapters.gymnasium"})
+PUBLIC = frozenset(
+    {
+        "anysim.adapters.gymnasium",
+        "anysim.model.affordance_lookup",
+        "anysim.planning.scenes",
+        "anysim.skills.living_bank",
+    }
+)
 """Documented modules for users and for authors of plugins, which core itself does not need."""
 
 LOCAL_NAMES = frozenset({"__init__", "__main__", "base"})
