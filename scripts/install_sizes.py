@@ -37,8 +37,8 @@ WORDS = {
     "pybullet": "the engine PyBullet",
     "robots": "the robot catalogue with its files, `anysim robot`, `anysim gallery`",
     "sapien": "the engine SAPIEN",
-    "skills": "scripted solutions of tasks: `pick`",
-    "tasks": "tasks with their experts: `pick_cube`",
+    "skills": "scripted solutions: grasp, place, push, press, open, close, insert, hand over",
+    "tasks": "twelve tasks on a table, with their experts",
 }
 """What each extra brings; the table has a row for each."""
 
