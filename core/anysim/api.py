@@ -83,6 +83,13 @@ def load(
     )
 
 
+def _as_text(engine: str | Mapping[str, Any]) -> str:
+    try:
+        return json.dumps(engine if isinstance(engine, str) else dict(engine))
+    except (TypeError, ValueError) as error:
+        raise TaskError(f"engine holds what no file can hold: {error}") from None
+
+
 def _check_texts(overrides: Sequence[str]) -> None:
     """A text alone is a sequence of texts too: of its letters."""
     given = cast("object", overrides)
@@ -276,7 +283,7 @@ def _loaded(source: str | Path | LoadedRun | Mapping[str, Any], overrides: Seque
 def make(
     source: str | Path | LoadedRun | Mapping[str, Any],
     *,
-    engine: str | None = None,
+    engine: str | Mapping[str, Any] | None = None,
     num_envs: int | None = None,
     seed: int | None = None,
     overrides: Sequence[str] = (),
@@ -288,7 +295,8 @@ def make(
 
     Args:
         source: an installed task by name, a YAML file, or what `load` returned.
-        engine: an installed engine by name; wins over the file, whose options are kept for the engine it names.
+        engine: an installed engine by name; wins over the file, whose options are kept for the engine it names. Or what
+            the key `engine` of a file holds, in its place: `{"name": "pybullet", "shards": 2}`.
         num_envs: parallel environments; wins over the file.
         seed: seeds the envs now; otherwise the first `reset(seed=...)` does.
         overrides: dotted overrides, as `-o` on the command line.
@@ -307,8 +315,10 @@ def make(
     if base is not None and not isinstance(cast("object", base), str | Path):
         raise TaskError(f"base is the folder that relative asset paths are relative to, got a {type(base).__name__}")
     base = None if base is None else Path(base)
-    if engine is not None and not (isinstance(cast("object", engine), str) and engine):
-        raise TaskError(f"engine is the name of an installed engine, got {shown(engine)}")
+    if engine is not None and not (isinstance(cast("object", engine), str | Mapping) and engine):
+        raise TaskError(
+            f"engine is the name of an installed engine, or what a file's `engine` holds, got {shown(engine)}"
+        )
     if num_envs is not None:
         num_envs = whole("num_envs", num_envs, TaskError, least=1)
     if seed is not None:  # before the env is built
@@ -316,7 +326,7 @@ def make(
     more = [*overrides, *([] if num_envs is None else [f"num_envs={num_envs}"])]
     loaded = _loaded(source, more)
     if engine is not None and loaded.spec.engine.name != engine:  # the options of a file are those of its own engine
-        loaded = _loaded(source, [*more, f"engine={json.dumps(engine)}"])
+        loaded = _loaded(source, [*more, f"engine={_as_text(engine)}"])
     spec = loaded.spec
     _announce_instances(loaded, base)
     world = compile_world(loaded, base=base)

@@ -200,6 +200,7 @@ def test_a_skill_finds_what_is_there_and_says_what_is_not() -> None:
         env.scene.look(None)
         present = there.present.copy()
         assert 0 < present.sum() < 8
+        action = policy.act(np.arange(8))
         outcomes = [policy.describe(i)["outcome"] for i in range(8)]
         assert outcomes == ["running" if p else "adverse_state" for p in present]
-        env.step(policy.act(np.arange(8)))
+        env.step(action)

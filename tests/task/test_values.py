@@ -75,8 +75,10 @@ def test_a_snapshot_goes_into_envs_by_number(env: TaskEnv) -> None:
         ({"num_envs": 0}, "num_envs must be from 1"),
         ({"num_envs": "2"}, "num_envs must be a whole number, got '2'"),
         ({"num_envs": 1.5}, "num_envs must be a whole number"),
-        ({"engine": ""}, "engine is the name of an installed engine, got ''"),
-        ({"engine": 5}, "engine is the name of an installed engine, got 5"),
+        ({"engine": ""}, "engine is the name of an installed engine, or what a file's `engine` holds, got ''"),
+        ({"engine": 5}, "engine is the name of an installed engine, or what a file's `engine` holds, got 5"),
+        ({"engine": {}}, "engine is the name of an installed engine, or what a file's `engine` holds"),
+        ({"engine": {"name": "null", "threads": print}}, "engine holds what no file can hold"),
         ({"seed": 1.5}, "seed must be a whole number"),
         ({"overrides": [5]}, r"overrides are a list of texts such as \['physics.dt=0.004'\]"),
         ({"overrides": "physics.dt=0.004"}, "overrides are a list of texts .* got 'physics.dt=0.004'"),
@@ -112,3 +114,10 @@ def test_several_overrides_may_be_none() -> None:
     with blocks(2) as env:
         env.reset(seed=1, overrides=[])
         env.reset(seed=1, overrides=[{}, {"layout.red.x": np.float64(0.1)}])
+
+
+def test_an_engine_is_given_as_a_file_gives_it() -> None:
+    given = {"name": "mujoco", "options": {"threads": 1}}
+    with anysim.make(BLOCKS, engine=given) as env:
+        assert env.spec.engine.name == "mujoco"
+        assert env.spec.engine.options == {"threads": 1}

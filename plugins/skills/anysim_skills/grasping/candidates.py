@@ -22,5 +22,5 @@ def from_above(object_pose: Array) -> Array:
 
 
 def across(size: Array) -> Array:
-    """(4,) [m] what the fingers have to span in each candidate, of an object of a size (3,) [m] along its axes."""
-    return np.array([size[1], size[0], size[1], size[0]])
+    """(n, 4) [m] what the fingers have to span in each candidate, of objects of sizes (n, 3) [m] along their axes."""
+    return size[:, [1, 0, 1, 0]]

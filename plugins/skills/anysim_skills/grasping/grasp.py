@@ -14,6 +14,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.grasping.candidates import DOWN, TOP_DOWN, across, from_above
+from anysim_skills.object_shapes import ObjectShapes
 
 ROOM = 0.004
 """[m] the gripper must open wider than the object by this."""
@@ -63,9 +64,7 @@ class Grasp(PhasedSkill):
         self.candidate = np.zeros(n, dtype=np.int64)
         """(N,) how many better candidates have been given up."""
         self._rest = np.zeros(n)
-        shape = env.scene.entity_shape(object.entity.name)
-        low, high = shape.bounds(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]))
-        self._widths = across(high - low)
+        self._shapes = ObjectShapes(env.scene, object)
         super().__init__(env, [self.arm])
 
     def make_phases(self) -> Sequence[Phase]:
@@ -112,14 +111,14 @@ class Grasp(PhasedSkill):
     def _choose(self, ids: Array, at: Array) -> None:
         """Candidates by the least motion to pre-grasp, grasp and whatever comes next."""
         self.arm.closed[ids] = False
-        grasps, widths = from_above(self._object.root.pose[at]), self._widths
+        grasps, widths = from_above(self._object.root.pose[at]), across(self._shapes.size(ids))
         grasps[..., :3] = self._place(at)[:, None]
         targets = np.stack([grasps + self._back, grasps], axis=2)
         if self._further is not None:
             targets = np.concatenate([targets, self._further(ids, at, grasps)], axis=2)
         n, g, m = targets.shape[:3]
         effort = self.arm.reach(ids, targets.reshape(n, g * m, 7))[1].reshape(n, g, m).max(axis=2)
-        effort[:, widths > self.arm.aperture - ROOM] = np.inf
+        effort[widths > self.arm.aperture - ROOM] = np.inf
         self._order[ids] = np.argsort(effort, axis=1, kind="stable")
         self._reachable[ids] = np.isfinite(effort).sum(axis=1)
         chosen = self._order[ids, np.minimum(self.candidate[ids], g - 1)]

@@ -15,6 +15,7 @@ from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.grasping.grasp import Metres, Speed
 from anysim_skills.grasping.release import OPENING_STEPS
+from anysim_skills.object_shapes import ObjectShapes
 
 GENTLE = 0.015
 """[m] lead of the command while the object is put down: it bounds the force on what is below."""
@@ -50,7 +51,7 @@ class Place(PhasedSkill):
         self._back = np.array([0.0, 0.0, retreat, 0.0, 0.0, 0.0, 0.0])
         self._height = np.zeros(env.num_envs)
         self._away = np.zeros((env.num_envs, 7))
-        self._shape = env.scene.entity_shape(object.entity.name)
+        self._shapes = ObjectShapes(env.scene, object)
         self._support = env.scene.entity_shape(target.name.partition(".")[0]) if _is_entity(env, target) else None
         super().__init__(env, [self.arm])
 
@@ -78,7 +79,7 @@ class Place(PhasedSkill):
         """How high the object's origin is to be above the target's when it rests there."""
         self.arm.take(ids, at, self._object.root)
         pose = self._object.root.pose[at]
-        below = pose[:, 2] - self._shape.bounds(pose)[0][..., 2]
+        below = self._shapes.below(ids, pose)
         on = 0.0
         if self._support is not None:
             target = self._target.pose[at]

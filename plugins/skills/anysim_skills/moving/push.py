@@ -14,6 +14,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.grasping.grasp import Metres, Speed
+from anysim_skills.object_shapes import ObjectShapes
 
 ASTRAY = np.deg2rad(35.0)
 """[rad] the object is pushed off its way when the goal lies further to the side of the stroke than this."""
@@ -44,9 +45,7 @@ class Push(PhasedSkill):
         self._object, self._goal = object, goal
         self._tolerance, self._height, self._clearance, self._hover = tolerance, height, clearance, hover
         self._speed, self._stroke_speed = speed, stroke_speed
-        shape = env.scene.entity_shape(object.entity.name)
-        low, high = shape.bounds(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]))
-        self._radius = float(np.max(np.maximum(np.abs(low), np.abs(high))[:2]))
+        self._shapes = ObjectShapes(env.scene, object)
         n = env.num_envs
         self._way = np.zeros((n, 3))
         """(N, 3) the direction of the stroke."""
@@ -98,7 +97,7 @@ class Push(PhasedSkill):
         behind = self._behind(ids, at)
         targets = np.concatenate([np.repeat(behind[:, None], 2, axis=1), turns], axis=-1)
         goal = targets.copy()
-        goal[..., :2] = (self._goal.position[at, :2] - self._radius * self._way[ids, :2])[:, None]
+        goal[..., :2] = (self._goal.position[at, :2] - self._shapes.radius(ids)[:, None] * self._way[ids, :2])[:, None]
         effort = self.arm.reach(ids, np.stack([targets, goal], axis=2).reshape(len(ids), 4, 7))[1]
         cost = effort.reshape(len(ids), 2, 2).max(axis=2)
         self._turn[ids] = turns[np.arange(len(ids)), np.argmin(cost, axis=1)]
@@ -106,7 +105,7 @@ class Push(PhasedSkill):
 
     def _behind(self, ids: Array, at: Array) -> Array:
         """(n, 3) behind the object, seen from the goal."""
-        place = self._object.root.position[at] - (self._radius + self._clearance) * self._way[ids]
+        place = self._object.root.position[at] - (self._shapes.radius(ids) + self._clearance)[:, None] * self._way[ids]
         place[:, 2] = self._object.root.position[at, 2] + self._height
         return place
 
@@ -127,7 +126,7 @@ class Push(PhasedSkill):
         line = self._way[ids]
         ahead = P.dot(way, line)
         reach = np.minimum(np.maximum(ahead, 0.0), 0.03)
-        target = thing - self._radius * line + (reach - 0.002)[:, None] * line
+        target = thing - self._shapes.radius(ids)[:, None] * line + (reach - 0.002)[:, None] * line
         target[:, 2] = thing[:, 2] + self._height
         self.arm.go(ids, np.concatenate([target, self._turn[ids]], axis=1), self._stroke_speed)
         there = left < self._tolerance
