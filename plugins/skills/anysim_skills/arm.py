@@ -29,6 +29,10 @@ SLIPPED = 0.05
 AT_REST = 0.02
 """[m/s] a tool that moves slower, while its command is ahead of it, is held up by something."""
 _PRESSED = 0.8
+STALLED = 15
+"""Control steps without inverse kinematics after which the arm leaves the line and moves joint by joint."""
+DETOUR_SPEED = 0.3
+"""Of the joints' velocity limits, on such a way."""
 TURN_RATE = 5.0
 """[rad/m] rotation allowed for each metre of a step; position and rotation arrive together."""
 
@@ -68,6 +72,9 @@ class Arm:
         self.grip = np.zeros((n, 3))
         self.joints = np.zeros((n, len(self.chain)))
         self._fresh = np.ones(n, dtype=bool)
+        self._stalled, self._detour = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=bool)
+        self._way = np.zeros((n, len(self.chain)))
+        """Where the joints go on a detour."""
 
     @classmethod
     def of(
@@ -107,6 +114,7 @@ class Arm:
         self.command[ids] = self.target[ids] = pose
         self.joints[ids] = self.env.scene.state.joint_pos[np.ix_(ids, self.chain.joints)]
         self.speed[ids], self.lead[ids], self.closed[ids], self.stuck[ids] = 0.2, LEAD, False, False
+        self._stalled[ids], self._detour[ids] = 0, False
 
     def go(self, ids: Array, target: Array, speed: float, lead: float = LEAD) -> None:
         """Move towards tool poses (n, 7) at a speed [m/s]."""
@@ -189,10 +197,38 @@ class Arm:
             self.command[ids], self._base(ids), self.joints[ids], random_restarts=0, rng_seeds=keys
         )
         self.stuck[ids] = ~found.converged
-        solved = ids[found.converged]
-        self.joints[solved] = found.joint_pos[found.converged]
+        if self._detour.any() or not found.converged.all():
+            self._around(ids)
+        own = found.converged & ~self._detour[ids]
+        self.joints[ids[own]] = found.joint_pos[own]
         action[ids, self._arm.start : self._arm.stop] = self._arm.controller.action_for(self.joints[ids], ids)
         action[ids, self._eef.start : self._eef.stop] = np.where(self.closed[ids], -1.0, 1.0)[:, None]
+
+    def _around(self, ids: Array) -> None:
+        """Where a straight line runs into the limit of a joint: joint by joint to another posture at its end."""
+        self._stalled[ids] = np.where(self.stuck[ids], self._stalled[ids] + 1, 0)
+        lost = (self._stalled[ids] >= STALLED) & ~self._detour[ids]
+        if lost.any():
+            rows, begun = ids[lost], np.repeat(self.chain.initial[None], int(lost.sum()), axis=0)
+            found = self.solver.solve(
+                self.target[rows],
+                self._base(rows),
+                begun,
+                random_restarts=0,
+                rng_seeds=self.env.streams.episode_seed[rows],
+            )
+            won = rows[found.converged]
+            self._way[won], self._detour[won], self._stalled[rows] = found.joint_pos[found.converged], True, 0
+        on = self._detour[ids]
+        if not on.any():
+            return
+        rows = ids[on]
+        step = DETOUR_SPEED * np.minimum(self.chain.velocity_limit, 10.0) * self._dt
+        left = self._way[rows] - self.joints[rows]
+        share = np.minimum(1.0, 1.0 / np.maximum((np.abs(left) / step).max(axis=1), 1e-9))
+        self.joints[rows] += share[:, None] * left
+        self.command[rows] = self.target[rows]  # the line goes on from its end
+        self._detour[rows] = share < 1.0
 
 
 def _aperture(env: TaskEnv, robot: RobotView, gripper: str) -> float:
