@@ -7,7 +7,20 @@ from anysim.testing.engines import require_engine
 from tests.plugins.skills.test_pick import rollout
 from tests.tasks.states import blind
 
-TASKS = ["reach", "place_on_pad", "stack_cube", "push_cube", "open_drawer", "close_drawer", "press_button"]
+TASKS = [
+    "reach",
+    "place_on_pad",
+    "stack_cube",
+    "push_cube",
+    "open_drawer",
+    "close_drawer",
+    "press_button",
+    "peg_in_hole_1mm",
+    "handover",
+    "put_away",
+]
+LEAST = {"put_away": 6}
+"""Of eight; where nothing is said seven."""
 
 
 @pytest.mark.slow
@@ -19,4 +32,4 @@ def test_the_expert_solves_the_task(task: str, engine: str) -> None:
         assert env.spec.task is not None
         env.reset(seed=4001)
         words = rollout(env, SkillPolicy(env), env.spec.task.horizon)
-    assert words.count("success") >= 7, words
+    assert words.count("success") >= LEAST.get(task, 7), words
