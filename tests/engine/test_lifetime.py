@@ -70,7 +70,8 @@ def test_envs_that_are_dropped_take_no_memory(engine: str) -> None:
     """PyBullet took 42 MiB with each, an env of a larger world more."""
     command = [sys.executable, "-c", MEMORY, engine]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=True)
-    assert float(done.stdout.splitlines()[-1]) < 120.0  # of twelve
+    # of twelve, which took 500 MiB; up to five wait for the collector before the first count or after the last
+    assert float(done.stdout.splitlines()[-1]) < 250.0
 
 
 def test_an_engine_whose_construction_failed_is_dropped_in_silence() -> None:
