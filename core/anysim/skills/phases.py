@@ -69,13 +69,13 @@ class Phase(NamedTuple):
 
     Attributes:
         name: for records and tables.
-        enter: called once an env comes here.
+        enter: called once an env comes here, if there is anything to do then.
         step: called in every control step, the first one too; (n,) STAY, GO_ON, or the index of a failure in OUTCOMES.
         steps: more control steps than this are a timeout.
     """
 
     name: str
-    enter: Callable[[Array, Array], None]
+    enter: Callable[[Array, Array], None] | None
     step: Callable[[Array, Array], Array]
     steps: int
 
@@ -173,8 +173,7 @@ class PhasedSkill(MovingSkill):
             if not here.any():
                 continue
             own, rows = ids[here], at[here]
-            fresh = self.steps[own] == 0
-            if fresh.any():
+            if phase.enter is not None and (fresh := self.steps[own] == 0).any():
                 phase.enter(own[fresh], rows[fresh])
             said = phase.step(own, rows)
             self.steps[own] += 1

@@ -17,6 +17,7 @@ from anysim.task.scene import RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.articulated.bar_grasps import TURNS, bar_grasps
 from anysim_skills.articulated.part import Part
+from anysim_skills.choice import Choice
 from anysim_skills.grasping.grasp import Speed
 
 STATIONS = 5
@@ -63,8 +64,7 @@ class AtHandle(PhasedSkill):
         self.handle = env.scene.frame(f"{env.engine.world.bodies[self.part.body].name}.handle")
         self.speed, self.part_speed, self.lead, self.late = speed, part_speed, lead, steps
         n = env.num_envs
-        self._order, self._reachable = np.zeros((n, len(TURNS)), dtype=np.int64), np.zeros(n, dtype=np.int64)
-        self.candidate = np.zeros(n, dtype=np.int64)
+        self._choice = Choice(n, len(TURNS))
         self._turn = np.zeros((n, 4))
         """The chosen orientation in the handle's frame."""
         self._grip = np.zeros((n, 7))
@@ -75,33 +75,25 @@ class AtHandle(PhasedSkill):
 
     def start(self, env_ids: Array) -> None:
         super().start(env_ids)
-        self.candidate[env_ids] = 0
+        self._choice.again(env_ids)
         self.phase[env_ids] = 1
 
     def retry(self, rung: Rung, env: int) -> int | None:
-        if rung is Rung.CANDIDATE and self.candidate[env] + 1 < self._reachable[env]:
-            self.candidate[env] += 1
-            return 0
-        if rung is Rung.RESAMPLE or rung is Rung.BACK_OFF:
-            return 0
-        return None
+        again = rung in (Rung.RESAMPLE, Rung.BACK_OFF) or (rung is Rung.CANDIDATE and self._choice.next(env))
+        return 0 if again else None
 
     def approach_phases(self) -> list[Phase]:
         """Away from the part, choose, before the handle, to the handle."""
         return [
             Phase("back off", self._leave_handle, self.leaving, self.late),
             Phase("choose", self._choose, self._chosen, 1),
-            Phase("approach", self.nothing, self._approach, self.late),
-            Phase("reach in", self.nothing, self._reach_in, self.late),
+            Phase("approach", None, self._approach, self.late),
+            Phase("reach in", None, self._reach_in, self.late),
         ]
 
     def depth(self, ids: Array) -> Array:
         """(n,) [m] how far beyond the handle's middle the tool goes."""
         return np.zeros(len(ids))
-
-    def nothing(self, ids: Array, at: Array) -> None:
-        """Nothing to do on entering."""
-        del ids, at
 
     # ------------------------------------------------------------------ to the handle and away from it
 
@@ -130,13 +122,11 @@ class AtHandle(PhasedSkill):
         ]
         targets = np.stack([clear, *way], axis=2)
         effort = self.arm.reach(ids, targets.reshape(n, -1, 7))[1].reshape(n, g, -1).max(axis=2)
-        self._order[ids] = np.argsort(effort, axis=1, kind="stable")
-        self._reachable[ids] = np.isfinite(effort).sum(axis=1)
-        self._turn[ids] = TURNS[self._order[ids, np.minimum(self.candidate[ids], g - 1)]]
+        self._turn[ids] = TURNS[self._choice.choose(ids, effort)]
 
     def _chosen(self, ids: Array, at: Array) -> Array:
         del at
-        return np.where(self._reachable[ids] <= self.candidate[ids], _NO_IK, GO_ON)
+        return np.where(self._choice.none_left(ids), _NO_IK, GO_ON)
 
     def _at_handle(self, ids: Array, at: Array, short_of: float) -> Array:
         """Tool poses (n, 7) at the handle, or short of it along the tool's z [m]."""

@@ -13,6 +13,7 @@ from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import ObjectView, RobotView
 from anysim_skills.arm import Arm
+from anysim_skills.choice import Choice
 from anysim_skills.grasping.candidates import DOWN, TOP_DOWN, across, from_above
 from anysim_skills.object_shapes import ObjectShapes
 
@@ -59,10 +60,7 @@ class Grasp(PhasedSkill):
         n = env.num_envs
         self.turn = np.zeros((n, 4))
         """(N, 4) the tool's orientation in the chosen grasp."""
-        self._order = np.zeros((n, TOP_DOWN), dtype=np.int64)
-        self._reachable = np.zeros(n, dtype=np.int64)
-        self.candidate = np.zeros(n, dtype=np.int64)
-        """(N,) how many better candidates have been given up."""
+        self._choice = Choice(n, TOP_DOWN)
         self._rest = np.zeros(n)
         self._shapes = ObjectShapes(env.scene, object)
         super().__init__(env, [self.arm])
@@ -72,8 +70,8 @@ class Grasp(PhasedSkill):
         phases = [
             Phase("back off", self._open, self._backing_off, late),
             Phase("choose", self._choose, self._chosen, 1),
-            Phase("approach", self._nothing, self._approach, late),
-            Phase("descend", self._nothing, self._descend, late),
+            Phase("approach", None, self._approach, late),
+            Phase("descend", None, self._descend, late),
             Phase("close", self._close, self._closing, CLOSING_STEPS + 1),
         ]
         if self._lift:
@@ -82,23 +80,19 @@ class Grasp(PhasedSkill):
 
     def start(self, env_ids: Array) -> None:
         super().start(env_ids)
-        self.candidate[env_ids] = 0
+        self._choice.again(env_ids)
         self.phase[env_ids] = 1
 
     def retry(self, rung: Rung, env: int) -> int | None:
         """The next candidate where one is left; else away from the object, and all of them again."""
-        if rung is Rung.CANDIDATE and self.candidate[env] + 1 < self._reachable[env]:
-            self.candidate[env] += 1
+        if rung is Rung.CANDIDATE and self._choice.next(env):
             return 0
         if rung is Rung.BACK_OFF:
-            self.candidate[env] = 0
+            self._choice.again(env)
             return 0
         return None
 
     # ------------------------------------------------------------------ phases
-
-    def _nothing(self, ids: Array, at: Array) -> None:
-        del ids, at
 
     def _open(self, ids: Array, at: Array) -> None:
         self.arm.closed[ids] = False
@@ -119,14 +113,11 @@ class Grasp(PhasedSkill):
         n, g, m = targets.shape[:3]
         effort = self.arm.reach(ids, targets.reshape(n, g * m, 7))[1].reshape(n, g, m).max(axis=2)
         effort[widths > self.arm.aperture - ROOM] = np.inf
-        self._order[ids] = np.argsort(effort, axis=1, kind="stable")
-        self._reachable[ids] = np.isfinite(effort).sum(axis=1)
-        chosen = self._order[ids, np.minimum(self.candidate[ids], g - 1)]
-        self.turn[ids] = grasps[np.arange(n), chosen, 3:]
+        self.turn[ids] = grasps[np.arange(n), self._choice.choose(ids, effort), 3:]
 
     def _chosen(self, ids: Array, at: Array) -> Array:
-        absent, none = ~self._object.present[at], self._reachable[ids] <= self.candidate[ids]
-        return np.where(absent, _ABSENT, np.where(none, _NO_IK, GO_ON))
+        absent = ~self._object.present[at]
+        return np.where(absent, _ABSENT, np.where(self._choice.none_left(ids), _NO_IK, GO_ON))
 
     def _place(self, at: Array) -> Array:
         """(n, 3) where the object is grasped."""

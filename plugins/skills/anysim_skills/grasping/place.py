@@ -9,22 +9,20 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.skills.base import OUTCOMES, Outcome
-from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
+from anysim.skills.phases import GO_ON, STAY, Phase, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.grasping.grasp import Metres, Speed
-from anysim_skills.grasping.release import OPENING_STEPS
+from anysim_skills.grasping.held import RESTING, Moves, PutsDown
 from anysim_skills.object_shapes import ObjectShapes
 
 GENTLE = 0.015
 """[m] lead of the command while the object is put down: it bounds the force on what is below."""
 SETTLING_STEPS = 15
-RESTING = 0.03
-"""[m/s] an object that moves slower has come to rest."""
 
 
-class Place(PhasedSkill):
+class Place(PutsDown):
     """Put the held `object` down on `target`, whose frame its origin ends up over."""
 
     def __init__(
@@ -44,25 +42,20 @@ class Place(PhasedSkill):
         retreat: Metres = 0.1,
         steps: Annotated[int, Field(ge=1, description="control steps that a move may take")] = 200,
     ) -> None:
-        self.arm = Arm.of(env, robot, tool=tool, solver=solver)
-        self._object, self._target = object, target
-        self._above, self._speed, self._lower_speed, self._align = above, speed, lower_speed, align
-        self._tolerance, self._late = tolerance, steps
-        self._back = np.array([0.0, 0.0, retreat, 0.0, 0.0, 0.0, 0.0])
+        self._target, self._above, self._align, self._tolerance = target, above, align, tolerance
         self._height = np.zeros(env.num_envs)
-        self._away = np.zeros((env.num_envs, 7))
         self._shapes = ObjectShapes(env.scene, object)
         self._support = env.scene.entity_shape(target.name.partition(".")[0]) if _is_entity(env, target) else None
-        super().__init__(env, [self.arm])
+        arm = Arm.of(env, robot, tool=tool, solver=solver)
+        super().__init__(env, arm, object, Moves(speed, lower_speed, retreat, steps))
 
     def make_phases(self) -> Sequence[Phase]:
         return (
-            Phase("transport", self._measure, self._transport, self._late),
-            Phase("align", self._nothing, self._aligning, 60),
-            Phase("lower", self._nothing, self._lowering, self._late),
-            Phase("open", self._open, self._opening, OPENING_STEPS + 1),
-            Phase("retreat", self._retreat, self._retreating, self._late),
-            Phase("settle", self._nothing, self._settling, SETTLING_STEPS + 1),
+            Phase("transport", self._measure, self._transport, self.moves.steps),
+            Phase("align", None, self._aligning, 60),
+            Phase("lower", None, self._lowering, self.moves.steps),
+            *self.let_go(),
+            Phase("settle", None, self._settling, SETTLING_STEPS + 1),
         )
 
     def retry(self, rung: Rung, env: int) -> int | None:
@@ -72,13 +65,10 @@ class Place(PhasedSkill):
 
     # ------------------------------------------------------------------ phases
 
-    def _nothing(self, ids: Array, at: Array) -> None:
-        del ids, at
-
     def _measure(self, ids: Array, at: Array) -> None:
         """How high the object's origin is to be above the target's when it rests there."""
-        self.arm.take(ids, at, self._object.root)
-        pose = self._object.root.pose[at]
+        self.take(ids, at)
+        pose = self.object.root.pose[at]
         below = self._shapes.below(ids, pose)
         on = 0.0
         if self._support is not None:
@@ -88,17 +78,14 @@ class Place(PhasedSkill):
 
     def _goal(self, ids: Array, at: Array, above: float) -> Array:
         """Tool poses (n, 7) at which the object is over the target, with the loop closed on where it is."""
-        thing, target = self._object.root.position[at], self._target.position[at]
+        thing, target = self.object.root.position[at], self._target.position[at]
         place = target + (self.arm.tool.position[at] - thing)
         place[:, 2] += self._height[ids] + above
         return np.concatenate([place, self.arm.target[ids, 3:]], axis=1)
 
     def _off(self, at: Array) -> Array:
         """(n,) [m] how far the object is from over the target, horizontally."""
-        return P.norm((self._object.root.position[at] - self._target.position[at])[:, :2])
-
-    def _held(self, ids: Array, at: Array, said: Array) -> Array:
-        return np.where(self.arm.holds(ids, at, self._object.root), said, _UNSTABLE)
+        return P.norm((self.object.root.position[at] - self._target.position[at])[:, :2])
 
     def _transport(self, ids: Array, at: Array) -> Array:
         """Up first where the object is lower than it is to pass, then across."""
@@ -107,47 +94,27 @@ class Place(PhasedSkill):
         far = self._off(at) > self._tolerance
         straight_up = low & far
         goal[straight_up, :2] = self.arm.command[ids[straight_up], :2]
-        self.arm.go(ids, goal, self._speed)
+        self.arm.go(ids, goal, self.moves.speed)
         near = ~far & (np.abs(self.arm.tool.position[at, 2] - goal[:, 2]) < 0.02)
-        return self._held(ids, at, np.where(near, GO_ON, STAY))
+        return self.held(ids, at, np.where(near, GO_ON, STAY))
 
     def _aligning(self, ids: Array, at: Array) -> Array:
-        self.arm.go(ids, self._goal(ids, at, self._above), self._speed / 4)
-        ready = (self._off(at) < self._align) & (P.norm(self._object.root.twist[at, :3]) < RESTING)
-        return self._held(ids, at, np.where(ready | (self.steps[ids] >= 50), GO_ON, STAY))
+        self.arm.go(ids, self._goal(ids, at, self._above), self.moves.speed / 4)
+        ready = (self._off(at) < self._align) & self.slow(at, RESTING)
+        return self.held(ids, at, np.where(ready | (self.steps[ids] >= 50), GO_ON, STAY))
 
     def _lowering(self, ids: Array, at: Array) -> Array:
         goal = self._goal(ids, at, -2 * GENTLE)  # beyond contact, which is what ends it
-        self.arm.go(ids, goal, self._lower_speed, GENTLE)
-        low = self._object.root.position[at, 2] - self._target.position[at, 2] - self._height[ids] < 0.001
+        self.arm.go(ids, goal, self.moves.lower_speed, GENTLE)
+        low = self.object.root.position[at, 2] - self._target.position[at, 2] - self._height[ids] < 0.001
         down = (self.steps[ids] >= 5) & (self.arm.touching(ids, at) | low)
-        return self._held(ids, at, np.where(down, GO_ON, STAY))
-
-    def _open(self, ids: Array, at: Array) -> None:
-        pose = self.arm.tool.pose[at]
-        self.arm.command[ids] = pose  # the press ends with the grip
-        self.arm.go(ids, pose, self._lower_speed)
-        self.arm.closed[ids] = False
-        self._away[ids] = pose + self._back
-
-    def _opening(self, ids: Array, at: Array) -> Array:
-        del at
-        still = (self.steps[ids] >= 5) & (self.arm.finger_speed(ids) < RESTING)
-        return np.where(still | (self.steps[ids] >= OPENING_STEPS), GO_ON, STAY)
-
-    def _retreat(self, ids: Array, at: Array) -> None:
-        del at
-        self.arm.go(ids, self._away[ids], self._speed / 2)
-
-    def _retreating(self, ids: Array, at: Array) -> Array:
-        return np.where(self.arm.arrived(ids, at, 0.01, 0.1), GO_ON, STAY)
+        return self.held(ids, at, np.where(down, GO_ON, STAY))
 
     def _settling(self, ids: Array, at: Array) -> Array:
-        resting = P.norm(self._object.root.twist[at, :3]) < RESTING
-        return np.where(resting | (self.steps[ids] >= SETTLING_STEPS), GO_ON, STAY)
+        return np.where(self.slow(at, RESTING) | (self.steps[ids] >= SETTLING_STEPS), GO_ON, STAY)
 
     def succeeded(self, env_ids: Array, at: Array) -> Array:
-        thing, target = self._object.root.position[at], self._target.position[at]
+        thing, target = self.object.root.position[at], self._target.position[at]
         high = np.abs(thing[:, 2] - target[:, 2] - self._height[env_ids]) < self._tolerance
         return np.where(high & (self._off(at) < self._tolerance), GO_ON, _LOST)
 
@@ -156,4 +123,4 @@ def _is_entity(env: TaskEnv, frame: Frame) -> bool:
     return frame.name.partition(".")[0] in env.engine.world.entity_numbers and "." not in frame.name
 
 
-_UNSTABLE, _LOST = OUTCOMES.index(Outcome.UNSTABLE_GRASP), OUTCOMES.index(Outcome.LOST)
+_LOST = OUTCOMES.index(Outcome.LOST)

@@ -9,13 +9,12 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.skills.base import OUTCOMES, Outcome
-from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
+from anysim.skills.phases import GO_ON, STAY, Phase, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.grasping.grasp import Metres, Speed
-from anysim_skills.grasping.place import RESTING
-from anysim_skills.grasping.release import OPENING_STEPS
+from anysim_skills.grasping.held import RESTING, Moves, PutsDown
 
 GENTLE = 0.012
 """[m] lead of the command while the peg is lowered: it bounds the force."""
@@ -27,7 +26,7 @@ TURN = 0.35
 """[rad] of the spiral in a control step."""
 
 
-class Insert(PhasedSkill):
+class Insert(PutsDown):
     """Put the held `object` into a hole: its frame `tip` goes through `mouth` to `hole`, whose z point out of it."""
 
     def __init__(
@@ -52,24 +51,21 @@ class Insert(PhasedSkill):
         retreat: Metres = 0.1,
         steps: Annotated[int, Field(ge=1, description="control steps that a move may take")] = 200,
     ) -> None:
-        self.arm = Arm.of(env, robot, tool=tool, solver=solver)
-        self._object, self._tip, self._hole, self._mouth = object, tip, hole, mouth
+        self._tip, self._hole, self._mouth = tip, hole, mouth
         self._symmetry, self._above, self._align, self._depth = symmetry, above, align, depth
-        self._pitch, self._reach, self._speed, self._lower_speed = pitch, reach, speed, lower_speed
-        self._back, self._late = np.array([0.0, 0.0, retreat, 0.0, 0.0, 0.0, 0.0]), steps
+        self._pitch, self._reach = pitch, reach
         self._touched = np.zeros(env.num_envs)
-        self._away = np.zeros((env.num_envs, 7))
-        super().__init__(env, [self.arm])
+        arm = Arm.of(env, robot, tool=tool, solver=solver)
+        super().__init__(env, arm, object, Moves(speed, lower_speed, retreat, steps))
 
     def make_phases(self) -> Sequence[Phase]:
         return (
-            Phase("transport", self._take, self._transport, self._late),
-            Phase("align", self._nothing, self._aligning, ALIGNING_STEPS + 1),
-            Phase("lower", self._nothing, self._lowering, self._late),
+            Phase("transport", self.take, self._transport, self.moves.steps),
+            Phase("align", None, self._aligning, ALIGNING_STEPS + 1),
+            Phase("lower", None, self._lowering, self.moves.steps),
             Phase("search", self._touch, self._searching, SEARCHING_STEPS + 1),
-            Phase("seat", self._nothing, self._seating, self._late),
-            Phase("open", self._open, self._opening, OPENING_STEPS + 1),
-            Phase("retreat", self._retreat, self._retreating, self._late),
+            Phase("seat", None, self._seating, self.moves.steps),
+            *self.let_go(),
         )
 
     def retry(self, rung: Rung, env: int) -> int | None:
@@ -79,15 +75,9 @@ class Insert(PhasedSkill):
 
     # ------------------------------------------------------------------ where the tip is, and is to be
 
-    def _take(self, ids: Array, at: Array) -> None:
-        self.arm.take(ids, at, self._object.root)
-
-    def _nothing(self, ids: Array, at: Array) -> None:
-        del ids, at
-
     def _goal(self, at: Array, offset: Array) -> Array:
         """Tool poses (n, 7) with the object along the hole's axis and the tip at offsets (n, 3) from the mouth."""
-        thing, mouth, tip = self._object.root.pose[at], self._mouth.pose[at], self._tip.pose[at]
+        thing, mouth, tip = self.object.root.pose[at], self._mouth.pose[at], self._tip.pose[at]
         seen = P.multiply(P.conjugate(mouth[:, 3:]), thing[:, 3:])
         yaw = 2.0 * np.arctan2(seen[:, 2], seen[:, 3])
         fit = 2.0 * np.pi / self._symmetry
@@ -108,9 +98,6 @@ class Insert(PhasedSkill):
         deep = P.norm(self._hole.position[at] - self._mouth.position[at])
         return -self._found(at)[:, 2] / np.maximum(deep, 1e-9)
 
-    def _held(self, ids: Array, at: Array, said: Array) -> Array:
-        return np.where(self.arm.holds(ids, at, self._object.root), said, _UNSTABLE)
-
     # ------------------------------------------------------------------ phases
 
     def _transport(self, ids: Array, at: Array) -> Array:
@@ -121,29 +108,28 @@ class Insert(PhasedSkill):
         far = P.norm(found[:, :2]) > 0.03
         rise = far & (found[:, 2] < self._above)
         goal[rise, :2], goal[rise, 3:] = self.arm.command[ids[rise], :2], self.arm.command[ids[rise], 3:]
-        self.arm.go(ids, goal, self._speed)
-        return self._held(ids, at, np.where(~far & ~rise, GO_ON, STAY))
+        self.arm.go(ids, goal, self.moves.speed)
+        return self.held(ids, at, np.where(~far & ~rise, GO_ON, STAY))
 
     def _aligning(self, ids: Array, at: Array) -> Array:
         over = np.zeros((len(ids), 3))
         over[:, 2] = self._above
-        self.arm.go(ids, self._goal(at, over), self._speed / 4)
+        self.arm.go(ids, self._goal(at, over), self.moves.speed / 4)
         off = P.norm(self._found(at)[:, :2])
-        still = P.norm(self._object.root.twist[at, :3]) < RESTING / 3
-        ready = (self.steps[ids] >= 10) & (off < self._align) & still
-        return self._held(ids, at, np.where(ready | (self.steps[ids] >= ALIGNING_STEPS), GO_ON, STAY))
+        ready = (self.steps[ids] >= 10) & (off < self._align) & self.slow(at, RESTING / 3)
+        return self.held(ids, at, np.where(ready | (self.steps[ids] >= ALIGNING_STEPS), GO_ON, STAY))
 
     def _down(self, ids: Array, at: Array, aside: Array) -> None:
         """Press down along the axis, with the tip at offsets (n, 2) from it."""
         found = self._found(at)
         below = np.concatenate([aside, (found[:, 2] - 2 * GENTLE)[:, None]], axis=1)
-        self.arm.go(ids, self._goal(at, below), self._lower_speed, GENTLE)
+        self.arm.go(ids, self._goal(at, below), self.moves.lower_speed, GENTLE)
 
     def _lowering(self, ids: Array, at: Array) -> Array:
         self._down(ids, at, np.zeros((len(ids), 2)))
         inside = self._found(at)[:, 2] < -FOUND
         touching = (self.steps[ids] >= 10) & self.arm.touching(ids, at)
-        return self._held(ids, at, np.where(inside | touching, GO_ON, STAY))
+        return self.held(ids, at, np.where(inside | touching, GO_ON, STAY))
 
     def _touch(self, ids: Array, at: Array) -> None:
         self._touched[ids] = self._found(at)[:, 2]
@@ -158,37 +144,18 @@ class Insert(PhasedSkill):
         found = depth < np.minimum(self._touched[ids], 0.0) - FOUND
         inside = depth < -FOUND
         said = np.where(found | inside, GO_ON, np.where(radius > self._reach, _JAMMED, STAY))
-        return self._held(ids, at, said)
+        return self.held(ids, at, said)
 
     def _seating(self, ids: Array, at: Array) -> Array:
         self._down(ids, at, np.zeros((len(ids), 2)))
         deep = self._depth_of(at) >= self._depth
         stuck = (self.steps[ids] >= 40) & self.arm.touching(ids, at)
-        return self._held(ids, at, np.where(deep, GO_ON, np.where(stuck, _JAMMED, STAY)))
-
-    def _open(self, ids: Array, at: Array) -> None:
-        pose = self.arm.tool.pose[at]
-        self.arm.command[ids] = pose  # the press ends with the grip
-        self.arm.go(ids, pose, self._lower_speed)
-        self.arm.closed[ids] = False
-        self._away[ids] = pose + self._back
-
-    def _opening(self, ids: Array, at: Array) -> Array:
-        del at
-        still = (self.steps[ids] >= 5) & (self.arm.finger_speed(ids) < RESTING)
-        return np.where(still | (self.steps[ids] >= OPENING_STEPS), GO_ON, STAY)
-
-    def _retreat(self, ids: Array, at: Array) -> None:
-        del at
-        self.arm.go(ids, self._away[ids], self._speed / 2)
-
-    def _retreating(self, ids: Array, at: Array) -> Array:
-        return np.where(self.arm.arrived(ids, at, 0.01, 0.1), GO_ON, STAY)
+        return self.held(ids, at, np.where(deep, GO_ON, np.where(stuck, _JAMMED, STAY)))
 
     def succeeded(self, env_ids: Array, at: Array) -> Array:
         del env_ids
         return np.where(self._depth_of(at) >= self._depth - 0.1, GO_ON, _LOST)
 
 
-_UNSTABLE, _LOST = OUTCOMES.index(Outcome.UNSTABLE_GRASP), OUTCOMES.index(Outcome.LOST)
+_LOST = OUTCOMES.index(Outcome.LOST)
 _JAMMED = OUTCOMES.index(Outcome.JAMMED)

@@ -14,6 +14,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.joints import RangedJointView
 from anysim.task.scene import Frame, RobotView
 from anysim_skills.arm import Arm
+from anysim_skills.choice import Choice
 from anysim_skills.grasping.grasp import Speed
 
 TURNS = 8
@@ -45,30 +46,24 @@ class Press(PhasedSkill):
         self._clear, self._beyond, self._speed, self._press_speed, self._hold = clear, beyond, speed, press_speed, hold
         n = env.num_envs
         self._turn = np.zeros((n, 4))
-        self._order, self._reachable = np.zeros((n, TURNS), dtype=np.int64), np.zeros(n, dtype=np.int64)
-        self._candidate, self._held = np.zeros((2, n), dtype=np.int64)
+        self._choice, self._held = Choice(n, TURNS), np.zeros(n, dtype=np.int64)
         super().__init__(env, [self.arm])
 
     def make_phases(self) -> Sequence[Phase]:
         return (
             Phase("choose", self._choose, self._chosen, 1),
-            Phase("approach", self._nothing, self._approach, 200),
+            Phase("approach", None, self._approach, 200),
             Phase("press", self._forget, self._press, 120),
-            Phase("retreat", self._nothing, self._retreat, 100),
+            Phase("retreat", None, self._retreat, 100),
         )
 
     def start(self, env_ids: Array) -> None:
         super().start(env_ids)
-        self._candidate[env_ids] = 0
+        self._choice.again(env_ids)
 
     def retry(self, rung: Rung, env: int) -> int | None:
-        if rung in (Rung.CANDIDATE, Rung.RESAMPLE) and self._candidate[env] + 1 < self._reachable[env]:
-            self._candidate[env] += 1
-            return 0
-        return 0 if rung is Rung.BACK_OFF else None
-
-    def _nothing(self, ids: Array, at: Array) -> None:
-        del ids, at
+        again = rung is Rung.BACK_OFF or (rung in (Rung.CANDIDATE, Rung.RESAMPLE) and self._choice.next(env))
+        return 0 if again else None
 
     def _at(self, at: Array, turn: Array, out: float) -> Array:
         """Tool poses (n, 7), `out` [m] above the button along its normal."""
@@ -92,15 +87,12 @@ class Press(PhasedSkill):
             axis=1,
         )
         effort = self.arm.reach(ids, targets.reshape(len(ids), -1, 7))[1].reshape(len(ids), TURNS, 2).max(axis=2)
-        self._order[ids] = np.argsort(effort, axis=1, kind="stable")
-        self._reachable[ids] = np.isfinite(effort).sum(axis=1)
-        chosen = self._order[ids, np.minimum(self._candidate[ids], TURNS - 1)]
-        self._turn[ids] = turns[np.arange(len(ids)), chosen]
+        self._turn[ids] = turns[np.arange(len(ids)), self._choice.choose(ids, effort)]
         self.arm.closed[ids] = True
 
     def _chosen(self, ids: Array, at: Array) -> Array:
         del at
-        return np.where(self._reachable[ids] <= self._candidate[ids], OUTCOMES.index(Outcome.NO_IK), GO_ON)
+        return np.where(self._choice.none_left(ids), OUTCOMES.index(Outcome.NO_IK), GO_ON)
 
     def _approach(self, ids: Array, at: Array) -> Array:
         self.arm.go(ids, self._at(at, self._turn[ids], self._clear), self._speed)

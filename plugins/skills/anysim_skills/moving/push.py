@@ -57,8 +57,8 @@ class Push(PhasedSkill):
         return (
             Phase("rise", self._rise, self._rising, 100),
             Phase("above", self._aim, self._above, 200),
-            Phase("descend", self._nothing, self._descend, 150),
-            Phase("stroke", self._nothing, self._stroke, 400),
+            Phase("descend", None, self._descend, 150),
+            Phase("stroke", None, self._stroke, 400),
             Phase("retreat", self._rise, self._rising, 100),
         )
 
@@ -66,9 +66,6 @@ class Push(PhasedSkill):
         """From behind the object again, where it is now."""
         del env
         return 0 if rung is not Rung.RECOVER else None
-
-    def _nothing(self, ids: Array, at: Array) -> None:
-        del ids, at
 
     def _to_goal(self, at: Array) -> Array:
         """(n, 3) from the object to the goal, horizontally."""
