@@ -11,6 +11,7 @@ import numpy as np
 
 from anysim.conventions import WORLD
 from anysim.geometry.bounds import ground_top
+from anysim.geometry.coal_solids import coal_solid
 from anysim.geometry.convex_parts import IDENTITY, Part, Placed, PlacedPart, Pose, Vec, boxed, pose_of, turned
 from anysim.math import pose as P
 from anysim.model.world import Box, Capsule, Cylinder, HeightFieldShape, MeshShape, Plane, Shape, Sphere, World
@@ -129,23 +130,13 @@ def _transform(coal: Any, pose: Pose) -> Any:
 
 def _geometry(part: Part) -> Any:
     """The shape as Coal has it; meshes are convex hulls, as they are for the engines."""
+    if (solid := coal_solid(part.shape)) is not None:
+        return solid
+    if part.vertices is None:
+        raise ValueError(f"a {type(part.shape).__name__} has no distance to anything")
     import coal  # pyright: ignore[reportMissingImports]  (found by its .pth file)
 
-    shape = part.shape
-    match shape:
-        case Box((x, y, z)):
-            return coal.Box(2 * x, 2 * y, 2 * z)
-        case Sphere(radius):
-            return coal.Sphere(radius)
-        case Capsule(radius, half_length):
-            return coal.Capsule(radius, 2 * half_length)
-        case Cylinder(radius, half_length):
-            return coal.Cylinder(radius, 2 * half_length)
-        case MeshShape():
-            assert part.vertices is not None
-            return _hull(coal, part.vertices)
-        case _:
-            raise ValueError(f"a {type(shape).__name__} has no distance to anything")
+    return _hull(coal, part.vertices)
 
 
 def _hull(coal: Any, vertices: Any) -> Any:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.geometry.coal_solids import coal_solid
 from anysim.math import pose as P
-from anysim.model.world import Box, Capsule, Cylinder, Sphere
 from anysim_banks.gripper import SPARE, Gripper
 from anysim_banks.pieces import Piece, bounding_radius
 
@@ -75,21 +75,13 @@ class CollisionFilter:
 
 
 def _geometry(coal: Any, piece: Piece) -> Any:
-    match piece.shape:
-        case Box((x, y, z)):
-            return coal.Box(2 * x, 2 * y, 2 * z)
-        case Sphere(radius):
-            return coal.Sphere(radius)
-        case Capsule(radius, half):
-            return coal.Capsule(radius, 2 * half)
-        case Cylinder(radius, half):
-            return coal.Cylinder(radius, 2 * half)
-        case _:
-            assert piece.hull is not None  # of a mesh; pieces have no other shapes
-            corners, numbers = np.unique(piece.hull.corners.reshape(-1, 3), axis=0, return_inverse=True)
-            points, faces = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-            for corner in corners:
-                points.append(corner)
-            for a, b, c in numbers.reshape(-1, 3).tolist():
-                faces.append(coal.Triangle(a, b, c))
-            return coal.Convex(points, faces)
+    if (solid := coal_solid(piece.shape)) is not None:
+        return solid
+    assert piece.hull is not None  # of a mesh; pieces have no other shapes
+    corners, numbers = np.unique(piece.hull.corners.reshape(-1, 3), axis=0, return_inverse=True)
+    points, faces = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    for corner in corners:
+        points.append(corner)
+    for a, b, c in numbers.reshape(-1, 3).tolist():
+        faces.append(coal.Triangle(a, b, c))
+    return coal.Convex(points, faces)

@@ -11,11 +11,12 @@ import numpy as np
 
 from anysim.conventions import WORLD, Array
 from anysim.errors import AnysimError, NameLookupError, listing, suggest
+from anysim.geometry.coal_solids import coal_solid
 from anysim.kinematics.pinocchio_model import pinocchio, se3
 from anysim.math import pose as P
 from anysim.model.pairs import may_meet
 from anysim.model.parts import EntityKind
-from anysim.model.shapes import Box, Capsule, Cylinder, HeightFieldShape, MeshShape, Plane, Shape, Sphere
+from anysim.model.shapes import HeightFieldShape, MeshShape, Plane, Shape
 from anysim.model.world import Geom, JointType, World
 from anysim.planning.motion import Attachment, PlanRequest, Scene
 
@@ -233,15 +234,8 @@ def _coal_shape(world: World, shape: Shape, padding: float) -> Any:
     """Coal's shape, grown by the padding."""
     import coal  # pyright: ignore[reportMissingImports]  (found by its .pth file)
 
+    made: Any
     match shape:
-        case Box((x, y, z)):
-            made = coal.Box(2 * x, 2 * y, 2 * z)
-        case Sphere(radius):
-            made = coal.Sphere(radius)
-        case Capsule(radius, half):
-            made = coal.Capsule(radius, 2 * half)
-        case Cylinder(radius, half):
-            made = coal.Cylinder(radius, 2 * half)
         case Plane():
             made = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
         case MeshShape(name, concave):
@@ -250,6 +244,8 @@ def _coal_shape(world: World, shape: Shape, padding: float) -> Any:
         case HeightFieldShape(name):
             field = next(f for f in world.heightfields if f.name == name)
             made = _surface(field.heights, field.size)
+        case _:
+            made = coal_solid(shape)
     if padding and hasattr(made, "setSweptSphereRadius"):
         made.setSweptSphereRadius(padding)
     made.computeLocalAABB()
