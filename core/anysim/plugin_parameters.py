@@ -7,12 +7,13 @@ hands them on to the constructor of its base has the parameters of that one too,
 """
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, create_model
+from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 
+from anysim.errors import SpecError, SpecIssue
 from anysim_schemas.base import Reference
 
 
@@ -52,3 +53,19 @@ def options_model(function: Callable[..., Any]) -> type[BaseModel]:
             fields[name] = (annotation, ... if p.default is inspect.Parameter.empty else p.default)
     config = ConfigDict(extra="forbid", frozen=True)
     return create_model(getattr(function, "__name__", "options"), __config__=config, **fields)
+
+
+def checked(model: type[BaseModel], params: Mapping[str, Any], path: str) -> BaseModel:
+    """The parameters by their model.
+
+    Raises:
+        SpecError: at their keys below `path`, what is wrong with them.
+    """
+    try:
+        return model.model_validate(dict(params))
+    except ValidationError as error:
+        issues = [
+            SpecIssue("", ".".join(map(str, (path, *e["loc"]))), f"{e['msg']}, got {e['input']!r}")
+            for e in error.errors()
+        ]
+        raise SpecError(issues) from None

@@ -1,16 +1,22 @@
 """Episodes of several commands, as `anysim run` collects them."""
 
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
-from anysim_schemas.base import Flag, Positive, Spec
+from anysim_schemas.base import Flag, Integer, Name, NonNegative, Positive, Spec
+from anysim_schemas.errors import KeyFault
+from anysim_schemas.task import PredicateTermSpec
+from anysim_schemas.values import TAG_PREFIX, WordChoice
+
+MOST_COMMANDS = 200
+"""Of an episode, its repetitions and all branches of its choices counted."""
 
 
 class CommandSpec(Spec):
     """One command of an episode: a skill with its parameters beside it, `{do: open, part: cabinet.drawer}`.
 
-    A bare string is a command without parameters.
+    A bare string is a command without parameters. `$name` in a parameter is what `bind` has drawn for the episode.
     """
 
     model_config = ConfigDict(extra="allow", frozen=True)
@@ -22,6 +28,13 @@ class CommandSpec(Spec):
         default=None, description="[s] that the command may take, its retries included; no bound where not given"
     )
     required: Flag = Field(default=True, description="false: the episode goes on without it where it fails")
+    if_: PredicateTermSpec | None = Field(
+        default=None, alias="if", description="passed over where this does not hold when its turn comes"
+    )
+    success: PredicateTermSpec | None = Field(
+        default=None, description="must hold when the skill says that it is done, else the command has failed"
+    )
+    save: Flag = Field(default=True, description="whether what it did is a segment of the recording where it succeeds")
 
     @classmethod
     def from_text(cls, text: str) -> dict[str, Any]:
@@ -34,9 +47,68 @@ class CommandSpec(Spec):
         return dict(self.model_extra or {})
 
 
+class ChooseSpec(Spec):
+    """One of several commands, or lists of commands, drawn in each episode."""
+
+    choose: tuple["Commands", ...] = Field(min_length=1, description="what is drawn from")
+    weights: tuple[NonNegative, ...] | None = Field(
+        default=None, description="how likely each is, in any unit; equal where not given"
+    )
+
+    @model_validator(mode="after")
+    def _weights_match(self) -> "ChooseSpec":
+        if self.weights is not None and (len(self.weights) != len(self.choose) or sum(self.weights) <= 0):
+            raise KeyFault(f"{len(self.choose)} branches need as many weights, with a positive sum", "weights")
+        return self
+
+
+class RepeatSpec(Spec):
+    """The same commands several times over."""
+
+    repeat: Integer = Field(gt=0, le=MOST_COMMANDS, description="how often, at most")
+    body: "Commands" = Field(description="what is repeated")
+    until: PredicateTermSpec | None = Field(
+        default=None, description="looked at before each time: where it holds, the episode goes on after them"
+    )
+
+
+def _form(value: object) -> str:
+    if isinstance(value, list | tuple):
+        return TAG_PREFIX + "list"
+    for form, model in (("choose", ChooseSpec), ("repeat", RepeatSpec)):
+        if isinstance(value, model) or (isinstance(value, dict) and form in value):
+            return TAG_PREFIX + form
+    return TAG_PREFIX + "do"
+
+
+if TYPE_CHECKING:
+    Entry = CommandSpec | ChooseSpec | RepeatSpec
+    Commands = Entry | tuple[Entry, ...]
+else:
+    _ENTRY = (
+        Annotated[CommandSpec, Tag(TAG_PREFIX + "do")]
+        | Annotated[ChooseSpec, Tag(TAG_PREFIX + "choose")]
+        | Annotated[RepeatSpec, Tag(TAG_PREFIX + "repeat")]
+    )
+    Entry = Annotated[_ENTRY, Discriminator(_form)]
+    Commands = Annotated[_ENTRY | Annotated[tuple[Entry, ...], Tag(TAG_PREFIX + "list")], Discriminator(_form)]
+
+ChooseSpec.model_rebuild()
+RepeatSpec.model_rebuild()
+
+
 class CollectSpec(Spec):
     """What `anysim run` does in each episode, in place of the task's expert."""
 
-    commands: tuple[CommandSpec, ...] = Field(
+    bind: dict[Name, WordChoice] = Field(
+        default_factory=dict,
+        description="values by name, drawn anew in each episode: parameters of commands and terms refer to `$name`",
+    )
+    commands: tuple[Entry, ...] = Field(
         min_length=1, description="commands in order, in one world: nothing is reset between them"
+    )
+    on_fail: Literal["stop", "skip", "continue"] = Field(
+        default="stop",
+        description="where a required command fails: stop: the episode has failed; skip: it goes on without it; "
+        "continue: it goes on, and has failed at its end",
     )

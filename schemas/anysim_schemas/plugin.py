@@ -9,11 +9,14 @@ There are two kinds of slots:
 - a spec with the class attribute `plugin_kind`, whose parameters stand beside its own fields: terms and skills. The
   name of the plugin is in the field `term`, or in the one that `plugin_name_field` names.
 
-The kinds are engine, writer, controller, asset, observation, reward, predicate, command, event and skill.
+The kinds are engine, writer, controller, asset, observation, reward, predicate, command, event and skill. A parameter
+of a term or skill may say `$name`: what that can be is checked where it is bound.
 """
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 from pydantic import BaseModel
 
@@ -32,3 +35,16 @@ class UnknownPlugin(LookupError):
 
 OptionsResolver = Callable[[str, str], type[BaseModel] | None]
 """`resolver(kind, name)` returns the model of the options, None if it takes none, or raises UnknownPlugin."""
+
+BOUND = re.compile(r"\$([a-zA-Z][a-zA-Z0-9_]*)")
+"""A value that is bound for an episode, in a parameter of a command or term."""
+
+
+def bound_names(value: object) -> Iterator[str]:
+    """The names of the bound values in a parameter."""
+    if isinstance(value, str):
+        yield from BOUND.findall(value)
+    elif isinstance(value, Mapping | list | tuple):
+        held = cast("Mapping[str, object] | Sequence[object]", value)
+        for item in held.values() if isinstance(held, Mapping) else held:
+            yield from bound_names(item)

@@ -20,7 +20,10 @@ class RecordSpec(Spec):
     markers: Flag = Field(
         default=True, description="goals are marked in the videos; of a camera that is observed, task.images says"
     )
-    keep: Literal["success", "all"] = Field(default="success", description="which trajectories are kept")
+    keep: Literal["success", "segments", "all"] = Field(
+        default="success",
+        description="which trajectories are kept; segments: those too in which a command of `collect` has succeeded",
+    )
     film: Literal["auto", "live", "success"] = Field(
         default="auto",
         description="when the videos are drawn; live: in each step; success: when an episode has ended and is kept, "

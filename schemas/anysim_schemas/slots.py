@@ -14,7 +14,7 @@ from anysim_schemas.errors import AnysimError
 from anysim_schemas.faults import locate
 from anysim_schemas.messages import unknown_key
 from anysim_schemas.nodes import Fault, Node
-from anysim_schemas.plugin import OptionsResolver, PluginSlot, UnknownPlugin
+from anysim_schemas.plugin import OptionsResolver, PluginSlot, UnknownPlugin, bound_names
 from anysim_schemas.shapes import LISTS, Shape, Shapes, fields_by_key, inside, shapes_of_field
 
 
@@ -51,10 +51,13 @@ def _check(slot: _Slot, resolver: OptionsResolver) -> list[Fault]:
             Fault(child.key or child.place, f"{slot.path}.{key}", _takes_nothing(slot, key))
             for key, child in slot.options.value.items()
         ]
+    given, known = slot.options.plain(), fields_by_key(model)
+    bound = {key for key, value in given.items() if slot.beside and key in known and any(bound_names(value))}
     try:
-        model.model_validate(slot.options.plain())
+        model.model_validate({key: value for key, value in given.items() if key not in bound})
     except ValidationError as error:
-        return locate(error, model, slot.options, slot.path, slot.beside)
+        later = {_join(slot.path, key) for key in bound}  # checked with each value that they can have
+        return [f for f in locate(error, model, slot.options, slot.path, slot.beside) if f.path not in later]
     return []
 
 
@@ -66,8 +69,8 @@ def _slots(shapes: Shapes, node: Node, path: str) -> Iterator[_Slot]:
     for shape in shapes:
         if shape.model is not None:
             yield from _slots_of_model(shape.model, node, path)
-        elif isinstance(node.value, list) and _is_list(shape):
-            for index, item in enumerate(node.value):
+        elif _is_list(shape):
+            for index, item in enumerate(node.value if isinstance(node.value, list) else ()):
                 yield from _slots(inside((shape,), index), item, f"{path}.{index}")
         else:
             for key, child in (named_entries(node, (shape,)) or {}).items():

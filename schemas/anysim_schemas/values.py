@@ -16,6 +16,7 @@ from anysim_schemas.base import (
     Density,
     Flag,
     Fraction,
+    Integer,
     Mass,
     Name,
     NonNegative,
@@ -29,6 +30,9 @@ from anysim_schemas.base import (
 from anysim_schemas.errors import KeyFault
 
 T = TypeVar("T")
+
+Word = Annotated[Flag | Integer | Number | str, Field(union_mode="left_to_right")]
+"""A single value of any kind, as it is written."""
 
 KINDS = ("range", "log_uniform", "choice", "normal")
 """The keys that make a mapping a value that is drawn."""
@@ -53,7 +57,7 @@ def _check_order(low: object, high: object, what: str) -> None:
 _LABELS: tuple[tuple[Any, str], ...] = (
     (Number, "number"), (Positive, "positive"), (NonNegative, "non_negative"), (Fraction, "fraction"),
     (Bounce, "bounce"), (Scale, "scale"), (Mass, "mass"), (Density, "density"),
-    (Vec3, "vector"), (Color, "color"), (Whole, "whole"), (Flag, "flag"), (Degrees, "degrees"),
+    (Vec3, "vector"), (Color, "color"), (Whole, "whole"), (Flag, "flag"), (Degrees, "degrees"), (Word, "word"),
 )  # fmt: skip
 
 
@@ -209,6 +213,7 @@ else:
             ]
 
 
+WordChoice = ChoiceOf[Word]
 FloatValue = Value[Number]
 PositiveValue = Value[Positive]
 NonNegativeValue = Value[NonNegative]

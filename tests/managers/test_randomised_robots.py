@@ -329,6 +329,13 @@ class Tape:
     def gave_up(self, env_ids: np.ndarray) -> np.ndarray:
         return np.zeros(len(env_ids), dtype=bool)
 
+    def solved(self, env_ids: np.ndarray) -> np.ndarray:
+        return np.zeros(len(env_ids), dtype=bool)
+
+    def ended(self, env: int, success: bool) -> dict[str, Any]:
+        del env, success
+        return {}
+
     def describe(self, env: int) -> dict[str, Any]:
         del env
         return {}

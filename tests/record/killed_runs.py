@@ -59,6 +59,15 @@ class Still:
         """Never."""
         return np.zeros(len(env_ids), dtype=bool)
 
+    def solved(self, env_ids: np.ndarray) -> np.ndarray:
+        """Nothing to say."""
+        return np.zeros(len(env_ids), dtype=bool)
+
+    def ended(self, env: int, success: bool) -> dict[str, Any]:
+        """Nothing to say."""
+        del env, success
+        return {}
+
     def describe(self, env: int) -> dict[str, Any]:
         """Nothing to say."""
         return {}

@@ -54,8 +54,16 @@ class Policy(Protocol):
         """(n,) bool: it is of no use to go on in these envs."""
         ...
 
+    def solved(self, env_ids: Array) -> Array:
+        """(n,) bool: all that was to be done is done and the task's success holds, though the episode may go on."""
+        ...
+
     def describe(self, env: int) -> dict[str, Any]:
         """Plain data about what an env is doing."""
+        ...
+
+    def ended(self, env: int, success: bool) -> dict[str, Any]:
+        """Plain data about an episode that has ended; under `segments` the parts of it that hold by themselves."""
         ...
 
 
@@ -127,7 +135,7 @@ class Collector:
             self._release()
             raise
         self.times = CollectTimes(env)
-        self._capture, self._instruction = env.capture, task.description
+        self._capture, self._instructions = env.capture, [task.description] * env.num_envs
         self._share = np.array([len(range(i, episodes, env.num_envs)) for i in range(env.num_envs)])
         self._episode = np.full(env.num_envs, -1)
         self._total = np.zeros(env.num_envs)
@@ -154,9 +162,11 @@ class Collector:
                     result = env.step(action, None if active.all() else active)
                 times.steps += len(ids)
                 self._append(ids, result.reward, result.status)
-                over = ids[(result.status[ids] != Status.RUNNING) | self.policy.gave_up(ids)]
-                for i in over:
-                    yield from self._finish(int(i), str(result.status[i]))
+                running, solved = result.status[ids] == Status.RUNNING, self.policy.solved(ids)
+                over = ids[~running | solved | self.policy.gave_up(ids)]
+                solved = set(ids[running & solved].tolist())
+                for i in over.tolist():
+                    yield from self._finish(i, str(Status.SUCCESS if i in solved else result.status[i]))
                 yield from self._settled()
                 yield from self._start(over)
             with times.record:
@@ -206,6 +216,7 @@ class Collector:
         with self.times.record:
             for i in map(int, fresh):
                 later = partial(draw_recorded, self.env, i, int(seen[i])) if self._film == "success" else None
+                self._instructions[i] = self.env.instruction(i)
                 self.recorder.start(self._header(i), later)
         self._append(fresh, None, self.env.status)
 
@@ -227,7 +238,7 @@ class Collector:
             episode_seed=int(env.streams.episode_seed[i]),
             drawn=env.streams.draws[i],
             overridden=env.streams.overridden[i],
-            instruction=self._instruction,
+            instruction=self._instructions[i],
             cameras={name: camera_of(env, i, name) for name in env.spec.record.cameras},
         )
 
@@ -252,10 +263,11 @@ class Collector:
             self.recorder.discard(i)
             return
         steps, total = int(env.scene.elapsed[i]), float(self._total[i])
-        outcome = self.policy.describe(i)
+        outcome = self.policy.ended(i, status == Status.SUCCESS)
         if status == Status.RUNNING:  # the policy gave up
             status = str(Status.FAILED)
-        keep = env.spec.record.keep == "all" or status == Status.SUCCESS
+        kept = env.spec.record.keep
+        keep = kept == "all" or status == Status.SUCCESS or (kept == "segments" and bool(outcome.get("segments")))
         seed = int(env.streams.episode_seed[i])
         result = EpisodeResult(
             i, int(self._episode[i]), seed, status, steps, total, outcome, reruns=int(self._reruns[i]), lost=lost
@@ -309,7 +321,7 @@ class Collector:
                     status=status[ids].tolist(),
                     obs={group: values[ids] for group, values in env.obs.items() if not group.startswith("images/")},
                     annotations=[self.policy.describe(i) for i in numbers],
-                    language=[self._instruction] * len(ids),
+                    language=[self._instructions[i] for i in numbers],
                     images=images,
                 ),
             )

@@ -8,13 +8,11 @@ import numpy as np
 from anysim import registry
 from anysim.conventions import Array
 from anysim.errors import AnysimError, SpecError, SpecIssue, TaskError
-from anysim.plugin_parameters import options_model, parameters, reference_kind
+from anysim.plugin_parameters import checked, options_model, parameters, reference_kind
 from anysim.skills.base import OUTCOMES, Outcome, Skill
-from anysim.skills.phases import MovingSkill
-from anysim.skills.sequence import SkillSequence
+from anysim.skills.commands import CommandSequence
 from anysim.task.env import TaskEnv
 from anysim.task.term_registry import resolve
-from anysim_schemas.collect import CollectSpec
 
 
 def bind_skill(name: str, params: Mapping[str, Any], env: TaskEnv, path: str) -> Skill:
@@ -24,7 +22,7 @@ def bind_skill(name: str, params: Mapping[str, Any], env: TaskEnv, path: str) ->
         SpecError: at `path.<parameter>`, a name that does not exist in this world.
     """
     skill_class: type[Skill] = registry.load("skills", name)
-    values = options_model(skill_class).model_validate(dict(params))
+    values = checked(options_model(skill_class), params, path)
     keywords: dict[str, Any] = {}
     for key, parameter in parameters(skill_class).items():
         value, handle = getattr(values, key), reference_kind(parameter.annotation)
@@ -49,32 +47,10 @@ def bind_expert(env: TaskEnv) -> tuple[str, Skill]:
     """
     task, collect = env.spec.task, env.spec.collect
     if collect is not None:
-        return "commands", _bind_commands(collect, env)
+        return "commands", CommandSequence(collect, env, bind_skill)
     if task is None or task.expert is None:
         raise TaskError(f"task '{env.name}' has no expert; add task.expert, or drive the env with a policy of your own")
     return task.expert.skill, bind_skill(task.expert.skill, task.expert.params, env, "task.expert")
-
-
-def _bind_commands(collect: CollectSpec, env: TaskEnv) -> SkillSequence:
-    members: dict[str, MovingSkill] = {}
-    optional: list[str] = []
-    limits: dict[str, int] = {}
-    for number, command in enumerate(collect.commands):
-        path = f"collect.commands.{number}"
-        skill = bind_skill(command.do, command.params, env, path)
-        if not isinstance(skill, MovingSkill):
-            words = (
-                f"the skill '{command.do}' drives the robot by itself and can only be a task's expert; one that is "
-                "derived from anysim.skills.phases.MovingSkill can be a command"
-            )
-            raise SpecError([SpecIssue("", f"{path}.do", words)])
-        name = f"{number + 1} {command.do}"
-        members[name] = skill
-        if not command.required:
-            optional.append(name)
-        if command.timeout is not None:
-            limits[name] = max(1, round(command.timeout / env.engine.world.physics.control_dt))
-    return SkillSequence(env, members, optional=optional, limits=limits)
 
 
 class SkillPolicy:
@@ -106,6 +82,19 @@ class SkillPolicy:
         """(n,) bool: the skill ended in these envs with a failure."""
         outcome = self.skill.outcome[env_ids]
         return (outcome != OUTCOMES.index(Outcome.RUNNING)) & (outcome != OUTCOMES.index(Outcome.OK))
+
+    def solved(self, env_ids: Array) -> Array:
+        """(n,) bool: the commands of `collect` are all done in these envs, and the task's success holds."""
+        if not isinstance(self.skill, CommandSequence):
+            return np.zeros(len(env_ids), dtype=bool)
+        return (self.skill.outcome[env_ids] == OUTCOMES.index(Outcome.OK)) & self.env.info["is_success"][env_ids]
+
+    def ended(self, env: int, success: bool) -> dict[str, object]:
+        """What is to be said of an env whose episode has ended."""
+        said = self.describe(env)
+        return (
+            said | {"segments": self.skill.segments(env, success)} if isinstance(self.skill, CommandSequence) else said
+        )
 
     def describe(self, env: int) -> dict[str, object]:
         """What an env is doing, for records and tables."""

@@ -75,20 +75,17 @@ class SkillSequence(MovingSkill):
                 self._go(np.array([env]), to)
             elif number in self._optional:
                 self._past[env] += (*member.history(env), (str(why), f"without {self.phases[number]}"))
-                self._go_on(np.array([env]), number)
+                self._go(np.array([env]), number + 1)
             else:
                 self.outcome[env] = OUTCOMES.index(why)
-        self._go_on(ids[done], number)
-
-    def _go_on(self, ids: Array, number: int) -> None:
-        if number + 1 < len(self.members):
-            self._go(ids, number + 1)
-        else:
-            self.outcome[ids] = GO_ON
+        self._go(ids[done], number + 1)
 
     def _go(self, ids: Array, number: int) -> None:
-        self.phase[ids], self._steps[ids] = number, 0
-        if len(ids):
+        """Begin with a member; after the last one the sequence has succeeded."""
+        if number == len(self.members):
+            self.outcome[ids] = GO_ON
+        elif len(ids):
+            self.phase[ids], self._steps[ids] = number, 0
             self.members[number].start(ids)
 
     def history(self, env: int) -> tuple[tuple[str, str], ...]:

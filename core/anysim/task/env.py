@@ -18,6 +18,7 @@ from anysim.managers.base import RESET_ORDER, Manager
 from anysim.managers.camera import CaptureManager
 from anysim.managers.terrain import TerrainManager
 from anysim.math import arrays
+from anysim.task.bindings import Bindings
 from anysim.task.contract import FAILED, RUNNING, STATUS_NAMES, SUCCESS, TRUNCATED, Obs, StepResult
 from anysim.task.overrides import Counterfactuals
 from anysim.task.scene import SceneView
@@ -66,7 +67,8 @@ class TaskEnv:
         self.action_dim = self.actions.dim
         self.scene = SceneView(engine, self._episodes, self._manager(TerrainManager))
         self.scene.action_columns = {name: slice(s.start, s.stop) for name, s in self.action_spaces.items()}
-        self.mdp = Mdp(spec.task, self.scene, self.streams, located)
+        self.bindings = Bindings(spec.collect, self.num_envs, self.streams)
+        self.mdp = Mdp(spec.task, self.scene, self.streams, located, self.bindings)
         self.capture.goals = self.scene.goals
         self.scene.last_action = np.zeros((self.num_envs, self.action_dim))
         self.counterfactuals = Counterfactuals(self.managers, self.mdp, engine, self.streams)
@@ -120,6 +122,10 @@ class TaskEnv:
     def running(self) -> Array:
         """(N,) bool: reset, and not ended."""
         return self._code == RUNNING
+
+    def instruction(self, env: int) -> str:
+        """The task in words, as it is in an env's episode."""
+        return self.bindings.said(self._task.description, env)
 
     # ------------------------------------------------------------------ reset
 

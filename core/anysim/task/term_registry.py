@@ -7,11 +7,10 @@ from typing import Any
 
 from anysim import registry
 from anysim.errors import AnysimError, PluginError, SpecError, SpecIssue, listing, suggest
-from anysim.plugin_parameters import options_model, parameters, reference_kind
+from anysim.plugin_parameters import checked, options_model, parameters, reference_kind
 from anysim.task.joints import JointView, RangedJointView
 from anysim.task.scene import Frame, ObjectView, RobotView, SceneView
 from anysim.task.slot_frames import CategoryView
-from anysim_schemas.task import TermSpec
 
 BUILTIN = "anysim"
 
@@ -48,16 +47,16 @@ def term_names(library: str) -> list[str]:
     return [f"{kind} {name}" for kind in tables for name in sorted(_functions(library, kind))]
 
 
-def bind(kind: str, spec: TermSpec, scene: SceneView, path: str) -> Callable[..., Any]:
+def bind(kind: str, term: str, params: Mapping[str, Any], scene: SceneView, path: str) -> Callable[..., Any]:
     """The term as a function of its positional arguments after `scene`, with parameters checked and names resolved.
 
     Raises:
-        SpecError: at `path`, a parameter names nothing in this world.
+        SpecError: at `path`, a parameter is wrong, or names nothing in this world.
     """
-    function = find(kind, spec.term)
-    with registry.Blame(f"{path}: the signature of the term '{spec.term}'", registry.origin(function)):
+    function = find(kind, term)
+    with registry.Blame(f"{path}: the signature of the term '{term}'", registry.origin(function)):
         model = options_model(function)
-    values = model.model_validate(spec.params)
+    values = checked(model, params, path)
     keywords: dict[str, Any] = {}
     for name, parameter in parameters(function).items():
         value = getattr(values, name)

@@ -15,10 +15,11 @@ from anysim.managers.base import Overridable
 from anysim.plugin_parameters import options_model
 from anysim.randomization.draw import draw_rows, is_random
 from anysim.randomization.streams import Streams
+from anysim.task.bindings import Bindings, bind_term
 from anysim.task.contract import Obs
 from anysim.task.observation_noise import Sensed
 from anysim.task.scene import SceneView
-from anysim.task.term_registry import bind, find
+from anysim.task.term_registry import find
 from anysim_schemas.task import EventTermSpec, TaskSpec
 
 Term = Callable[..., Any]
@@ -43,9 +44,17 @@ def _values(terms: Sequence[BoundTerm]) -> list[Any]:
 class Mdp:
     """Evaluates a TaskSpec on a SceneView. Holds one slice of state: the goals, and how long success has held."""
 
-    def __init__(self, spec: TaskSpec, scene: SceneView, streams: Streams, located: Callable[[str], str] = str) -> None:
+    def __init__(
+        self,
+        spec: TaskSpec,
+        scene: SceneView,
+        streams: Streams,
+        located: Callable[[str], str] = str,
+        bindings: Bindings | None = None,
+    ) -> None:
         """`located` puts the place of its key before a dotted path."""
         self.spec, self.scene, self.streams = spec, scene, streams
+        self.bindings = Bindings(None, scene.engine.num_envs, streams) if bindings is None else bindings
         n = scene.engine.num_envs
         for name in spec.command:
             scene.goals[name] = np.tile(np.array([0, 0, 0, 0, 0, 0, 1.0]), (n, 1))
@@ -60,7 +69,7 @@ class Mdp:
             for name, term in specs.items():
                 path = f"task.{section}.{name}"
                 try:
-                    call = bind(kind, term, scene, path)
+                    call = bind_term(kind, term, scene, path, self.bindings)
                     who = f"{located(path)}: the term '{term.term}'"
                     bound[name] = BoundTerm(call, registry.Blame(who, registry.origin(call), prefix=True))
                 except SpecError as error:
@@ -101,8 +110,9 @@ class Mdp:
         return [call for terms in self._groups.values() for call, _ in terms if isinstance(call, Sensed)]
 
     def reset(self, env_ids: Array) -> None:
-        """Reset events, then new goals; the scene must be looking at these rows."""
+        """New bindings, reset events, then new goals; the scene must be looking at these rows."""
         self.held[env_ids] = 0
+        self.bindings.draw(env_ids)
         self._run_events("reset", 0)
         for name, term in self._commands.items():
             goals = self.scene.goals[name]
@@ -190,7 +200,8 @@ class Mdp:
         for kind, section, terms in (("command", "command", self.spec.command), ("event", "events", self.spec.events)):
             for name, term in terms.items():
                 midway = isinstance(term, EventTermSpec) and term.when == "step"
-                values = options_model(find(kind, term.term)).model_validate(term.params)
+                params = self.bindings.variants(term.params, f"task.{section}.{name}").params[0]
+                values = options_model(find(kind, term.term)).model_validate(params)
                 entries += [
                     Overridable(f"task.{section}.{name}.{key}", values, key, midway=midway)
                     for key in type(values).model_fields
@@ -201,6 +212,7 @@ class Mdp:
     def snapshot(self, env_ids: Array) -> dict[str, Array]:
         """Copies of the goals and counters."""
         data = {"held": self.held[env_ids]} | {f"goal.{name}": g[env_ids] for name, g in self.scene.goals.items()}
+        data |= self.bindings.snapshot(env_ids)
         for term in self._altered:
             data |= term.snapshot(env_ids)
         return data
@@ -208,12 +220,14 @@ class Mdp:
     def refuse_rows(self, data: Mapping[str, Array]) -> None:
         """Raise SnapshotError for values that no env can have."""
         refuse_range("held", data["held"], 0, self.spec.horizon)
+        self.bindings.refuse_rows(data)
         for term in self._altered:
             term.refuse_rows(data)
 
     def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
         """Write what `snapshot` returned."""
         self.held[env_ids] = data["held"]
+        self.bindings.restore(env_ids, data)
         for name, goal in self.scene.goals.items():
             goal[env_ids] = data[f"goal.{name}"]
         self.scene.moment += 1

@@ -15,6 +15,11 @@ EXPERT = (
     "world.robots.panda.actions={arm: joint_position, eef: gripper_binary}",
 )
 COMMANDS = (*EXPERT[1:], "collect={commands: [{do: pick, object: red, goal: goal}]}")
+LATE = "collect.commands.0.timeout=0.02"
+DRAWN = "collect={bind: {x: {choice: [ball]}}, commands: [{do: pick, object: $x, goal: goal}]}"
+CHOICE = "collect={commands: [{choose: [{do: pick, object: red, goal: goal}, release], weights: [1, 0]}]}"
+RELEASE = (*EXPERT[1:], "task.horizon=300", "collect={commands: [release, {do: reach, goal: goal}]}")
+REPEATED = "collect={commands: [{repeat: 1, body: release}, {do: reach, goal: goal}]}"
 
 ROWS: dict[str, Row] = {
     "RunSpec.engine": row("engine=mujoco", seen="engine"),
@@ -57,11 +62,25 @@ ROWS: dict[str, Row] = {
     "TaskSpec.expert": row("task.expert=null", given=EXPERT, seen="expert", error="has no expert"),
     "RunSpec.collect": row("collect=null", given=COMMANDS, seen="expert", error="has no expert"),
     "CollectSpec.commands": row("collect.commands=[{do: reach, goal: goal}]", given=COMMANDS, seen="expert"),
+    "CollectSpec.bind": row("collect.bind.x.choice=[red]", given=(*COMMANDS, DRAWN), seen="episode"),
+    "CollectSpec.on_fail": row("collect.on_fail=skip", given=(*COMMANDS, LATE), seen="expert"),
+    "CommandSpec.if_": row(
+        "collect.commands.0.if={term: below, frame: red, height: 0.0}", given=COMMANDS, seen="expert"
+    ),
+    "CommandSpec.success": row(
+        "collect.commands.0.success={term: below, frame: red, height: 0.0}", given=RELEASE, seen="expert"
+    ),
+    "CommandSpec.save": row("collect.commands.0.save=false", given=RELEASE, seen="expert"),
+    "ChooseSpec.choose": row("collect.commands.0.choose=[release, release]", given=(*COMMANDS, CHOICE), seen="expert"),
+    "ChooseSpec.weights": row("collect.commands.0.weights=[0, 1]", given=(*COMMANDS, CHOICE), seen="expert"),
+    "RepeatSpec.repeat": row("collect.commands.0.repeat=2", given=(*RELEASE, REPEATED), seen="expert"),
+    "RepeatSpec.body": row("collect.commands.0.body=[]", given=(*RELEASE, REPEATED), seen="expert"),
+    "RepeatSpec.until": row(
+        "collect.commands.0.until={term: below, frame: red, height: 9.0}", given=(*RELEASE, REPEATED), seen="expert"
+    ),
     "CommandSpec.do": row("collect.commands.0.do=bring", given=COMMANDS, seen="expert"),
     "CommandSpec.timeout": row("collect.commands.0.timeout=0.02", given=COMMANDS, seen="expert"),
-    "CommandSpec.required": row(
-        "collect.commands.0.required=false", given=(*COMMANDS, "collect.commands.0.timeout=0.02"), seen="expert"
-    ),
+    "CommandSpec.required": row("collect.commands.0.required=false", given=(*COMMANDS, LATE), seen="expert"),
     "TermSpec.term": row("task.rewards.close.term=tanh_distance", seen="episode"),
     "ObservationTermSpec.noise": row(
         "task.observations.policy=[{term: frame_pose, frame: red, noise: {normal: {mean: 0, std: 0.1}}}]",
