@@ -13,10 +13,11 @@ import sys
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
-from math import sqrt
 from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
+
+from anysim.math.statistics import wilson
 
 PAGE = Path(__file__).parents[1] / "docs" / "collect.md"
 ENGINES = ("mujoco", "pybullet", "sapien")
@@ -34,14 +35,6 @@ class Row(NamedTuple):
     retried: int
     steps: float
     cpu_s: float
-
-
-def wilson(successes: int, attempts: int) -> tuple[float, float]:
-    """The 95 % interval of a share (Wilson 1927)."""
-    z = 1.959964
-    share, squared = successes / attempts, z * z / attempts
-    middle, half = share + squared / 2, z * sqrt(share * (1 - share) / attempts + squared / (4 * attempts))
-    return (middle - half) / (1 + squared), (middle + half) / (1 + squared)
 
 
 def measured(task: str, engine: str, episodes: int, seed: int) -> Row:

@@ -25,6 +25,7 @@ WORDS = {
     "assets": "cabinets, lids, valves, wheeled bases, a gripper, a flying camera, rooms, ground, patterns",
     "banks": "`anysim bank`: grasps sampled on assets and tried in physics",
     "bench": "`anysim bench`: what anysim costs on top of an engine",
+    "collect": "`anysim run`: episodes by scripted solutions, and reports of them",
     "control": "tools by inverse kinematics and operational space, vehicles, hands, cameras",
     "film": "`anysim render`: videos of recorded episodes, with other sizes, looks or engines",
     "kinematics": "mechanics of robots (Pinocchio), for controllers of your own",

@@ -59,7 +59,9 @@ class Installed:
 @pytest.fixture(scope="module")
 def here(environment, program, external_wheels, tmp_path_factory) -> Installed:
     """anysim, its recorder and the stranger: no backend of ours."""
-    python = environment("anysim", "anysim-mcap", others=(external_wheels["anysim-ballistic"],), tools=("pytest",))
+    python = environment(
+        "anysim", "anysim-collect", "anysim-mcap", others=(external_wheels["anysim-ballistic"],), tools=("pytest",)
+    )
     folder = tmp_path_factory.mktemp("work")
     (folder / "world.yaml").write_text(WORLD)
     return Installed(python, program, folder)
@@ -68,7 +70,9 @@ def here(environment, program, external_wheels, tmp_path_factory) -> Installed:
 @pytest.fixture(scope="module")
 def crowded(environment, program, external_wheels, tmp_path_factory) -> Installed:
     """The same, with a package whose engines do not work."""
-    python = environment("anysim", "anysim-mcap", others=tuple(external_wheels.values()), tools=("pytest",))
+    python = environment(
+        "anysim", "anysim-collect", "anysim-mcap", others=tuple(external_wheels.values()), tools=("pytest",)
+    )
     folder = tmp_path_factory.mktemp("crowded")
     (folder / "world.yaml").write_text(WORLD)
     return Installed(python, program, folder)

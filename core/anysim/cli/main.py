@@ -8,7 +8,7 @@ from typing import Any
 import typer
 
 from anysim import __version__
-from anysim.cli import audit, check, doctor, explain, listing, replay, run, schema, snapshot
+from anysim.cli import audit, check, doctor, explain, listing, replay, schema, snapshot
 from anysim.cli.options import BROKE, CommandEnded, Commands
 
 EXIT_CODES = """Exit codes: 0 done; 1 it ran, and the answer is no (a replay that differs, a file with faults, too few
@@ -26,7 +26,6 @@ app = typer.Typer(
     rich_markup_mode=None,  # plain help: importing what draws boxes takes as long as everything else together
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("run")(run.run)
 app.command("replay")(replay.replay)
 app.command("check")(check.check)
 app.command("list")(listing.list_)

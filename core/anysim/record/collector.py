@@ -7,7 +7,7 @@ does not depend on how fast the others are or how many there are.
 import sys
 import weakref
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -117,9 +117,21 @@ def run_header(env: TaskEnv, seed: int) -> RunHeader:
 class Collector:
     """Runs episodes and records them. Use it once: `for result in collector.run(): ...`."""
 
-    def __init__(self, env: TaskEnv, policy: Policy, out: Path, episodes: int, seed: int) -> None:
-        """Run `episodes` in all, shared out as evenly as can be: env i runs one of every N."""
+    def __init__(
+        self,
+        env: TaskEnv,
+        policy: Policy,
+        out: Path,
+        episodes: int,
+        seed: int,
+        enough: Callable[[], bool] | None = None,
+    ) -> None:
+        """Run `episodes` in all, shared out as evenly as can be: env i runs one of every N.
+
+        Once `enough` says so no episode is begun any more; those that are under way are run to their ends.
+        """
         self.env, self.policy, self.seed = env, policy, seed
+        self._enough = enough
         record, task = env.spec.record, env.spec.task
         assert task is not None
         self._film = film_mode(env.spec)
@@ -202,7 +214,7 @@ class Collector:
                 self.env.streams.skip(i, 1)
                 yield self._resumed(i, int(self._episode[i]))
                 self._episode[i] += 1
-            begin[i] = self._episode[i] < self._share[i]
+            begin[i] = self._episode[i] < self._share[i] and not (self._enough is not None and self._enough())
         self.env.retire(ids[~begin[ids]])
         if not begin.any():
             return

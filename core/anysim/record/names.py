@@ -1,9 +1,12 @@
 """Names inside a run directory, and which names a manifest may mention."""
 
+import hashlib
+import json
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 from anysim.errors import RecordError
 
@@ -18,6 +21,12 @@ _TRAJECTORY = re.compile(r"env_(\d{4,9})_episode_(\d{4,9})")
 _ATTEMPT = re.compile(rf"{_TRAJECTORY.pattern}\.(\d+-\d+)")
 _OWNER_LOCK = re.compile(r"(\d+-\d+)\.lock")
 _FILE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,127}")
+
+
+def run_name(task: str, engine: str, spec: Mapping[str, Any], seed: int) -> str:
+    """A directory for what is run: the same spec and seed give the same name, any other spec another one."""
+    digest = hashlib.sha256(json.dumps([spec, seed]).encode()).hexdigest()
+    return f"{task}-{engine}-seed{seed}-{digest[:8]}"
 
 
 def trajectory_name(env: int, episode: int) -> str:

@@ -10,11 +10,11 @@ import pytest
 from lxml import etree
 
 from anysim.errors import AnysimError
+from anysim.math.statistics import wilson
 from anysim_parity.html import page
 from anysim_parity.judge import nearest
 from anysim_parity.report import Comparison, as_data
 from anysim_parity.result import Gap, Layer, Measure, Picture, Plot, Series
-from anysim_parity.statistics import wilson
 from anysim_parity.verdict import ANALYTIC, declares, disagreements, findings
 from anysim_parity.write import write
 

@@ -1,0 +1,1 @@
+"""Collecting: many episodes of one or several tasks, and what became of them."""

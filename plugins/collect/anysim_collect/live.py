@@ -1,0 +1,72 @@
+"""Progress of a collection: a table on a terminal, a line for each episode in a pipe."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, Protocol
+
+import typer
+
+from anysim.cli.output import interactive
+from anysim.math.statistics import wilson
+from anysim.record.collector import EpisodeResult
+from anysim_collect.tally import Tally, ordered
+
+REFRESH = 4
+"""[Hz] of the table."""
+
+
+class Show(Protocol):
+    """Called once an episode has ended, and counted."""
+
+    def __call__(self, result: EpisodeResult) -> None: ...
+
+
+def line(result: EpisodeResult) -> str:
+    """One episode in words."""
+    kept = f" -> {result.path}" if result.path else ""
+    return f"env {result.env} episode {result.episode}: {result.status} in {result.steps} steps{kept}"
+
+
+@contextmanager
+def showing(name: str, total: int | None, tally: Tally, quiet: bool) -> Iterator[Show]:
+    """Show how `tally` grows towards `total` episodes; None where hours or bytes end the collection."""
+    if quiet or not interactive():
+        yield lambda result: None if quiet else typer.echo(line(result))
+        return
+    from rich.live import Live
+
+    began, cpu = time.perf_counter(), time.process_time()
+
+    def table() -> Any:
+        return _table(name, total, tally, time.perf_counter() - began, time.process_time() - cpu)
+
+    with Live(get_renderable=table, refresh_per_second=REFRESH, transient=True):
+        yield lambda result: None
+
+
+def _table(name: str, total: int | None, tally: Tally, wall: float, cpu: float) -> Any:
+    from rich.progress_bar import ProgressBar
+    from rich.table import Table
+
+    grid = Table.grid(padding=(0, 2))
+    new = tally.attempts - tally.resumed
+    done = tally.attempts + tally.lost
+    count = f"{done:,}" + (f" of {total:,}" if total is not None else "")
+    grid.add_row(name, ProgressBar(total, done, width=40) if total is not None else "", f"{count} episodes")
+    left = f", {_clock(wall * (total - done) / new)} left" if total is not None and new else ""
+    grid.add_row("time", _clock(wall) + left, f"{60.0 * new / wall:,.1f} episodes a minute" if wall else "")
+    low, high = wilson(tally.successes, tally.attempts)
+    share = f"{tally.successes / tally.attempts:.1%} ({low:.0%} to {high:.0%})" if tally.attempts else "none yet"
+    grid.add_row("success", share, f"{tally.kept:,} kept, {tally.kept_bytes / 1e6:,.1f} MB")
+    fresh = tally.kept - tally.resumed
+    grid.add_row("cost", f"{cpu / fresh:.2f} CPU seconds an episode kept" if fresh else "", "")
+    worst = ", ".join(f"{count} {why}" for why, count in list(ordered(tally.failures).items())[:4])
+    grid.add_row("failures", worst or "none", f"{tally.faults} faults" if tally.faults else "")
+    return grid
+
+
+def _clock(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}"

@@ -1,0 +1,73 @@
+"""Reports: `report.json` and `report.html` in the directory of a run, whole or not at all."""
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from anysim.errors import RecordError
+from anysim_collect.tally import Tally
+
+FORMAT = "anysim-report-1"
+REPORT_FILE, PAGE_FILE = "report.json", "report.html"
+
+
+def report_of(
+    run: dict[str, Any], tally: Tally, parts: dict[str, float], cpu_s: float, planning: dict[str, Any] | None = None
+) -> dict[str, Any]:
+    """A report as plain data.
+
+    Args:
+        run: what was run: task, engine, seed, envs.
+        tally: what became of its episodes.
+        parts: wall seconds by part; resumed episodes took none.
+        cpu_s: CPU seconds of the process, planning apart.
+        planning: what the planner's workers counted.
+    """
+    fresh = tally.kept - tally.resumed
+    return {
+        "format": FORMAT,
+        **run,
+        **tally.to_dict(),
+        "cpu_s": cpu_s,
+        "cpu_s_per_kept": cpu_s / fresh if fresh > 0 else None,
+        "wall_s": parts,
+        "planning": planning or {},
+    }
+
+
+def write_report(out: Path, report: dict[str, Any]) -> Path:
+    """Write both files; returns the page.
+
+    Raises:
+        RecordError: they cannot be written.
+    """
+    from anysim_collect.page import page
+
+    texts = {REPORT_FILE: json.dumps(report, indent=2, sort_keys=True) + "\n", PAGE_FILE: page(report)}
+    try:
+        for name, text in texts.items():
+            aside = out / f".{name}.{os.getpid()}"
+            aside.write_text(text, encoding="utf-8")
+            aside.replace(out / name)
+    except OSError as error:
+        raise RecordError(f"cannot write the report of {out}: {error}; the trajectories are whole") from error
+    return out / PAGE_FILE
+
+
+def read_report(out: Path) -> dict[str, Any]:
+    """The report of a run.
+
+    Raises:
+        RecordError: there is none, or it is none of ours.
+    """
+    path = out / REPORT_FILE
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise RecordError(f"{path} is not there; `anysim run` writes it when a run has ended") from None
+    except (OSError, ValueError) as error:
+        raise RecordError(f"{path} cannot be read: {error}; run the same command again to write it anew") from error
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise RecordError(f"{path} is no report of the format {FORMAT}; run the same command again to write it anew")
+    return data

@@ -1,0 +1,178 @@
+"""`anysim run` with several tasks and limits, and what its reports say."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from anysim.errors import RecordError, TaskError
+from anysim.record.collector import EpisodeResult
+from anysim_collect import cli, mixture as mixtures
+from anysim_collect.mixture import Limits, Part, mixture, parse_bytes, shared_out
+from anysim_collect.page import page
+from anysim_collect.report import read_report, report_of, write_report
+from anysim_collect.tally import Tally
+
+WORLDS = Path(__file__).parents[1] / "skills/worlds"
+DRAWN = str(WORLDS / "drawn_commands.yaml")
+app = typer.Typer()
+app.command("run")(cli.run)
+app.command("report")(cli.report)
+RUN = {"task": "t", "engine": "e", "engine_version": "e 1", "num_envs": 2, "seed": 0}
+
+
+def anysim(*words: str) -> Any:
+    return CliRunner().invoke(app, list(words))
+
+
+def test_a_mixture_is_tasks_with_weights() -> None:
+    assert mixture(["pick_cube=3", "push_cube"]) == [Part("pick_cube", 0.75), Part("push_cube", 0.25)]
+    for words, said in ((["a=0"], "'a=0'"), (["a=much"], "'a=much'"), (["=2"], "'=2'"), (["a", "a=2"], "named twice")):
+        with pytest.raises(TaskError, match=said):
+            mixture(words)
+
+
+@pytest.mark.parametrize(
+    ("weights", "episodes", "counts"),
+    [((3, 1), 64, [48, 16]), ((1, 1, 1), 10, [4, 3, 3]), ((9, 1), 1, [1, 0]), ((1, 1), 3, [2, 1])],
+)
+def test_episodes_are_shared_out_whole(weights: Sequence[int], episodes: int, counts: list[int]) -> None:
+    parts = [Part(str(k), w / sum(weights)) for k, w in enumerate(weights)]
+    assert shared_out(parts, episodes) == counts
+
+
+@pytest.mark.parametrize(("text", "size"), [("500MB", 5e8), ("2 GB", 2e9), ("1000", 1000), ("1.5k", 1500)])
+def test_sizes_are_decimal(text: str, size: float) -> None:
+    assert parse_bytes(text) == size
+
+
+@pytest.mark.parametrize("text", ["", "GB", "-1", "0", "5 MiB"])
+def test_what_is_no_size_is_refused(text: str) -> None:
+    with pytest.raises(TaskError, match="expected a size such as"):
+        parse_bytes(text)
+
+
+def test_limits_end_a_collection(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [100.0]
+    monkeypatch.setattr(mixtures.time, "monotonic", lambda: now[0])
+    limits = Limits(hours=1.0, max_bytes=1000)
+    assert limits.reached() == ""
+    half = limits.part(0.5)
+    now[0] += 1900.0
+    assert (limits.reached(), half.reached()) == ("", "0.5 hours")
+    limits.kept = 1000
+    assert limits.reached() == "1,000 bytes"
+
+
+def result(status: str = "success", steps: int = 10, **outcome: Any) -> EpisodeResult:
+    path = Path("x") if status == "success" else None
+    return EpisodeResult(0, 0, 1, status, steps, 1.0, outcome, path)
+
+
+def segment(number: int, skill: str) -> dict[str, Any]:
+    return {"segment": number - 1, "command": number, "skill": skill, "attempt": 1, "first_step": 1, "last_step": 2}
+
+
+def counted() -> Tally:
+    tally = Tally()
+    both = [segment(1, "open"), segment(2, "close")]
+    tally.add(result(phase="2 close: retreat", command=2, segments=both, outcome="ok"), 500)
+    ladder = ["no_ik -> candidate", "no_ik -> give up"]
+    failed = {"phase": "2 close: reach", "command": 2, "segments": both[:1], "outcome": "no_ik", "ladder": ladder}
+    tally.add(result("failed", **failed))
+    tally.add(result("truncated", phase="1 open: pull", command=1, segments=[], outcome="running"))
+    return tally
+
+
+def test_a_tally_tells_commands_and_failures_apart() -> None:
+    told = counted().to_dict()
+    assert (told["attempts"], told["successes"], told["kept"], told["kept_bytes"]) == (3, 1, 1, 500)
+    assert told["failures"] == {"no_ik": 1, "truncated": 1}
+    assert told["ladder"] == {"no_ik -> candidate": 1, "no_ik -> give up": 1}
+    first, second = told["commands"]
+    assert (first["command"], first["begun"], first["succeeded"]) == ("1 open", 3, 2)
+    assert first["failures"] == {"truncated": 1}
+    assert (second["command"], second["begun"], second["succeeded"]) == ("2 close", 2, 1)
+    assert second["failures"] == {"no_ik": 1}
+
+
+def test_an_expert_is_one_command_and_a_lost_episode_is_no_attempt() -> None:
+    tally = Tally()
+    tally.add(result(skill="pick", phase="bring: carry", outcome="ok"))
+    tally.add(EpisodeResult(0, 1, 1, "failed", 0, 0.0, {}, lost=True))
+    told = tally.to_dict()
+    assert (told["attempts"], told["lost"]) == (1, 1)
+    assert [(c["command"], c["begun"]) for c in told["commands"]] == [("pick", 1)]
+
+
+def test_a_report_is_written_whole_and_read_again(tmp_path: Path) -> None:
+    told = report_of(RUN, counted(), {"physics": 1.0, "policy": 3.0}, 2.5, {"submitted": 4})
+    path = write_report(tmp_path, told)
+    assert read_report(tmp_path) == json.loads(json.dumps(told))
+    assert read_report(tmp_path)["cpu_s_per_kept"] == 2.5
+    text = path.read_text("utf-8")
+    root = ElementTree.fromstring(text.partition("\n")[2])
+    assert [h.text for h in root.iter("h2")] == ["By command", "Failures", "Retries", "Where the time went", "Planning"]
+    assert page(told) == text
+    (tmp_path / "report.json").write_text("{}")
+    with pytest.raises(RecordError, match="is no report of the format"):
+        read_report(tmp_path)
+    with pytest.raises(RecordError, match="is not there"):
+        read_report(tmp_path / "elsewhere")
+
+
+def test_a_report_of_nothing_is_a_page(tmp_path: Path) -> None:
+    assert "no attempt" in write_report(tmp_path, report_of(RUN, Tally(), {}, 0.0)).read_text("utf-8")
+
+
+def test_run_and_report_from_the_command_line(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    words = [
+        "run",
+        DRAWN,
+        "--num-envs",
+        "4",
+        "--episodes",
+        "4",
+        "--seed",
+        "3",
+        "--out",
+        str(out),
+        "-o",
+        "record.keep=segments",
+    ]
+    done = anysim(*words, "--json")
+    assert done.exit_code == 0, done.output
+    told = json.loads(done.output)
+    report = read_report(out)
+    assert (report["attempts"], report["kept"]) == (4, sum(e["path"] is not None for e in told["episodes"]))
+    assert report["kept"] > report["successes"], "some are kept for their segments alone"
+    for episode in told["episodes"]:
+        assert (episode["path"] is not None) == (episode["status"] == "success" or bool(episode["outcome"]["segments"]))
+    again = anysim(*words)  # resumes what is kept, and runs the rest anew
+    assert again.exit_code == 0
+    assert "resuming" in again.output
+    assert read_report(out)["commands"] == report["commands"]
+    said = anysim("report", str(out))
+    assert "1 open" in said.output
+
+
+def test_a_limit_of_bytes_ends_a_run(tmp_path: Path) -> None:
+    words = ["run", "reach", "--num-envs", "2", "--bytes", "1", "--out", str(tmp_path), "-o", "record.cameras=[]"]
+    done = anysim(*words)
+    assert done.exit_code == 0, done.output
+    assert "ended at the limit of 1 bytes" in done.output
+    assert 1 <= read_report(tmp_path)["attempts"] < 200
+
+
+def test_several_tasks_have_a_directory_each(tmp_path: Path) -> None:
+    quick = ["-o", "record.cameras=[]", "--num-envs", "2", "--episodes", "3", "--out", str(tmp_path), "--json"]
+    done = anysim("run", "reach=2", "press_button=1", *quick)
+    assert done.exit_code == 0, done.output
+    assert [run["attempts"] for run in json.loads(done.output)["runs"]] == [2, 1]
+    assert {path.name for path in tmp_path.iterdir()} == {"reach", "press_button"}
