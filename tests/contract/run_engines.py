@@ -1,7 +1,7 @@
-"""Run tests of the contract suite on many engines in one process: `run_engines.py JOBS.json RESULTS.json`.
+"""Run tests of a contract suite on many engines in one process: `run_engines.py JOBS.json RESULTS.json [planners]`.
 
-Jobs map engines (`module:Class`) to tests (`test_x.py::test_y`); results map engines to tests to outcomes, where a
-parametrised test has failed if one of its cases has.
+Jobs map engines, or planners (`module:Class`), to tests (`test_x.py::test_y`); results map engines to tests to
+outcomes, where a parametrised test has failed if one of its cases has.
 """
 
 import json
@@ -31,21 +31,22 @@ class Outcomes:
         self.tests[name] = max(before, report.outcome, key=_ORDER.index)
 
 
-def run(engine: str, tests: list[str]) -> dict[str, str]:
+def run(engine: str, tests: list[str], option: str = "--engine", suite: Path = SUITE) -> dict[str, str]:
     """Outcomes of the tests on one engine."""
     outcomes = Outcomes()
-    where = [f"{SUITE}/{test}" for test in tests]
+    where = [f"{suite}/{test}" for test in tests]
     options = ["-q", "--no-header", "--tb=no", "-p", "no:cacheprovider", "--import-mode=importlib"]
     options += [
         "-W",
         "ignore::pytest.PytestAssertRewriteWarning",
     ]  # the suite is imported before pytest runs, by design
-    pytest.main([*options, "--engine", engine, *where], plugins=[outcomes])
+    pytest.main([*options, option, engine, *where], plugins=[outcomes])
     return outcomes.tests
 
 
 if __name__ == "__main__":
     jobs, results = Path(sys.argv[1]), Path(sys.argv[2])
+    kind = ("--planner", SUITE / "planners") if "planners" in sys.argv[3:] else ("--engine", SUITE)
     results.write_text(
-        json.dumps({engine: run(engine, tests) for engine, tests in json.loads(jobs.read_text()).items()})
+        json.dumps({name: run(name, tests, *kind) for name, tests in json.loads(jobs.read_text()).items()})
     )

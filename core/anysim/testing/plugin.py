@@ -1,7 +1,7 @@
-"""The pytest plugin of the contract suite: `--engine`, `--engine-option`, `--shards`, and the line that sums a run up.
+"""The pytest plugin of the contract suites: `--engine` with its options, `--planner`, and the line that sums a run up.
 
 It is loaded by every pytest run on a machine that has anysim, so it imports nothing but the standard library and
-pytest until `--engine` is given.
+pytest until `--engine` or `--planner` is given.
 """
 
 import importlib
@@ -14,6 +14,8 @@ from typing import Any
 import pytest
 
 HERE = Path(__file__).parent
+PLANNERS = HERE / "planners"
+CLAIMS = "anysim_claims"
 NEEDS = "anysim_needs"
 OVERLAPS = "anysim_overlaps"
 _SUITE = pytest.StashKey[frozenset[str]]()
@@ -34,12 +36,20 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--shards", metavar="N", type=int, default=0, help="run the engine in N worker processes, fewer for fewer envs"
     )
+    group.addoption("--planner", metavar="NAME", help="the planner of motion under test (anysim.testing.planners)")
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Register the marker; with an engine to test, look whether it can run here, and register the fixtures."""
     config.addinivalue_line("markers", f"{NEEDS}(*capabilities): skip where the engine does not declare them all")
     config.addinivalue_line("markers", f"{OVERLAPS}: begins inside of something, which makes energy: it is not counted")
+    config.addinivalue_line("markers", f"{CLAIMS}(*capabilities): skip where the planner does not declare them all")
+    if name := config.getoption("planner"):
+        try:
+            planner_class(config)
+        except Exception as error:  # whatever a stranger's planner raises is the answer to its name
+            raise pytest.UsageError(f"--planner {name}: {error}") from error
+        config.pluginmanager.register(importlib.import_module("anysim.testing.planners.fixtures"), "anysim-planners")
     name = config.getoption("engine")
     if not name:
         return
@@ -53,17 +63,25 @@ def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(importlib.import_module("anysim.testing.fixtures"), "anysim-contract-fixtures")
 
 
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """With an engine to test, the planners' suite is no part of its own."""
+    return True if collection_path == PLANNERS and not config.getoption("planner") else None
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Note which tests are the suite's, and refuse to run them without an engine: each would lack its fixtures."""
-    config.stash[_SUITE] = frozenset(item.nodeid for item in items if item.path.is_relative_to(HERE))
-    if config.stash[_SUITE] and not config.getoption("engine"):
+    suites = [item for item in items if item.path.is_relative_to(HERE)]
+    config.stash[_SUITE] = frozenset(item.nodeid for item in suites)
+    if any(item.path.is_relative_to(PLANNERS) for item in suites) and not config.getoption("planner"):
+        raise pytest.UsageError("this suite tests one planner: pytest --pyargs anysim.testing.planners --planner NAME")
+    if any(not item.path.is_relative_to(PLANNERS) for item in suites) and not config.getoption("engine"):
         raise pytest.UsageError("the contract suite tests one engine: pytest --pyargs anysim.testing --engine NAME")
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
-    """One line: engine, version, counts, and what was skipped for want of which capability."""
+    """One line: engine or planner, version, counts, and what was skipped for want of which capability."""
     suite = config.stash.get(_SUITE, frozenset())
-    if not suite or not config.getoption("engine"):
+    if not suite or not (config.getoption("engine") or config.getoption("planner")):
         return
     outcomes = {
         kind: [r for r in terminalreporter.stats.get(kind, []) if getattr(r, "nodeid", "") in suite]
@@ -75,6 +93,10 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     failures = len(outcomes["failed"]) + len(outcomes["error"])
     counts += [f"{failures} failed"] if failures else []
     counts += [f"{len(outcomes['skipped'])} skipped" + (f" ({detail})" if detail else "")]
+    if not config.getoption("engine"):
+        planner = planner_class(config)
+        terminalreporter.write_line(f"anysim contract: planner {planner.name} {planner.version}: {', '.join(counts)}")
+        return
     engine = engine_class(config)
     version = engine.availability().version
     where = f" in {config.getoption('shards')} shards" if config.getoption("shards") else ""
@@ -100,6 +122,20 @@ def load_engine(name: str) -> Any:
     from anysim.engine.factory import engine_class as installed
 
     return installed(name)
+
+
+def planner_class(config: pytest.Config) -> Any:
+    """The MotionPlanner class that `--planner` names: an installed name, or `module:Class`."""
+    from anysim import registry
+    from anysim.planning.motion import MotionPlanner
+
+    name = str(config.getoption("planner"))
+    module, colon, attribute = name.partition(":")
+    outside = colon and attribute[:1].isupper()
+    made = getattr(importlib.import_module(module), attribute) if outside else registry.load("planners", name)
+    if not (isinstance(made, type) and issubclass(made, MotionPlanner)):
+        raise pytest.UsageError("it is no planner of motion: expected a class derived from MotionPlanner")
+    return made
 
 
 def engine_options(config: pytest.Config) -> dict[str, Any]:

@@ -1,0 +1,78 @@
+"""The suite of planners: it clears the right ones, and finds each wrong one by the test named for its defect."""
+
+import inspect
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.planning import wrong_planners
+
+HERE = Path(__file__).parent
+WRONG = [
+    name
+    for name, made in inspect.getmembers(wrong_planners, inspect.isclass)
+    if made.__module__ == wrong_planners.__name__ and not name.startswith("_")
+]
+SUITE = ("-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", "--pyargs", "anysim.testing.planners")
+
+
+def run(*words: str, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
+    paths = [str(HERE.parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+    command = [sys.executable, *words]
+    return subprocess.run(
+        command, capture_output=True, text=True, timeout=300, env=environment, cwd=folder, check=False
+    )
+
+
+def test_rrt_passes(tmp_path: Path) -> None:
+    done = run(*SUITE, "--planner", "rrt", folder=tmp_path)
+    assert done.returncode == 0, done.stdout[-4000:]
+    assert "anysim contract: planner rrt 1: 26 passed, 0 skipped" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "cause"),
+    [
+        (("--planner", "numba_ik"), "it is no planner of motion"),
+        (("--planner", "rt"), "no planner named 'rt'"),
+        ((), "this suite tests one planner: pytest --pyargs anysim.testing.planners --planner NAME"),
+    ],
+)
+def test_what_is_no_planner_is_told(words: tuple[str, ...], cause: str, tmp_path: Path) -> None:
+    where = () if words else (str(Path(_suite()) / "test_paths.py"),)
+    done = run("-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", *words, *where, folder=tmp_path)
+    assert done.returncode == pytest.ExitCode.USAGE_ERROR
+    assert cause in done.stdout + done.stderr
+
+
+def _suite() -> str:
+    import anysim.testing.planners as suite
+
+    return str(Path(suite.__file__).parent)
+
+
+@pytest.fixture(scope="module")
+def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, str]]:
+    """Of all wrong planners, in one process."""
+    folder = tmp_path_factory.mktemp("wrong")
+    jobs = {name: inspect.getdoc(getattr(wrong_planners, name)).split() for name in WRONG}
+    named = {f"{wrong_planners.__name__}:{name}": tests for name, tests in jobs.items()}
+    (folder / "jobs.json").write_text(json.dumps(named))
+    runner = HERE.parent / "contract" / "run_engines.py"
+    done = run(str(runner), str(folder / "jobs.json"), str(folder / "results.json"), "planners", folder=folder)
+    assert done.returncode == 0, done.stdout[-4000:] + done.stderr
+    found = json.loads((folder / "results.json").read_text())
+    return {name.rpartition(":")[2]: tests for name, tests in found.items()}
+
+
+@pytest.mark.slow
+@pytest.mark.xdist_group("wrong planners")
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_planner_is_found(name: str, outcomes: dict[str, dict[str, str]]) -> None:
+    assert outcomes[name]
+    assert set(outcomes[name].values()) == {"failed"}, outcomes[name]
