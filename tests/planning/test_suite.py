@@ -3,6 +3,7 @@
 import inspect
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -29,12 +30,16 @@ def run(*words: str, folder: Path | None = None) -> subprocess.CompletedProcess[
     )
 
 
-def test_rrt_passes(tmp_path: Path) -> None:
-    done = run(*SUITE, "--planner", "rrt", folder=tmp_path)
+@pytest.mark.parametrize("planner", ["rrt", pytest.param("roboplan", marks=pytest.mark.slow)])
+def test_a_right_planner_passes(planner: str, tmp_path: Path) -> None:
+    if planner == "roboplan":
+        pytest.importorskip("roboplan.rrt", reason="roboplan is an extra")
+    done = run(*SUITE, "--planner", planner, folder=tmp_path)
     assert done.returncode == 0, done.stdout[-4000:]
-    assert "anysim contract: planner rrt 1: 26 passed, 0 skipped" in done.stdout
+    assert re.search(rf"anysim contract: planner {planner} 1.*: 26 passed, 0 skipped", done.stdout)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "cause"),
     [

@@ -113,6 +113,21 @@ class RrtPlanner(MotionPlanner):
             PlanStatus.NO_PATH, f"no free {kind} to the nearest {CANDIDATES} configurations", goal_status=tried
         )
 
+    def search(
+        self,
+        request: PlanRequest,
+        world: PlanningWorld,
+        start: Array,
+        goal: Array,
+        step: float,
+        rng: np.random.Generator,
+        budget: Budget,
+    ) -> Array | None:
+        """A path (M, K) between joint positions, free in steps of `step` [rad] or [m]; None if none was found."""
+        free = edge_check(world, step)
+        path = connect(start, goal, world.lower, world.upper, free, rng, budget)
+        return path if path is None else shortened(path, free, rng, budget)
+
     def _motion(
         self, request: PlanRequest, scene: Scene, world: PlanningWorld, goal: Reached, budget: Budget, passed: Any
     ) -> Trajectory | None:
@@ -123,9 +138,7 @@ class RrtPlanner(MotionPlanner):
             if request.straight is not None and request.joint_goal is None:
                 path, blend = straight_line(self._goals, request, scene, goal.chosen), 1.0  # the points are dense
             else:
-                free = edge_check(world, step)
-                path = connect(start, goal.joint_pos, world.lower, world.upper, free, rng, budget)
-                path = path if path is None else shortened(path, free, rng, budget)
+                path = self.search(request, world, start, goal.joint_pos, step, rng, budget)
             passed("search")
             if path is None or budget.spent:
                 return None

@@ -15,7 +15,7 @@ from anysim.geometry.coal_solids import coal_solid
 from anysim.kinematics.pinocchio_model import pinocchio, se3
 from anysim.math import pose as P
 from anysim.model.pairs import may_meet
-from anysim.model.parts import EntityKind
+from anysim.model.parts import BodyKind, EntityKind
 from anysim.model.shapes import HeightFieldShape, MeshShape, Plane, Shape
 from anysim.model.world import Geom, JointType, World
 from anysim.planning.motion import Attachment, PlanRequest, Scene
@@ -36,6 +36,8 @@ class PlanningWorld:
     Attributes:
         order: (K,) positions of the request's joints in the order of the model, parents first.
         lower, upper, velocity_limit: (K,) in the request's order.
+        model, geometry: Pinocchio's, of the planned joints by their names and of all geoms.
+        geoms, padding: (G) the World's geoms in the order of `geometry`, and by how much [m] each is grown.
     """
 
     def __init__(self, world: World, request: PlanRequest, shapes: dict[object, Any]) -> None:
@@ -95,7 +97,8 @@ class PlanningWorld:
             parent = self._joint_of[int(self._anchor_of[world.bodies[joint.body].parent])]
             added = self.model.addJoint(parent, kind(np.array(joint.axis)), pin.SE3.Identity(), joint.name)
             self._joint_of[joint.body] = added
-        self.geometry, self._geoms = pin.GeometryModel(), list[Geom]()
+        self.geometry, self.geoms = pin.GeometryModel(), list[Geom]()
+        self.padding: list[float] = []
         self._bodies, self._local = list[int](), list[Array]()
         entities = np.array([*world.body_entity, -1])
         for g, geom in enumerate(world.geoms):
@@ -109,7 +112,8 @@ class PlanningWorld:
             joint = self._joint_of[int(self._anchor_of[geom.body])]
             placed = pin.GeometryObject(f"{g}:{geom.name}", joint, pin.SE3.Identity(), shapes[key])
             self.geometry.addGeometryObject(placed)
-            self._geoms.append(geom)
+            self.geoms.append(geom)
+            self.padding.append(padding)
             self._bodies.append(geom.body)
             self._local.append(P.pose(geom.position, geom.quaternion))
 
@@ -149,7 +153,7 @@ class PlanningWorld:
         found = [b for b, body in enumerate(world.bodies) if body.name == name]
         if name in world.entity_numbers:
             return entities == world.entity_numbers[name]
-        ground = np.array([geom.name == name and geom.body == WORLD for geom in self._geoms])
+        ground = np.array([geom.name == name and geom.body == WORLD for geom in self.geoms])
         if ground.any():
             return ground
         if not found:
@@ -200,6 +204,12 @@ class PlanningWorld:
         """World pose of the frame of the joint that moves a body; of no use for bodies that no planned joint moves."""
         return P.compose(poses[body], self._axis_point(body)) if body in self._moved_by else poses[body]
 
+    def is_still(self, geom: Geom) -> bool:
+        """Whether a geom keeps its place relative to the planned joint above it, unless a static thing is moved."""
+        if geom.body == WORLD or geom.body in self._attached:
+            return geom.body == WORLD
+        return geom.body in self._moved_by or self._world.bodies[geom.body].kind is BodyKind.STATIC
+
     # ------------------------------------------------------------------ checks
 
     def hits(self, joint_pos: Array, stop: bool = False) -> Array:
@@ -243,7 +253,7 @@ def _coal_shape(world: World, shape: Shape, padding: float) -> Any:
             made = _mesh(mesh.vertices, mesh.faces, concave)
         case HeightFieldShape(name):
             field = next(f for f in world.heightfields if f.name == name)
-            made = _surface(field.heights, field.size)
+            made = _mesh(*surface_triangles(field.heights, field.size), concave=True)
         case _:
             made = coal_solid(shape)
     if padding and hasattr(made, "setSweptSphereRadius"):
@@ -266,12 +276,12 @@ def _mesh(vertices: Array, faces: Array, concave: bool) -> Any:
     return model.convex
 
 
-def _surface(heights: Array, size: tuple[float, float]) -> Any:
-    """A height field as triangles."""
+def surface_triangles(heights: Array, size: tuple[float, float]) -> tuple[Array, Array]:
+    """Vertices (V, 3) [m] and faces (F, 3) of a height field."""
     rows, columns = heights.shape
     x, y = np.linspace(-size[0] / 2, size[0] / 2, columns), np.linspace(-size[1] / 2, size[1] / 2, rows)
     vertices = np.column_stack([np.tile(x, rows), np.repeat(y, columns), np.asarray(heights, dtype=float).ravel()])
     corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     lower = np.column_stack([corner, corner + 1, corner + columns])
     upper = np.column_stack([corner + 1, corner + columns + 1, corner + columns])
-    return _mesh(vertices, np.concatenate([lower, upper]), concave=True)
+    return vertices, np.concatenate([lower, upper])
