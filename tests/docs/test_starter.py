@@ -11,6 +11,7 @@ from tests.external_packages import EXTERNAL, install, run
 KINDS = {
     "tasks": "touch_shelf",
     "skills": "starter_reach",
+    "planners": "starter_hop",
     "controllers": "starter_eased_position",
     "assets": "starter_shelf",
     "terms": "starter",
@@ -59,6 +60,28 @@ def test_its_task_is_solved_and_replays_to_the_bit(site: Path, engine: str, tmp_
     assert found["successes"] == found["attempts"] == 8
     again = anysim(site, "replay", str(tmp_path))
     assert again["identical"] == again["replayed"] == 8
+
+
+@pytest.mark.parametrize(
+    "engine", ["mujoco", *(pytest.param(e, marks=pytest.mark.slow) for e in ("pybullet", "sapien"))]
+)
+def test_its_commands_are_planned_by_two_planners_and_replay(site: Path, engine: str, tmp_path: Path) -> None:
+    words = ("-e", engine, "-n", "4", "-k", "8", "-o", "record.cameras=[]", "--out", str(tmp_path))
+    found = anysim(site, "run", "touch_twice", *words)
+    assert found["successes"] == found["attempts"] == 8
+    again = anysim(site, "replay", str(tmp_path))
+    assert again["identical"] == again["replayed"] == 8
+
+
+@pytest.mark.slow
+def test_its_planner_passes_the_suite(site: Path, tmp_path: Path) -> None:
+    words = ("-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", "--pyargs", "anysim.testing.planners")
+    done = run(site, *words, "--planner", "starter_hop", cwd=tmp_path)
+    assert done.returncode == 0, done.stdout[-4000:]
+    page = (Path(__file__).parents[2] / "docs" / "write_a_planner.md").read_text()
+    line = re.search(r"anysim contract: planner starter_hop .*\)", done.stdout)
+    assert line, done.stdout[-400:]
+    assert f"`{line[0]}`" in page
 
 
 CODE = """

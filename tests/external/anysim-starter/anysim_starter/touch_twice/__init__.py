@@ -1,0 +1,1 @@
+"""Reach a drawn point above a shelf."""
