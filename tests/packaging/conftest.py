@@ -79,24 +79,27 @@ def environment(wheels: list[Path], tmp_path_factory: pytest.TempPathFactory) ->
 
 def _closure(wanted: list[Path], own: dict[str, Path]) -> tuple[list[Path], list[str]]:
     """The wheels and those of ours that they need, and the requirements that are not ours."""
-    chosen: list[Path] = []
+    seen: dict[tuple[Path, str], None] = {}  # wheels with an extra of theirs, or none
     foreign: set[str] = set()
-    while wanted:
-        wheel = wanted.pop()
-        if wheel in chosen:
+    asked = [(wheel, "") for wheel in wanted]
+    while asked:
+        one = asked.pop()
+        if one in seen:
             continue
-        chosen.append(wheel)
-        for requirement in _requirements(wheel):
+        seen[one] = None
+        for requirement in _requirements(*one):
             name = canonicalize_name(requirement.name)
             if name in own:
-                wanted.append(own[name])
+                asked += [(own[name], extra) for extra in ("", *requirement.extras)]
             else:
+                requirement.marker = None
                 foreign.add(str(requirement))
-    return chosen, sorted(foreign)
+    return list(dict.fromkeys(wheel for wheel, _ in seen)), sorted(foreign)
 
 
-def _requirements(wheel: Path) -> list[Requirement]:
+def _requirements(wheel: Path, extra: str) -> list[Requirement]:
     with zipfile.ZipFile(wheel) as archive:
         name = next(name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
         lines = HeaderParser().parsestr(archive.read(name).decode()).get_all("Requires-Dist", [])
-    return [found for found in map(Requirement, lines) if found.marker is None]
+    found = map(Requirement, lines)
+    return [one for one in found if (one.marker.evaluate({"extra": extra}) if one.marker else not extra)]
