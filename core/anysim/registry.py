@@ -55,7 +55,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-mujoco": {"engines": "mujoco", "importers": "mjcf", "oracles": "mjcf"},
     "anysim-parity": {"commands": "compare picture"},
     "anysim-policy": {"controllers": "policy"},
-    "anysim-planning": {"planners": "roboplan rrt threads"},
+    "anysim-planning": {"commands": "retarget", "planners": "roboplan rrt threads"},
     "anysim-pybullet": {"engines": "pybullet"},
     "anysim-robots": {"commands": "gallery robot"},
     "anysim-sapien": {"engines": "sapien"},

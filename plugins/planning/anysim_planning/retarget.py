@@ -65,6 +65,20 @@ def tool_motion(recording: TrajectoryReader, world: World, robot: str, tool: str
     return ToolMotion(recording.times, P.compose(poses, P.pose(site.position, site.quaternion)), base)
 
 
+def only_tool(world: World, robot: str | None = None, tool: str | None = None) -> tuple[str, str]:
+    """Robot and tool; what is None may be left out where there is one alone.
+
+    Raises:
+        NameLookupError: there is no such tool, or several are meant.
+    """
+    known = [(r.name, name) for r in world.robots for name in r.tools]
+    meant = [one for one in known if robot in (None, one[0]) and tool in (None, one[1])]
+    if len(meant) != 1:
+        names = listing([".".join(one) for one in meant or known])
+        raise NameLookupError(f"{len(meant)} tools are meant; name the robot and one of its tools: {names}")
+    return meant[0]
+
+
 def arm_of(world: World, robot: str, tool: str) -> Chain:
     """The joints of a robot's channels that move a tool: one arm of a robot that has two.
 

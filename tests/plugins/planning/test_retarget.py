@@ -1,5 +1,6 @@
 """Tool motion of a Panda, made by a UR5 and by one arm of a robot that has two."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -89,6 +90,20 @@ def test_a_recording_of_a_panda_is_made_by_other_arms(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     (manifest,) = (tmp_path / "out").rglob("manifest.json")
     recording = open_trajectory(manifest.parent)
+    words = ["retarget", str(manifest.parent), "-r", "dual_ur5", "--tool", "right", "--shift", "0", "-0.8", "0"]
+    again = [sys.executable, "-m", "anysim.cli", *words, "--out", str(tmp_path / "made.npz"), "--json"]
+    done = subprocess.run(again, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["reached"] == found["rows"] == recording.manifest.steps
+    with np.load(tmp_path / "made.npz") as file:
+        assert file["joint_pos"].shape == (found["rows"], 6)
+        assert str(file["joints"][0]).rpartition(".")[2] == "right_shoulder_pan_joint"
+    away = subprocess.run(
+        [*again[:-3], "--shift", "9", "0", "0", "--json"], capture_output=True, text=True, check=False
+    )
+    assert away.returncode == 1
+    assert json.loads(away.stdout)["reached"] == 0
     world = compile_world("pick_cube")
     done_by = tool_motion(recording, world, "panda", "tool")
     for robot, tool in CASES:

@@ -1,0 +1,68 @@
+"""`anysim retarget`: the motion of a recorded tool, as another robot's arm makes it."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from anysim.cli.options import AsJson
+
+
+def retarget(
+    recording: Annotated[Path, typer.Argument(metavar="DIR", help="A trajectory, as `anysim run` writes it.")],
+    robot: Annotated[str, typer.Option("--robot", "-r", help="Who is to make the motion, as in `anysim list robots`.")],
+    tool: Annotated[str | None, typer.Option(help="Its tool; default: its only one.")] = None,
+    of: Annotated[str | None, typer.Option(help="ROBOT.TOOL of the recording; default: the only one.")] = None,
+    shift: Annotated[
+        tuple[float, float, float], typer.Option(help="Moves the motion in the frame of the robot's base [m].")
+    ] = (0.0, 0.0, 0.0),
+    seed: Annotated[int, typer.Option(help="Of the postures that it may begin in.")] = 0,
+    out: Annotated[Path | None, typer.Option(help="A file .npz for times, joint positions and errors.")] = None,
+    json: AsJson = False,
+) -> None:
+    """Carry the motion of a recorded tool to another robot, seen from its base; nothing is simulated.
+
+    Exit code 1 says that a part of the motion is out of reach.
+
+    Examples:
+      anysim run pick_cube -k 1 --out runs/a && anysim retarget runs/a/episodes/* --robot ur5 --out ur5.npz
+      anysim retarget runs/a/episodes/* --robot dual_ur5 --tool right --shift 0 -0.8 0
+    """
+    import numpy as np
+
+    from anysim.api import compile_world
+    from anysim.cli.output import print_json
+    from anysim.conventions import IDENTITY_QUATERNION
+    from anysim.math import pose as P
+    from anysim.record.reader import open_trajectory
+    from anysim_planning import retarget as motions
+
+    reader = open_trajectory(recording)
+    source = compile_world(reader.manifest.spec)
+    first, its_tool = motions.only_tool(source, *(of.partition(".")[::2] if of else (None, None)))
+    done = motions.tool_motion(reader, source, first, its_tool)
+    world = compile_world({"world": {"terrain": "none", "robots": {robot: {"robot": robot}}}})
+    arm = motions.arm_of(world, *motions.only_tool(world, robot, tool))
+    base = world.initial_body_pose[arm.root]
+    wanted = motions.carried(done.poses, done.base, base, P.pose(shift, IDENTITY_QUATERNION))
+    made = motions.retarget(arm, base, done.times, wanted, seed=seed)
+    found = {
+        "rows": len(made.times),
+        "reached": int(made.reached.sum()),
+        "position_error_m": float(made.position_error.max()),
+        "rotation_error_rad": float(made.rotation_error.max()),
+        "slowed_by": float(np.ptp(made.times) / max(np.ptp(done.times), 1e-9)),
+        "out": None if out is None else str(out),
+    }
+    if out is not None:
+        with out.open("wb") as file:
+            np.savez(file, joints=np.array(arm.joint_names), **made._asdict())
+    if json:
+        print_json(found)
+    else:
+        typer.echo(
+            f"{found['reached']} of {found['rows']} rows reached by {arm.name}, at most "
+            f"{found['position_error_m'] * 1e3:.3g} mm and {found['rotation_error_rad']:.3g} rad off, "
+            f"slowed by {found['slowed_by']:.3g}" + (f" -> {out}" if out else "")
+        )
+    raise typer.Exit(int(not made.reached.all()))
