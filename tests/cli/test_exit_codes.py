@@ -125,6 +125,7 @@ def test_answers_and_requests_that_cannot_be_met(code: int, words: list[str], tm
         (2, ["bench", "step", "--engine", "warp_drive"]),
         (2, ["gallery", "--nothing-like-it"]),
         (2, ["render", "nowhere"]),
+        (2, ["retarget", "nowhere", "-r", "ur5"]),
         (0, ["robot", "franka_panda"]),
         (2, ["robot", "no_such_robot"]),
         (2, ["robot", "import", "no_such_file.urdf"]),
