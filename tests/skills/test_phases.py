@@ -56,6 +56,9 @@ class Hand:
     def act(self, ids: Array, action: Array) -> None:
         self._log.append(f"move {ids.tolist()}")
 
+    def describe(self, env: int) -> dict[str, object]:
+        return {}
+
 
 def after(steps: int, then: int = GO_ON) -> Answer:
     return lambda env, step: then if step >= steps else STAY

@@ -8,6 +8,8 @@ has a budget for the whole skill, and what no rung is left for ends the skill wi
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
+from functools import reduce
+from operator import or_
 from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
@@ -61,6 +63,10 @@ class Mover(Protocol):
 
     def act(self, ids: Array, action: Array) -> None:
         """Write the rows of the action of these envs, which the scene looks at."""
+        ...
+
+    def describe(self, env: int) -> dict[str, object]:
+        """What records say of how it moves, the same as long as an episode lasts."""
         ...
 
 
@@ -123,7 +129,8 @@ class MovingSkill(Skill):
 
     def describe(self, env: int) -> dict[str, object]:
         climbed = [f"{outcome} -> {rung}" for outcome, rung in self.history(env)]
-        return super().describe(env) | ({"ladder": climbed} if climbed else {})
+        said = super().describe(env) | ({"ladder": climbed} if climbed else {})
+        return reduce(or_, (mover.describe(env) for mover in self.movers), said)
 
 
 class PhasedSkill(MovingSkill):

@@ -2,7 +2,8 @@
 
 Skills of all kinds write `target`, `speed` and `closed` of the envs they act in; the arm then moves all of them at
 once, each along a straight line, with inverse kinematics solved for the commanded pose. It never leads the real tool by
-more than `lead`, which bounds the force with which it presses on what it cannot pass.
+more than `lead`, which bounds the force with which it presses on what it cannot pass. Where the way may not be free a
+skill asks for a planned move instead.
 """
 
 from typing import Self
@@ -11,12 +12,16 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.errors import TaskError
 from anysim.kinematics.chain import Chain
 from anysim.math import pose as P
 from anysim.model.world import JointType
 from anysim.planning.api import inverse_kinematics
+from anysim.skills.phases import GO_ON, STAY
 from anysim.task.env import TaskEnv
-from anysim.task.scene import Frame, RobotView
+from anysim.task.scene import Frame, ObjectView, RobotView
+from anysim_skills.planned_moves import PlannedMoves, Stage
+from anysim_skills.planning import LATENCY, planner_of
 
 ARRIVED = 0.004
 """[m] distance of the tool at which a straight move counts as done."""
@@ -54,7 +59,10 @@ class Arm:
         grip: (N, 3) [m] where what is held was in the tool's frame when it was taken.
         aperture: [m] how wide the gripper opens; infinite where its fingers turn.
         stuck: (N,) bool: the last step towards the target had no inverse kinematics.
+        plans: its planned moves; None as long as no skill has a planner.
     """
+
+    plans: PlannedMoves | None = None
 
     def __init__(self, env: TaskEnv, robot: RobotView, channel: str, gripper: str, tool: str, solver: str) -> None:
         self.env, self.robot = env, robot
@@ -86,23 +94,53 @@ class Arm:
         gripper: str = "eef",
         tool: str = "tool",
         solver: str = "numba_ik",
+        planner: str = "",
+        latency: int = LATENCY,
     ) -> Self:
         """The arm of an env, shared by all skills that drive it.
 
+        Args:
+            env, robot, channel, gripper, tool, solver: whose arm it is, and how it is moved.
+            planner: what plans its moves, by name; empty: this skill has no moves planned.
+            latency: control steps until a plan takes effect.
+
         Raises:
-            NameLookupError, TaskError: the robot has no such channels or tool, or they have no controllers.
+            NameLookupError, TaskError: the robot has no such channels or tool, or they have no controllers; two skills
+                want other planners for the same arm.
+            PluginError: no planner of that name is installed.
         """
         arms = _ARMS.setdefault(env, {})
         key = (robot.name, channel, gripper, tool)
         if key not in arms:
             arms[key] = cls(env, robot, channel, gripper, tool, solver)
+        if planner:
+            arms[key].plan_with(planner, latency, tool)
         return arms[key]  # pyright: ignore[reportReturnType]
+
+    def plan_with(self, planner: str, latency: int, tool: str) -> None:
+        """Have moves planned from now on."""
+        if self.plans is None:
+            made = planner_of(self.env, planner)
+            self.plans = PlannedMoves(self.env, made, latency, self.solver, (self.robot.name, tool), self.joints)
+        known = self.plans.planner.name, self.plans.latency
+        if known != (planner, latency):
+            raise TaskError(
+                f"skills plan moves of '{self.robot.name}' with {known[0]} at a latency of {known[1]} control steps, "
+                f"and with {planner} at {latency}; give all skills of an arm the same planner and latency"
+            )
 
     # ------------------------------------------------------------------ what skills ask and say; the scene looks at ids
 
     def renew(self, ids: Array) -> None:
         """These envs have just been reset: whatever was commanded is forgotten."""
         self._fresh[ids] = True
+        if self.plans is not None:
+            self.plans.renew(ids)
+
+    def describe(self, env: int) -> dict[str, object]:
+        """What records say of how it is moved."""
+        del env
+        return {} if self.plans is None else {"planner": self.plans.describe()}
 
     def prepare(self, ids: Array) -> None:
         """Begin from where the arm is, in envs that have been reset; the scene looks at `ids`."""
@@ -117,12 +155,51 @@ class Arm:
         self._stalled[ids], self._detour[ids] = 0, False
 
     def go(self, ids: Array, target: Array, speed: float, lead: float = LEAD) -> None:
-        """Move towards tool poses (n, 7) at a speed [m/s]."""
+        """Move straight towards tool poses (n, 7) at a speed [m/s]."""
+        if self.plans is not None:
+            self.plans.drop(ids)
         self.target[ids], self.speed[ids], self.lead[ids] = target, speed, lead
 
     def stay(self, ids: Array) -> None:
         """Hold the commanded pose."""
+        if self.plans is not None:
+            self.plans.drop(ids)
         self.target[ids] = self.command[ids]
+
+    def plan(
+        self,
+        ids: Array,
+        goals: Array,
+        *,
+        held: ObjectView | None = None,
+        then: Array | None = None,
+        touched: ObjectView | None = None,
+    ) -> None:
+        """Move to one of the tool poses (n, G, 7) around whatever is in the way; see `planned` for how that goes.
+
+        The arm holds its pose until the answer takes effect, and follows it in the space of its joints.
+
+        Args:
+            ids: the envs.
+            goals: the goal set of each; the planner chooses what is nearest and free.
+            held: the object in the hand, which is to hit nothing either.
+            then: (n, 7) the end of a straight line after the move, on which nothing may be in the way but `touched`.
+            touched: what the robot may touch on that line.
+
+        Raises:
+            TaskError: the arm has no planner.
+        """
+        if self.plans is None:
+            raise TaskError(f"the arm of '{self.robot.name}' has no planner; give one to `Arm.of`")
+        self.target[ids] = self.command[ids]
+        self.plans.ask(ids, goals, held, then, touched)
+
+    def planned(self, ids: Array) -> Array:
+        """(n,) STAY while a move is planned or followed, GO_ON where it has arrived, else its failure in OUTCOMES."""
+        assert self.plans is not None
+        stage = self.plans.stage[ids]
+        failed = np.where(stage == Stage.FAILED, self.plans.failure[ids], STAY)
+        return np.where(stage == Stage.ARRIVED, GO_ON, failed)
 
     def arrived(self, ids: Array, at: Array, distance: float = ARRIVED, angle: float = TURNED) -> Array:
         """(n,) bool: the tool is at its target. `at` are the rows of these envs in the scene."""
@@ -187,7 +264,28 @@ class Arm:
 
     def act(self, ids: Array, action: Array) -> None:
         """Write the action of these envs, which the scene looks at: one step towards their targets."""
-        free = P.norm(self.command[ids, :3] - self.tool.position) < self.lead[ids]
+        if self.plans is None:
+            self._straight(ids, self.tool.position)
+        else:
+            led = self.plans.move(ids)
+            if led.any():
+                self._led(ids[led])
+            if not led.all():
+                self._straight(ids[~led], self.tool.position[~led])
+        action[ids, self._arm.start : self._arm.stop] = self._arm.controller.action_for(self.joints[ids], ids)
+        action[ids, self._eef.start : self._eef.stop] = np.where(self.closed[ids], -1.0, 1.0)[:, None]
+
+    def _led(self, ids: Array) -> None:
+        """The joints are told by a plan: commands follow them."""
+        assert self.plans is not None
+        self.command[ids] = self.chain.tool_pose(self._base(ids), self.joints[ids])
+        under_way = self.plans.stage[ids] != Stage.ARRIVED
+        self.target[ids] = np.where(under_way[:, None], self.command[ids], self.plans.goal[ids])
+        self.stuck[ids], self._stalled[ids], self._detour[ids] = False, 0, False
+
+    def _straight(self, ids: Array, tool: Array) -> None:
+        """One step of the joints along straight lines, of tools at (n, 3)."""
+        free = P.norm(self.command[ids, :3] - tool) < self.lead[ids]
         rows = ids[free]
         if len(rows):
             distance = self.speed[rows] * self._dt
@@ -201,8 +299,6 @@ class Arm:
             self._around(ids)
         own = found.converged & ~self._detour[ids]
         self.joints[ids[own]] = found.joint_pos[own]
-        action[ids, self._arm.start : self._arm.stop] = self._arm.controller.action_for(self.joints[ids], ids)
-        action[ids, self._eef.start : self._eef.stop] = np.where(self.closed[ids], -1.0, 1.0)[:, None]
 
     def _around(self, ids: Array) -> None:
         """Where a straight line runs into the limit of a joint: joint by joint to another posture at its end."""

@@ -1,0 +1,283 @@
+"""Planned moves of an arm: a question to the planner, the wait for its answer, and the way along the trajectory.
+
+An answer takes effect a fixed number of control steps after its question, by the env's own clock; a loop that is there
+earlier waits. So what an env does depends on no other env, nor on the number of workers.
+"""
+
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from time import perf_counter
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.math import pose as P
+from anysim.planning.api import InverseKinematics
+from anysim.planning.motion import Attachment, PlanAnswer, PlanRequest, PlanStatus, ToolGoal, Trajectory
+from anysim.planning.scenes import Scenes
+from anysim.planning.service import PlanFuture
+from anysim.skills.base import OUTCOMES, Outcome
+from anysim.task.env import TaskEnv
+from anysim.task.scene import ObjectView
+from anysim_skills.planning import EnvPlanner
+
+PADDING = 0.01
+"""[m] kept from obstacles: more than an arm strays from its trajectory."""
+VELOCITY_SCALE = 0.5
+DEADLINE = 20.0
+"""[s] only a net: searches are bounded by their own counts."""
+TOLERANCE = (5e-4, 5e-3)
+"""[m], [rad] of the goals."""
+LAG = 0.15
+"""[rad] an arm may be behind what it is told; the trajectory then waits for it."""
+NEAR = 0.02
+"""[rad] from the end of a trajectory at which the arm has arrived."""
+PATIENCE = 50
+"""Control steps without getting on after which the controller has not followed."""
+RESTARTS = 20
+LINE_POINTS = 8
+"""Of the straight line after a planned move, from which its joint positions are interpolated."""
+JUMP = 0.5
+"""[rad] that no joint moves between two of them: more is another posture."""
+
+
+class Stage(IntEnum):
+    """How the planned move of an env stands."""
+
+    NONE = 0
+    PLANNING = 1
+    FOLLOWING = 2
+    ARRIVED = 3
+    FAILED = 4
+
+
+@dataclass(eq=False)
+class Question:
+    """What was asked for one env.
+
+    Attributes:
+        future: of the answer.
+        scenes: the scene that it was asked in.
+        due: the control step of the episode at which the answer takes effect.
+        goals: (G, 7) tool poses.
+        then: (7,) the end of a straight line after the move that has to be free too, or None.
+        touched: the entity that the robot may touch on that line, or None.
+    """
+
+    future: PlanFuture
+    scenes: Scenes
+    due: int
+    goals: Array
+    then: Array | None
+    touched: str | None
+
+
+class PlannedMoves:
+    """The planned moves of one arm in all envs.
+
+    Attributes:
+        stage: (N,) of `Stage`.
+        failure: (N,) index into OUTCOMES, where the stage is FAILED.
+        goal: (N, 7) the tool pose that was chosen of the goals.
+    """
+
+    def __init__(
+        self,
+        env: TaskEnv,
+        planner: EnvPlanner,
+        latency: int,
+        solver: InverseKinematics,
+        tool: tuple[str, str],
+        joints: Array,
+    ) -> None:
+        """`tool` is of a robot, by their names; `joints` (N, K) is what the arm tells its joints, written here."""
+        self.planner, self.latency = planner, latency
+        self._env, self._solver, self._chain, self._joints = env, solver, solver.chain, joints
+        self._robot, self._tool = tool
+        world = env.engine.world
+        self._holder = world.sites[env.engine.index.robot(self._robot).tools[self._tool]].body
+        drives = {a.joint: a.kd / a.kp for a in world.actuators if a.kp > 0}
+        self._behind = np.array([drives.get(j, 0.0) for j in self._chain.joints.tolist()])
+        """[s] by which a joint that moves evenly is behind its target: damping over stiffness of its drive."""
+        n = env.num_envs
+        self.stage, self.failure = np.zeros((2, n), dtype=np.int64)
+        self.goal = np.zeros((n, 7))
+        self._questions: dict[int, Question] = {}
+        self._paths: dict[int, Array] = {}
+        """(S, K) for each env that follows one: where the joints are told to be in each control step."""
+        self._row, self._waited, self._asked = np.zeros((3, n), dtype=np.int64)
+
+    def describe(self) -> dict[str, object]:
+        """For records."""
+        return {"name": self.planner.name, "version": self.planner.version, "latency": self.latency}
+
+    def renew(self, ids: Array) -> None:
+        """These envs have just been reset."""
+        self.drop(ids)
+        self._asked[ids] = 0
+
+    def drop(self, ids: Array) -> None:
+        """Something else moves the arm in these envs from here on."""
+        for i in ids[self.stage[ids] != Stage.NONE].tolist():
+            if (question := self._questions.pop(i, None)) is not None:
+                question.future.cancel()
+            self._paths.pop(i, None)
+            self.stage[i] = Stage.NONE
+
+    def ask(
+        self, ids: Array, goals: Array, held: ObjectView | None, then: Array | None, touched: ObjectView | None
+    ) -> None:
+        """Plan in these envs; see `Arm.plan`."""
+        self.drop(ids)
+        holding, touching = _present(held, ids), _present(touched, ids)
+        for row, i in enumerate(ids.tolist()):
+            request = PlanRequest(
+                self._chain.joint_names,
+                np.clip(self._joints[i], self._chain.lower, self._chain.upper),
+                (ToolGoal(self._robot, self._tool, goals[row].copy(), (1.0, 1.0, 1.0), *TOLERANCE),),
+                attached=(self._attached(i, holding[i]),) if i in holding else (),
+                padding=PADDING,
+                velocity_scale=VELOCITY_SCALE,
+                seed=self._seed(i),
+                deadline=DEADLINE,
+            )
+            self._submit(i, request, None if then is None else then[row].copy(), touching.get(i))
+        self.stage[ids] = Stage.PLANNING
+        self.planner.service.flush()
+
+    def _submit(self, env: int, request: PlanRequest, then: Array | None, touched: str | None) -> None:
+        scene = self._env.scene
+        scenes = self.planner.scenes(scene.state.body_pose[env], scene.presence[env])
+        future = self.planner.service.submit(request, scenes.scene(0), env=env, latency=None)
+        due = int(scene.elapsed[env]) + self.latency
+        self._questions[env] = Question(future, scenes, due, request.goals[0].poses, then, touched)
+
+    def _seed(self, env: int) -> int:
+        """Of the next question: it depends on the episode, and on how many were asked in it."""
+        key = [int(self._env.streams.episode_seed[env]), int(self._asked[env])]
+        self._asked[env] += 1
+        return int(np.random.SeedSequence(key).generate_state(1)[0])
+
+    def _attached(self, env: int, entity: str) -> Attachment:
+        world, pose = self._env.engine.world, self._env.scene.state.body_pose[env]
+        root = world.entities[world.entity_numbers[entity]].root
+        offset = P.compose(P.inverse(pose[self._holder]), pose[root])
+        return Attachment(entity, world.bodies[self._holder].name, offset)
+
+    # ------------------------------------------------------------------ moving
+
+    def move(self, ids: Array) -> Array:
+        """Tell the joints where to be in this control step; (n,) bool: in which envs that was told."""
+        for i in ids[self.stage[ids] == Stage.PLANNING].tolist():
+            if self._env.scene.elapsed[i] >= self._questions[i].due:
+                self._answered(i)
+        led = np.isin(self.stage[ids], (Stage.PLANNING, Stage.FOLLOWING))
+        following = ids[self.stage[ids] == Stage.FOLLOWING]
+        if len(following):
+            actual = self._env.scene.state.joint_pos[np.ix_(following, self._chain.joints)]
+            lag = np.abs(self._joints[following] - actual).max(axis=1)
+            for i, behind in zip(following.tolist(), lag.tolist(), strict=True):
+                self._follow(i, behind)
+        return led
+
+    def _follow(self, env: int, lag: float) -> None:
+        path, row = self._paths[env], int(self._row[env])
+        self._waited[env] += 1
+        if row < len(path) and lag < LAG:
+            self._joints[env] = path[row]
+            self._row[env], self._waited[env] = row + 1, 0
+        elif row >= len(path) and lag < NEAR:
+            self.stage[env] = Stage.ARRIVED
+        elif self._waited[env] > PATIENCE:
+            self._fail(env, Outcome.CONTROLLER)
+
+    def _fail(self, env: int, why: Outcome) -> None:
+        self.stage[env], self.failure[env] = Stage.FAILED, OUTCOMES.index(why)
+
+    # ------------------------------------------------------------------ answers
+
+    def _answered(self, env: int) -> None:
+        """Follow the answer, if there is one that still holds; ask again where only the padding was in the way."""
+        question = self._questions.pop(env)
+        answer, request = self._wait(question.future), question.future.request
+        if answer.status is PlanStatus.START_IN_COLLISION and request.padding:
+            self._submit(env, replace(request, padding=0.0), question.then, question.touched)
+            self.planner.service.flush()
+            return
+        why = self._judged(env, question, answer)
+        if why is not None or answer.trajectory is None:
+            self._fail(env, why or Outcome.NO_PATH)
+            return
+        self._paths[env] = self._told(answer.trajectory)
+        self._row[env] = self._waited[env] = 0
+        self.goal[env], self.stage[env] = question.goals[answer.chosen[0]], Stage.FOLLOWING
+
+    def _told(self, trajectory: Trajectory) -> Array:
+        """(S, K) what the joints are told in each control step: ahead by what their drives stay behind."""
+        dt = self._env.engine.world.physics.control_dt
+        steps = dt * np.arange(1, int(np.ceil(trajectory.times[-1] / dt)) + 1)
+        position, velocity = (
+            np.column_stack([np.interp(steps, trajectory.times, column) for column in rows.T])
+            for rows in (trajectory.joint_pos, trajectory.joint_vel)
+        )
+        return np.clip(position + self._behind * velocity, self._chain.lower, self._chain.upper)
+
+    def _wait(self, future: PlanFuture) -> PlanAnswer:
+        """The answer; one that is late is waited for and counted."""
+        service, late, begun = self.planner.service, not future.done, perf_counter()
+        answer = future.result()
+        if late:
+            service.counts.late += 1
+            service.counts.waited += perf_counter() - begun
+        service.harvest(0)  # what is answered need not be kept
+        return answer
+
+    def _judged(self, env: int, question: Question, answer: PlanAnswer) -> Outcome | None:
+        """Why an answer is of no use; None where it is."""
+        if answer.status is PlanStatus.NO_IK:
+            return Outcome.COLLISION if self._reachable(env, question.goals) else Outcome.NO_IK
+        if answer.status is not PlanStatus.OK or answer.trajectory is None:
+            return _OUTCOMES.get(answer.status, Outcome.NO_PATH)
+        request, path = question.future.request, answer.trajectory.joint_pos
+        scenes, state = question.scenes, self._env.scene.state
+        scenes.update(state.body_pose[env][None], self._env.scene.presence[env][None])
+        if scenes.is_stale(0, answer) and not self.planner.checker.is_free(request, scenes.scene(0), path):
+            return Outcome.NO_PATH
+        return None if question.then is None else self._after(env, question, path[-1])
+
+    def _reachable(self, env: int, goals: Array) -> bool:
+        """Whether the arm reaches one of the tool poses (G, 7), free or not."""
+        seeds, base = np.tile(self._chain.initial, (len(goals), 1)), np.tile(self._base(env), (len(goals), 1))
+        keys = np.full(len(goals), self._env.streams.episode_seed[env])
+        found = self._solver.solve(goals, base, seeds, random_restarts=RESTARTS, rng_seeds=keys)
+        return bool(found.converged.any())
+
+    def _after(self, env: int, question: Question, joints: Array) -> Outcome | None:
+        """Why the straight line from joint positions (K,) to the pose after the move cannot be gone."""
+        assert question.then is not None
+        begin, keys = self._chain.tool_pose(self._base(env), joints), np.zeros(1, dtype=np.uint64)
+        reach, turn = P.norm((question.then - begin)[None, :3])[0], 2 * np.pi
+        rows = [joints]
+        for part in np.linspace(0.0, 1.0, LINE_POINTS)[1:]:
+            pose = P.step_toward(begin[None], question.then[None], part * reach, part * turn)
+            found = self._solver.solve(pose, self._base(env)[None], rows[-1][None], random_restarts=0, rng_seeds=keys)
+            if not found.converged[0] or np.abs(found.joint_pos[0] - rows[-1]).max() > JUMP:
+                return Outcome.NO_IK
+            rows.append(found.joint_pos[0])
+        touching = () if question.touched is None else ((self._robot, question.touched),)
+        request = replace(question.future.request, allowed=touching, padding=0.0)
+        free = self.planner.checker.is_free(request, question.scenes.scene(0), np.array(rows))
+        return None if free else Outcome.COLLISION
+
+    def _base(self, env: int) -> Array:
+        return self._env.scene.state.body_pose[env, self._chain.root]
+
+
+def _present(thing: ObjectView | None, ids: Array) -> dict[int, str]:
+    """For each of these envs the name of the entity that an object is."""
+    found = () if thing is None else thing.by_entity(ids)
+    return {int(i): entity.name for entity, own in found for i in own}
+
+
+_OUTCOMES = {PlanStatus.START_IN_COLLISION: Outcome.COLLISION, PlanStatus.TIMEOUT: Outcome.TIMEOUT}
+"""What a planner's failures are for a skill; every other one is that there is no path."""
