@@ -9,20 +9,37 @@ import pytest
 
 from anysim import make
 from anysim.conventions import Array
-from anysim.errors import TaskError
+from anysim.errors import PluginError, TaskError
 from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.phases import STAY
+from anysim.skills.runner import SkillPolicy
+from anysim.task.contract import Status
 from anysim.task.env import TaskEnv
 from anysim_skills.arm import Arm
 from anysim_skills.planning import WORKERS_VARIABLE
+from tests.plugins.skills.test_pick import rollout
 
 WALL = Path(__file__).parent / "worlds/behind_wall.yaml"
+STEPS = 1000
 
 
 def behind_wall(*overrides: str, engine: str = "mujoco", num_envs: int = 2) -> TaskEnv:
     env = make(WALL, engine=engine, num_envs=num_envs, overrides=overrides)
     env.reset(seed=11)
     return env
+
+
+def test_what_is_behind_a_wall_is_fetched_with_a_planner_and_not_without() -> None:
+    for planner, status in (("rrt", Status.SUCCESS), ("", Status.TRUNCATED)):
+        with behind_wall(f"task.expert.planner={planner!r}") as env:
+            policy = SkillPolicy(env)
+            assert rollout(env, policy, STEPS) == [status] * 2
+            assert ("planner" in policy.describe(0)) == bool(planner)
+
+
+def test_records_say_who_has_planned() -> None:
+    with behind_wall() as env:
+        assert SkillPolicy(env).describe(0)["planner"] == {"name": "rrt", "version": "1", "latency": 5}
 
 
 def driven(env: TaskEnv, arm: Arm, steps: int, until: Callable[[], bool] = lambda: False) -> Array:
@@ -124,6 +141,11 @@ def test_one_arm_has_one_planner() -> None:
         asked(env)
         with pytest.raises(TaskError, match="the same planner and latency"):
             Arm.of(env, env.scene.robot("panda"), planner="rrt", latency=9)
+
+
+def test_a_planner_that_is_not_there_is_told() -> None:
+    with behind_wall("task.expert.planner=rtt") as env, pytest.raises(PluginError, match="did you mean 'rrt'"):
+        SkillPolicy(env)
 
 
 @pytest.mark.parametrize("workers", ["0", "two"])

@@ -13,7 +13,9 @@ from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.arm import Arm
-from anysim_skills.grasping.grasp import Metres, Speed
+from anysim_skills.grasping.grasp import PLANNED_STEPS, Metres, Speed
+from anysim_skills.grasping.held import RAISED, turned_about
+from anysim_skills.planning import LATENCY, Latency, PlannerName
 
 STILL = 0.05
 """[m/s] an object that moves slower has come to rest in the air."""
@@ -35,20 +37,46 @@ class Bring(PhasedSkill):
         tolerance: Metres = 0.01,
         hold: Annotated[int, Field(ge=1, description="control steps")] = 10,
         steps: Annotated[int, Field(ge=1, description="control steps that the way may take")] = 400,
+        planner: PlannerName = "",
+        latency: Latency = LATENCY,
     ) -> None:
-        self.arm = Arm.of(env, robot, tool=tool, solver=solver)
+        self.arm = Arm.of(env, robot, tool=tool, solver=solver, planner=planner, latency=latency)
+        self._plans = bool(planner)
         self._object, self._goal, self._speed, self._tolerance = object, goal, speed, tolerance
         self._hold, self._late = hold, steps
         self._held = np.zeros(env.num_envs, dtype=np.int64)
         super().__init__(env, [self.arm])
 
     def make_phases(self) -> Sequence[Phase]:
-        return (Phase("carry", self._enter, self._carry, self._late),)
+        carry = Phase("carry", self._enter, self._carry, self._late)
+        if not self._plans:
+            return (carry,)
+        return (
+            Phase("raise", self._raise, self._raising, self._late),
+            Phase("plan", self._plan, self._planned, PLANNED_STEPS),
+            carry,
+        )
 
     def retry(self, rung: Rung, env: int) -> int | None:
-        """None: what is not held any more has to be grasped again."""
-        del rung, env
-        return None
+        """Another plan; None: what is not held any more has to be grasped again."""
+        return 1 if rung is Rung.REPLAN and self._plans and self.phase[env] == 1 else None
+
+    def _raise(self, ids: Array, at: Array) -> None:
+        """Off what it stands on, so that nothing is touched where the plan begins."""
+        self.arm.take(ids, at, self._object.root)
+        self.arm.go(ids, self.arm.command[ids] + RAISED, self._speed / 2)
+
+    def _raising(self, ids: Array, at: Array) -> Array:
+        held = self.arm.holds(ids, at, self._object.root)
+        return np.where(~held, _UNSTABLE, np.where(self.arm.arrived(ids, at), GO_ON, STAY))
+
+    def _plan(self, ids: Array, at: Array) -> None:
+        goals = turned_about(self.arm.tool.pose[at], self._object.root.position[at], self._goal.position[at])
+        self.arm.plan(ids, goals, held=self._object)
+
+    def _planned(self, ids: Array, at: Array) -> Array:
+        held = self.arm.holds(ids, at, self._object.root)
+        return np.where(held, self.arm.planned(ids), _UNSTABLE)
 
     def _enter(self, ids: Array, at: Array) -> None:
         self.arm.take(ids, at, self._object.root)

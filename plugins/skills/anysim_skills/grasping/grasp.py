@@ -16,12 +16,18 @@ from anysim_skills.arm import Arm
 from anysim_skills.choice import Choice
 from anysim_skills.grasping.candidates import DOWN, TOP_DOWN, across, from_above
 from anysim_skills.object_shapes import ObjectShapes
+from anysim_skills.planning import LATENCY, Latency, PlannerName
 
 ROOM = 0.004
 """[m] the gripper must open wider than the object by this."""
 CLOSING_STEPS = 20
 SETTLED = 0.02
 """[rad/s, m/s] a gripper whose joints are slower has closed on something, or on nothing."""
+
+CHOOSE, PLAN = 1, 2
+"""Phases."""
+PLANNED_STEPS = 500
+"""Control steps that a planned move may take; the planner's limits end it long before."""
 
 Offset = Annotated[
     tuple[float, float, float], Field(description="[m] from the object's origin to the grasp, in the object's frame")
@@ -50,9 +56,12 @@ class Grasp(PhasedSkill):
         speed: Speed = 0.4,
         descend_speed: Speed = 0.2,
         phase_steps: Annotated[int, Field(ge=1, description="control steps that a move may take")] = 150,
+        planner: PlannerName = "",
+        latency: Latency = LATENCY,
     ) -> None:
         """`further` gives what the next command wants of a grasp: candidates that do not reach it are not chosen."""
-        self.arm = Arm.of(env, robot, tool=tool, solver=solver)
+        self.arm = Arm.of(env, robot, tool=tool, solver=solver, planner=planner, latency=latency)
+        self._plans = bool(planner)
         self._object, self._further, self._lift = object, further, lift
         self._speed, self._descend_speed, self._steps = speed, descend_speed, phase_steps
         self._offset = np.array(offset)
@@ -70,6 +79,7 @@ class Grasp(PhasedSkill):
         phases = [
             Phase("back off", self._open, self._backing_off, late),
             Phase("choose", self._choose, self._chosen, 1),
+            *([Phase("plan", self._plan, self._planned, PLANNED_STEPS)] if self._plans else ()),
             Phase("approach", None, self._approach, late),
             Phase("descend", None, self._descend, late),
             Phase("close", self._close, self._closing, CLOSING_STEPS + 1),
@@ -81,12 +91,15 @@ class Grasp(PhasedSkill):
     def start(self, env_ids: Array) -> None:
         super().start(env_ids)
         self._choice.again(env_ids)
-        self.phase[env_ids] = 1
+        self.phase[env_ids] = CHOOSE
 
     def retry(self, rung: Rung, env: int) -> int | None:
-        """The next candidate where one is left; else away from the object, and all of them again."""
+        """Another plan; the next candidate where one is left; else away from the object, and all of them again."""
+        planning = self._plans and self.phase[env] == PLAN
+        if rung is Rung.REPLAN and planning:
+            return PLAN
         if rung is Rung.CANDIDATE and self._choice.next(env):
-            return 0
+            return CHOOSE if planning else 0
         if rung is Rung.BACK_OFF:
             self._choice.again(env)
             return 0
@@ -128,6 +141,14 @@ class Grasp(PhasedSkill):
 
     def _grasp(self, ids: Array, at: Array) -> Array:
         return np.concatenate([self._place(at), self.turn[ids]], axis=1)
+
+    def _plan(self, ids: Array, at: Array) -> None:
+        grasp = self._grasp(ids, at)
+        self.arm.plan(ids, (grasp + self._back)[:, None], then=grasp, touched=self._object)
+
+    def _planned(self, ids: Array, at: Array) -> Array:
+        del at
+        return self.arm.planned(ids)
 
     def _approach(self, ids: Array, at: Array) -> Array:
         self.arm.go(ids, self._grasp(ids, at) + self._back, self._speed)

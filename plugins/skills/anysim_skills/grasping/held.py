@@ -13,6 +13,10 @@ from anysim.task.scene import ObjectView
 from anysim_skills.arm import Arm
 from anysim_skills.grasping.release import OPENING_STEPS
 
+RAISED = np.array([0.0, 0.0, 0.03, 0.0, 0.0, 0.0, 0.0])
+"""[m] up from what it stands on an object is brought before its way is planned."""
+TURNS = np.pi / 2 * np.arange(4)
+"""[rad] about the vertical that an object which is brought somewhere may be turned by."""
 RESTING = 0.03
 """[m/s, rad/s] what moves slower has come to rest."""
 
@@ -24,6 +28,19 @@ class Moves(NamedTuple):
     lower_speed: float
     retreat: float
     steps: int
+
+
+def turned_about(tool: Array, thing: Array, place: Array) -> Array:
+    """Tool poses (n, G, 7) that bring a held thing (n, 3) to a place (n, 3), of tools (n, 7): turned by each of TURNS.
+
+    The first is not turned.
+    """
+    turns = np.zeros((1, len(TURNS), 4))
+    turns[0, :, 2], turns[0, :, 3] = np.sin(TURNS / 2), np.cos(TURNS / 2)
+    turns = np.repeat(turns, len(tool), axis=0)
+    offset = np.repeat((tool[:, :3] - thing)[:, None], len(TURNS), axis=1)
+    rotation = P.multiply(turns, np.repeat(tool[:, None, 3:], len(TURNS), axis=1))
+    return np.concatenate([place[:, None] + P.rotate(turns, offset), rotation], axis=-1)
 
 
 class PutsDown(PhasedSkill):

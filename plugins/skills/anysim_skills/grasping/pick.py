@@ -11,6 +11,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.grasping.bring import Bring
 from anysim_skills.grasping.grasp import Grasp, Metres, Speed
+from anysim_skills.planning import LATENCY, Latency, PlannerName
 
 
 class Pick(SkillSequence):
@@ -30,6 +31,8 @@ class Pick(SkillSequence):
         descend_speed: Speed = 0.2,
         max_attempts: Annotated[int, Field(ge=1)] = 3,
         phase_steps: Annotated[int, Field(ge=1)] = 150,
+        planner: PlannerName = "",
+        latency: Latency = LATENCY,
     ) -> None:
         """`hover` [m] is the height of the approach; `phase_steps` bounds each move [control steps]."""
 
@@ -40,6 +43,7 @@ class Pick(SkillSequence):
             return poses
 
         arm = {"robot": robot, "object": object, "tool": tool, "solver": solver, "speed": speed}
+        arm |= {"planner": planner, "latency": latency}
         grasp = Grasp(env, at_goal, **arm, hover=hover, lift=0.0, descend_speed=descend_speed, phase_steps=phase_steps)
         super().__init__(
             env,

@@ -11,6 +11,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.grasping.grasp import Grasp, Metres, Speed
 from anysim_skills.grasping.place import Place
+from anysim_skills.planning import LATENCY, Latency, PlannerName
 
 
 class PickPlace(SkillSequence):
@@ -30,6 +31,8 @@ class PickPlace(SkillSequence):
         above: Annotated[float, Field(gt=0, description="[m] over the place on the way there and back")] = 0.06,
         tolerance: Annotated[float, Field(gt=0, description="[m] horizontally, once it rests")] = 0.03,
         max_attempts: Annotated[int, Field(ge=1)] = 3,
+        planner: PlannerName = "",
+        latency: Latency = LATENCY,
     ) -> None:
         def over_target(ids: Array, at: Array, grasps: Array) -> Array:
             """Candidates have to reach the place too."""
@@ -39,6 +42,7 @@ class PickPlace(SkillSequence):
             return poses
 
         arm = {"robot": robot, "object": object, "tool": tool, "solver": solver, "speed": speed}
+        arm |= {"planner": planner, "latency": latency}
         members = {
             "grasp": Grasp(env, over_target, **arm, hover=hover, lift=0.0),
             "place": Place(env, **arm, target=target, above=above, retreat=max(above, 0.1), tolerance=tolerance),

@@ -13,9 +13,10 @@ from anysim.skills.phases import GO_ON, STAY, Phase, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.arm import Arm
-from anysim_skills.grasping.grasp import Metres, Speed
-from anysim_skills.grasping.held import RESTING, Moves, PutsDown
+from anysim_skills.grasping.grasp import PLANNED_STEPS, Metres, Speed
+from anysim_skills.grasping.held import RAISED, RESTING, Moves, PutsDown, turned_about
 from anysim_skills.object_shapes import ObjectShapes
+from anysim_skills.planning import LATENCY, Latency, PlannerName
 
 GENTLE = 0.015
 """[m] lead of the command while the object is put down: it bounds the force on what is below."""
@@ -41,16 +42,24 @@ class Place(PutsDown):
         tolerance: Annotated[float, Field(gt=0, description="[m] horizontally, once it rests")] = 0.03,
         retreat: Metres = 0.1,
         steps: Annotated[int, Field(ge=1, description="control steps that a move may take")] = 200,
+        planner: PlannerName = "",
+        latency: Latency = LATENCY,
     ) -> None:
         self._target, self._above, self._align, self._tolerance = target, above, align, tolerance
         self._height = np.zeros(env.num_envs)
         self._shapes = ObjectShapes(env.scene, object)
         self._support = env.scene.entity_shape(target.name.partition(".")[0]) if _is_entity(env, target) else None
-        arm = Arm.of(env, robot, tool=tool, solver=solver)
+        self._plans = bool(planner)
+        arm = Arm.of(env, robot, tool=tool, solver=solver, planner=planner, latency=latency)
         super().__init__(env, arm, object, Moves(speed, lower_speed, retreat, steps))
 
     def make_phases(self) -> Sequence[Phase]:
+        planned = (
+            Phase("raise", self._raise, self._raising, self.moves.steps),
+            Phase("plan", self._plan, self._planned, PLANNED_STEPS),
+        )
         return (
+            *(planned if self._plans else ()),
             Phase("transport", self._measure, self._transport, self.moves.steps),
             Phase("align", None, self._aligning, 60),
             Phase("lower", None, self._lowering, self.moves.steps),
@@ -59,11 +68,27 @@ class Place(PutsDown):
         )
 
     def retry(self, rung: Rung, env: int) -> int | None:
-        """None: what is not held any more has to be grasped again."""
-        del rung, env
-        return None
+        """Another plan; None: what is not held any more has to be grasped again."""
+        return 1 if rung is Rung.REPLAN and self._plans and self.phase[env] == 1 else None
 
     # ------------------------------------------------------------------ phases
+
+    def _raise(self, ids: Array, at: Array) -> None:
+        """Off what it stands on, so that nothing is touched where the plan begins."""
+        self._measure(ids, at)
+        self.arm.go(ids, self.arm.command[ids] + RAISED, self.moves.speed / 2)
+
+    def _raising(self, ids: Array, at: Array) -> Array:
+        return self.held(ids, at, np.where(self.arm.arrived(ids, at), GO_ON, STAY))
+
+    def _plan(self, ids: Array, at: Array) -> None:
+        place = self._target.position[at].copy()
+        place[:, 2] += self._height[ids] + self._above
+        goals = turned_about(self.arm.tool.pose[at], self.object.root.position[at], place)
+        self.arm.plan(ids, goals, held=self.object)
+
+    def _planned(self, ids: Array, at: Array) -> Array:
+        return self.held(ids, at, self.arm.planned(ids))
 
     def _measure(self, ids: Array, at: Array) -> None:
         """How high the object's origin is to be above the target's when it rests there."""
