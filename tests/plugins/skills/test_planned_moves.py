@@ -15,6 +15,7 @@ from anysim.skills.phases import STAY
 from anysim.skills.runner import SkillPolicy
 from anysim.task.contract import Status
 from anysim.task.env import TaskEnv
+from anysim.testing.engines import require_engine
 from anysim_skills.arm import Arm
 from anysim_skills.planning import WORKERS_VARIABLE
 from tests.plugins.skills.test_pick import rollout
@@ -35,6 +36,14 @@ def test_what_is_behind_a_wall_is_fetched_with_a_planner_and_not_without() -> No
             policy = SkillPolicy(env)
             assert rollout(env, policy, STEPS) == [status] * 2
             assert ("planner" in policy.describe(0)) == bool(planner)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["pybullet", "sapien"])
+def test_it_is_fetched_on_the_other_engines(engine: str) -> None:
+    require_engine(engine)
+    with behind_wall(engine=engine, num_envs=4) as env:
+        assert rollout(env, SkillPolicy(env), STEPS).count(Status.SUCCESS) >= 3
 
 
 def test_records_say_who_has_planned() -> None:
