@@ -61,6 +61,14 @@ class Bring(PhasedSkill):
         """Another plan; None: what is not held any more has to be grasped again."""
         return 1 if rung is Rung.REPLAN and self._plans and self.phase[env] == 1 else None
 
+    def wanted(self, ids: Array, at: Array, grasps: Array) -> Array:
+        """Tool poses (n, g, 1, 7) that bring the object to the goal in grasps (n, g, 7)."""
+        del ids
+        poses = grasps[:, :, None].copy()
+        held = poses[..., :3] - self._object.root.position[at][:, None, None]
+        poses[..., :3] = self._goal.position[at][:, None, None] + held
+        return poses
+
     def _raise(self, ids: Array, at: Array) -> None:
         """Off what it stands on, so that nothing is touched where the plan begins."""
         self.arm.take(ids, at, self._object.root)

@@ -1,7 +1,7 @@
 """Grasp: close the gripper on an object, and lift it."""
 
-from collections.abc import Callable, Sequence
-from typing import Annotated
+from collections.abc import Sequence
+from typing import Annotated, Protocol
 
 import numpy as np
 from pydantic import Field
@@ -34,8 +34,14 @@ Offset = Annotated[
 ]
 Metres = Annotated[float, Field(gt=0, description="[m]")]
 Speed = Annotated[float, Field(gt=0, description="[m/s] of the tool")]
-Further = Callable[[Array, Array, Array], Array]
-"""Of envs (n,), their rows in the scene (n,) and grasps (n, g, 7): more tool poses (n, g, m, 7) to be reached."""
+
+
+class TakesOver(Protocol):
+    """A skill that goes on with what a grasp holds."""
+
+    def wanted(self, ids: Array, at: Array, grasps: Array) -> Array:
+        """Tool poses (n, g, m, 7) that it will need, of envs (n,), their rows in the scene and grasps (n, g, 7)."""
+        ...
 
 
 class Grasp(PhasedSkill):
@@ -44,7 +50,7 @@ class Grasp(PhasedSkill):
     def __init__(
         self,
         env: TaskEnv,
-        further: Further | None = None,
+        then: TakesOver | None = None,
         *,
         robot: RobotView,
         object: ObjectView,
@@ -59,10 +65,10 @@ class Grasp(PhasedSkill):
         planner: PlannerName = "",
         latency: Latency = LATENCY,
     ) -> None:
-        """`further` gives what the next command wants of a grasp: candidates that do not reach it are not chosen."""
+        """`then` is what comes next: a candidate with which that cannot be done is not chosen."""
         self.arm = Arm.of(env, robot, tool=tool, solver=solver, planner=planner, latency=latency)
         self._plans = bool(planner)
-        self._object, self._further, self._lift = object, further, lift
+        self._object, self._then, self._lift = object, then, lift
         self._speed, self._descend_speed, self._steps = speed, descend_speed, phase_steps
         self._offset = np.array(offset)
         self._back = np.array([*(-hover * DOWN), 0.0, 0.0, 0.0, 0.0])
@@ -121,8 +127,8 @@ class Grasp(PhasedSkill):
         grasps, widths = from_above(self._object.root.pose[at]), across(self._shapes.size(ids))
         grasps[..., :3] = self._place(at)[:, None]
         targets = np.stack([grasps + self._back, grasps], axis=2)
-        if self._further is not None:
-            targets = np.concatenate([targets, self._further(ids, at, grasps)], axis=2)
+        if self._then is not None:
+            targets = np.concatenate([targets, self._then.wanted(ids, at, grasps)], axis=2)
         n, g, m = targets.shape[:3]
         effort = self.arm.reach(ids, targets.reshape(n, g * m, 7))[1].reshape(n, g, m).max(axis=2)
         effort[widths > self.arm.aperture - ROOM] = np.inf

@@ -34,9 +34,10 @@ class Handover(SkillSequence):
         max_attempts: Annotated[int, Field(ge=1)] = 3,
     ) -> None:
         both = {"object": object, "tool": tool, "solver": solver}
+        hold_out = Bring(env, **both, robot=robot, goal=meeting, speed=speed)
         members = {
-            "grasp": Grasp(env, **both, robot=robot, offset=give, hover=hover, lift=0.05, speed=speed),
-            "hold out": Bring(env, **both, robot=robot, goal=meeting, speed=speed),
+            "grasp": Grasp(env, hold_out, **both, robot=robot, offset=give, hover=hover, lift=0.05, speed=speed),
+            "hold out": hold_out,
             "take": Grasp(env, **both, robot=receiver, offset=take, hover=hover, lift=0.0, speed=speed),
             "let go": Release(env, robot=robot, tool=tool, solver=solver, retreat=retreat),
         }

@@ -4,7 +4,6 @@ from typing import Annotated
 
 from pydantic import Field
 
-from anysim.conventions import Array
 from anysim.skills.base import Outcome
 from anysim.skills.sequence import SkillSequence
 from anysim.task.env import TaskEnv
@@ -35,19 +34,13 @@ class Pick(SkillSequence):
         latency: Latency = LATENCY,
     ) -> None:
         """`hover` [m] is the height of the approach; `phase_steps` bounds each move [control steps]."""
-
-        def at_goal(ids: Array, at: Array, grasps: Array) -> Array:
-            del ids
-            poses = grasps[:, :, None].copy()
-            poses[..., :3] = goal.position[at][:, None, None]
-            return poses
-
         arm = {"robot": robot, "object": object, "tool": tool, "solver": solver, "speed": speed}
         arm |= {"planner": planner, "latency": latency}
-        grasp = Grasp(env, at_goal, **arm, hover=hover, lift=0.0, descend_speed=descend_speed, phase_steps=phase_steps)
+        bring = Bring(env, **arm, goal=goal)
+        grasp = Grasp(env, bring, **arm, hover=hover, lift=0.0, descend_speed=descend_speed, phase_steps=phase_steps)
         super().__init__(
             env,
-            {"grasp": grasp, "bring": Bring(env, **arm, goal=goal)},
+            {"grasp": grasp, "bring": bring},
             back={("bring", Outcome.UNSTABLE_GRASP): "grasp"},
             max_attempts=max_attempts,
         )

@@ -4,7 +4,6 @@ from typing import Annotated
 
 from pydantic import Field
 
-from anysim.conventions import Array
 from anysim.skills.base import Outcome
 from anysim.skills.sequence import SkillSequence
 from anysim.task.env import TaskEnv
@@ -34,18 +33,9 @@ class PickPlace(SkillSequence):
         planner: PlannerName = "",
         latency: Latency = LATENCY,
     ) -> None:
-        def over_target(ids: Array, at: Array, grasps: Array) -> Array:
-            """Candidates have to reach the place too."""
-            del ids
-            poses = grasps[:, :, None].copy()
-            poses[..., :2] = target.position[at][:, None, None, :2]
-            return poses
-
         arm = {"robot": robot, "object": object, "tool": tool, "solver": solver, "speed": speed}
         arm |= {"planner": planner, "latency": latency}
-        members = {
-            "grasp": Grasp(env, over_target, **arm, hover=hover, lift=0.0),
-            "place": Place(env, **arm, target=target, above=above, retreat=max(above, 0.1), tolerance=tolerance),
-        }
+        place = Place(env, **arm, target=target, above=above, retreat=max(above, 0.1), tolerance=tolerance)
+        members = {"grasp": Grasp(env, place, **arm, hover=hover, lift=0.0), "place": place}
         again = {("place", why): "grasp" for why in (Outcome.UNSTABLE_GRASP, Outcome.LOST)}
         super().__init__(env, members, back=again, max_attempts=max_attempts)

@@ -71,6 +71,14 @@ class Place(PutsDown):
         """Another plan; None: what is not held any more has to be grasped again."""
         return 1 if rung is Rung.REPLAN and self._plans and self.phase[env] == 1 else None
 
+    def wanted(self, ids: Array, at: Array, grasps: Array) -> Array:
+        """Tool poses (n, g, 1, 7) over the target in grasps (n, g, 7), no higher than these."""
+        del ids
+        poses = grasps[:, :, None].copy()
+        held = poses[..., :2] - self.object.root.position[at, :2][:, None, None]
+        poses[..., :2] = self._target.position[at, :2][:, None, None] + held
+        return poses
+
     # ------------------------------------------------------------------ phases
 
     def _raise(self, ids: Array, at: Array) -> None:

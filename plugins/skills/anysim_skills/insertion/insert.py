@@ -75,8 +75,8 @@ class Insert(PutsDown):
 
     # ------------------------------------------------------------------ where the tip is, and is to be
 
-    def _goal(self, at: Array, offset: Array) -> Array:
-        """Tool poses (n, 7) with the object along the hole's axis and the tip at offsets (n, 3) from the mouth."""
+    def _fitting(self, at: Array, offset: Array) -> Array:
+        """Poses (n, 7) of the object along the hole's axis, with the tip at offsets (n, 3) from the mouth."""
         thing, mouth, tip = self.object.root.pose[at], self._mouth.pose[at], self._tip.pose[at]
         seen = P.multiply(P.conjugate(mouth[:, 3:]), thing[:, 3:])
         yaw = 2.0 * np.arctan2(seen[:, 2], seen[:, 3])
@@ -86,8 +86,20 @@ class Insert(PutsDown):
         turn = P.multiply(mouth[:, 3:], np.stack([zero, zero, np.sin(half), np.cos(half)], axis=1))
         point = mouth[:, :3] + P.rotate(mouth[:, 3:], offset)
         to_tip = P.compose(P.inverse(thing), tip)[:, :3]
-        wanted = np.concatenate([point - P.rotate(turn, to_tip), turn], axis=1)
-        return P.compose(wanted, P.compose(P.inverse(thing), self.arm.tool.pose[at]))
+        return np.concatenate([point - P.rotate(turn, to_tip), turn], axis=1)
+
+    def _goal(self, at: Array, offset: Array) -> Array:
+        """Tool poses (n, 7) with the object along the hole's axis and the tip at offsets (n, 3) from the mouth."""
+        held = P.compose(P.inverse(self.object.root.pose[at]), self.arm.tool.pose[at])
+        return P.compose(self._fitting(at, offset), held)
+
+    def wanted(self, ids: Array, at: Array, grasps: Array) -> Array:
+        """Tool poses (n, g, 2, 7) over the mouth and at the hole's end, in grasps (n, g, 7)."""
+        over, inside = np.zeros((2, len(ids), 3))
+        over[:, 2], inside[:, 2] = 2 * self._above, -P.norm(self._hole.position[at] - self._mouth.position[at])
+        held = P.compose(P.inverse(self.object.root.pose[at])[:, None], grasps)
+        ends = [P.compose(self._fitting(at, offset)[:, None], held) for offset in (over, inside)]
+        return np.stack(ends, axis=2)
 
     def _found(self, at: Array) -> Array:
         """(n, 3) the tip in the mouth's frame: z is below zero inside of the hole."""

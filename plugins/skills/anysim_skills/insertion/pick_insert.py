@@ -33,9 +33,7 @@ class PickInsert(SkillSequence):
         max_attempts: Annotated[int, Field(ge=1)] = 3,
     ) -> None:
         arm = {"robot": robot, "object": object, "tool": tool, "solver": solver, "speed": speed}
-        members = {
-            "grasp": Grasp(env, **arm, offset=offset, hover=hover, lift=0.0),
-            "insert": Insert(env, **arm, tip=tip, hole=hole, mouth=mouth, symmetry=symmetry),
-        }
+        insert = Insert(env, **arm, tip=tip, hole=hole, mouth=mouth, symmetry=symmetry)
+        members = {"grasp": Grasp(env, insert, **arm, offset=offset, hover=hover, lift=0.0), "insert": insert}
         again = {("insert", why): "grasp" for why in (Outcome.UNSTABLE_GRASP, Outcome.LOST)}
         super().__init__(env, members, back=again, max_attempts=max_attempts)
