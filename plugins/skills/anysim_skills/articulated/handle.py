@@ -7,7 +7,6 @@ import numpy as np
 from pydantic import Field
 
 from anysim.conventions import Array
-from anysim.errors import TaskError
 from anysim.math import pose as P
 from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.phases import FIRST_RUNGS, GO_ON, STAY, Phase, PhasedSkill, Rung
@@ -57,11 +56,9 @@ class AtHandle(PhasedSkill):
         lead: Annotated[float, Field(gt=0, description="[m] the command is at most this far ahead of the hand")] = 0.05,
         steps: Annotated[int, Field(ge=1, description="control steps that a move may take")] = 200,
     ) -> None:
-        if len(part.found) > 1:
-            raise TaskError(f"'{part.name}' is a joint of several objects; a handle is found on one alone")
         self.arm = Arm.of(env, robot, tool=tool, solver=solver)
         self.part = Part(env.scene, part)
-        self.handle = env.scene.frame(f"{env.engine.world.bodies[self.part.body].name}.handle")
+        self.handle = self.part.handle()
         self.speed, self.part_speed, self.lead, self.late = speed, part_speed, lead, steps
         n = env.num_envs
         self._choice = Choice(n, len(TURNS))
