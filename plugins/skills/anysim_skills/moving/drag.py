@@ -1,0 +1,48 @@
+"""Drag: grasp an object, and slide it across its support to a goal without lifting it."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from anysim.conventions import Array
+from anysim.skills.base import Outcome
+from anysim.skills.sequence import SkillSequence
+from anysim.task.env import TaskEnv
+from anysim.task.scene import Frame, ObjectView, RobotView
+from anysim_skills.grasping.grasp import Grasp, Metres, Offset, Speed
+from anysim_skills.moving.slide import Slide
+
+
+class Drag(SkillSequence):
+    """Grasp `object` with `robot` where it lies and slide it to `goal`, horizontally; what is lost is grasped again."""
+
+    def __init__(
+        self,
+        env: TaskEnv,
+        *,
+        robot: RobotView,
+        object: ObjectView,
+        goal: Frame,
+        tool: str = "tool",
+        solver: str = "numba_ik",
+        offset: Offset = (0.0, 0.0, 0.0),
+        hover: Metres = 0.1,
+        tolerance: Metres = 0.01,
+        speed: Speed = 0.4,
+        slide_speed: Speed = 0.12,
+        max_attempts: Annotated[int, Field(ge=1)] = 3,
+    ) -> None:
+
+        def at_goal(ids: Array, at: Array, grasps: Array) -> Array:
+            del ids
+            poses = grasps[:, :, None].copy()
+            poses[..., :2] = goal.position[at][:, None, None, :2]
+            return poses
+
+        arm = {"robot": robot, "object": object, "tool": tool, "solver": solver, "speed": speed}
+        members = {
+            "grasp": Grasp(env, at_goal, **arm, offset=offset, hover=hover, lift=0.0),
+            "slide": Slide(env, **arm, goal=goal, tolerance=tolerance, slide_speed=slide_speed),
+        }
+        again = {("slide", why): "grasp" for why in (Outcome.UNSTABLE_GRASP, Outcome.LOST)}
+        super().__init__(env, members, back=again, max_attempts=max_attempts)
