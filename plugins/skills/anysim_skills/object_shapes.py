@@ -28,6 +28,11 @@ class ObjectShapes:
         which = self._which(ids)
         return self._high[which] - self._low[which]
 
+    def box(self, ids: Array) -> tuple[Array, Array]:
+        """Its lowest and highest corners (n, 3) [m] in its own frame."""
+        which = self._which(ids)
+        return self._low[which], self._high[which]
+
     def radius(self, ids: Array) -> Array:
         """(n,) [m] how far it reaches from its origin along its own x or y."""
         which = self._which(ids)
