@@ -1,0 +1,166 @@
+"""A base on wheels as skills drive it: a pose on the ground to go to in each env, straight and turning in free space.
+
+A base that moves to all sides goes straight to its goal while it turns. One with a differential drive turns towards the
+goal, drives there, and turns again. Obstacles are not seen.
+"""
+
+from typing import NamedTuple, Self
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.errors import TaskError, listing
+from anysim.math import pose as P
+from anysim.task.env import TaskEnv
+from anysim.task.scene import RobotView
+
+HOLONOMIC, DIFFERENTIAL = ("forward", "left", "turn"), ("speed", "turn")
+"""Components of the actions that it can give."""
+TOWARDS, ALONG, ROUND = range(3)
+"""What a differential base does: it turns towards its goal, drives, or turns at the goal."""
+ALIGNED = np.deg2rad(2.0)
+"""[rad] a differential base that looks past its goal by less drives."""
+GAIN = 4.0
+"""[1/s] of what is left, near the goal."""
+BACKWARDS = 0.3
+"""[m] what lies behind a differential base and is not further away is reached backwards."""
+
+_BASES: WeakKeyDictionary[TaskEnv, dict[tuple[str, str, str], "Base"]] = WeakKeyDictionary()
+
+
+class Pace(NamedTuple):
+    """How fast a base goes: [m/s], [rad/s], and how it brakes [m/s^2], [rad/s^2]."""
+
+    speed: float = 0.6
+    rate: float = 1.2
+    braking: float = 0.4
+    turn_braking: float = 1.0
+
+
+class Base:
+    """The base of a robot in all envs.
+
+    Attributes:
+        frame: the frame that is moved.
+        target: (N, 3) where it is to go: x, y [m] and yaw [rad] in the world.
+        pace: how fast.
+        close: [m] from there the rest of the way is not worth another turn.
+    """
+
+    def __init__(self, env: TaskEnv, robot: RobotView, channel: str, link: str) -> None:
+        self.env = env
+        self.frame = env.scene.frame(f"{robot.name}.{link}") if link else robot.base
+        self._slice = env.actions.slice_of(robot.name, channel)
+        labels = tuple(self._slice.controller.labels)
+        if labels not in (HOLONOMIC, DIFFERENTIAL):
+            known = listing([f"({', '.join(names)})" for names in (HOLONOMIC, DIFFERENTIAL)])
+            raise TaskError(
+                f"the base of '{robot.name}' takes ({', '.join(labels)}) by the controller of '{channel}'; expected "
+                f"one of {known}, as of holonomic_drive, planar_drive and differential_drive"
+            )
+        self._sideways = labels == HOLONOMIC
+        self.target = np.zeros((env.num_envs, 3))
+        self.pace, self.close = Pace(), 0.01
+        self._fresh = np.ones(env.num_envs, dtype=bool)
+        self._mode = np.zeros(env.num_envs, dtype=np.int64)
+        self._ahead = np.ones(env.num_envs)
+        """(N,) 1 where the base drives forwards, -1 backwards."""
+
+    @classmethod
+    def of(cls, env: TaskEnv, robot: RobotView, *, channel: str = "base", link: str = "") -> Self:
+        """The base of an env, shared by all skills that drive it.
+
+        Raises:
+            TaskError: the channel has no controller, or one that drives no base.
+        """
+        bases = _BASES.setdefault(env, {})
+        key = (robot.name, channel, link)
+        if key not in bases:
+            bases[key] = cls(env, robot, channel, link)
+        return bases[key]  # pyright: ignore[reportReturnType]
+
+    def renew(self, ids: Array) -> None:
+        """These envs have just been reset."""
+        self._fresh[ids] = True
+
+    def prepare(self, ids: Array) -> None:
+        """Stay where the base is, in envs that have been reset; the scene looks at `ids`."""
+        fresh = self._fresh[ids]
+        if fresh.any():
+            self.target[ids[fresh]] = self.pose(np.flatnonzero(fresh))
+            self._mode[ids[fresh]] = ROUND
+            self._fresh[ids] = False
+
+    def pose(self, at: Array) -> Array:
+        """(n, 3) x, y [m] and yaw [rad]; `at` are rows of the scene."""
+        pose = self.frame.pose[at]
+        return np.concatenate([pose[:, :2], yaw_of(pose[:, 3:])[:, None]], axis=1)
+
+    def go(self, ids: Array, target: Array) -> None:
+        """Go to x, y, yaw (n, 3)."""
+        self.target[ids], self._mode[ids] = target, TOWARDS
+
+    def left(self, ids: Array, at: Array) -> tuple[Array, Array]:
+        """(n,) [m] and (n,) [rad] that are left of the way."""
+        now, target = self.pose(at), self.target[ids]
+        return P.norm(target[:, :2] - now[:, :2]), np.abs(wrapped(target[:, 2] - now[:, 2]))
+
+    def speed(self, at: Array) -> tuple[Array, Array]:
+        """(n,) [m/s] over the ground and (n,) [rad/s] about the vertical."""
+        twist = self.frame.twist[at]
+        return P.norm(twist[:, :2]), np.abs(twist[:, 5])
+
+    def act(self, ids: Array, action: Array) -> None:
+        """Write the action of these envs, which the scene looks at."""
+        now = self.pose(np.arange(len(ids)))
+        way = self.target[ids, :2] - now[:, :2]
+        turn = wrapped(self.target[ids, 2] - now[:, 2])
+        cosine, sine = np.cos(now[:, 2]), np.sin(now[:, 2])
+        forward, aside = cosine * way[:, 0] + sine * way[:, 1], cosine * way[:, 1] - sine * way[:, 0]
+        drive = self._straight if self._sideways else self._turning
+        action[ids, self._slice.start : self._slice.stop] = drive(ids, forward, aside, turn)
+
+    def _straight(self, ids: Array, forward: Array, aside: Array, turn: Array) -> Array:
+        del ids
+        distance = np.hypot(forward, aside)
+        share = self._velocity(distance) / np.maximum(distance, 1e-9)
+        return np.stack([share * forward, share * aside, self._rate(turn)], axis=1)
+
+    def _turning(self, ids: Array, forward: Array, aside: Array, turn: Array) -> Array:
+        distance, mode = np.hypot(forward, aside), self._mode[ids]
+        far = distance > self.close
+        fresh = (mode == TOWARDS) & far
+        behind = (forward < 0) & (distance < BACKWARDS)
+        self._ahead[ids[fresh]] = np.where(behind, -1.0, 1.0)[fresh]
+        ahead = self._ahead[ids]
+        bearing = np.arctan2(ahead * aside, ahead * forward)
+        mode = np.where(fresh & (np.abs(bearing) < ALIGNED), ALONG, mode)
+        mode = np.where((mode == TOWARDS) & ~far, ROUND, mode)
+        passed = (mode == ALONG) & (ahead * forward < 0.25 * self.close)
+        mode = np.where(passed, np.where(far, TOWARDS, ROUND), mode)
+        self._mode[ids] = mode
+        steer = np.where(distance > 0.1, GAIN * np.clip(bearing, -0.3, 0.3), 0.0)
+        speed = np.where(mode == ALONG, ahead * self._velocity(np.maximum(ahead * forward, 0.0)), 0.0)
+        rate = np.where(mode == ALONG, steer, self._rate(np.where(mode == TOWARDS, bearing, turn)))
+        return np.stack([speed, rate], axis=1)
+
+    def _velocity(self, distance: Array) -> Array:
+        braking = np.sqrt(2 * self.pace.braking * distance)
+        return np.minimum(np.minimum(self.pace.speed, braking), GAIN * distance)
+
+    def _rate(self, angle: Array) -> Array:
+        size = np.abs(angle)
+        braking = np.sqrt(2 * self.pace.turn_braking * size)
+        return np.sign(angle) * np.minimum(np.minimum(self.pace.rate, braking), GAIN * size)
+
+
+def yaw_of(quaternion: Array) -> Array:
+    """(n,) [rad] the direction of the frame's x axis over the ground."""
+    x, y, z, w = np.moveaxis(quaternion, -1, 0)
+    return np.arctan2(2 * (x * y + z * w), 1 - 2 * (y * y + z * z))
+
+
+def wrapped(angle: Array) -> Array:
+    """The same angles within [-pi, pi)."""
+    return (angle + np.pi) % (2 * np.pi) - np.pi

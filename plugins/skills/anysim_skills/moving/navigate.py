@@ -1,0 +1,102 @@
+"""Navigate: drive a base to a pose on the ground, and stop there."""
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from anysim.conventions import Array
+from anysim.skills.base import OUTCOMES, Outcome
+from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
+from anysim.task.env import TaskEnv
+from anysim.task.scene import Frame, RobotView
+from anysim_skills.grasping.grasp import Metres
+from anysim_skills.moving.base import Base, Pace, yaw_of
+
+HELD_UP = 75
+"""Control steps in which a base that is not at its goal has neither come nearer nor turned: something holds it."""
+NEARER = 0.01
+"""[m, rad] what counts as nearer."""
+STOPPED = 0.02
+"""[m/s, rad/s]"""
+
+
+class Navigate(PhasedSkill):
+    """Drive the base of `robot` to x, y and yaw of `goal` in free space, within `tolerance` and `angle`, and stop.
+
+    A base that is held up fails with `controller`; it backs off once and tries again.
+    """
+
+    def __init__(
+        self,
+        env: TaskEnv,
+        *,
+        robot: RobotView,
+        goal: Frame,
+        channel: str = "base",
+        link: Annotated[str, Field(description="of the robot, that is driven there; its own frame where empty")] = "",
+        heading: Annotated[bool, Field(description="whether the yaw of the goal counts")] = True,
+        tolerance: Metres = 0.02,
+        angle: Annotated[float, Field(gt=0, description="[rad]")] = 0.035,
+        speed: Annotated[float, Field(gt=0, description="[m/s]")] = 0.6,
+        rate: Annotated[float, Field(gt=0, description="[rad/s]")] = 1.2,
+        back_off: Metres = 0.2,
+        steps: Annotated[int, Field(ge=1, description="control steps that the way may take")] = 1500,
+    ) -> None:
+        self.base = Base.of(env, robot, channel=channel, link=link)
+        self._goal, self._heading, self._back = goal, heading, back_off
+        self._tolerance, self._angle, self._late = tolerance, angle, steps
+        self._pace = Pace(speed, rate)
+        self._best, self._nearest = np.zeros(env.num_envs), np.zeros(env.num_envs, dtype=np.int64)
+        """The least that was left of the way, and the step in which it was."""
+        super().__init__(env, [self.base])
+
+    def make_phases(self) -> Sequence[Phase]:
+        return (Phase("back off", self._away, self._backing, 150), Phase("drive", self._enter, self._drive, self._late))
+
+    def start(self, env_ids: Array) -> None:
+        super().start(env_ids)
+        self.phase[env_ids] = 1
+
+    def retry(self, rung: Rung, env: int) -> int | None:
+        """Back from what holds the base, once."""
+        del env
+        return 0 if rung is Rung.BACK_OFF else None
+
+    def _away(self, ids: Array, at: Array) -> None:
+        now = self.base.pose(at)
+        now[:, 0] -= self._back * np.cos(now[:, 2])
+        now[:, 1] -= self._back * np.sin(now[:, 2])
+        self.base.go(ids, now)
+
+    def _backing(self, ids: Array, at: Array) -> Array:
+        return np.where((self.base.left(ids, at)[0] < 0.05) | (self.steps[ids] >= 100), GO_ON, STAY)
+
+    def _enter(self, ids: Array, at: Array) -> None:
+        self.base.pace, self.base.close = self._pace, 0.5 * self._tolerance
+        self.base.go(ids, self._wanted(at))
+        self._best[ids], self._nearest[ids] = np.inf, 0
+
+    def _wanted(self, at: Array) -> Array:
+        goal = self._goal.pose[at]
+        if self._heading:
+            yaw = yaw_of(goal[:, 3:])
+        else:
+            way = goal[:, :2] - self.base.pose(at)[:, :2]
+            yaw = np.arctan2(way[:, 1], way[:, 0])
+        return np.concatenate([goal[:, :2], yaw[:, None]], axis=1)
+
+    def _drive(self, ids: Array, at: Array) -> Array:
+        distance, turn = self.base.left(ids, at)
+        speed, rate = self.base.speed(at)
+        there = (distance < self._tolerance) & (turn < self._angle) & (speed < STOPPED) & (rate < STOPPED)
+        # a base that turns on the spot is on its way as well
+        moved = (distance < self._best[ids] - NEARER) | (rate > NEARER * 5) | (speed > NEARER * 5)
+        self._best[ids] = np.where(moved, np.minimum(distance, self._best[ids]), self._best[ids])
+        self._nearest[ids] = np.where(moved, self.steps[ids], self._nearest[ids])
+        held = self.steps[ids] - self._nearest[ids] > HELD_UP
+        return np.where(there, GO_ON, np.where(held, _CONTROLLER, STAY))
+
+
+_CONTROLLER = OUTCOMES.index(Outcome.CONTROLLER)
