@@ -1,0 +1,201 @@
+"""BiLift: two arms grasp one wide object at its ends, and lift it in step."""
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from anysim.conventions import Array
+from anysim.math import pose as P
+from anysim.skills.base import OUTCOMES, Outcome
+from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
+from anysim.task.env import TaskEnv
+from anysim.task.scene import ObjectView, RobotView
+from anysim_skills.arm import Arm
+from anysim_skills.choice import Choice
+from anysim_skills.grasping.candidates import DOWN, TOP_DOWN, across, from_above
+from anysim_skills.grasping.grasp import CLOSING_STEPS, ROOM, SETTLED, Metres, Speed
+from anysim_skills.object_shapes import ObjectShapes
+
+BEHIND = 0.03
+"""[m] while the command of one arm is further ahead of its tool than this, both wait."""
+PAIRS = 2 * TOP_DOWN * TOP_DOWN
+"""Which arm takes which end, and how each hand is turned."""
+
+
+class BiLift(PhasedSkill):
+    """Lift `object` by `lift` with `robot` and `partner`, each at one of its two ends, `ends` from its origin.
+
+    A candidate is a pair of grasps: who takes which end, and how the hands are turned. What one of the arms does not
+    reach is not chosen for either. The object never tilts by more than `tilt`, else it is put down as unstable.
+    """
+
+    def __init__(
+        self,
+        env: TaskEnv,
+        *,
+        robot: RobotView,
+        partner: RobotView,
+        object: ObjectView,
+        ends: Annotated[
+            tuple[tuple[float, float, float], tuple[float, float, float]],
+            Field(description="[m] the two places to grasp, in the object's frame"),
+        ],
+        tool: str = "tool",
+        solver: str = "numba_ik",
+        hover: Metres = 0.1,
+        lift: Metres = 0.15,
+        tilt: Annotated[float, Field(gt=0, description="[rad]")] = 0.2,
+        speed: Speed = 0.4,
+        lift_speed: Speed = 0.1,
+        hold: Annotated[int, Field(ge=1, description="control steps above")] = 10,
+        phase_steps: Annotated[int, Field(ge=1, description="control steps that a move may take")] = 200,
+    ) -> None:
+        self.arms = tuple(Arm.of(env, one, tool=tool, solver=solver) for one in (robot, partner))
+        self._object, self._ends = object, np.array(ends)
+        self._shapes = ObjectShapes(env.scene, object)
+        self._back = np.array([*(-hover * DOWN), 0.0, 0.0, 0.0, 0.0])
+        self._lift, self._tilt, self._hold, self._late = lift, tilt, hold, phase_steps
+        self._speed, self._lift_speed = speed, lift_speed
+        self._dt = env.engine.world.physics.control_dt
+        n = env.num_envs
+        self._choice = Choice(n, PAIRS)
+        self._pair = np.zeros(n, dtype=np.int64)
+        self._begun, self._held = np.zeros((n, 2, 7)), np.zeros(n, dtype=np.int64)
+        self._rest, self._risen = np.zeros((n, 7)), np.zeros(n)
+        super().__init__(env, self.arms)
+
+    def make_phases(self) -> Sequence[Phase]:
+        return (
+            Phase("back off", self._open, self._backing_off, self._late),
+            Phase("choose", self._choose, self._chosen, 1),
+            Phase("approach", None, self._approach, self._late),
+            Phase("descend", None, self._descend, self._late),
+            Phase("close", self._close, self._closing, CLOSING_STEPS + 1),
+            Phase("lift", self._take, self._lifting, self._late + int(self._lift / (self._lift_speed * self._dt))),
+        )
+
+    def start(self, env_ids: Array) -> None:
+        super().start(env_ids)
+        self._choice.again(env_ids)
+        self.phase[env_ids] = 1
+
+    def retry(self, rung: Rung, env: int) -> int | None:
+        """The next pair where one is left; else away from the object, and all of them again."""
+        if rung is Rung.CANDIDATE and self._choice.next(env):
+            return 0
+        if rung is Rung.BACK_OFF:
+            self._choice.again(env)
+            return 0
+        return None
+
+    # ------------------------------------------------------------------ to the object
+
+    def _open(self, ids: Array, at: Array) -> None:
+        for arm in self.arms:
+            arm.closed[ids] = False
+            arm.go(ids, arm.tool.pose[at] + self._back, self._speed)
+
+    def _backing_off(self, ids: Array, at: Array) -> Array:
+        return np.where(self._both(ids, at) | (self.steps[ids] >= self._late), GO_ON, STAY)
+
+    def _both(self, ids: Array, at: Array) -> Array:
+        """(n,) bool: both arms have arrived."""
+        return self.arms[0].arrived(ids, at) & self.arms[1].arrived(ids, at)
+
+    def _grasps(self, at: Array) -> Array:
+        """(n, end, turn, 7) tool poses at the ends, from above."""
+        thing = self._object.root.pose[at]
+        turns = from_above(thing)
+        places = [thing[:, :3] + P.rotate(thing[:, 3:], np.broadcast_to(end, (len(at), 3))) for end in self._ends]
+        grasps = np.stack([turns, turns], axis=1)
+        grasps[..., :3] = np.stack(places, axis=1)[:, :, None]
+        return grasps
+
+    def _choose(self, ids: Array, at: Array) -> None:
+        """The pair with the least motion of the arm that has more of it."""
+        n, grasps = len(ids), self._grasps(at)
+        up = np.array([0.0, 0.0, self._lift, 0.0, 0.0, 0.0, 0.0])
+        ways = np.stack([grasps + self._back, grasps, grasps + up], axis=3)
+        widths = across(self._shapes.size(ids))
+        efforts: list[Array] = []
+        for arm in self.arms:
+            arm.closed[ids] = False
+            effort = arm.reach(ids, ways.reshape(n, -1, 7))[1].reshape(n, 2, TOP_DOWN, 3).max(axis=3)
+            efforts.append(np.where((widths > arm.aperture - ROOM)[:, None], np.inf, effort))
+        first, second = efforts
+        straight = np.maximum(first[:, 0, :, None], second[:, 1, None, :])
+        crossed = np.maximum(first[:, 1, :, None], second[:, 0, None, :])
+        cost = np.stack([straight, crossed], axis=1).reshape(n, PAIRS)
+        self._pair[ids] = self._choice.choose(ids, cost)
+
+    def _chosen(self, ids: Array, at: Array) -> Array:
+        none = self._choice.none_left(ids)
+        return np.where(~self._object.present[at], _ABSENT, np.where(none, _NO_IK, GO_ON))
+
+    def _targets(self, ids: Array, at: Array) -> tuple[Array, Array]:
+        """(n, 7) of each arm: its grasp of the chosen pair."""
+        end, turns = np.divmod(self._pair[ids], TOP_DOWN * TOP_DOWN)
+        first, second = np.divmod(turns, TOP_DOWN)
+        grasps, row = self._grasps(at), np.arange(len(ids))
+        return grasps[row, end, first], grasps[row, 1 - end, second]
+
+    def _approach(self, ids: Array, at: Array) -> Array:
+        for arm, target in zip(self.arms, self._targets(ids, at), strict=True):
+            arm.go(ids, target + self._back, self._speed)
+        return np.where(self._both(ids, at), GO_ON, STAY)
+
+    def _descend(self, ids: Array, at: Array) -> Array:
+        for arm, target in zip(self.arms, self._targets(ids, at), strict=True):
+            arm.go(ids, target, self._speed / 2)
+        return np.where(self._both(ids, at), GO_ON, STAY)
+
+    def _close(self, ids: Array, at: Array) -> None:
+        del at
+        for arm in self.arms:
+            arm.stay(ids)
+            arm.closed[ids] = True
+
+    def _closing(self, ids: Array, at: Array) -> Array:
+        del at
+        steps = self.steps[ids]
+        speed = np.maximum(*(arm.finger_speed(ids) for arm in self.arms))
+        return np.where((steps >= CLOSING_STEPS) | ((steps >= 5) & (speed < SETTLED)), GO_ON, STAY)
+
+    # ------------------------------------------------------------------ up
+
+    def _take(self, ids: Array, at: Array) -> None:
+        for number, arm in enumerate(self.arms):
+            arm.take(ids, at, self._object.root)
+            self._begun[ids, number] = arm.command[ids]
+        self._rest[ids] = self._object.root.pose[at]
+        self._risen[ids] = self._held[ids] = 0
+
+    def _lifting(self, ids: Array, at: Array) -> Array:
+        """Both commands rise by the same height, and only while both tools follow."""
+        with_it = np.maximum(*(arm.ahead(ids, at) for arm in self.arms)) < BEHIND
+        self._risen[ids] = np.minimum(self._lift, self._risen[ids] + with_it * self._lift_speed * self._dt)
+        for number, arm in enumerate(self.arms):
+            target = self._begun[ids, number]
+            target[:, 2] += self._risen[ids]
+            arm.go(ids, target, 1.5 * self._lift_speed)
+        up = (self._risen[ids] >= self._lift) & self._both(ids, at)
+        self._held[ids] = (self._held[ids] + 1) * up
+        held = self.arms[0].holds(ids, at, self._object.root) & self.arms[1].holds(ids, at, self._object.root)
+        lost = ~held | (self.tilted(ids, at) > self._tilt)
+        return np.where(lost, _UNSTABLE, np.where(self._held[ids] >= self._hold, GO_ON, STAY))
+
+    def tilted(self, ids: Array, at: Array) -> Array:
+        """(n,) [rad] how far the object leans from how it lay, whatever its heading."""
+        turn = P.multiply(self._object.root.quaternion[at], P.conjugate(self._rest[ids, 3:]))
+        up = P.rotate(turn, np.broadcast_to(np.array([0.0, 0.0, 1.0]), (len(ids), 3)))
+        return np.arctan2(np.hypot(up[:, 0], up[:, 1]), up[:, 2])
+
+    def succeeded(self, env_ids: Array, at: Array) -> Array:
+        risen = self._object.root.position[at, 2] - self._rest[env_ids, 2]
+        return np.where(risen > 0.8 * self._lift, GO_ON, _MISSED)
+
+
+_NO_IK, _ABSENT = OUTCOMES.index(Outcome.NO_IK), OUTCOMES.index(Outcome.ADVERSE_STATE)
+_UNSTABLE, _MISSED = OUTCOMES.index(Outcome.UNSTABLE_GRASP), OUTCOMES.index(Outcome.MISSED_CONTACT)
