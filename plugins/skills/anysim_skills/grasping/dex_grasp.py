@@ -1,0 +1,196 @@
+"""DexGrasp: close a hand with several fingers around a bar or a bottle, and lift it."""
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from anysim.conventions import Array
+from anysim.math import pose as P
+from anysim.skills.base import OUTCOMES, Outcome
+from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
+from anysim.task.env import TaskEnv
+from anysim.task.scene import ObjectView, RobotView
+from anysim_skills.arm import Arm
+from anysim_skills.choice import Choice
+from anysim_skills.grasping.grasp import Metres, Offset, Speed
+from anysim_skills.grasping.hand import Hand
+from anysim_skills.object_shapes import ObjectShapes
+
+ANGLES = 16
+"""Directions of approach about the object's long axis; in each the hand may point either way."""
+STEEPEST = 0.3
+"""Sine of the elevation from which on a hand that comes from below, or whose fingers point up, is no candidate."""
+LEAST = 0.05
+"""[m] that a tool is above the lowest point of the object."""
+
+
+class DexGrasp(PhasedSkill):
+    """Close the hand of `robot` around `object` by a synergy, each finger until it touches, then lift.
+
+    The tool's z is out of the palm and its y along the fingers. Candidates lay its x along the object's long axis and
+    come from all sides across it; `place` is where that axis then is in the tool's frame.
+    """
+
+    def __init__(
+        self,
+        env: TaskEnv,
+        *,
+        robot: RobotView,
+        object: ObjectView,
+        synergy: str = "power",
+        tool: str = "tool",
+        hand: Annotated[str, Field(description="the channel of the fingers")] = "eef",
+        solver: str = "numba_ik",
+        place: Annotated[tuple[float, float, float], Field(description="[m] in the tool's frame")] = (0.0, 0.0, 0.0),
+        offset: Offset = (0.0, 0.0, 0.0),
+        hover: Metres = 0.12,
+        lift: Metres = 0.1,
+        links: Annotated[int, Field(ge=1, description="of fingers that touch what is held")] = 3,
+        speed: Speed = 0.3,
+        phase_steps: Annotated[int, Field(ge=1, description="control steps that a move may take")] = 250,
+    ) -> None:
+        self.arm = Arm.of(env, robot, gripper=hand, tool=tool, solver=solver)
+        self.hand = Hand.of(env, robot, channel=hand)
+        self._object, self._synergy = object, self.hand.named(synergy)
+        self._place, self._offset = np.array(place), np.array(offset)
+        self._hover, self._lift, self._links = hover, lift, links
+        self._speed, self._late = speed, phase_steps
+        self._shapes = ObjectShapes(env.scene, object)
+        n = env.num_envs
+        self._choice = Choice(n, 2 * ANGLES)
+        self._goal, self._rest = np.zeros((n, 7)), np.zeros(n)
+        super().__init__(env, [self.arm, self.hand])
+
+    def make_phases(self) -> Sequence[Phase]:
+        return (
+            Phase("back off", self._open, self._backing_off, self._late),
+            Phase("choose", self._choose, self._chosen, 1),
+            Phase("pre", None, self._pre, self._late),
+            Phase("approach", None, self._approach, self._late),
+            Phase("close", self._close, self._closing, 120),
+            Phase("lift", self._take, self._lifting, self._late),
+            Phase("hold", None, self._holding, 30),
+        )
+
+    def start(self, env_ids: Array) -> None:
+        super().start(env_ids)
+        self._choice.again(env_ids)
+        self.phase[env_ids] = 1
+
+    def retry(self, rung: Rung, env: int) -> int | None:
+        """The next candidate where one is left; else away from the object, and all of them again."""
+        if rung is Rung.CANDIDATE and self._choice.next(env):
+            return 0
+        if rung is Rung.BACK_OFF:
+            self._choice.again(env)
+            return 0
+        return None
+
+    # ------------------------------------------------------------------ to the object
+
+    def _open(self, ids: Array, at: Array) -> None:
+        self.hand.open(ids)
+        self.arm.go(ids, _along(self.arm.tool.pose[at], -self._hover), self._speed)
+
+    def _backing_off(self, ids: Array, at: Array) -> Array:
+        return np.where((self.arm.arrived(ids, at) & (self.steps[ids] > 30)) | (self.steps[ids] >= 100), GO_ON, STAY)
+
+    def _candidates(self, ids: Array, at: Array) -> Array:
+        """(n, g, 7) tool poses."""
+        thing, size = self._object.root.pose[at], self._shapes.size(ids)
+        long = P.rotate(thing[:, 3:], np.eye(3)[np.argmax(size, axis=1)])
+        middle = thing[:, :3] + P.rotate(thing[:, 3:], np.broadcast_to(self._offset, (len(at), 3)))
+        return around(middle, long, self._place)
+
+    def _choose(self, ids: Array, at: Array) -> None:
+        self.hand.open(ids)
+        grasps = self._candidates(ids, at)
+        up = np.array([0.0, 0.0, self._lift, 0.0, 0.0, 0.0, 0.0])
+        ways = np.stack([_along(grasps, -self._hover), grasps, grasps + up], axis=2)
+        n, g, m = ways.shape[:3]
+        effort = self.arm.reach(ids, ways.reshape(n, g * m, 7))[1].reshape(n, g, m).max(axis=2)
+        lowest = self._object.root.position[at, 2] - self._shapes.below(ids, self._object.root.pose[at])
+        turn = grasps[..., 3:]
+        out, fingers = (P.rotate(turn, np.broadcast_to(np.eye(3)[k], (n, g, 3)))[..., 2] for k in (2, 1))
+        bad = (out > STEEPEST) | (fingers > STEEPEST) | (grasps[..., 2] < lowest[:, None] + LEAST)
+        effort = np.where(bad, np.inf, effort)
+        self._goal[ids] = grasps[np.arange(n), self._choice.choose(ids, effort)]
+
+    def _chosen(self, ids: Array, at: Array) -> Array:
+        none = self._choice.none_left(ids)
+        return np.where(~self._object.present[at], _ABSENT, np.where(none, _NO_IK, GO_ON))
+
+    def _pre(self, ids: Array, at: Array) -> Array:
+        self.arm.go(ids, _along(self._goal[ids], -self._hover), self._speed)
+        return np.where(self.arm.arrived(ids, at, 0.01, 0.1), GO_ON, STAY)
+
+    def _approach(self, ids: Array, at: Array) -> Array:
+        """Until the tool is there, or the palm holds it up."""
+        self.arm.go(ids, self._goal[ids], self._speed / 3, 0.03)
+        there = self.arm.arrived(ids, at) | self.arm.touching(ids, at)
+        return np.where(there, GO_ON, STAY)
+
+    def _close(self, ids: Array, at: Array) -> None:
+        del at
+        self.arm.stay(ids)
+        self.hand.close(ids, self._synergy)
+
+    def _closing(self, ids: Array, at: Array) -> Array:
+        del at
+        still = self.hand.closed(ids) & (self.arm.finger_speed(ids) < 0.3)
+        done = still | (self.steps[ids] >= 100)
+        if not done.any():
+            return np.full(len(ids), STAY)
+        around = self.hand.touches(ids)[1] >= self._links
+        return np.where(done, np.where(around, GO_ON, _MISSED), STAY)
+
+    # ------------------------------------------------------------------ up
+
+    def _take(self, ids: Array, at: Array) -> None:
+        self._rest[ids] = self._object.root.position[at, 2]
+        self.arm.take(ids, at, self._object.root)
+        up = np.array([0.0, 0.0, self._lift, 0.0, 0.0, 0.0, 0.0])
+        self.arm.go(ids, self.arm.command[ids] + up, self._speed / 3)
+
+    def _held(self, ids: Array, at: Array, said: Array) -> Array:
+        return np.where(self.arm.holds(ids, at, self._object.root), said, _UNSTABLE)
+
+    def _lifting(self, ids: Array, at: Array) -> Array:
+        return self._held(ids, at, np.where(self.arm.arrived(ids, at, 0.01, 0.1), GO_ON, STAY))
+
+    def _holding(self, ids: Array, at: Array) -> Array:
+        return self._held(ids, at, np.where(self.steps[ids] >= 10, GO_ON, STAY))
+
+    def succeeded(self, env_ids: Array, at: Array) -> Array:
+        risen = self._object.root.position[at, 2] - self._rest[env_ids] > 0.5 * self._lift
+        return np.where(risen & (self.hand.touches(env_ids)[1] >= self._links), GO_ON, _MISSED)
+
+
+def around(middle: Array, long: Array, place: Array) -> Array:
+    """Tool poses (n, 2 * ANGLES, 7) across axes `long` (n, 3) through points (n, 3), which are at `place` (3,) in them.
+
+    The first half has the tool's x along the axis, the second against it.
+    """
+    seed = np.eye(3)[np.argmin(np.abs(long), axis=1)]
+    first = P.cross(long, seed)
+    first = first / P.norm(first)[:, None]
+    second = P.cross(long, first)
+    angle = 2 * np.pi / ANGLES * np.arange(ANGLES)
+    out = np.cos(angle)[:, None] * first[:, None] + np.sin(angle)[:, None] * second[:, None]
+    x = np.concatenate([np.broadcast_to(long[:, None], out.shape), np.broadcast_to(-long[:, None], out.shape)], axis=1)
+    z = np.concatenate([out, out], axis=1)
+    columns = np.stack([x, P.cross(z, x), z], axis=-1)
+    turn = np.array([P.from_matrix(m) for m in columns.reshape(-1, 3, 3)]).reshape(*x.shape[:2], 4)
+    return np.concatenate([middle[:, None] - P.rotate(turn, np.broadcast_to(place, x.shape)), turn], axis=-1)
+
+
+def _along(poses: Array, distance: float) -> Array:
+    """The poses (..., 7) moved along their own z [m]."""
+    way = np.broadcast_to(np.array([0.0, 0.0, distance]), (*poses.shape[:-1], 3))
+    return np.concatenate([poses[..., :3] + P.rotate(poses[..., 3:], way), poses[..., 3:]], axis=-1)
+
+
+_NO_IK, _ABSENT = OUTCOMES.index(Outcome.NO_IK), OUTCOMES.index(Outcome.ADVERSE_STATE)
+_UNSTABLE, _MISSED = OUTCOMES.index(Outcome.UNSTABLE_GRASP), OUTCOMES.index(Outcome.MISSED_CONTACT)
