@@ -1,7 +1,7 @@
 """Push: move an object across its support with the closed fingers."""
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -14,6 +14,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.grasping.grasp import Metres, Speed
+from anysim_skills.moving.push_mpc import StrokePlanner
 from anysim_skills.object_shapes import ObjectShapes
 
 ASTRAY = np.deg2rad(35.0)
@@ -21,7 +22,11 @@ ASTRAY = np.deg2rad(35.0)
 
 
 class Push(PhasedSkill):
-    """Push `object` with `robot` until it lies within `tolerance` of `goal`, horizontally."""
+    """Push `object` with `robot` until it lies within `tolerance` of `goal`, horizontally.
+
+    With the backend `planner` a stroke goes straight; with `mpc` the tool's motion in it is found by trying out
+    `samples` motions at a time in a batch of the same world on MuJoCo, several times a second.
+    """
 
     first_rungs: ClassVar[Mapping[Outcome, Rung]] = {**FIRST_RUNGS, Outcome.LOST: Rung.REPLAN}
 
@@ -40,17 +45,23 @@ class Push(PhasedSkill):
         hover: Metres = 0.12,
         speed: Speed = 0.4,
         stroke_speed: Speed = 0.1,
+        backend: Literal["planner", "mpc"] = "planner",
+        samples: Annotated[int, Field(ge=4, description="of backend mpc: motions tried out at a time")] = 16,
     ) -> None:
         self.arm = Arm.of(env, robot, tool=tool, solver=solver)
         self._object, self._goal = object, goal
         self._tolerance, self._height, self._clearance, self._hover = tolerance, height, clearance, hover
         self._speed, self._stroke_speed = speed, stroke_speed
         self._shapes = ObjectShapes(env.scene, object)
+        self._dt = env.engine.world.physics.control_dt
         n = env.num_envs
         self._way = np.zeros((n, 3))
         """(N, 3) the direction of the stroke."""
         self._turn = np.zeros((n, 4))
         self._blocked = np.zeros(n, dtype=bool)
+        self._strokes = (
+            StrokePlanner(env, self.arm, "arm", object, goal, stroke_speed, samples) if backend == "mpc" else None
+        )
         super().__init__(env, [self.arm])
 
     def make_phases(self) -> Sequence[Phase]:
@@ -58,7 +69,7 @@ class Push(PhasedSkill):
             Phase("rise", self._rise, self._rising, 100),
             Phase("above", self._aim, self._above, 200),
             Phase("descend", None, self._descend, 150),
-            Phase("stroke", None, self._stroke, 400),
+            Phase("stroke", self._begin_stroke, self._stroke, 400),
             Phase("retreat", self._rise, self._rising, 100),
         )
 
@@ -116,6 +127,11 @@ class Push(PhasedSkill):
         self.arm.go(ids, np.concatenate([self._behind(ids, at), self._turn[ids]], axis=1), self._speed / 2)
         return np.where(self.arm.arrived(ids, at, 0.006, 0.1), GO_ON, STAY)
 
+    def _begin_stroke(self, ids: Array, at: Array) -> None:
+        del at
+        if self._strokes is not None:
+            self._strokes.begin(ids, self._way[ids, :2])
+
     def _stroke(self, ids: Array, at: Array) -> Array:
         """Push on along the line; sideways corrections would drag the object along by friction, the wrong way."""
         thing, way = self._object.root.position[at], self._to_goal(at)
@@ -124,8 +140,13 @@ class Push(PhasedSkill):
         ahead = P.dot(way, line)
         reach = np.minimum(np.maximum(ahead, 0.0), 0.03)
         target = thing - self._shapes.radius(ids)[:, None] * line + (reach - 0.002)[:, None] * line
+        speed = self._stroke_speed
+        if self._strokes is not None:
+            self._strokes.step(ids, at, self._turn[ids], self._shapes.radius(ids))
+            target[:, :2] = self.arm.command[ids, :2] + self._dt * self._strokes.velocity[ids]
+            speed *= 1.5
         target[:, 2] = thing[:, 2] + self._height
-        self.arm.go(ids, np.concatenate([target, self._turn[ids]], axis=1), self._stroke_speed)
+        self.arm.go(ids, np.concatenate([target, self._turn[ids]], axis=1), speed)
         there = left < self._tolerance
         astray = (left > 2 * self._tolerance) & (ahead < np.cos(ASTRAY) * left)
         return np.where(there, GO_ON, np.where(astray, _LOST, STAY))
