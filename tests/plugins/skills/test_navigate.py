@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 
 from anysim import make
+from anysim.math import pose as P
 from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
 from anysim_skills.moving.base import wrapped, yaw_of
 from anysim_skills.moving.navigate import Navigate
+from tests.plugins.skills.test_pick import rollout
 
 WORLD = Path(__file__).parent / "worlds/navigate.yaml"
+FETCH = WORLD.with_name("fetch.yaml")
 BASES = {"holonomic_base": "holonomic_drive", "differential_base": "differential_drive"}
 
 
@@ -81,3 +84,27 @@ def test_the_way_back_is_driven_backwards_where_it_is_short() -> None:
             yaws.append(float(yaw_of(env.scene.robot("base").base.quaternion)[0]))
         assert isinstance(policy.skill, Navigate)
         assert np.abs(yaws).max() < 0.1
+
+
+@pytest.mark.parametrize(
+    "engine", ["mujoco", *(pytest.param(e, marks=pytest.mark.slow) for e in ("pybullet", "sapien"))]
+)
+def test_a_mobile_arm_drives_to_a_table_and_takes_a_cube(engine: str) -> None:
+    require_engine(engine)
+    with make(FETCH, engine=engine, num_envs=2) as env:
+        env.reset(seed=11)
+        assert rollout(env, SkillPolicy(env), 500) == ["success"] * 2
+
+
+def test_an_arm_that_is_carried_keeps_its_place_on_the_base() -> None:
+    with make(FETCH, engine="mujoco") as env:
+        env.reset(seed=11)
+        policy, one = SkillPolicy(env), np.array([0])
+        policy.begin(one)
+        base, tool = env.scene.robot("robot").base, env.scene.robot("robot").tool()
+        begun = P.compose(P.inverse(base.pose), tool.pose)
+        while policy.skill.phase[0] == 0:
+            env.step(policy.act(one))
+            now = P.compose(P.inverse(base.pose), tool.pose)
+            assert P.norm(now - begun)[0] < 0.02
+        assert base.position[0, 0] > 1.3

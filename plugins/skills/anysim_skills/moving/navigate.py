@@ -7,10 +7,12 @@ import numpy as np
 from pydantic import Field
 
 from anysim.conventions import Array
+from anysim.math import pose as P
 from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, RobotView
+from anysim_skills.arm import Arm
 from anysim_skills.grasping.grasp import Metres
 from anysim_skills.moving.base import Base, Pace, yaw_of
 
@@ -25,7 +27,8 @@ STOPPED = 0.02
 class Navigate(PhasedSkill):
     """Drive the base of `robot` to x, y and yaw of `goal` in free space, within `tolerance` and `angle`, and stop.
 
-    A base that is held up fails with `controller`; it backs off once and tries again.
+    A base that is held up fails with `controller`; it backs off once and tries again. Arms that are told where to go in
+    the world would stay behind: those named in `carried` keep their place on the base.
     """
 
     def __init__(
@@ -42,15 +45,22 @@ class Navigate(PhasedSkill):
         speed: Annotated[float, Field(gt=0, description="[m/s]")] = 0.6,
         rate: Annotated[float, Field(gt=0, description="[rad/s]")] = 1.2,
         back_off: Metres = 0.2,
+        carried: Annotated[
+            tuple[str, ...], Field(description="tools of arms on the base, which other commands of the episode move")
+        ] = (),
+        solver: str = "numba_ik",
         steps: Annotated[int, Field(ge=1, description="control steps that the way may take")] = 1500,
     ) -> None:
         self.base = Base.of(env, robot, channel=channel, link=link)
+        self._arms = [Arm.of(env, robot, tool=tool, solver=solver) for tool in carried]
+        self._tools = np.zeros((env.num_envs, len(carried), 7))
+        """(N, T, 7) where their commands stand in the frame of the base."""
         self._goal, self._heading, self._back = goal, heading, back_off
         self._tolerance, self._angle, self._late = tolerance, angle, steps
         self._pace = Pace(speed, rate)
         self._best, self._nearest = np.zeros(env.num_envs), np.zeros(env.num_envs, dtype=np.int64)
         """The least that was left of the way, and the step in which it was."""
-        super().__init__(env, [self.base])
+        super().__init__(env, [self.base, *self._arms])
 
     def make_phases(self) -> Sequence[Phase]:
         return (Phase("back off", self._away, self._backing, 150), Phase("drive", self._enter, self._drive, self._late))
@@ -73,7 +83,14 @@ class Navigate(PhasedSkill):
     def _backing(self, ids: Array, at: Array) -> Array:
         return np.where((self.base.left(ids, at)[0] < 0.05) | (self.steps[ids] >= 100), GO_ON, STAY)
 
+    def decide(self, ids: Array, at: Array) -> None:
+        super().decide(ids, at)
+        for number, arm in enumerate(self._arms):  # as the base stands now
+            arm.command[ids] = arm.target[ids] = P.compose(self.base.frame.pose[at], self._tools[ids, number])
+
     def _enter(self, ids: Array, at: Array) -> None:
+        for number, arm in enumerate(self._arms):
+            self._tools[ids, number] = P.compose(P.inverse(self.base.frame.pose[at]), arm.command[ids])
         self.base.pace, self.base.close = self._pace, 0.5 * self._tolerance
         self.base.go(ids, self._wanted(at))
         self._best[ids], self._nearest[ids] = np.inf, 0
