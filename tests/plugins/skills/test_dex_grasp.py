@@ -15,7 +15,7 @@ from anysim_skills.grasping.dex_grasp import DexGrasp
 from tests.plugins.skills.test_pick import rollout
 
 WORLD = Path(__file__).parent / "worlds/dex_grasp.yaml"
-CLOSE, LIFT = 4, 5
+CLOSE, LIFT = 5, 6
 
 
 def lifting(engine: str, num_envs: int, *overrides: str) -> TaskEnv:

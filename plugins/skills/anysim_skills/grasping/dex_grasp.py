@@ -22,6 +22,8 @@ ANGLES = 16
 """Directions of approach about the object's long axis; in each the hand may point either way."""
 STEEPEST = 0.3
 """Sine of the elevation from which on a hand that comes from below, or whose fingers point up, is no candidate."""
+OVER = 0.15
+"""[m] that the hand is higher on its way to where it approaches from."""
 LEAST = 0.05
 """[m] that a tool is above the lowest point of the object."""
 
@@ -67,6 +69,7 @@ class DexGrasp(PhasedSkill):
         return (
             Phase("back off", self._open, self._backing_off, self._late),
             Phase("choose", self._choose, self._chosen, 1),
+            Phase("over", None, self._over, 100),
             Phase("pre", None, self._pre, self._late),
             Phase("approach", None, self._approach, self._late),
             Phase("close", self._close, self._closing, 120),
@@ -121,6 +124,14 @@ class DexGrasp(PhasedSkill):
     def _chosen(self, ids: Array, at: Array) -> Array:
         none = self._choice.none_left(ids)
         return np.where(~self._object.present[at], _ABSENT, np.where(none, _NO_IK, GO_ON))
+
+    def _over(self, ids: Array, at: Array) -> Array:
+        """Above where the approach begins, so that fingers that point down pass over what stands there."""
+        target = _along(self._goal[ids], -self._hover)
+        target[:, 2] += OVER
+        self.arm.go(ids, target, self._speed)
+        near = P.norm(target[:, :2] - self.arm.tool.position[at, :2]) < 0.03
+        return np.where(near | (self.steps[ids] >= 80), GO_ON, STAY)
 
     def _pre(self, ids: Array, at: Array) -> Array:
         self.arm.go(ids, _along(self._goal[ids], -self._hover), self._speed)
