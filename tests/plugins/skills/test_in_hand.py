@@ -58,7 +58,10 @@ def turned(env: TaskEnv) -> Outcome:
     return OUTCOMES[skilled.skill.outcome[0]]
 
 
-@pytest.mark.parametrize("engine", ["mujoco", "pybullet", "sapien"])
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize("engine", ["mujoco", pytest.param("pybullet", marks=SLOW), pytest.param("sapien", marks=SLOW)])
 @pytest.mark.parametrize("yaw", [0.3, -0.3])
 def test_the_bar_is_turned_to_the_goal(engine: str, yaw: float, tmp_path: Path) -> None:
     require_engine(engine)
