@@ -40,6 +40,7 @@ WORDS = {
     "sapien": "the engine SAPIEN",
     "skills": "scripted solutions: grasp, place, push, press, open, close, insert, hand over",
     "tasks": "twelve tasks on a table, with their experts",
+    "teleop": "`anysim teleop`: demonstrations, driven by an input device",
 }
 """What each extra brings; the table has a row for each."""
 

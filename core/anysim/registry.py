@@ -23,6 +23,7 @@ KINDS: Mapping[str, str] = {
     "terms": "libraries of observation, reward, predicate, command and event terms",
     "skills": "skills",
     "planners": "planners",
+    "devices": "input devices, with which people drive robots",
     "writers": "record writers",
     "readers": "record readers, by the writer's name",
     "importers": "asset importers, by file format",
@@ -60,6 +61,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-robots": {"commands": "gallery robot"},
     "anysim-sapien": {"engines": "sapien"},
     "anysim-skills": {"skills": "pick"},
+    "anysim-teleop": {"commands": "teleop", "devices": "script"},
 }
 INSTALL_HINTS: Mapping[tuple[str, str], str] = {
     (kind, name): package

@@ -1,0 +1,1 @@
+"""Teleoperation: input devices that drive the tool of a robot, and the recording of what they do."""
