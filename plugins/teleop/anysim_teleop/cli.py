@@ -14,8 +14,10 @@ if TYPE_CHECKING:
 
 def teleop(
     task: Task,
-    device: Annotated[str, typer.Option("--device", "-d", help="An installed input device (`anysim list devices`).")],
     engine: Engine = None,
+    device: Annotated[
+        str, typer.Option("--device", "-d", help="An installed input device (`anysim list devices`).")
+    ] = "keyboard",
     device_option: Annotated[
         list[str] | None,
         typer.Option("--device-option", "-D", metavar="KEY=VALUE", help="An option of the device. May be repeated."),
@@ -44,9 +46,19 @@ def teleop(
     command again goes on with the episodes that are missing.
 
     Devices:
+      keyboard  in this terminal
       script    timed commands of a file, not in real time; -D file=pick.yaml
 
+    Keys, which ? shows again:
+      w/s a/d r/f    move along x, y, z (so do arrows and page keys)    space  open or close the gripper
+      u/o i/k j/l    turn about x, y, z                                 t      axes of the base or of the tool
+      + -            faster, slower                                     tab    the next arm
+      enter          start the clock; later: end the episode            q      quit
+      backspace      begin the same episode again                       x      discard it, go on with the next
+
     Examples:
+      anysim teleop pick_cube --episodes 10 --seed 3
+      anysim teleop handover --robot partner --speed 0.1 -o record.cameras=[]
       anysim teleop pick_cube -d script -D file=pick.yaml --out runs/scripted && anysim replay runs/scripted
     """
     from anysim.api import load, make

@@ -1,13 +1,14 @@
 """Scripts: faults with their lines, moves in control steps, and the command line."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from typer import Typer
+from typer.testing import CliRunner
 
 from anysim.errors import AnysimError, PluginError, SpecError
+from anysim_teleop.cli import teleop
 from anysim_teleop.device import Button, DeviceInput, Job, Moment
 from anysim_teleop.devices import make_device
 from anysim_teleop.script import ScriptDevice
@@ -78,19 +79,13 @@ def test_options_are_checked_by_name_and_value(tmp_path: Path) -> None:
     assert np.all(make_device("script", [f"file={path}"]).read is not None)
 
 
-def test_the_command_line_plays_a_script_and_says_how_it_went(tmp_path: Path) -> None:
-    (tmp_path / "up.yaml").write_text("moves: [{for: 0.1, linear: [0, 0, 0.1]}]")
-    command = (
-        "teleop pick_cube -d script -D file=up.yaml --out run -o record.cameras=[] --min-success 1 --time 1"
-    ).split()
-    done = subprocess.run(
-        [sys.executable, "-m", "anysim.cli", *command],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    assert done.returncode == 1, done.stderr
-    assert "episode 0: truncated in 5 steps, not kept" in done.stdout
-    assert "0 of 1 episodes succeeded; 0 trajectories" in done.stdout
+def test_the_command_line_plays_a_script_and_says_how_it_went(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("up.yaml").write_text("moves: [{for: 0.1, linear: [0, 0, 0.1]}]")
+    app = Typer()
+    app.command()(teleop)
+    options = "pick_cube -d script -D file=up.yaml --out run -o record.cameras=[] --min-success 1 --time 1"
+    done = CliRunner().invoke(app, options.split())
+    assert done.exit_code == 1, done.output
+    assert "episode 0: truncated in 5 steps, not kept" in done.output
+    assert "0 of 1 episodes succeeded; 0 trajectories" in done.output
