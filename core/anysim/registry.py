@@ -61,7 +61,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-robots": {"commands": "gallery robot"},
     "anysim-sapien": {"engines": "sapien"},
     "anysim-skills": {"skills": "pick"},
-    "anysim-teleop": {"commands": "teleop", "devices": "keyboard script"},
+    "anysim-teleop": {"commands": "teleop", "devices": "browser keyboard script"},
 }
 INSTALL_HINTS: Mapping[tuple[str, str], str] = {
     (kind, name): package

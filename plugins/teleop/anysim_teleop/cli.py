@@ -47,6 +47,7 @@ def teleop(
 
     Devices:
       keyboard  in this terminal
+      browser   a page on this machine: picture, keys, gamepads; -D port=8080
       script    timed commands of a file, not in real time; -D file=pick.yaml
 
     Keys, which ? shows again:
@@ -57,6 +58,7 @@ def teleop(
       backspace      begin the same episode again                       x      discard it, go on with the next
 
     Examples:
+      anysim teleop pick_cube -e sapien -d browser --camera front
       anysim teleop pick_cube --episodes 10 --seed 3
       anysim teleop handover --robot partner --speed 0.1 -o record.cameras=[]
       anysim teleop pick_cube -d script -D file=pick.yaml --out runs/scripted && anysim replay runs/scripted
