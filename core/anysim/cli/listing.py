@@ -10,7 +10,9 @@ from anysim.cli.options import AsJson
 def list_(
     kind: Annotated[
         str,
-        typer.Argument(metavar="KIND", help="engines, tasks, robots, controllers, terms, skills, planners, writers…"),
+        typer.Argument(
+            metavar="KIND", help="engines, tasks, robots, controllers, terms, skills, planners, devices, writers…"
+        ),
     ],
     json: AsJson = False,
 ) -> None:

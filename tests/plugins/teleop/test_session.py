@@ -18,7 +18,6 @@ from anysim_teleop.device import Button, DeviceInput, InputDevice, Moment
 from anysim_teleop.drive import LEAD
 from anysim_teleop.script import ScriptDevice
 from anysim_teleop.session import DISCARDED, Session, Setup
-from tests.plugins.teleop.scripts import write_pick
 
 PLAIN = ("record.cameras=[]",)
 STILL = DeviceInput(np.zeros(6))
@@ -60,8 +59,8 @@ def play(
 
 
 def picked(tmp_path: Path, engine: str) -> None:
-    script = write_pick(tmp_path / "pick.yaml", engine)
-    [result] = play(tmp_path / "run", ScriptDevice(file=str(script)), engine=engine)
+    script = Path(__file__).with_name("pick_cube.yaml")
+    [result] = play(tmp_path, ScriptDevice(file=str(script)), engine=engine)
     assert result.status == "success"
     assert result.path is not None
     assert verify(result.path) == []
