@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from anysim.conventions import Array
+from anysim.controllers.base import Controller
+from anysim.conventions import IDENTITY_QUATERNION, Array
 from anysim.errors import AnysimError, TaskError, listing, suggest
 from anysim.kinematics.chain import Chain
 from anysim.managers.action import ActionSlice
@@ -32,6 +33,10 @@ class DrivenChannel:
         world = env.engine.world
         self._env, self._part = env, part
         self.channel = part.controller.channel
+        self.takes_joints = type(part.controller).action_for is not Controller.action_for
+        """Whether its controller can be asked for joint positions."""
+        self.apart = part.controller.dim == len(self.channel)
+        """Whether each drive has a component of the action of its own."""
         self.joints = np.array([world.actuators[a].joint for a in self.channel.actuators], dtype=int)
         self.targets = np.zeros(len(self.joints))
 
@@ -42,9 +47,9 @@ class DrivenChannel:
     def write(self, action: Array) -> None:
         """Write the columns of the action (A,); a controller that takes no joint positions is asked for nothing."""
         part = self._part
-        try:
+        if self.takes_joints:
             action[part.start : part.stop] = part.controller.action_for(self.targets[None], _ENV)[0]
-        except TaskError:
+        else:
             action[part.start : part.stop] = np.clip(0.0, part.controller.low, part.controller.high)
 
 
@@ -54,7 +59,6 @@ class DrivenArm:
     Attributes:
         name: `robot.tool`.
         command: (7,) where the tool is told to be now, world frame.
-        closed: whether the gripper is told to close.
     """
 
     def __init__(
@@ -68,9 +72,10 @@ class DrivenArm:
         self._dt = env.engine.world.physics.control_dt
         limit = np.where(chain.velocity_limit > 0, np.minimum(chain.velocity_limit, _FASTEST), _FASTEST)
         self._most = limit * self._dt
-        self.command = np.zeros(7)
-        self.closed = False
-        self._posture = np.zeros(len(chain))
+        self._fingers = np.zeros(0, dtype=int) if gripper is None else _below(env.engine.world, gripper, chain)
+        self.command = P.pose(np.zeros(3), IDENTITY_QUATERNION)
+        self._posture = chain.initial
+        self._follow(self.command, chain.initial)  # so that what is compiled is there before the first key
 
     def begin(self) -> None:
         """Begin where the tool is, with an open gripper."""
@@ -78,15 +83,22 @@ class DrivenArm:
         self._posture = self._channel.targets[self._columns].copy()
         self.grip(False)
 
+    @property
+    def closed(self) -> bool:
+        """Whether the gripper is told to close."""
+        if self._gripper is None or self._gripper.channel.closed is None:
+            return False
+        return bool((self._gripper.targets == self._gripper.channel.closed)[self._fingers].all())
+
     def grip(self, closed: bool) -> None:
-        """Tell the gripper to close, or to open."""
-        self.closed = closed
+        """Tell the gripper to close, or to open; grippers that only open and close together do."""
         if self._gripper is None:
             return
         view = self._gripper.channel
         ends = view.closed if closed else view.opened
         assert ends is not None
-        self._gripper.targets[:] = ends
+        own = self._fingers if self._gripper.apart else slice(None)
+        self._gripper.targets[own] = ends[own]
 
     def move(self, wanted: DeviceInput, speed: float, turn: float) -> None:
         """Move the command by one control step, and the joints after it.
@@ -108,15 +120,19 @@ class DrivenArm:
         command = np.concatenate([self.command[:3] + linear, rotation])[None]
         place = P.step_toward(real, command, LEAD, np.inf)[0, :3]  # apart: a tool that turns late is not held back
         self.command = np.append(place, P.step_toward(real, command, np.inf, LEAD_ANGLE)[0, 3:])
+        self._channel.targets[self._columns] = self._follow(base, self._channel.targets[self._columns])
+
+    def _follow(self, base: Array, joints: Array) -> Array:
+        """Joint positions (K,) one step nearer to the command."""
         step = self._solver.step(
             self.command[None],
             base[None],
-            self._channel.targets[None, self._columns],
+            joints[None],
             max_step=self._most,
             posture=self._posture,
             posture_gain=POSTURE_GAIN,
         )
-        self._channel.targets[self._columns] = step.joint_pos[0]
+        return step.joint_pos[0]
 
 
 class Drives:
@@ -145,29 +161,34 @@ class Drives:
         if not self.arms:
             where = f"robot '{robot}'" if robot else f"task '{env.name}'"
             raise TaskError(
-                f"{where} has no arm that a device can drive: a tool below the joints of a channel that has a "
-                f"controller (robots: {listing(names)}); add world.robots.NAME.actions.arm"
+                f"{where} has no arm that a device can drive: a tool below the joints of a channel whose controller "
+                f"takes joint positions (robots: {listing(names)}); set world.robots.NAME.actions.arm, for instance to "
+                "joint_delta_position"
             )
         self.active = self.arms[0]
 
     def _arms_of(self, robot: str, solver: str) -> list[DrivenArm]:
-        """One arm for each set of joints that moves a tool; of several tools on one arm the first."""
+        """Each tool with the channel that has most of the joints above it; of several tools on one arm the first."""
         world = self._env.engine.world
         model = next(r for r in world.robots if r.name == robot)
         own = {name: channel for (owner, name), channel in self._channels.items() if owner == robot}
         arms: dict[tuple[int, ...], DrivenArm] = {}
         for tool in model.tools:
-            above = _joints_above(world, model.tools[tool])
-            for name, channel in own.items():
-                joints = [j for j in channel.joints.tolist() if j in above]
-                if channel.channel.opened is not None or not joints or tuple(joints) in arms:
-                    continue
-                try:
-                    chain = Chain.from_world(world, robot, name, tool, joints=joints)
-                except AnysimError:  # a coupled joint on the way: no arm
-                    continue
-                gripper = next((c for c in own.values() if _hangs_from(world, c, int(chain.joints[-1]))), None)
-                arms[tuple(joints)] = DrivenArm(self._env, f"{robot}.{tool}", chain, channel, gripper, solver)
+            above = _joints_above(world, world.sites[model.tools[tool]].body)
+            moving = {
+                name: [j for j in channel.joints.tolist() if j in above]
+                for name, channel in own.items()
+                if channel.takes_joints and channel.channel.opened is None
+            }
+            name = max(moving, key=lambda name: len(moving[name]), default="")
+            if not moving.get(name) or tuple(moving[name]) in arms:
+                continue
+            try:
+                chain = Chain.from_world(world, robot, name, tool, joints=moving[name])
+            except AnysimError:  # a coupled joint on the way: no arm
+                continue
+            gripper = next((c for c in own.values() if _is_gripper(c) and len(_below(world, c, chain))), None)
+            arms[tuple(moving[name])] = DrivenArm(self._env, f"{robot}.{tool}", chain, own[name], gripper, solver)
         return list(arms.values())
 
     def begin(self) -> None:
@@ -198,22 +219,20 @@ def _shortened(vector: Array, most: float) -> Array:
     return vector * (most / length) if length > most else vector
 
 
-def _joints_above(world: World, site: int) -> set[int]:
-    """The joints between a site and the world."""
-    body, found = world.sites[site].body, set()
+def _joints_above(world: World, body: int) -> set[int]:
+    """The joints between a body and the world."""
+    found: set[int] = set()
     while body >= 0:
         found.add(world.body_joint[body])
         body = world.bodies[body].parent
     return found
 
 
-def _hangs_from(world: World, channel: DrivenChannel, joint: int) -> bool:
-    """Whether a channel is a gripper below a joint."""
-    if channel.channel.opened is None or channel.channel.closed is None:
-        return False
-    finger = int(np.flatnonzero(np.array(world.body_joint) == channel.joints[0])[0])
-    while finger >= 0:
-        if world.body_joint[finger] == joint:
-            return True
-        finger = world.bodies[finger].parent
-    return False
+def _is_gripper(channel: DrivenChannel) -> bool:
+    return channel.channel.opened is not None and channel.channel.closed is not None
+
+
+def _below(world: World, channel: DrivenChannel, chain: Chain) -> Array:
+    """The columns of a channel whose joints hang from the last joint of a chain."""
+    bodies = [world.body_joint.index(joint) for joint in channel.joints.tolist()]
+    return np.flatnonzero([int(chain.joints[-1]) in _joints_above(world, body) for body in bodies])

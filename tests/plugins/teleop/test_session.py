@@ -202,6 +202,37 @@ def test_two_arms_take_turns_and_the_other_holds_still(tmp_path: Path) -> None:
         Session(env, Pressing(lambda moment: STILL), tmp_path / "x", 1, 0, Setup("test", robot="left"))
 
 
+def test_arms_of_one_robot_have_their_own_joints_and_grippers(tmp_path: Path) -> None:
+    robot = {"robot": "mobile_dual_panda", "actions": {"arm": "joint_position", "eef": "joint_position"}}
+    watching = {"observations": {"policy": ["last_action"]}, "horizon": 100}
+    spec = {"engine": "mujoco", "world": {"robots": {"robot": robot}}, "task": watching}
+    close = DeviceInput(np.zeros(6), closed=True)
+    with anysim.make(spec, num_envs=1) as env:
+        with Session(env, Pressing(lambda moment: STILL), tmp_path, 1, 0, Setup("test")) as session:
+            drives = session.drives
+            left, right = drives.arms
+            assert (left.name, right.name) == ("robot.left_tool", "robot.right_tool")
+            assert not set(left.chain.joints.tolist()) & set(right.chain.joints.tolist())
+            env.reset(seed=0)
+            drives.begin()
+            drives.switch()
+            before = env.scene.state.joint_pos[0].copy()
+            for _ in range(25):
+                env.step(drives.act(close, 0.2, 1.0))
+            assert (left.closed, right.closed) == (False, True)
+            moved = np.abs(env.scene.state.joint_pos[0] - before) > 0.01
+        closing = [joint.name for joint, much in zip(env.engine.world.joints, moved, strict=True) if much]
+    fingers = [name for name in closing if "finger" in name]  # arms sag a little
+    assert len(fingers) == 2
+    assert all("right" in name for name in fingers), fingers
+
+
+def test_controllers_that_take_no_joint_positions_are_named(tmp_path: Path) -> None:
+    with env_of("pick_cube", "world.robots.panda.actions.arm=joint_effort") as env:
+        with pytest.raises(TaskError, match=r"no arm that a device can drive.*joint_delta_position"):
+            Session(env, Pressing(lambda moment: STILL), tmp_path, 1, 0, Setup("test"))
+
+
 def test_a_directory_of_another_run_is_refused(tmp_path: Path) -> None:
     play(tmp_path, Pressing(lambda moment: STILL), "task.horizon=2")
     device = Pressing(lambda moment: STILL)
