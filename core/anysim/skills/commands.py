@@ -212,11 +212,9 @@ class CommandSequence(SkillSequence):
     def _keep(self, number: int, env: int) -> None:
         last = int(self._env.scene.elapsed[env])
         if self._specs[number].save and last >= self._first_step[env]:
-            attempt = int(self.members[number].attempts[env])
-            self._segments[env] += (
-                Segment(len(self._segments[env]), number + 1, self._specs[number].do, attempt,
-                        int(self._first_step[env]), last),
-            )  # fmt: skip
+            before, attempt = self._segments[env], int(self.members[number].attempts[env])
+            what = Segment(len(before), number + 1, self._specs[number].do, attempt, int(self._first_step[env]), last)
+            self._segments[env] = (*before, what)
 
     def segments(self, env: int, success: bool) -> list[dict[str, object]]:
         """What was verified in an episode that has ended; the command under way too where the task was solved."""

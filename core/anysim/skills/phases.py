@@ -5,12 +5,12 @@ it stays, goes on, or has failed and how. A failure climbs the ladder: its first
 has a budget for the whole skill, and what no rung is left for ends the skill with the type of the failure.
 """
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from functools import reduce
 from operator import or_
-from typing import ClassVar, NamedTuple, Protocol
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -50,24 +50,23 @@ FIRST_RUNGS: Mapping[Outcome, Rung] = {
 """Where the ladder begins; what is not listed is not retried."""
 
 
-class Mover(Protocol):
+class Mover(ABC):
     """What skills move, such as an arm with its gripper: they say where to, and it moves once for all of them."""
 
     def renew(self, ids: Array) -> None:
         """These envs have just been reset."""
-        ...
 
     def prepare(self, ids: Array) -> None:
         """Look at these envs, which the scene looks at, before the skills do."""
-        ...
 
+    @abstractmethod
     def act(self, ids: Array, action: Array) -> None:
         """Write the rows of the action of these envs, which the scene looks at."""
-        ...
 
     def describe(self, env: int) -> dict[str, object]:
         """What records say of how it moves, the same as long as an episode lasts."""
-        ...
+        del env
+        return {}
 
 
 class Phase(NamedTuple):

@@ -17,7 +17,7 @@ from anysim.kinematics.chain import Chain
 from anysim.math import pose as P
 from anysim.model.world import JointType
 from anysim.planning.api import inverse_kinematics
-from anysim.skills.phases import GO_ON, STAY
+from anysim.skills.phases import GO_ON, STAY, Mover
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.planned_moves import PlannedMoves, Stage
@@ -44,7 +44,7 @@ TURN_RATE = 5.0
 _ARMS: WeakKeyDictionary[TaskEnv, dict[tuple[str, str, str, str], "Arm"]] = WeakKeyDictionary()
 
 
-class Arm:
+class Arm(Mover):
     """One arm and gripper of a robot in all envs.
 
     Attributes:

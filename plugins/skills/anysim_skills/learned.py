@@ -14,6 +14,7 @@ from anysim.controllers.base import ChannelView
 from anysim.conventions import Array
 from anysim.errors import TaskError, listing, suggest
 from anysim.plugin_parameters import options_model, parameters
+from anysim.skills.phases import Mover
 from anysim.task.env import TaskEnv
 from anysim.task.scene import RobotView
 
@@ -44,7 +45,7 @@ class LearnedPolicy(Protocol):
         ...
 
 
-class Learned:
+class Learned(Mover):
     """A channel of a robot in all envs, driven by a policy whose output are position targets.
 
     Attributes:

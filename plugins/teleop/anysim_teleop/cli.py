@@ -64,8 +64,8 @@ def teleop(
       anysim teleop pick_cube -d script -D file=pick.yaml --out runs/scripted && anysim replay runs/scripted
     """
     from anysim.api import load, make
-    from anysim.record.names import run_name
     from anysim.record.commit import file_at, no_directory
+    from anysim.record.names import run_name
     from anysim_teleop.devices import make_device
     from anysim_teleop.session import Session, Setup
 

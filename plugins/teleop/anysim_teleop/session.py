@@ -21,9 +21,9 @@ from anysim.record.manifest import read_manifest
 from anysim.record.names import EPISODES, trajectory_name
 from anysim.record.recorder import Recorder
 from anysim.record.writer import make_writer
+from anysim.task.bindings import bind_term
 from anysim.task.contract import Status
 from anysim.task.env import TaskEnv
-from anysim.task.term_registry import bind
 from anysim_teleop.device import Button, DeviceInput, InputDevice, Job, Moment
 from anysim_teleop.drive import Drives
 
@@ -85,7 +85,8 @@ class Session:
         self._instruction, self._keep = task.description, record.keep
         self._film = film_mode(env.spec)
         self._success = {
-            name: bind("predicate", t, env.scene, f"task.success.{name}") for name, t in task.success.items()
+            name: bind_term("predicate", t, env.scene, f"task.success.{name}", env.bindings)
+            for name, t in task.success.items()
         }
         self._dt = env.engine.world.physics.control_dt
         self._camera = _shown_camera(env, setup.camera) if device.shows_pictures else None

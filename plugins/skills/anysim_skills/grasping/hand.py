@@ -13,6 +13,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.errors import TaskError, listing, suggest
 from anysim.math import pose as P
+from anysim.skills.phases import Mover
 from anysim.task.env import TaskEnv
 from anysim.task.scene import RobotView
 
@@ -22,7 +23,7 @@ TOUCH = 0.5
 _HANDS: WeakKeyDictionary[TaskEnv, dict[tuple[str, str], "Hand"]] = WeakKeyDictionary()
 
 
-class Hand:
+class Hand(Mover):
     """The hand of a robot in all envs.
 
     Attributes:

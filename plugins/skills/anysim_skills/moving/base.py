@@ -12,6 +12,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.errors import TaskError, listing
 from anysim.math import pose as P
+from anysim.skills.phases import Mover
 from anysim.task.env import TaskEnv
 from anysim.task.scene import RobotView
 
@@ -38,7 +39,7 @@ class Pace(NamedTuple):
     turn_braking: float = 1.0
 
 
-class Base:
+class Base(Mover):
     """The base of a robot in all envs.
 
     Attributes:

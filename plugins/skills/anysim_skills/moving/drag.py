@@ -4,7 +4,6 @@ from typing import Annotated
 
 from pydantic import Field
 
-from anysim.conventions import Array
 from anysim.skills.base import Outcome
 from anysim.skills.sequence import SkillSequence
 from anysim.task.env import TaskEnv
@@ -32,17 +31,8 @@ class Drag(SkillSequence):
         slide_speed: Speed = 0.12,
         max_attempts: Annotated[int, Field(ge=1)] = 3,
     ) -> None:
-
-        def at_goal(ids: Array, at: Array, grasps: Array) -> Array:
-            del ids
-            poses = grasps[:, :, None].copy()
-            poses[..., :2] = goal.position[at][:, None, None, :2]
-            return poses
-
         arm = {"robot": robot, "object": object, "tool": tool, "solver": solver, "speed": speed}
-        members = {
-            "grasp": Grasp(env, at_goal, **arm, offset=offset, hover=hover, lift=0.0),
-            "slide": Slide(env, **arm, goal=goal, tolerance=tolerance, slide_speed=slide_speed),
-        }
+        slide = Slide(env, **arm, goal=goal, tolerance=tolerance, slide_speed=slide_speed)
+        members = {"grasp": Grasp(env, slide, **arm, offset=offset, hover=hover, lift=0.0), "slide": slide}
         again = {("slide", why): "grasp" for why in (Outcome.UNSTABLE_GRASP, Outcome.LOST)}
         super().__init__(env, members, back=again, max_attempts=max_attempts)

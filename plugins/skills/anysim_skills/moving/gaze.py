@@ -13,6 +13,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.errors import TaskError, listing
 from anysim.math import pose as P
+from anysim.skills.phases import Mover
 from anysim.task.env import TaskEnv
 from anysim.task.scene import RobotView
 
@@ -26,7 +27,7 @@ _FORWARD = np.array([0.0, 0.0, 1.0])
 _GAZES: WeakKeyDictionary[TaskEnv, dict[tuple[str, str, str, tuple[str, ...]], "Gaze"]] = WeakKeyDictionary()
 
 
-class Gaze:
+class Gaze(Mover):
     """The direction of a camera in all envs, by joints of one channel; the channel's others hold where they are.
 
     Attributes:

@@ -51,6 +51,13 @@ class Slide(PutsDown):
         arm = Arm.of(env, robot, tool=tool, solver=solver)
         super().__init__(env, arm, object, Moves(speed, slide_speed, retreat, steps))
 
+    def wanted(self, ids: Array, at: Array, grasps: Array) -> Array:
+        """Tool poses (n, g, 1, 7) at the goal for grasps (n, g, 7): what chooses a grasp looks at them."""
+        del ids
+        poses = grasps[:, :, None].copy()
+        poses[..., :2] = self._goal.position[at][:, None, None, :2]
+        return poses
+
     def make_phases(self) -> Sequence[Phase]:
         return (Phase("slide", self._begin, self._slide, self.moves.steps), *self.let_go())
 

@@ -10,7 +10,7 @@ from anysim.kinematics.chain import Chain
 from anysim.planning.motion import Budget, PlanRequest, PlanStatus, ToolGoal, Trajectory, motion_planner
 from anysim.planning.scenes import Scenes
 from anysim.skills.base import OUTCOMES, Outcome
-from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
+from anysim.skills.phases import GO_ON, STAY, Mover, Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, RobotView
 
@@ -25,7 +25,7 @@ FAILURES = {
 _JOINTS: WeakKeyDictionary[TaskEnv, dict[str, "Joints"]] = WeakKeyDictionary()
 
 
-class Joints:
+class Joints(Mover):
     """A mover: the joints of an arm, told where to be in each control step. All skills of an env share one."""
 
     def __init__(self, env: TaskEnv, robot: str, chain: Chain) -> None:
