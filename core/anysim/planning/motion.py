@@ -180,14 +180,18 @@ class PlanAnswer:
 
 
 class Budget:
-    """The time of one request and the wish to stop it. The planner looks at `spent` in its loops."""
+    """The time of one request and the wish to stop it. The planner looks at `spent` in its loops.
+
+    Attributes:
+        end: [s] of `time.perf_counter`, when the time is over; inf before it begins.
+    """
 
     def __init__(self, deadline: float) -> None:
-        self._deadline, self._end, self._cancelled = deadline, float("inf"), Event()
+        self._deadline, self.end, self._cancelled = deadline, float("inf"), Event()
 
     def begin(self) -> None:
         """Start the clock; the service does it for each request when its turn comes."""
-        self._end = perf_counter() + self._deadline
+        self.end = perf_counter() + self._deadline
 
     def cancel(self) -> None:
         """Ask the planner to stop; from any thread."""
@@ -198,7 +202,7 @@ class Budget:
         """`cancelled`, `timeout`, or None to go on."""
         if self._cancelled.is_set():
             return PlanStatus.CANCELLED
-        return PlanStatus.TIMEOUT if perf_counter() > self._end else None
+        return PlanStatus.TIMEOUT if perf_counter() > self.end else None
 
 
 class MotionPlanner(ABC):
@@ -215,6 +219,9 @@ class MotionPlanner(ABC):
 
     def __init__(self, world: World) -> None:
         self.world = world
+
+    def warm_up(self, request: PlanRequest, scene: Scene) -> None:
+        """Load, compile and build what a request needs; services call it before the clock of the request begins."""
 
     @abstractmethod
     def plan(self, request: PlanRequest, scene: Scene, budget: Budget) -> PlanAnswer:

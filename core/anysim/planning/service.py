@@ -97,7 +97,7 @@ class PlannerService(ABC):
         self.close()
 
 
-def planner_service(world: World, planner: str = "rrt", threads: int = 1, service: str = "threads") -> PlannerService:
+def planner_service(world: World, planner: str = "rrt", workers: int = 1, service: str = "threads") -> PlannerService:
     """A service whose workers plan with the named planner.
 
     Raises:
@@ -108,4 +108,4 @@ def planner_service(world: World, planner: str = "rrt", threads: int = 1, servic
         raise PluginError(f"'{service}' is a planner and no service; try 'threads'")
     maker = cast(Callable[..., PlannerService], made)
     with registry.using("planners", service, (TypeError,)):
-        return maker(world, planner, threads)
+        return maker(world, planner, workers)

@@ -50,6 +50,13 @@ class RrtPlanner(MotionPlanner):
         self._worlds[key].take(scene, request.attached)
         return self._worlds[key]
 
+    def warm_up(self, request: PlanRequest, scene: Scene) -> None:
+        """Build the collision world, and load the solvers, which are compiled where no compiled ones are kept."""
+        self.world_of(request, scene)
+        for goal in request.goals:
+            if goal.enabled:
+                self._goals.arm(request, goal)
+
     def is_free(self, request: PlanRequest, scene: Scene, joint_pos: Array) -> bool:
         """Whether a path (T, K) is free, 0.005 rad by 0.005 rad."""
         return _free(self.world_of(request, scene), joint_pos)
