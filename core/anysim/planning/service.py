@@ -105,7 +105,7 @@ def planner_service(world: World, planner: str = "rrt", workers: int = 1, servic
     """
     made = registry.load("planners", service)
     if not (isinstance(made, type) and issubclass(made, PlannerService)):
-        raise PluginError(f"'{service}' is a planner and no service; try 'threads'")
+        raise PluginError(f"'{service}' is a planner and no service; try 'processes' or 'threads'")
     maker = cast(Callable[..., PlannerService], made)
     with registry.using("planners", service, (TypeError,)):
         return maker(world, planner, workers)

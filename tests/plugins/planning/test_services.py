@@ -1,6 +1,7 @@
 """Planner services with planners that answer, raise, hang, exit, and answer out of order."""
 
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from anysim.errors import AnysimError
 from anysim.model.world import World
 from anysim.planning.motion import PlanRequest, PlanStatus
 from anysim_planning import queued
+from anysim_planning.processes import ProcessService
 from anysim_planning.threads import ThreadedService
 from tests.plugins.planning.scripted import (
     ASKS,
@@ -25,12 +27,13 @@ from tests.plugins.planning.scripted import (
     broken,
 )
 
-Kind = type[ThreadedService]
-KINDS = [ThreadedService]
+Kind = type[ThreadedService] | type[ProcessService]
+KINDS = [ThreadedService, ProcessService]
 
 
 @pytest.fixture(params=KINDS, ids=lambda kind: kind.__name__)
-def kind(request: pytest.FixtureRequest) -> Kind:
+def kind(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Kind:
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[3]))  # processes import the scripted planner
     return request.param
 
 

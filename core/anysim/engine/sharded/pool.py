@@ -20,7 +20,7 @@ from anysim.model.world import World
 START_S = 300.0
 """The least time to load an engine, to build a world and to draw: a short limit is meant for steps [s]."""
 
-_POOLS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "LP_NUM_THREADS")
+THREAD_POOLS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "LP_NUM_THREADS")
 """The variables that size the thread pools of the libraries engines compute and draw with."""
 
 Answers = tuple[dict[int, Any], dict[int, AnysimError], dict[int, WorkerLost]]
@@ -85,7 +85,7 @@ class Crew:
         folder = self._folder / str(k)
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir()
-        limits = {name: str(self._threads) for name in _POOLS}
+        limits = {name: str(self._threads) for name in THREAD_POOLS}
         self._workers[k] = Worker({**limits, **os.environ, "TMPDIR": str(folder)}, self._timeout)
 
     def _load(self, places: Iterable[int]) -> None:

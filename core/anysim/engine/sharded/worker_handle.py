@@ -21,10 +21,9 @@ from anysim import errors
 from anysim.errors import AnysimError, EngineError
 from anysim.own_process import Lifeline, how_it_ended
 
-_MODULE = "anysim.engine.sharded.worker"
 _PROGRAM = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
-    f"from {_MODULE} import main; main(int(sys.argv[2]), int(sys.argv[3]))"
+    "from {} import main; main(int(sys.argv[2]), int(sys.argv[3]))"
 )
 GRACE_S = 10.0
 """How long a worker may take to free its engine and end by itself [s]."""
@@ -35,9 +34,14 @@ class WorkerLost(Exception):
 
 
 class Worker:
-    """One worker process. Every message has a number and is answered; an answer to an earlier one is dropped."""
+    """One worker process. Every message has a number and is answered; an answer to an earlier one is dropped.
 
-    def __init__(self, environment: dict[str, str], timeout_s: float) -> None:
+    `module` has `main(connection, lifeline)`, which gets two file descriptors.
+    """
+
+    def __init__(
+        self, environment: dict[str, str], timeout_s: float, module: str = "anysim.engine.sharded.worker"
+    ) -> None:
         self._timeout = timeout_s
         self._sent = 0
         own, theirs = socket.socketpair()
@@ -48,7 +52,7 @@ class Worker:
                     get_executable(),
                     "-P",
                     "-c",
-                    _PROGRAM,
+                    _PROGRAM.format(module),
                     json.dumps(sys.path),
                     str(theirs.fileno()),
                     str(lifeline.worker_end),
@@ -96,6 +100,10 @@ class Worker:
         except (EOFError, OSError):
             raise WorkerLost(self._how_it_ended()) from None
 
+    def has_news(self, limit: float) -> bool:
+        """Whether an answer, or its end, comes within `limit` [s]."""
+        return bool(self._arrival.poll(limit * 1e3))
+
     def answer(self, deadline: float, limit: float) -> Any:
         """The answer to the last message, by a time of `time.perf_counter()`; `limit` [s] is for the message.
 
@@ -112,7 +120,7 @@ class Worker:
 
     def _receive(self, deadline: float, limit: float) -> tuple[Any, ...]:
         try:
-            if not self._arrival.poll(max(0.0, deadline - time.perf_counter()) * 1e3):
+            if not self.has_news(max(0.0, deadline - time.perf_counter())):
                 raise WorkerLost(self._hangs(limit))
             return self._connection.recv()
         except BlockingIOError:
