@@ -42,7 +42,10 @@ class PlanFuture:
 
 @dataclass
 class ServiceCounts:
-    """Of all requests so far; `late` were waited for, for `waited` [s] in all; `lost_workers` hung or died."""
+    """Of all requests so far; `late` were waited for, for `waited` [s] in all; `lost_workers` hung or died.
+
+    `processor` [s] is what planners computed, where they answered.
+    """
 
     submitted: int = 0
     answered: int = 0
@@ -50,6 +53,7 @@ class ServiceCounts:
     late: int = 0
     waited: float = 0.0
     lost_workers: int = 0
+    processor: float = 0.0
 
 
 class PlannerService(ABC):

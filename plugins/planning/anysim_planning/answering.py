@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from time import thread_time
 from typing import NamedTuple
 
 from anysim import registry
@@ -37,8 +38,14 @@ class PlannerHost:
     def __init__(self, make: PlannerMaker) -> None:
         self._make, self._planner = make, None
 
-    def answers(self, jobs: Sequence[Job]) -> Iterator[PlanAnswer]:
-        """Answers in order, each as soon as it is there; a request that breaks the planner fails alone."""
+    def answers(self, jobs: Sequence[Job]) -> Iterator[tuple[PlanAnswer, float]]:
+        """Answers in order, each as soon as it is there with its processor time [s]; what breaks one fails it alone."""
+        begun = thread_time()
+        for answer in self._answers(jobs):
+            yield answer, thread_time() - begun
+            begun = thread_time()
+
+    def _answers(self, jobs: Sequence[Job]) -> Iterator[PlanAnswer]:
         try:
             self.prepare()
         except BaseException as error:  # noqa: BLE001  (a stranger's code must not end the worker)

@@ -83,7 +83,7 @@ class ProcessService(QueuedService):
                     process.note(batch)
                 process.ask()
                 for _ in batch:
-                    self._give(seat, self._answer_of(process, seat))
+                    self._give(seat, *self._answer_of(process, seat))
             except WorkerLost as how:
                 left = [future for future in batch if future in seat.jobs] or seat.jobs
                 begun = [future for future in left if future.budget.end < float("inf")]
@@ -99,8 +99,8 @@ class ProcessService(QueuedService):
                     with contextlib.suppress(WorkerLost):
                         self._open(seat)
 
-    def _answer_of(self, process: "PlannerProcess", seat: Seat) -> PlanAnswer:
-        """The next answer; raises `WorkerLost` where there is none in time."""
+    def _answer_of(self, process: "PlannerProcess", seat: Seat) -> tuple[PlanAnswer, float]:
+        """The next answer, and its processor time [s]; raises `WorkerLost` where there is none in time."""
         patience = GRACE
         while not process.has_news(GLANCE):
             process.tell_ends()
@@ -181,8 +181,8 @@ class PlannerProcess:
         for future, end in zip(self._batch, self._notes["end"], strict=False):
             future.budget.end = float(end)
 
-    def answer(self) -> PlanAnswer:
-        """The next answer, which is on its way."""
+    def answer(self) -> tuple[PlanAnswer, float]:
+        """The next answer, which is on its way, and its processor time [s]."""
         found = self._worker.answer(perf_counter() + MESSAGE_LIMIT, MESSAGE_LIMIT)
         self.useful = True
         return found

@@ -162,9 +162,10 @@ class QueuedService(PlannerService):
             seat.since = perf_counter()
             return list(seat.jobs)
 
-    def _give(self, seat: Seat, answer: PlanAnswer) -> None:
-        """Answer the first of a worker's requests."""
+    def _give(self, seat: Seat, answer: PlanAnswer, processor: float) -> None:
+        """Answer the first of a worker's requests, which took that much processor time [s]."""
         with self._changed:
+            self.counts.processor += processor
             if not seat.retired:
                 self._answer(seat.jobs.pop(0), answer)
                 seat.since = perf_counter()

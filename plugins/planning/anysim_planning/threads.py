@@ -21,8 +21,8 @@ class ThreadedService(QueuedService):
     def _work(self, seat: Seat) -> None:
         host = PlannerHost(self._make)
         while (jobs := self._next(seat)) is not None:
-            for answer in host.answers([Job(f.request, f.scene, f.budget) for f in jobs]):
-                self._give(seat, answer)
+            for answer, processor in host.answers([Job(f.request, f.scene, f.budget) for f in jobs]):
+                self._give(seat, answer, processor)
 
     def _replace_the_hung(self) -> None:
         for number, seat in enumerate(self._seats):

@@ -52,6 +52,7 @@ def test_answers_come_at_their_step_in_the_order_of_submission(kind: Kind, worke
         assert seeds(plans.harvest(6)) == [SLEEPS, 1, 2]
         assert plans.harvest(7) == []
         assert plans.counts.submitted == plans.counts.answered == 4
+        assert 0.0 < plans.counts.processor < 5.0
 
 
 def test_late_answers_are_waited_for_and_counted(kind: Kind) -> None:
