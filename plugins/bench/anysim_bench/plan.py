@@ -1,30 +1,81 @@
-"""Planning: a service's rate against its planner called directly, the quality of plans, and what it does to the loop.
+"""Planning: services against their planner called directly, the quality of plans, and what they do to the loop.
 
-Requests go from free configurations to the tool poses of others, all drawn from a seed. A path counts as free if its
-planner finds it so 0.005 rad by 0.005 rad after all planning is over.
+Requests go from free configurations to the tool poses of others, all drawn from a seed. All sides plan the same
+requests in turns, and the best of each counts. A path counts as free if no shapes touch 0.005 rad by 0.005 rad, which
+is looked at after all planning is over, with nothing of the planner.
 """
 
 import time
+from collections.abc import Sequence
+from contextlib import ExitStack
 from typing import NamedTuple
 
 import numpy as np
 
-from anysim import make
-from anysim.conventions import Array
-from anysim.errors import EngineError
+from anysim import compile_world, make
 from anysim.kinematics.chain import Chain
+from anysim.model.world import World
 from anysim.planning.api import inverse_kinematics
-from anysim.planning.motion import Budget, PlanAnswer, PlanRequest, PlanStatus, Scene, ToolGoal, motion_planner
+from anysim.planning.motion import Budget, MotionPlanner, PlanAnswer, PlanRequest, PlanStatus, Scene, motion_planner
 from anysim.planning.scenes import Scenes
-from anysim.planning.service import planner_service
+from anysim.planning.service import PlannerService, planner_service
 from anysim.task.env import TaskEnv
+from anysim_bench.free_paths import Touching, dense
+from anysim_bench.plan_requests import DEADLINE, Arms
+from anysim_bench.resets import resident_mib
 
 RATIO_GOAL = 0.85
-"""Plans a second of a service with one thread, of those of the planner alone."""
+"""Plans a second of a service with one worker, of those of the planner alone."""
 STALL_GOAL_MS = 2.0
 """By which the 99th percentile of a control step may grow while requests are in flight."""
 IK_GOAL = 20_000
 """Solutions a second."""
+WORKERS = (1, 2)
+ROUNDS = 3
+"""Turns of all sides on the requests."""
+BLOCKS, STEPS = 4, 100
+"""Turns of an idle and a busy loop, and the steps of each."""
+
+
+class ServiceCost(NamedTuple):
+    """A planner service.
+
+    Attributes:
+        service, workers: its name, and how many workers.
+        start_ms: until it has answered a first request, with its kernels compiled before.
+        rate: plans a second.
+        ratio: of the planner's alone, by the clock on the wall.
+        cpu_ratio: the same by processor time, all that workers and this process compute for it.
+        same: whether it gave the answers of the planner alone, bit for bit.
+        busy_p99_ms: 99th percentile of a control step of 16 envs with requests in flight; None for several workers.
+    """
+
+    service: str
+    workers: int
+    start_ms: float
+    rate: float
+    ratio: float
+    cpu_ratio: float
+    same: bool
+    busy_p99_ms: float | None = None
+
+
+class PairCost(NamedTuple):
+    """Two arms planned together: candidates that both are known to reach.
+
+    Attributes:
+        robot: of the catalogue.
+        pairs: how many requests.
+        reached, solved, free: how many had joint positions for both tools, a path, and a path that is free.
+        plan_ms: median of a plan.
+    """
+
+    robot: str
+    pairs: int
+    reached: int
+    solved: int
+    free: int
+    plan_ms: float
 
 
 class PlanCost(NamedTuple):
@@ -37,12 +88,13 @@ class PlanCost(NamedTuple):
         length: [rad] mean length of a path.
         plan_ms, plan_p95_ms: median and 95th percentile of a plan alone.
         first_ms: the first plan, in which the planning world is built and kernels are loaded.
+        world_ms, world_mib: time and memory [MiB] of another planning world, which serves all envs.
+        scene_ms, scene_kib: to put an env's scene into it, and what an env keeps [KiB].
         alone: plans a second of the planner called directly.
-        services: plans a second of the service, by threads.
-        same: whether the services gave the answers of the planner alone, bit for bit.
+        services: what runs around it.
         ik: solutions of inverse kinematics a second, from random configurations.
-        step_p99_ms, busy_p99_ms: 99th percentile of a control step of 16 envs, without and with requests in flight.
-        busy_steps: how many steps were measured with requests in flight.
+        step_p99_ms: 99th percentile of a control step of 16 envs with nothing to plan.
+        pairs: two arms, where asked for.
     """
 
     planner: str
@@ -55,128 +107,207 @@ class PlanCost(NamedTuple):
     plan_ms: float
     plan_p95_ms: float
     first_ms: float
+    world_ms: float
+    world_mib: float
+    scene_ms: float
+    scene_kib: float
     alone: float
-    services: dict[str, float]
-    same: bool
+    services: list[ServiceCost]
     ik: float
     step_p99_ms: float
-    busy_p99_ms: float
-    busy_steps: int
+    pairs: PairCost | None
+
+    @property
+    def good(self) -> bool:
+        """Whether all paths are free, and services answer as their planner does."""
+        return self.free == 1.0 and all(one.same for one in self.services) and self.pairs_are_free
+
+    @property
+    def pairs_are_free(self) -> bool:
+        """Whether two arms never touched on a path."""
+        return self.pairs is None or self.pairs.free == self.pairs.solved
 
 
 def plan_cost(
-    planner: str = "rrt", task: str = "pick_cube", requests: int = 50, goals: int = 16, engine: str | None = None
+    planner: str = "rrt",
+    task: str = "pick_cube",
+    requests: int = 50,
+    goals: int = 16,
+    engine: str | None = None,
+    services: Sequence[str] = ("processes", "threads"),
+    dual: str = "baxter",
+    pairs: int = 0,
 ) -> PlanCost:
-    """Measure a planner with the arm of a task's first robot.
+    """Measure a planner with the arm of a task's first robot, and `pairs` plans of the two arms of the robot `dual`.
 
     Raises:
-        EngineError: the task's first robot has no tool.
+        EngineError: the task's first robot has no tool, or `dual` not two that move apart.
     """
     with make(task, engine=engine, num_envs=16, overrides=["record=null"]) as env:
         env.reset(seed=1)
-        world = env.engine.world
-        if not world.robots or not world.robots[0].tools:
-            raise EngineError(f"'{task}' has no robot with a tool; choose a task with an arm, such as pick_cube")
-        robot = world.robots[0]
-        channel, tool = next(iter(robot.channels)), next(iter(robot.tools))
-        chain = Chain.from_world(world, robot.name, channel, tool)
+        world, state, made = env.engine.world, env.engine.get_state(), motion_planner(env.engine.world, planner)
         scenes = Scenes(world, env.num_envs)
-        scenes.update(env.engine.get_state().body_pose)
+        scenes.update(state.body_pose)
         scene = scenes.scene(0)
-        asked = _requests(planner, chain, robot.name, tool, scene, requests, goals, env)
-        made = motion_planner(world, planner)
+        arms = Arms(world, made, 1)
         begun = time.perf_counter()
-        made.plan(asked[0], scene, Budget(60.0))
+        asked = arms.requests(scene, state.joint_pos[0], requests, goals)
+        made.warm_up(asked[0], scene)
+        made.plan(asked[0], scene, Budget(DEADLINE))
         first = time.perf_counter() - begun
-        answers, spent = list[PlanAnswer](), list[float]()
-        for request in asked:
-            begun = time.perf_counter()
-            answers.append(made.plan(request, scene, Budget(60.0)))
-            spent.append(time.perf_counter() - begun)
-        services, same = dict[str, float](), True
-        for threads in (1, 2):
-            with planner_service(world, planner, threads) as service:
-                for future in [service.submit(asked[0], scene) for _ in range(threads)]:
-                    future.result()
-                begun = time.perf_counter()
-                found = [f.result() for f in [service.submit(request, scene) for request in asked]]
-                services[str(threads)] = requests / (time.perf_counter() - begun)
-                same &= all(_same(a, b) for a, b in zip(answers, found, strict=True))
-        idle, busy = _stalls(env, planner, asked, scene)
-        paths = [
-            (request, answer.trajectory.joint_pos)
-            for request, answer in zip(asked, answers, strict=True)
-            if answer.trajectory is not None
+        built, grown, taken = _worlds(world, planner, asked[0], scene, scenes.scene(1))
+        answers, spent, found = _in_turns(world, made, planner, services, asked, scene)
+        paths = [answer.trajectory.joint_pos for answer in answers if answer.trajectory is not None]
+        touching = Touching(world)
+        free = [not touching.any(arms.bodies(scene, dense(path), state.joint_pos[0])) for path in paths]
+        idle, busy = _stalls(env, planner, services, asked, scene)
+        found = [
+            one._replace(busy_p99_ms=1e3 * float(np.quantile(busy[one.service], 0.99))) if one.workers == 1 else one
+            for one in found
         ]
-        return PlanCost(
-            planner,
-            task,
-            requests,
-            goals,
-            sum(answer.status is PlanStatus.OK for answer in answers) / requests,
-            float(np.mean([made.is_free(request, scene, path) for request, path in paths])) if paths else 0.0,
-            float(np.mean([np.linalg.norm(np.diff(path, axis=0), axis=1).sum() for _, path in paths] or [0.0])),
-            1e3 * float(np.median(spent)),
-            1e3 * float(np.quantile(spent, 0.95)),
-            1e3 * first,
-            requests / sum(spent),
-            services,
-            same,
-            _ik_rate(chain),
-            1e3 * float(np.quantile(idle, 0.99)),
-            1e3 * float(np.quantile(busy, 0.99)),
-            len(busy),
-        )
+        robot, tool = world.robots[0], next(iter(arms.tools))
+        chain = Chain.from_world(world, robot.name, next(iter(robot.channels)), tool, joints=arms.tools[tool])
+    return PlanCost(
+        planner,
+        task,
+        requests,
+        goals,
+        sum(answer.status is PlanStatus.OK for answer in answers) / requests,
+        float(np.mean(free)) if free else 0.0,
+        float(np.mean([np.linalg.norm(np.diff(path, axis=0), axis=1).sum() for path in paths] or [0.0])),
+        1e3 * float(np.median(spent)),
+        1e3 * float(np.quantile(spent, 0.95)),
+        1e3 * first,
+        1e3 * built,
+        grown,
+        1e3 * taken,
+        sum(part.nbytes for part in scene[1:]) / 2**10,
+        requests / sum(spent),
+        found,
+        _ik_rate(chain),
+        1e3 * float(np.quantile(idle, 0.99)),
+        _pairs(planner, dual, pairs) if pairs else None,
+    )
 
 
-def _requests(
-    planner: str, chain: Chain, robot: str, tool: str, scene: Scene, count: int, goals: int, env: TaskEnv
-) -> list[PlanRequest]:
-    """From one drawn free configuration to the tool poses of others."""
-    made = motion_planner(env.engine.world, planner)
-    rng, free = np.random.default_rng(20_000), list[Array]()
-    while len(free) < count + goals:
-        q = rng.uniform(chain.lower, chain.upper)
-        if made.is_free(PlanRequest(chain.joint_names, q, joint_goal=q), scene, q[None]):
-            free.append(q)
-    base = scene.body_pose[chain.root]
-    poses = chain.tool_pose(np.tile(base, (len(free), 1)), np.array(free))
-    return [
-        PlanRequest(
-            chain.joint_names, free[i], (ToolGoal(robot, tool, poses[i + 1 : i + 1 + goals]),), seed=i, deadline=60.0
-        )
-        for i in range(count)
+def _worlds(world: World, planner: str, request: PlanRequest, scene: Scene, other: Scene) -> tuple[float, float, float]:
+    """Seconds and MiB of a planning world, and seconds to put another scene into it."""
+    made, built, taken = list[MotionPlanner](), list[float](), list[float]()
+    before = resident_mib()
+    for _ in range(10):
+        made.append(motion_planner(world, planner))
+        begun = time.perf_counter()
+        made[-1].warm_up(request, scene)
+        built.append(time.perf_counter() - begun)
+    grown = (resident_mib() - before) / len(made)
+    for k in range(20):
+        begun = time.perf_counter()
+        made[0].warm_up(request, scene if k % 2 else other)
+        taken.append(time.perf_counter() - begun)
+    return float(np.median(built)), grown, float(np.median(taken))
+
+
+def _in_turns(
+    world: World, made: MotionPlanner, planner: str, names: Sequence[str], asked: list[PlanRequest], scene: Scene
+) -> tuple[list[PlanAnswer], list[float], list[ServiceCost]]:
+    """Answers, seconds of each plan alone in the best turn, and what services take for all of them."""
+    answers, spent, alone_cpu = list[PlanAnswer](), [np.inf], np.inf
+    with ExitStack() as stack:
+        running, start = dict[tuple[str, int], PlannerService](), dict[tuple[str, int], float]()
+        for kind in [(name, workers) for name in names for workers in WORKERS]:
+            begun = time.perf_counter()
+            running[kind] = stack.enter_context(planner_service(world, planner, kind[1], kind[0]))
+            for future in [running[kind].submit(asked[0], scene) for _ in range(kind[1])]:
+                future.result()
+            start[kind] = time.perf_counter() - begun
+        wall, cpu, same = dict.fromkeys(running, np.inf), dict.fromkeys(running, np.inf), dict.fromkeys(running, True)
+        for _ in range(ROUNDS):
+            processor = time.process_time()
+            answers, times = _one_by_one(made, asked, scene)
+            spent = min(spent, times, key=sum)
+            alone_cpu = min(alone_cpu, time.process_time() - processor)
+            for kind, service in running.items():
+                begun, processor, before = time.perf_counter(), time.process_time(), service.counts.processor
+                found = [f.result() for f in [service.submit(request, scene) for request in asked]]
+                wall[kind] = min(wall[kind], time.perf_counter() - begun)
+                here = time.process_time() - processor  # planners in threads are part of it
+                there = 0.0 if kind[0] == "threads" else service.counts.processor - before
+                cpu[kind] = min(cpu[kind], here + there)
+                same[kind] &= all(_same(a, b) for a, b in zip(answers, found, strict=True))
+                service.harvest(0)
+    best = len(asked) / sum(spent)
+    costs = [
+        ServiceCost(*kind, 1e3 * start[kind], (rate := len(asked) / wall[kind]), rate / best, alone_cpu / cpu[kind], ok)
+        for kind, ok in same.items()
     ]
+    return answers, spent, costs
 
 
-def _stalls(env: TaskEnv, planner: str, asked: list[PlanRequest], scene: Scene) -> tuple[list[float], list[float]]:
-    """Seconds of control steps of all envs: with nothing to plan, and while requests are in flight."""
+def _stalls(
+    env: TaskEnv, planner: str, names: Sequence[str], asked: list[PlanRequest], scene: Scene
+) -> tuple[list[float], dict[str, list[float]]]:
+    """Seconds of control steps of all envs: with nothing to plan, and with each service's requests in flight."""
     action = np.zeros((env.num_envs, env.action_dim))
-    idle, busy = list[float](), list[float]()
+    idle, busy = list[float](), {name: list[float]() for name in names}
 
-    def step() -> float:
+    def step(service: PlannerService | None = None) -> float:
         if not env.running.all():
             env.reset(mask=~env.running)
         begun = time.perf_counter()
         env.step(action)
+        if service is not None:
+            service.harvest(0)
         return time.perf_counter() - begun
 
-    for _ in range(10):
+    for _ in range(20):
         step()
-    idle.extend(step() for _ in range(200))
-    with planner_service(env.engine.world, planner, 1) as service:
-        service.submit(asked[0], scene).result()
-        while len(busy) < 200:
-            futures = [service.submit(request, scene) for request in asked]
-            service.flush()
-            before = len(busy)
-            while not all(future.done for future in futures):
-                busy.append(step())
-            for future in futures:
-                future.result()
-            if len(busy) == before:  # planned faster than a step takes
-                busy.append(step())
+    with ExitStack() as stack:
+        running = {n: stack.enter_context(planner_service(env.engine.world, planner, 1, n)) for n in names}
+        for service in running.values():
+            service.submit(asked[0], scene).result()
+        for _ in range(BLOCKS):
+            idle.extend(step() for _ in range(STEPS))
+            for name, service in running.items():
+                futures = []
+                for _ in range(STEPS):
+                    if all(future.done for future in futures):
+                        futures = [service.submit(request, scene, latency=None) for request in asked]
+                    busy[name].append(step(service))
+                for future in futures:
+                    future.cancel()
+                service.submit(asked[0], scene).result()  # after which its worker is idle
     return idle, busy
+
+
+def _pairs(planner: str, robot: str, count: int) -> PairCost:
+    """Plan two arms from free configurations to the tool poses of others."""
+    text = {"world": {"terrain": "plane", "robots": {"robot": {"robot": robot, "position": [0, 0, 0]}}}}
+    world = compile_world(text)
+    scene, initial = Scenes(world, 1).scene(0), np.array([joint.initial for joint in world.joints])
+    made = motion_planner(world, planner)
+    arms, touching = Arms(world, made, 2), Touching(world)
+    asked = arms.requests(scene, initial, count, 1)
+    reached, free = 0, 0
+    made.warm_up(asked[0], scene)
+    answers, spent = _one_by_one(made, asked, scene)
+    for answer in answers:
+        reached += answer.status is not PlanStatus.NO_IK
+        if answer.trajectory is not None:
+            free += not touching.any(arms.bodies(scene, dense(answer.trajectory.joint_pos), initial))
+    solved = sum(answer.status is PlanStatus.OK for answer in answers)
+    return PairCost(robot, count, reached, solved, free, 1e3 * float(np.median(spent)))
+
+
+def _one_by_one(
+    made: MotionPlanner, asked: Sequence[PlanRequest], scene: Scene
+) -> tuple[list[PlanAnswer], list[float]]:
+    """Answers and the seconds of each."""
+    answers, spent = list[PlanAnswer](), list[float]()
+    for request in asked:
+        begun = time.perf_counter()
+        answers.append(made.plan(request, scene, Budget(DEADLINE)))
+        spent.append(time.perf_counter() - begun)
+    return answers, spent
 
 
 def _ik_rate(chain: Chain, count: int = 4_000) -> float:
@@ -185,7 +316,7 @@ def _ik_rate(chain: Chain, count: int = 4_000) -> float:
     q = rng.uniform(chain.lower, chain.upper, (count, len(chain)))
     seeds, keys = rng.uniform(chain.lower, chain.upper, q.shape), np.arange(count, dtype=np.uint64)
     targets, best = chain.tool_pose(base, q), 0.0
-    for _ in range(3):
+    for _ in range(ROUNDS):
         begun = time.perf_counter()
         solved = solver.solve(targets, base, seeds, random_restarts=50, rng_seeds=keys).converged.sum()
         best = max(best, float(solved) / (time.perf_counter() - begun))

@@ -169,10 +169,14 @@ def growth(samples: list[Sample], first_ms: float, last_ms: float, world: World,
     return tuple(words)
 
 
+def resident_mib() -> float:
+    """Memory of this process [MiB]; 0 where the system does not say."""
+    if not (_PROC / "statm").exists():
+        return 0.0
+    return int((_PROC / "statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20
+
+
 def _sample(resets: int, engine: SimEngine) -> Sample:
     gc.collect()
-    memory, descriptors = 0.0, 0
-    if (_PROC / "statm").exists():
-        memory = int((_PROC / "statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20
-        descriptors = len(list((_PROC / "fd").iterdir()))
-    return Sample(resets, memory, descriptors, threading.active_count(), dict(engine.handles()))
+    descriptors = len(list((_PROC / "fd").iterdir())) if _PROC.exists() else 0
+    return Sample(resets, resident_mib(), descriptors, threading.active_count(), dict(engine.handles()))

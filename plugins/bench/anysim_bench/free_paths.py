@@ -1,0 +1,98 @@
+"""An independent check of paths: poses by the World's own kinematics, shape against shape, nothing of a planner."""
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.errors import EngineError
+from anysim.geometry.bounds import shape_bounds
+from anysim.geometry.coal_solids import coal_solid
+from anysim.math import pose as P
+from anysim.model.forward_kinematics import forward_kinematics
+from anysim.model.pairs import may_meet
+from anysim.model.shapes import MeshShape, Plane, Shape
+from anysim.model.world import World
+
+STEP = 0.005
+"""[rad] or [m] between the configurations that are looked at."""
+
+
+def dense(path: Array, step: float = STEP) -> Array:
+    """A path (T, K) with so many rows between its own that no joint moves by more than `step` from one to the next."""
+    rows = [path[:1]]
+    for a, b in pairwise(path):
+        count = max(1, int(np.ceil(np.abs(b - a).max() / step)))
+        rows.append(a + (b - a) * (np.arange(1, count + 1) / count)[:, None])
+    return np.concatenate(rows)
+
+
+class Touching:
+    """Which poses of all bodies of a World have shapes that touch; parts of one robot that touch at home may."""
+
+    def __init__(self, world: World) -> None:
+        """Raises EngineError for ground of triangles, which this check does not know."""
+        self._geoms = [geom for geom in world.geoms if geom.collides]
+        self._meshes = {mesh.name: mesh for mesh in world.meshes}
+        self._shapes = [self._coal(geom.shape) for geom in self._geoms]
+        self._local = [P.pose(geom.position, geom.quaternion) for geom in self._geoms]
+        bodies = np.array([geom.body for geom in self._geoms])
+        self._pairs = np.argwhere(np.triu(may_meet(world, bodies)))
+        entity = np.append(np.array(world.body_entity, dtype=int), -1)[bodies]
+        initial = np.array([[joint.initial for joint in world.joints]])
+        home = self._boxes_and_poses(forward_kinematics(world, world.initial_body_pose[None], initial))
+        own = entity[self._pairs[:, 0]] == entity[self._pairs[:, 1]]
+        rests = [bool(same) and self._touch(*pair, home[2], 0) for same, pair in zip(own, self._pairs, strict=True)]
+        self._pairs = self._pairs[~np.array(rests, dtype=bool)]
+
+    def any(self, body_pose: Array) -> bool:
+        """Whether anything touches in any of the poses (n, B, 7) of all bodies, that does not move in all of them."""
+        low, high, poses = self._boxes_and_poses(body_pose)
+        moves = np.array([np.ptp(rows, axis=0).any() for rows in poses])
+        for a, b in self._pairs[moves[self._pairs].any(axis=1)]:
+            near = ((low[a] <= high[b]) & (low[b] <= high[a])).all(axis=1)
+            if any(self._touch(a, b, poses, int(row)) for row in np.flatnonzero(near)):
+                return True
+        return False
+
+    def _boxes_and_poses(self, body_pose: Array) -> tuple[list[Array], list[Array], list[Array]]:
+        """For each geom the corners (n, 3) of the box around it, and its poses (n, 7)."""
+        still = np.tile(P.pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)), (len(body_pose), 1))
+        low, high, poses = list[Array](), list[Array](), list[Array]()
+        for geom, local in zip(self._geoms, self._local, strict=True):
+            pose = P.compose(still if geom.body < 0 else body_pose[:, geom.body], np.broadcast_to(local, still.shape))
+            if isinstance(geom.shape, Plane):
+                box = np.full((len(pose), 3), -np.inf), np.full((len(pose), 3), np.inf)
+            else:
+                box = shape_bounds(geom.shape, pose, self._meshes)
+            low.append(box[0])
+            high.append(box[1])
+            poses.append(pose)
+        return low, high, poses
+
+    def _touch(self, a: int, b: int, poses: list[Array], row: int) -> bool:
+        import coal  # pyright: ignore[reportMissingImports]  (found by its .pth file)
+
+        placed = [coal.Transform3s(P.to_matrix(poses[g][row, 3:]), poses[g][row, :3]) for g in (a, b)]
+        result = coal.CollisionResult()
+        coal.collide(self._shapes[a], placed[0], self._shapes[b], placed[1], coal.CollisionRequest(), result)
+        return bool(result.isCollision())
+
+    def _coal(self, shape: Shape) -> Any:
+        import coal  # pyright: ignore[reportMissingImports]  (found by its .pth file)
+
+        if isinstance(shape, Plane):
+            return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+        if isinstance(shape, MeshShape):
+            mesh, model = self._meshes[shape.mesh], coal.BVHModelOBBRSS()
+            model.beginModel(len(mesh.faces), len(mesh.vertices))
+            model.addVertices(np.asarray(mesh.vertices, dtype=float))
+            model.addTriangles(np.asarray(mesh.faces, dtype=np.uint32))
+            model.endModel()
+            if not shape.concave:
+                model.buildConvexHull(True, "Qt")
+            return model if shape.concave else model.convex
+        if (solid := coal_solid(shape)) is None:
+            raise EngineError(f"paths over a {type(shape).__name__} cannot be checked; choose a task on a plane")
+        return solid
