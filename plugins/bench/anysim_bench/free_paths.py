@@ -1,7 +1,8 @@
 """An independent check of paths: poses by the World's own kinematics, shape against shape, nothing of a planner."""
 
+from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from anysim.geometry.coal_solids import coal_solid
 from anysim.math import pose as P
 from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.pairs import may_meet
-from anysim.model.shapes import MeshShape, Plane, Shape
+from anysim.model.shapes import Mesh, MeshShape, Plane, Shape
 from anysim.model.world import World
 
 STEP = 0.005
@@ -28,6 +29,15 @@ def dense(path: Array, step: float = STEP) -> Array:
     return np.concatenate(rows)
 
 
+class _Placed(NamedTuple):
+    """A geom in n poses: the corners (n, 3) of the box around it, its positions (n, 3) and turns (n, 3, 3)."""
+
+    low: Array
+    high: Array
+    position: Array
+    turn: Array
+
+
 class Touching:
     """Which poses of all bodies of a World have shapes that touch; parts of one robot that touch at home may."""
 
@@ -36,47 +46,44 @@ class Touching:
         self._geoms = [geom for geom in world.geoms if geom.collides]
         self._meshes = {mesh.name: mesh for mesh in world.meshes}
         self._shapes = [self._coal(geom.shape) for geom in self._geoms]
+        self._boxes = [_box(geom.shape, self._meshes) for geom in self._geoms]
         self._local = [P.pose(geom.position, geom.quaternion) for geom in self._geoms]
         bodies = np.array([geom.body for geom in self._geoms])
         self._pairs = np.argwhere(np.triu(may_meet(world, bodies)))
         entity = np.append(np.array(world.body_entity, dtype=int), -1)[bodies]
         initial = np.array([[joint.initial for joint in world.joints]])
-        home = self._boxes_and_poses(forward_kinematics(world, world.initial_body_pose[None], initial))
+        home = self._placed(forward_kinematics(world, world.initial_body_pose[None], initial))
         own = entity[self._pairs[:, 0]] == entity[self._pairs[:, 1]]
-        rests = [bool(same) and self._touch(*pair, home[2], 0) for same, pair in zip(own, self._pairs, strict=True)]
+        rests = [bool(same) and self._touch(*pair, home, 0) for same, pair in zip(own, self._pairs, strict=True)]
         self._pairs = self._pairs[~np.array(rests, dtype=bool)]
 
     def any(self, body_pose: Array) -> bool:
         """Whether anything touches in any of the poses (n, B, 7) of all bodies, that does not move in all of them."""
-        low, high, poses = self._boxes_and_poses(body_pose)
-        moves = np.array([np.ptp(rows, axis=0).any() for rows in poses])
+        placed = self._placed(body_pose)
+        moves = np.array([any(np.ptp(rows, axis=0).any() for rows in (one.position, one.turn)) for one in placed])
         for a, b in self._pairs[moves[self._pairs].any(axis=1)]:
-            near = ((low[a] <= high[b]) & (low[b] <= high[a])).all(axis=1)
-            if any(self._touch(a, b, poses, int(row)) for row in np.flatnonzero(near)):
+            near = ((placed[a].low <= placed[b].high) & (placed[b].low <= placed[a].high)).all(axis=1)
+            if any(self._touch(a, b, placed, int(row)) for row in np.flatnonzero(near)):
                 return True
         return False
 
-    def _boxes_and_poses(self, body_pose: Array) -> tuple[list[Array], list[Array], list[Array]]:
-        """For each geom the corners (n, 3) of the box around it, and its poses (n, 7)."""
+    def _placed(self, body_pose: Array) -> list[_Placed]:
         still = np.tile(P.pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)), (len(body_pose), 1))
-        low, high, poses = list[Array](), list[Array](), list[Array]()
-        for geom, local in zip(self._geoms, self._local, strict=True):
+        found = list[_Placed]()
+        for geom, local, (middle, half) in zip(self._geoms, self._local, self._boxes, strict=True):
             pose = P.compose(still if geom.body < 0 else body_pose[:, geom.body], np.broadcast_to(local, still.shape))
-            if isinstance(geom.shape, Plane):
-                box = np.full((len(pose), 3), -np.inf), np.full((len(pose), 3), np.inf)
-            else:
-                box = shape_bounds(geom.shape, pose, self._meshes)
-            low.append(box[0])
-            high.append(box[1])
-            poses.append(pose)
-        return low, high, poses
+            centre = pose[:, :3] + P.rotate(pose[:, 3:], np.broadcast_to(middle, (len(pose), 3)))
+            turn = P.to_matrix(pose[:, 3:])
+            reach = np.full_like(centre, np.inf) if half is None else np.abs(turn) @ half
+            found.append(_Placed(centre - reach, centre + reach, pose[:, :3], turn))
+        return found
 
-    def _touch(self, a: int, b: int, poses: list[Array], row: int) -> bool:
+    def _touch(self, a: int, b: int, placed: list[_Placed], row: int) -> bool:
         import coal  # pyright: ignore[reportMissingImports]  (found by its .pth file)
 
-        placed = [coal.Transform3s(P.to_matrix(poses[g][row, 3:]), poses[g][row, :3]) for g in (a, b)]
+        at = [coal.Transform3s(placed[g].turn[row], placed[g].position[row]) for g in (a, b)]
         result = coal.CollisionResult()
-        coal.collide(self._shapes[a], placed[0], self._shapes[b], placed[1], coal.CollisionRequest(), result)
+        coal.collide(self._shapes[a], at[0], self._shapes[b], at[1], coal.CollisionRequest(), result)
         return bool(result.isCollision())
 
     def _coal(self, shape: Shape) -> Any:
@@ -96,3 +103,11 @@ class Touching:
         if (solid := coal_solid(shape)) is None:
             raise EngineError(f"paths over a {type(shape).__name__} cannot be checked; choose a task on a plane")
         return solid
+
+
+def _box(shape: Shape, meshes: Mapping[str, Mesh]) -> tuple[Array, Array | None]:
+    """Middle and half sizes (3,) of the box around a shape in its own frame; no sizes for a plane."""
+    if isinstance(shape, Plane):
+        return np.zeros(3), None
+    low, high = shape_bounds(shape, P.pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)), meshes)
+    return (low + high) / 2, (high - low) / 2
