@@ -104,6 +104,9 @@ class PlannerService(ABC):
 def planner_service(world: World, planner: str = "rrt", workers: int = 1, service: str = "threads") -> PlannerService:
     """A service whose workers plan with the named planner.
 
+    Of the services of anysim-planning, `threads` is ready at once but holds up the control loop while it plans;
+    `processes` takes a second or two to start, then leaves the loop alone: it is for runs longer than that.
+
     Raises:
         PluginError: no planner or service of that name is installed, or it is something else.
     """

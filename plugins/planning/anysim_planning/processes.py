@@ -59,14 +59,14 @@ class ProcessService(QueuedService):
 
     def _work(self, seat: Seat) -> None:
         try:
-            self._open(seat)
+            self._start(seat)
             while (jobs := self._next(seat, IDLE)) is not None:
                 process = self._processes.get(seat)
                 if jobs:
                     self._plan(seat)
                 elif process is not None and process.useful and process.has_news(0.0):  # it can only have ended
                     self._lose(seat)
-                    self._open(seat)
+                    self._start(seat)
         finally:
             self._drop(seat)
 
@@ -81,10 +81,11 @@ class ProcessService(QueuedService):
                     seat.jobs = [future for future in seat.jobs if not future.done]
                     batch = seat.jobs[: 1 if alone else None]
                     process.note(batch)
-                process.ask()
+                if batch:
+                    process.ask()
                 for _ in batch:
                     self._give(seat, *self._answer_of(process, seat))
-            except WorkerLost as how:
+            except Exception as how:  # noqa: BLE001  (`WorkerLost`, or a request that cannot be sent)
                 left = [future for future in batch if future in seat.jobs] or seat.jobs
                 begun = [future for future in left if future.budget.end < float("inf")]
                 self._lose(seat)
@@ -96,8 +97,7 @@ class ProcessService(QueuedService):
                     seat.jobs.remove(blamed)
                     self._answer(blamed, overdue() if isinstance(how, _Overdue) else _failed(how))
                 if not self._closed:
-                    with contextlib.suppress(WorkerLost):
-                        self._open(seat)
+                    self._start(seat)
 
     def _answer_of(self, process: "PlannerProcess", seat: Seat) -> tuple[PlanAnswer, float]:
         """The next answer, and its processor time [s]; raises `WorkerLost` where there is none in time."""
@@ -123,6 +123,11 @@ class ProcessService(QueuedService):
             with self._changed:
                 self._processes[seat] = process
         return self._processes[seat]
+
+    def _start(self, seat: Seat) -> None:
+        """Start its process before there is anything to do; where that fails, the first request is told."""
+        with contextlib.suppress(Exception):
+            self._open(seat)
 
     def _lose(self, seat: Seat) -> None:
         with self._changed:
@@ -202,5 +207,6 @@ class _Overdue(WorkerLost):
     """A process that is beyond a deadline."""
 
 
-def _failed(how: WorkerLost) -> PlanAnswer:
-    return PlanAnswer(PlanStatus.FAILED, message=f"the planner's process {how}")
+def _failed(how: Exception) -> PlanAnswer:
+    said = str(how) if isinstance(how, WorkerLost) else f"cannot be asked: {type(how).__name__}: {how}"
+    return PlanAnswer(PlanStatus.FAILED, message=f"the planner's process {said}")

@@ -2,7 +2,10 @@
 
 import os
 import signal
+import subprocess
+import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -92,6 +95,25 @@ def test_processes_yield_to_the_control_loop_and_have_no_pools() -> None:
         environment = Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
         assert b"NUMBA_NUM_THREADS=1" in environment
         assert alive(pid)
+
+
+def test_a_request_that_cannot_be_sent_fails_alone() -> None:
+    with ProcessService(World(), Scripted) as plans:
+        unsendable = replace(asked(2), allowed=((lambda: None, "a"),))  # pyright: ignore[reportArgumentType]
+        answers = [f.result() for f in [plans.submit(r, SCENE) for r in (asked(1), unsendable, asked(3))]]
+        assert [answer.status for answer in answers] == ["ok", "failed", "ok"]
+        assert "cannot be asked" in answers[1].message
+
+
+def test_a_process_ends_with_its_parent() -> None:
+    program = (
+        "import os, sys; from anysim.model.world import World; from anysim_planning.processes import ProcessService; "
+        "plans = ProcessService(World(), 'rrt')\n"
+        "while not plans.pids: pass\n"
+        "sys.stdout.write(str(plans.pids[0])); sys.stdout.flush(); os._exit(0)"
+    )
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
+    assert gone([int(ended.stdout)])
 
 
 def test_a_maker_that_other_processes_cannot_import_is_refused() -> None:
