@@ -10,6 +10,7 @@ from anysim.kinematics.chain import Chain
 from anysim.model.world import World
 from anysim.planning.motion import Attachment, Budget, PlanAnswer, PlanRequest, PlanStatus, Scene, motion_planner
 from anysim.planning.scenes import Scenes
+from anysim_planning import goals, rrt
 from anysim_planning.rrt import RrtPlanner
 from anysim_planning.threads import ThreadedService
 from tests.plugins.planning.conftest import LEFT, RIGHT, across, arm_joints, down, in_the_wall, reach
@@ -146,6 +147,18 @@ def test_scenes_age_when_things_move_and_not_when_robots_do(world: World) -> Non
     scenes.update(poses)
     assert (scenes.version - before).tolist() == [1, 0]
     assert scenes.is_stale(0, PlanAnswer(PlanStatus.OK, world_version=int(before[0])))
+
+
+def test_after_warming_up_there_is_nothing_to_build(
+    world: World, scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made, request = RrtPlanner(world), reach(world, down((0.5, -0.3, 0.3)))
+    made.warm_up(request, scene)
+    monkeypatch.setattr(rrt, "PlanningWorld", None)
+    monkeypatch.setattr(goals, "inverse_kinematics", None)
+    assert planned(made, request, scene).status is PlanStatus.OK
+    with pytest.raises(TypeError):  # as another set of joints needs new ones
+        planned(made, replace(request, joints=request.joints[:6], start=LEFT[:6]), scene)
 
 
 def test_cancelled_and_late_searches_end(world: World, planner: RrtPlanner, scene: Scene) -> None:
