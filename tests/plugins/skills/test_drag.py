@@ -6,7 +6,8 @@ import pytest
 from anysim import make
 from anysim.skills.base import Outcome
 from anysim.skills.runner import SkillPolicy
-from tests.plugins.skills.test_manipulation import WORLDS, given_up, solved
+from tests.plugins.skills.test_honest_failures import given_up
+from tests.plugins.skills.test_manipulation import WORLDS, solved
 
 
 def test_an_object_is_dragged_to_its_goal_on_mujoco_and_never_lifted() -> None:

@@ -3,7 +3,8 @@
 import pytest
 
 from anysim.skills.base import Outcome
-from tests.plugins.skills.test_manipulation import given_up, solved
+from tests.plugins.skills.test_honest_failures import given_up
+from tests.plugins.skills.test_manipulation import solved
 
 
 def test_a_peg_is_pulled_out_on_mujoco() -> None:

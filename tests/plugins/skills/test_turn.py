@@ -7,7 +7,8 @@ from anysim import make
 from anysim.errors import TaskError
 from anysim.skills.base import Outcome
 from anysim.skills.runner import SkillPolicy
-from tests.plugins.skills.test_manipulation import WORLDS, given_up, solved
+from tests.plugins.skills.test_honest_failures import given_up
+from tests.plugins.skills.test_manipulation import WORLDS, solved
 
 VALVE = "world.objects.valve.source.params"
 WHEEL = (f"{VALVE}.style=wheel", f"{VALVE}.radius=0.12", "task.expert.inset=0.05")
