@@ -3,13 +3,16 @@
 A free rigid object of which nothing is said has the affordance `body`: all that it collides with.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
+from anysim.conventions import IDENTITY_QUATERNION, WORLD
 from anysim.errors import NameLookupError, listing, suggest
 from anysim.model.affordances import Affordance, AffordanceKind
 from anysim.model.frames import FixedFrame, find_frame
+from anysim.model.hash import world_hash
 from anysim.model.slots import members
-from anysim.model.world import BodyKind, Entity, World
+from anysim.model.world import ORIGIN, BodyKind, Entity, Geom, Inertial, World
 
 BODY = "body"
 """The affordance of a free rigid object of which nothing was said."""
@@ -85,6 +88,36 @@ def resolve_affordance(world: World, entity: int, spec: Affordance) -> FoundAffo
     joints = range(owner.joint_start, owner.joint_stop)
     joint = next((i for i in joints if world.joints[i].name == f"{owner.name}.{spec.joint}"), -1)
     return FoundAffordance(entity, spec, frame, geoms, joint)
+
+
+def asset_hash(world: World, owner: Entity, held: int) -> str:
+    """A digest of what decides how an entity is grasped at its body `held`: shapes, surfaces, masses and joints.
+
+    Looks, names, where it stands, and whether a root that is not held is fixed do not matter.
+    """
+    first, own = owner.body_start, range(owner.body_start, owner.body_stop)
+    bodies = [
+        replace(b, name="", parent=b.parent - first if b.parent in own else WORLD)
+        for b in world.bodies[first : own.stop]
+    ]
+    bodies[0] = replace(bodies[0], kind=BodyKind.FREE, position=ORIGIN, quaternion=IDENTITY_QUATERNION)
+    if held != first:
+        bodies[0] = replace(bodies[0], inertial=Inertial(0.0))
+    joints = world.joints[owner.joint_start : owner.joint_stop]
+    geoms = tuple(collision_geom(g, g.body - first) for g in world.geoms if g.body in own and g.collides)
+    alone = World(
+        "asset",
+        bodies=tuple(bodies),
+        joints=tuple(replace(j, name="", body=j.body - first, mimic=None) for j in joints),
+        geoms=geoms,
+        meshes=tuple(m for m in world.meshes if m.name in {getattr(g.shape, "mesh", "") for g in geoms}),
+    )
+    return world_hash(alone)
+
+
+def collision_geom(geom: Geom, body: int) -> Geom:
+    """A geom on the body of another World, without looks and name."""
+    return Geom("", body, geom.shape, geom.position, geom.quaternion, surface=geom.surface)
 
 
 def _local(name: str, owner: Entity) -> str:

@@ -46,7 +46,7 @@ def made(
         AssetError: nothing that was sampled could be held; says what became of it.
     """
     began = process_time()
-    rng = np.random.default_rng([order.seed, int(subject.hash[:8], 16)])
+    rng = np.random.default_rng([order.seed, int(subject.hash[:8], 16), int(subject.place[:8], 16)])
     found = sample(subject.pieces, subject.affordance, subject.frame, order.raw, gripper.max_width, rng)
     if subject.region is not None:
         point, radius = subject.region
@@ -79,6 +79,9 @@ def made(
         "kept": len(kept),
         "seed": order.seed,
         "asked": [order.raw, order.keep],
+        "place": subject.place,
+        "link": subject.link,
+        "stroke": round(gripper.stroke, _POSE_DIGITS),
         "test": {"hardest": HARDEST, "shift": SHIFT, "turn": TURN},
         **(about or {}),
     }

@@ -1,5 +1,6 @@
 """Files of banks: one for each affordance and gripper, written whole or not at all."""
 
+import hashlib
 import json
 import re
 from pathlib import Path
@@ -12,8 +13,9 @@ from anysim_banks.subject import Subject
 
 
 def bank_path(folder: Path, name: str, subject: Subject, gripper: Gripper) -> Path:
-    """Where the bank of an affordance is, `name` being what its asset is called."""
-    parts = (name, subject.affordance.name, gripper.name)
+    """Where the bank of an affordance is, `name` being what its asset is called; what differs has a name of its own."""
+    digest = hashlib.sha256(f"{subject.hash} {subject.place} {gripper.hash}".encode()).hexdigest()[:8]
+    parts = (name, subject.affordance.name, gripper.name, digest)
     return folder / (".".join(re.sub(r"[^\w.=-]+", "_", part).strip("_") for part in parts) + ".json")
 
 
@@ -24,8 +26,8 @@ def stored(path: Path, subject: Subject, gripper: Gripper, order: Order) -> Bank
     except AssetError:
         return None
     same = (bank.asset_hash, bank.gripper_hash) == (subject.hash, gripper.hash)
-    ordered = bank.provenance.get("asked") == [order.raw, order.keep] and bank.provenance.get("seed") == order.seed
-    return bank if same and ordered else None
+    about = {"place": subject.place, "asked": [order.raw, order.keep], "seed": order.seed}
+    return bank if same and all(bank.provenance.get(key) == value for key, value in about.items()) else None
 
 
 def write(path: Path, bank: Bank) -> None:

@@ -1,17 +1,24 @@
 """The subject of a bank: one affordance of an entity, its body alone, and what stands beside it."""
 
-from dataclasses import dataclass, replace
+import hashlib
+from dataclasses import dataclass
 
 import numpy as np
 
-from anysim.conventions import IDENTITY_QUATERNION, WORLD, Array
+from anysim.conventions import Array
 from anysim.errors import AssetError
 from anysim.math import pose as P
-from anysim.model.affordance_lookup import FoundAffordance, affordances_of, find_affordance, resolve_affordance
+from anysim.model.affordance_lookup import (
+    FoundAffordance,
+    affordances_of,
+    asset_hash,
+    collision_geom,
+    find_affordance,
+    resolve_affordance,
+)
 from anysim.model.affordances import Affordance, AffordanceKind
-from anysim.model.hash import world_hash
 from anysim.model.slots import single
-from anysim.model.world import ORIGIN, Body, BodyKind, Entity, Geom, Inertial, JointType, Vec3, World
+from anysim.model.world import Body, BodyKind, Entity, JointType, Vec3, World
 from anysim_banks.pieces import Piece, piece_of
 
 GRASPED = frozenset(
@@ -35,7 +42,8 @@ class Subject:
         body: the body, to be held freely: its mass and inertia.
         world: the body alone, with what of it collides.
         pull: what its joint lets it move along at the affordance, unit, in the body's frame; None: it is carried.
-        hash: a digest of the entity and the affordance.
+        hash: a digest of the entity (`anysim.model.affordance_lookup.asset_hash`).
+        link: the body's number among the entity's.
         region: a point in the affordance's frame and the radius about it [m] that grasps keep to; None: no bounds.
     """
 
@@ -48,7 +56,13 @@ class Subject:
     world: World
     pull: Array | None
     hash: str
+    link: int
     region: Region | None = None
+
+    @property
+    def place(self) -> str:
+        """A digest of the affordance and its region: where on the asset grasps are looked for."""
+        return hashlib.sha256(f"{self.affordance} {self.region}".encode()).hexdigest()
 
 
 def subjects(world: World, entity: str, only: str = "") -> list[Subject]:
@@ -104,7 +118,7 @@ def subject(world: World, found: FoundAffordance, region: Region | None = None) 
     if body.inertial.mass <= 0:
         raise AssetError(f"'{where}' has no mass, so that holding it cannot be tried; give its object a mass")
     alone = Body("", BodyKind.FREE, inertial=body.inertial)
-    geoms = tuple(_plain(g, 0) for g in world.geoms if g.body == number and g.collides)
+    geoms = tuple(collision_geom(g, 0) for g in world.geoms if g.body == number and g.collides)
     meshes = tuple(m for m in world.meshes if any(getattr(g.shape, "mesh", "") == m.name for g in geoms))
     frame = np.array([*found.frame.position, *found.frame.quaternion])
     return Subject(
@@ -116,14 +130,10 @@ def subject(world: World, found: FoundAffordance, region: Region | None = None) 
         alone,
         World("subject", bodies=(alone,), geoms=geoms, meshes=meshes),
         _pull(world, found),
-        _hash(world, owner, found, region),
+        asset_hash(world, owner, number),
+        number - owner.body_start,
         region,
     )
-
-
-def _plain(geom: Geom, body: int) -> Geom:
-    """A geom without looks and name."""
-    return Geom("", body, geom.shape, geom.position, geom.quaternion, surface=geom.surface)
 
 
 def _around(world: World, owner: Entity, number: int) -> list[Piece]:
@@ -148,27 +158,3 @@ def _pull(world: World, found: FoundAffordance) -> Array | None:
     along = np.cross(axis, np.array(found.frame.position) - np.array(joint.anchor))
     length = float(np.linalg.norm(along))
     return along / length if length > 1e-6 else None
-
-
-def _hash(world: World, owner: Entity, found: FoundAffordance, region: Region | None) -> str:
-    """Of what decides how a grasp goes: shapes, surfaces, masses and joints; not looks, names or where it is."""
-    first = owner.body_start
-    own = range(first, owner.body_stop)
-    bodies = [
-        replace(b, name="", parent=b.parent - first if b.parent in own else WORLD)
-        for b in world.bodies[first : owner.body_stop]
-    ]
-    if found.frame.body != first:  # whether it is fixed or not does not matter to what is held of it
-        bodies[0] = replace(bodies[0], inertial=Inertial(0.0))
-    bodies[0] = replace(bodies[0], kind=BodyKind.FREE, position=ORIGIN, quaternion=IDENTITY_QUATERNION)
-    joints = world.joints[owner.joint_start : owner.joint_stop]
-    geoms = [_plain(g, g.body - first) for g in world.geoms if g.body in own and g.collides]
-    names = {getattr(g.shape, "mesh", "") for g in geoms}
-    alone = World(
-        f"{found.spec} {region}",
-        bodies=tuple(bodies),
-        joints=tuple(replace(j, name="", body=j.body - first, mimic=None) for j in joints),
-        geoms=tuple(geoms),
-        meshes=tuple(m for m in world.meshes if m.name in names),
-    )
-    return world_hash(alone)

@@ -93,3 +93,11 @@ def test_what_cannot_be_grasped_says_why() -> None:
     assert "no parallel gripper" in str(result.exception)
     result = anysim("build", BOX, "--gripper", "parallel_gripper:stroke=wide")
     assert "stroke=wide" in str(result.exception)
+
+
+def test_things_of_one_name_have_files_of_their_own() -> None:
+    """Two boxes are both called `object`; neither bank takes the other's place, and each is found again."""
+    [one], [other] = built(BOX), built("{box: [0.03, 0.06, 0.1]}")
+    assert one["file"] != other["file"]
+    assert read_bank(Path(str(one["file"]))).asset_hash != read_bank(Path(str(other["file"]))).asset_hash
+    assert [built(BOX)[0]["raw_per_cpu_second"], built("{box: [0.03, 0.06, 0.1]}")[0]["raw_per_cpu_second"]] == [0, 0]
