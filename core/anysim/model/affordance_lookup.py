@@ -96,23 +96,14 @@ def asset_hash(world: World, owner: Entity, held: int) -> str:
     Looks, names, where it stands, and whether a root that is not held is fixed do not matter.
     """
     first, own = owner.body_start, range(owner.body_start, owner.body_stop)
-    bodies = [
-        replace(b, name="", parent=b.parent - first if b.parent in own else WORLD)
-        for b in world.bodies[first : own.stop]
-    ]
+    bodies = [replace(world.bodies[b], name="", parent=max(world.bodies[b].parent - first, WORLD)) for b in own]
     bodies[0] = replace(bodies[0], kind=BodyKind.FREE, position=ORIGIN, quaternion=IDENTITY_QUATERNION)
     if held != first:
         bodies[0] = replace(bodies[0], inertial=Inertial(0.0))
-    joints = world.joints[owner.joint_start : owner.joint_stop]
+    joints = (replace(j, name="", body=j.body - first, mimic=None) for j in world.joints if j.body in own)
     geoms = tuple(collision_geom(g, g.body - first) for g in world.geoms if g.body in own and g.collides)
-    alone = World(
-        "asset",
-        bodies=tuple(bodies),
-        joints=tuple(replace(j, name="", body=j.body - first, mimic=None) for j in joints),
-        geoms=geoms,
-        meshes=tuple(m for m in world.meshes if m.name in {getattr(g.shape, "mesh", "") for g in geoms}),
-    )
-    return world_hash(alone)
+    meshes = tuple(m for m in world.meshes if m.name in {getattr(g.shape, "mesh", "") for g in geoms})
+    return world_hash(World("asset", bodies=tuple(bodies), joints=tuple(joints), geoms=geoms, meshes=meshes))
 
 
 def collision_geom(geom: Geom, body: int) -> Geom:

@@ -11,9 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
+from anysim.assets.mesh_budget import bounded
 from anysim.conventions import Array
 from anysim.errors import AssetError, listing
 from anysim.math import pose as P
+from anysim_schemas.limits import JSON_BYTES
 
 FORMAT = "anysim-bank-1"
 _DIGITS = 9  # a nanometre
@@ -135,8 +137,10 @@ def read_bank(path: Path) -> Bank:
     Raises:
         AssetError: there is no such file, or it holds no bank of this format.
     """
+    if not path.exists():
+        raise AssetError(f"there is no bank at {path}; make one with `anysim bank build`")
     try:
-        data = json.loads(path.read_text())
+        data = json.loads(bounded(path, JSON_BYTES))
         if data["format"] != FORMAT:
             raise AssetError(f"{path} is of the format {data['format']!r}, not {FORMAT!r}; build it anew")
         rows, engines = data["candidates"], data["engines"]
@@ -151,7 +155,5 @@ def read_bank(path: Path) -> Bank:
             passed={str(e): np.array([e in row["passed"] for row in rows], dtype=bool) for e in engines},
             provenance=data["provenance"],
         )
-    except OSError as error:
-        raise AssetError(f"no bank at {path} ({error.strerror}); make one with `anysim bank build`") from None
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise AssetError(f"{path} holds no bank ({type(error).__name__}: {error}); build it anew") from None

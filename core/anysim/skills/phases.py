@@ -107,6 +107,11 @@ class MovingSkill(Skill):
         del env
         return ()
 
+    def about(self, env: int) -> dict[str, object]:
+        """What records say besides, such as which bank it goes by; the same as long as `moment` is."""
+        del env
+        return {}
+
     def begin(self, env_ids: Array) -> None:
         self.start(env_ids)
         for mover in self.movers:
@@ -128,7 +133,7 @@ class MovingSkill(Skill):
 
     def describe(self, env: int) -> dict[str, object]:
         climbed = [f"{outcome} -> {rung}" for outcome, rung in self.history(env)]
-        said = super().describe(env) | ({"ladder": climbed} if climbed else {})
+        said = super().describe(env) | ({"ladder": climbed} if climbed else {}) | self.about(env)
         return reduce(or_, (mover.describe(env) for mover in self.movers), said)
 
 

@@ -1,6 +1,7 @@
 """SkillPolicy: the task's expert, or an episode's commands, as a policy over all envs, each on its own timeline."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,11 @@ from anysim.task.term_registry import resolve
 def bind_skill(name: str, params: Mapping[str, Any], env: TaskEnv, path: str) -> Skill:
     """The skill with its parameters checked and names resolved; `path` is the key of the file that asks for it.
 
+    A relative `Path` is one from the folder of that file, which it must not leave. A SpecError that a skill raises is
+    told at `path.<its key>`.
+
     Raises:
-        SpecError: at `path.<parameter>`, a name that does not exist in this world.
+        SpecError: at `path.<parameter>`, a name that does not exist in this world, or a path that leaves its folder.
     """
     skill_class: type[Skill] = registry.load("skills", name)
     values = checked(options_model(skill_class), params, path)
@@ -31,11 +35,27 @@ def bind_skill(name: str, params: Mapping[str, Any], env: TaskEnv, path: str) ->
                 value = resolve(handle, value, env.scene)
             except AnysimError as error:
                 raise SpecError([SpecIssue("", f"{path}.{key}", str(error))]) from None
-        keywords[key] = value
+        keywords[key] = _from_file(env, f"{path}.{key}", value) if isinstance(value, Path) else value
     try:
         return skill_class(env, **keywords)
+    except SpecError as error:
+        keys = [(f"{path}.{issue.path}", issue.message) for issue in error.issues]
+        raise SpecError([SpecIssue(_place(env, key), key, words) for key, words in keys]) from None
     except BaseException as error:  # noqa: BLE001 - told with the key
         registry.blame(error, f"{env.located(path)}: the skill '{name}'", registry.origin(skill_class))
+
+
+def _from_file(env: TaskEnv, key: str, path: Path) -> Path:
+    """A path as seen from the file that `key` was written in; from here where that was none."""
+    file = Path(_place(env, key).rsplit(":", 2)[0])
+    folder = (file.parent if file.is_file() else Path.cwd()).resolve()
+    if path.is_absolute() or (folder / path).resolve().is_relative_to(folder):
+        return folder / path
+    raise SpecError([SpecIssue(_place(env, key), key, f"'{path}' leaves {folder}; give an absolute path")])
+
+
+def _place(env: TaskEnv, key: str) -> str:
+    return env.located(key).removesuffix(key).removesuffix(": ")
 
 
 def bind_expert(env: TaskEnv) -> tuple[str, Skill]:

@@ -94,6 +94,9 @@ class SkillSequence(MovingSkill):
     def moment(self, env: int) -> tuple[int, ...]:
         return *super().moment(env), *self.members[self.phase[env]].moment(env)
 
+    def about(self, env: int) -> dict[str, object]:
+        return {key: value for member in self.members for key, value in member.about(env).items()}
+
     def describe(self, env: int) -> dict[str, object]:
         said = super().describe(env)
         now = self.members[self.phase[env]].describe(env)
