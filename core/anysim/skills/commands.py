@@ -78,6 +78,9 @@ class DrawnSkill(MovingSkill):
     def moment(self, env: int) -> tuple[int, ...]:
         return self._own(env).moment(env)
 
+    def about(self, env: int) -> dict[str, object]:
+        return self._own(env).about(env)
+
     def describe(self, env: int) -> dict[str, object]:
         return self._own(env).describe(env)
 

@@ -14,6 +14,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.choice import Choice
+from anysim_skills.grasping.banked import BankedGrasps, BankFile, CountsFolder, Pinned, before
 from anysim_skills.grasping.candidates import DOWN, TOP_DOWN, across, from_above
 from anysim_skills.object_shapes import ObjectShapes
 from anysim_skills.planning import LATENCY, Latency, PlannerName
@@ -64,6 +65,9 @@ class Grasp(PhasedSkill):
         phase_steps: Annotated[int, Field(ge=1, description="control steps that a move may take")] = 150,
         planner: PlannerName = "",
         latency: Latency = LATENCY,
+        bank: BankFile = None,
+        living: CountsFolder = None,
+        pinned: Pinned = "",
     ) -> None:
         """`then` is what comes next: a candidate with which that cannot be done is not chosen."""
         self.arm = Arm.of(env, robot, tool=tool, solver=solver, planner=planner, latency=latency)
@@ -75,7 +79,9 @@ class Grasp(PhasedSkill):
         n = env.num_envs
         self.turn = np.zeros((n, 4))
         """(N, 4) the tool's orientation in the chosen grasp."""
-        self._choice = Choice(n, TOP_DOWN)
+        self._hover = hover
+        self._bank = None if bank is None else BankedGrasps(env, self.arm, object, bank, living, pinned)
+        self._choice = Choice(n, TOP_DOWN if self._bank is None else self._bank.goal_count)
         self._rest = np.zeros(n)
         self._shapes = ObjectShapes(env.scene, object)
         super().__init__(env, [self.arm])
@@ -97,6 +103,8 @@ class Grasp(PhasedSkill):
     def start(self, env_ids: Array) -> None:
         super().start(env_ids)
         self._choice.again(env_ids)
+        if self._bank is not None:
+            self._bank.start(env_ids)
         self.phase[env_ids] = CHOOSE
 
     def retry(self, rung: Rung, env: int) -> int | None:
@@ -104,18 +112,25 @@ class Grasp(PhasedSkill):
         planning = self._plans and self.phase[env] == PLAN
         if rung is Rung.REPLAN and planning:
             return PLAN
+        if self._bank is not None and rung in (Rung.CANDIDATE, Rung.RESAMPLE):
+            return (CHOOSE if planning else 0) if self._bank.give_up(env) else None
         if rung is Rung.CANDIDATE and self._choice.next(env):
             return CHOOSE if planning else 0
         if rung is Rung.BACK_OFF:
             self._choice.again(env)
+            if self._bank is not None:
+                self._bank.again(env)
             return 0
         return None
+
+    def about(self, env: int) -> dict[str, object]:
+        return super().about(env) if self._bank is None else self._bank.about(env)
 
     # ------------------------------------------------------------------ phases
 
     def _open(self, ids: Array, at: Array) -> None:
         self.arm.closed[ids] = False
-        self.arm.go(ids, self.arm.tool.pose[at] + self._back, self._speed)
+        self.arm.go(ids, self._before(self.arm.tool.pose[at]), self._speed)
 
     def _backing_off(self, ids: Array, at: Array) -> Array:
         done = self.arm.arrived(ids, at) | (self.steps[ids] >= self._steps)
@@ -124,40 +139,59 @@ class Grasp(PhasedSkill):
     def _choose(self, ids: Array, at: Array) -> None:
         """Candidates by the least motion to pre-grasp, grasp and whatever comes next."""
         self.arm.closed[ids] = False
-        grasps, widths = from_above(self._object.root.pose[at]), across(self._shapes.size(ids))
-        grasps[..., :3] = self._place(at)[:, None]
-        targets = np.stack([grasps + self._back, grasps], axis=2)
+        grasps, widths = self._candidates(ids, at)
+        targets = np.stack([self._before(grasps), grasps], axis=2)
         if self._then is not None:
             targets = np.concatenate([targets, self._then.wanted(ids, at, grasps)], axis=2)
         n, g, m = targets.shape[:3]
         effort = self.arm.reach(ids, targets.reshape(n, g * m, 7))[1].reshape(n, g, m).max(axis=2)
         effort[widths > self.arm.aperture - ROOM] = np.inf
-        self.turn[ids] = grasps[np.arange(n), self._choice.choose(ids, effort), 3:]
+        if self._bank is not None:  # they are in order
+            effort = np.where(np.isfinite(effort), np.arange(g), np.inf)
+        chosen = self._choice.choose(ids, effort)
+        self.turn[ids] = grasps[np.arange(n), chosen, 3:]
+        if self._bank is not None:
+            self._bank.choose(ids, chosen, ~self._choice.none_left(ids))
+
+    def _candidates(self, ids: Array, at: Array) -> tuple[Array, Array]:
+        """Tool poses (n, g, 7), and what the fingers have to span in them (n, g) [m]."""
+        thing = self._object.root.pose[at]
+        if self._bank is not None:
+            return self._bank.goals(ids, thing, self._hover)
+        grasps = from_above(thing)
+        grasps[..., :3] = self._place(ids, at)[:, None]
+        return grasps, across(self._shapes.size(ids))
+
+    def _before(self, grasps: Array) -> Array:
+        """Tool poses (..., 7) from which these are approached."""
+        return grasps + self._back if self._bank is None else before(grasps, self._hover)
 
     def _chosen(self, ids: Array, at: Array) -> Array:
         absent = ~self._object.present[at]
         return np.where(absent, _ABSENT, np.where(self._choice.none_left(ids), _NO_IK, GO_ON))
 
-    def _place(self, at: Array) -> Array:
+    def _place(self, ids: Array, at: Array) -> Array:
         """(n, 3) where the object is grasped."""
         thing = self._object.root.pose[at]
+        if self._bank is not None:
+            return self._bank.position(ids, thing)
         if not self._offset.any():
             return thing[:, :3]
         return thing[:, :3] + P.rotate(thing[:, 3:], np.broadcast_to(self._offset, (len(at), 3)))
 
     def _grasp(self, ids: Array, at: Array) -> Array:
-        return np.concatenate([self._place(at), self.turn[ids]], axis=1)
+        return np.concatenate([self._place(ids, at), self.turn[ids]], axis=1)
 
     def _plan(self, ids: Array, at: Array) -> None:
         grasp = self._grasp(ids, at)
-        self.arm.plan(ids, (grasp + self._back)[:, None], then=grasp, touched=self._object)
+        self.arm.plan(ids, self._before(grasp)[:, None], then=grasp, touched=self._object)
 
     def _planned(self, ids: Array, at: Array) -> Array:
         del at
         return self.arm.planned(ids)
 
     def _approach(self, ids: Array, at: Array) -> Array:
-        self.arm.go(ids, self._grasp(ids, at) + self._back, self._speed)
+        self.arm.go(ids, self._before(self._grasp(ids, at)), self._speed)
         return np.where(self.arm.arrived(ids, at), GO_ON, STAY)
 
     def _descend(self, ids: Array, at: Array) -> Array:
@@ -166,6 +200,8 @@ class Grasp(PhasedSkill):
 
     def _close(self, ids: Array, at: Array) -> None:
         del at
+        if self._bank is not None:
+            self._bank.closed(ids)
         self.arm.closed[ids] = True
         self.arm.go(ids, np.concatenate([self.arm.command[ids, :3], self.turn[ids]], axis=1), self._speed)
 

@@ -8,6 +8,7 @@ from anysim.skills.base import Outcome
 from anysim.skills.sequence import SkillSequence
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
+from anysim_skills.grasping.banked import BankFile, CountsFolder, Pinned
 from anysim_skills.grasping.bring import Bring
 from anysim_skills.grasping.grasp import Grasp, Metres, Speed
 from anysim_skills.planning import LATENCY, Latency, PlannerName
@@ -32,12 +33,17 @@ class Pick(SkillSequence):
         phase_steps: Annotated[int, Field(ge=1)] = 150,
         planner: PlannerName = "",
         latency: Latency = LATENCY,
+        bank: BankFile = None,
+        living: CountsFolder = None,
+        pinned: Pinned = "",
     ) -> None:
         """`hover` [m] is the height of the approach; `phase_steps` bounds each move [control steps]."""
         arm = {"robot": robot, "object": object, "tool": tool, "solver": solver, "speed": speed}
         arm |= {"planner": planner, "latency": latency}
+        known = {"bank": bank, "living": living, "pinned": pinned}
+        pace = {"hover": hover, "descend_speed": descend_speed, "phase_steps": phase_steps}
         bring = Bring(env, **arm, goal=goal)
-        grasp = Grasp(env, bring, **arm, hover=hover, lift=0.0, descend_speed=descend_speed, phase_steps=phase_steps)
+        grasp = Grasp(env, bring, **arm, **known, **pace, lift=0.0)
         super().__init__(
             env,
             {"grasp": grasp, "bring": bring},

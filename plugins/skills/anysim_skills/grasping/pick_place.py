@@ -8,6 +8,7 @@ from anysim.skills.base import Outcome
 from anysim.skills.sequence import SkillSequence
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
+from anysim_skills.grasping.banked import BankFile, CountsFolder, Pinned
 from anysim_skills.grasping.grasp import Grasp, Metres, Speed
 from anysim_skills.grasping.place import Place
 from anysim_skills.planning import LATENCY, Latency, PlannerName
@@ -32,10 +33,14 @@ class PickPlace(SkillSequence):
         max_attempts: Annotated[int, Field(ge=1)] = 3,
         planner: PlannerName = "",
         latency: Latency = LATENCY,
+        bank: BankFile = None,
+        living: CountsFolder = None,
+        pinned: Pinned = "",
     ) -> None:
         arm = {"robot": robot, "object": object, "tool": tool, "solver": solver, "speed": speed}
         arm |= {"planner": planner, "latency": latency}
+        known = {"bank": bank, "living": living, "pinned": pinned}
         place = Place(env, **arm, target=target, above=above, retreat=max(above, 0.1), tolerance=tolerance)
-        members = {"grasp": Grasp(env, place, **arm, hover=hover, lift=0.0), "place": place}
+        members = {"grasp": Grasp(env, place, **arm, **known, hover=hover, lift=0.0), "place": place}
         again = {("place", why): "grasp" for why in (Outcome.UNSTABLE_GRASP, Outcome.LOST)}
         super().__init__(env, members, back=again, max_attempts=max_attempts)

@@ -8,6 +8,7 @@ from anysim.skills.base import Outcome
 from anysim.skills.sequence import SkillSequence
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
+from anysim_skills.grasping.banked import BankFile, CountsFolder, Pinned
 from anysim_skills.grasping.grasp import Grasp, Metres, Offset, Speed
 from anysim_skills.insertion.insert import Insert
 
@@ -31,9 +32,13 @@ class PickInsert(SkillSequence):
         speed: Speed = 0.4,
         symmetry: Annotated[int, Field(ge=1, description="turns about the axis in which the object fits")] = 4,
         max_attempts: Annotated[int, Field(ge=1)] = 3,
+        bank: BankFile = None,
+        living: CountsFolder = None,
+        pinned: Pinned = "",
     ) -> None:
         arm = {"robot": robot, "object": object, "tool": tool, "solver": solver, "speed": speed}
+        known = {"bank": bank, "living": living, "pinned": pinned}
         insert = Insert(env, **arm, tip=tip, hole=hole, mouth=mouth, symmetry=symmetry)
-        members = {"grasp": Grasp(env, insert, **arm, offset=offset, hover=hover, lift=0.0), "insert": insert}
+        members = {"grasp": Grasp(env, insert, **arm, **known, offset=offset, hover=hover, lift=0.0), "insert": insert}
         again = {("insert", why): "grasp" for why in (Outcome.UNSTABLE_GRASP, Outcome.LOST)}
         super().__init__(env, members, back=again, max_attempts=max_attempts)

@@ -1,0 +1,133 @@
+"""Banks of an object from files: those that hold for what it is, for the gripper and the engine, and their counts."""
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.errors import AssetError, SpecError, SpecIssue, listing
+from anysim.model.affordance_lookup import asset_hash
+from anysim.model.world import Entity
+from anysim.skills.bank import Bank, read_bank
+from anysim.skills.living_bank import LivingBank
+from anysim.task.env import TaskEnv
+from anysim.task.scene import ObjectView
+
+SAME_STROKE = 0.01
+"""[m] by which the bank's gripper and the arm's may open differently."""
+_NOTHING = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+
+
+class Banks:
+    """The candidates of each entity that an object can be, from one bank or several.
+
+    Attributes:
+        pose: (E, G, 7) tool poses in the object's frame; what an entity has fewer of is filled up.
+        width: (E, G) [m].
+        score: (E, G) the higher the better; -infinite where nothing is, or did not pass on this engine.
+        about: versions of the banks and of their counts, for records.
+    """
+
+    def __init__(
+        self, env: TaskEnv, aperture: float, object: ObjectView, path: Path, living: Path | None, pinned: str
+    ) -> None:
+        """As of `BankedGrasps`; `aperture` [m] is how wide the gripper opens."""
+        self._env, self._aperture, self._object, self._path = env, aperture, object, path
+        if pinned and living is None:
+            raise _at("pinned", "counts are pinned, but none are kept; say where they are with `living`")
+        found = self._read()
+        used = [self._of(entity, found) for entity in object.entities]
+        engine = env.engine.name
+        self._counts: list[list[LivingBank]] = []
+        self._start: list[list[int]] = []
+        most = max(sum(map(len, banks)) for banks in used)
+        shape = (len(used), most)
+        self.pose, self.width, self.score = (
+            np.tile(_NOTHING, (*shape, 1)),
+            np.full(shape, np.inf),
+            np.full(shape, -np.inf),
+        )
+        for row, banks in enumerate(used):
+            counts = [LivingBank(bank, engine, living) for bank in banks] if living is not None else []
+            ends = np.cumsum([len(bank) for bank in banks])
+            self._counts.append(counts)
+            self._start.append([0, *ends[:-1].tolist()])
+            self.pose[row, : ends[-1]] = np.concatenate([bank.pose for bank in banks])
+            self.width[row, : ends[-1]] = np.concatenate([bank.width for bank in banks])
+            beliefs = [count.belief for count in counts] or [np.ones(len(bank)) for bank in banks]
+            scores = [bank.margin * belief for bank, belief in zip(banks, beliefs, strict=True)]
+            passed = np.concatenate([self._passed(bank, engine) for bank in banks])
+            self.score[row, : ends[-1]] = np.where(passed, np.concatenate(scores), -np.inf)
+        self._pinned = bool(pinned)
+        self.about: dict[str, str | int] = {"version": _digest([bank.version for banks in used for bank in banks])}
+        if living is not None:
+            counted = _digest([count.version for counts in self._counts for count in counts])
+            self.about["counts"] = counted
+            if pinned and counted != pinned:
+                words = (
+                    f"the counts in {living} are of version {counted}, pinned is '{pinned}': outcomes were added since"
+                )
+                raise _at("pinned", f"{words}; restore them, or drop the pin")
+
+    def note(self, which: int, number: int, success: bool) -> None:
+        """An outcome of a candidate of an entity, if outcomes are kept."""
+        if self._counts[which]:
+            bank = int(np.searchsorted(self._start[which], number, side="right")) - 1
+            self._counts[which][bank].note(number - self._start[which][bank], success)
+
+    def save(self) -> None:
+        """Add the outcomes to their files."""
+        for counts in [] if self._pinned else self._counts:
+            for count in counts:
+                count.save()
+
+    def _read(self) -> list[Bank]:
+        """All banks at the path."""
+        files = sorted(self._path.glob("*.json")) if self._path.is_dir() else [self._path]
+        try:
+            found = [read_bank(file) for file in files]
+        except AssetError as error:
+            raise _at("bank", str(error)) from None
+        if not found:
+            raise _at("bank", f"there are no banks in the folder {self._path}; make one with `anysim bank build`")
+        return found
+
+    def _of(self, entity: Entity, found: list[Bank]) -> list[Bank]:
+        """The banks of an entity."""
+        world, gripper = self._env.engine.world, self._aperture
+        own = asset_hash(world, entity, entity.root)
+        banks = [bank for bank in found if bank.asset_hash == own]
+        more = f"build one with `anysim bank build {self._env.name} --object {self._object.name}`"
+        if not banks:
+            has = listing([f"{bank.affordance} of {bank.asset}" for bank in found])
+            words = f"{self._path} holds no bank of '{entity.name}' as it is here, of the digest {own[:12]}"
+            raise _at("bank", f"{words}: shapes, surfaces, mass and joints must be the same (banks: {has}); {more}")
+        fit = [bank for bank in banks if abs(_stroke(bank) - gripper) <= SAME_STROKE]
+        if not fit:
+            has = listing(sorted({f"{bank.gripper}, which opens {_stroke(bank):g} m" for bank in banks}))
+            words = f"{self._path} is for another gripper ({has}); this one opens {gripper:g} m"
+            raise _at("bank", f"{words}; {more} --gripper parallel_gripper:stroke={gripper:g}")
+        return fit
+
+    def _passed(self, bank: Bank, engine: str) -> Array:
+        try:
+            return bank.passed_on(engine)
+        except AssetError as error:
+            raise _at("bank", str(error)) from None
+
+
+def _stroke(bank: Bank) -> float:
+    stroke = bank.provenance.get("stroke")
+    return float(stroke) if isinstance(stroke, int | float) else float("nan")
+
+
+def _digest(versions: list[str]) -> str:
+    """The version of all of them: that of the only one where there is one."""
+    if len(versions) == 1:
+        return versions[0]
+    return hashlib.sha256(" ".join(versions).encode()).hexdigest()[:16]
+
+
+def _at(key: str, words: str) -> SpecError:
+    return SpecError([SpecIssue("", key, words)])

@@ -1,0 +1,53 @@
+"""Banks of the cube of `pick_cube`, written by hand."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from anysim.api import compile_world
+from anysim.math import pose as P
+from anysim.model.affordance_lookup import asset_hash
+from anysim.skills.bank import Bank
+
+DOWN = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+"""At the cube's middle, from above."""
+
+
+def tilted(pose: np.ndarray, angle: float) -> np.ndarray:
+    """A tool pose turned about its own y, along which fingers close."""
+    return np.concatenate(
+        [pose[:3], P.multiply(pose[3:], P.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.array(angle)))]
+    )
+
+
+def shifted(pose: np.ndarray, *offset: float) -> np.ndarray:
+    """A tool pose elsewhere [m]."""
+    return pose + np.array([*offset, 0.0, 0.0, 0.0, 0.0])
+
+
+def cube_bank(*poses: np.ndarray, asset: str = "", stroke: float = 0.08) -> Bank:
+    """These grasps of the cube, of falling margins."""
+    world = compile_world("pick_cube")
+    cube = world.entities[world.entity_numbers["cube"]]
+    own, n = asset or asset_hash(world, cube, cube.root), len(poses)
+    margin, passed = np.arange(n, 0, -1.0) + 1.0, {"mujoco 3": np.ones(n, dtype=bool)}
+    about = {"stroke": stroke}
+    return Bank(
+        "cube", "body", "hand", own, "g", np.stack(poses), np.full(n, 0.04), ("box",) * n, margin, passed, about
+    )
+
+
+def written(folder: Path, bank: Bank, name: str = "bank.json") -> Path:
+    """Its file."""
+    path = folder / name
+    path.write_text(json.dumps(bank.document()))
+    return path
+
+
+def task(folder: Path, **expert: str) -> Path:
+    """A file in this folder with `pick_cube`, whose expert is given these parameters from line 4 on."""
+    lines = ["extends: task:pick_cube", "task:", "  expert:", *(f"    {key}: {value}" for key, value in expert.items())]
+    path = folder / "pick.yaml"
+    path.write_text("\n".join([*lines, ""]))
+    return path
