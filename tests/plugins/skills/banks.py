@@ -1,6 +1,7 @@
 """Banks of the cube of `pick_cube`, written by hand."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +32,10 @@ def cube_bank(*poses: np.ndarray, asset: str = "", stroke: float = 0.08) -> Bank
     world = compile_world("pick_cube")
     cube = world.entities[world.entity_numbers["cube"]]
     own, n = asset or asset_hash(world, cube, cube.root), len(poses)
-    margin, passed = np.arange(n, 0, -1.0) + 1.0, {"mujoco 3": np.ones(n, dtype=bool)}
+    margin, passed = (
+        np.arange(n, 0, -1.0) + 1.0,
+        {e: np.ones(n, dtype=bool) for e in ("mujoco 3", "pybullet 3", "sapien 3")},
+    )
     about = {"stroke": stroke}
     return Bank(
         "cube", "body", "hand", own, "g", np.stack(poses), np.full(n, 0.04), ("box",) * n, margin, passed, about
@@ -51,3 +55,13 @@ def task(folder: Path, **expert: str) -> Path:
     path = folder / "pick.yaml"
     path.write_text("\n".join([*lines, ""]))
     return path
+
+
+def badly_chosen() -> Bank:
+    """Eight grasps that close 6 cm over the cube, then the same at its middle: as of a shape whose origin was moved."""
+    good = [tilted(DOWN, angle) for angle in np.linspace(-0.35, 0.35, 8)]
+    return replace(cube_bank(*(shifted(pose, 0.0, 0.0, 0.06) for pose in good), *good), margin=np.repeat([4.0, 3.0], 8))
+
+
+if __name__ == "__main__":
+    written(Path(__file__).parent / "worlds", badly_chosen(), "bad_grasps.json")

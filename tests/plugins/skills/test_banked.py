@@ -9,11 +9,14 @@ import pytest
 
 from anysim import make
 from anysim.errors import SpecError
+from anysim.record.collector import Collector
+from anysim.skills.bank import read_bank
 from anysim.skills.living_bank import LivingBank
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
-from tests.plugins.skills.banks import DOWN, cube_bank, shifted, task, tilted, written
+from tests.plugins.skills.banks import DOWN, badly_chosen, cube_bank, shifted, task, tilted, written
+from tests.plugins.skills.test_manipulation import WORLDS
 from tests.plugins.skills.test_pick import rollout
 
 UP = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -118,3 +121,24 @@ def test_outcomes_are_counted_and_believed_by_the_next_run(tmp_path: Path) -> No
     pinned = task(tmp_path, bank="bank.json", living="counts", pinned=kept.version)
     assert episodes(pinned, 1)[1] == kept.version
     assert LivingBank(bank, "mujoco", tmp_path / "counts").version == kept.version, "none were added"
+
+
+def test_the_badly_chosen_bank_is_what_is_written_beside_its_world() -> None:
+    path = WORLDS / "bad_grasps.json"
+    assert read_bank(path).document() == badly_chosen().document(), "python -m tests.plugins.skills.banks writes it"
+
+
+@pytest.mark.slow
+def test_outcomes_raise_the_yield_of_a_badly_chosen_bank(tmp_path: Path) -> None:
+    """Three tries an episode, at what the run began with: two runs find out about six grasps, and the third holds."""
+
+    def run(number: int, *more: str) -> int:
+        require_engine("mujoco")
+        with make(WORLDS / "bad_grasps.yaml", engine="mujoco", num_envs=4, overrides=more) as env:
+            return sum(one.success for one in Collector(env, SkillPolicy(env), tmp_path / str(number), 8, number).run())
+
+    living = f"task.expert.living={tmp_path / 'counts'}"
+    first, second, third = (run(number, living) for number in range(3))
+    assert (first, second) == (0, 0)
+    assert third >= 6
+    assert run(3) == 0
