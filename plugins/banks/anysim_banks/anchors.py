@@ -1,20 +1,20 @@
 """Anchors: regions of an asset that a person or a vision-language model proposes to take hold of, as a JSON document.
 
-They are proposals alone: what a bank holds of them was sampled there, filtered and held in physics like all the rest.
+They are proposals alone, which no skill reads: a bank made of them holds what was sampled there, and held in physics.
+Functional priors come after that, as a factor on the margins by which a skill ranks its candidates.
 """
 
-import json
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from anysim.errors import AssetError, NameLookupError
+from anysim.errors import AssetError, NameLookupError, SpecError, SpecIssue
 from anysim.model.affordances import Affordance, AffordanceKind
 from anysim.model.world import World
 from anysim_banks.subject import Subject, subject_of
 from anysim_schemas.base import Name, Number, Positive, Spec
+from anysim_schemas.load import Loaded, load
 
 Vector = tuple[Number, Number, Number]
 
@@ -41,35 +41,35 @@ class Anchors(Spec):
     anchors: tuple[Anchor, ...] = Field(description="the regions")
 
 
-def read_anchors(path: Path) -> Anchors:
-    """A document of anchors.
+def read_anchors(path: Path) -> Loaded[Anchors]:
+    """A document of anchors, with the places of its keys.
 
     Raises:
-        AssetError: there is no such file, or it is no such document; says what is wrong where.
+        AssetError: there is no such file.
+        SpecError: it is no such document; every fault with line and column.
     """
-    try:
-        return Anchors.model_validate(json.loads(path.read_text()))
-    except OSError as error:
-        raise AssetError(f"there are no anchors at {path}: {error.strerror}") from None
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise AssetError(f"{path}: {'.'.join(map(str, first['loc']))}: {first['msg']}") from None
-    except ValueError as error:
-        raise AssetError(f"{path} is no JSON document: {error}") from None
+    if not path.is_file():
+        raise AssetError(f"there are no anchors at {path}; it is a JSON document as in docs/banks.md")
+    return load(Anchors, path)
 
 
-def anchored(world: World, entity: str, anchors: Sequence[Anchor]) -> list[tuple[Subject, Anchor]]:
+def anchored(world: World, entity: str, loaded: Loaded[Anchors]) -> list[tuple[Subject, Anchor]]:
     """What banks are made of by anchors on an entity.
 
     Raises:
-        AssetError: an anchor names a link or a piece that the entity does not have, or has no mass or convex piece.
+        SpecError: with its line, an anchor on a link or a piece that the entity does not have, or without mass or
+            convex piece, or of a kind that fingers do not close on.
     """
     found: list[tuple[Subject, Anchor]] = []
-    for anchor in anchors:
+    issues: list[SpecIssue] = []
+    for number, anchor in enumerate(loaded.spec.anchors):
         spec = Affordance(anchor.name, anchor.kind, anchor.link, anchor.pieces, anchor.use, anchor.approach)
+        region = None if anchor.point is None else (anchor.point, anchor.radius)
         try:
-            region = None if anchor.point is None else (anchor.point, anchor.radius)
             found.append((subject_of(world, entity, spec, region), anchor))
-        except NameLookupError as error:
-            raise AssetError(f"the anchor '{anchor.name}': {error}") from None
+        except (NameLookupError, AssetError) as error:
+            path = f"anchors.{number}"
+            issues.append(SpecIssue(loaded.where(path), path, f"the anchor '{anchor.name}': {error}"))
+    if issues:
+        raise SpecError(issues)
     return found

@@ -91,8 +91,8 @@ def works(wish: Wish) -> list[Work]:
         if len(chosen) != 1:
             raise AssetError(f"anchors are on one object; name it with --object (objects: {', '.join(chosen)})")
         document = read_anchors(wish.anchors)
-        pairs = anchored(world, chosen[0], document.anchors)
-        return [Work(chosen[0], subject, hand, anchor, document.source) for subject, anchor in pairs]
+        pairs = anchored(world, chosen[0], document)
+        return [Work(chosen[0], subject, hand, anchor, document.spec.source) for subject, anchor in pairs]
     found = [Work(name, one, hand) for name in chosen for one in subjects(world, name, wish.affordance)]
     if not found:
         raise AssetError(f"nothing in '{wish.what}' affords a grasp: free objects and what builders declare do")

@@ -42,7 +42,12 @@ def build(
     seed: Annotated[int, typer.Option("--seed", "-s", min=0, help="The seed of the sampling.")] = 0,
     anchors: Annotated[
         Path | None,
-        typer.Option(help="A JSON document of regions to take hold of, in place of what the asset affords."),
+        typer.Option(
+            "--affordances",
+            "--anchors",
+            help="A JSON document of regions to take hold of, in place of what the asset affords; what holds there in "
+            "physics becomes a bank, and nothing else of it is ever executed.",
+        ),
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder of the banks, one file for each affordance.")] = Path("banks"),
     json: AsJson = False,

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner, Result
 
-from anysim.errors import AssetError
+from anysim.errors import AssetError, SpecError
 from anysim.skills.bank import read_bank
 from anysim_banks.cli import app
 
@@ -56,7 +56,7 @@ def test_anchors_become_banks_by_trial(tmp_path: Path) -> None:
     anchor = {"name": "top", "point": [0, 0, 0.035], "radius": 0.015, "approach": [[0, 0, -1]], "prior": 0.5}
     path = tmp_path / "anchors.json"
     path.write_text(json.dumps({"format": "anysim-anchors-1", "source": "a person", "anchors": [anchor]}))
-    result = anysim("build", BOX, "--anchors", str(path), "--raw", "400", "--keep", "6", "--json")
+    result = anysim("build", BOX, "--affordances", str(path), "--raw", "400", "--keep", "6", "--json")
     assert result.exit_code == 0, result.output
     [row] = json.loads(result.stdout)["banks"]
     bank = read_bank(Path(str(row["file"])))
@@ -65,24 +65,44 @@ def test_anchors_become_banks_by_trial(tmp_path: Path) -> None:
     assert (((bank.pose[:, :3] - [0, 0, 0.035]) ** 2).sum(axis=1) <= 0.015**2 + 1e-9).all()
 
 
+FAULTY = """{
+  "format": "anysim-anchors-1",
+  "anchors": [
+    {"name": "a"},
+    %s
+  ]
+}"""
+
+
 @pytest.mark.parametrize(
-    ("document", "message"),
+    ("anchor", "message"),
     [
-        ("{", "is no JSON document"),
-        ('{"format": "anysim-anchors-1"}', "anchors: Field required"),
-        ('{"format": "anysim-anchors-1", "anchors": [{"name": "a", "prior": 2}]}', r"anchors\.0\.prior"),
-        ('{"format": "anysim-anchors-1", "anchors": [{"name": "a", "pieces": ["lid"]}]}', "anchor 'a'.*no geom 'lid'"),
-        ('{"format": "anysim-anchors-1", "anchors": [{"name": "a", "link": "lid"}]}', "anchor 'a'.*no link"),
-        ('{"format": "anysim-anchors-1", "anchors": [{"name": "a", "kind": "button"}]}', "fingers do not close on"),
+        ('{"name": "b"', r"anchors\.json:\d+:\d+: "),
+        ('{"name": "b", "prior": 2}', r"anchors\.json:5:\d+: anchors\.1\.prior"),
+        ('{"name": "b", "points": [0, 0, 0]}', r"anchors\.json:5:\d+: anchors\.1\.points"),
+        ('{"name": "b", "pieces": ["lid"]}', r"anchors\.json:5:\d+: anchors\.1: the anchor 'b'.*no geom 'lid'"),
+        ('{"name": "b", "link": "lid"}', r"anchors\.json:5:\d+: anchors\.1: the anchor 'b'.*no link"),
+        ('{"name": "b", "kind": "button"}', r"anchors\.json:5:\d+: .*fingers do not close on"),
     ],
 )
-def test_wrong_anchors_are_refused(tmp_path: Path, document: str, message: str) -> None:
+def test_wrong_anchors_are_refused_with_their_line(tmp_path: Path, anchor: str, message: str) -> None:
     path = tmp_path / "anchors.json"
-    path.write_text(document)
-    result = anysim("build", BOX, "--anchors", str(path))
+    path.write_text(FAULTY % anchor)
+    result = anysim("build", BOX, "--affordances", str(path))
     assert result.exit_code != 0
-    with pytest.raises(AssetError, match=message):
+    with pytest.raises(SpecError, match=message):
         raise result.exception or AssertionError("no error")
+
+
+def test_anchors_are_not_candidates_until_they_were_tried(tmp_path: Path) -> None:
+    path = tmp_path / "anchors.json"
+    path.write_text(FAULTY % '{"name": "beside", "point": [0.5, 0, 0]}')
+    with pytest.raises(AssetError, match="format 'anysim-anchors-1', not 'anysim-bank-1'"):
+        read_bank(path)
+    rows = json.loads(anysim("build", BOX, "--affordances", str(path), *FEW, "--json").stdout)["banks"]
+    assert [row["affordance"] for row in rows] == ["object.a", "object.beside"]
+    assert "no grasp of object beside was held" in rows[1]["failed"], "nothing is there"
+    assert [Path(row["file"]).exists() for row in rows if "file" in row] == [True]
 
 
 def test_what_cannot_be_grasped_says_why() -> None:

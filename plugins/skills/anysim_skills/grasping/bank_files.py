@@ -56,7 +56,7 @@ class Banks:
             self.pose[row, : ends[-1]] = np.concatenate([bank.pose for bank in banks])
             self.width[row, : ends[-1]] = np.concatenate([bank.width for bank in banks])
             beliefs = [count.belief for count in counts] or [np.ones(len(bank)) for bank in banks]
-            scores = [bank.margin * belief for bank, belief in zip(banks, beliefs, strict=True)]
+            scores = [bank.margin * belief * _prior(bank) for bank, belief in zip(banks, beliefs, strict=True)]
             passed = np.concatenate([self._passed(bank, engine) for bank in banks])
             self.score[row, : ends[-1]] = np.where(passed, np.concatenate(scores), -np.inf)
         self._pinned = bool(pinned)
@@ -120,6 +120,12 @@ class Banks:
 def _stroke(bank: Bank) -> float:
     stroke = bank.provenance.get("stroke")
     return float(stroke) if isinstance(stroke, int | float) else float("nan")
+
+
+def _prior(bank: Bank) -> float:
+    """How fit its region is thought for its use, by who proposed it."""
+    prior = bank.provenance.get("prior", 1.0)
+    return float(prior) if isinstance(prior, int | float) else 1.0
 
 
 def _digest(versions: list[str]) -> str:
