@@ -4,7 +4,8 @@ The fingers close without gravity; then loads act on the thing from each directi
 state just after closing. The easy test admits a grasp: the thing's own weight, both ways along each axis of the hand.
 The hard test ranks: a load that grows to `HARDEST` times that, one way along each axis, as friction gives way alike in
 both. What is moved by its joint is pulled instead, both ways along its path, with a line of force through the
-affordance, as its guides would let it.
+affordance, as its guides would let it. The long test keeps the easy one's loads for half a second, one way along each
+axis: a thin bar that is held far from the thing's weight turns in the fingers slowly.
 """
 
 from dataclasses import replace
@@ -17,6 +18,7 @@ from anysim.compile.builder import WorldBuilder
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.factory import create_simulation
+from anysim.engine.state import Snapshot
 from anysim.math import pose as P
 from anysim.model.world import Actuator, BodyKind, ControlMode, EntityKind, Physics, World
 from anysim_banks.gripper import SPARE, Gripper
@@ -27,8 +29,12 @@ HARDEST = 12.0
 """The largest load of the hard test, in loads of the easy one."""
 PULL = 10.0
 """[N] the load of the easy test on what is moved by its joint: a stiff drawer."""
+LONG = 25
+"""Control steps of the long test: 0.5 s."""
 SHIFT, TURN = 0.003, 0.1
 """[m], [rad] by which the thing may move in the fingers under a load: what slips does not stop there."""
+CREEP = 0.0012, 0.01
+"""[m], [rad] of the long test on a bank's first engine: what slips a little there slips away on others."""
 DISPLACED = 0.01, 0.2
 """[m], [rad] by which it may move while they close."""
 MISSED = 0.6
@@ -51,6 +57,15 @@ class Verdicts(NamedTuple):
 
     margin: Array
     missed: Array
+
+
+class _Closed(NamedTuple):
+    """Things in closed fingers: poses (n, 7), which have got away, which were missed, and where loads begin."""
+
+    held: Array
+    gone: Array
+    missed: Array
+    start: Snapshot
 
 
 class Trial:
@@ -76,14 +91,47 @@ class Trial:
 
     def run(self, candidates: Candidates, *, hard: bool = True) -> Verdicts:
         """Try grasps; their order does not matter to their verdicts. Without the hard test margins are 0 or 1."""
-        n = len(candidates.width)
-        margin, missed = np.zeros(n), np.zeros(n, dtype=bool)
-        for first in range(0, n, self._n):
-            rows = np.arange(first, min(first + self._n, n))
-            margin[rows], missed[rows] = self._try(candidates.pose[rows], candidates.width[rows], hard)
+        n, margin, missed = 0, np.zeros(len(candidates.width)), np.zeros(len(candidates.width), dtype=bool)
+        for part in self._parts(candidates):
+            rows = np.arange(n, n + len(part.width))
+            margin[rows], missed[rows] = self._try(part.pose, part.width, hard)
+            n += len(rows)
         return Verdicts(margin, missed)
 
+    def lasting(self, candidates: Candidates, limits: tuple[float, float] = (SHIFT, TURN)) -> Array:
+        """(n,) bool: the grasps in which the thing moves less than `limits` [m], [rad] in the long test."""
+        parts = [self._lasting(part, limits) for part in self._parts(candidates)]
+        return np.concatenate([np.zeros(0, dtype=bool), *parts])
+
+    def _parts(self, candidates: Candidates) -> list[Candidates]:
+        n = len(candidates.width)
+        return [candidates.take(np.arange(i, min(i + self._n, n))) for i in range(0, n, self._n)]
+
+    def _lasting(self, part: Candidates, limits: tuple[float, float]) -> Array:
+        closed = self._close(part.pose, part.width)
+        held = ~closed.gone
+        for load in self._loads[::2]:
+            alive = np.flatnonzero(held)
+            if len(alive) == 0:
+                break
+            self._sim.restore(closed.start.rows(alive), alive)
+            held[alive] = self._loaded(alive, closed.held[alive], load, LONG, 0, limits) > 0
+        return held
+
     def _try(self, pose: Array, width: Array, hard: bool) -> tuple[Array, Array]:
+        closed = self._close(pose, width)
+        margin = np.where(closed.gone, 0.0, HARDEST if hard else 1.0)
+        for number, load in enumerate(self._loads):
+            alive = np.flatnonzero(margin >= 1.0)
+            if len(alive) == 0:
+                break
+            self._sim.restore(closed.start.rows(alive), alive)
+            ramp = _RAMP if hard and number % 2 == 0 else 0
+            margin[alive] = np.minimum(margin[alive], self._loaded(alive, closed.held[alive], load, _HOLD, ramp))
+        return margin, closed.missed
+
+    def _close(self, pose: Array, width: Array) -> _Closed:
+        """Close the fingers on things at these grasps, one in each env."""
         sim, ids = self._sim, np.arange(len(width))
         sim.reset(ids)
         at = P.compose(self._gripper.tool, P.inverse(pose))
@@ -101,32 +149,25 @@ class Trial:
         missed = (grip < MISSED * width) | (state.fault[ids] != 0)
         moved = P.norm(held[:, :3] - at[:, :3]) > DISPLACED[0]
         gone = missed | moved | (P.angle_between(held[:, 3:], at[:, 3:]) > DISPLACED[1])
-        start = sim.snapshot(ids)
-        margin = np.where(gone, 0.0, HARDEST if hard else 1.0)
-        for number, load in enumerate(self._loads):
-            alive = np.flatnonzero(margin >= 1.0)
-            if len(alive) == 0:
-                break
-            sim.restore(start.rows(alive), alive)
-            margin[alive] = np.minimum(margin[alive], self._loaded(alive, held[alive], load, hard and number % 2 == 0))
-        return margin, missed
+        return _Closed(held, gone, missed, sim.snapshot(ids))
 
-    def _loaded(self, ids: Array, held: Array, load: Array, hard: bool) -> Array:
-        """(n,) the largest multiple of a load that these envs held, 0 below one; one that is not `hard` is no bound."""
+    def _loaded(
+        self, ids: Array, held: Array, load: Array, hold: int, ramp: int, limits: tuple[float, float] = (SHIFT, TURN)
+    ) -> Array:
+        """(n,) the largest multiple of a load that these envs held, 0 below one; without a ramp it is no bound."""
         wrench = _in_world(load, held, self._subject)
         reached, left = np.zeros(len(ids)), np.arange(len(ids))
-        for step in range(_HOLD + _RAMP if hard else _HOLD):
-            grown = max(0, step + 1 - _HOLD) / _RAMP
-            times = 1.0 + (HARDEST - 1.0) * grown
+        for step in range(hold + ramp):
+            times = 1.0 + (HARDEST - 1.0) * max(0, step + 1 - hold) / _RAMP
             sim, rows = self._sim, ids[left]
             sim.apply_wrench(times * wrench[left, None], [self._thing], rows)
             sim.step(_SUBSTEPS, rows)
             now = sim.get_state().body_pose[rows, self._thing]
             shift = P.norm(now[:, :3] - held[left, :3])
             turn = P.angle_between(now[:, 3:], held[left, 3:])
-            left = left[(shift <= SHIFT) & (turn <= TURN)]  # a state that is no number is not held either
-            if step + 1 >= _HOLD:
-                reached[left] = times if hard else HARDEST
+            left = left[(shift <= limits[0]) & (turn <= limits[1])]  # a state that is no number is not held either
+            if step + 1 >= hold:
+                reached[left] = times if ramp else HARDEST
             if len(left) == 0:
                 break
         return reached

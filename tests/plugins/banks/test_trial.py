@@ -10,9 +10,9 @@ from anysim.errors import AssetError
 from anysim.model.world import World
 from anysim_banks.gripper import Gripper, gripper
 from anysim_banks.making import Order, made, tried_on
-from anysim_banks.sampling import Candidates, sample
+from anysim_banks.sampling import Candidates, sample, tool_turn
 from anysim_banks.subject import subjects
-from anysim_banks.trial import HARDEST, Trial
+from anysim_banks.trial import CREEP, HARDEST, Trial
 
 DOWN = [1.0, 0.0, 0.0, 0.0]
 ENGINES = runnable(Capability.WRENCHES)
@@ -81,7 +81,8 @@ def test_a_handle_is_pulled_along_its_joint(hand: Gripper) -> None:
     assert rate > 0
     assert (bank.approach[:, 0] < -0.5).all(), "from the front"
     again, _ = made(drawer, hand, "mujoco", Order(60, 8), print)
-    assert (again.version, len(bank)) == (bank.version, 8)
+    assert again.version == bank.version
+    assert 4 <= len(bank) <= 8
     np.testing.assert_array_equal(np.sort(bank.margin)[::-1], bank.margin)
 
 
@@ -92,12 +93,31 @@ def test_a_thing_too_wide_says_so(hand: Gripper) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("source", [{"box": [0.04, 0.06, 0.1]}, {"cylinder": [0.03, 0.12]}])
-def test_most_of_what_mujoco_keeps_is_held_on_the_other_engines(hand: Gripper, source: dict[str, object]) -> None:
-    world = compile_world({"world": {"objects": {"thing": {"source": source, "mass": 0.2}}}})
-    [thing] = subjects(world, "thing")
+@pytest.mark.parametrize(
+    ("source", "affordance"),
+    [({"box": [0.04, 0.06, 0.1]}, "body"), ({"cylinder": [0.03, 0.12]}, "body"), ("procedural:mug", "handle")],
+)
+def test_most_of_what_mujoco_keeps_is_held_on_the_other_engines(
+    hand: Gripper, source: dict[str, object] | str, affordance: str
+) -> None:
+    world = compile_world({"world": {"objects": {"thing": {"source": source}}}})
+    [thing] = subjects(world, "thing", affordance)
     bank, _ = made(thing, hand, "mujoco", Order(300, 32), print)
     others = [e for e in ("pybullet", "sapien") if e in ENGINES]
     bank = tried_on(bank, thing, hand, others, print)
     for engine in others:
         assert bank.passed_on(engine).mean() >= 0.9
+
+
+def test_a_thin_bar_far_from_the_weight_turns_in_the_fingers_slowly(hand: Gripper) -> None:
+    """Across the middle of a mug's handle the easy test is passed, and the long one is not; at a box it is."""
+    world = compile_world({"world": {"objects": {"mug": {"source": "procedural:mug"}}}})
+    [handle], [box] = subjects(world, "mug", "handle"), subjects(box_world(), "box")
+    turn = tool_turn(np.array([[0.0, 1.0, 0.0]]), np.array([[-1.0, 0.0, 0.0]]))
+    pose = np.concatenate([handle.frame[None, :3], turn], axis=1)
+    across = Candidates(pose, np.array([0.01]), np.array(["bar"]), np.zeros(1, dtype=int))
+    with Trial(hand, handle, "mujoco", envs=1) as trial:
+        assert trial.run(across, hard=False).margin[0] == 1.0
+        assert not trial.lasting(across, CREEP)[0]
+    with Trial(hand, box, "mujoco", envs=1) as trial:
+        assert trial.lasting(grasps((0.0, 0.0, 0.0)), CREEP)[0]
