@@ -142,3 +142,14 @@ def test_outcomes_raise_the_yield_of_a_badly_chosen_bank(tmp_path: Path) -> None
     assert (first, second) == (0, 0)
     assert third >= 6
     assert run(3) == 0
+
+
+def test_envs_do_not_disturb_each_other(tmp_path: Path) -> None:
+    written(tmp_path, cube_bank(tilted(DOWN, 0.3), BESIDE, DOWN))
+    path, finals = task(tmp_path, bank="bank.json"), []
+    for n in (1, 3):
+        with env_of(path, n) as env:
+            env.reset(seed=2)
+            rollout(env, SkillPolicy(env), 120)
+            finals.append(env.engine.get_state().joint_pos[0].copy())
+    assert (finals[0] == finals[1]).all()

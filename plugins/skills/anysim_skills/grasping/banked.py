@@ -54,6 +54,7 @@ class BankedGrasps:
         self._hand = _corners(env.engine.world, arm)
         n, count = env.num_envs, self.banks.score.shape[1]
         self.number, self._closed = np.full((2, n), -1)
+        self._entity = np.zeros(n, dtype=np.int64)
         self._given_up = np.zeros((n, count), dtype=bool)
         self._page, self._left = np.zeros((n, min(GOALS, count)), dtype=np.int64), np.zeros(n, dtype=np.int64)
         OUTCOMES.watch(env, self)
@@ -91,7 +92,7 @@ class BankedGrasps:
 
     def closed(self, ids: Array) -> None:
         """Fingers close in the chosen grasps."""
-        self._closed[ids] = self.number[ids]
+        self._closed[ids], self._entity[ids] = self.number[ids], self._which(ids)
 
     def start(self, ids: Array) -> None:
         """A grasp is begun; where one was made in this episode before, it did not hold."""
@@ -131,7 +132,7 @@ class BankedGrasps:
         self._note(ids, success=False)
 
     def _note(self, ids: Array, success: bool) -> None:
-        for which, number in zip(self._which(ids).tolist(), self._closed[ids].tolist(), strict=True):
+        for which, number in zip(self._entity[ids].tolist(), self._closed[ids].tolist(), strict=True):
             self.banks.note(which, number, success)
         self._closed[ids] = -1
 
