@@ -29,6 +29,7 @@ def poured(engine: str, num_envs: int, *overrides: str) -> tuple[list[Outcome], 
         return [OUTCOMES[o] for o in policy.skill.outcome], inside.sum(axis=1)
 
 
+@pytest.mark.slow
 def test_beads_are_poured_on_mujoco() -> None:
     outcomes, beads = poured("mujoco", 1)
     assert outcomes == [Outcome.OK]

@@ -36,6 +36,7 @@ def stroke(env: TaskEnv, steps: int) -> Array:
     return np.array(actions)
 
 
+@pytest.mark.slow
 def test_the_cube_is_pushed_to_the_goal() -> None:
     with pushing("mujoco", 1) as env:
         env.reset(seed=11)

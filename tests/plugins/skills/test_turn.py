@@ -24,6 +24,7 @@ def test_a_lever_is_turned_on_the_other_engines(engine: str) -> None:
     assert solved("turn_valve", engine, 4) >= 0.75
 
 
+@pytest.mark.slow
 def test_a_wheel_is_turned_clockwise_further_than_a_wrist_turns() -> None:
     far = (f"{VALVE}.limits=[-6.0,0.5]", "task.expert.angle=-5.5")
     assert solved("turn_valve", "mujoco", 2, *WHEEL, *far) == 1.0

@@ -38,6 +38,7 @@ def wiped(engine: str, num_envs: int, *overrides: str) -> tuple[list[Outcome], A
         return [OUTCOMES[o] for o in policy.skill.outcome], covered.mean(axis=1), np.array(forces)
 
 
+@pytest.mark.slow
 def test_a_patch_is_wiped_on_mujoco() -> None:
     outcomes, covered, forces = wiped("mujoco", 2)
     assert outcomes == [Outcome.OK] * 2

@@ -142,6 +142,7 @@ class Typist:
         os.close(self.slave)
 
 
+@pytest.mark.slow
 def test_a_session_in_a_terminal(tmp_path: Path) -> None:
     """Discard, keep, break off: one trajectory is left, with the motion of its keys, and the terminal is as it was."""
     options = "--out run -k 3 -o record.cameras=[] -o record.keep=all"
