@@ -203,13 +203,14 @@ def test_overrides_are_checked_like_files() -> None:
     )
 
 
-def test_a_command_of_a_package_that_is_not_installed_names_the_package() -> None:
+def test_a_command_of_a_package_that_is_not_installed_names_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
     from typer.main import get_command
 
     from anysim.cli.main import app
     from anysim.errors import PluginError
 
-    group = get_command(app)  # without plugins: they are added by `main`
+    monkeypatch.setattr(app, "registered_groups", [])  # without plugins
+    group = get_command(app)
     with pytest.raises(
         PluginError, match="`anysim robot` comes with anysim-robots, which is not installed: pip install"
     ):

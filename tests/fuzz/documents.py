@@ -19,6 +19,8 @@ from tests.task.helpers import BLOCKS
 T = TypeVar("T")
 
 HERE = Path(__file__).parent
+DEEP = 20
+"""Levels below which only the first of alternatives is taken: commands may hold commands without end."""
 PARTS: dict[str, Any] = yaml.safe_load((HERE / "parts.yaml").read_text())
 NAMES, TEXTS = PARTS["names"], [text for row in PARTS["texts"] for text in row]
 HOSTILE: list[Any] = [value for row in PARTS["hostile"] for value in row]
@@ -90,7 +92,7 @@ class Documents:
             node = schema() if node["$ref"] == "#" else schema()["$defs"][name]
         for key in ("anyOf", "oneOf"):
             if key in node:
-                return self.value(rng.choice(node[key]), depth)
+                return self.value(node[key][0] if depth > DEEP else rng.choice(node[key]), depth)
         if "enum" in node:
             return rng.choice(node["enum"])
         if "const" in node:
