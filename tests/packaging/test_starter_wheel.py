@@ -5,13 +5,14 @@ import json
 import pytest
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("wheels")]  # built once, by one worker
+OURS = "anysim", "anysim-collect", "anysim-mujoco", "anysim-mcap", "anysim-robots"
 
 
 def test_its_wheel_brings_a_skill_a_command_and_a_planner_that_collect(
     environment, program, external_wheels, tmp_path
 ) -> None:
     wheel = external_wheels["anysim-starter"]
-    python = environment("anysim", "anysim-mujoco", "anysim-mcap", "anysim-robots", others=(wheel,), tools=("pytest",))
+    python = environment(*OURS, others=(wheel,), tools=("pytest",))
 
     def anysim(*words: str):
         return json.loads(program(python.with_name("anysim"), *words, "--json", cwd=tmp_path).stdout)

@@ -193,7 +193,7 @@ def test_choosing_a_broken_engine_says_why(crowded, name, cause):
 
 def test_broken_commands_leave_the_others_in_place(crowded):
     done = crowded.anysim("--help")
-    assert "Run a task's expert" in done.stdout
+    assert "Run the experts of tasks" in done.stdout
     assert done.stderr.count("\n") == 1
     assert "the plugin 'commands' of anysim-broken does not load" in done.stderr
     assert "pip uninstall anysim-broken" in done.stderr

@@ -2,7 +2,7 @@
 
 A plan is a horizontal velocity of the tool for each of a few stretches of time. Samples of plans are tried out in
 rollouts from the live state; the best ones make the mean and the spread of the next round. The first stretches of the
-last mean are carried out, then it is planned again from there.
+best sample of the last round are carried out, then it is planned again from there.
 """
 
 import numpy as np
