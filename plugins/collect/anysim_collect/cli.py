@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 Tasks = Annotated[
     list[str],
     typer.Argument(
-        metavar="TASK[=WEIGHT]…",
-        help="Installed tasks (`anysim list tasks`) or YAML files; several share the episodes.",
+        metavar="TASK[=WEIGHT]", help="Installed tasks (`anysim list tasks`) or YAML files; several share the episodes."
     ),
 ]
 

@@ -7,7 +7,6 @@ skill asks for a planned move instead.
 """
 
 from typing import Self
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from anysim.planning.api import inverse_kinematics
 from anysim.skills.phases import GO_ON, STAY, Mover
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
+from anysim_skills.env_lifetime import PerEnv
 from anysim_skills.planned_moves import PlannedMoves, Stage
 from anysim_skills.planning import LATENCY, planner_of
 
@@ -41,7 +41,7 @@ DETOUR_SPEED = 0.3
 TURN_RATE = 5.0
 """[rad/m] rotation allowed for each metre of a step; position and rotation arrive together."""
 
-_ARMS: WeakKeyDictionary[TaskEnv, dict[tuple[str, str, str, str], "Arm"]] = WeakKeyDictionary()
+_ARMS: PerEnv[tuple[str, str, str, str], "Arm"] = PerEnv()
 
 
 class Arm(Mover):
@@ -109,13 +109,11 @@ class Arm(Mover):
                 want other planners for the same arm.
             PluginError: no planner of that name is installed.
         """
-        arms = _ARMS.setdefault(env, {})
         key = (robot.name, channel, gripper, tool)
-        if key not in arms:
-            arms[key] = cls(env, robot, channel, gripper, tool, solver)
+        arm = _ARMS.of(env, key, lambda: cls(env, robot, channel, gripper, tool, solver))
         if planner:
-            arms[key].plan_with(planner, latency, tool)
-        return arms[key]  # pyright: ignore[reportReturnType]
+            arm.plan_with(planner, latency, tool)
+        return arm  # pyright: ignore[reportReturnType]
 
     def plan_with(self, planner: str, latency: int, tool: str) -> None:
         """Have moves planned from now on."""

@@ -2,7 +2,6 @@
 
 import os
 from typing import Annotated
-from weakref import WeakKeyDictionary
 
 from pydantic import Field
 
@@ -13,7 +12,7 @@ from anysim.planning.motion import motion_planner
 from anysim.planning.scenes import Scenes
 from anysim.planning.service import planner_service
 from anysim.task.env import TaskEnv
-from anysim_skills.env_lifetime import ENDINGS
+from anysim_skills.env_lifetime import PerEnv
 
 WORKERS_VARIABLE = "ANYSIM_PLANNER_WORKERS"
 """The environment variable that says how many workers plan; no result depends on it."""
@@ -49,7 +48,7 @@ class EnvPlanner:
         return scenes
 
 
-_PLANNERS: WeakKeyDictionary[TaskEnv, dict[str, EnvPlanner]] = WeakKeyDictionary()
+_PLANNERS: PerEnv[str, EnvPlanner] = PerEnv(lambda made: made.service.close())
 
 
 def planner_of(env: TaskEnv, name: str) -> EnvPlanner:
@@ -59,11 +58,7 @@ def planner_of(env: TaskEnv, name: str) -> EnvPlanner:
         PluginError: no planner of motion of that name is installed.
         TaskError: the number of workers in the environment variable is none.
     """
-    planners = _PLANNERS.setdefault(env, {})
-    if name not in planners:
-        made = planners[name] = EnvPlanner(env.engine.world, name, _workers())
-        ENDINGS.add(env, made.service.close)
-    return planners[name]
+    return _PLANNERS.of(env, name, lambda: EnvPlanner(env.engine.world, name, _workers()))
 
 
 def _workers() -> int:

@@ -6,7 +6,6 @@ stops where it touches, and then goes on by `press`: that far beyond contact is 
 
 from collections.abc import Mapping
 from typing import Self
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -16,11 +15,12 @@ from anysim.math import pose as P
 from anysim.skills.phases import Mover
 from anysim.task.env import TaskEnv
 from anysim.task.scene import RobotView
+from anysim_skills.env_lifetime import PerEnv
 
 TOUCH = 0.5
 """[N] at which a finger touches."""
 
-_HANDS: WeakKeyDictionary[TaskEnv, dict[tuple[str, str], "Hand"]] = WeakKeyDictionary()
+_HANDS: PerEnv[tuple[str, str], "Hand"] = PerEnv()
 
 
 class Hand(Mover):
@@ -72,10 +72,8 @@ class Hand(Mover):
         Raises:
             TaskError: the channel has no controller, or no fingers.
         """
-        hands = _HANDS.setdefault(env, {})
-        if (robot.name, channel) not in hands:
-            hands[robot.name, channel] = cls(env, robot, channel)
-        return hands[robot.name, channel]  # pyright: ignore[reportReturnType]
+        made = _HANDS.of(env, (robot.name, channel), lambda: cls(env, robot, channel))
+        return made  # pyright: ignore[reportReturnType]
 
     def named(self, synergy: str) -> int:
         """The index of a posture.

@@ -5,7 +5,6 @@ goal, drives there, and turns again. Obstacles are not seen.
 """
 
 from typing import NamedTuple, Self
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from anysim.math import pose as P
 from anysim.skills.phases import Mover
 from anysim.task.env import TaskEnv
 from anysim.task.scene import RobotView
+from anysim_skills.env_lifetime import PerEnv
 
 HOLONOMIC, DIFFERENTIAL = ("forward", "left", "turn"), ("speed", "turn")
 """Components of the actions that it can give."""
@@ -27,7 +27,7 @@ GAIN = 4.0
 BACKWARDS = 0.3
 """[m] what lies behind a differential base and is not further away is reached backwards."""
 
-_BASES: WeakKeyDictionary[TaskEnv, dict[tuple[str, str, str], "Base"]] = WeakKeyDictionary()
+_BASES: PerEnv[tuple[str, str, str], "Base"] = PerEnv()
 
 
 class Pace(NamedTuple):
@@ -75,11 +75,8 @@ class Base(Mover):
         Raises:
             TaskError: the channel has no controller, or one that drives no base.
         """
-        bases = _BASES.setdefault(env, {})
-        key = (robot.name, channel, link)
-        if key not in bases:
-            bases[key] = cls(env, robot, channel, link)
-        return bases[key]  # pyright: ignore[reportReturnType]
+        made = _BASES.of(env, (robot.name, channel, link), lambda: cls(env, robot, channel, link))
+        return made  # pyright: ignore[reportReturnType]
 
     def renew(self, ids: Array) -> None:
         """These envs have just been reset."""

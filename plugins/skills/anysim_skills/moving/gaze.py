@@ -6,7 +6,6 @@ moves them a little along the damped least squares of the angle between the opti
 
 from collections.abc import Sequence
 from typing import Self
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from anysim.math import pose as P
 from anysim.skills.phases import Mover
 from anysim.task.env import TaskEnv
 from anysim.task.scene import RobotView
+from anysim_skills.env_lifetime import PerEnv
 
 GAIN = 5.0
 """[1/s] of the angle that is left."""
@@ -24,7 +24,7 @@ LEAD = 0.3
 """[rad, m] a joint's command runs at most this far ahead of the joint."""
 _FORWARD = np.array([0.0, 0.0, 1.0])
 
-_GAZES: WeakKeyDictionary[TaskEnv, dict[tuple[str, str, str, tuple[str, ...]], "Gaze"]] = WeakKeyDictionary()
+_GAZES: PerEnv[tuple[str, str, str, tuple[str, ...]], "Gaze"] = PerEnv()
 
 
 class Gaze(Mover):
@@ -74,11 +74,9 @@ class Gaze(Mover):
         Raises:
             NameLookupError, TaskError: no such camera or channel, or no such joint carries the camera.
         """
-        gazes = _GAZES.setdefault(env, {})
         key = (robot.name, camera, channel, tuple(joints))
-        if key not in gazes:
-            gazes[key] = cls(env, robot, camera, channel, joints)
-        return gazes[key]  # pyright: ignore[reportReturnType]
+        made = _GAZES.of(env, key, lambda: cls(env, robot, camera, channel, joints))
+        return made  # pyright: ignore[reportReturnType]
 
     def renew(self, ids: Array) -> None:
         """These envs have just been reset."""
