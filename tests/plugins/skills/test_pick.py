@@ -1,9 +1,12 @@
 """The pick skill on the real engine: it succeeds, acts only through actions, and types its failures."""
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 
-from anysim import load, registry
+from anysim import load, make, registry
 from anysim.errors import SpecError
 from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.runner import SkillPolicy
@@ -105,3 +108,13 @@ def test_where_it_is_not_installed_the_error_names_its_package(monkeypatch: pyte
     )
     with pytest.raises(SpecError, match=remedy):
         load("pick_cube")
+
+
+def test_what_skills_share_in_an_env_goes_with_it() -> None:
+    env = make("pick_cube", engine="mujoco", num_envs=1)
+    policy = SkillPolicy(env)
+    shared = weakref.ref(policy.skill.movers[0])  # type: ignore[attr-defined]
+    env.close()
+    del policy, env
+    gc.collect()
+    assert shared() is None
