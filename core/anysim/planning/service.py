@@ -7,7 +7,7 @@ or as soon as it is ready (`latency=None`), which gives up reproducibility.
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Self, cast
+from typing import ClassVar, Self, cast
 
 from anysim import registry
 from anysim.errors import PluginError
@@ -44,7 +44,7 @@ class PlanFuture:
 class ServiceCounts:
     """Of all requests so far; `late` were waited for, for `waited` [s] in all; `lost_workers` hung or died.
 
-    `processor` [s] is what planners computed, where they answered.
+    `answered` has the cancelled ones in it. `processor` [s] is what planners computed, where they answered.
     """
 
     submitted: int = 0
@@ -55,9 +55,20 @@ class ServiceCounts:
     lost_workers: int = 0
     processor: float = 0.0
 
+    @property
+    def queue(self) -> int:
+        """How many wait for their answers."""
+        return self.submitted - self.answered
+
 
 class PlannerService(ABC):
-    """Workers that answer requests. Use it as a context manager, or call `close`; one thread calls it."""
+    """Workers that answer requests. Use it as a context manager, or call `close`; one thread calls it.
+
+    Attributes:
+        beside: whether its workers are processes of their own, whose processor time this one's has not in it.
+    """
+
+    beside: ClassVar[bool] = False
 
     def __init__(self) -> None:
         self.counts = ServiceCounts()

@@ -15,6 +15,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.planning.service import PlannerService
 from anysim.skills.base import OUTCOMES, Outcome, Skill
 from anysim.task.env import TaskEnv
 
@@ -62,6 +63,11 @@ class Mover(ABC):
     @abstractmethod
     def act(self, ids: Array, action: Array) -> None:
         """Write the rows of the action of these envs, which the scene looks at."""
+
+    @property
+    def planners(self) -> tuple[PlannerService, ...]:
+        """The services that plan its moves."""
+        return ()
 
     def describe(self, env: int) -> dict[str, object]:
         """What records say of how it moves, the same as long as an episode lasts."""

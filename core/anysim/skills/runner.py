@@ -9,9 +9,11 @@ import numpy as np
 from anysim import registry
 from anysim.conventions import Array
 from anysim.errors import AnysimError, SpecError, SpecIssue, TaskError
+from anysim.planning.service import PlannerService
 from anysim.plugin_parameters import checked, options_model, parameters, reference_kind
 from anysim.skills.base import OUTCOMES, Outcome, Skill
 from anysim.skills.commands import CommandSequence
+from anysim.skills.phases import MovingSkill
 from anysim.task.env import TaskEnv
 from anysim.task.term_registry import resolve
 
@@ -115,6 +117,12 @@ class SkillPolicy:
         return (
             said | {"segments": self.skill.segments(env, success)} if isinstance(self.skill, CommandSequence) else said
         )
+
+    @property
+    def planners(self) -> tuple[PlannerService, ...]:
+        """The services that plan the skill's moves, each once; what they have counted is of all envs."""
+        movers = self.skill.movers if isinstance(self.skill, MovingSkill) else ()
+        return tuple(dict.fromkeys(service for mover in movers for service in mover.planners))
 
     def describe(self, env: int) -> dict[str, object]:
         """What an env is doing, for records and tables."""

@@ -125,6 +125,8 @@ def report(
     for title, counts in (("Failures", told["failures"]), ("Retries", told["ladder"])):
         if counts:
             print_table(title, ("type", "times"), list(counts.items()))
+    if told["planning"]:
+        print_table("Planning", ("", ""), [(name, f"{value:.3g}") for name, value in told["planning"].items()])
     typer.echo(f"the page: {directory / PAGE_FILE}")
 
 
@@ -185,7 +187,7 @@ def _run(order: Order, out: Path | None, episodes: int, total: int | None, limit
             _announce(env, directory, total, seed, len(collector.recorder.committed()), order.verbose, task)
         results: list[EpisodeResult] = []
         tally, began = Tally(), process_time()
-        with showing(f"{env.name} on {env.engine.name}", total, tally, order.json) as show:
+        with showing(f"{env.name} on {env.engine.name}", total, tally, order.json, policy.planners) as show:
             for result in collector.run():
                 size = 0 if result.path is None else size_of(result.path)
                 limits.kept += size
@@ -201,7 +203,7 @@ def _run(order: Order, out: Path | None, episodes: int, total: int | None, limit
             "seed": seed,
         }
         times = collector.times
-        told = report_of(what, tally, times.parts(), process_time() - began)
+        told = report_of(what, tally, times.parts(), process_time() - began, policy.planners)
         return Ran(
             directory, results, tally, times.steps, times.parts(), limits.reached(), write_report(directory, told)
         )

@@ -1,7 +1,7 @@
 """Progress of a collection: a table on a terminal, a line for each episode in a pipe."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Protocol
 
@@ -9,6 +9,7 @@ import typer
 
 from anysim.cli.output import interactive
 from anysim.math.statistics import wilson
+from anysim.planning.service import PlannerService
 from anysim.record.collector import EpisodeResult
 from anysim_collect.tally import Tally, ordered
 
@@ -29,7 +30,9 @@ def line(result: EpisodeResult) -> str:
 
 
 @contextmanager
-def showing(name: str, total: int | None, tally: Tally, quiet: bool) -> Iterator[Show]:
+def showing(
+    name: str, total: int | None, tally: Tally, quiet: bool, planners: Sequence[PlannerService] = ()
+) -> Iterator[Show]:
     """Show how `tally` grows towards `total` episodes; None where hours or bytes end the collection."""
     if quiet or not interactive():
         yield lambda result: None if quiet else typer.echo(line(result))
@@ -39,7 +42,13 @@ def showing(name: str, total: int | None, tally: Tally, quiet: bool) -> Iterator
     began, cpu = time.perf_counter(), time.process_time()
 
     def table() -> Any:
-        return _table(name, total, tally, time.perf_counter() - began, time.process_time() - cpu)
+        grid = _table(name, total, tally, time.perf_counter() - began, time.process_time() - cpu)
+        counts = [service.counts for service in planners]
+        if counts:
+            queue, answered = sum(c.queue for c in counts), sum(c.answered for c in counts)
+            late = f"{sum(c.late for c in counts):,} waited for"
+            grid.add_row("planner", f"{queue} in the queue, {answered:,} answered", late)
+        return grid
 
     with Live(get_renderable=table, refresh_per_second=REFRESH, transient=True):
         yield lambda result: None

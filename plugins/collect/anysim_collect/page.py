@@ -32,8 +32,8 @@ def _body(report: Mapping[str, Any], title: str) -> Iterator[str]:
     share = f"{successes / attempts:.1%}" if attempts else "no attempt"
     yield f'<p class="big">{share}</p><p>{successes} of {attempts} attempts succeeded (95 %: {low:.0%} to {high:.0%}).'
     cost = report["cpu_s_per_kept"]
-    yield f"{report['kept']} trajectories kept, {report['kept_bytes'] / 1e6:,.1f} MB"
-    yield f"; {cost:.2f} CPU seconds each.</p>" if cost is not None else ".</p>"
+    each = "" if cost is None else f"; {cost:.2f} CPU seconds each"
+    yield f"{report['kept']} trajectories kept, {report['kept_bytes'] / 1e6:,.1f} MB{each}.</p>"
     commands = report["commands"]
     yield from _table(
         "By command",

@@ -2,10 +2,12 @@
 
 import json
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from anysim.errors import RecordError
+from anysim.planning.service import PlannerService
 from anysim_collect.tally import Tally
 
 FORMAT = "anysim-report-1"
@@ -13,7 +15,7 @@ REPORT_FILE, PAGE_FILE = "report.json", "report.html"
 
 
 def report_of(
-    run: dict[str, Any], tally: Tally, parts: dict[str, float], cpu_s: float, planning: dict[str, Any] | None = None
+    run: dict[str, Any], tally: Tally, parts: dict[str, float], cpu_s: float, planners: Sequence[PlannerService] = ()
 ) -> dict[str, Any]:
     """A report as plain data.
 
@@ -21,10 +23,12 @@ def report_of(
         run: what was run: task, engine, seed, envs.
         tally: what became of its episodes.
         parts: wall seconds by part; resumed episodes took none.
-        cpu_s: CPU seconds of the process, planning apart.
-        planning: what the planner's workers counted.
+        cpu_s: CPU seconds of the process.
+        planners: that planned moves; their own CPU seconds are told apart.
     """
     fresh = tally.kept - tally.resumed
+    planning = planned(planners)
+    cpu_s -= sum(service.counts.processor for service in planners if not service.beside)
     return {
         "format": FORMAT,
         **run,
@@ -32,7 +36,23 @@ def report_of(
         "cpu_s": cpu_s,
         "cpu_s_per_kept": cpu_s / fresh if fresh > 0 else None,
         "wall_s": parts,
-        "planning": planning or {},
+        "planning": planning,
+    }
+
+
+def planned(planners: Sequence[PlannerService]) -> dict[str, float]:
+    """What planners have counted together; empty where nothing is planned."""
+    counts = [service.counts for service in planners]
+    if not counts:
+        return {}
+    return {
+        "requests": sum(count.submitted for count in counts),
+        "answered": sum(count.answered for count in counts),
+        "cancelled": sum(count.cancelled for count in counts),
+        "waited for": sum(count.late for count in counts),
+        "waited [s]": sum(count.waited for count in counts),
+        "workers lost": sum(count.lost_workers for count in counts),
+        "CPU [s]": sum(count.processor for count in counts),
     }
 
 

@@ -31,6 +31,8 @@ MESSAGE_LIMIT = 60.0
 class ProcessService(QueuedService):
     """Worker processes around planners; one that hangs or dies is replaced, and the request that it had fails."""
 
+    beside = True
+
     def __init__(self, world: World, planner: str | PlannerMaker = "rrt", workers: int = 1) -> None:
         """`planner`: a name, or what makes one, which processes import; each makes its own.
 

@@ -16,6 +16,7 @@ from anysim.kinematics.chain import Chain
 from anysim.math import pose as P
 from anysim.model.world import JointType
 from anysim.planning.api import inverse_kinematics
+from anysim.planning.service import PlannerService
 from anysim.skills.phases import GO_ON, STAY, Mover
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
@@ -134,6 +135,11 @@ class Arm(Mover):
         self._fresh[ids] = True
         if self.plans is not None:
             self.plans.renew(ids)
+
+    @property
+    def planners(self) -> tuple[PlannerService, ...]:
+        """The service that plans its moves, if they are planned."""
+        return () if self.plans is None else (self.plans.planner.service,)
 
     def describe(self, env: int) -> dict[str, object]:
         """What records say of how it is moved."""

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from xml.etree import ElementTree
 
@@ -11,6 +12,7 @@ import typer
 from typer.testing import CliRunner
 
 from anysim.errors import RecordError, TaskError
+from anysim.planning.service import ServiceCounts
 from anysim.record.collector import EpisodeResult
 from anysim_collect import cli, mixture as mixtures
 from anysim_collect.mixture import Limits, Part, mixture, parse_bytes, shared_out
@@ -19,7 +21,7 @@ from anysim_collect.report import read_report, report_of, write_report
 from anysim_collect.tally import Tally
 
 WORLDS = Path(__file__).parents[1] / "skills/worlds"
-DRAWN = str(WORLDS / "drawn_commands.yaml")
+DRAWN, BEHIND_WALL = (str(WORLDS / name) for name in ("drawn_commands.yaml", "behind_wall.yaml"))
 app = typer.Typer()
 app.command("run")(cli.run)
 app.command("report")(cli.report)
@@ -111,7 +113,7 @@ def test_an_expert_is_one_command_and_a_lost_episode_is_no_attempt() -> None:
 
 
 def test_a_report_is_written_whole_and_read_again(tmp_path: Path) -> None:
-    told = report_of(RUN, counted(), {"physics": 1.0, "policy": 3.0}, 2.5, {"submitted": 4})
+    told = report_of(RUN, counted(), {"physics": 1.0, "policy": 3.0}, 2.5) | {"planning": {"requests": 4}}
     path = write_report(tmp_path, told)
     assert read_report(tmp_path) == json.loads(json.dumps(told))
     assert read_report(tmp_path)["cpu_s_per_kept"] == 2.5
@@ -160,6 +162,24 @@ def test_run_and_report_from_the_command_line(tmp_path: Path) -> None:
     assert read_report(out)["commands"] == report["commands"]
     said = anysim("report", str(out))
     assert "1 open" in said.output
+
+
+def test_planning_is_counted_apart(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    done = anysim("run", BEHIND_WALL, "--num-envs", "2", "--episodes", "2", "--seed", "3", "--out", str(out))
+    assert done.exit_code == 0, done.output
+    report = read_report(out)
+    planning = report["planning"]
+    assert planning["requests"] == planning["answered"] > 0
+    assert planning["CPU [s]"] > 0.0
+    assert report["cpu_s"] > 0.0
+    assert "<h2>Planning</h2>" in (out / "report.html").read_text("utf-8")
+    assert "waited for" in anysim("report", str(out)).output
+    counts = [ServiceCounts(submitted=5, answered=3, processor=1.5), ServiceCounts(submitted=1, processor=0.5)]
+    services = [SimpleNamespace(counts=counts[0], beside=False), SimpleNamespace(counts=counts[1], beside=True)]
+    told = report_of(RUN, Tally(), {}, 4.0, services)  # pyright: ignore[reportArgumentType]
+    assert (told["cpu_s"], told["planning"]["CPU [s]"]) == (2.5, 2.0), "processes of their own were not in it"
+    assert [count.queue for count in counts] == [2, 1]
 
 
 def test_a_limit_of_bytes_ends_a_run(tmp_path: Path) -> None:
