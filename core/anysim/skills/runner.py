@@ -75,6 +75,11 @@ def bind_expert(env: TaskEnv) -> tuple[str, Skill]:
     return task.expert.skill, bind_skill(task.expert.skill, task.expert.params, env, "task.expert")
 
 
+SETTLE = 100
+"""Control steps in which a scene may come to rest after a skill has succeeded."""
+_OK, _ADVERSE = OUTCOMES.index(Outcome.OK), OUTCOMES.index(Outcome.ADVERSE_STATE)
+
+
 class SkillPolicy:
     """Acts in the envs it is asked for; an env whose skill has given up stays still."""
 
@@ -86,30 +91,42 @@ class SkillPolicy:
             f"{env.located(path)}: the skill '{self.name}'", registry.origin(self.skill), prefix=True
         )
         self._told: list[tuple[tuple[int, ...], dict[str, object]]] = [((), {})] * env.num_envs
+        self._done = np.zeros(env.num_envs, dtype=np.int64)
+        """Control steps since the skill has succeeded, by env."""
+        self._settle = SETTLE + (0 if env.spec.task is None else env.spec.task.hold)
         self._still = np.clip(np.zeros(env.action_dim), *env.action_bounds)
 
     def begin(self, env_ids: Array) -> None:
         """These envs have just been reset."""
+        self._done[env_ids] = 0
         with self._blame:
             self.skill.begin(env_ids)
 
     def act(self, env_ids: Array) -> Array:
-        """The action (N, A); only the rows `env_ids` mean anything."""
+        """The action (N, A); only the rows `env_ids` mean anything.
+
+        A skill that succeeded more than SETTLE control steps ago has failed as `adverse_state` where the task's success
+        does not hold.
+        """
         action = np.tile(self._still, (self.env.num_envs, 1))
         with self._blame:
             self.skill.act(env_ids, action)
+        outcome = self.skill.outcome
+        self._done[env_ids] += outcome[env_ids] == _OK
+        if (late := env_ids[self._done[env_ids] > self._settle]).size:
+            outcome[late[~self.env.info["is_success"][late] & (outcome[late] == _OK)]] = _ADVERSE
         return action
 
     def gave_up(self, env_ids: Array) -> Array:
         """(n,) bool: the skill ended in these envs with a failure."""
         outcome = self.skill.outcome[env_ids]
-        return (outcome != OUTCOMES.index(Outcome.RUNNING)) & (outcome != OUTCOMES.index(Outcome.OK))
+        return (outcome != OUTCOMES.index(Outcome.RUNNING)) & (outcome != _OK)
 
     def solved(self, env_ids: Array) -> Array:
         """(n,) bool: the commands of `collect` are all done in these envs, and the task's success holds."""
         if not isinstance(self.skill, CommandSequence):
             return np.zeros(len(env_ids), dtype=bool)
-        return (self.skill.outcome[env_ids] == OUTCOMES.index(Outcome.OK)) & self.env.info["is_success"][env_ids]
+        return (self.skill.outcome[env_ids] == _OK) & self.env.info["is_success"][env_ids]
 
     def ended(self, env: int, success: bool) -> dict[str, object]:
         """What is to be said of an env whose episode has ended."""

@@ -1,12 +1,15 @@
 """Failures are honest: what cannot be solved ends with the right type after the ladder."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from anysim import make
 from anysim.planning.motion import PlanAnswer, PlanRequest, PlanStatus
+from anysim.record.collector import Collector
 from anysim.skills.base import OUTCOMES, Outcome
-from anysim.skills.runner import SkillPolicy
+from anysim.skills.runner import SETTLE, SkillPolicy
 from anysim.testing.engines import require_engine
 from anysim_planning.rrt import RrtPlanner
 from tests.plugins.skills.test_manipulation import STEPS, WORLDS
@@ -68,3 +71,11 @@ def test_a_planner_that_breaks_fails_the_episode_and_nothing_else(monkeypatch: p
 
     monkeypatch.setattr(RrtPlanner, "plan", broken)
     assert given_up("behind_wall")[0] == [Outcome.NO_PATH] * 2
+
+
+def test_a_skill_that_succeeds_where_the_task_does_not_ends_the_episode(tmp_path: Path) -> None:
+    overrides = ["record.cameras=[]", "task.success.at_goal.tolerance=1.0e-6"]
+    with make("pick_cube", engine="mujoco", num_envs=2, overrides=overrides) as env:
+        results = list(Collector(env, SkillPolicy(env), tmp_path, 2, seed=3).run())
+        assert [(r.status, r.outcome["outcome"]) for r in results] == [("failed", "adverse_state")] * 2
+        assert all(SETTLE < r.steps < env.spec.task.horizon for r in results if env.spec.task)
