@@ -39,8 +39,8 @@ class CollectTimes:
         self._env = env
         self._began, self._physics, self._drawn = time.perf_counter(), env.physics_seconds, drawn(env)
 
-    def parts(self) -> dict[str, float]:
-        """Wall seconds by part since the collector was made; they add up to all of it."""
+    def parts(self, whole: float | None = None) -> dict[str, float]:
+        """Wall seconds by part; they add up to `whole`, which is since the collector was made unless it is given."""
         physics = self._env.physics_seconds - self._physics
         parts = {
             "physics": physics,
@@ -50,7 +50,8 @@ class CollectTimes:
             "record": self.record.seconds,
             "draw": drawn(self._env) - self._drawn,
         }
-        return parts | {"other": time.perf_counter() - self._began - sum(parts.values())}
+        whole = time.perf_counter() - self._began if whole is None else whole
+        return parts | {"other": whole - sum(parts.values())}
 
 
 def drawn(env: TaskEnv) -> float:

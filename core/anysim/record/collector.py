@@ -7,7 +7,8 @@ does not depend on how fast the others are or how many there are.
 import sys
 import weakref
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -162,6 +163,13 @@ class Collector:
         Yields each that an earlier run has committed, and each other one when it has ended and, where it is kept, when
         its trajectory is on the disk.
         """
+        with closing(self.rounds()) as rounds:
+            for result in rounds:
+                if result is not None:
+                    yield result
+
+    def rounds(self) -> Generator[EpisodeResult | None]:
+        """The same, and None after each control step of the envs: between two of them other work may be done."""
         env, times = self.env, self.times
         try:
             env.streams.seed(self.seed, np.arange(env.num_envs))
@@ -181,6 +189,7 @@ class Collector:
                     yield from self._finish(i, str(Status.SUCCESS if i in solved else result.status[i]))
                 yield from self._settled()
                 yield from self._start(over)
+                yield None
             with times.record:
                 self.recorder.flush()
             yield from self._settled()

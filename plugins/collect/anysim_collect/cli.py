@@ -1,7 +1,7 @@
 """`anysim run`: collect episodes of tasks with their experts. `anysim report`: what became of them."""
 
 from collections.abc import Sequence
-from contextlib import nullcontext
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -12,8 +12,9 @@ from anysim.cli.options import BROKE, AsJson, Engine, NumEnvs, Overrides, Seed, 
 if TYPE_CHECKING:
     from anysim.record.collector import EpisodeResult
     from anysim.task.env import TaskEnv
-    from anysim_collect.mixture import Limits
+    from anysim_collect.mixture import Limits, Part
     from anysim_collect.tally import Tally
+    from anysim_collect.turns import Collection
 
 Tasks = Annotated[
     list[str],
@@ -71,7 +72,9 @@ def run(
       anysim run pick_cube=3 push_cube=1 --num-envs 16 --hours 2 --bytes 20GB --out runs/mixed
     """
     from anysim.record.commit import file_at, no_directory
+    from anysim_collect.live import showing
     from anysim_collect.mixture import UNBOUNDED, Limits, mixture, parse_bytes, shared_out
+    from anysim_collect.turns import collect
 
     if out is not None and (file := file_at(out)) is not None:
         raise no_directory("--out", file)
@@ -79,15 +82,20 @@ def run(
     limits = Limits(hours, None if max_bytes is None else parse_bytes(max_bytes))
     bounded = hours is not None or max_bytes is not None
     total = episodes if episodes is not None else UNBOUNDED if bounded else 1
-    runs: list[Ran] = []
-    for part, count in zip(parts, shared_out(parts, total), strict=True):
-        if count == 0:
-            continue
-        order = Order(part.task, engine, num_envs, seed, override or (), strict_observers, verbose, json)
-        own = out if out is None or len(parts) == 1 else out / Path(part.task).stem
-        ran = _run(order, own, count, None if bounded and episodes is None else count, limits.part(part.share))
-        runs.append(ran)
-        if not json:
+    with ExitStack() as stack:
+        collections: list[Collection] = []
+        for part, count in zip(parts, shared_out(parts, total), strict=True):
+            if count == 0:
+                continue
+            order = Order(part, engine, num_envs, seed, override or (), strict_observers, verbose, json)
+            own = out if out is None or len(parts) == 1 else out / Path(part.task).stem
+            ends = bounded and episodes is None
+            collections.append(_begin(stack, order, own, count, None if ends else count, limits))
+        with showing(collections, json) as show:
+            collect(collections, show)
+        runs = [_end(one) for one in collections]
+    if not json:
+        for ran in runs:
             _tell(ran)
     if json:
         _print_json(runs)
@@ -133,7 +141,7 @@ def report(
 class Order(NamedTuple):
     """One task to be run, and how."""
 
-    task: str
+    part: "Part"
     engine: str | None
     num_envs: int | None
     seed: int | None
@@ -155,58 +163,52 @@ class Ran(NamedTuple):
     page: Path
 
 
-def _run(order: Order, out: Path | None, episodes: int, total: int | None, limits: "Limits") -> Ran:
-    from time import process_time
-
+def _begin(
+    stack: ExitStack, order: Order, out: Path | None, episodes: int, total: int | None, limits: "Limits"
+) -> "Collection":
+    """Make the env of a task, which closes with the stack, and what collects with it."""
     from anysim.api import make
     from anysim.cli.output import working_on
-    from anysim.record.collector import Collector
     from anysim.record.names import run_name
-    from anysim.skills.runner import SkillPolicy
     from anysim.task.cost import MANY
-    from anysim_collect.live import showing
-    from anysim_collect.mixture import size_of
-    from anysim_collect.report import report_of, write_report
-    from anysim_collect.tally import Tally
+    from anysim_collect.turns import Collection
 
-    task, many = order.task, (order.num_envs or 1) >= MANY
+    task, many = order.part.task, (order.num_envs or 1) >= MANY
     with working_on(f"building {task}") if many else nullcontext():
-        made = make(
-            task,
-            engine=order.engine,
-            num_envs=order.num_envs,
-            overrides=order.overrides,
-            strict_observers=order.strict_observers,
+        env = stack.enter_context(
+            make(
+                task,
+                engine=order.engine,
+                num_envs=order.num_envs,
+                overrides=order.overrides,
+                strict_observers=order.strict_observers,
+            )
         )
-    with made as env:
-        seed = env.spec.seed if order.seed is None else order.seed
-        directory = out or Path("runs") / run_name(env.name, env.engine.name, env.spec.to_dict(), seed)
-        policy = SkillPolicy(env)
-        collector = Collector(env, policy, directory, episodes, seed, lambda: bool(limits.reached()))
-        if not order.json:
-            _announce(env, directory, total, seed, len(collector.recorder.committed()), order.verbose, task)
-        results: list[EpisodeResult] = []
-        tally, began = Tally(), process_time()
-        with showing(f"{env.name} on {env.engine.name}", total, tally, order.json, policy.planners) as show:
-            for result in collector.run():
-                size = 0 if result.path is None else size_of(result.path)
-                limits.kept += size
-                results.append(result)
-                tally.add(result, size)
-                show(result)
-        results.sort(key=lambda r: (r.env, r.episode))
-        what = {
-            "task": env.name,
-            "engine": env.engine.name,
-            "engine_version": f"{env.engine.name} {env.engine.version}",
-            "num_envs": env.num_envs,
-            "seed": seed,
-        }
-        times = collector.times
-        told = report_of(what, tally, times.parts(), process_time() - began, policy.planners)
-        return Ran(
-            directory, results, tally, times.steps, times.parts(), limits.reached(), write_report(directory, told)
-        )
+    seed = env.spec.seed if order.seed is None else order.seed
+    directory = out or Path("runs") / run_name(env.name, env.engine.name, env.spec.to_dict(), seed)
+    made = Collection(env, directory, episodes, seed, limits, share=order.part.share, total=total)
+    stack.callback(made.close)
+    if not order.json:
+        present = len(made.collector.recorder.committed())
+        _announce(env, directory, total, seed, present, order.verbose, task)
+    return made
+
+
+def _end(one: "Collection") -> Ran:
+    """Write the report of a collection that has ended."""
+    from anysim_collect.report import report_of, write_report
+
+    env, results = one.env, sorted(one.results, key=lambda r: (r.env, r.episode))
+    what = {
+        "task": env.name,
+        "engine": env.engine.name,
+        "engine_version": f"{env.engine.name} {env.engine.version}",
+        "num_envs": env.num_envs,
+        "seed": one.seed,
+    }
+    parts = one.collector.times.parts(one.wall)
+    page = write_report(one.out, report_of(what, one.tally, parts, one.cpu, one.planners))
+    return Ran(one.out, results, one.tally, one.collector.times.steps, parts, one.limits.reached(), page)
 
 
 def _announce(

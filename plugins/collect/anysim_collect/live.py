@@ -1,26 +1,23 @@
 """Progress of a collection: a table on a terminal, a line for each episode in a pipe."""
 
-import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, Protocol
+from typing import Any
 
 import typer
 
 from anysim.cli.output import interactive
 from anysim.math.statistics import wilson
-from anysim.planning.service import PlannerService
 from anysim.record.collector import EpisodeResult
-from anysim_collect.tally import Tally, ordered
+from anysim_collect.tally import ordered
+from anysim_collect.turns import Collection
 
 REFRESH = 4
 """[Hz] of the table."""
 
 
-class Show(Protocol):
-    """Called once an episode has ended, and counted."""
-
-    def __call__(self, result: EpisodeResult) -> None: ...
+Show = Callable[[Collection, EpisodeResult], None]
+"""Called once an episode has ended, and counted."""
 
 
 def line(result: EpisodeResult) -> str:
@@ -30,34 +27,30 @@ def line(result: EpisodeResult) -> str:
 
 
 @contextmanager
-def showing(
-    name: str, total: int | None, tally: Tally, quiet: bool, planners: Sequence[PlannerService] = ()
-) -> Iterator[Show]:
-    """Show how `tally` grows towards `total` episodes; None where hours or bytes end the collection."""
-    if quiet or not interactive():
-        yield lambda result: None if quiet else typer.echo(line(result))
+def showing(collections: Sequence[Collection], quiet: bool) -> Iterator[Show]:
+    """Show how collections grow."""
+    several = len(collections) > 1
+    if quiet:
+        yield lambda one, result: None
         return
+    if not interactive():
+        yield lambda one, result: typer.echo(f"{one.env.name}: {line(result)}" if several else line(result))
+        return
+    from rich.console import Group
     from rich.live import Live
 
-    began, cpu = time.perf_counter(), time.process_time()
-
     def table() -> Any:
-        grid = _table(name, total, tally, time.perf_counter() - began, time.process_time() - cpu)
-        counts = [service.counts for service in planners]
-        if counts:
-            queue, answered = sum(c.queue for c in counts), sum(c.answered for c in counts)
-            late = f"{sum(c.late for c in counts):,} waited for"
-            grid.add_row("planner", f"{queue} in the queue, {answered:,} answered", late)
-        return grid
+        return Group(*(_table(one) for one in collections))
 
     with Live(get_renderable=table, refresh_per_second=REFRESH, transient=True):
-        yield lambda result: None
+        yield lambda one, result: None
 
 
-def _table(name: str, total: int | None, tally: Tally, wall: float, cpu: float) -> Any:
+def _table(one: Collection) -> Any:
     from rich.progress_bar import ProgressBar
     from rich.table import Table
 
+    name, total, tally, wall, cpu = one.name, one.total, one.tally, one.wall, one.cpu
     grid = Table.grid(padding=(0, 2))
     new = tally.attempts - tally.resumed
     done = tally.attempts + tally.lost
@@ -72,6 +65,11 @@ def _table(name: str, total: int | None, tally: Tally, wall: float, cpu: float) 
     grid.add_row("cost", f"{cpu / fresh:.2f} CPU seconds an episode kept" if fresh else "", "")
     worst = ", ".join(f"{count} {why}" for why, count in list(ordered(tally.failures).items())[:4])
     grid.add_row("failures", worst or "none", f"{tally.faults} faults" if tally.faults else "")
+    counts = [service.counts for service in one.planners]
+    if counts:
+        queue, answered = sum(c.queue for c in counts), sum(c.answered for c in counts)
+        late = f"{sum(c.late for c in counts):,} waited for"
+        grid.add_row("planner", f"{queue} in the queue, {answered:,} answered", late)
     return grid
 
 

@@ -94,8 +94,3 @@ class Limits:
         if self.hours is not None and time.monotonic() - self._began > 3600.0 * self.hours:
             return f"{self.hours:g} hours"
         return f"{self.max_bytes:,} bytes" if self.max_bytes is not None and self.kept >= self.max_bytes else ""
-
-    def part(self, share: float) -> "Limits":
-        """The same for one part of a mixture, from now on."""
-        hours = None if self.hours is None else self.hours * share
-        return Limits(hours, None if self.max_bytes is None else max(1, int(self.max_bytes * share)))

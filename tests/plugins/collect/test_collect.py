@@ -19,6 +19,7 @@ from anysim_collect.mixture import Limits, Part, mixture, parse_bytes, shared_ou
 from anysim_collect.page import page
 from anysim_collect.report import read_report, report_of, write_report
 from anysim_collect.tally import Tally
+from anysim_collect.turns import Collection, collect
 
 WORLDS = Path(__file__).parents[1] / "skills/worlds"
 DRAWN, BEHIND_WALL = (str(WORLDS / name) for name in ("drawn_commands.yaml", "behind_wall.yaml"))
@@ -64,11 +65,12 @@ def test_limits_end_a_collection(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mixtures.time, "monotonic", lambda: now[0])
     limits = Limits(hours=1.0, max_bytes=1000)
     assert limits.reached() == ""
-    half = limits.part(0.5)
-    now[0] += 1900.0
-    assert (limits.reached(), half.reached()) == ("", "0.5 hours")
+    now[0] += 3500.0
+    assert limits.reached() == ""
     limits.kept = 1000
     assert limits.reached() == "1,000 bytes"
+    now[0] += 200.0
+    assert limits.reached() == "1 hours"
 
 
 def result(status: str = "success", steps: int = 10, **outcome: Any) -> EpisodeResult:
@@ -190,9 +192,43 @@ def test_a_limit_of_bytes_ends_a_run(tmp_path: Path) -> None:
     assert 1 <= read_report(tmp_path)["attempts"] < 200
 
 
-def test_several_tasks_have_a_directory_each(tmp_path: Path) -> None:
-    quick = ["-o", "record.cameras=[]", "--num-envs", "2", "--episodes", "3", "--out", str(tmp_path), "--json"]
-    done = anysim("run", "reach=2", "press_button=1", *quick)
+def manifests(folder: Path) -> dict[str, Any]:
+    """What the manifests below a folder say, but for their clocks."""
+    said = {str(path.relative_to(folder)): json.loads(path.read_text()) for path in folder.rglob("manifest.json")}
+    return {place: {k: v for k, v in manifest.items() if k != "clock"} for place, manifest in said.items()}
+
+
+def test_several_tasks_have_a_directory_each_and_are_what_they_are_alone(tmp_path: Path) -> None:
+    quick = ["-o", "record.cameras=[]", "--num-envs", "2", "--json"]
+    done = anysim("run", "reach=2", "press_button=1", *quick, "--episodes", "3", "--out", str(tmp_path / "both"))
     assert done.exit_code == 0, done.output
     assert [run["attempts"] for run in json.loads(done.output)["runs"]] == [2, 1]
-    assert {path.name for path in tmp_path.iterdir()} == {"reach", "press_button"}
+    assert {path.name for path in (tmp_path / "both").iterdir()} == {"reach", "press_button"}
+    alone = tmp_path / "alone"
+    assert anysim("run", "reach", *quick, "--episodes", "2", "--out", str(alone)).exit_code == 0
+    assert manifests(tmp_path / "both/reach") == manifests(alone) != {}
+
+
+class Paced(Collection):
+    """A collection of nothing, with episodes of some steps."""
+
+    def __init__(self, share: float, steps: int, total: int | None, order: list[float]) -> None:
+        self.share, self.total, self.tally = share, total, Tally()
+        self._steps, self._order, self._made = steps, order, 0
+
+    def advance(self, show: Any) -> bool:
+        self._order.append(self.share)
+        self._made += 1
+        if self._made % self._steps == 0:
+            self.tally.add(result())
+        return len(self._order) < 400
+
+
+def test_turns_go_round_or_follow_the_shares() -> None:
+    order: list[float] = []
+    collect([Paced(0.25, 2, 9, order), Paced(0.75, 5, 9, order)], lambda one, ended: None)
+    assert order[:6] == [0.25, 0.75] * 3
+    order.clear()
+    rare, often = Paced(0.25, 2, None, order), Paced(0.75, 5, None, order)
+    collect([rare, often], lambda one, ended: None)
+    assert often.tally.attempts == pytest.approx(3 * rare.tally.attempts, abs=3), "though its episodes are longer"
