@@ -12,10 +12,10 @@ import pytest
 
 import anysim
 from anysim import hooks, registry
-from anysim.cli.doctor_imports import broken
 from anysim.engine.factory import availability, create_simulation, runnable
 from anysim.errors import AssetError, EngineError, PluginError, PluginFailure
 from anysim.task.env import TaskEnv
+from anysim_inspect.plugins import broken
 from tests.task.helpers import BLOCKS, blocks
 
 PACKAGE, MODULE = "anysim-rotten", "anysim_rotten"

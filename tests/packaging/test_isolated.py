@@ -29,8 +29,8 @@ def alone(environment: Callable[..., Path]) -> Callable[[str], Path]:
 
     def make(engine: str) -> Path:
         if engine not in made:
-            distribution = "anysim" if engine == "null" else f"anysim-{engine}"
-            made[engine] = environment(distribution, tools=("pytest",))
+            distributions = ["anysim-inspect", *([] if engine == "null" else [f"anysim-{engine}"])]
+            made[engine] = environment(*distributions, tools=("pytest",))
         return made[engine]
 
     return make

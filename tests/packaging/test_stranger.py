@@ -60,7 +60,12 @@ class Installed:
 def here(environment, program, external_wheels, tmp_path_factory) -> Installed:
     """anysim, its recorder and the stranger: no backend of ours."""
     python = environment(
-        "anysim", "anysim-collect", "anysim-mcap", others=(external_wheels["anysim-ballistic"],), tools=("pytest",)
+        "anysim",
+        "anysim-collect",
+        "anysim-inspect",
+        "anysim-mcap",
+        others=(external_wheels["anysim-ballistic"],),
+        tools=("pytest",),
     )
     folder = tmp_path_factory.mktemp("work")
     (folder / "world.yaml").write_text(WORLD)
@@ -71,7 +76,12 @@ def here(environment, program, external_wheels, tmp_path_factory) -> Installed:
 def crowded(environment, program, external_wheels, tmp_path_factory) -> Installed:
     """The same, with a package whose engines do not work."""
     python = environment(
-        "anysim", "anysim-collect", "anysim-mcap", others=tuple(external_wheels.values()), tools=("pytest",)
+        "anysim",
+        "anysim-collect",
+        "anysim-inspect",
+        "anysim-mcap",
+        others=tuple(external_wheels.values()),
+        tools=("pytest",),
     )
     folder = tmp_path_factory.mktemp("crowded")
     (folder / "world.yaml").write_text(WORLD)

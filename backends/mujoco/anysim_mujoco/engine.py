@@ -8,11 +8,11 @@ import numpy as np
 from mujoco.batch import SimulationError
 
 from anysim.conventions import Array, wxyz_from_xyzw, xyzw_from_wxyz
+from anysim.engine.availability import Finding, Health
 from anysim.engine.base import SimEngine
 from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Capabilities
 from anysim.engine.control import Control, alternating
-from anysim.engine.doctor import Finding, Health
 from anysim.engine.presence import Lifecycle
 from anysim.engine.state import ContactPoints, RayHits, SnapshotLevel
 from anysim.math import pose as P

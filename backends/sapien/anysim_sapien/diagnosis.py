@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from anysim.engine.doctor import Finding, Health
+from anysim.engine.availability import Finding, Health
 from anysim_sapien import vulkan
 
 

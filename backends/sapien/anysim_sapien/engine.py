@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 from anysim.conventions import Array
+from anysim.engine.availability import Finding
 from anysim.engine.capability import Allowance, Capabilities
-from anysim.engine.doctor import Finding
 from anysim.engine.one_world.base import OneWorldPerEnv
 from anysim.engine.presence import Lifecycle
 from anysim.engine.requirements import crowded

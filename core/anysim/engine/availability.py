@@ -1,16 +1,39 @@
-"""Versions of a library that an engine can run on, judged by installed metadata alone: nothing heavy is imported."""
+"""Versions of a library that an engine can run on, judged by metadata alone, and findings about this machine."""
 
 import platform
 import re
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import StrEnum
 from functools import cache
 from importlib import metadata
+from typing import NamedTuple
 
 from anysim.engine.state import Availability
 
 Version = tuple[int, ...]
+
+
+class Health(StrEnum):
+    """How a thing is."""
+
+    OK = "ok"
+    NOTE = "note"  # good to know, nothing to repair
+    ABSENT = "absent"  # this engine does not have it, by design
+    MISSING = "missing"  # not installed
+    UNAVAILABLE = "unavailable"  # installed, but not for this machine, or a version that must not be used
+    WRONG = "wrong"  # it runs and gives a wrong answer
+    BROKEN = "broken"  # it does not run
+
+
+class Finding(NamedTuple):
+    """One line of a diagnosis: what was looked at, how it is, what was found, and the remedy where one is needed."""
+
+    what: str
+    state: Health
+    found: str
+    remedy: str = ""
 
 
 @dataclass(frozen=True)

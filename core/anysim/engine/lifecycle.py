@@ -10,11 +10,10 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine import arguments
-from anysim.engine.availability import LibraryRequirement
+from anysim.engine.availability import Finding, LibraryRequirement
 from anysim.engine.capability import Allowance, Capabilities, Capability, Need, check
 from anysim.engine.conditioning import doubts
 from anysim.engine.control import CommandBuffer
-from anysim.engine.doctor import Finding
 from anysim.engine.extent import Extent
 from anysim.engine.lifetime import EngineLifetime
 from anysim.engine.options import EngineOptions

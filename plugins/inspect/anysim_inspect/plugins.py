@@ -1,6 +1,6 @@
 """Plugins that do not load, found in a process of their own: one that crashes or hangs there costs its own row.
 
-Engines have their own examination (`anysim.engine.doctor`). The process, `python -m` with this module and a KIND/NAME
+Engines have their own examination (`anysim_inspect.engines`). The process, `python -m` with this module and a KIND/NAME
 for each plugin, prints a JSON line as soon as one is known; the first one without a line is the one that ended it.
 """
 
@@ -8,7 +8,7 @@ import json
 import sys
 
 from anysim import registry
-from anysim.engine.doctor import Finding, Health
+from anysim.engine.availability import Finding, Health
 from anysim.own_process import run_module
 
 LIMIT_S = 120.0

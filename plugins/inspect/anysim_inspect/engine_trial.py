@@ -1,4 +1,4 @@
-"""Trial of one engine in this process, `python -m anysim.testing.doctor_trial NAME`: a ball falls and is drawn.
+"""Trial of one engine in this process, `python -m anysim_inspect.engine_trial NAME`: a ball falls and is drawn.
 
 Prints one JSON document per finding as soon as it is known: what a crash leaves unprinted is what crashed.
 """
@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from anysim import registry
+from anysim.engine.availability import Finding, Health
 from anysim.engine.capability import Capability
-from anysim.engine.doctor import Finding, Health
 from anysim.engine.factory import engine_class
 from anysim.errors import AnysimError
 from anysim.model.world import Body, BodyKind, Camera, Entity, EntityKind, Geom, Inertial, Sphere, World

@@ -1,41 +1,20 @@
 """Diagnosis of engines: what is installed, imports, falls, draws, and the remedy for what does not.
 
-Each engine is tried in a process of its own (`anysim.testing.doctor_trial`), so that one that crashes, hangs or prints
+Each engine is tried in a process of its own (`anysim_inspect.engine_trial`), so that one that crashes, hangs or prints
 costs nothing but its own findings.
 """
 
 import json
 from collections.abc import Iterable
-from enum import StrEnum
 from typing import NamedTuple
 
 from anysim import registry
+from anysim.engine.availability import Finding, Health
 from anysim.errors import AnysimError
 from anysim.own_process import run_module
 
 TIMEOUT_S = 180.0
 """Longest time [s] of a trial. SAPIEN's first image takes half a minute with some drivers in software."""
-
-
-class Health(StrEnum):
-    """How a thing is."""
-
-    OK = "ok"
-    NOTE = "note"  # good to know, nothing to repair
-    ABSENT = "absent"  # this engine does not have it, by design
-    MISSING = "missing"  # not installed
-    UNAVAILABLE = "unavailable"  # installed, but not for this machine, or a version that must not be used
-    WRONG = "wrong"  # it runs and gives a wrong answer
-    BROKEN = "broken"  # it does not run
-
-
-class Finding(NamedTuple):
-    """One line of a diagnosis: what was looked at, how it is, what was found, and the remedy where one is needed."""
-
-    what: str
-    state: Health
-    found: str
-    remedy: str = ""
 
 
 class Examination(NamedTuple):
@@ -75,7 +54,7 @@ def _package(name: str) -> str:
 def _try_apart(name: str, timeout: float) -> Examination:
     """The trial in its own process; its death or silence is a finding."""
     what = f"{name}: physics"
-    ended = run_module("anysim.testing.doctor_trial", name, limit=timeout)
+    ended = run_module("anysim_inspect.engine_trial", name, limit=timeout)
     findings, works = _read(ended.out.splitlines())
     trouble = ended.trouble or ("" if findings else "ended without a finding")
     if trouble:

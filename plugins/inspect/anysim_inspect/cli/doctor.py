@@ -9,7 +9,7 @@ import typer
 from anysim.cli.options import AsJson
 
 if TYPE_CHECKING:
-    from anysim.engine.doctor import Finding
+    from anysim.engine.availability import Finding
 
 STYLES = {
     "ok": "green", "note": "dim", "absent": "dim", "missing": "yellow", "unavailable": "red", "wrong": "bold red",
@@ -27,9 +27,10 @@ def doctor(json: AsJson = False) -> None:
     crashes or hangs costs nothing but its own rows. Exit code 1 if no engine with dynamics works.
     """
     from anysim import registry
-    from anysim.cli.doctor_imports import broken
     from anysim.cli.output import print_json, print_table, working_on
-    from anysim.engine.doctor import Finding, Health, examine
+    from anysim.engine.availability import Finding, Health
+    from anysim_inspect.engines import examine
+    from anysim_inspect.plugins import broken
 
     rows = machine()
     works = False
@@ -56,7 +57,7 @@ def doctor(json: AsJson = False) -> None:
 def machine() -> "list[Finding]":
     """Versions, processors, the cache, and the variables that are set."""
     from anysim import __version__
-    from anysim.engine.doctor import Finding, Health
+    from anysim.engine.availability import Finding, Health
 
     rows = [
         Finding("anysim", Health.OK, __version__),
@@ -74,7 +75,7 @@ def _processors() -> str:
 
 def _cache() -> "Finding":
     from anysim.cache import cache_folder
-    from anysim.engine.doctor import Finding, Health
+    from anysim.engine.availability import Finding, Health
 
     folder = cache_folder()
     nearest = next((p for p in (folder, *folder.parents) if p.exists()), folder)

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from anysim import registry
-from anysim.engine.doctor import Examination, Health, examine
+from anysim.engine.availability import Health
+from anysim_inspect.engines import Examination, examine
 
 BASE = """
 import os, sys, time
