@@ -13,7 +13,7 @@ from anysim.errors import AssetError, SpecError
 from anysim.managers.object_parameters import SceneManager
 from anysim.model.world import Slot
 from anysim.randomization.streams import Streams
-from anysim.record.explain import explain
+from anysim_inspect.draws import explain
 from tests.task.helpers import BLOCKS
 
 DRAWN: dict[str, Any] = {

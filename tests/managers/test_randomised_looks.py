@@ -10,9 +10,9 @@ import anysim
 from anysim.api import check_engine, compile_world, load
 from anysim.engine.factory import engine_class
 from anysim.errors import CapabilityError, SpecError
-from anysim.record.explain import explain
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_drawing
+from anysim_inspect.draws import explain
 
 ENGINES = ("mujoco", "pybullet", "sapien")
 SCENE: dict[str, Any] = {

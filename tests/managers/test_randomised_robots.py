@@ -12,8 +12,8 @@ from anysim.engine.kinematic import NullEngine
 from anysim.errors import CapabilityError, SpecError
 from anysim.randomization.draw import noise_rows
 from anysim.randomization.streams import Streams
-from anysim.record.explain import explain
 from anysim.task.env import TaskEnv
+from anysim_inspect.draws import explain
 from anysim_schemas.values import Choice, Normal, NormalParameters, Range
 from tests.task.helpers import BLIND, arm, blocks
 

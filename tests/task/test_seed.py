@@ -19,6 +19,6 @@ def test_a_given_seed_wins() -> None:
 
 
 def test_what_an_episode_draws_is_explained_for_the_file_s_seed() -> None:
-    from anysim.record.explain import explain
+    from anysim_inspect.draws import explain
 
     assert explain({**BLOCKS, "seed": 3}).episode_seed == explain(BLOCKS, seed=3).episode_seed

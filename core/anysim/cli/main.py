@@ -8,7 +8,7 @@ from typing import Any
 import typer
 
 from anysim import __version__
-from anysim.cli import audit, check, explain, listing, replay, schema, snapshot
+from anysim.cli import check, listing, replay, schema
 from anysim.cli.options import BROKE, CommandEnded, Commands
 
 EXIT_CODES = """Exit codes: 0 done; 1 it ran, and the answer is no (a replay that differs, a file with faults, too few
@@ -29,10 +29,7 @@ app = typer.Typer(
 app.command("replay")(replay.replay)
 app.command("check")(check.check)
 app.command("list")(listing.list_)
-app.command("explain")(explain.explain)
-app.command("audit")(audit.audit)
 app.command("schema")(schema.schema)
-app.add_typer(snapshot.app, name="snapshot")
 
 
 def _version(show: bool) -> None:

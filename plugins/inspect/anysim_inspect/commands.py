@@ -10,7 +10,10 @@ if TYPE_CHECKING:
 
 @hookimpl
 def add_cli(app: "typer.Typer") -> None:
-    """`anysim doctor`."""
-    from anysim_inspect.cli import doctor
+    """`anysim explain`, `doctor`, `audit` and `snapshot`."""
+    from anysim_inspect.cli import audit, doctor, explain, snapshot
 
+    app.command("explain")(explain.explain)
     app.command("doctor")(doctor.doctor)
+    app.command("audit")(audit.audit)
+    app.add_typer(snapshot.app, name="snapshot")

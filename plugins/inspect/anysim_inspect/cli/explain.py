@@ -21,7 +21,7 @@ def explain(
     The same on every engine, and whatever the number of envs. `anysim run TASK --seed S` has this episode in env I.
     """
     from anysim.cli.output import print_json, print_table
-    from anysim.record.explain import explain as explain_one
+    from anysim_inspect.draws import explain as explain_one
     from anysim_schemas.files import exists
 
     found = explain_one(

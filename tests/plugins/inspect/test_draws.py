@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import anysim
-from anysim.record.explain import explain
+from anysim_inspect.draws import explain
 from tests.task.helpers import BLOCKS
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from typer.testing import CliRunner
 
-from anysim.cli.main import app
+from tests.plugins.inspect.commands import app
 
 WORLD = """\
 world:

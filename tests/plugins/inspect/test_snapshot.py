@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from anysim.cli.main import app
 from anysim.engine.snapshots.file import read
 from anysim.errors import NameLookupError, SnapshotError
+from tests.plugins.inspect.commands import app
 from tests.runtime import light
 
 
