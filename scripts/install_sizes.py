@@ -42,6 +42,7 @@ WORDS = {
     "skills": "scripted solutions: grasp, place, push, press, open, close, insert, hand over",
     "tasks": "twelve tasks on a table, with their experts",
     "teleop": "`anysim teleop`: demonstrations, driven by an input device",
+    "urdf": "URDF files",
 }
 """What each extra brings; the table has a row for each."""
 

@@ -74,7 +74,7 @@ def inertial() -> Callable[[float], str]:
 def urdf(tmp_path: Path) -> "Callable[..., ImportedModel]":
     """Imports the body of a <robot> element from a file in tmp_path."""
 
-    from anysim.assets.urdf import import_urdf
+    from anysim_urdf.load import import_urdf
 
     def load(body: str, **options: Any) -> "ImportedModel":
         path = tmp_path / "arm.urdf"

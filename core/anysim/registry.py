@@ -63,6 +63,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-sapien": {"engines": "sapien"},
     "anysim-skills": {"skills": "pick"},
     "anysim-teleop": {"commands": "teleop", "devices": "browser keyboard script"},
+    "anysim-urdf": {"importers": "urdf"},
 }
 INSTALL_HINTS: Mapping[tuple[str, str], str] = {
     (kind, name): package

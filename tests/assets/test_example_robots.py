@@ -8,7 +8,6 @@ import pytest
 import yourdfpy
 
 from anysim.assets.model import ImportedModel
-from anysim.assets.urdf import import_urdf
 from anysim.assets.uri import example_robot_data
 from anysim.compile.builder import WorldBuilder
 from anysim.errors import AssetError
@@ -17,6 +16,7 @@ from anysim.math import pose as P
 from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.frames import find_frame
 from anysim.model.world import BodyKind, EntityKind, MeshShape, World
+from anysim_urdf.load import import_urdf
 
 ROBOTS = {  # path: moving joints, followers, mass [kg]
     "ur_description/urdf/ur5_robot.urdf": (6, 0, 20.994),

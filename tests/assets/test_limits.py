@@ -16,7 +16,6 @@ import pytest
 from anysim.assets import mesh_budget, meshes
 from anysim.assets.ground_files import read_heights
 from anysim.assets.images import opened_image
-from anysim.assets.urdf import import_urdf
 from anysim.errors import AssetError
 from anysim_schemas.limits import (
     ARRAY_BYTES,
@@ -32,6 +31,7 @@ from anysim_schemas.limits import (
     Limit,
     table,
 )
+from anysim_urdf.load import import_urdf
 
 
 @pytest.fixture(autouse=True)

@@ -17,7 +17,6 @@ from anysim.assets.mesh_budget import bounded
 from anysim.assets.meshes import VISUAL_ERROR
 from anysim.assets.model import ImportedModel, strange_number
 from anysim.assets.procedural import from_uri
-from anysim.assets.urdf import import_urdf
 from anysim.assets.uri import locate, locate_folder
 from anysim.errors import AssetError
 from anysim_schemas.limits import MODEL_BYTES
@@ -48,7 +47,7 @@ def import_asset(
     packages: Mapping[str, str] = MappingProxyType({}),
     visual_error: float = VISUAL_ERROR,
 ) -> ImportedModel:
-    """The model behind a URI. `.urdf` is read here; `.xml` and `.mjcf` by the installed importer named `mjcf`.
+    """The model behind a URI: `.urdf` is read by the installed importer `urdf`, `.xml` and `.mjcf` by `mjcf`.
 
     `procedural:NAME` is built by the installed builder, with its default parameters. `packages` are the folders, as
     URIs, of packages that a URDF refers to as `package://NAME/…`. `visual_error` [m] is how far its looks may be off.
@@ -67,12 +66,12 @@ def _read(uri: str, base: Path | None, scale: float, packages: Mapping[str, str]
     if uri.startswith(PROCEDURAL):
         return from_uri(uri, scale=scale)
     file = model_file(uri, base=base)
+    own: dict[str, object] = {"body": file.body}
     if file.kind == "urdf":
-        folders = {name: locate_folder(folder, base=base).path for name, folder in packages.items()}
-        return import_urdf(file.path, root=file.root, scale=scale, packages=folders, visual_error=visual_error)
+        own = {"packages": {name: locate_folder(folder, base=base).path for name, folder in packages.items()}}
     importer = registry.load("importers", file.kind)
     with registry.using("importers", file.kind):
-        return importer(file.path, root=file.root, scale=scale, body=file.body, visual_error=visual_error)
+        return importer(file.path, root=file.root, scale=scale, visual_error=visual_error, **own)
 
 
 def split_body(uri: str) -> tuple[str, str]:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from math import isinf, isnan
 from pathlib import Path
-from typing import Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple, Protocol
 
 from anysim.conventions import IDENTITY_QUATERNION
 from anysim.model.affordances import Affordance
@@ -122,11 +122,12 @@ class Importer(Protocol):
 
     `visual_error` [m] is how far what is only looked at may be off, `anysim.assets.meshes.light_mesh` keeps it.
 
-    `body` names one of several trees in the file, all others and what refers to them stay behind; empty: there is one.
+    That of MJCF takes `body` too, the name of one of several trees in the file: all others and what refers to them stay
+    behind; empty: there is one. That of URDF takes `packages` too, a mapping of the names of packages to folders.
     Masses scale with the cube of `scale` and inertias with its fifth power (the density stays). Raises AssetError for a
     file that is missing or holds what the neutral model cannot say, naming the file and the element.
     """
 
     def __call__(
-        self, path: Path, *, root: Path, scale: float = 1.0, body: str = "", visual_error: float = ...
+        self, path: Path, *, root: Path, scale: float = 1.0, visual_error: float = ..., **own: Any
     ) -> ImportedModel: ...

@@ -43,6 +43,8 @@ tools: {tool: {link: link, position: [0, 0, 0.2]}}
 @pytest.fixture
 def two_link(tmp_path, monkeypatch):
     """The name of a small robot that is in the catalogue for the time of the test."""
+    if "urdf" not in registry.names("importers"):
+        pytest.skip("the robot is a URDF file: pip install anysim-urdf")
     package = tmp_path / "contract_two_link_package"
     package.mkdir()
     (package / "two_link.urdf").write_text(TWO_LINK)

@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from anysim.assets.unheld import notes_of
 from anysim.assets.xml import xml_root
 from anysim.conventions import Array
 from anysim.errors import AssetError, listing
 from anysim.math import pose as P
+from anysim_urdf.unheld import notes_of
 
 Rgba = tuple[float, float, float, float]
 _GEOMETRY = {"box": ("size", 3), "sphere": ("radius", 1), "cylinder": ("radius", 1), "mesh": ("filename", 0)}

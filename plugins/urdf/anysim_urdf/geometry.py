@@ -6,11 +6,9 @@ from typing import Literal
 
 import numpy as np
 
-from anysim.assets import urdf_xml
 from anysim.assets.mesh_budget import check
 from anysim.assets.meshes import collision_mesh, visual_parts
 from anysim.assets.model import ImportNote
-from anysim.assets.urdf_xml import LinkElement, UrdfFile
 from anysim.assets.uri import resolve_reference
 from anysim.conventions import Array
 from anysim.errors import AssetError
@@ -18,6 +16,8 @@ from anysim.math import pose as P
 from anysim.model.hash import split
 from anysim.model.world import Box, Cylinder, Geom, Mesh, MeshShape, Quat, Shape, Sphere, Vec3
 from anysim_schemas.limits import ASSET_BYTES
+from anysim_urdf import xml as urdf_xml
+from anysim_urdf.xml import LinkElement, UrdfFile
 
 _GREY = (0.7, 0.7, 0.7, 1.0)
 

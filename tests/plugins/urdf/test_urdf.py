@@ -10,12 +10,12 @@ import pytest
 
 from anysim.assets.catalogue import load_robot
 from anysim.assets.model import ImportedModel
-from anysim.assets.urdf import import_urdf
 from anysim.compile.builder import WorldBuilder
 from anysim.compile.robot import import_robot
 from anysim.errors import AssetError
 from anysim.kinematics import inertia
 from anysim.model.world import BodyKind, Box, Cylinder, EntityKind, JointType, Sphere, World
+from anysim_urdf.load import import_urdf
 
 Load = Callable[..., ImportedModel]
 Text = Callable[[float], str]

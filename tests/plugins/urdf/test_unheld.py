@@ -10,10 +10,10 @@ from typer.testing import CliRunner
 from anysim import load
 from anysim.api import compile_world
 from anysim.assets.model import ImportedModel
-from anysim.assets.unheld import READ
 from anysim.cli.main import app
 from anysim.compile.edit import without_entity
 from anysim.record.collector import run_header
+from anysim_urdf.unheld import READ
 
 Load = Callable[..., ImportedModel]
 
@@ -118,7 +118,7 @@ def test_every_element_of_the_format_is_read_or_noted(path: str, urdf: Load) -> 
         inner = f'<{tag} name="x"{attributes}>{inner}</{tag}>'
     from lxml import etree
 
-    from anysim.assets.unheld import notes_of
+    from anysim_urdf.unheld import notes_of
 
     found = [note.where for note in notes_of(etree.fromstring(f"<robot>{inner}</robot>"))]
     parents = ["/".join(path.split("/")[:n]) for n in range(2, path.count("/") + 2)]

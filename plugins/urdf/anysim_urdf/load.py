@@ -24,8 +24,6 @@ import numpy as np
 
 from anysim.assets.meshes import VISUAL_ERROR
 from anysim.assets.model import ImportedModel, ImportNote
-from anysim.assets.urdf_geometry import GeometryReader
-from anysim.assets.urdf_xml import InertialElement, JointElement, UrdfFile
 from anysim.conventions import Array
 from anysim.errors import AssetError, listing, suggest
 from anysim.kinematics import inertia
@@ -33,6 +31,8 @@ from anysim.kinematics.inertia import VIRTUAL_SHARE
 from anysim.math import matrix as M, pose as P
 from anysim.model.hash import split, tidy
 from anysim.model.world import FAR, Body, BodyKind, Inertial, Joint, JointType, Mimic, Site
+from anysim_urdf.geometry import GeometryReader
+from anysim_urdf.xml import InertialElement, JointElement, UrdfFile
 
 _LIMIT_SLACK = 1e-3  # [rad] or [m] that limits of followers and leaders may differ by, from rounding
 _TYPES = {"revolute": JointType.REVOLUTE, "continuous": JointType.REVOLUTE, "prismatic": JointType.PRISMATIC}
