@@ -28,7 +28,7 @@ WORDS = {
     "collect": "`anysim run`: episodes by scripted solutions, and reports of them",
     "control": "tools by inverse kinematics and operational space, vehicles, hands, cameras",
     "film": "`anysim render`: videos of recorded episodes, with other sizes, looks or engines",
-    "inspect": "`anysim doctor`, `audit`, `explain`, `snapshot`: what is here, what was built, what was drawn",
+    "inspect": "`anysim doctor`, `audit`, `explain`, `replay`, `snapshot`: what is here, was built, drawn, recorded",
     "kinematics": "mechanics of robots (Pinocchio), for controllers of your own",
     "legged": "a trot, balance and walking",
     "mcap": "recordings: MCAP files and videos",

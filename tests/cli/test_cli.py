@@ -119,7 +119,7 @@ def test_a_killed_run_leaves_whole_trajectories_and_goes_on(tmp_path: Path) -> N
     finally:
         process.kill()
         process.communicate()
-    from anysim.record.verify import verify
+    from anysim_inspect.verify import verify
 
     survived = sorted(p.name for p in episodes.iterdir())
     assert 1 <= len(survived) < 8

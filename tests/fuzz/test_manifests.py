@@ -17,7 +17,7 @@ from anysim.record.manifest import read_run
 from anysim.record.names import trajectories
 from anysim.record.reader import open_trajectory, world_state
 from anysim.record.replay import begin, rebuild
-from anysim.record.verify import verify
+from anysim_inspect.verify import verify
 from tests.fuzz.budget import Tally
 from tests.fuzz.forging import forged_trees, replaced
 from tests.plugins.mcap import conftest as sample

@@ -5,7 +5,7 @@ import json
 import pytest
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("wheels")]  # built once, by one worker
-OURS = "anysim", "anysim-collect", "anysim-mujoco", "anysim-mcap", "anysim-robots"
+OURS = "anysim", "anysim-collect", "anysim-inspect", "anysim-mujoco", "anysim-mcap", "anysim-robots"
 
 
 def test_its_wheel_brings_a_skill_a_command_and_a_planner_that_collect(

@@ -24,12 +24,12 @@ from anysim.record.film import draw_recorded, film_mode, hindrances
 from anysim.record.header import EpisodeHeader, Header
 from anysim.record.manifest import read_manifest
 from anysim.record.names import trajectories
-from anysim.record.verify import verify
 from anysim.record.writer import TrajectoryWriter
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
 from anysim.task.terms import events
 from anysim.testing.engines import require_drawing
+from anysim_inspect.verify import verify
 
 ENGINES = ("mujoco", "pybullet", "sapien")
 CAMERAS = ("front", "wrist")

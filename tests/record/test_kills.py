@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from anysim.record.verify import verify_run
+from anysim_inspect.verify import verify_run
 from tests.record.killed_runs import ENVS, EPISODES, Order
 
 ROOT = Path(__file__).parents[2]

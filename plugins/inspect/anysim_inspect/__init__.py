@@ -1,1 +1,1 @@
-"""Commands that look at what is there: a machine with its engines and plugins, a live world, draws, snapshot files."""
+"""Commands that look at what is there: a machine with its engines and plugins, a live world, draws, recordings."""

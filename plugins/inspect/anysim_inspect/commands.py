@@ -10,9 +10,10 @@ if TYPE_CHECKING:
 
 @hookimpl
 def add_cli(app: "typer.Typer") -> None:
-    """`anysim explain`, `doctor`, `audit` and `snapshot`."""
-    from anysim_inspect.cli import audit, doctor, explain, snapshot
+    """`anysim replay`, `explain`, `doctor`, `audit` and `snapshot`."""
+    from anysim_inspect.cli import audit, doctor, explain, replay, snapshot
 
+    app.command("replay")(replay.replay)
     app.command("explain")(explain.explain)
     app.command("doctor")(doctor.doctor)
     app.command("audit")(audit.audit)

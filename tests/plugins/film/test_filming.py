@@ -16,7 +16,6 @@ from anysim.record.incoming import FileLock
 from anysim.record.manifest import read_manifest
 from anysim.record.names import MANIFEST_FILE, trajectories
 from anysim.record.reader import open_trajectory
-from anysim.record.verify import verify
 from anysim.skills.runner import SkillPolicy
 from anysim.testing.engines import require_drawing
 from anysim_film import commit
@@ -24,6 +23,7 @@ from anysim_film.episode import moments_for
 from anysim_film.filmer import Filmer, FilmOrder, film_targets
 from anysim_film.jobs import film_all
 from anysim_film.sheet import FILM_FILE, read_sheet
+from anysim_inspect.verify import verify
 from tests.record.test_film import SEEN, filmed_env, recorded as played
 
 SHORT = (*SEEN, "task.horizon=6", "record.keep=all", "record.fps=25")

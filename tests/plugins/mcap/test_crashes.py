@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from anysim.record.recorder import Recorder
-from anysim.record.verify import verify_run
 from anysim.record.writer import make_writer
+from anysim_inspect.verify import verify_run
 
 SAMPLE = str(Path(__file__).with_name("conftest.py"))
 PRELUDE = """
@@ -24,7 +24,7 @@ spec.loader.exec_module(sample)
 from pathlib import Path
 from anysim.errors import RecordError
 from anysim.record.recorder import Recorder
-from anysim.record.verify import verify_run
+from anysim_inspect.verify import verify_run
 from anysim.record.writer import make_writer
 out = Path(sys.argv[2])
 """

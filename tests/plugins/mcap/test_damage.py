@@ -13,8 +13,8 @@ from anysim.errors import RecordError
 from anysim.record.columns import Change, ColumnStore, EpisodeColumns
 from anysim.record.header import Header
 from anysim.record.reader import open_trajectory
-from anysim.record.verify import verify
 from anysim.record.writer import make_writer
+from anysim_inspect.verify import verify
 from anysim_mcap.chunks import records
 from anysim_mcap.reader import McapReader
 

@@ -8,8 +8,8 @@ from anysim.record.frame import RecordedFrame
 from anysim.record.header import ArrayLayout, EpisodeHeader, RunHeader, StateLayout
 from anysim.record.reader import open_trajectory
 from anysim.record.recorder import Recorder
-from anysim.record.verify import verify
 from anysim.record.writer import make_writer
+from anysim_inspect.verify import verify
 
 
 def same_bits(a, b):

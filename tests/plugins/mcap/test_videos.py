@@ -6,7 +6,7 @@ import pytest
 
 from anysim.errors import RecordError
 from anysim.record.reader import open_trajectory
-from anysim.record.verify import verify
+from anysim_inspect.verify import verify
 from anysim_mcap.video import frame_rate
 
 

@@ -28,7 +28,7 @@ def replay(
     from anysim.cli.output import counting, print_json
     from anysim.record.names import find_trajectories
     from anysim.record.replay import replay as replay_one
-    from anysim.record.verify import verify
+    from anysim_inspect.verify import verify
 
     found = find_trajectories(directories)
     results: dict[str, ReplayResult] = {}

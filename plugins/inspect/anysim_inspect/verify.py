@@ -1,4 +1,4 @@
-"""Is a committed trajectory what its recorder committed?"""
+"""Faults of a committed trajectory: what is not as its recorder committed it."""
 
 from pathlib import Path
 
