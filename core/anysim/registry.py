@@ -52,7 +52,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
         "planners": "numba_ik",
     },
     "anysim-film": {"commands": "render"},
-    "anysim-inspect": {"commands": "audit doctor explain replay snapshot"},
+    "anysim-inspect": {"commands": "audit doctor explain replay snapshot verify"},
     "anysim-mcap": {"readers": "mcap", "writers": "mcap"},
     "anysim-mujoco": {"engines": "mujoco", "importers": "mjcf", "oracles": "mjcf"},
     "anysim-parity": {"commands": "compare picture"},

@@ -10,10 +10,11 @@ if TYPE_CHECKING:
 
 @hookimpl
 def add_cli(app: "typer.Typer") -> None:
-    """`anysim replay`, `explain`, `doctor`, `audit` and `snapshot`."""
-    from anysim_inspect.cli import audit, doctor, explain, replay, snapshot
+    """`anysim replay`, `verify`, `explain`, `doctor`, `audit` and `snapshot`."""
+    from anysim_inspect.cli import audit, doctor, explain, replay, snapshot, verify
 
     app.command("replay")(replay.replay)
+    app.command("verify")(verify.verify)
     app.command("explain")(explain.explain)
     app.command("doctor")(doctor.doctor)
     app.command("audit")(audit.audit)

@@ -34,17 +34,6 @@ def test_show_prints_the_stamp(tmp_path: Path) -> None:
         raise broken.exception
 
 
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run of two trajectories."""
-    out = tmp_path_factory.mktemp("run")
-    blind = [word for name in ("front", "wrist") for word in ("-o", f"world.cameras.{name}.channels=[]")]
-    words = ["run", "pick_cube", "-e", "mujoco", "-n", "2", "-k", "2", "--out", str(out), "-o", "record.cameras=[]"]
-    done = CliRunner().invoke(app, [*words, *blind])
-    assert done.exit_code == 0, done.output
-    return out
-
-
 def test_a_moment_of_a_run_is_taken_from_its_first_trajectory_or_the_one_named(recorded: Path, tmp_path: Path) -> None:
     def take(source: Path, name: str, *more: str) -> str:
         done = CliRunner().invoke(app, ["snapshot", "take", str(source), str(tmp_path / name), "--step", "3", *more])
