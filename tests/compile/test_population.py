@@ -1,5 +1,6 @@
 """Declared objects and what they become: entities, slots and categories."""
 
+import tracemalloc
 from collections.abc import Callable
 from itertools import product
 from pathlib import Path
@@ -8,14 +9,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from anysim.compile.collisions import with_exclusions
 from anysim.compile.edit import without_entity
 from anysim.compile.population import grid
 from anysim.compile.variants import counts, sizes
-from anysim.errors import AssetError, NameLookupError, SpecError
+from anysim.engine.requirements import needs_of
+from anysim.errors import AssetError, Issues, NameLookupError, SpecError
 from anysim.geometry.bounds import EntityShape
 from anysim.model.frames import frames_of
 from anysim.model.index import Index
+from anysim.model.pairs import may_meet
 from anysim.model.world import Box, World
+from anysim_schemas.collisions import CollisionsSpec
 from anysim_schemas.objects import ObjectSpec
 
 BALL, BRICK = {"sphere": 0.05}, {"box": [0.1, 0.1, 0.2]}
@@ -315,3 +320,30 @@ def test_an_instancer_can_have_several_sources(world: Make) -> None:
     assert names(made) == ["table", "grains~0", "grains~1"]
     assert made.slots[0].entities == (1, 2)
     assert made.bodies[-1].name == "grains~1.4"
+
+
+def test_what_many_ask_for_grows_with_their_number(world: Make) -> None:
+    """Of 2,000 balls that stand still, and a brick: no table of all pairs, which has 4 MB for each of its sums."""
+    balls = {"source": BALL, "count": 2000, "family": "rigid_instancer", "fixed": True}
+    made = world(objects={"balls": balls, "brick": {"source": BRICK}})
+    tracemalloc.start()
+    try:
+        needs = needs_of(made)
+        excluded = with_exclusions(made, CollisionsSpec(exclude=(("balls", "brick"),)), Issues()).excluded_pairs
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert "geom 'brick.shape' collides with 'terrain'" in [need.why for need in needs]
+    assert len(excluded) == 2000
+    assert peak < 4e6
+
+
+def test_which_of_some_may_meet_which_of_others(world: Make) -> None:
+    objects = {"pair": {"source": {"choice": [BALL, BRICK]}}, "wall": {"source": BRICK, "fixed": True}}
+    made = world(objects=objects | {"ball": {"source": BALL, "count": 3}}, collisions={"exclude": [["ball_0", "wall"]]})
+    bodies = np.arange(-1, len(made.bodies))
+    whole = may_meet(made, bodies)
+    assert 0 < whole.sum() < whole.size
+    for some, others in (([3, 1, -1], [0, 2]), ([5], bodies), (bodies[::-1], [4, 4])):
+        found = may_meet(made, np.array(some), np.array(others))
+        assert (found == whole[np.ix_(np.array(some) + 1, np.array(others) + 1)]).all()

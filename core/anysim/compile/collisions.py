@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 
 from anysim.assets.model import ImportedModel
-from anysim.conventions import GROUND, WORLD
+from anysim.conventions import GROUND
 from anysim.errors import AssetError, Issues, NameLookupError, listing, suggest
 from anysim.math import pose as P
 from anysim.model.frames import find_bodies
@@ -26,13 +26,15 @@ def with_exclusions(world: World, spec: CollisionsSpec, issues: Issues) -> World
     """The World without the collisions that a spec excludes; `issues` is at the path of `collisions`."""
     groups = {name: _group(world, name, members, issues.at("groups", name)) for name, members in spec.groups.items()}
     pairs: set[tuple[int, int]] = set()
-    meet = could_meet(world, np.append(np.arange(len(world.bodies)), WORLD))  # the world is the last row
     for i, pair in enumerate(spec.exclude):
         first, second = (_members(world, name, groups, issues.at("exclude", i, k)) for k, name in enumerate(pair))
+        rows, columns = (sorted({body for own in some.values() for body in own}) for some in (first, second))
+        meet = could_meet(world, np.array(rows, dtype=int), np.array(columns, dtype=int))
+        row, column = ({body: k for k, body in enumerate(some)} for some in (rows, columns))
         alone = pair[0] == pair[1] and pair[0] not in groups and len(first) == 1
-        for (name, bodies), (other, others) in product(first.items(), second.items()):
+        for (name, own), (other, others) in product(first.items(), second.items()):
             if name != other or alone:
-                pairs |= {(min(a, b), max(a, b)) for a, b in product(bodies, others) if meet[a, b]}
+                pairs |= {(min(a, b), max(a, b)) for a, b in product(own, others) if meet[row[a], column[b]]}
     return replace(world, excluded_pairs=world.excluded_pairs | pairs)
 
 

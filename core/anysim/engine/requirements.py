@@ -28,7 +28,7 @@ from anysim.model.world import (
 )
 
 _FEW = 100
-"""So many bodies are asked first whether they can touch each other."""
+"""So many bodies are asked at a time whether they can touch anything."""
 
 Rows = tuple[tuple[C, object, str], ...]
 """A capability, whether it is needed, and why, in words that follow the name of the thing."""
@@ -137,12 +137,13 @@ def _contacts(world: World, path: Mapping[int, str]) -> Iterator[tuple[str, str,
     names = {geom.body: geom.name for geom in reversed(world.geoms) if geom.collides}
     bodies = np.array(sorted(names), dtype=int)
     fixed = np.array([b == WORLD or world.bodies[b].kind is BodyKind.STATIC for b in bodies.tolist()], dtype=bool)
-    few = np.concatenate([np.flatnonzero(fixed)[:_FEW], np.flatnonzero(~fixed)[:_FEW]])
-    for capability, partner in ((C.CONTACTS_STATIC, fixed), (C.CONTACTS_MOVING, ~fixed)):
-        for some in (few, np.arange(len(bodies))):  # of thousands the first will meet, or were excluded for a reason
-            meet = may_meet(world, bodies[some]) & ~fixed[some][:, None] & partner[some]
-            if meet.any():
-                body, other = (int(bodies[some[i]]) for i in np.argwhere(meet)[0])
+    moving = bodies[~fixed]
+    for capability, partners in ((C.CONTACTS_STATIC, bodies[fixed]), (C.CONTACTS_MOVING, moving)):
+        for start in range(0, len(moving), _FEW):  # of thousands the first will meet, or were excluded for a reason
+            some = moving[start : start + _FEW]
+            pairs = np.argwhere(may_meet(world, some, partners))
+            if len(pairs):
+                body, other = int(some[pairs[0][0]]), int(partners[pairs[0][1]])
                 why = f"collides with '{names[other]}'"
                 yield f"geom '{names[body]}'", path[body], ((capability, True, why),)
                 break

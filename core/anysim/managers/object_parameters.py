@@ -38,7 +38,7 @@ class EntityIndices:
         """The entity by its index."""
         thing = world.entities[entity]
         own = range(thing.body_start, thing.body_stop)
-        geoms = [i for i, geom in enumerate(world.geoms) if geom.body in own]
+        geoms = sorted(geom for body in own for geom in world.body_geoms[body])
         shown = [i for i in geoms if world.geoms[i].visible]
         bodies = np.array(own)
         roots = bodies if thing.family == INSTANCER else bodies[:1]

@@ -7,29 +7,41 @@ from anysim.model.parts import BodyKind, ContactSensor
 from anysim.model.world import World
 
 
-def could_meet(world: World, bodies: Array) -> Array:
-    """(K, K) bool: whether these bodies (K,), -1 for the world, collide unless they are excluded.
+def could_meet(world: World, bodies: Array, others: Array | None = None) -> Array:
+    """(K, L) bool: whether bodies (K,) and others (L,), -1 for the world, collide unless they are excluded.
 
-    One body does not with itself, nor a link with its parent, nor what is fixed with what is fixed.
+    One body does not with itself, nor a link with its parent, nor what is fixed with what is fixed. Without `others`
+    they are the bodies themselves.
     """
+    others = bodies if others is None else others
+    (still, parent), (still_too, parent_too) = _kin(world, bodies), _kin(world, others)
+    kin = (parent[:, None] == others) | (bodies[:, None] == parent_too)
+    return ~((bodies[:, None] == others) | (still[:, None] & still_too) | kin)
+
+
+def _kin(world: World, bodies: Array) -> tuple[Array, Array]:
+    """Which bodies (K,) stand still, and the parent (K,) of each; -2 where it is no link."""
     parts = [None if body == WORLD else world.bodies[body] for body in bodies.tolist()]
     still = np.array([part is None or part.kind is BodyKind.STATIC for part in parts], dtype=bool)
-    parent = np.array([-2 if part is None or part.kind is not BodyKind.LINK else part.parent for part in parts])
-    child = parent[:, None] == bodies
-    return ~((bodies[:, None] == bodies) | (still[:, None] & still) | child | child.T)
+    return still, np.array([-2 if part is None or part.kind is not BodyKind.LINK else part.parent for part in parts])
 
 
-def may_meet(world: World, bodies: Array) -> Array:
-    """(K, K) bool: `could_meet`, without excluded pairs, and without two entities of one slot: one of them is there."""
-    entity = np.append(np.array(world.body_entity, dtype=int), -1)[bodies]
+def may_meet(world: World, bodies: Array, others: Array | None = None) -> Array:
+    """(K, L) bool: `could_meet`, without excluded pairs, and without two entities of one slot: one of them is there."""
+    others = bodies if others is None else others
+    entity = np.append(np.array(world.body_entity, dtype=int), -1)
     slot = np.full(len(world.entities) + 1, -1)  # the last one for what belongs to no entity
     for number, one in enumerate(world.slots):
         slot[list(one.entities)] = number
-    apart = (slot[entity][:, None] == slot[entity]) & (slot[entity] >= 0) & (entity[:, None] != entity)
-    excluded = np.zeros((len(world.bodies) + 1,) * 2, dtype=bool)
+    first, second = entity[bodies][:, None], entity[others]
+    apart = (slot[first] == slot[second]) & (slot[second] >= 0) & (first != second)
+    named = np.unique(np.array([*world.excluded_pairs], dtype=int))
+    number = np.full(len(world.bodies) + 1, len(named))  # the world is the last one, by its index of -1
+    number[named] = np.arange(len(named))
+    excluded = np.zeros((len(named) + 1,) * 2, dtype=bool)
     for low, high in world.excluded_pairs:
-        excluded[low, high] = excluded[high, low] = True  # the world is the last row, by its index of -1
-    return could_meet(world, bodies) & ~(apart | excluded[np.ix_(bodies, bodies)])
+        excluded[number[low], number[high]] = excluded[number[high], number[low]] = True
+    return could_meet(world, bodies, others) & ~(apart | excluded[np.ix_(number[bodies], number[others])])
 
 
 def pair_friction(friction: Array, priority: Array) -> Array:
