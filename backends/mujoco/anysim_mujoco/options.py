@@ -27,7 +27,7 @@ class MujocoOptions(EngineOptions):
     tolerance: float = Field(default=1e-8, ge=0, description="improvement at which the constraint solver stops")
     jacobian: Literal["auto", "dense", "sparse"] = Field(default="auto", description="auto: sparse from 60 dofs on")
     memory_mb: int = Field(
-        default=0, ge=0, description="memory for contacts per thread [MiB]; 0: MuJoCo's own estimate"
+        default=0, ge=0, description="memory for contacts per thread [MiB]; 0: an estimate from the number of bodies"
     )
     gl: Literal["auto", "egl", "osmesa"] = Field(
         default="auto", description="how images are drawn; auto: what MUJOCO_GL says, else EGL, else OSMesa"

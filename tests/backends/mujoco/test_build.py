@@ -17,6 +17,7 @@ from anysim.model.world import (
     Mesh,
     MeshShape,
     Plane,
+    Sphere,
     World,
 )
 
@@ -203,3 +204,14 @@ def test_options_that_do_not_exist(make, worlds):
         make(worlds.ball(), thread=2)
     with pytest.raises(EngineError, match="options of mujoco"):
         make(worlds.ball(), integrator="rk4")
+
+
+def test_a_crowd_asks_for_the_memory_that_it_takes(make):
+    """MuJoCo's own estimate for 1,001 free bodies is 1.8 GB, and fails where there is not as much."""
+    ball = Inertial(1.0, inertia=(0.01, 0.01, 0.01, 0.0, 0.0, 0.0))
+    bodies = tuple(Body(str(i), kind=BodyKind.FREE, position=(0.1 * i, 0.0, 0.04), inertial=ball) for i in range(1001))
+    geoms = tuple(Geom(str(i), i, Sphere(0.05)) for i in range(1001))
+    engine = make(World("crowd", bodies=bodies, geoms=(Geom("ground", -1, Plane()), *geoms)))
+    assert engine._sims.model.narena < 200e6
+    engine.step(1)
+    assert not engine.get_state().fault.any()
