@@ -50,10 +50,18 @@ def measured(build: Callable[[int], AbstractContextManager[object]]) -> Cost:
 
 def grown(build: Callable[[int], AbstractContextManager[object]], count: int) -> Cost:
     """The cost of each of `count` instances in one world, where the seconds may grow faster than their number."""
-    few, more = (_of(build, number) for number in (CROWD // 8, CROWD // 4))
-    power = min(max(log2(max(more[0], 1e-3) / max(few[0], 1e-3)), 1.0), 3.0)
-    scale = 4 * count / CROWD
-    return Cost(more[0] * scale**power / count, 4 * max(more[1], 0.0) / CROWD, CROWD // 4)
+    several = CROWD // 8
+    size = _of(build, several)[1] / several  # imports and caches are paid for as well
+    most = max(2 * several, min(count // 10, CROWD))
+    few, more = (_seconds(build, number) for number in (most // 2, most))
+    power = min(max(log2(more / few), 1.0), 3.0)
+    return Cost(more * (count / most) ** power / count, size, most)
+
+
+def _seconds(build: Callable[[int], AbstractContextManager[object]], count: int) -> float:
+    began = time.perf_counter()
+    with build(count):
+        return max(time.perf_counter() - began, 1e-3)
 
 
 def _of(build: Callable[[int], AbstractContextManager[object]], count: int) -> tuple[float, float]:
