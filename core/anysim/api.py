@@ -4,6 +4,7 @@ import json
 import os
 import warnings
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from importlib.resources import files
@@ -309,7 +310,7 @@ def make(
         SpecError: the file, with line and column.
         CapabilityError: the engine cannot run this world; nothing was built.
     """
-    from anysim.task.cost import MANY, announce, measured
+    from anysim.task.cost import MANY, announce, measured, told
 
     _check_texts(overrides)
     if base is not None and not isinstance(cast("object", base), str | Path):
@@ -328,7 +329,7 @@ def make(
     if engine is not None and loaded.spec.engine.name != engine:  # the options of a file are those of its own engine
         loaded = _loaded(source, [*more, f"engine={_as_text(engine)}"])
     spec = loaded.spec
-    _announce_instances(loaded, base)
+    crowd = _announce_instances(loaded, base)
     world = compile_world(loaded, base=base)
     name = str(source) if isinstance(source, str) and "/" not in str(source) else world.name
     if spec.num_envs >= MANY:
@@ -337,7 +338,8 @@ def make(
         announce(f"envs of '{name}' on {spec.engine.name}", spec.num_envs, each, "lower num_envs")
     try:
         given = _proposals(loaded, proposals)
-        env = _env(loaded, world, simulation(spec), spec.num_envs, name, given, strict_observers=strict_observers)
+        with told(f"building '{name}' on {spec.engine.name}") if crowd or spec.num_envs >= MANY else nullcontext():
+            env = _env(loaded, world, simulation(spec), spec.num_envs, name, given, strict_observers=strict_observers)
     except SpecError as error:
         raise located(error, loaded) from None
     if seed is not None:
@@ -345,14 +347,14 @@ def make(
     return env
 
 
-def _announce_instances(loaded: LoadedRun, base: Path | None) -> None:
-    """Say what the instances of objects cost where they are very many, from what fewer of them do."""
+def _announce_instances(loaded: LoadedRun, base: Path | None) -> bool:
+    """Say what the instances of objects cost where they are very many, from what fewer of them do: whether they are."""
     from anysim.task.cost import CROWD, announce, grown
 
     counts = {name: most(thing.count) for name, thing in loaded.spec.world.objects.items() if thing.count is not None}
     total = sum(counts.values())
     if total < CROWD:
-        return
+        return False
 
     def build(number: int) -> "SimEngine":
         fewer = [f"world.objects.{name}.count={max(1, count * number // total)}" for name, count in counts.items()]
@@ -364,8 +366,9 @@ def _announce_instances(loaded: LoadedRun, base: Path | None) -> None:
     try:
         cost = grown(build, total)
     except AnysimError:  # what is wrong with fewer of them is no fault of the file
-        return
+        return True
     announce(f"instances of {listing(counts)} on {loaded.spec.engine.name}", total, cost, "lower `count`")
+    return True
 
 
 TERM_KINDS = ("observation", "reward", "predicate", "command", "event")

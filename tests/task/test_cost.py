@@ -1,5 +1,6 @@
 """Costs that are said before a build begins."""
 
+import time
 import warnings
 from contextlib import contextmanager
 
@@ -8,7 +9,7 @@ import pytest
 import anysim
 from anysim.errors import EngineError
 from anysim.task import cost
-from anysim.task.cost import Cost, CostWarning, announce, available, grown, measured
+from anysim.task.cost import Cost, CostWarning, announce, available, grown, measured, told
 from tests.task.helpers import BLOCKS, blocks
 
 
@@ -61,6 +62,21 @@ def test_many_instances_are_announced(monkeypatch: pytest.MonkeyPatch) -> None:
         anysim.make(spec) as env,
     ):
         assert len(env.engine.world.entities) == 103
+
+
+@pytest.mark.parametrize("live", [True, False])
+def test_a_build_says_how_long_it_takes(
+    live: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.stderr.isatty", lambda: live)
+    with told("building 'blocks'"):
+        time.sleep(0.05)
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(cost, "_WORTH_A_WORD", 0.01)
+    with told("building 'blocks'"):
+        time.sleep(0.2)
+    line = "building 'blocks': 0 s so far\n"
+    assert capsys.readouterr().err == ("\r" if live else "") + line
 
 
 def test_what_is_free_is_known_here() -> None:

@@ -1,10 +1,12 @@
 """Cost of many envs, in seconds and memory, measured with a few of them before all are built."""
 
+import sys
+import threading
 import time
 import tracemalloc
 import warnings
-from collections.abc import Callable
-from contextlib import AbstractContextManager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, suppress
 from math import log2
 from pathlib import Path
 from typing import NamedTuple
@@ -100,6 +102,30 @@ def announce(what: str, count: int, cost: Cost, remedy: str) -> None:
             CostWarning,
             stacklevel=3,
         )
+
+
+@contextmanager
+def told(what: str) -> Iterator[None]:
+    """Say on stderr how long something slow is taking: on a terminal each second, in a pipe a line each minute."""
+    done, began = threading.Event(), time.monotonic()
+
+    def tell() -> None:
+        live, wait = sys.stderr.isatty(), _WORTH_A_WORD
+        while not done.wait(wait):
+            words = f"{what}: {time.monotonic() - began:,.0f} s so far"
+            sys.stderr.write(f"\r{words}" if live else f"{words}\n")
+            sys.stderr.flush()
+            wait = 1.0 if live else 60.0
+        if live and wait == 1.0:
+            sys.stderr.write("\n")
+
+    teller = threading.Thread(target=tell, daemon=True)
+    teller.start()
+    try:
+        yield
+    finally:
+        done.set()
+        teller.join()
 
 
 def available() -> int | None:
