@@ -103,7 +103,7 @@ class SnapshotForgetsCommands(Right):
 
     caught_by = ("test_snapshots.py::test_continuing_is_exact",)
 
-    def restore(self, snapshot, env_ids=None):
+    def restore(self, snapshot, env_ids=None, *, checked=False):
         commands = Control(*(part.copy() for part in self._commands.control))
         super().restore(snapshot, env_ids)
         for ours, kept in zip(self._commands.control, commands, strict=True):
@@ -128,7 +128,7 @@ class TakesAnySnapshot(Right):
         "test_snapshots.py::test_foreign_snapshots_are_refused",
     )
 
-    def restore(self, snapshot, env_ids=None):
+    def restore(self, snapshot, env_ids=None, *, checked=False):
         super().restore(replace(snapshot, world_hash=self.world.hash), env_ids)
 
 

@@ -222,3 +222,17 @@ def test_the_environment_variable_names_the_engine_unless_the_file_does(monkeypa
     assert anysim.load({"engine": "mujoco"}).spec.engine.name == "mujoco"
     monkeypatch.delenv("ANYSIM_ENGINE")
     assert anysim.load("pick_cube").spec.engine.name == "mujoco"
+
+
+def test_the_rows_of_a_snapshot_are_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    with blocks(2) as env:
+        env.reset(seed=0)
+        snapshot, looked = env.snapshot(), []
+        refuse = type(env.engine).refuse_snapshot
+        monkeypatch.setattr(
+            type(env.engine), "refuse_snapshot", lambda *words: looked.append(refuse(*words)), raising=True
+        )
+        env.reset_to(snapshot)
+        assert len(looked) == 1
+        env.engine.restore(snapshot.engine)
+        assert len(looked) == 2

@@ -348,7 +348,7 @@ class TaskEnv:
         before, streams = self._managed(ids), self.streams.snapshot(ids)
         try:
             self._put(ids, snapshot.managers, snapshot.streams)
-            self.engine.restore(snapshot.engine, ids)
+            self.engine.restore(snapshot.engine, ids, checked=True)
         except BaseException:
             self._put(ids, before, streams)
             raise
