@@ -9,6 +9,7 @@ import yaml
 
 from anysim import cache
 from anysim.assets import meshes
+from anysim.compile.edit import with_object, with_robot
 from anysim.compile.world import compile_world
 from anysim.errors import AssetError
 from anysim.geometry.tessellate import convex_hull
@@ -159,6 +160,12 @@ def test_a_world_and_a_catalogue_entry_say_how_far_looks_may_be_off(folder: Path
     )
     assert faces("coarse") == faces("coarse", visual_error=0) <= 3_000
     assert faces("whole") == 20_480
+    bare = compile_world(WorldSpec(visual_error=0))
+    for added in (
+        with_robot(bare, "b", str(folder / "follows.yaml"), {}),
+        with_object(bare, "ball", {"source": {"mesh": str(folder / "ball.stl")}, "mass": 1.0}),
+    ):
+        assert max(len(mesh.faces) for mesh in added.meshes) == 20_480
 
 
 def test_the_material_file_is_part_of_the_hash(folder: Path) -> None:

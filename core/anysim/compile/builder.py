@@ -31,9 +31,9 @@ from anysim.model.world import (
 class WorldBuilder:
     """A World under construction. Starts from an existing one, which is not changed."""
 
-    def __init__(self, world: World, visual_error: float = VISUAL_ERROR) -> None:
-        """`visual_error` [m] is how far meshes that are only looked at may be off."""
-        self._world, self.visual_error = world, visual_error
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self.visual_error = VISUAL_ERROR if world.visual_error is None else world.visual_error
         self.bodies: list[Body] = list(world.bodies)
         self.joints: list[Joint] = list(world.joints)
         self.geoms: list[Geom] = list(world.geoms)

@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from anysim.assets.meshes import VISUAL_ERROR
 from anysim.assets.model import ImportNote
 from anysim.compile.appearance import compile_lights, compile_scenery
 from anysim.compile.builder import WorldBuilder
@@ -68,8 +67,7 @@ def compile_with_report(
         issues, content, steps = Issues("world"), spec.world, physics or spec.physics
     else:
         issues, content, steps = Issues(), spec, physics or PhysicsSpec()
-    error = VISUAL_ERROR if content.visual_error is None else content.visual_error
-    builder = WorldBuilder(World(name=content.name, physics=neutral_physics(steps)), error)
+    builder = WorldBuilder(World(content.name, neutral_physics(steps), visual_error=content.visual_error))
     add_terrain(builder, content.terrain, issues.at("terrain"), _base(base, GROUND))
     add_room(builder, content, issues)
     notes: dict[str, tuple[ImportNote, ...]] = {}

@@ -103,6 +103,8 @@ class World:
         default=(), compare=False, metadata=MappingProxyType({"hashed": "never"})
     )
     """The name of a thing, and what its source says that is not so here; see `anysim.assets.model.ImportNote`."""
+    visual_error: float | None = field(default=None, compare=False, metadata=MappingProxyType({"hashed": "never"}))
+    """How far [m] what is only looked at may be off in what is added later; see `anysim.assets.meshes.light_mesh`."""
 
     @cached_property
     def hash(self) -> str:
