@@ -4,11 +4,13 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
-from anysim_schemas.base import Flag, Integer, Name, NonNegative, Positive, Spec
+from anysim_schemas.base import Flag, Integer, Name, NonNegative, Number, Positive, Spec
 from anysim_schemas.errors import KeyFault
 from anysim_schemas.task import PredicateTermSpec
-from anysim_schemas.values import TAG_PREFIX, WordChoice
+from anysim_schemas.values import TAG_PREFIX, Choice, Word, kind_of
 
+MOST_VALUES = 256
+"""How many values a range that is bound may have."""
 MOST_COMMANDS = 200
 """Of an episode, its repetitions and all branches of its choices counted."""
 
@@ -97,10 +99,65 @@ ChooseSpec.model_rebuild()
 RepeatSpec.model_rebuild()
 
 
+class BoundRange(Spec):
+    """A number between two bounds: whole ones where both are whole, else evenly spaced ones. Each is equally likely.
+
+    What refers to it is made and checked for each of its values when the file is read, both bounds among them.
+    """
+
+    range: tuple[Integer | Number, Integer | Number] = Field(description="lower and upper bound, both of them drawn")
+    steps: Integer | None = Field(
+        default=None, ge=2, le=MOST_VALUES, description="how many values; 11, or all where they are whole"
+    )
+
+    @model_validator(mode="after")
+    def _counted(self) -> "BoundRange":
+        low, high = self.range
+        if low > high:
+            raise KeyFault(f"the lower bound {low:g} is above the upper bound {high:g}", "range")
+        if not self.whole:
+            return self
+        if self.steps is not None:
+            raise KeyFault("whole numbers are drawn one by one; write the bounds with a point to have steps", "steps")
+        if high - low >= MOST_VALUES:
+            raise KeyFault(f"{high - low + 1} whole numbers, at most {MOST_VALUES} are possible", "range")
+        return self
+
+    @property
+    def whole(self) -> bool:
+        """Whether whole numbers are drawn."""
+        return all(isinstance(bound, int) for bound in self.range)
+
+    @property
+    def choice(self) -> Choice[Any]:
+        """The choice among its values."""
+        low, high = self.range
+        if self.whole:
+            return Choice[Any](choice=tuple(range(int(low), int(high) + 1)))
+        last = (self.steps or 11) - 1
+        shares = (k / last for k in range(last + 1))
+        return Choice[Any](choice=tuple(float(f"{low * (1.0 - t) + high * t:.12g}") for t in shares))
+
+
+def _bound_form(value: object) -> str:
+    return TAG_PREFIX + "range" if isinstance(value, BoundRange) else kind_of(value)
+
+
+if TYPE_CHECKING:
+    BoundValue = bool | int | float | str | Choice[Any] | BoundRange
+else:
+    BoundValue = Annotated[
+        Annotated[Word, Tag(TAG_PREFIX + "constant")]
+        | Annotated[Choice[Word], Tag(TAG_PREFIX + "choice")]
+        | Annotated[BoundRange, Tag(TAG_PREFIX + "range")],
+        Discriminator(_bound_form),
+    ]
+
+
 class CollectSpec(Spec):
     """What `anysim run` does in each episode, in place of the task's expert."""
 
-    bind: dict[Name, WordChoice] = Field(
+    bind: dict[Name, BoundValue] = Field(
         default_factory=dict,
         description="values by name, drawn anew in each episode: parameters of commands and terms refer to `$name`",
     )

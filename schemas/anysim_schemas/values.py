@@ -170,7 +170,8 @@ class Normal(Drawn[T], Generic[T]):
     normal: NormalParameters[T] = Field(description="mean, standard deviation and limits")
 
 
-def _kind(value: object) -> str:
+def kind_of(value: object) -> str:
+    """The tag of the branch that a value is of."""
     mapping = cast("dict[object, object]", value) if isinstance(value, dict) else {}
     for kind in KINDS:
         if kind in mapping or (isinstance(value, Drawn) and hasattr(cast("object", value), kind)):
@@ -195,7 +196,7 @@ else:
                 | Annotated[LogUniform[item], Tag(TAG_PREFIX + "log_uniform")]
                 | Annotated[Choice[item], Tag(TAG_PREFIX + "choice")]
                 | Annotated[Normal[item], Tag(TAG_PREFIX + "normal")],
-                Discriminator(_kind),
+                Discriminator(kind_of),
             ]
 
 
@@ -209,11 +210,10 @@ else:
         def __class_getitem__(cls, item: Any) -> Any:
             return Annotated[
                 Annotated[item, Tag("as:constant")] | Annotated[Choice[item], Tag("as:choice")],
-                Discriminator(lambda value: "as:choice" if _kind(value) == "as:choice" else "as:constant"),
+                Discriminator(lambda value: "as:choice" if kind_of(value) == "as:choice" else "as:constant"),
             ]
 
 
-WordChoice = ChoiceOf[Word]
 FloatValue = Value[Number]
 PositiveValue = Value[Positive]
 NonNegativeValue = Value[NonNegative]
@@ -231,7 +231,7 @@ if TYPE_CHECKING:
 else:
     FlagValue = Annotated[
         Annotated[Flag, Tag(TAG_PREFIX + "constant")] | Annotated[Choice[Flag], Tag(TAG_PREFIX + "choice")],
-        Discriminator(_kind),
+        Discriminator(kind_of),
     ]
     """True, false, or a choice of both: there is nothing between them."""
 

@@ -110,6 +110,21 @@ def test_commands_have_the_values_of_their_env(env: TaskEnv) -> None:
         assert told[number] == drawn
 
 
+def test_numbers_are_drawn_between_bounds_which_are_drawn_too() -> None:
+    overrides = ["collect.bind.share={range: [0.5, 0.7], steps: 3}", "collect.bind.n={range: [2, 4]}"]
+    term = "task.success.shut.share=$share"
+    with make(FILE, engine="mujoco", num_envs=32, overrides=[*overrides, term]) as env:
+        env.reset(seed=5)
+        drawn = [(draws["collect/bind.share"], draws["collect/bind.n"]) for draws in env.streams.draws]
+        assert {share for share, _ in drawn} == {0.5, 0.6, 0.7}
+        assert {n for _, n in drawn} == {2, 3, 4}
+        assert all(type(n) is int for _, n in drawn)
+        skill = bound(env, {"commands": [{"do": "wait", "steps": "$n", "share": "$share"}]})
+        which = skill.members[0]._which(np.arange(32))  # type: ignore[attr-defined]
+        told = [skill.members[0].variants[k].params for k in which]  # type: ignore[attr-defined]
+        assert told == [{"steps": n, "share": share} for share, n in drawn]
+
+
 def test_repetitions_end_early_where_a_condition_holds(env: TaskEnv) -> None:
     _, said = followed(env, {"commands": [{"repeat": 3, "body": ["a", "b"]}, "c"]})
     assert said[0] == ["1 a 0", "2 b 1", "3 a 2", "4 b 3", "5 a 4", "6 b 5", "7 c 6"]
@@ -169,6 +184,13 @@ def test_what_is_drawn_is_in_snapshots_and_damage_is_refused(env: TaskEnv) -> No
         ),
         ("collect.commands.0.fractoin=$share", "did you mean 'fraction'"),
         ("collect.bind.share=[0.5]", "collect.bind.share"),
+        ("collect.bind.share={range: [0.5, 1.2]}", "collect.commands.0.fraction"),
+        ("collect.bind.share={range: [-0.1, 0.5]}", "collect.commands.0.fraction"),
+        ("collect.bind.share={range: [0.8, 0.5]}", "collect.bind.share.range: the lower bound 0.8 is above"),
+        ("collect.bind.share={range: [0.5, much]}", "collect.bind.share.range.1"),
+        ("collect.bind.share={range: [0, 1], steps: 5}", "collect.bind.share.steps: whole numbers are drawn one by"),
+        ("collect.bind.share={range: [0, 300]}", "collect.bind.share.range: 301 whole numbers, at most 256"),
+        ("collect.bind.share={range: [0.5, 0.7], steps: 200}", "have 400 combinations"),
         ("collect.bind.d.choice=[drawer_1, drawer_9]", "task.success.shut.joint: 'cabinet' has no joint 'drawer_9'"),
         ("collect.bind.share.choice=[0.5, much]", "collect.commands.0.fraction"),
         ("collect.commands.1.weights=[1]", "collect.commands.1.weights: 2 branches need as many weights"),

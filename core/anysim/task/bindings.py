@@ -18,12 +18,12 @@ from anysim.randomization.draw import draw
 from anysim.randomization.streams import Streams
 from anysim.task.scene import SceneView
 from anysim.task.term_registry import bind
-from anysim_schemas.collect import ChooseSpec, CollectSpec, RepeatSpec
+from anysim_schemas.collect import BoundRange, ChooseSpec, CollectSpec, RepeatSpec
 from anysim_schemas.plugin import BOUND, bound_names
 from anysim_schemas.task import TermSpec
 from anysim_schemas.values import Choice
 
-MOST_VARIANTS = 64
+MOST_VARIANTS = 256
 """How many combinations of values the parameters of one command or term may have."""
 
 
@@ -51,7 +51,10 @@ class Bindings:
         self._streams = streams
         bound: Mapping[str, Any] = {} if collect is None else collect.bind
         choices = {} if collect is None else dict(_choices(collect.commands, "collect.commands"))
-        self._specs = {name: (value, f"collect.bind.{name}") for name, value in bound.items()}
+        self._specs = {
+            name: (value.choice if isinstance(value, BoundRange) else value, f"collect.bind.{name}")
+            for name, value in bound.items()
+        }
         self._specs |= {path: (value, path) for path, value in choices.items()}
         self.values: dict[str, tuple[Any, ...]] = {
             name: value.choice if isinstance(value, Choice) else (value,) for name, (value, _) in self._specs.items()
@@ -84,7 +87,9 @@ class Bindings:
         count = prod(len(self.values[name]) for name in names)
         if count > MOST_VARIANTS:
             words = f"{listing([f'${name}' for name in names])} have {count} combinations, at most {MOST_VARIANTS}"
-            raise SpecError([SpecIssue("", path, f"{words} are possible: choose among fewer values")])
+            raise SpecError(
+                [SpecIssue("", path, f"{words} are possible: choose among fewer values, or of ranges fewer `steps`")]
+            )
         combinations = product(*(self.values[name] for name in names))
         every = [_filled(params, dict(zip(names, values, strict=True))) for values in combinations]
         return Variants(tuple(names), every)
@@ -137,8 +142,10 @@ def bind_term(
     calls = [bind(kind, spec.term, params, scene, path) for params in variants.params]
 
     def chosen(*arguments: Any) -> Array:
-        said = np.stack([call(*arguments) for call in calls])
-        return said[bindings.which(variants.names, scene.env_ids), np.arange(len(scene.env_ids))]
+        which = bindings.which(variants.names, scene.env_ids)
+        drawn, number = np.unique(which, return_inverse=True)
+        said = np.stack([calls[k](*arguments) for k in drawn])
+        return said[number, np.arange(len(which))]
 
     return chosen
 

@@ -17,6 +17,7 @@ EXPERT = (
 COMMANDS = (*EXPERT[1:], "collect={commands: [{do: pick, object: red, goal: goal}]}")
 LATE = "collect.commands.0.timeout=0.02"
 DRAWN = "collect={bind: {x: {choice: [ball]}}, commands: [{do: pick, object: $x, goal: goal}]}"
+RANGED = "collect={bind: {x: {range: [0.1, 0.2]}}, commands: [{do: pick, object: red, goal: goal, hover: $x}]}"
 CHOICE = "collect={commands: [{choose: [{do: pick, object: red, goal: goal}, release], weights: [1, 0]}]}"
 RELEASE = (*EXPERT[1:], "task.horizon=300", "collect={commands: [release, {do: reach, goal: goal}]}")
 REPEATED = "collect={commands: [{repeat: 1, body: release}, {do: reach, goal: goal}]}"
@@ -63,6 +64,8 @@ ROWS: dict[str, Row] = {
     "RunSpec.collect": row("collect=null", given=COMMANDS, seen="expert", error="has no expert"),
     "CollectSpec.commands": row("collect.commands=[{do: reach, goal: goal}]", given=COMMANDS, seen="expert"),
     "CollectSpec.bind": row("collect.bind.x.choice=[red]", given=(*COMMANDS, DRAWN), seen="episode"),
+    "BoundRange.range": row("collect.bind.x.range=[0.2, 0.3]", given=(*COMMANDS, RANGED), seen="episode"),
+    "BoundRange.steps": row("collect.bind.x.steps=12", given=(*COMMANDS, RANGED), seen="episode"),
     "CollectSpec.on_fail": row("collect.on_fail=skip", given=(*COMMANDS, LATE), seen="expert"),
     "CommandSpec.if_": row(
         "collect.commands.0.if={term: below, frame: red, height: 0.0}", given=COMMANDS, seen="expert"
