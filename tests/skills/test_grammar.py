@@ -125,6 +125,16 @@ def test_numbers_are_drawn_between_bounds_which_are_drawn_too() -> None:
         assert told == [{"steps": n, "share": share} for share, n in drawn]
 
 
+def test_policies_see_what_was_drawn() -> None:
+    terms = ["{term: drawn, value: d}", "{term: drawn, value: share}"]
+    with make(FILE, engine="mujoco", num_envs=8, overrides=[f"task.observations.asked=[{', '.join(terms)}]"]) as env:
+        for seed in (5, 6):
+            seen = env.reset(seed=seed)[0]["asked"]
+            draws = [(d["collect/bind.d"], d["collect/bind.share"]) for d in env.streams.draws]
+            told = [[d == "drawer_1", d == "drawer_2", np.float32(share)] for d, share in draws]
+            assert seen.tolist() == np.array(told, dtype=np.float32).tolist()
+
+
 def test_repetitions_end_early_where_a_condition_holds(env: TaskEnv) -> None:
     _, said = followed(env, {"commands": [{"repeat": 3, "body": ["a", "b"]}, "c"]})
     assert said[0] == ["1 a 0", "2 b 1", "3 a 2", "4 b 3", "5 a 4", "6 b 5", "7 c 6"]
@@ -198,6 +208,7 @@ def test_what_is_drawn_is_in_snapshots_and_damage_is_refused(env: TaskEnv) -> No
         ("collect.commands.0.if={term: closd}", "no predicate term is named 'closd'; did you mean 'closed'"),
         ("collect.commands.1={repeat: 300, body: release}", "collect.commands.1.repeat"),
         ("task.rewards.lift={term: tanh_distance, a: $b, b: panda.tool, scale: 1.0}", "task.rewards.lift.a: '$b'"),
+        ("task.observations.o=[{term: drawn, value: shar}]", "collect.bind has no 'shar'; did you mean 'share'"),
         ("task.events.x={term: push, object: $d, force: [1.0, 0.0, 0.0]}", "an event cannot refer to what is bound"),
     ],
 )

@@ -71,6 +71,13 @@ class Bindings:
                 same = (k for k, one in enumerate(self.values[name]) if one == drawn and type(one) is type(drawn))
                 self.index[name][env] = next(same)
 
+    def rows(self) -> dict[str, tuple[Array, Array]]:
+        """By bound name its values as rows of numbers (V, k), and which of them each env has (N,), kept up to date.
+
+        A number is itself; what is no number has one column for each value.
+        """
+        return {name: (_numbers(self.values[name]), self.index[name]) for name in self._names}
+
     def variants(self, params: Mapping[str, Any], path: str) -> Variants:
         """The parameters at a path of the file with every combination of the values that they refer to.
 
@@ -160,6 +167,13 @@ def _choices(entries: Any, path: str) -> Iterator[tuple[str, Choice[int]]]:
                 yield from _choices(branch, f"{here}.choose.{number}")
         elif isinstance(entry, RepeatSpec):
             yield from _choices(entry.body, f"{here}.body")
+
+
+def _numbers(values: Sequence[Any]) -> Array:
+    """(V, 1) the values, or (V, V) one column for each."""
+    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
+        return np.array(values, dtype=float)[:, None]
+    return np.eye(len(values))
 
 
 def _filled(value: Any, values: Mapping[str, Any]) -> Any:

@@ -37,6 +37,8 @@ class SceneView:
         episodes = Episodes(engine.num_envs) if episodes is None else episodes
         self.goals: dict[str, Array] = {}
         """Goal poses (N, 7) by command name."""
+        self.drawn: dict[str, tuple[Array, Array]] = {}
+        """What `Bindings.rows` returns."""
         self.last_action = np.zeros((engine.num_envs, 0))
         """The last action (N, A), clipped."""
         self.action_columns: dict[str, slice] = {}
@@ -135,6 +137,18 @@ class SceneView:
         if handle is None:
             handle = self._robots[name] = RobotView(self, name)
         return handle
+
+
+class DrawnView:
+    """What `collect.bind` can draw, as `rows` (V, k), and the `index` (N,) of each env's. In YAML: its name."""
+
+    reference_kind: ClassVar[str] = "drawn value"
+
+    def __init__(self, scene: SceneView, name: str) -> None:
+        if name not in scene.drawn:
+            hint = suggest(name, list(scene.drawn))
+            raise NameLookupError(f"collect.bind has no '{name}'{hint}; it has {listing(scene.drawn)}")
+        self.rows, self.index = scene.drawn[name]
 
 
 class Frame(ABC):

@@ -9,7 +9,7 @@ from anysim import registry
 from anysim.errors import AnysimError, PluginError, SpecError, SpecIssue, listing, suggest
 from anysim.plugin_parameters import checked, options_model, parameters, reference_kind
 from anysim.task.joints import JointView, RangedJointView
-from anysim.task.scene import Frame, ObjectView, RobotView, SceneView
+from anysim.task.scene import DrawnView, Frame, ObjectView, RobotView, SceneView
 from anysim.task.slot_frames import CategoryView
 
 BUILTIN = "anysim"
@@ -70,13 +70,17 @@ def bind(kind: str, term: str, params: Mapping[str, Any], scene: SceneView, path
     return partial(function, scene, **keywords)
 
 
-def resolve(kind: str, name: str | None, scene: SceneView) -> Frame | RobotView | ObjectView | JointView | CategoryView:
+def resolve(
+    kind: str, name: str | None, scene: SceneView
+) -> Frame | RobotView | ObjectView | JointView | CategoryView | DrawnView:
     """The handle that a reference in a YAML file stands for."""
     if kind == "robot":
         return scene.robot(scene.index.robot(name).name)
     assert name is not None
     if kind in ("joint", "ranged joint"):
         return (JointView if kind == "joint" else RangedJointView)(scene, name)
+    if kind == "drawn value":
+        return DrawnView(scene, name)
     if kind == "category":
         return scene.category(name)
     return ObjectView(scene, name) if kind == "object" else scene.frame(name)

@@ -55,6 +55,7 @@ class Mdp:
         """`located` puts the place of its key before a dotted path."""
         self.spec, self.scene, self.streams = spec, scene, streams
         self.bindings = Bindings(None, scene.engine.num_envs, streams) if bindings is None else bindings
+        scene.drawn = self.bindings.rows()
         n = scene.engine.num_envs
         for name in spec.command:
             scene.goals[name] = np.tile(np.array([0, 0, 0, 0, 0, 0, 1.0]), (n, 1))

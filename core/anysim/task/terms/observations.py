@@ -8,7 +8,7 @@ from anysim.conventions import Array
 from anysim.errors import TaskError, listing
 from anysim.math import pose as P
 from anysim.task.joints import RangedJointView
-from anysim.task.scene import Frame, ObjectView, RobotView, SceneView
+from anysim.task.scene import DrawnView, Frame, ObjectView, RobotView, SceneView
 from anysim.task.slot_frames import CategoryView
 from anysim_schemas.base import Number, Positive
 
@@ -92,9 +92,10 @@ def commanded_velocity(scene: SceneView, *, robot: RobotView, channel: str = "ba
 
 __all__ = [
     "base_ang_vel", "base_lin_vel", "base_pose", "category_offset", "category_pose", "category_present",
-    "category_twist", "channel_action", "channel_joint_pos", "channel_joint_vel", "commanded_velocity", "frame_pose",
-    "frame_twist", "goal_position", "height_scan", "joint_opening", "joint_pos", "joint_vel", "last_action",
-    "object_joint_pos", "object_joint_vel", "offset", "present", "projected_gravity", "tool_pose", "tool_twist",
+    "category_twist", "channel_action", "channel_joint_pos", "channel_joint_vel", "commanded_velocity", "drawn",
+    "frame_pose", "frame_twist", "goal_position", "height_scan", "joint_opening", "joint_pos", "joint_vel",
+    "last_action", "object_joint_pos", "object_joint_vel", "offset", "present", "projected_gravity", "tool_pose",
+    "tool_twist",
 ]  # fmt: skip
 
 
@@ -136,6 +137,11 @@ def _flat(rows: Array) -> Array:
 def frame_twist(scene: SceneView, *, frame: Frame) -> Array:
     """Velocity of a frame's origin and its rate, world axes [m/s, rad/s]."""
     return frame.twist
+
+
+def drawn(scene: SceneView, *, value: DrawnView) -> Array:
+    """What `collect.bind` has drawn: the number; of words or flags one column for each, 1 for the one that it is."""
+    return value.rows[value.index[scene.env_ids]]
 
 
 def goal_position(scene: SceneView, *, goal: Frame) -> Array:
