@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -60,6 +61,17 @@ class DrawnSkill(MovingSkill):
             one.decide(ids[here], at[here])
         self._tell(ids)
 
+    def foresee(self, following: MovingSkill) -> None:
+        for one in self.variants:
+            one.foresee(following)
+
+    def wanted(self, ids: Array, at: Array, grasps: Array) -> Array:
+        parts = [(here, one.wanted(ids[here], at[here], grasps[here])) for one, here in self._each(ids)]
+        poses = np.zeros((*grasps.shape[:2], *parts[0][1].shape[2:]))
+        for here, part in parts:
+            poses[here] = part
+        return poses
+
     def _each(self, ids: Array) -> list[tuple[MovingSkill, Array]]:
         number = self._which(ids)
         return [(self.variants[k], number == k) for k in np.unique(number)]
@@ -101,6 +113,7 @@ class CommandSequence(SkillSequence):
         self._made: dict[str, MovingSkill] = {}
         skills: list[MovingSkill] = []
         self._lay(collect.commands, "collect.commands", skills)
+        self._look_ahead(skills)
         names = [f"{number} {spec.do}" for number, spec in enumerate(self._specs, 1)]
         dt = env.engine.world.physics.control_dt
         limits = {
@@ -165,6 +178,15 @@ class CommandSequence(SkillSequence):
             which = partial(self._env.bindings.which, variants.names)
             self._made[path] = made[0] if len(made) == 1 else DrawnSkill(self._env, made, which)
         return self._made[path]
+
+    def _look_ahead(self, skills: Sequence[MovingSkill]) -> None:
+        """Tell commands which one comes next, where that is always the same one."""
+        following: dict[MovingSkill, set[MovingSkill | None]] = {}
+        for (skill, after), guards in zip(pairwise(skills), self._guards[1:], strict=True):
+            following.setdefault(skill, set()).add(None if guards else after)
+        for skill, (after, *others) in following.items():
+            if after is not None and not others:
+                skill.foresee(after)
 
     def _predicate(self, spec: PredicateTermSpec, path: str) -> Holds:
         scene = self._env.scene

@@ -108,6 +108,15 @@ class MovingSkill(Skill):
     def decide(self, ids: Array, at: Array) -> None:
         """Say what is to move where in these envs; `at` are their rows among those that the scene looks at."""
 
+    def foresee(self, following: "MovingSkill") -> None:
+        """The command that comes next, once: what cannot go on with that need not be begun."""
+        del following
+
+    def wanted(self, ids: Array, at: Array, grasps: Array) -> Array:
+        """Tool poses (n, g, m, 7) that it needs with grasps (n, g, 7), of envs (n,), their rows in the scene."""
+        del ids, at
+        return np.zeros((*grasps.shape[:2], 0, 7))
+
     def history(self, env: int) -> tuple[tuple[str, str], ...]:
         """The failures of an env since it was started, each with what was tried next."""
         del env

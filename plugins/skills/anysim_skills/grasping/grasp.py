@@ -9,7 +9,7 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.skills.base import OUTCOMES, Outcome
-from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
+from anysim.skills.phases import GO_ON, STAY, MovingSkill, Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import ObjectView, RobotView
 from anysim_skills.arm import Arm
@@ -99,6 +99,10 @@ class Grasp(PhasedSkill):
         if self._lift:
             phases.append(Phase("lift", self._note_height, self._lifting, late))
         return phases
+
+    def foresee(self, following: MovingSkill) -> None:
+        if self._then is None and self.arm in following.movers:
+            self._then = following
 
     def start(self, env_ids: Array) -> None:
         super().start(env_ids)
