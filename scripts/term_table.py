@@ -8,14 +8,14 @@
 import inspect
 import re
 import sys
-from collections.abc import Callable, Iterator
-from types import ModuleType
+from collections.abc import Callable
 from typing import Any, get_args, get_origin
 
 from generated import main
 from pydantic.fields import FieldInfo
 
 from anysim.plugin_parameters import parameters, reference_kind
+from anysim.task.conditions import Conditions
 from anysim.task.terms import TERMS
 
 TITLES = {
@@ -27,11 +27,6 @@ TITLES = {
 }
 
 
-def functions(module: ModuleType) -> Iterator[tuple[str, Callable[..., Any]]]:
-    """The terms of a kind, by name."""
-    yield from ((name, getattr(module, name)) for name in sorted(module.__all__))
-
-
 def typed(annotation: Any) -> tuple[str, str]:
     """What a parameter is written as in YAML, and what its annotation says about it."""
     said, metadata = "", getattr(annotation, "__metadata__", ())
@@ -40,7 +35,9 @@ def typed(annotation: Any) -> tuple[str, str]:
             bounds = [f"{SIGNS[type(b).__name__]} {next(iter(vars_of(b).values()))}" for b in extra.metadata]
             said = ", ".join([*bounds, *([extra.description] if extra.description else [])])
     bare = get_args(annotation)[0] if metadata else annotation
-    if kind := reference_kind(bare):
+    if (kind := reference_kind(bare)) == Conditions.reference_kind:
+        return "predicates by name", said
+    if kind:
         return f"name of {'an' if kind[0] in 'aeiou' else 'a'} {kind}", said
     return spelled(bare), said
 
@@ -60,6 +57,8 @@ def spelled(annotation: Any) -> str:
         return " or ".join(f"`{value}`" for value in get_args(annotation))
     if "Range" in text or "Choice" in text:
         return "3 values, each may be drawn" if "tuple" in text else "a value, may be drawn"
+    if text.startswith("tuple["):
+        return f"{len(get_args(annotation))} numbers"
     words = {"float": "number", "int": "whole number", "str": "word", "bool": "true or false"}
     return words.get(text, re.sub(r"[\w.]+\.(\w+)", r"\1", text))
 
@@ -83,9 +82,9 @@ def row(name: str, function: Callable[..., Any]) -> str:
 def reference() -> str:
     """A table for each kind of term."""
     lines: list[str] = []
-    for kind, module in TERMS.items():
+    for kind, functions in TERMS.items():
         lines += [f"## {TITLES[kind]}", "", "| term | what it is | parameters |", "|---|---|---|"]
-        lines += [row(name, function) for name, function in functions(module)]
+        lines += [row(name, function) for name, function in sorted(functions.items())]
         lines.append("")
     return "\n".join(lines).rstrip()
 

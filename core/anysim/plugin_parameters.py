@@ -2,7 +2,8 @@
 
 A function or class takes its positional arguments from anysim and its keyword-only ones from the YAML file. Their
 annotations are checked when the file is loaded; an annotation with an attribute `reference_kind` (a handle such as
-`Frame`) is written as a name in the file and resolved when the env is built. A constructor that takes `**options` and
+`Frame`) is written as a name in the file, or as its attribute `written_as` says, and resolved when the env is built. A
+constructor that takes `**options` and
 hands them on to the constructor of its base has the parameters of that one too, before its own.
 """
 
@@ -49,7 +50,7 @@ def options_model(function: Callable[..., Any]) -> type[BaseModel]:
         if kind == "robot":  # the only robot of a world need not be named
             fields[name] = (reference | None, None)
         else:
-            annotation = reference if kind else p.annotation
+            annotation = getattr(p.annotation, "written_as", reference) if kind else p.annotation
             fields[name] = (annotation, ... if p.default is inspect.Parameter.empty else p.default)
     config = ConfigDict(extra="forbid", frozen=True)
     return create_model(getattr(function, "__name__", "options"), __config__=config, **fields)

@@ -52,13 +52,14 @@ def _check(slot: _Slot, resolver: OptionsResolver) -> list[Fault]:
             for key, child in slot.options.value.items()
         ]
     given, known = slot.options.plain(), fields_by_key(model)
+    within = [fault for inner in _slots_of_model(model, slot.options, slot.path) for fault in _check(inner, resolver)]
     bound = {key for key, value in given.items() if slot.beside and key in known and any(bound_names(value))}
     try:
         model.model_validate({key: value for key, value in given.items() if key not in bound})
     except ValidationError as error:
         later = {_join(slot.path, key) for key in bound}  # checked with each value that they can have
-        return [f for f in locate(error, model, slot.options, slot.path, slot.beside) if f.path not in later]
-    return []
+        return [f for f in locate(error, model, slot.options, slot.path, slot.beside) if f.path not in later] + within
+    return within
 
 
 def _takes_nothing(slot: _Slot, key: str) -> str:

@@ -66,6 +66,16 @@ class PredicateTermSpec(TermSpec):
     plugin_kind: ClassVar[str] = "predicate"
 
 
+class EndingTermSpec(PredicateTermSpec):
+    """A predicate that counts as success or failure, and what that is worth."""
+
+    reward: Number = Field(
+        default=0.0,
+        description="added to the reward of each control step in which the success, or this failure, counts; once "
+        "where it ends the episode",
+    )
+
+
 class CommandTermSpec(TermSpec):
     """A goal that is drawn at each reset, and that other terms refer to by its key."""
 
@@ -126,9 +136,9 @@ class TaskSpec(Spec):
     rewards: Annotated[dict[Name, RewardTermSpec], ByTerm] = Field(
         default_factory=dict, description="terms whose weighted sum is the reward"
     )
-    success: Annotated[dict[Name, PredicateTermSpec], ByTerm] = Field(default_factory=dict, description="all must hold")
+    success: Annotated[dict[Name, EndingTermSpec], ByTerm] = Field(default_factory=dict, description="all must hold")
     hold: Integer = Field(default=1, gt=0, description="consecutive control steps that success must hold")
-    failure: Annotated[dict[Name, PredicateTermSpec], ByTerm] = Field(default_factory=dict, description="any is enough")
+    failure: Annotated[dict[Name, EndingTermSpec], ByTerm] = Field(default_factory=dict, description="any is enough")
     events: Annotated[dict[Name, EventTermSpec], ByTerm] = Field(
         default_factory=dict, description="what happens to the world at resets and steps"
     )

@@ -94,3 +94,13 @@ def test_the_first_screen_of_a_run_has_one_line_on_what_is_approximate(tmp_path:
 
     assert len(first_screen()) == 2
     assert sum("approximate: " in line for line in first_screen("-v")) >= 2
+
+
+def test_success_that_is_worth_less_than_going_on_is_warned_of() -> None:
+    poor = report_on("pick_cube", None, False, ["task.success.at_goal.reward=10"])
+    assert not poor.faults
+    warning = next(w for w in poor.warnings if "task.success" in w)
+    assert "success is worth 10 and ends rewards of up to 400 in the 100 steps" in warning
+    assert "`reward: 390` or more" in warning
+    endless = report_on("pick_cube", None, False, ["task.success.at_goal.reward=10", "task.on_success=continue"])
+    assert not any("task.success" in w for w in (*endless.warnings, *report_on("pick_cube", None, False, []).warnings))

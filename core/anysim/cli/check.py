@@ -105,6 +105,7 @@ def report_on(name: str, engine: str | None, all_engines: bool, overrides: list[
     from anysim.api import compile_world, dry_run, load, place_of
     from anysim.engine.conditioning import doubts
     from anysim.errors import AnysimError, AssetError, PluginFailure, SpecError, SpecIssue
+    from anysim.task import ending_worth
     from anysim_schemas.files import exists
 
     past: list[SpecIssue] = []
@@ -114,7 +115,9 @@ def report_on(name: str, engine: str | None, all_engines: bool, overrides: list[
         if loaded.spec.task is not None:
             dry_run(loaded, world)
             _check_film(loaded)
-        warnings = tuple(str(SpecIssue(place_of(loaded, doubt.path), *doubt[:2])) for doubt in doubts(world))
+        found = [doubt[:2] for doubt in doubts(world)]
+        found += [] if loaded.spec.task is None else ending_worth.doubts(loaded.spec.task)
+        warnings = tuple(str(SpecIssue(place_of(loaded, path), path, sentence)) for path, sentence in found)
         engines = registry.names("engines") if all_engines else [engine or loaded.spec.engine.name]
         if any(issue.path.startswith("engine") for issue in past):
             engines = []  # which one was meant is not known

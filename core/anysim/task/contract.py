@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from enum import StrEnum
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -32,6 +32,22 @@ def changes_nothing_seen(event: Event) -> Event:
     """
     vars(event)[UNSEEN] = True
     return event
+
+
+Reward = TypeVar("Reward", bound=Callable[..., Any])
+
+MOST = "at_most"
+"""The mark of a reward term, an attribute of the function: no env gets more of it in a step."""
+
+
+def at_most(bound: float) -> Callable[[Reward], Reward]:
+    """Mark a reward term that is never more than a bound; `anysim check` sees by it what success has to be worth."""
+
+    def marked(reward: Reward) -> Reward:
+        vars(reward)[MOST] = bound
+        return reward
+
+    return marked
 
 
 STATUS_NAMES = np.array([str(s) for s in Status])

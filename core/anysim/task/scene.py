@@ -5,7 +5,7 @@ env is built. A handle returns arrays for `scene.rows` only: all envs in a step,
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import ClassVar
 
 import numpy as np
@@ -22,6 +22,7 @@ from anysim.math import pose as P
 from anysim.model import frames
 from anysim.model.slots import members, single
 from anysim.model.world import BodyKind, Channel, Entity
+from anysim.task.memory import Memory
 from anysim.task.slot_frames import CategoryView, Column, Follower, columns_of, varies
 
 
@@ -49,6 +50,8 @@ class SceneView:
         """The manager of tiles and levels; None in a scene without managers."""
         self.elapsed = episodes.elapsed
         """Control steps since each env's reset (N,)."""
+        self.memories: list[Memory] = []
+        """What terms remember, in the order in which they were made."""
         self._rows: Array | slice = slice(None)
         self._everyone = self._env_ids = np.arange(engine.num_envs)
         self._everyone.setflags(write=False)
@@ -119,6 +122,12 @@ class SceneView:
             return SlotFrame(self, name, columns_of(world, name)[0])
         whole = f"{slot.name}{dot}{part}"
         return BodyFrame(self, whole, self.index.frame(whole))
+
+    def memory(self, width: int = 1) -> Callable[[Callable[[Array, Array], Array]], Array]:
+        """A new `Memory`, as the function that updates the rows at hand and returns them (n, width)."""
+        memory = Memory(self.engine.num_envs, width)
+        self.memories.append(memory)
+        return lambda change: memory.update(self._env_ids, self.elapsed[self._env_ids], change)
 
     def entity_shape(self, name: str) -> EntityShape:
         """The collision geometry of an entity of the World; made once."""

@@ -1,5 +1,6 @@
 """Term functions by name, and their binding to a scene."""
 
+import inspect
 from collections.abc import Callable, Mapping
 from functools import partial
 from types import ModuleType
@@ -8,9 +9,12 @@ from typing import Any
 from anysim import registry
 from anysim.errors import AnysimError, PluginError, SpecError, SpecIssue, listing, suggest
 from anysim.plugin_parameters import checked, options_model, parameters, reference_kind
+from anysim.task.conditions import Conditions
+from anysim.task.contact_view import ContactView
 from anysim.task.joints import JointView, RangedJointView
 from anysim.task.scene import DrawnView, Frame, ObjectView, RobotView, SceneView
 from anysim.task.slot_frames import CategoryView
+from anysim_schemas.task import PredicateTermSpec
 
 BUILTIN = "anysim"
 
@@ -50,6 +54,8 @@ def term_names(library: str) -> list[str]:
 def bind(kind: str, term: str, params: Mapping[str, Any], scene: SceneView, path: str) -> Callable[..., Any]:
     """The term as a function of its positional arguments after `scene`, with parameters checked and names resolved.
 
+    A class is a term that remembers: it is made with the scene and its parameters, and its instance is the function.
+
     Raises:
         SpecError: at `path`, a parameter is wrong, or names nothing in this world.
     """
@@ -61,18 +67,36 @@ def bind(kind: str, term: str, params: Mapping[str, Any], scene: SceneView, path
     for name, parameter in parameters(function).items():
         value = getattr(values, name)
         handle = reference_kind(parameter.annotation)
-        if handle is not None:
+        if handle == Conditions.reference_kind:
+            value = _conditions(value, scene, f"{path}.{name}")
+        elif handle is not None:
             try:
                 value = resolve(handle, value, scene)
             except AnysimError as error:
                 raise SpecError([SpecIssue("", f"{path}.{name}", str(error))]) from None
         keywords[name] = value
-    return partial(function, scene, **keywords)
+    made = partial(function, scene, **keywords)
+    return made() if inspect.isclass(function) else made
 
 
-def resolve(
-    kind: str, name: str | None, scene: SceneView
-) -> Frame | RobotView | ObjectView | JointView | CategoryView | DrawnView:
+def _conditions(specs: Mapping[str, PredicateTermSpec], scene: SceneView, path: str) -> Conditions:
+    """Predicates inside one; SpecError with the faults of all of them."""
+    calls: list[Callable[..., Any]] = []
+    issues: list[SpecIssue] = []
+    for key, spec in specs.items():
+        try:
+            calls.append(bind("predicate", spec.term, spec.params, scene, f"{path}.{key}"))
+        except SpecError as error:
+            issues.extend(error.issues)
+    if issues:
+        raise SpecError(issues)
+    return Conditions(calls)
+
+
+Handle = Frame | RobotView | ObjectView | JointView | CategoryView | ContactView | DrawnView
+
+
+def resolve(kind: str, name: str | None, scene: SceneView) -> Handle:
     """The handle that a reference in a YAML file stands for."""
     if kind == "robot":
         return scene.robot(scene.index.robot(name).name)
@@ -81,6 +105,8 @@ def resolve(
         return (JointView if kind == "joint" else RangedJointView)(scene, name)
     if kind == "drawn value":
         return DrawnView(scene, name)
+    if kind == ContactView.reference_kind:
+        return ContactView(scene, name)
     if kind == "category":
         return scene.category(name)
     return ObjectView(scene, name) if kind == "object" else scene.frame(name)

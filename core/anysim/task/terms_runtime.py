@@ -42,7 +42,7 @@ def _values(terms: Sequence[BoundTerm]) -> list[Any]:
 
 
 class Mdp:
-    """Evaluates a TaskSpec on a SceneView. Holds one slice of state: the goals, and how long success has held."""
+    """Evaluates a TaskSpec on a SceneView. Its state: the goals, how long success has held, what terms remember."""
 
     def __init__(
         self,
@@ -83,6 +83,11 @@ class Mdp:
         rewards = terms("reward", spec.rewards, "rewards")
         self._success = list(terms("predicate", spec.success, "success").values())
         self._failure = list(terms("predicate", spec.failure, "failure").values())
+        self._worth = sum(term.reward for term in spec.success.values())
+        """Of success, beside the rewards."""
+        self._penalties = np.array([term.reward for term in spec.failure.values()])
+        self._ending = np.zeros(0)
+        """What success and failure are worth (n,) in this step, as of the last `judge`."""
         events = terms("event", spec.events, "events")
         self._groups: dict[str, list[BoundTerm]] = {}
         for group, entries in spec.observations.items():
@@ -90,6 +95,7 @@ class Mdp:
             self._groups[group] = [term._replace(call=self._sensed(group, int(i), term)) for i, term in bound.items()]
         if issues:
             raise SpecError(issues)
+        self._memories = tuple(scene.memories)
         self._rewards, self._weights = list(rewards.values()), [spec.rewards[name].weight for name in rewards]
         self._due = {
             when: {name: term for name, term in events.items() if spec.events[name].when == when}
@@ -113,6 +119,8 @@ class Mdp:
     def reset(self, env_ids: Array) -> None:
         """New bindings, reset events, then new goals; the scene must be looking at these rows."""
         self.held[env_ids] = 0
+        for memory in self.scene.memories:
+            memory.forget(env_ids)
         self.bindings.draw(env_ids)
         self._run_events("reset", 0)
         for name, term in self._commands.items():
@@ -171,10 +179,12 @@ class Mdp:
     def reward(self, faulted: Array) -> Array:
         """The weighted sum of the reward terms for the rows at hand, float32 (n,); NaN for faulted envs.
 
+        What the success and failure of the last `judge` are worth is in it.
+
         Raises:
             TaskError: a term is not finite for an env whose state is.
         """
-        total = np.zeros(len(faulted))
+        total = self._ending.copy() if len(self._ending) else np.zeros(len(faulted))
         for term, weight, value in zip(self._rewards, self._weights, _values(self._rewards), strict=True):
             _fit(term, value, total.shape)
             total += weight * value
@@ -190,10 +200,15 @@ class Mdp:
         """(success, failure) (n,) bool for the rows at hand; counts how long success has held."""
         rows = self.scene.rows
         held = self.held[rows]
-        success = _combined(np.logical_and, self._success, held.shape)
-        failure = _combined(np.logical_or, self._failure, held.shape)
-        self.held[rows] = held = (held + 1) * success
-        return held >= self.spec.hold, failure
+        success = _each(self._success, held.shape)
+        failures = _each(self._failure, held.shape)
+        self.held[rows] = held = (held + 1) * _combined(np.logical_and, success, held.shape)
+        succeeded = held >= self.spec.hold
+        if self._worth or self._penalties.any():
+            self._ending = self._worth * succeeded
+            for worth, failure in zip(self._penalties.tolist(), failures, strict=True):
+                self._ending = self._ending + worth * failure
+        return succeeded, _combined(np.logical_or, failures, held.shape)
 
     def overridable(self) -> list[Overridable]:
         """The parameters of commands and events that are drawn; those of events in steps may change midway."""
@@ -214,6 +229,8 @@ class Mdp:
         """Copies of the goals and counters."""
         data = {"held": self.held[env_ids]} | {f"goal.{name}": g[env_ids] for name, g in self.scene.goals.items()}
         data |= self.bindings.snapshot(env_ids)
+        for number, memory in enumerate(self._memories):
+            data |= {f"memory.{number}": memory.values[env_ids], f"memory.{number}.seen": memory.seen[env_ids]}
         for term in self._altered:
             data |= term.snapshot(env_ids)
         return data
@@ -222,6 +239,8 @@ class Mdp:
         """Raise SnapshotError for values that no env can have."""
         refuse_range("held", data["held"], 0, self.spec.horizon)
         self.bindings.refuse_rows(data)
+        for number in range(len(self._memories)):
+            refuse_range(f"memory.{number}.seen", data[f"memory.{number}.seen"], -1, self.spec.horizon)
         for term in self._altered:
             term.refuse_rows(data)
 
@@ -229,6 +248,9 @@ class Mdp:
         """Write what `snapshot` returned."""
         self.held[env_ids] = data["held"]
         self.bindings.restore(env_ids, data)
+        for number, memory in enumerate(self._memories):
+            memory.values[env_ids] = data[f"memory.{number}"]
+            memory.seen[env_ids] = data[f"memory.{number}.seen"]
         for name, goal in self.scene.goals.items():
             goal[env_ids] = data[f"goal.{name}"]
         self.scene.moment += 1
@@ -236,14 +258,17 @@ class Mdp:
             term.restore(env_ids, data)
 
 
-def _combined(both: np.ufunc, predicates: Sequence[BoundTerm], shape: tuple[int, ...]) -> Array:
-    """What the predicates say together (n,) bool; false where there are none."""
-    if not predicates:
-        return np.zeros(shape, dtype=bool)
+def _each(predicates: Sequence[BoundTerm], shape: tuple[int, ...]) -> list[Array]:
+    """What each predicate says (n,) bool."""
     values = _values(predicates)
     for term, value in zip(predicates, values, strict=True):
         _fit(term, value, shape, "truth values")
-    return reduce(both, values)
+    return values
+
+
+def _combined(both: np.ufunc, values: Sequence[Array], shape: tuple[int, ...]) -> Array:
+    """What predicates say together (n,) bool; false where there are none."""
+    return reduce(both, values) if values else np.zeros(shape, dtype=bool)
 
 
 def _fit(term: BoundTerm, value: Any, shape: tuple[int, ...], what: str = "numbers") -> None:

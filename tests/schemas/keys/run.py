@@ -103,6 +103,9 @@ ROWS: dict[str, Row] = {
     "ImageSpec.fps": row("task.images.eye.fps=25", given=(*OBSERVED, ARM), seen="filmed"),
     "ImageSpec.markers": row("task.images.eye.markers=true", given=OBSERVED, seen="filmed"),
     "RewardTermSpec.weight": row("task.rewards.close.weight=-2.0", seen="episode"),
+    "EndingTermSpec.reward": row(
+        "task.success.there.reward=2.0", given="task.success.there.tolerance=5", seen="episode"
+    ),
     "EventTermSpec.when": row(
         "task.events.polish.when=step",
         given="task.events={polish: {term: set_friction, object: red, friction: {range: [0.1, 0.2]}}}",

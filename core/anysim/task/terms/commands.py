@@ -10,10 +10,11 @@ import numpy as np
 from pydantic import Field
 
 from anysim.conventions import Array
+from anysim.math import pose as P
 from anysim.task.scene import Frame, ObjectView, SceneView
 from anysim_schemas.values import FloatValue, Vec3Value
 
-__all__ = ["goal_above", "goal_at", "goal_beside"]
+__all__ = ["goal_above", "goal_at", "goal_beside", "goal_from", "goal_pose"]
 
 Draw = Callable[[str, Any], Array]
 
@@ -25,6 +26,30 @@ def _upright(position: Array) -> Array:
 def goal_at(scene: SceneView, draw: Draw, *, position: Vec3Value) -> Array:
     """A point in the world [m]; on tiled ground relative to the env's tile."""
     return _upright(draw("position", position) + scene.origin[scene.rows])
+
+
+def goal_pose(
+    scene: SceneView,
+    draw: Draw,
+    *,
+    position: Vec3Value,
+    roll: FloatValue = 0.0,
+    pitch: FloatValue = 0.0,
+    yaw: FloatValue = 0.0,
+) -> Array:
+    """A pose in the world [m, rad]; on tiled ground relative to the env's tile."""
+    angles = np.stack([draw("roll", roll), draw("pitch", pitch), draw("yaw", yaw)], axis=1)
+    return np.concatenate(
+        [draw("position", position) + scene.origin[scene.rows], P.from_roll_pitch_yaw(angles)], axis=1
+    )
+
+
+def goal_from(
+    scene: SceneView, draw: Draw, *, frame: Frame, offset: Vec3Value = (0.0, 0.0, 0.0), yaw: FloatValue = 0.0
+) -> Array:
+    """A pose at an offset [m] and a turn about z [rad] from a frame, in its axes, as it is at the reset."""
+    turn = P.from_axis_angle(np.array([0.0, 0.0, 1.0]), draw("yaw", yaw))
+    return P.compose(frame.pose, np.concatenate([draw("offset", offset), turn], axis=1))
 
 
 def _top(scene: SceneView, surface: Frame) -> Array:

@@ -1,12 +1,15 @@
 """Observation terms: `(scene, *, parameters) -> (n, k)`."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field
 
 from anysim.conventions import Array
 from anysim.errors import TaskError, listing
 from anysim.math import pose as P
+from anysim.task.conditions import Conditions
+from anysim.task.contact_view import ContactView
 from anysim.task.joints import RangedJointView
 from anysim.task.scene import DrawnView, Frame, ObjectView, RobotView, SceneView
 from anysim.task.slot_frames import CategoryView
@@ -92,10 +95,10 @@ def commanded_velocity(scene: SceneView, *, robot: RobotView, channel: str = "ba
 
 __all__ = [
     "base_ang_vel", "base_lin_vel", "base_pose", "category_offset", "category_pose", "category_present",
-    "category_twist", "channel_action", "channel_joint_pos", "channel_joint_vel", "commanded_velocity", "drawn",
-    "frame_pose", "frame_twist", "goal_position", "height_scan", "joint_opening", "joint_pos", "joint_vel",
-    "last_action", "object_joint_pos", "object_joint_vel", "offset", "present", "projected_gravity", "tool_pose",
-    "tool_twist",
+    "category_twist", "channel_action", "channel_joint_pos", "channel_joint_vel", "commanded_velocity", "contact_force",
+    "drawn", "frame_pose", "frame_twist", "goal_position", "height_scan", "holds", "joint_opening", "joint_pos",
+    "joint_vel", "last_action", "object_joint_pos", "object_joint_vel", "offset", "present", "projected_gravity",
+    "relative_pose", "time_left", "tool_pose", "tool_twist",
 ]  # fmt: skip
 
 
@@ -152,6 +155,31 @@ def goal_position(scene: SceneView, *, goal: Frame) -> Array:
 def offset(scene: SceneView, *, a: Frame, b: Frame) -> Array:
     """From a to b, in the axes of a [m]."""
     return P.rotate_inverse(a.quaternion, b.position - a.position)
+
+
+def relative_pose(scene: SceneView, *, a: Frame, b: Frame) -> Array:
+    """Pose of b in the axes of a [m, xyzw]; the quaternion's scalar part is never negative."""
+    return P.unsigned(P.compose(P.inverse(a.pose), b.pose))
+
+
+def contact_force(
+    scene: SceneView,
+    *,
+    sensor: ContactView,
+    limit: Annotated[float, Field(gt=0, description="each component is cut off at it [N]")] = 100.0,
+) -> Array:
+    """The net force on the body of a contact sensor, world axes [N]."""
+    return np.clip(sensor.force, -limit, limit)
+
+
+def holds(scene: SceneView, *, of: Conditions) -> Array:
+    """1 for each of the predicates that holds, 0 for the others, in order: how far a task has come."""
+    return of.each().T.astype(np.float64)
+
+
+def time_left(scene: SceneView, *, steps: Annotated[int, Field(ge=1, description="the horizon")]) -> Array:
+    """Share of so many control steps that is left of the episode: 1 at its beginning."""
+    return np.clip(1.0 - scene.elapsed[scene.rows, None] / steps, 0.0, 1.0)
 
 
 def present(scene: SceneView, *, object: ObjectView) -> Array:

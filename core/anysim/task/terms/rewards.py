@@ -7,10 +7,29 @@ from pydantic import Field
 
 from anysim.conventions import Array
 from anysim.math import pose as P
+from anysim.task.conditions import Conditions
+from anysim.task.contact_view import ContactView
+from anysim.task.contract import at_most
 from anysim.task.joints import RangedJointView
-from anysim.task.scene import Frame, SceneView
+from anysim.task.scene import Frame, RobotView, SceneView
+from anysim.task.terms.geometry import Axis, axis_of, turned_by
 
-__all__ = ["action_rate", "distance", "joint_progress", "tanh_distance"]
+__all__ = [
+    "action_rate",
+    "alive",
+    "angle",
+    "axis_angle",
+    "contact_force",
+    "distance",
+    "effort",
+    "height",
+    "joint_limit",
+    "joint_progress",
+    "joint_speed",
+    "speed",
+    "stage",
+    "tanh_distance",
+]
 
 
 def distance(scene: SceneView, *, a: Frame, b: Frame) -> Array:
@@ -18,6 +37,7 @@ def distance(scene: SceneView, *, a: Frame, b: Frame) -> Array:
     return P.norm(b.position - a.position)
 
 
+@at_most(1.0)
 def tanh_distance(
     scene: SceneView,
     *,
@@ -29,6 +49,7 @@ def tanh_distance(
     return 1.0 - np.tanh(P.norm(b.position - a.position) / scale)
 
 
+@at_most(1.0)
 def joint_progress(
     scene: SceneView,
     *,
@@ -43,3 +64,70 @@ def action_rate(scene: SceneView) -> Array:
     """Sum of the squared action components."""
     action = scene.last_action[scene.rows]
     return P.dot(action, action) if action.shape[1] else np.zeros(len(action))
+
+
+@at_most(1.0)
+def alive(scene: SceneView) -> Array:
+    """1 in each control step."""
+    return np.ones(len(scene.env_ids))
+
+
+def angle(scene: SceneView, *, a: Frame, b: Frame, symmetry: Annotated[int, Field(ge=1)] = 1) -> Array:
+    """Angle between two frames [rad]; b may be the same after each 1/symmetry of a turn about its z axis."""
+    return turned_by(a.quaternion, b.quaternion, symmetry)
+
+
+def axis_angle(scene: SceneView, *, a: Frame, b: Frame, axis: Axis = "z") -> Array:
+    """Angle between the same axis of two frames [rad]."""
+    return np.arccos(np.clip(P.dot(axis_of(a.quaternion, axis), axis_of(b.quaternion, axis)), -1.0, 1.0))
+
+
+def height(scene: SceneView, *, a: Frame, b: Frame) -> Array:
+    """Height of a's origin over b's, along the world's z [m]."""
+    return a.position[:, 2] - b.position[:, 2]
+
+
+def speed(scene: SceneView, *, frame: Frame) -> Array:
+    """Speed of a frame's origin [m/s]."""
+    return P.norm(frame.twist[:, :3])
+
+
+@at_most(1.0)
+def contact_force(
+    scene: SceneView,
+    *,
+    sensor: ContactView,
+    limit: Annotated[float, Field(gt=0, description="the force counts up to it [N]")] = 100.0,
+) -> Array:
+    """What a contact sensor feels, as a share of a limit: 0 without contact, at most 1."""
+    return np.minimum(sensor.strength / limit, 1.0)
+
+
+@at_most(1.0)
+def stage(scene: SceneView, *, of: Conditions) -> Array:
+    """Share of the predicates, in their order, that hold before the first that does not: how far a task has come."""
+    return np.logical_and.accumulate(of.each(), axis=0).mean(axis=0)
+
+
+def joint_speed(scene: SceneView, *, robot: RobotView) -> Array:
+    """Sum of the squared velocities of a robot's joints [rad²/s², m²/s²]."""
+    return P.dot(robot.joint_vel, robot.joint_vel)
+
+
+def effort(scene: SceneView, *, robot: RobotView) -> Array:
+    """Sum of the squared efforts that a robot's drives exerted in the last substep [N² m², N²]."""
+    efforts = scene.state.joint_effort[scene.rows, robot.joints]
+    return P.dot(efforts, efforts)
+
+
+def joint_limit(
+    scene: SceneView,
+    *,
+    robot: RobotView,
+    margin: Annotated[float, Field(gt=0, le=0.5, description="of the range, at each end")] = 0.05,
+) -> Array:
+    """How far a robot's joints are in the margins of their ranges: summed up, 1 for each that is at a limit."""
+    limited = np.isfinite(robot.upper - robot.lower)
+    position, lower, upper = robot.joint_pos[:, limited], robot.lower[limited], robot.upper[limited]
+    left = np.minimum(position - lower, upper - position) / (upper - lower)
+    return np.sum(np.clip(1.0 - left / margin, 0.0, 1.0), axis=1)

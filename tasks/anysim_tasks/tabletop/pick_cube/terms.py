@@ -7,9 +7,11 @@ from pydantic import Field
 
 from anysim.conventions import Array
 from anysim.math.pose import norm
+from anysim.task.contract import at_most
 from anysim.task.scene import Frame, ObjectView, SceneView
 
 
+@at_most(1.0)
 def lifted_toward(
     scene: SceneView, *, object: ObjectView, goal: Frame, scale: Annotated[float, Field(gt=0, description="[m]")] = 0.3
 ) -> Array:

@@ -7,10 +7,12 @@ from pydantic import Field
 
 from anysim.conventions import Array
 from anysim.math.pose import norm
+from anysim.task.contract import at_most
 from anysim.task.joints import RangedJointView
 from anysim.task.scene import Frame, ObjectView, SceneView
 
 
+@at_most(1.0)
 def stowed(
     scene: SceneView,
     *,
