@@ -10,6 +10,7 @@ from pydantic import BaseModel, ValidationError
 from anysim_schemas.entries import places
 from anysim_schemas.errors import SpecError, SpecIssue
 from anysim_schemas.faults import locate
+from anysim_schemas.levels import split, with_level
 from anysim_schemas.merging import override, override_name
 from anysim_schemas.messages import suggest
 from anysim_schemas.nodes import Fault, Node, from_data, in_order
@@ -122,7 +123,9 @@ def load(
     faults = reader.faults
     if reader.fatal:
         raise SpecError(in_order([*reader.fatal, *faults], order))
-    root = override(reader.merged(nodes), overrides, shapes, faults)
+    about, others = split(overrides)
+    root = with_level(override(reader.merged(nodes), about, shapes, faults), shapes, faults)
+    root = override(root, others, shapes, faults)
     refused = {fault.mark for fault in faults if fault.mark.line}  # what such a value is taken for says nothing new
     spec, invalid = _validated(model, root, resolver)
     if spec is None or faults or invalid:

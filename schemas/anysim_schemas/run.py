@@ -1,6 +1,6 @@
 """The root of a file: everything about a run."""
 
-from typing import Self
+from typing import Any, Self
 
 from pydantic import Field, model_validator
 
@@ -65,6 +65,11 @@ class RunSpec(Spec):
 
     engine: EngineSpec = Field(default=EngineSpec(), description="the engine that runs the world")
     num_envs: Integer = Field(default=1, gt=0, description="number of parallel environments")
+    level: Name | None = Field(default=None, description="which of the `levels` to run; the file as it is if not given")
+    levels: dict[Name, dict[str, Any]] = Field(
+        default_factory=dict,
+        description="levels of difficulty: what each changes, as a file that extends this one would",
+    )
     seed: Integer = Field(default=0, ge=0, lt=2**64, description="seed of everything that is drawn")
     physics: PhysicsSpec = Field(default=PhysicsSpec(), description="time steps and gravity")
     world: WorldSpec = Field(default=WorldSpec(), description="what exists, where it goes and what looks at it")

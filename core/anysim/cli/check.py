@@ -100,7 +100,18 @@ def check_one(name: str, engine: str | None, all_engines: bool, overrides: list[
 
 
 def report_on(name: str, engine: str | None, all_engines: bool, overrides: list[str]) -> Report:
-    """Every fault of one file, and what each engine that is asked says to it."""
+    """Every fault of one file and of its levels, and what each engine that is asked says to it."""
+    report, levels = _report_on(name, engine, all_engines, overrides)
+    for level in levels:
+        faults = _report_on(name, engine, all_engines, [*overrides, f"level={level}"])[0].faults
+        report = report._replace(faults=report.faults + [fault for fault in faults if fault not in report.faults])
+    return report
+
+
+def _report_on(
+    name: str, engine: str | None, all_engines: bool, overrides: list[str]
+) -> tuple[Report, tuple[str, ...]]:
+    """The report on a file as it is, and its levels where none of them is chosen."""
     from anysim import registry
     from anysim.api import compile_world, dry_run, load, place_of
     from anysim.engine.conditioning import doubts
@@ -123,14 +134,15 @@ def report_on(name: str, engine: str | None, all_engines: bool, overrides: list[
             engines = []  # which one was meant is not known
         answers = tuple(_ask(one, loaded, world, name) for one in engines)
     except (SpecError, AssetError) as error:
-        return Report([str(issue) for issue in [*past, *error.issues]] or [f"{name}: {error}"])
+        return Report([str(issue) for issue in [*past, *error.issues]] or [f"{name}: {error}"]), ()
     except PluginFailure:  # which says nothing of the file
         raise
     except AnysimError as error:
-        return Report([*map(str, past), f"{name}: {error}"])
+        return Report([*map(str, past), f"{name}: {error}"]), ()
     refused = [answer.refusal for answer in answers if answer.refusal]
     faults = [*map(str, past), *(refused if len(refused) == len(answers) else [])]
-    return Report(faults, () if past else answers, warnings, world)
+    levels = tuple(loaded.spec.levels) if loaded.spec.level is None else ()
+    return Report(faults, () if past else answers, warnings, world), levels
 
 
 def _ask(engine: str, loaded: "LoadedRun", world: "World", name: str) -> Answer:

@@ -26,6 +26,10 @@ ROWS: dict[str, Row] = {
     "RunSpec.engine": row("engine=mujoco", seen="engine"),
     "RunSpec.num_envs": row("num_envs=3", seen="engine"),
     "RunSpec.seed": row("seed=1", seen="episode"),
+    "RunSpec.level": row("level=fixed", given="levels.fixed.world.objects.red.fixed=true"),
+    "RunSpec.levels": row(
+        "levels.fixed.world.objects.red.fixed=true", given=("levels.fixed.physics.dt=0.001", "level=fixed")
+    ),
     "RunSpec.physics": row("physics={dt: 0.001}"),
     "RunSpec.world": row("world.objects.red.fixed=true"),
     "RunSpec.task": row("task.horizon=2", seen="episode"),
