@@ -1,0 +1,1 @@
+"""Evaluation: policies by name, how often they solve a task, and whether engines agree."""

@@ -1,0 +1,70 @@
+"""An evaluation as one self-contained page: rates with their intervals drawn, failures by type, agreement."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from html import escape
+from importlib.resources import files
+from typing import Any
+
+WIDTH, HEIGHT = 240, 16
+"""[px] of a drawn interval."""
+
+
+def page(told: Mapping[str, Any]) -> str:
+    """HTML that is also well-formed XML; the same bytes for the same evaluation."""
+    css = files("anysim_evaluation").joinpath("page.css").read_text("utf-8")
+    title = escape(f"{told['policy']} on {told['task']}")
+    head = f'<meta charset="utf-8"/><title>{title}</title><style>\n{css}</style>'
+    body = "\n".join(_body(told, title))
+    return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head>\n<body>\n{body}\n</body></html>\n'
+
+
+def _body(told: Mapping[str, Any], title: str) -> Iterator[str]:
+    level = f", level {told['level']}" if told["level"] else ""
+    yield f"<h1>{title}</h1><p>{told['num_episodes']} episodes of the split {escape(told['split'])}{escape(level)}.</p>"
+    engines: Mapping[str, Any] = told["engines"]
+    rows = [
+        [
+            escape(name),
+            f"{one['successes']} of {one['attempts']}",
+            _drawn(one["success_rate"], one["interval"]),
+            "{:.0%} to {:.0%}".format(*one["interval"]),
+            "" if one["steps"] is None else f"{one['steps']:g}",
+            str(one["faults"]),
+        ]
+        for name, one in engines.items()
+    ]
+    yield from _table("Success", ("engine", "solved", "", "95 %", "steps", "faults"), rows)
+    kinds = sorted({kind for one in engines.values() for kind in one["failures"]})
+    counts = [[escape(kind), *(str(one["failures"].get(kind, 0)) for one in engines.values())] for kind in kinds]
+    yield from _table("Failures", ("type", *engines), counts)
+    pairs = [
+        [
+            f"{escape(pair['first'])} and {escape(pair['second'])}",
+            f"{pair['agree']:.1%}",
+            "" if pair["kappa"] is None else f"{pair['kappa']:.2f}",
+            f"{pair['only_first']} and {pair['only_second']}",
+            f"{pair['p']:.3f}",
+        ]
+        for pair in told["agreement"]
+        if pair["seeds"]
+    ]
+    yield from _table("Agreement, seed by seed", ("engines", "same outcome", "kappa", "one alone", "p"), pairs)
+
+
+def _drawn(share: float | None, interval: Sequence[float]) -> str:
+    if share is None:
+        return ""
+    low, high = (WIDTH * value for value in interval)
+    middle = HEIGHT / 2
+    return (
+        f'<svg width="{WIDTH}" height="{HEIGHT}"><rect width="{WIDTH}" height="{HEIGHT}" fill="#eee"/>'
+        f'<line x1="{low:.1f}" x2="{high:.1f}" y1="{middle}" y2="{middle}" stroke="#369" stroke-width="4"/>'
+        f'<circle cx="{WIDTH * share:.1f}" cy="{middle}" r="5" fill="#136"/></svg>'
+    )
+
+
+def _table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    if rows:
+        yield f"<h2>{title}</h2><table><tr>" + "".join(f"<th>{escape(column)}</th>" for column in columns) + "</tr>"
+        yield from ("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
+        yield "</table>"

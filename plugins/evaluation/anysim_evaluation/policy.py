@@ -1,0 +1,121 @@
+"""Policies of whole envs: the contract, and how one is named on the command line.
+
+A policy is an entry point of the group `anysim.env_policies`: a class that is made of an env and keyword-only
+parameters. Nothing about an episode may depend on which env it runs in: draws come from `env.streams.generator`.
+"""
+
+import importlib
+from typing import Any, NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+import yaml
+
+from anysim import registry
+from anysim.conventions import Array
+from anysim.errors import TaskError
+from anysim.plugin_parameters import checked, options_model, parameters
+from anysim.task.contract import Obs
+from anysim.task.env import TaskEnv
+
+
+class Policy(Protocol):
+    """What `anysim evaluate` drives envs with."""
+
+    def reset(self, env_ids: Array) -> None:
+        """These envs have just begun an episode."""
+        ...
+
+    def act(self, obs: Obs, env_ids: Array) -> Array:
+        """Actions (n, A) for the rows of `obs`, which are those of `env_ids`; or chunks (n, K, A).
+
+        A chunk is carried out step by step; the policy is asked again for an env once its chunk is used up.
+        """
+        ...
+
+
+@runtime_checkable
+class Judging(Protocol):
+    """A policy that also knows when an episode need not go on, as the expert does."""
+
+    def gave_up(self, env_ids: Array) -> Array:
+        """(n,) bool: it is of no use to go on in these envs."""
+        ...
+
+    def solved(self, env_ids: Array) -> Array:
+        """(n,) bool: all is done and the task's success holds, though the episode may go on."""
+        ...
+
+    def failure(self, env: int) -> str:
+        """Why an env's episode failed, as one word; empty where the policy cannot say."""
+        ...
+
+
+class PolicyName(NamedTuple):
+    """`NAME`, or `NAME:KEY=VALUE,KEY=VALUE`, or `MODULE:FUNCTION`."""
+
+    name: str
+    options: dict[str, Any]
+    function: str = ""
+
+
+def parse(text: str) -> PolicyName:
+    """What a policy's name on the command line says.
+
+    Raises:
+        TaskError: it is of none of the three forms.
+    """
+    name, colon, rest = text.partition(":")
+    if colon and "=" not in rest and name not in registry.names("env_policies"):
+        if not all(part.isidentifier() for part in [*name.split("."), rest]):
+            raise TaskError(f"--policy {text}: expected NAME, NAME:KEY=VALUE,… or MODULE:FUNCTION")
+        return PolicyName(name, {}, rest)
+    options: dict[str, Any] = {}
+    for pair in rest.split(",") if colon else ():
+        key, equals, value = pair.partition("=")
+        if not equals or not key.isidentifier() or key in options:
+            raise TaskError(f"--policy {text}: '{pair}' is no KEY=VALUE of its own, as in expert:sigma=0.03")
+        options[key] = _value(value)
+    return PolicyName(name, options)
+
+
+def _value(text: str) -> Any:
+    """A number, a truth value, or the words themselves."""
+    try:
+        return float(text)
+    except ValueError:
+        return yaml.safe_load(text) if text in ("true", "false") else text
+
+
+def make_policy(env: TaskEnv, text: str) -> Policy:
+    """The policy of a name for an env.
+
+    Raises:
+        PluginError: none of this name is installed.
+        SpecError: at `policy.KEY`, a parameter that it does not take, or of another kind.
+        TaskError: the name has another form, or the function is not there.
+    """
+    said = parse(text)
+    if said.function:
+        return FunctionPolicy(env, said.name, said.function)
+    made = registry.load("env_policies", said.name)
+    given = checked(options_model(made), said.options, "policy")
+    return made(env, **{key: getattr(given, key) for key in parameters(made)})
+
+
+class FunctionPolicy:
+    """`MODULE:FUNCTION`: a function of the observations that gives actions (n, A), or chunks (n, K, A)."""
+
+    def __init__(self, env: TaskEnv, module: str, function: str) -> None:
+        try:
+            self._function = getattr(importlib.import_module(module), function)
+        except (ImportError, AttributeError) as error:
+            raise TaskError(
+                f"--policy {module}:{function}: {error}; expected a module on the Python path, and a function in it"
+            ) from None
+
+    def reset(self, env_ids: Array) -> None:
+        """Nothing: a function remembers nothing."""
+
+    def act(self, obs: Obs, env_ids: Array) -> Array:
+        """What the function gives for these rows."""
+        return np.asarray(self._function(obs))

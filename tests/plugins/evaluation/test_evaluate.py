@@ -1,0 +1,206 @@
+"""`anysim evaluate`: the same episodes whatever the envs, logs that go on, and what is said of the outcomes."""
+
+import json
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+import anysim
+from anysim.errors import AnysimError, RecordError, SpecError, TaskError
+from anysim_evaluation import cli, policy as policies
+from anysim_evaluation.driver import Episode, drive, episode_seeds
+from anysim_evaluation.log import EpisodeLog
+from anysim_evaluation.page import page
+from anysim_evaluation.policy import make_policy
+from anysim_evaluation.summary import agreement, agreements, summary
+
+BLIND = ["record.cameras=[]"]
+SEEDS = episode_seeds("validation", 0, 5)
+app = typer.Typer()
+app.command()(cli.evaluate)
+
+
+def run(task: str, policy: Any, num_envs: int = 2, *overrides: str, **options: Any) -> list[Episode]:
+    """The episodes of SEEDS, in their order."""
+    with anysim.make(task, engine="mujoco", num_envs=num_envs, overrides=[*BLIND, *overrides]) as env:
+        made = make_policy(env, policy) if isinstance(policy, str) else policy(env)
+        return sorted(drive(env, made, SEEDS, **options), key=lambda e: e.seed)
+
+
+class Chunked:
+    """The action zero, three steps at a time; what it was shown is kept."""
+
+    def __init__(self, env: Any, length: int = 3, columns: int = 0) -> None:
+        self.shape = (length, env.action_dim + columns)
+        self.asked: list[int] = []
+        self.groups: set[str] = set()
+
+    def reset(self, env_ids: Any) -> None:
+        pass
+
+    def act(self, obs: Any, env_ids: Any) -> Any:
+        self.asked.append(len(env_ids))
+        self.groups |= set(obs)
+        return np.zeros((len(env_ids), *self.shape))
+
+
+# ------------------------------------------------------------------ policies and the driver
+
+
+@pytest.mark.parametrize("policy", ["expert:sigma=0.2", "random"])
+def test_episodes_do_not_depend_on_the_number_of_envs(policy: str) -> None:
+    few = run("reach", policy, 1, "task.horizon=60")
+    assert few == run("reach", policy, 4, "task.horizon=60")
+    assert [e.seed for e in few] == SEEDS
+    assert len({e.total_reward for e in few}) == 5
+
+
+def test_the_expert_solves_what_doing_nothing_does_not() -> None:
+    assert {e.status for e in run("reach", "expert")} == {"success"}
+    idle = run("reach", "zero", 2, "task.horizon=20")
+    assert {(e.status, e.failure, e.steps) for e in idle} == {("truncated", "truncated", 20)}
+
+
+def test_what_the_expert_gives_up_has_its_type() -> None:
+    far = ["world.layout.cube.x=0.75", "world.layout.cube.y=0.6"]
+    assert {e.failure for e in run("pick_cube", "expert", 5, *far)} == {"no_ik"}
+
+
+def test_a_chunk_is_carried_out_before_the_policy_is_asked_again() -> None:
+    made: list[Chunked] = []
+    run("reach", lambda env: made.append(Chunked(env)) or made[0], 5, "task.horizon=9")
+    assert made[0].asked == [5, 5, 5]
+    assert made[0].groups == {"policy"}
+    run("pick_cube", lambda env: made.append(Chunked(env)) or made[1], 5, "task.horizon=3", privileged=True)
+    assert made[1].groups == {"policy", "privileged"}
+
+
+def test_what_are_no_actions_is_refused() -> None:
+    with pytest.raises(TaskError, match=r"gave \(2, 3, 9\); expected actions \(2, 8\) or chunks \(2, K, 8\)"):
+        run("reach", lambda env: Chunked(env, columns=1))
+
+
+def test_policies_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert policies.parse("expert:sigma=0.5") == ("expert", {"sigma": 0.5}, "")
+    assert policies.parse("my.module:act") == ("my.module", {}, "act")
+    for wrong in ("expert:=1", "expert:sigma=1,sigma=2", "a b:c d"):
+        with pytest.raises(TaskError, match="--policy"):
+            policies.parse(wrong)
+    with anysim.make("reach", engine="mujoco", overrides=BLIND) as env:
+        for name, said in (("nobody", "nobody"), ("expert:sigma=-1", "policy.sigma"), ("expert:gain=1", "policy.gain")):
+            with pytest.raises((AnysimError, SpecError), match=said):
+                make_policy(env, name)
+        with pytest.raises(TaskError, match="a module on the Python path, and a function in it"):
+            make_policy(env, "json:no_such_function")
+        monkeypatch.setattr(json, "twos", lambda obs: np.full((len(obs["policy"]), 8), 2.0), raising=False)
+        assert (make_policy(env, "json:twos").act(env.reset(seed=0)[0], np.array([0])) == 2.0).all()
+
+
+def test_splits_are_apart_and_end() -> None:
+    splits = [set(episode_seeds(name, 0, 200)) for name in ("train", "validation", "test")]
+    assert len(set.union(*splits)) == 600
+    for split, first, said in (("tset", 0, "expected one of train, validation, test"), ("test", 150, "has 200 seeds")):
+        with pytest.raises(TaskError, match=said):
+            episode_seeds(split, first, 100)
+
+
+# ------------------------------------------------------------------ logs
+
+
+def episode(seed: int, success: bool = True, failure: str = "no_ik") -> Episode:
+    return Episode(seed, "success" if success else "failed", "" if success else failure, 10 + seed, 0.1 * seed)
+
+
+def test_a_log_goes_on_where_it_was_cut_off(tmp_path: Path) -> None:
+    with EpisodeLog(tmp_path, {"task": "a"}) as log:
+        log.add(episode(1))
+        log.add(episode(2, False))
+        with pytest.raises(RecordError, match="another run"):
+            EpisodeLog(tmp_path, {"task": "a"})
+    path = tmp_path / "episodes.jsonl"
+    path.write_bytes(path.read_bytes()[:-7])
+    with EpisodeLog(tmp_path, {"task": "a"}) as log:
+        assert log.episodes == {1: episode(1)}
+        log.add(episode(3))
+    with EpisodeLog(tmp_path, {"task": "a"}) as log:
+        assert log.episodes == {1: episode(1), 3: episode(3)}
+    with pytest.raises(RecordError, match="has episodes of something else: task 'a' and now 'b'"):
+        EpisodeLog(tmp_path, {"task": "b"})
+    path.write_text("[1]\n{}\n")
+    with pytest.raises(RecordError, match="is no log of episodes"):
+        EpisodeLog(tmp_path, {"task": "a"})
+
+
+# ------------------------------------------------------------------ what is said
+
+
+def test_faults_are_no_attempts() -> None:
+    told = summary([episode(1), episode(2, False), episode(3, False, "lost"), Episode(4, "fault", "fault", 1, 0.0)])
+    assert (told["attempts"], told["successes"], told["faults"]) == (3, 1, 1)
+    assert told["failures"] == {"lost": 1, "no_ik": 1}
+    assert told["success_rate"] == pytest.approx(1 / 3)
+    assert told["interval"] == pytest.approx([0.0615, 0.7923], abs=1e-3)
+    assert told["steps"] == 11
+
+
+def test_agreement_is_cohens_and_mcnemars() -> None:
+    # 20 both, 15 neither, 5 and 10 alone: kappa (0.7 - 0.5) / 0.5 of Cohen's own example
+    outcomes = [(True, True)] * 20 + [(True, False)] * 5 + [(False, True)] * 10 + [(False, False)] * 15
+    a, b = ({k: episode(k, pair[side]) for k, pair in enumerate(outcomes)} for side in (0, 1))
+    told = agreement(a, b)
+    assert (told["seeds"], told["only_first"], told["only_second"]) == (50, 5, 10)
+    assert told["agree"] == pytest.approx(0.7)
+    assert told["kappa"] == pytest.approx(0.4)
+    assert told["p"] == pytest.approx(0.3018, abs=1e-3)  # two-sided, 5 or fewer of 15 fair coins
+    same = agreement(dict(list(a.items())[:3]), a)
+    assert (same["agree"], same["kappa"], same["p"]) == (1.0, None, 1.0)
+    assert agreement(a, {})["seeds"] == 0
+    assert [(pair["first"], pair["second"]) for pair in agreements({"x": a, "y": b, "z": a})] == [
+        ("x", "y"),
+        ("x", "z"),
+        ("y", "z"),
+    ]
+
+
+def test_from_the_command_line_and_again(tmp_path: Path) -> None:
+    words = ["reach", "-e", "mujoco", "-k", "4", "-n", "2", "--out", str(tmp_path), "--json"]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.output
+    told = json.loads(done.output)
+    one = told["engines"]["mujoco"]
+    assert (one["attempts"], one["successes"], told["agreement"]) == (4, 4, [])
+    assert [e["seed"] for e in one["episodes"]] == episode_seeds("validation", 0, 4)
+    log = tmp_path / "mujoco/episodes.jsonl"
+    lines = log.read_bytes().splitlines(keepends=True)
+    log.write_bytes(b"".join(lines[:3]))
+    assert json.loads(CliRunner().invoke(app, words).output) == told
+    assert log.read_bytes().splitlines(keepends=True)[:3] == lines[:3]
+    text = (tmp_path / "evaluation.html").read_text("utf-8")
+    assert text == page(told)
+    assert ElementTree.fromstring(text.partition("\n")[2]) is not None
+    other = CliRunner().invoke(app, [*words, "--policy", "zero"])
+    assert "has episodes of something else: policy 'expert' and now 'zero'" in str(other.exception)
+
+
+def test_all_engines_and_levels(tmp_path: Path) -> None:
+    done = CliRunner().invoke(
+        app, ["pick_cube", "-e", "mujoco", "-k", "2", "--level", "L0", "--out", str(tmp_path), "--json"]
+    )
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.output)["level"] == "L0"
+    wrong = CliRunner().invoke(app, ["pick_cube", "-e", "mujoco", "--level", "L9", "--out", str(tmp_path / "b")])
+    assert "there is no level 'L9'" in str(wrong.exception)
+
+
+@pytest.mark.slow
+def test_engines_agree_on_reach(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["reach", "-e", "all", "-k", "6", "--out", str(tmp_path), "--json"])
+    assert done.exit_code == 0, done.output
+    told = json.loads(done.stdout)
+    assert {"mujoco", "pybullet", "sapien"} <= set(told["engines"])
+    assert all(pair["agree"] == 1.0 for pair in told["agreement"])
