@@ -27,7 +27,7 @@ from anysim.record.names import trajectories
 from anysim.record.writer import TrajectoryWriter
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
-from anysim.task.terms import events
+from anysim.task.terms import TERMS
 from anysim.testing.engines import require_drawing
 from anysim_inspect.verify import verify
 
@@ -291,8 +291,7 @@ def repaint(scene: Any, draw: Any) -> None:
 
 
 def _spec(monkeypatch: pytest.MonkeyPatch, *overrides: str) -> Any:
-    monkeypatch.setattr(events, "repaint", repaint, raising=False)
-    monkeypatch.setattr(events, "__all__", [*events.__all__, "repaint"])
+    monkeypatch.setitem(TERMS["event"], "repaint", repaint)
     return load("pick_cube", overrides=overrides).spec
 
 
