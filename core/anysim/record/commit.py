@@ -9,7 +9,7 @@ import errno
 import hashlib
 import os
 import shutil
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -93,6 +93,23 @@ def publish_all(moves: Sequence[tuple[Path, Path]]) -> list[OSError | None]:
                 final.rename(incoming)
             errors[place] = error
     return errors
+
+
+def write_whole(directory: Path, texts: Mapping[str, str]) -> None:
+    """Write files about what is in a directory, by name, each whole or not at all.
+
+    Raises:
+        RecordError: one cannot be written.
+    """
+    try:
+        for name, text in texts.items():
+            aside = directory / f".{name}.{os.getpid()}"
+            aside.write_text(text, encoding="utf-8")
+            aside.replace(directory / name)
+    except OSError as error:
+        raise RecordError(
+            f"cannot write {', '.join(texts)} into {directory}: {error}; what is there is whole"
+        ) from error
 
 
 def describe_run(out: Path, incoming: Path, run: RunHeader) -> None:

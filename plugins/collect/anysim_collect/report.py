@@ -1,13 +1,13 @@
 """Reports: `report.json` and `report.html` in the directory of a run, whole or not at all."""
 
 import json
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from anysim.errors import RecordError
 from anysim.planning.service import PlannerService
+from anysim.record.commit import write_whole
 from anysim_collect.tally import Tally
 
 FORMAT = "anysim-report-1"
@@ -64,14 +64,8 @@ def write_report(out: Path, report: dict[str, Any]) -> Path:
     """
     from anysim_collect.page import page
 
-    texts = {REPORT_FILE: json.dumps(report, indent=2, sort_keys=True) + "\n", PAGE_FILE: page(report)}
-    try:
-        for name, text in texts.items():
-            aside = out / f".{name}.{os.getpid()}"
-            aside.write_text(text, encoding="utf-8")
-            aside.replace(out / name)
-    except OSError as error:
-        raise RecordError(f"cannot write the report of {out}: {error}; the trajectories are whole") from error
+    text = json.dumps(report, indent=2, sort_keys=True) + "\n"
+    write_whole(out, {REPORT_FILE: text, PAGE_FILE: page(report)})
     return out / PAGE_FILE
 
 

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from anysim.task.env import TaskEnv
     from anysim_evaluation.driver import Episode
 
+PAGE = "evaluation.html"
 MOST_ENVS = 16
 """Envs where their number is not given; it changes the time alone."""
 
@@ -72,7 +74,9 @@ def evaluate(
     """
     from anysim.cli.output import print_json
     from anysim.errors import AnysimError, TaskError
+    from anysim.record.commit import write_whole
     from anysim_evaluation.driver import episode_seeds
+    from anysim_evaluation.page import page
     from anysim_evaluation.summary import agreements, summary
 
     overrides = [*(override or ()), *([] if level is None else [f"level={level}"])]
@@ -99,11 +103,12 @@ def evaluate(
         "engines": {name: summary(list(found.values())) for name, found in done.items()},
         "agreement": agreements(done),
     }
-    pages = _write(folder, told)
+    write_whole(folder, {"evaluation.json": dumps(told, indent=2) + "\n", PAGE: page(told)})
     if json:
         print_json(told)
     else:
-        _tell(told, pages)
+        _tell(told)
+        typer.echo(f"the page: {folder / PAGE}")
 
 
 def _engines(engine: str | None) -> list[str | None]:
@@ -153,26 +158,7 @@ def _identity(question: Question, env: "TaskEnv") -> dict[str, str]:
     }
 
 
-def _write(folder: Path, told: Mapping[str, Any]) -> Path:
-    """Write both files whole; returns the page."""
-    import json
-    import os
-
-    from anysim.errors import RecordError
-    from anysim_evaluation.page import page
-
-    texts = {"evaluation.json": json.dumps(told, indent=2) + "\n", "evaluation.html": page(told)}
-    try:
-        for name, text in texts.items():
-            aside = folder / f".{name}.{os.getpid()}"
-            aside.write_text(text, encoding="utf-8")
-            aside.replace(folder / name)
-    except OSError as error:
-        raise RecordError(f"cannot write the results into {folder}: {error}; the episodes are whole") from error
-    return folder / "evaluation.html"
-
-
-def _tell(told: Mapping[str, Any], page: Path) -> None:
+def _tell(told: Mapping[str, Any]) -> None:
     from anysim.cli.output import print_table
 
     def row(name: str, one: Mapping[str, Any]) -> tuple[Any, ...]:
@@ -197,4 +183,3 @@ def _tell(told: Mapping[str, Any], page: Path) -> None:
             for pair in pairs
         ]
         print_table("Agreement, seed by seed", ("engines", "same outcome", "kappa", "solved by one alone", "p"), rows)
-    typer.echo(f"the page: {page}")
