@@ -66,6 +66,7 @@ check-tables:
 	$(BIN)/python scripts/capability_table.py --check
 	$(BIN)/python scripts/axes_table.py --check
 	$(BIN)/python scripts/term_table.py --check
+	$(BIN)/python scripts/command_table.py --check
 	$(BIN)/python scripts/limits_table.py --check
 	$(BIN)/python scripts/robot_table.py --check
 	$(BIN)/python scripts/install_sizes.py --check
@@ -87,6 +88,7 @@ docs: schema $(TEST)  ## write what is generated and run the examples of docs/
 	$(BIN)/python scripts/capability_table.py
 	$(BIN)/python scripts/axes_table.py
 	$(BIN)/python scripts/term_table.py
+	$(BIN)/python scripts/command_table.py
 	$(BIN)/python scripts/limits_table.py
 	$(BIN)/python scripts/robot_table.py
 	$(BIN)/python -m pytest tests/docs $(ARGS)

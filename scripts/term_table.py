@@ -8,7 +8,7 @@
 import inspect
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any, get_args, get_origin
 
 from generated import main
@@ -57,25 +57,33 @@ def spelled(annotation: Any) -> str:
         return " or ".join(f"`{value}`" for value in get_args(annotation))
     if "Range" in text or "Choice" in text:
         return "3 values, each may be drawn" if "tuple" in text else "a value, may be drawn"
+    if text == "tuple[str, ...]":
+        return "words"
     if text.startswith("tuple["):
         return f"{len(get_args(annotation))} numbers"
     words = {"float": "number", "int": "whole number", "str": "word", "bool": "true or false"}
+    text = text.removesuffix(" | None")
     return words.get(text, re.sub(r"[\w.]+\.(\w+)", r"\1", text))
 
 
-def row(name: str, function: Callable[..., Any]) -> str:
-    """One term as a row of a table."""
-    given: list[str] = []
-    for key, parameter in parameters(function).items():
-        kind, said = typed(parameter.annotation)
-        words = [kind, *([said] if said else [])]
-        if kind == "name of a robot":
-            words.append("may be left out where there is one")
-        if parameter.default is not inspect.Parameter.empty:
-            words.append(f"default {parameter.default!r}")
-        given.append(f"`{key}`: {', '.join(words)}")
+def described(key: str, parameter: inspect.Parameter) -> str:
+    """One parameter: its name, type, unit and default."""
+    kind, said = typed(parameter.annotation)
+    words = [kind, *([said] if said else [])]
+    if kind == "name of a robot":
+        words.append("may be left out where there is one")
+    if parameter.default is not inspect.Parameter.empty:
+        words.append(f"default {parameter.default!r}")
+    return f"`{key}`: {', '.join(words)}"
+
+
+def row(name: str, function: Callable[..., Any], only_named: Collection[str] = ()) -> str:
+    """One term or skill as a row of a table, some of whose parameters are described elsewhere."""
+    given = [described(key, parameter) for key, parameter in parameters(function).items()]
     what = " ".join((function.__doc__ or "").split("\n\n")[0].split())
-    cells = (cell.replace("|", "\\|") for cell in (f"`{name}`", what, "<br>".join(given)))
+    named = ", ".join(words.partition(":")[0] for words in given if words in only_named)
+    lines = [*([named] if named else []), *(words for words in given if words not in only_named)]
+    cells = (cell.replace("|", "\\|") for cell in (f"`{name}`", what, "<br>".join(lines)))
     return f"| {' | '.join(cells)} |"
 
 
