@@ -10,7 +10,7 @@ from anysim.testing.engines import require_engine
 from tests.plugins.skills.test_pick import rollout
 
 WORLDS = Path(__file__).parent / "worlds"
-STEPS = 700
+STEPS = 1000
 
 
 def solved(world: str, engine: str, num_envs: int, *overrides: str) -> float:

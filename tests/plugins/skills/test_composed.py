@@ -1,0 +1,31 @@
+"""Commands composed of others, on real engines: each solves a small world."""
+
+import pytest
+
+from anysim import make
+from anysim.errors import SpecError
+from anysim.skills.runner import SkillPolicy
+from tests.plugins.skills.test_manipulation import WORLDS, solved
+
+COMPOSED = ["tidy", "stack_two", "lift_and_regrasp", "unplug"]
+
+
+@pytest.mark.parametrize("world", COMPOSED)
+def test_it_is_solved_on_mujoco(world: str) -> None:
+    assert solved(world, "mujoco", 2) == 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["pybullet", "sapien"])
+@pytest.mark.parametrize("world", COMPOSED)
+def test_it_is_solved_on_the_other_engines(world: str, engine: str) -> None:
+    assert solved(world, engine, 4) >= 0.75
+
+
+@pytest.mark.parametrize(
+    ("objects", "said"), [("[cube, cubee]", "objects.1.*cubee"), ("[cube, cube]", "objects.1.*twice")]
+)
+def test_a_wrong_name_is_told_at_its_key(objects: str, said: str) -> None:
+    change = f"collect.commands=[{{do: tidy, objects: {objects}, target: tray}}]"
+    with make(WORLDS / "tidy.yaml", engine="mujoco", overrides=[change]) as env, pytest.raises(SpecError, match=said):
+        SkillPolicy(env)
