@@ -13,6 +13,7 @@ from anysim_skills.grasping.grasp import Metres, Speed
 from anysim_skills.grasping.pick_place import PickPlace
 from anysim_skills.grasping.spot import Spot
 
+Names = Annotated[tuple[str, ...], Field(description="names of objects")]
 Objects = Annotated[tuple[str, ...], Field(min_length=1, description="names of objects, first one first")]
 
 
@@ -44,18 +45,18 @@ class Tidy(SkillSequence):
         super().__init__(env, members)
 
 
-def handles(env: TaskEnv, names: Sequence[str]) -> list[ObjectView]:
-    """The objects of these names.
+def handles(env: TaskEnv, names: Sequence[str], key: str = "objects") -> list[ObjectView]:
+    """The objects of these names, which a file has at `key`.
 
     Raises:
-        SpecError: at `objects.<number>`, a name that is not that of an object, or that comes twice.
+        SpecError: at `<key>.<number>`, a name that is not that of an object, or that comes twice.
     """
     found: list[ObjectView] = []
     for number, name in enumerate(names):
         try:
             found.append(ObjectView(env.scene, name))
         except NameLookupError as error:
-            raise SpecError([SpecIssue("", f"objects.{number}", str(error))]) from None
+            raise SpecError([SpecIssue("", f"{key}.{number}", str(error))]) from None
         if name in names[:number]:
-            raise SpecError([SpecIssue("", f"objects.{number}", f"'{name}' is named twice; name each object once")])
+            raise SpecError([SpecIssue("", f"{key}.{number}", f"'{name}' is named twice; name each object once")])
     return found
