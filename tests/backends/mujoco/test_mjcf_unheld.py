@@ -92,6 +92,69 @@ def test_what_is_left_out_is_named(load: Callable[..., ImportedModel], place: st
     assert any(words in note for note in found), found
 
 
+def actuators(*drives: str) -> str:
+    return f"<actuator>{''.join(drives)}</actuator>"
+
+
+@pytest.mark.parametrize(
+    ("place", "text", "notes"),
+    [
+        (
+            "rest",
+            actuators('<general name="a" joint="turn" gainprm="9" biastype="affine" biasprm="3 -9 -1"/>'),
+            ["adds a constant force of 3"],
+        ),
+        ("rest", actuators('<motor name="a" joint="turn" gear="0"/>'), ["has a gear of 0: it moves nothing"]),
+        (
+            "rest",
+            actuators('<motor name="a" joint="turn"/>', '<motor name="b" joint="turn"/>'),
+            ["turn: has several drives in its file; none of them is used (dropped)"],
+        ),
+        (
+            "rest",
+            actuators('<position name="a" joint="turn" kp="9" ctrlrange="-1 2"/>'),
+            ["actuator 'a': has the ctrlrange [-1, 2], which is left out as limits of a target position"],
+        ),
+        (
+            "rest",
+            actuators('<velocity name="a" joint="turn" kv="9" ctrlrange="-1 1"/>'),
+            ["actuator 'a': has the ctrlrange [-1, 1], which is left out as limits of a target velocity (dropped)"],
+        ),
+        ("rod", 'solref="0 1"', ["geom solref: 0 1 mixes two forms: the default holds, as in MuJoCo"]),
+        ("rod", 'solref="0.1 -1"', ["geom solref: 0.1 -1 mixes two forms"]),
+        ("joint", 'solreflimit="0.1 0.5"', []),
+        ("joint", 'solimplimit="0.5 0.6"', []),
+        ("joint", 'margin="0.1"', []),
+        ("joint", 'solreffriction="0.1 0.5"', []),
+        ("joint", 'solimpfriction="0.5 0.6"', []),
+        ("joint", 'frictionloss="1" solreffriction="0.1 0.5"', ["joint solref_friction: 0.1 0.5 is left out"]),
+        ("joint", 'range="-9 9" margin="0.1"', ["joint margin: 0.1 is left out: limits act at the limit"]),
+    ],
+)
+def test_notes_say_what_happens(load: Callable[..., ImportedModel], place: str, text: str, notes: list[str]) -> None:
+    """As many notes as faults, and none of what has no effect in MuJoCo either."""
+    found = [str(note) for note in load(**{place: text}).report]
+    assert len(found) == len(notes), found
+    assert all(words in note for words, note in zip(notes, found, strict=True)), found
+
+
+@pytest.mark.parametrize(
+    ("share", "words"), [(2, "2 of its weight, now of all"), (-1, "-1 of its weight, now of none")]
+)
+def test_partial_gravity_compensation_is_all_or_none(
+    load: Callable[..., ImportedModel], share: int, words: str
+) -> None:
+    tip = f'<body name="tip" gravcomp="{share}"><joint name="bend"/><geom size="0.05" mass="1"/></body>'
+    found = [str(note) for note in load(inner=tip).report]
+    assert any(words in note for note in found), found
+
+
+def test_a_mixed_solref_is_as_soft_as_the_default(load: Callable[..., ImportedModel]) -> None:
+    model = load(rod='solref="0.1 -1"', joint='range="-9 9" solreflimit="0.1 -1"')
+    assert {geom.surface.softness for geom in model.geoms} == {0.0}
+    assert {joint.limit_softness for joint in model.joints} == {0.0}
+
+
 def test_defaults_count_where_they_are_used(load: Callable[..., ImportedModel]) -> None:
     """A class sets a margin; two geoms are of it, of which one says otherwise."""
     model = load(default='<geom margin="0.001"/>', trunk='class="soft"', rod='class="soft" margin="0"')

@@ -1,6 +1,7 @@
 """The drives that an MJCF file declares, as neutral ones."""
 
-from collections.abc import Callable, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from math import inf
 from typing import Any
 
@@ -29,6 +30,8 @@ def drive_hint(
     ):
         return None, "has dynamics or a gain of its own; the neutral drive is a proportional-derivative one"
     gear, gain = float(model.actuator_gear[a, 0]), float(model.actuator_gainprm[a, 0])
+    if gear == 0.0:
+        return None, "has a gear of 0: it moves nothing"
     affine = model.actuator_biastype[a] == mujoco.mjtBias.mjBIAS_AFFINE
     _, stiffness, damping = (-float(v) for v in model.actuator_biasprm[a, :3]) if affine else (0.0, 0.0, 0.0)
     if stiffness > 0 and abs(stiffness - gain) < 1e-9 * gain:
@@ -48,3 +51,27 @@ def drive_hint(
         limits.append(float(np.abs(model.jnt_actfrcrange[joint]).max()))
     factor = gear * gear / unit(joint)
     return ActuatorHint(number[joint], mode, stiffness * factor, damping * factor, min(limits)), ""
+
+
+def left_out(model: Any, a: int, hint: ActuatorHint) -> Iterator[str]:
+    """What MuJoCo actuator `a` has and its neutral drive `hint` does not, in words; values are the file's.
+
+    A constant bias is a force before the gear. The range of a motor's control is its effort limit, that of a position
+    drive narrows its targets beside the range (gear times position) of its joint.
+    """
+    constant = float(model.actuator_biasprm[a, 0])
+    if constant and model.actuator_biastype[a] == mujoco.mjtBias.mjBIAS_AFFINE:
+        yield f"adds a constant force of {constant:g}, which is left out"
+    if hint.mode is ControlMode.EFFORT or not model.actuator_ctrllimited[a]:
+        return
+    joint, given = int(model.actuator_trnid[a, 0]), model.actuator_ctrlrange[a]
+    reach = np.sort(model.jnt_range[joint] * model.actuator_gear[a, 0])
+    if hint.mode is ControlMode.POSITION and model.jnt_limited[joint] and np.allclose(given, reach, atol=1e-6):
+        return
+    kind = "position: those of its joint hold" if hint.mode is ControlMode.POSITION else "velocity"
+    yield f"has the ctrlrange [{given[0]:g}, {given[1]:g}], which is left out as limits of a target {kind}"
+
+
+def shared(hints: Iterable[ActuatorHint]) -> list[int]:
+    """The joints that several drives have."""
+    return [joint for joint, count in Counter(hint.joint for hint in hints).items() if count > 1]

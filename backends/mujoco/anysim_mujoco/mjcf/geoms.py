@@ -25,6 +25,7 @@ from anysim.model.world import (
     Sphere,
     Surface,
 )
+from anysim_mujoco.mjcf.unheld import mixed
 
 _UNSET = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
 _SOFTNESS = 0.02  # MuJoCo's default time constant [s]; the neutral model leaves it to the engine
@@ -160,7 +161,7 @@ class GeomReader:
         model = self._model
         sliding, torsional, rolling = (float(v) for v in model.geom_friction[g])
         time_constant = float(model.geom_solref[g, 0])
-        custom = time_constant > 0 and abs(time_constant - _SOFTNESS) > 1e-9
+        custom = time_constant > 0 and not mixed(model.geom_solref[g]) and abs(time_constant - _SOFTNESS) > 1e-9
         return Surface(
             friction=sliding,
             torsional_friction=torsional,

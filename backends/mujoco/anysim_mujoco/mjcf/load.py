@@ -32,10 +32,11 @@ from anysim.math import pose as P
 from anysim.model.hash import split, tidy
 from anysim.model.world import Body, BodyKind, Inertial, Joint, JointType, Mimic, Site
 from anysim_mujoco.inertia import full
-from anysim_mujoco.mjcf.drives import drive_hint
+from anysim_mujoco.mjcf.drives import drive_hint, left_out, shared
 from anysim_mujoco.mjcf.file import compiled
 from anysim_mujoco.mjcf.geoms import GeomReader, pose_of
 from anysim_mujoco.mjcf.pairs import PairReader
+from anysim_mujoco.mjcf.unheld import mixed
 
 _IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 _HINGE, _SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
@@ -178,7 +179,8 @@ class _MjcfImport:
         """Gravity compensation is all or nothing in the neutral model."""
         share = float(self.model.body_gravcomp[number])
         if share not in (0.0, 1.0):
-            self._note("repaired", self.links[number], f"is relieved of {share:g} of its weight, now {round(share)}")
+            now = "all" if share >= 0.5 else "none"
+            self._note("repaired", self.links[number], f"is relieved of {share:g} of its weight, now of {now}")
         return share >= 0.5
 
     def _add_body(self, body: Body) -> int:
@@ -249,7 +251,7 @@ class _MjcfImport:
         home = [k for k in range(model.nkey) if model.key(k).name == "home"]
         start = model.key_qpos[home[0]] if home else model.qpos0
         initial = float(start[model.jnt_qposadr[j]]) * unit
-        softness = float(model.jnt_solref[j, 0])
+        softness = 0.0 if mixed(model.jnt_solref[j]) else float(model.jnt_solref[j, 0])
         if not lower <= initial <= upper:
             self._note("repaired", name, f"starts at {initial:g}, outside of [{lower:g}, {upper:g}]; now at the limit")
         return Joint(
@@ -297,8 +299,10 @@ class _MjcfImport:
             hint, why = drive_hint(self.model, a, self.number, self._unit)
             if hint is not None:
                 hints.append(hint)
-            else:
-                self._note("dropped", f"actuator '{self.model.actuator(a).name or a}'", why)
+            for text in (why,) if hint is None else left_out(self.model, a, hint):
+                self._note("dropped", f"actuator '{self.model.actuator(a).name or a}'", text)
+        for joint in shared(hints):
+            self._note("dropped", self.joints[joint].name, "has several drives in its file; none of them is used")
         return tuple(hints)
 
     def _note(self, kind: Literal["repaired", "dropped", "info"], where: str, message: str) -> None:

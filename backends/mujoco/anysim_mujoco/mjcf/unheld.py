@@ -59,7 +59,11 @@ PARTLY: Mapping[tuple[str, str], Callable[[Any], str]] = {
     ("geom", "conaffinity"): lambda geom: "",  # with contype
     ("joint", "damping"): lambda joint: _polynomial(joint, "damping"),
     ("joint", "stiffness"): lambda joint: _polynomial(joint, "stiffness"),
-    ("joint", "solref_limit"): lambda joint: _solref(joint.solref_limit),
+    ("joint", "solref_limit"): lambda joint: _solref(joint.solref_limit) if _limited(joint) else "",
+    ("joint", "solimp_limit"): lambda joint: _whole(joint, "solimp_limit") if _limited(joint) else "",
+    ("joint", "margin"): lambda joint: _whole(joint, "margin") if _limited(joint) else "",
+    ("joint", "solref_friction"): lambda joint: _whole(joint, "solref_friction") if _rubs(joint) else "",
+    ("joint", "solimp_friction"): lambda joint: _whole(joint, "solimp_friction") if _rubs(joint) else "",
     ("joint", "actfrcrange"): lambda joint: _lopsided(joint.actfrcrange),
     ("actuator", "forcerange"): lambda drive: _lopsided(drive.forcerange),
     ("actuator", "ctrlrange"): lambda drive: _lopsided(drive.ctrlrange) if _motor(drive) else "",
@@ -224,10 +228,31 @@ def _named(elements: list[Any], effect: str) -> str:
 # ------------------------------------------------------------------ fields that are read in part
 
 
+def mixed(solref: Any) -> bool:
+    """Whether a `solref` (2,) mixes a time constant with a damping, or the reverse: MuJoCo takes its default there."""
+    return bool((solref[0] > 0) != (solref[1] > 0))
+
+
 def _solref(value: Any) -> str:
+    if mixed(value):
+        return f"{value[0]:g} {value[1]:g} mixes two forms: the default holds, as in MuJoCo"
     if value[0] <= 0:
         return f"{value[0]:g} {value[1]:g} is a stiffness and a damping, and left out"
     return "" if value[1] == 1.0 else f"the damping ratio of {value[1]:g} is left out"
+
+
+def _whole(joint: Any, field: str) -> str:
+    return _left_out("joint", field, value_of(joint, field))
+
+
+def _limited(joint: Any) -> bool:
+    if joint.limited == mujoco.mjtLimited.mjLIMITED_AUTO:
+        return bool(joint.range[0] < joint.range[1])
+    return joint.limited == mujoco.mjtLimited.mjLIMITED_TRUE
+
+
+def _rubs(joint: Any) -> bool:
+    return any(_numbers(joint.frictionloss))
 
 
 def _bent(solimp: Any) -> bool:
