@@ -308,9 +308,11 @@ def make(
 
     Raises:
         SpecError: the file, with line and column.
+        TaskError: the file has no task, or an argument is none; nothing was built.
         CapabilityError: the engine cannot run this world; nothing was built.
     """
     from anysim.task.cost import MANY, announce, measured, told
+    from anysim.task.env import NO_TASK
 
     _check_texts(overrides)
     if base is not None and not isinstance(cast("object", base), str | Path):
@@ -329,6 +331,8 @@ def make(
     if engine is not None and loaded.spec.engine.name != engine:  # the options of a file are those of its own engine
         loaded = _loaded(source, [*more, f"engine={_as_text(engine)}"])
     spec = loaded.spec
+    if spec.task is None:  # before the world is built
+        raise TaskError(NO_TASK)
     crowd = _announce_instances(loaded, base)
     world = compile_world(loaded, base=base)
     name = str(source) if isinstance(source, str) and "/" not in str(source) else world.name

@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 import anysim
-from anysim.errors import AssetError, SpecError
+from anysim import api
+from anysim.errors import AssetError, SpecError, TaskError
 
 TETRAHEDRON = """solid t
 facet normal 0 0 -1
@@ -83,3 +84,9 @@ def test_a_task_that_is_extended_like_a_file_is_suggested(tmp_path: Path) -> Non
     file.write_text("extends: pick_cubes\n")
     with pytest.raises(SpecError, match="does not exist"):
         anysim.load(file)
+
+
+def test_a_file_without_a_task_is_refused_before_its_world_is_built(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(api, "compile_world", lambda *_, **__: pytest.fail("the world was built"))
+    with pytest.raises(TaskError, match="this file has no `task`"):
+        anysim.make({"world": {}}, engine="null")

@@ -27,6 +27,8 @@ from anysim.task.terms_runtime import Mdp
 from anysim_schemas.run import RunSpec
 
 _Kind = TypeVar("_Kind", bound=Manager)
+NO_TASK = "this file has no `task`; a world alone can be run through `create_simulation`"
+
 Overriding = Mapping[str, Any] | Sequence[Mapping[str, Any]] | None
 """Values by dotted path, for all envs alike or for each."""
 
@@ -53,7 +55,7 @@ class TaskEnv:
         `located` puts the file, line and column of its key before a dotted path, for what terms and controllers raise.
         """
         if spec.task is None:
-            raise TaskError("this file has no `task`; a world alone can be run through `create_simulation`")
+            raise TaskError(NO_TASK)
         self.spec, self.engine, self.name = spec, engine, name
         self.num_envs = engine.num_envs
         order = {manager: place for place, manager in enumerate(RESET_ORDER)}
