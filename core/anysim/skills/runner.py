@@ -77,7 +77,7 @@ def bind_expert(env: TaskEnv) -> tuple[str, Skill]:
 
 SETTLE = 100
 """Control steps in which a scene may come to rest after a skill has succeeded."""
-_OK, _ADVERSE = OUTCOMES.index(Outcome.OK), OUTCOMES.index(Outcome.ADVERSE_STATE)
+_OK = OUTCOMES.index(Outcome.OK)
 
 
 class SkillPolicy:
@@ -103,24 +103,26 @@ class SkillPolicy:
             self.skill.begin(env_ids)
 
     def act(self, env_ids: Array) -> Array:
-        """The action (N, A); only the rows `env_ids` mean anything.
-
-        A skill that succeeded more than SETTLE control steps ago has failed as `adverse_state` where the task's success
-        does not hold.
-        """
+        """The action (N, A); only the rows `env_ids` mean anything."""
         action = np.tile(self._still, (self.env.num_envs, 1))
         with self._blame:
             self.skill.act(env_ids, action)
-        outcome = self.skill.outcome
-        self._done[env_ids] += outcome[env_ids] == _OK
-        if (late := env_ids[self._done[env_ids] > self._settle]).size:
-            outcome[late[~self.env.info["is_success"][late] & (outcome[late] == _OK)]] = _ADVERSE
+        self._done[env_ids] += self.skill.outcome[env_ids] == _OK
         return action
 
+    def _unsolved(self, env_ids: Array) -> Array:
+        """(n,) bool: the skill succeeded in these envs, and the task's success does not come to hold."""
+        late = self._done[env_ids] > self._settle
+        return late & ~self.env.info["is_success"][env_ids] if late.any() else late
+
     def gave_up(self, env_ids: Array) -> Array:
-        """(n,) bool: the skill ended in these envs with a failure."""
+        """(n,) bool: the skill ended in these envs with a failure.
+
+        Or it succeeded more than SETTLE control steps ago, and the task's success does not hold: that is told as
+        `adverse_state`.
+        """
         outcome = self.skill.outcome[env_ids]
-        return (outcome != OUTCOMES.index(Outcome.RUNNING)) & (outcome != _OK)
+        return (outcome != OUTCOMES.index(Outcome.RUNNING)) & (outcome != _OK) | self._unsolved(env_ids)
 
     def solved(self, env_ids: Array) -> Array:
         """(n,) bool: the commands of `collect` are all done in these envs, and the task's success holds."""
@@ -131,6 +133,8 @@ class SkillPolicy:
     def ended(self, env: int, success: bool) -> dict[str, object]:
         """What is to be said of an env whose episode has ended."""
         said = self.describe(env)
+        if not success and self._unsolved(np.array([env])).any():
+            said = said | {"outcome": str(Outcome.ADVERSE_STATE)}
         return (
             said | {"segments": self.skill.segments(env, success)} if isinstance(self.skill, CommandSequence) else said
         )
