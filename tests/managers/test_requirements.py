@@ -50,7 +50,7 @@ def test_a_draw_that_the_engine_cannot_make_is_refused_by_field_line_and_engine(
 
 def test_make_refuses_before_the_build(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "cube.yaml"
-    path.write_text(YAML)
+    path.write_text(YAML + "task: {observations: {policy: [last_action]}}\n")
     monkeypatch.setattr("anysim.api.simulation", lambda spec: Rigid())
     with pytest.raises(CapabilityError, match=r"cube\.yaml:7:17"):
         make(path)
