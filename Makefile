@@ -8,6 +8,7 @@ STAMP := .venv/installed
 TEST  := .venv/with-test
 CHECK := .venv/with-check
 SITE  := .venv/with-site
+TORCH := .venv-torch/installed
 
 # The demo: a scripted robot picks cubes in four worlds at once, records it, and a picture shows what happened. Then
 # every installed engine gets the same world, and a page shows how far they agree.
@@ -19,7 +20,7 @@ ARGS ?=
 PYTEST = $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist loadgroup
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test test-slow test-full check format lock schema docs site bench wheels clean
+.PHONY: help venv demo test test-slow test-full test-learning check format lock schema docs site bench wheels clean
 
 help:  ## list the targets
 	@echo "make TARGET, where TARGET is one of"
@@ -45,8 +46,20 @@ test: $(TEST)  ## run the tests that are neither marked slow nor full (minutes),
 test-slow: $(TEST)  ## run the tests that are marked slow
 	$(PYTEST) -m "slow and not full" $(ARGS)
 
-test-full: $(TEST)  ## run every test, those that are marked full too (hours): before a release
+test-full: $(TEST) test-learning  ## run every test, those that are marked full too (hours): before a release
 	$(PYTEST) $(ARGS)
+
+test-learning: $(TORCH)  ## run the tests of the learners, in an environment with torch (gigabytes where CUDA is)
+	OMP_NUM_THREADS=1 .venv-torch/bin/python -m pytest -n 0 tests/plugins/learning/test_learners.py $(ARGS)
+
+# The packages of .venv, and what the learners need beside them.
+$(TORCH): $(TEST) plugins/learning/pyproject.toml
+	$(BIN)/python -m venv .venv-torch
+	$(BIN)/python -c 'import sysconfig; print("import site; site.addsitedir(%r)" % sysconfig.get_path("purelib"))' \
+	  > .venv-torch/lib/$$($(BIN)/python -c 'import sys; print("python%d.%d" % sys.version_info[:2])')/site-packages/anysim.pth
+	.venv-torch/bin/python -m pip install --quiet torch
+	.venv-torch/bin/python -m pip install --quiet $$($(BIN)/python scripts/extra_requirements.py plugins/learning torch sb3 rsl)
+	@touch $@
 
 CHECKS := check-lint check-format check-style check-layers check-schema check-tables check-types check-site
 check: $(CHECKS)  ## lint, format, types, layers, style and generated files (make -k check: do not stop at the first)
@@ -108,5 +121,5 @@ wheels: $(STAMP)  ## build the wheels of all packages into dist/ (docs/install.m
 	@ls dist
 
 clean:  ## remove .venv, caches, wheels and the demo's output; other recordings stay
-	rm -rf .venv .venv-tools .cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache build dist runs/demo
+	rm -rf .venv .venv-tools .venv-torch .cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache build dist runs/demo
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

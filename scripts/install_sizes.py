@@ -31,6 +31,7 @@ WORDS = {
     "film": "`anysim render`: videos of recorded episodes, with other sizes, looks or engines",
     "inspect": "`anysim doctor`, `audit`, `explain`, `replay`, `snapshot`: what is here, was built, drawn, recorded",
     "kinematics": "mechanics of robots (Pinocchio), for controllers of your own",
+    "learning": "`anysim train`, tasks for gymnasium, views for learners; torch is `anysim-learning[sb3]` or `[rsl]`",
     "legged": "a trot, balance and walking",
     "mcap": "recordings: MCAP files and videos",
     "mujoco": "the engine MuJoCo, and MJCF files",

@@ -7,7 +7,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 import anysim
-from anysim.adapters.gymnasium import GymEnv
+from anysim_learning.gymnasium import GymEnv
 
 
 def make_env():

@@ -5,6 +5,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import ConfigDict, Field, field_validator
 
 from anysim_schemas.base import Flag, Integer, Name, NamedByKey, Number, Positive, Spec
+from anysim_schemas.cameras import Channel
 from anysim_schemas.errors import KeyFault
 from anysim_schemas.values import FloatValue, WholeValue, unshared
 
@@ -111,6 +112,11 @@ class ImageSpec(Spec):
     fps: Positive | None = Field(
         default=None, description="images per second, the latest one holds meanwhile; each control step if not given"
     )
+    channels: tuple[Channel, ...] = Field(
+        default=("rgb",),
+        min_length=1,
+        description="rgb is `images/CAMERA`; depth [m], cut off at `far`, and segmentation: `images/CAMERA/CHANNEL`",
+    )
     markers: Flag = Field(
         default=False, description="goals are marked in the observed images, and in the camera's videos"
     )
@@ -131,7 +137,7 @@ class TaskSpec(Spec):
         description="groups of terms; `policy` is required, `privileged` may hold simulator-only truth"
     )
     images: dict[Name, ImageSpec] = Field(
-        default_factory=dict, description="cameras whose colour images are observed, as `images/CAMERA`"
+        default_factory=dict, description="cameras whose images are observed, as `images/CAMERA`"
     )
     rewards: Annotated[dict[Name, RewardTermSpec], ByTerm] = Field(
         default_factory=dict, description="terms whose weighted sum is the reward"

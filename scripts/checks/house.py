@@ -23,14 +23,7 @@ ANY_IN_SIGNATURES = 75
 """How many parameters and results of core's public functions may be `Any`; the number only falls."""
 
 SENTENCE = re.compile(r"(What|Who|Whose|Where|How|Whether|When|Why|From|Whoever)\b")
-PUBLIC = frozenset(
-    {
-        "anysim.adapters.gymnasium",
-        "anysim.model.affordance_lookup",
-        "anysim.planning.scenes",
-        "anysim.skills.living_bank",
-    }
-)
+PUBLIC = frozenset({"anysim.model.affordance_lookup", "anysim.planning.scenes", "anysim.skills.living_bank"})
 """Documented modules for users and for authors of plugins, which core itself does not need."""
 
 LOCAL_NAMES = frozenset({"__init__", "__main__", "base"})

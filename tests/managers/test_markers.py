@@ -7,6 +7,7 @@ import anysim
 from anysim.managers.markers import COLORS
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_drawing
+from anysim_learning.gymnasium import observation_space
 
 LOOK = [
     "world.cameras.front={from: [1.2, 0.0, 0.6], look_at: [0.3, 0.0, 0.6], fov: 40, size: [120, 80]}",
@@ -70,3 +71,33 @@ def test_what_is_behind_the_camera_or_beside_the_image_is_not_drawn() -> None:
 def test_the_overview_of_a_world_without_cameras_is_marked_too() -> None:
     with _env("mujoco", "record.cameras=[]") as env:
         assert (env.render("default") != env.render("default", markers=False)).any()
+
+
+_ALL = "[rgb, depth, segmentation]"
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "pybullet", "sapien"])
+def test_depth_and_segmentation_are_observed_as_the_engine_gives_them_up_to_the_far_plane(engine: str) -> None:
+    channels = f"task.images={{front: {{channels: {_ALL}, fps: 25}}}}"
+    with _env(engine, f"world.cameras.front.channels={_ALL}", channels) as env:
+        drawn = env.engine.render("front", channels=("rgb", "depth", "segmentation"))
+        seen = {"rgb": "images/front", "depth": "images/front/depth", "segmentation": "images/front/segmentation"}
+        assert np.isinf(drawn["depth"]).any(), "some of it is nothing"
+        far = env.engine.world.cameras[env.engine.index.camera("front")].far
+        drawn["depth"] = np.minimum(drawn["depth"], np.float32(far))
+        held = {name: drawn[channel] for channel, name in seen.items()}
+        for name, images in held.items():
+            assert env.obs[name].dtype == images.dtype
+            assert env.obs[name].shape[1:] == env.image_shapes[name]
+            assert np.array_equal(env.obs[name], images)
+        assert np.isfinite(env.obs["images/front/depth"]).all()
+        assert env.obs["images/front/segmentation"].any()
+        space = observation_space(env)
+        assert all(space[name].contains(env.obs[name][0]) for name in held)
+        env.step(np.ones((2, env.action_dim)))
+        between = env.snapshot()
+        env.step(np.ones((2, env.action_dim)))
+        assert not np.array_equal(env.obs["images/front/depth"], held["images/front/depth"]), "the next one was due"
+        env.reset_to(between)
+        for name, images in held.items():
+            assert np.array_equal(env.obs[name], images), "the latest one holds between two"

@@ -225,7 +225,7 @@ def test_nothing_is_drawn_where_no_image_is_asked_for(monkeypatch: pytest.Monkey
 
 def test_the_observation_space_has_the_images() -> None:
     gym = pytest.importorskip("gymnasium")
-    from anysim.adapters.gymnasium import observation_space
+    from anysim_learning.gymnasium import observation_space
 
     with studio("mujoco", 1) as env:
         space = observation_space(env)["images/top"]

@@ -41,9 +41,13 @@ class CameraView:
 
     def blank(self, channels: Sequence[str]) -> dict[str, Array]:
         """Images (E, H, W, ...) of these channels, to be drawn into."""
-        size = (len(self.pose), self.height, self.width)
-        kinds = {"rgb": ((*size, 3), np.uint8), "depth": (size, np.float32), "segmentation": (size, np.int32)}
-        return {name: np.empty(*kinds[name]) for name in channels}
+        return blank_images((len(self.pose), self.height, self.width), channels)
+
+
+def blank_images(size: tuple[int, int, int], channels: Sequence[str]) -> dict[str, Array]:
+    """Images of nothing by channel: `size` is (E, H, W)."""
+    kinds = {"rgb": ((*size, 3), np.uint8), "depth": (size, np.float32), "segmentation": (size, np.int32)}
+    return {name: np.zeros(*kinds[name]) for name in channels}
 
 
 class CameraRig:

@@ -1,13 +1,14 @@
 """Cameras: where they look from in an episode, and the one place where their images are taken in a run."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
+from anysim.engine.cameras import blank_images
 from anysim.engine.snapshots.row_checks import refuse_range
 from anysim.errors import SpecError, SpecIssue, listing, suggest
 from anysim.managers.base import WORLD, Manager, Overridable, random_fields
@@ -120,8 +121,10 @@ class CaptureManager(Manager):
             if name not in cameras:
                 text = f"there is no camera '{name}'{suggest(name, list(cameras))} (cameras: {listing(cameras)})"
                 issues.append(SpecIssue("", path, text))
-            elif "rgb" not in cameras[name].channels:
-                text = f"the camera gives no colours; add rgb to world.cameras.{name}.channels"
+            elif lacking := set(images[name].channels) - set(cameras[name].channels):
+                text = (
+                    f"the camera gives no {' and no '.join(sorted(lacking))}; add it to world.cameras.{name}.channels"
+                )
                 issues.append(SpecIssue("", path, text))
         if issues:
             raise SpecError(issues)
@@ -132,6 +135,7 @@ class CaptureManager(Manager):
         self.observed = {
             name: 1 if image.fps is None else interval(control_dt, image.fps) for name, image in images.items()
         }
+        self._channels = {name: image.channels for name, image in images.items()}
 
     def bind(self, engine: SimEngine) -> None:
         super().bind(engine)
@@ -146,9 +150,9 @@ class CaptureManager(Manager):
         self.draw_seconds = 0.0
         """Wall time [s] of drawing so far, for tables of where time goes; nothing else depends on it."""
         self.image_shapes = {
-            f"images/{name}": (camera.height, camera.width, 3)
+            f"images/{_kept_as(name, channel)}": self._blank(name, channel, 0).shape[1:]
             for name in self.observed
-            for camera in [engine.world.cameras[engine.index.camera(name)]]
+            for channel in self._channels[name]
         }
         """The shape of each observed image."""
 
@@ -172,25 +176,34 @@ class CaptureManager(Manager):
         return env_ids[self.episodes.elapsed[env_ids] % self.every == 0]
 
     def observe(self, env_ids: Array) -> dict[str, Array]:
-        """The observed images (n, H, W, 3) uint8 by `images/CAMERA`; between two a camera shows its latest."""
+        """The observed images; between two a camera shows its latest.
+
+        `images/CAMERA` (n, H, W, 3) uint8, `images/CAMERA/depth` (n, H, W) float32 [m], at most the far plane's, and
+        `images/CAMERA/segmentation` (n, H, W) int32 entity ids.
+        """
         found: dict[str, Array] = {}
         for camera, every in self.observed.items():
-            self._room(camera)
-            new = (self.episodes.elapsed[env_ids] % every == 0) | (self._taken[camera][env_ids] < 0)
-            self.image(camera, env_ids[new])
-            seen = self._latest[camera][env_ids]
-            found[f"images/{camera}"] = self.mark(seen, camera, env_ids) if camera in self._marked else seen
+            due = self.episodes.elapsed[env_ids] % every == 0
+            for name, images in self._seen(camera, self._channels[camera], env_ids, due).items():
+                marked = name == camera and camera in self._marked
+                found[f"images/{name}"] = self.mark(images, camera, env_ids) if marked else images
         return found
 
     def image(self, camera: str, env_ids: Array) -> Array:
         """Images (n, H, W, 3) uint8 of a camera at this control step, with its brightness and noise."""
-        self._room(camera)
-        latest, taken = self._latest[camera], self._taken[camera]
-        missing = env_ids[taken[env_ids] != self.episodes.elapsed[env_ids]]
-        if len(missing):
-            latest[missing] = self._shoot(camera, missing, self.episodes.elapsed[missing])
-            taken[missing] = self.episodes.elapsed[missing]
-        return latest[env_ids]
+        return self._seen(camera, ("rgb",), env_ids, np.ones(len(env_ids), dtype=bool))[camera]
+
+    def _seen(self, camera: str, channels: Sequence[str], env_ids: Array, due: Array) -> dict[str, Array]:
+        """The latest images of these envs, by `_kept_as`: of this control step where `due`, or where there is none."""
+        now, names = self.episodes.elapsed[env_ids], [self._room(camera, channel) for channel in channels]
+        taken = np.stack([self._taken[name][env_ids] for name in names])
+        missing = ((taken < 0) | (due & (taken != now))).any(axis=0)
+        if missing.any():
+            drawn = self._shoot(camera, env_ids[missing], now[missing], channels)
+            for name, channel in zip(names, channels, strict=True):
+                self._latest[name][env_ids[missing]] = drawn[channel]
+                self._taken[name][env_ids[missing]] = now[missing]
+        return {name: self._latest[name][env_ids] for name in names}
 
     def picture(self, camera: str, env_ids: Array) -> Array:
         """Images (n, H, W, 3) uint8 as they are recorded: with the goals marked, unless the spec says otherwise."""
@@ -212,25 +225,41 @@ class CaptureManager(Manager):
         but the poses of the bodies: `body_pose` (B, 7), as the state had them.
         """
         ids, poses = np.array([env]), body_pose[None]
-        image = self._shoot(camera, ids, np.array([tick]), poses)
+        image = self._shoot(camera, ids, np.array([tick]), ("rgb",), poses)["rgb"]
         return (self.mark(image, camera, ids, poses) if self._recorded_with_marks(camera) else image)[0]
 
-    def _room(self, camera: str) -> None:
-        if camera not in self._latest:
-            found, n = self.engine.world.cameras[self.engine.index.camera(camera)], self.engine.num_envs
-            self._latest[camera] = np.zeros((n, found.height, found.width, 3), dtype=np.uint8)
-            self._taken[camera] = np.full(n, -1, dtype=np.int64)
+    def _room(self, camera: str, channel: str) -> str:
+        """Where a camera's images of a channel are kept: as `_kept_as` names it."""
+        name = _kept_as(camera, channel)
+        if name not in self._latest:
+            self._latest[name] = self._blank(camera, channel, self.engine.num_envs)
+            self._taken[name] = np.full(self.engine.num_envs, -1, dtype=np.int64)
+        return name
 
-    def _shoot(self, camera: str, env_ids: Array, ticks: Array, body_pose: Array | None = None) -> Array:
+    def _blank(self, camera: str, channel: str, rows: int) -> Array:
+        """Images of nothing, of a camera's size; what a camera gives in a run that only looks its names up."""
         found = self.engine.world.cameras[self.engine.index.camera(camera)]
-        if "rgb" not in found.channels:
-            # a run that only looks its names up has cameras that give nothing
-            return np.zeros((len(env_ids), found.height, found.width, 3), dtype=np.uint8)
+        return blank_images((rows, found.height, found.width), [channel])[channel]
+
+    def _shoot(
+        self, camera: str, env_ids: Array, ticks: Array, channels: Sequence[str], body_pose: Array | None = None
+    ) -> dict[str, Array]:
+        if not set(channels) <= set(self.engine.world.cameras[self.engine.index.camera(camera)].channels):
+            return {channel: self._blank(camera, channel, len(env_ids)) for channel in channels}
         began = time.perf_counter()
-        images = self.engine.render(camera, env_ids=env_ids, body_pose=body_pose)["rgb"]
+        found = self.engine.render(camera, env_ids=env_ids, channels=channels, body_pose=body_pose)
         self.draw_seconds += time.perf_counter() - began
+        if "depth" in found:  # finite, for policies and snapshots
+            far = self.engine.world.cameras[self.engine.index.camera(camera)].far
+            np.minimum(found["depth"], np.float32(far), out=found["depth"])
+        if "rgb" in found:
+            self._expose(camera, env_ids, ticks, found["rgb"])
+        return found
+
+    def _expose(self, camera: str, env_ids: Array, ticks: Array, images: Array) -> None:
+        """Give images the brightness and the noise that the camera has in these envs."""
         if camera not in self._specs:
-            return images
+            return
         for row, env in enumerate(env_ids.tolist()):
             light = images[row] * self._exposure[camera][env]
             level = self._noise[camera][env]
@@ -238,7 +267,6 @@ class CaptureManager(Manager):
                 generator = self.streams.generator(env, f"capture/{camera}/pixels", int(ticks[row]))
                 light = light + 255 * level * generator.standard_normal(light.shape, dtype=np.float32)
             images[row] = np.rint(np.clip(light, 0, 255))
-        return images
 
     # ------------------------------------------------------------------ snapshots
 
@@ -246,11 +274,16 @@ class CaptureManager(Manager):
         data: dict[str, Array] = {}
         for name in self._specs:
             data |= {f"exposure.{name}": self._exposure[name][env_ids], f"noise.{name}": self._noise[name][env_ids]}
-        for camera, every in self.observed.items():
-            if every > 1 and camera in self._latest:  # an image of an earlier moment cannot be taken again
-                data |= {f"latest.{camera}": self._latest[camera][env_ids]}
-                data |= {f"taken.{camera}": self._taken[camera][env_ids]}
+        for name in self._lasting():  # an image of an earlier moment cannot be taken again
+            if name in self._latest:
+                data |= {f"latest.{name}": self._latest[name][env_ids], f"taken.{name}": self._taken[name][env_ids]}
         return data
+
+    def _lasting(self) -> list[str]:
+        """Which observed images show more than one control step, as `_kept_as` names them."""
+        return [
+            _kept_as(camera, c) for camera, every in self.observed.items() if every > 1 for c in self._channels[camera]
+        ]
 
     def refuse_rows(self, data: Mapping[str, Array]) -> None:
         for name in self._specs:
@@ -263,11 +296,16 @@ class CaptureManager(Manager):
             self._noise[name][env_ids] = data[f"noise.{name}"]
         for taken in self._taken.values():
             taken[env_ids] = -1
-        for camera in self.observed:
-            if f"latest.{camera}" in data:
-                self._room(camera)
-                self._latest[camera][env_ids] = data[f"latest.{camera}"]
-                self._taken[camera][env_ids] = data[f"taken.{camera}"]
+        for name in self._lasting():
+            if f"latest.{name}" in data:
+                camera, _, channel = name.partition("/")
+                self._room(camera, channel or "rgb")
+                self._latest[name][env_ids], self._taken[name][env_ids] = data[f"latest.{name}"], data[f"taken.{name}"]
+
+
+def _kept_as(camera: str, channel: str) -> str:
+    """What the images of a camera's channel are called: `CAMERA` in colours, `CAMERA/depth`, `CAMERA/segmentation`."""
+    return camera if channel == "rgb" else f"{camera}/{channel}"
 
 
 def interval(control_dt: float, fps: float) -> int:

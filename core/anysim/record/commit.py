@@ -95,7 +95,7 @@ def publish_all(moves: Sequence[tuple[Path, Path]]) -> list[OSError | None]:
     return errors
 
 
-def write_whole(directory: Path, texts: Mapping[str, str]) -> None:
+def write_whole(directory: Path, texts: Mapping[str, str | bytes]) -> None:
     """Write files about what is in a directory, by name, each whole or not at all.
 
     Raises:
@@ -104,7 +104,7 @@ def write_whole(directory: Path, texts: Mapping[str, str]) -> None:
     try:
         for name, text in texts.items():
             aside = directory / f".{name}.{os.getpid()}"
-            aside.write_text(text, encoding="utf-8")
+            aside.write_bytes(text.encode() if isinstance(text, str) else text)
             aside.replace(directory / name)
     except OSError as error:
         raise RecordError(

@@ -57,7 +57,8 @@ RUNNING, SUCCESS, FAILED, TRUNCATED = range(4)
 Obs = dict[str, Array]
 """Observation groups: `policy` always; `privileged` and others as the task declares; (N, D) float32.
 
-Images that the task observes are `images/CAMERA`; (N, H, W, 3) uint8."""
+Images that the task observes are `images/CAMERA` (N, H, W, 3) uint8, `images/CAMERA/depth` (N, H, W) float32 [m] and
+`images/CAMERA/segmentation` (N, H, W) int32."""
 
 
 class StepResult(NamedTuple):

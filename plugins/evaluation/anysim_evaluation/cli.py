@@ -36,7 +36,9 @@ def evaluate(
     policy: Annotated[
         str,
         typer.Option(
-            "--policy", "-p", help="expert, expert:sigma=0.03, random, zero, MODULE:FUNCTION, or an installed one."
+            "--policy",
+            "-p",
+            help="expert, expert:sigma=0.03, random, zero, MODULE:FUNCTION, FILE.onnx, or an installed one.",
         ),
     ] = "expert",
     engine: Annotated[
@@ -134,7 +136,7 @@ def _evaluate(question: Question, engine: str | None, folder: Path, quiet: bool)
     with make(question.task, engine=engine, num_envs=question.num_envs, overrides=overrides) as env:
         driven = make_policy(env, question.policy)
         name = env.engine.name
-        with EpisodeLog(folder / name, _identity(question, env)) as log:
+        with EpisodeLog(folder / name, _identity(question, env, getattr(driven, "version", ""))) as log:
             left = [seed for seed in question.seeds if seed not in log.episodes]
             won = sum(log.episodes[seed].status == "success" for seed in question.seeds if seed in log.episodes)
             with counting(f"{question.policy} on {env.name}, {name}", len(left), quiet) as tell:
@@ -145,7 +147,7 @@ def _evaluate(question: Question, engine: str | None, folder: Path, quiet: bool)
             return {name: {seed: log.episodes[seed] for seed in question.seeds}}
 
 
-def _identity(question: Question, env: "TaskEnv") -> dict[str, str]:
+def _identity(question: Question, env: "TaskEnv", version: str) -> dict[str, str]:
     """What an episode's outcome depends on, besides its seed."""
     from anysim.task.snapshot import spec_hash
 
@@ -154,7 +156,7 @@ def _identity(question: Question, env: "TaskEnv") -> dict[str, str]:
         "spec": spec_hash(env.spec),
         "world": env.engine.world.hash,
         "engine": f"{env.engine.name} {env.engine.version}",
-        "policy": question.policy + (" (privileged)" if question.privileged else ""),
+        "policy": " ".join([question.policy, *(["(privileged)"] if question.privileged else []), version]).strip(),
     }
 
 

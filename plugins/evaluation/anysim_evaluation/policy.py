@@ -17,9 +17,15 @@ from anysim.plugin_parameters import checked, options_model, parameters
 from anysim.task.contract import Obs
 from anysim.task.env import TaskEnv
 
+MODELS = (".onnx", ".pt", ".jit")
+"""How the files of models end; the policy `file` runs them."""
+
 
 class Policy(Protocol):
-    """What `anysim evaluate` drives envs with."""
+    """What `anysim evaluate` drives envs with.
+
+    One that depends on more than its name and options, as on a file, says on what in a text `version`.
+    """
 
     def reset(self, env_ids: Array) -> None:
         """These envs have just begun an episode."""
@@ -51,7 +57,7 @@ class Judging(Protocol):
 
 
 class PolicyName(NamedTuple):
-    """`NAME`, or `NAME:KEY=VALUE,KEY=VALUE`, or `MODULE:FUNCTION`."""
+    """`NAME`, or `NAME:KEY=VALUE,KEY=VALUE`, or `MODULE:FUNCTION`, or a model file."""
 
     name: str
     options: dict[str, Any]
@@ -62,12 +68,14 @@ def parse(text: str) -> PolicyName:
     """What a policy's name on the command line says.
 
     Raises:
-        TaskError: it is of none of the three forms.
+        TaskError: it is of none of the four forms.
     """
+    if text.endswith(MODELS):
+        return PolicyName("file", {"path": text})
     name, colon, rest = text.partition(":")
     if colon and "=" not in rest and name not in registry.names("env_policies"):
         if not all(part.isidentifier() for part in [*name.split("."), rest]):
-            raise TaskError(f"--policy {text}: expected NAME, NAME:KEY=VALUE,… or MODULE:FUNCTION")
+            raise TaskError(f"--policy {text}: expected NAME, NAME:KEY=VALUE,…, MODULE:FUNCTION or FILE.onnx")
         return PolicyName(name, {}, rest)
     options: dict[str, Any] = {}
     for pair in rest.split(",") if colon else ():

@@ -6,6 +6,7 @@ torch's number of threads is that of the process, which is the caller's to set.
 """
 
 import warnings
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -50,7 +51,30 @@ def load_model(path: Path, size: int, outputs: int) -> Runtime:
     return model
 
 
-def _onnx(path: Path, size: int) -> Runtime:
+def described_model(path: Path) -> tuple[str, Callable[[Mapping[str, Array]], Array]]:
+    """What the file of a model says of itself under `anysim`, and a function of its inputs (1, D) float32 by name.
+
+    Raises:
+        PluginError: the package that runs it is not installed.
+        TaskError: it is damaged, of an unknown kind, or not trusted.
+    """
+    if path.suffix == ".onnx":
+        session = _session(path)
+        said = str(session.get_modelmeta().custom_metadata_map.get("anysim", ""))
+        return said, lambda inputs: np.asarray(session.run(None, dict(inputs))[0])
+    if path.suffix not in (".pt", ".jit"):
+        raise TaskError(f"the policy {path} is of no known kind; expected .onnx, .pt, .jit")
+    torch, module, said = _module(path)
+
+    def run(inputs: Mapping[str, Array]) -> Array:
+        with torch.inference_mode():
+            return module(*(torch.from_numpy(rows) for rows in inputs.values())).numpy()
+
+    return said, run
+
+
+def _session(path: Path) -> Any:
+    """An ONNX model, ready to run in one thread."""
     check_onnx(path)
     try:
         import onnxruntime
@@ -62,9 +86,14 @@ def _onnx(path: Path, size: int) -> Runtime:
     options.use_deterministic_compute = True
     options.log_severity_level = 4  # what fails is raised
     try:
-        session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+        session: Any = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
     except Exception as error:
         raise TaskError(f"the policy {path} is no ONNX model that onnxruntime reads: {error}") from error
+    return session
+
+
+def _onnx(path: Path, size: int) -> Runtime:
+    session = _session(path)
     inputs, outputs = session.get_inputs(), session.get_outputs()
     if len(inputs) != 1 or len(outputs) != 1:
         raise TaskError(
@@ -86,6 +115,17 @@ def _onnx(path: Path, size: int) -> Runtime:
 
 
 def _torch(path: Path, size: int) -> Runtime:
+    torch, module, _ = _module(path)
+
+    def run(row: Array) -> Array:
+        with torch.inference_mode():
+            return module(torch.from_numpy(row[None])).numpy().reshape(-1)
+
+    return run
+
+
+def _module(path: Path) -> tuple[Any, Any, str]:
+    """torch, a TorchScript module, and what its extra file `anysim` says."""
     check_torch(path)
     try:
         import torch  # pyright: ignore[reportMissingImports]
@@ -95,12 +135,9 @@ def _torch(path: Path, size: int) -> Runtime:
         with warnings.catch_warnings():
             # Newer versions would rather have exported programs; the policies that people publish are TorchScript.
             warnings.simplefilter("ignore", DeprecationWarning)
-            module = torch.jit.load(str(path), map_location="cpu").eval()
+            extra = {"anysim": ""}
+            module = torch.jit.load(str(path), map_location="cpu", _extra_files=extra).eval()
     except Exception as error:
         raise TaskError(f"the policy {path} is no TorchScript module: {error}") from error
-
-    def run(row: Array) -> Array:
-        with torch.inference_mode():
-            return module(torch.from_numpy(row[None])).numpy().reshape(-1)
-
-    return run
+    said: str | bytes = extra["anysim"]
+    return torch, module, said.decode() if isinstance(said, bytes) else said

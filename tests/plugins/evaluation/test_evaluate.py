@@ -88,6 +88,7 @@ def test_what_are_no_actions_is_refused() -> None:
 def test_policies_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
     assert policies.parse("expert:sigma=0.5") == ("expert", {"sigma": 0.5}, "")
     assert policies.parse("my.module:act") == ("my.module", {}, "act")
+    assert policies.parse("runs/a.b=c/policy.onnx") == ("file", {"path": "runs/a.b=c/policy.onnx"}, "")
     for wrong in ("expert:=1", "expert:sigma=1,sigma=2", "a b:c d"):
         with pytest.raises(TaskError, match="--policy"):
             policies.parse(wrong)

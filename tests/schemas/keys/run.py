@@ -105,6 +105,11 @@ ROWS: dict[str, Row] = {
         seen="episode",
     ),
     "ImageSpec.fps": row("task.images.eye.fps=25", given=(*OBSERVED, ARM), seen="filmed"),
+    "ImageSpec.channels": row(
+        "task.images.eye.channels=[depth]",
+        given=OBSERVED,
+        error=r"task\.images\.eye: the camera gives no depth; add it to world\.cameras\.eye\.channels",
+    ),
     "ImageSpec.markers": row("task.images.eye.markers=true", given=OBSERVED, seen="filmed"),
     "RewardTermSpec.weight": row("task.rewards.close.weight=-2.0", seen="episode"),
     "EndingTermSpec.reward": row(

@@ -10,8 +10,9 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-from anysim.adapters.gymnasium import GymEnv, GymVectorEnv
+from anysim import registry
 from anysim.errors import TaskError
+from anysim_learning.gymnasium import GymEnv, GymVectorEnv
 from tests.task.helpers import arm, blocks
 
 N = 4
@@ -109,3 +110,38 @@ def test_named_actions_check_and_step_as_the_flat_ones() -> None:
 def test_an_unknown_form_of_action_is_refused() -> None:
     with arm(1) as env, pytest.raises(TaskError, match="'flat' or 'named', got 'names'"):
         GymEnv(env, action="names")  # type: ignore[arg-type]
+
+
+# ------------------------------------------------------------------ installed tasks by name
+
+
+def checked(task: str) -> None:
+    """Gymnasium's checker on a task by its name, and a vector env of it."""
+    blind = ["record.cameras=[]"]
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=".*Box.*(infinity|unbounded).*")
+        warnings.filterwarnings("ignore", message=".*not having any render modes.*|.*render_mode.*")
+        single = gym.make(f"anysim_learning.envs:anysim/{task}-v0", engine="mujoco", overrides=blind)
+        check_env(single.unwrapped, skip_render_check=True)
+        assert "privileged" not in single.observation_space.spaces
+        single.close()
+    many = gym.make_vec(f"anysim/{task}-v0", num_envs=2, engine="mujoco", overrides=blind, autoreset_mode="SameStep")
+    obs, info = many.reset(seed=3)
+    assert many.observation_space.contains(obs)
+    assert info["episode_seed"].shape == (2,)
+    obs, reward, *_ = many.step(many.action_space.sample())
+    assert np.isfinite(reward).all()
+    many.close()
+
+
+def test_a_task_is_made_by_its_name() -> None:
+    checked("push_cube")
+    shown = gym.make("anysim/push_cube-v0", engine="mujoco", privileged=True)
+    assert "privileged" in shown.reset(seed=0)[0]
+    shown.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("task", [name for name in registry.names("tasks") if name != "push_cube"])
+def test_every_task_is_made_by_its_name(task: str) -> None:
+    checked(task)

@@ -13,14 +13,28 @@ from anysim.errors import TaskError
 from anysim.task.contract import Obs, Status
 from anysim.task.env import TaskEnv
 
+PRIVILEGED = "privileged"
+"""The group of observations that only a simulator knows; a view shows it to whoever asks for it."""
 
-def observation_space(env: TaskEnv) -> gym.spaces.Dict:
-    """A Dict with a float32 Box for each observation group, and a uint8 one for each observed image."""
+
+def observation_space(env: TaskEnv, privileged: bool = False) -> gym.spaces.Dict:
+    """A Dict with a float32 Box for each observation group that is shown, and one for each observed image."""
     spaces: dict[str, gym.Space[Any]] = {
-        group: gym.spaces.Box(-np.inf, np.inf, (size,), np.float32) for group, size in env.observation_sizes.items()
+        group: gym.spaces.Box(-np.inf, np.inf, (size,), np.float32)
+        for group, size in env.observation_sizes.items()
+        if privileged or group != PRIVILEGED
     }
-    spaces |= {name: gym.spaces.Box(0, 255, shape, np.uint8) for name, shape in env.image_shapes.items()}
+    spaces |= {name: _image_space(name, shape) for name, shape in env.image_shapes.items()}
     return gym.spaces.Dict(spaces)
+
+
+def _image_space(name: str, shape: tuple[int, ...]) -> gym.spaces.Box:
+    """The range of an image: colours, metres, or entity ids."""
+    if name.endswith("/depth"):
+        return gym.spaces.Box(0.0, np.inf, shape, np.float32)
+    if name.endswith("/segmentation"):
+        return gym.spaces.Box(0, np.iinfo(np.int32).max, shape, np.int32)
+    return gym.spaces.Box(0, 255, shape, np.uint8)
 
 
 ActionForm = Literal["flat", "named"]
@@ -67,14 +81,17 @@ def _with_masks(values: dict[str, Array], present: Array) -> dict[str, Any]:
 class GymEnv(gym.Env[dict[str, Array], Any]):
     """One env. `info` holds `status`, `is_success`, `fault`, `elapsed_steps` and `episode_seed`."""
 
-    def __init__(self, env: TaskEnv, render_mode: str | None = None, action: ActionForm = "flat") -> None:
+    def __init__(
+        self, env: TaskEnv, render_mode: str | None = None, action: ActionForm = "flat", privileged: bool = False
+    ) -> None:
         if env.num_envs != 1:
             raise TaskError(f"GymEnv views an env with num_envs=1, this one has {env.num_envs}; use GymVectorEnv")
         self.env = env
         self.metadata = _metadata(env)
         self.render_mode = render_mode
-        self.observation_space: gym.spaces.Space[Any] = observation_space(env)
+        self.observation_space: gym.spaces.Space[Any] = observation_space(env, privileged)
         self.action_space: gym.spaces.Space[Any] = action_space(env, action)
+        self._shown = tuple(observation_space(env, privileged))
         self._form: ActionForm = action
 
     def reset(
@@ -86,13 +103,16 @@ class GymEnv(gym.Env[dict[str, Array], Any]):
         obs, info = self.env.reset(
             seed=None if seed is None else [seed], episode_seeds=None if chosen is None else [int(chosen)]
         )
-        return {g: rows[0] for g, rows in obs.items()}, _single_info(info, self.env.status, 0)
+        return self._first(obs), _single_info(info, self.env.status, 0)
+
+    def _first(self, obs: Obs) -> dict[str, Array]:
+        return {name: obs[name][0] for name in self._shown}
 
     def step(self, action: Any) -> tuple[dict[str, Array], float, bool, bool, dict[str, Any]]:
         """One control step."""
         result = self.env.step(_batch(action, self._form))
         return (
-            {g: rows[0] for g, rows in result.obs.items()},
+            self._first(result.obs),
             float(result.reward[0]),
             bool(result.terminated[0]),
             bool(result.truncated[0]),
@@ -121,13 +141,15 @@ class GymVectorEnv(VectorEnv[dict[str, Array], Any, Any]):
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
         action: ActionForm = "flat",
+        privileged: bool = False,
     ) -> None:
         self.env = env
         self.num_envs = env.num_envs
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = _metadata(env) | {"autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode
-        self.single_observation_space = observation_space(env)
+        self.single_observation_space = observation_space(env, privileged)
+        self._shown = tuple(self.single_observation_space)
         self.single_action_space = action_space(env, action)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -151,7 +173,7 @@ class GymVectorEnv(VectorEnv[dict[str, Array], Any, Any]):
             )
         _, info = self.env.reset(mask=mask)
         self._pending[mask] = False
-        return self.env.obs, _with_masks(self._spread(info, mask), mask)
+        return self._obs(), _with_masks(self._spread(info, mask), mask)
 
     def step(self, actions: Any) -> tuple[dict[str, Array], Array, Array, Array, dict[str, Any]]:
         """One control step of all envs; what becomes of ended ones is the autoreset mode's."""
@@ -182,10 +204,10 @@ class GymVectorEnv(VectorEnv[dict[str, Array], Any, Any]):
         else:
             self._pending = done
         infos = _with_masks(info | {"status": status.astype(object)}, everyone)
-        return self.env.obs, reward, terminated, truncated, infos | extra
+        return self._obs(), reward, terminated, truncated, infos | extra
 
     def _final(self, info: dict[str, Array], status: Array, done: Array) -> dict[str, Any]:
-        obs: Obs = self.env.obs
+        obs = self._obs()
         final = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(done):
             final[i] = {g: rows[i] for g, rows in obs.items()}
@@ -200,6 +222,10 @@ class GymVectorEnv(VectorEnv[dict[str, Array], Any, Any]):
             "final_info": _with_masks(kept, done),
             "_final_info": done.copy(),
         }
+
+    def _obs(self) -> Obs:
+        obs = self.env.obs
+        return {name: obs[name] for name in self._shown}
 
     def _spread(self, info: dict[str, Array], mask: Array) -> dict[str, Array]:
         spread: dict[str, Array] = {}
@@ -217,23 +243,3 @@ class GymVectorEnv(VectorEnv[dict[str, Array], Any, Any]):
 
     def close_extras(self, **kwargs: Any) -> None:
         self.env.close()
-
-
-def make_gym(
-    source: Any,
-    *,
-    autoreset_mode: AutoresetMode | str | None = None,
-    render_mode: str | None = None,
-    action: ActionForm = "flat",
-    **options: Any,
-) -> Any:
-    """`make_gym("pick_cube")` is a single env; with `num_envs` in `options` and an autoreset mode, a vector env.
-
-    `action="named"` makes the action space a Dict with a Box for each `robot.channel`.
-    """
-    from anysim.api import make
-
-    if autoreset_mode is None:
-        options["num_envs"] = 1
-        return GymEnv(make(source, **options), render_mode, action)
-    return GymVectorEnv(make(source, **options), autoreset_mode, render_mode, action)

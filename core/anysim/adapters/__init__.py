@@ -1,1 +1,0 @@
-"""Views of a TaskEnv in the dialects of other libraries."""

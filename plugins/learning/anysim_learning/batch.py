@@ -1,0 +1,114 @@
+"""A batch of envs as learners want it: an env whose episode ends begins the next one in the same step."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.errors import TaskError, listing
+from anysim.task.contract import Status
+from anysim.task.env import TaskEnv
+
+POLICY = "policy"
+"""The group of observations that every policy may see."""
+
+
+class Ended(NamedTuple):
+    """An episode that has ended in a step.
+
+    Attributes:
+        env: where.
+        status: success, failed, truncated or fault.
+        obs: its last observations by group, rows (D,).
+        total_reward: the sum of its rewards.
+        steps: control steps.
+    """
+
+    env: int
+    status: str
+    obs: dict[str, Array]
+    total_reward: float
+    steps: int
+
+
+class Moment(NamedTuple):
+    """What a step of the batch gave.
+
+    Attributes:
+        obs: observations by group (N, D) float32; of envs whose episode has ended, the first ones of the next.
+        reward: (N,) float32; 0 where the simulation gave up on an env.
+        done: (N,) bool, episodes that have ended, for whatever reason.
+        truncated: (N,) bool, those of them that only ran out of time, or whose simulation gave up.
+        ended: these episodes.
+    """
+
+    obs: dict[str, Array]
+    reward: Array
+    done: Array
+    truncated: Array
+    ended: tuple[Ended, ...]
+
+
+class Batch:
+    """Envs that begin their next episode in the step that ends one.
+
+    Actions are in [-1, 1], which stand for the bounds of the env's.
+    """
+
+    def __init__(self, env: TaskEnv, groups: Sequence[str] = (POLICY,)) -> None:
+        """`groups` are the observation groups that are given out.
+
+        Raises:
+            TaskError: the task has no such group.
+        """
+        for group in groups:
+            if group not in env.observation_sizes:
+                raise TaskError(
+                    f"the task '{env.name}' has no observation group '{group}' (groups: "
+                    f"{listing(env.observation_sizes)}); add it under task.observations"
+                )
+        self.env, self.groups = env, tuple(groups)
+        self.sizes = {group: env.observation_sizes[group] for group in groups}
+        low, high = (np.asarray(bound, dtype=np.float64) for bound in env.action_bounds)
+        if not (np.isfinite(low) & np.isfinite(high)).all():
+            raise TaskError(f"the actions of '{env.name}' have no bounds, which learners need: bound its controllers")
+        self.middle, self.half = (low + high) / 2, (high - low) / 2
+        self._total = np.zeros(env.num_envs)
+
+    def reset(self, seed: int) -> dict[str, Array]:
+        """Begin an episode in each env; the episodes to come follow from `seed`."""
+        self.env.reset(seed=seed)
+        self._total[:] = 0.0
+        return self._obs()
+
+    def step(self, action: Array) -> Moment:
+        """One control step of all envs with actions (N, A) in [-1, 1]; what is beyond is cut off."""
+        env = self.env
+        unit = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0)
+        result = env.step(self.middle + self.half * unit)
+        fault = env.info["fault"]
+        reward = np.where(fault, 0.0, result.reward)
+        self._total += reward
+        done = result.status != Status.RUNNING
+        truncated = done & ((result.status == Status.TRUNCATED) | fault)
+        ended: tuple[Ended, ...] = ()
+        if done.any():
+            last = self._obs()
+            ended = tuple(
+                Ended(
+                    i,
+                    "fault" if fault[i] else str(result.status[i]),
+                    {group: rows[i] for group, rows in last.items()},
+                    float(self._total[i]),
+                    int(env.scene.elapsed[i]),
+                )
+                for i in np.flatnonzero(done).tolist()
+            )
+            env.reset(mask=done)
+            self._total[done] = 0.0
+        return Moment(self._obs(), reward.astype(np.float32), done, truncated, ended)
+
+    def _obs(self) -> dict[str, Array]:
+        obs = self.env.obs
+        return {group: np.nan_to_num(obs[group]) for group in self.groups}

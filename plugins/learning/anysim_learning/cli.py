@@ -1,0 +1,171 @@
+"""`anysim train`: a policy learns a task."""
+
+import re
+from collections.abc import Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from anysim.cli.options import AsJson, Engine, Overrides, Task
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+def train(
+    task: Task,
+    learner: Annotated[
+        str, typer.Option("--learner", "-l", help="sb3-ppo, rsl-rl, clone, or another installed one.")
+    ] = "sb3-ppo",
+    engine: Engine = None,
+    steps: Annotated[
+        int | None, typer.Option(min=1, help="When to end: control steps of all envs, or steps of descent of `clone`.")
+    ] = None,
+    num_envs: Annotated[int, typer.Option("--num-envs", "-n", min=1, help="Parallel environments.")] = 32,
+    seed: Annotated[int, typer.Option("--seed", "-s", min=0, help="Of episodes, weights and noise.")] = 0,
+    privileged: Annotated[
+        bool, typer.Option("--privileged", help="Learn from the observations that only a simulator knows, too.")
+    ] = False,
+    data: Annotated[
+        list[Path] | None, typer.Option("--data", help="A run to learn from, for `clone`; may be repeated.")
+    ] = None,
+    option: Annotated[
+        list[str] | None, typer.Option("--option", help="A hyperparameter, KEY=VALUE; may be repeated.")
+    ] = None,
+    exams: Annotated[
+        int,
+        typer.Option(min=1, help="How often on the way the policy is tried without noise, and a checkpoint written."),
+    ] = 20,
+    level: Annotated[str | None, typer.Option(help="A level of difficulty that the task has.")] = None,
+    override: Overrides = None,
+    out: Annotated[Path | None, typer.Option(help="Directory of the results; default runs/train-….")] = None,
+    json: AsJson = False,
+) -> None:
+    """Train a policy on a task, and write it as policy.onnx.
+
+    The same command again goes on from the last checkpoint. `tensorboard --logdir DIR` draws the curves while it
+    learns; curve.jsonl has the exams: success without noise in 64 episodes of the validation split. The policy of the
+    best exam is the one that is kept.
+
+    Needs torch: pip install 'anysim-learning[sb3]' (or [rsl], or [torch] for `clone`), best in an environment of its
+    own.
+
+    Examples:
+      anysim train reach --steps 2000000
+      anysim train pick_cube --privileged --engine mujoco --num-envs 64
+      anysim train pick_cube --learner clone --data runs/pick_cube --privileged
+      anysim evaluate reach --policy runs/train-reach-sb3-ppo-0/policy.onnx --split test --engine all
+    """
+    from anysim import registry
+    from anysim.api import make
+    from anysim.cli.output import print_json
+    from anysim.errors import PluginError
+    from anysim.plugin_parameters import checked, options_model, parameters
+    from anysim_learning.batch import POLICY
+    from anysim_learning.gymnasium import PRIVILEGED
+    from anysim_learning.learner import Lesson
+    from anysim_learning.train import claim, train as run
+
+    folder = out or Path("runs") / "-".join(["train", Path(task).stem, *([level] if level else []), learner, str(seed)])
+    overrides = [*(override or ()), *([] if level is None else [f"level={level}"]), "record.cameras=[]"]
+    try:
+        made = registry.load("learners", learner)
+    except PluginError as error:
+        if isinstance(error.__cause__, ImportError):
+            raise PluginError(
+                f"the learner '{learner}' cannot run here: {error.__cause__}. pip install "
+                f"'anysim-learning[{_EXTRAS.get(learner, 'torch')}]'"
+            ) from error
+        raise
+    given = checked(options_model(made), _options(option or ()), "option")
+    with (
+        make(task, engine=engine, num_envs=num_envs, overrides=overrides) as env,
+        make(task, engine=engine, num_envs=_EXAMINED, overrides=overrides) as examined,
+    ):
+        groups = (POLICY, PRIVILEGED) if privileged and PRIVILEGED in env.observation_sizes else (POLICY,)
+        runs = tuple(path.resolve() for path in data or ())
+        claim(folder, _about(env, learner, groups, seed, given.model_dump(), runs))
+        lesson = Lesson(env, groups, seed, runs)
+        with registry.using("learners", learner, (ValueError,)):
+            driven = made(lesson, **{key: getattr(given, key) for key in parameters(made)})
+        total = steps or getattr(made, "default_steps", 1_000_000)
+        with _telling(f"{learner} on {env.name}, {env.engine.name}", total, json) as tell:
+            numbers = run(driven, lesson, examined, total, exams, folder, tell)
+    if json:
+        print_json({"policy": str(folder / "policy.onnx"), **numbers})
+    else:
+        typer.echo(f"the best exam: {numbers['best']:.0%} of {_EXAMINED} episodes of the validation split solved")
+        shown = " --privileged" if len(groups) > 1 else ""
+        typer.echo(f"next: anysim evaluate {task} --policy {folder / 'policy.onnx'}{shown} --split test --engine all")
+
+
+_EXTRAS = {"sb3-ppo": "sb3", "rsl-rl": "rsl", "clone": "torch"}
+_EXAMINED = 64
+
+
+def _options(pairs: Sequence[str]) -> dict[str, Any]:
+    import yaml
+
+    from anysim.errors import TaskError
+
+    options: dict[str, Any] = {}
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not equals or not re.fullmatch(r"\w+", key) or key in options:
+            raise TaskError(f"--option {pair}: expected KEY=VALUE, each key once, as in --option gamma=0.99")
+        options[key] = float(value) if re.fullmatch(r"[-+]?\d+(\.\d*)?e[-+]?\d+", value) else yaml.safe_load(value)
+    return options
+
+
+def _about(
+    env: Any, learner: str, groups: Sequence[str], seed: int, options: Mapping[str, Any], data: Sequence[Path]
+) -> dict[str, Any]:
+    """What a training depends on."""
+    from anysim.task.snapshot import spec_hash
+
+    return {
+        "task": env.name,
+        "spec": spec_hash(env.spec),
+        "engine": f"{env.engine.name} {env.engine.version}",
+        "num_envs": env.num_envs,
+        "learner": learner,
+        "groups": list(groups),
+        "seed": seed,
+        "options": dict(options),
+        "data": [str(path) for path in data],
+    }
+
+
+@contextmanager
+def _telling(what: str, total: int, quiet: bool) -> "Iterator[Any]":
+    """A bar for a person, a line now and then in a pipe."""
+    from anysim.cli.output import interactive
+
+    def words(numbers: Mapping[str, float]) -> str:
+        shown = {k: v for k, v in numbers.items() if k != "steps"}
+        return ", ".join(f"{name} {value:.3g}" for name, value in shown.items())
+
+    if quiet:
+        yield lambda numbers: None
+    elif not interactive():
+        yield (
+            lambda numbers: (
+                typer.echo(f"{numbers['steps']} of {total}: {words(numbers)}") if "exam" in numbers else None
+            )
+        )
+    else:
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.completed:,.0f} of {task.total:,.0f} steps"),
+            TimeElapsedColumn(),
+            TimeRemainingColumn(),
+            TextColumn("{task.fields[words]}"),
+        )
+        with Progress(*columns) as progress:
+            bar = progress.add_task(what, total=total, words="")
+            yield lambda numbers: progress.update(bar, completed=numbers["steps"], words=words(numbers))

@@ -1,0 +1,90 @@
+"""The loop of `anysim train`: stretches of learning, exams, curves, checkpoints, and the policy as a file."""
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+from anysim.errors import TaskError
+from anysim.record.commit import write_whole
+from anysim.task.env import TaskEnv
+from anysim_learning import checkpoint
+from anysim_learning.learner import Learner, Lesson
+
+POLICY, CHECKPOINT, ABOUT, CURVE = "policy.onnx", "checkpoint.npz", "train.json", "curve.jsonl"
+
+Told = Callable[[Mapping[str, float]], None]
+
+
+def train(
+    learner: Learner, lesson: Lesson, examined: TaskEnv, steps: int, exams: int, out: Path, tell: Told
+) -> Mapping[str, float]:
+    """Learn until `steps` are done, from the checkpoint in `out` on where there is one; returns the last numbers.
+
+    The policy that is kept is that of the best exam, the latest of equals: `best` of the numbers is its success.
+
+    Args:
+        learner: that of the lesson.
+        lesson: what is learnt from.
+        examined: envs of the same task for exams, one episode in each.
+        steps: when to end, as the learner counts.
+        exams: how many there are on the way; a checkpoint is written after each.
+        out: where `policy.onnx`, `checkpoint.npz`, `curve.jsonl` and TensorBoard's files go.
+        tell: is called with the numbers of each stretch, and how many `steps` are done.
+    """
+    from torch.utils.tensorboard import SummaryWriter  # pyright: ignore[reportMissingImports]
+
+    from anysim_learning.exam import exam
+    from anysim_learning.export import described, export
+
+    rows = [json.loads(line) for line in _lines(out / CURVE)]
+    if (out / CHECKPOINT).exists():
+        learner.restore(checkpoint.load(out / CHECKPOINT))
+    rows = [row for row in rows if row["steps"] <= learner.steps]  # what was learnt after it is learnt again
+    about = described(lesson.env, {g: lesson.env.observation_sizes[g] for g in lesson.groups}, learner.chunk)
+    numbers: dict[str, float] = rows[-1] if rows else {}
+    with closing(SummaryWriter(str(out / "tensorboard"), purge_step=learner.steps)) as board:
+        for goal in _goals(learner.steps, steps, exams):
+            while learner.steps < goal:
+                numbers = {**learner.advance(), "steps": learner.steps}
+                for name, value in numbers.items():
+                    board.add_scalar(name, value, learner.steps)
+                tell(numbers)
+            network = learner.network()
+            passed, best = exam(examined, lesson.groups, network), max((row["exam"] for row in rows), default=0.0)
+            numbers = {**numbers, "steps": learner.steps, "exam": passed, "best": max(passed, best)}
+            board.add_scalar("exam", passed, learner.steps)
+            tell(numbers)
+            rows.append(numbers)
+            if passed >= best:
+                export(network, about, out / POLICY)
+            checkpoint.save(out / CHECKPOINT, learner.state())
+            write_whole(out, {CURVE: "".join(json.dumps(row) + "\n" for row in rows)})
+    return numbers
+
+
+def claim(out: Path, about: Mapping[str, Any]) -> None:
+    """Say in `out` what is trained there, or see that it is the same.
+
+    Raises:
+        TaskError: it is the directory of another training.
+    """
+    path = out / ABOUT
+    if path.exists():
+        before = json.loads(path.read_text("utf-8"))
+        other = sorted(key for key in {*before, *about} if before.get(key) != about.get(key))
+        if other:
+            told = ", ".join(f"{key} {before.get(key)!r} there and {about.get(key)!r} here" for key in other)
+            raise TaskError(f"{out} holds another training ({told}); give another --out, or delete it")
+    out.mkdir(parents=True, exist_ok=True)
+    write_whole(out, {ABOUT: json.dumps(dict(about), indent=2) + "\n"})
+
+
+def _goals(done: int, steps: int, exams: int) -> Iterator[int]:
+    """Steps at which there are exams, the last at the end."""
+    yield from (goal for n in range(1, exams + 1) if (goal := -(-steps * n // exams)) > done)
+
+
+def _lines(path: Path) -> list[str]:
+    return path.read_text("utf-8").splitlines() if path.exists() else []

@@ -1,0 +1,102 @@
+"""Policies of whole envs from files that say what they observe: ONNX, as `anysim train` writes it, and TorchScript."""
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from anysim.conventions import Array
+from anysim.errors import TaskError, listing
+from anysim.task.contract import Obs
+from anysim.task.env import TaskEnv
+from anysim_policy.runtimes import described_model
+from anysim_schemas.base import Name, Spec
+from anysim_schemas.files import RefusedFileError, read_plain
+from anysim_schemas.limits import POLICY_BYTES
+
+FORMAT = "anysim-policy-1"
+
+
+Whole = Annotated[int, Field(ge=1)]
+
+
+class About(Spec):
+    """What a file says of itself: under the key `anysim` of ONNX metadata, or in TorchScript's extra file `anysim`."""
+
+    format: str = Field(description=FORMAT)
+    task: str = Field(default="", description="the task that it was trained on")
+    world: str = Field(default="", description="the hash of the world that it was trained in")
+    engine: str = Field(default="", description="the engine that it was trained on, and its version")
+    control_dt: float = Field(default=0.0, ge=0, description="seconds between two actions; 0 if it does not matter")
+    observations: dict[Name, Whole] = Field(description="its inputs in order: observation groups and their sizes")
+    actions: Whole = Field(description="how many numbers are an action")
+    chunk: Whole = Field(default=1, description="how many actions it gives for an observation")
+
+
+class FileEnvPolicy:
+    """A model of observation groups, (1, D) float32 each, to actions (1, A) or chunks (1, K, A) in the env's units.
+
+    It is run row by row: a batch may be summed in another order, and an episode would depend on its neighbours.
+
+    Attributes:
+        version: of the file: the digest of its bytes.
+    """
+
+    def __init__(
+        self,
+        env: TaskEnv,
+        *,
+        path: Annotated[str, Field(description="the .onnx file; .pt or .jit in a trusted folder")],
+    ) -> None:
+        self._path, self._dim = Path(path), env.action_dim
+        try:
+            self.version = hashlib.sha256(read_plain(self._path, POLICY_BYTES)).hexdigest()[:16]
+        except RefusedFileError as error:
+            raise TaskError(f"the policy {path} {error.strerror}") from error
+        except OSError as error:
+            raise TaskError(f"the policy {path} cannot be read: {error.strerror}") from error
+        text, self._run = described_model(self._path)
+        self._about = self._checked(text, env)
+
+    def _checked(self, text: str, env: TaskEnv) -> About:
+        try:
+            about = About.model_validate(json.loads(text))
+            if about.format != FORMAT:
+                raise ValueError(f"its format is '{about.format}'")
+        except ValueError as error:
+            raise TaskError(
+                f"the policy {self._path} does not say what it observes ({error}); expected JSON of the format "
+                f"{FORMAT} under the key 'anysim' of its metadata, as `anysim train` writes it"
+            ) from None
+        sizes = env.observation_sizes
+        for group, size in about.observations.items():
+            if sizes.get(group) != size:
+                here = f"has {sizes[group]}" if group in sizes else f"has no such group (groups: {listing(sizes)})"
+                raise TaskError(f"the policy {self._path} observes {size} numbers of '{group}'; '{env.name}' {here}")
+        dt = env.engine.world.physics.control_dt
+        if about.actions != env.action_dim or (about.control_dt and abs(about.control_dt - dt) > 1e-9):
+            raise TaskError(
+                f"the policy {self._path} gives {about.actions} numbers each {about.control_dt:g} s; '{env.name}' "
+                f"takes {env.action_dim} each {dt:g} s"
+            )
+        return about
+
+    def reset(self, env_ids: Array) -> None:
+        """Nothing: it remembers nothing."""
+
+    def act(self, obs: Obs, env_ids: Array) -> Array:
+        """Actions (n, A), or chunks (n, K, A)."""
+        hidden = [group for group in self._about.observations if group not in obs]
+        if hidden:
+            raise TaskError(f"the policy {self._path} observes {listing(hidden)}; --privileged shows it")
+        rows: list[Any] = []
+        for k in range(len(env_ids)):
+            seen = {group: obs[group][k : k + 1].astype(np.float32) for group in self._about.observations}
+            rows.append(self._run(seen)[0])
+        given = np.array(rows, dtype=np.float64)
+        if given.shape[-1] != self._dim or given.ndim not in (2, 3):
+            raise TaskError(f"the policy {self._path} gave {given.shape[1:]} for an observation, not ({self._dim},)")
+        return given

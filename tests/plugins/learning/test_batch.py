@@ -1,0 +1,103 @@
+"""Batches, demonstrations and checkpoints: what learners are fed with, without any learner."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import anysim
+from anysim.errors import RecordError, TaskError
+from anysim.record.collector import Collector
+from anysim.record.reader import open_trajectory
+from anysim.skills.runner import SkillPolicy
+from anysim_learning import checkpoint
+from anysim_learning.batch import Batch
+from anysim_learning.demonstrations import Demonstrations
+
+QUIET = ["record.cameras=[]"]
+
+
+def test_a_batch_is_the_env_with_actions_of_unit_range() -> None:
+    halved = "world.robots.panda.actions.arm={controller: joint_delta_position, params: {scale: 0.06}}"
+    overrides = [*QUIET, halved, "task.horizon=3"]
+    generator = np.random.default_rng(0)
+    with (
+        anysim.make("reach", engine="mujoco", num_envs=3, overrides=overrides) as env,
+        anysim.make("reach", engine="mujoco", num_envs=3, overrides=overrides) as same,
+    ):
+        batch = Batch(env)
+        obs = batch.reset(4)
+        expected, _ = same.reset(seed=4)
+        assert np.array_equal(obs["policy"], expected["policy"])
+        low, high = same.action_bounds
+        total = np.zeros(3)
+        for step in range(1, 4):
+            action = generator.uniform(-1.5, 1.5, (3, env.action_dim))
+            moment = batch.step(action)
+            result = same.step((low + high) / 2 + (high - low) / 2 * np.clip(action, -1, 1))
+            total += result.reward
+            assert np.allclose(moment.reward, result.reward)
+            assert moment.done.all() == (step == 3)
+        assert moment.truncated.all()
+        assert [one.total_reward for one in moment.ended] == pytest.approx(total.tolist())
+        assert all(one.status == "truncated" and one.steps == 3 for one in moment.ended)
+        for one in moment.ended:
+            assert np.array_equal(one.obs["policy"], result.obs["policy"][one.env])
+        same.reset()
+        assert np.array_equal(moment.obs["policy"], same.obs["policy"]), "the next episodes have begun"
+
+
+def test_a_batch_has_the_groups_that_are_asked_for() -> None:
+    with anysim.make("push_cube", engine="mujoco", num_envs=1, overrides=QUIET) as env:
+        assert set(Batch(env).reset(0)) == {"policy"}
+        assert set(Batch(env, ("policy", "privileged")).reset(0)) == {"policy", "privileged"}
+        with pytest.raises(TaskError, match=r"no observation group 'privilege' \(groups: policy, privileged\)"):
+            Batch(env, ("privilege",))
+
+
+def test_demonstrations_pair_what_was_seen_with_what_was_done(tmp_path: Path) -> None:
+    with anysim.make("reach", engine="mujoco", num_envs=2, overrides=[*QUIET, "record.keep=all"]) as env:
+        for _ in Collector(env, SkillPolicy(env), tmp_path / "run", 2, seed=3).run():
+            pass
+    data = Demonstrations([tmp_path / "run"], ("policy",), chunk=4)
+    readers = [open_trajectory(path) for path in sorted((tmp_path / "run" / "episodes").iterdir())]
+    assert len(data) == sum(reader.manifest.steps for reader in readers)
+    first = readers[0]
+    obs, chunk, mask = data[0]
+    assert np.array_equal(obs["policy"], first.initial_obs["policy"].astype(np.float32))
+    assert np.array_equal(chunk, first.actions[:4].astype(np.float32))
+    assert mask.tolist() == [1, 1, 1, 1]
+    last = first.manifest.steps - 1
+    obs, chunk, mask = data[last]
+    assert np.array_equal(obs["policy"], first.obs["policy"][last - 1].astype(np.float32))
+    assert np.array_equal(chunk[0], first.actions[last].astype(np.float32))
+    assert mask.tolist() == [1, 0, 0, 0]
+    one = data.arrays([1])
+    assert len(one[1]) == readers[1].manifest.steps
+    with pytest.raises(TaskError, match="recorded without the observations depth"):
+        Demonstrations([tmp_path / "run"], ("policy", "depth"))
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(TaskError, match="has no successful trajectory"):
+        Demonstrations([tmp_path / "empty"], ("policy",))
+
+
+def test_a_checkpoint_comes_back_as_it_was(tmp_path: Path) -> None:
+    tree = {
+        "weights": {"a": np.arange(6.0).reshape(2, 3), "b": np.array(3)},
+        "optimizer": {"state": {0: {"step": np.float32(2)}, 1: {}}, "groups": [{"lr": 1e-3, "betas": (0.9, 0.99)}]},
+        "words": "yes",
+        "none": None,
+        "flag": True,
+    }
+    checkpoint.save(tmp_path / "c.npz", tree)
+    back = checkpoint.load(tmp_path / "c.npz")
+    assert np.array_equal(back["weights"]["a"], tree["weights"]["a"])
+    assert back["weights"]["b"].shape == ()
+    assert back["optimizer"]["state"][0]["step"] == 2.0
+    assert back["optimizer"]["groups"] == [{"lr": 1e-3, "betas": [0.9, 0.99]}]
+    assert (back["words"], back["none"], back["flag"]) == ("yes", None, True)
+    data = (tmp_path / "c.npz").read_bytes()
+    for cut in (0, 10, len(data) // 2, len(data) - 1):
+        (tmp_path / "c.npz").write_bytes(data[:cut])
+        with pytest.raises(RecordError, match="is damaged"):
+            checkpoint.load(tmp_path / "c.npz")
