@@ -1,7 +1,7 @@
 """JSON Schemas of the files that people write, so that editors complete and check them.
 
-`python -m anysim_schemas.jsonschema [--check] DIR` writes `run.schema.json`, `robot.schema.json` and
-`proposal.schema.json`.
+`python -m anysim_schemas.jsonschema [--check] DIR` writes `run.schema.json`, `robot.schema.json`,
+`proposal.schema.json` and `benchmark.schema.json`.
 
 A schema sees one file, and a file may be only a part: it may extend another, be extended, or be given with others. So
 where files are merged nothing is required, and null (which removes what is inherited) is allowed everywhere. Items of
@@ -20,6 +20,7 @@ from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import core_schema
 
 from anysim_schemas.base import Spec
+from anysim_schemas.benchmark import BenchmarkSpec
 from anysim_schemas.proposals import Proposals
 from anysim_schemas.robot_model import RobotModelSpec
 from anysim_schemas.run import RunSpec
@@ -28,6 +29,7 @@ SCHEMAS: Mapping[str, type[BaseModel]] = {
     "run.schema.json": RunSpec,
     "robot.schema.json": RobotModelSpec,
     "proposal.schema.json": Proposals,
+    "benchmark.schema.json": BenchmarkSpec,
 }
 """The files that are generated, and the roots they describe."""
 
