@@ -156,6 +156,7 @@ class PhasedSkill(MovingSkill):
     """A skill that is a table of phases.
 
     Attributes:
+        budgets: how often it may use each rung of the ladder in one env.
         steps: (N,) control steps in the present phase.
         used: (N, rungs) how often each rung of the ladder was used since `begin`.
         climbs: for each env the failures so far, each with the rung that was tried next.
@@ -168,6 +169,7 @@ class PhasedSkill(MovingSkill):
         self.movers = tuple(movers)
         self.table: Sequence[Phase] = self.make_phases()
         self.phases = tuple(phase.name for phase in self.table)
+        self.budgets: Sequence[int] = BUDGETS
         self.steps = np.zeros(env.num_envs, dtype=np.int64)
         self.used = np.zeros((env.num_envs, len(RUNGS)), dtype=np.int64)
         self.climbs: list[tuple[tuple[str, str], ...]] = [()] * env.num_envs
@@ -232,7 +234,7 @@ class PhasedSkill(MovingSkill):
         first = self.first_rungs.get(failure)
         for rung in RUNGS[RUNGS.index(first) :] if first is not None else ():
             number = RUNGS.index(rung)
-            if self.used[env, number] >= BUDGETS[number]:
+            if self.used[env, number] >= self.budgets[number]:
                 continue
             phase = self.retry(rung, env)
             if phase is None:

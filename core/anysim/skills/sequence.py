@@ -34,7 +34,7 @@ class SkillSequence(MovingSkill):
         self.members = tuple(members.values())
         self.movers = tuple(dict.fromkeys(mover for member in self.members for mover in member.movers))
         self._back = {(self.phases.index(m), why): self.phases.index(to) for (m, why), to in (back or {}).items()}
-        self._max_attempts = max_attempts
+        self.max_attempts = max_attempts
         self._optional = {self.phases.index(name) for name in optional}
         self._limits = {self.phases.index(name): steps for name, steps in (limits or {}).items()}
         self._steps = np.zeros(env.num_envs, dtype=np.int64)
@@ -69,7 +69,7 @@ class SkillSequence(MovingSkill):
         for env in ids[~done].tolist():
             why = OUTCOMES[member.outcome[env]]
             to = self._back.get((number, why))
-            if to is not None and self.attempts[env] < self._max_attempts:
+            if to is not None and self.attempts[env] < self.max_attempts:
                 self.attempts[env] += 1
                 self._past[env] += (*member.history(env), (str(why), f"back to {self.phases[to]}"))
                 self._go(np.array([env]), to)

@@ -6,7 +6,11 @@ import numpy as np
 from pydantic import Field
 
 from anysim.conventions import Array
+from anysim.skills.base import Skill
+from anysim.skills.commands import DrawnSkill
+from anysim.skills.phases import RUNGS, PhasedSkill
 from anysim.skills.runner import SkillPolicy
+from anysim.skills.sequence import SkillSequence
 from anysim.task.contract import Obs
 from anysim.task.env import TaskEnv
 
@@ -23,11 +27,19 @@ class ExpertPolicy:
         env: TaskEnv,
         *,
         sigma: Annotated[float, Field(ge=0.0, description="of the noise on actions, in half ranges")] = 0.0,
+        retries: Annotated[bool, Field(description="whether a failure is followed by another try")] = True,
     ) -> None:
         self._env, self._sigma, self._skill = env, sigma, SkillPolicy(env)
+        if not retries:
+            _try_once(self._skill.skill)
         low, high = env.action_bounds
         half = (high - low) / 2
         self._scale = np.where(np.isfinite(half), half, 1.0)
+
+    @property
+    def skill(self) -> Skill:
+        """What acts."""
+        return self._skill.skill
 
     def reset(self, env_ids: Array) -> None:
         """Begin the skill in these envs."""
@@ -54,3 +66,16 @@ class ExpertPolicy:
         """The skill's outcome, as `no_ik`; empty while it runs."""
         outcome = str(self._skill.ended(env, False).get("outcome", ""))
         return "" if outcome in ("running", "ok") else outcome
+
+
+def _try_once(skill: Skill) -> None:
+    """Take a skill's ladder of retries away, and that of the skills it is made of."""
+    if isinstance(skill, PhasedSkill):
+        skill.budgets = (0,) * len(RUNGS)
+    elif isinstance(skill, SkillSequence):
+        skill.max_attempts = 1
+    parts = (
+        skill.members if isinstance(skill, SkillSequence) else skill.variants if isinstance(skill, DrawnSkill) else ()
+    )
+    for part in parts:
+        _try_once(part)

@@ -87,11 +87,11 @@ def parse(text: str) -> PolicyName:
 
 
 def _value(text: str) -> Any:
-    """A number, a truth value, or the words themselves."""
+    """A number, a truth value (`true` or `on`, `false` or `off`), or the words themselves."""
     try:
         return float(text)
     except ValueError:
-        return yaml.safe_load(text) if text in ("true", "false") else text
+        return yaml.safe_load(text) if text in ("true", "false", "on", "off") else text
 
 
 def make_policy(env: TaskEnv, text: str) -> Policy:

@@ -12,8 +12,10 @@ from typer.testing import CliRunner
 
 import anysim
 from anysim.errors import AnysimError, RecordError, SpecError, TaskError
+from anysim.skills.phases import MovingSkill
 from anysim_evaluation import cli, policy as policies
 from anysim_evaluation.driver import Episode, drive, episode_seeds
+from anysim_evaluation.expert import ExpertPolicy
 from anysim_evaluation.log import EpisodeLog
 from anysim_evaluation.page import page
 from anysim_evaluation.policy import make_policy
@@ -71,6 +73,21 @@ def test_what_the_expert_gives_up_has_its_type() -> None:
     assert {e.failure for e in run("pick_cube", "expert", 5, *far)} == {"no_ik"}
 
 
+def test_without_retries_the_first_failure_is_the_end() -> None:
+    far = ["world.layout.cube.x=0.75", "world.layout.cube.y=0.6"]
+    with anysim.make("stack_cube", engine="mujoco", overrides=[*BLIND, *far]) as env:
+        climbed: dict[str, list[str]] = {}
+        for name in ("expert", "expert:retries=off"):
+            policy = make_policy(env, name)
+            (one,) = drive(env, policy, SEEDS[:1])
+            assert (one.status, one.failure) == ("failed", "no_ik")
+            assert isinstance(policy, ExpertPolicy)
+            assert isinstance(policy.skill, MovingSkill)
+            climbed[name] = [rung for _, rung in policy.skill.history(0)]
+    assert len(climbed["expert"]) > 1
+    assert climbed["expert:retries=off"] == ["give up"]
+
+
 def test_a_chunk_is_carried_out_before_the_policy_is_asked_again() -> None:
     made: list[Chunked] = []
     run("reach", lambda env: made.append(Chunked(env)) or made[0], 5, "task.horizon=9")
@@ -89,6 +106,7 @@ def test_policies_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
     assert policies.parse("expert:sigma=0.5") == ("expert", {"sigma": 0.5}, "")
     assert policies.parse("my.module:act") == ("my.module", {}, "act")
     assert policies.parse("runs/a.b=c/policy.onnx") == ("file", {"path": "runs/a.b=c/policy.onnx"}, "")
+    assert policies.parse("expert:retries=off").options == {"retries": False}
     for wrong in ("expert:=1", "expert:sigma=1,sigma=2", "a b:c d"):
         with pytest.raises(TaskError, match="--policy"):
             policies.parse(wrong)
