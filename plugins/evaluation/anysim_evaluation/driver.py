@@ -1,7 +1,7 @@
 """The driver: episodes with fixed seeds, run in as many envs as there are. Each free env begins the next episode."""
 
 from collections import Counter, deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,11 +58,18 @@ class Episode:
     total_reward: float
 
 
-def drive(env: TaskEnv, policy: Policy, seeds: Sequence[int], *, privileged: bool = False) -> Iterator[Episode]:
+def drive(
+    env: TaskEnv,
+    policy: Policy,
+    seeds: Sequence[int],
+    *,
+    privileged: bool = False,
+    groups: Collection[str] | None = None,
+) -> Iterator[Episode]:
     """Run an episode of each seed, and yield it when it has ended.
 
-    Which episodes these are, and how they come out, depends neither on the number of envs nor on the order. The group
-    of observations `privileged` is not shown to the policy unless asked for.
+    Which episodes these are, and how they come out, depends neither on the number of envs nor on the order. The policy
+    is shown the groups of observations `groups`, all where not given; the group `privileged` only if asked for.
 
     Raises:
         TaskError: the policy gives something else than actions, or an episode loses its worker again and again.
@@ -72,6 +79,9 @@ def drive(env: TaskEnv, policy: Policy, seeds: Sequence[int], *, privileged: boo
     chunks: list[Array] = [np.zeros((0, env.action_dim))] * env.num_envs
     action = np.tile(np.clip(np.zeros(env.action_dim), *env.action_bounds), (env.num_envs, 1))
     judging = policy if isinstance(policy, Judging) else None
+
+    def shown(group: str) -> bool:
+        return privileged if group == "privileged" else groups is None or group in groups
 
     def begin(free: Array) -> None:
         ids = free[: len(waiting)]
@@ -93,7 +103,7 @@ def drive(env: TaskEnv, policy: Policy, seeds: Sequence[int], *, privileged: boo
         ids = np.flatnonzero(active)
         asked = np.array([i for i in ids.tolist() if len(chunks[i]) == 0], dtype=int)
         if len(asked):
-            obs = {group: rows[asked] for group, rows in env.obs.items() if privileged or group != "privileged"}
+            obs = {group: rows[asked] for group, rows in env.obs.items() if shown(group)}
             given = _chunks(policy.act(obs, asked), len(asked), env.action_dim)
             for i, chunk in zip(asked.tolist(), given, strict=True):
                 chunks[i] = chunk

@@ -1,0 +1,1 @@
+"""Benchmarks: protocols that are frozen, run and summed up."""
