@@ -11,7 +11,6 @@ import typer
 from anysim.cli.options import AsJson, Overrides, Task
 
 if TYPE_CHECKING:
-    from anysim.task.env import TaskEnv
     from anysim_evaluation.driver import Episode
 
 PAGE = "evaluation.html"
@@ -129,14 +128,14 @@ def _evaluate(question: Question, engine: str | None, folder: Path, quiet: bool)
     from anysim.api import make
     from anysim.cli.output import counting
     from anysim_evaluation.driver import drive
-    from anysim_evaluation.log import EpisodeLog
+    from anysim_evaluation.log import EpisodeLog, identity
     from anysim_evaluation.policy import make_policy
 
     overrides = [*question.overrides, "record.cameras=[]"]
     with make(question.task, engine=engine, num_envs=question.num_envs, overrides=overrides) as env:
         driven = make_policy(env, question.policy)
         name = env.engine.name
-        with EpisodeLog(folder / name, _identity(question, env, getattr(driven, "version", ""))) as log:
+        with EpisodeLog(folder / name, identity(env, question.policy, question.privileged)) as log:
             left = [seed for seed in question.seeds if seed not in log.episodes]
             won = sum(log.episodes[seed].status == "success" for seed in question.seeds if seed in log.episodes)
             with counting(f"{question.policy} on {env.name}, {name}", len(left), quiet) as tell:
@@ -145,19 +144,6 @@ def _evaluate(question: Question, engine: str | None, folder: Path, quiet: bool)
                     won += episode.status == "success"
                     tell(f"{name} seed {episode.seed}: {episode.failure or 'success'}", f"{won} solved")
             return {name: {seed: log.episodes[seed] for seed in question.seeds}}
-
-
-def _identity(question: Question, env: "TaskEnv", version: str) -> dict[str, str]:
-    """What an episode's outcome depends on, besides its seed."""
-    from anysim.task.snapshot import spec_hash
-
-    return {
-        "task": env.name,
-        "spec": spec_hash(env.spec),
-        "world": env.engine.world.hash,
-        "engine": f"{env.engine.name} {env.engine.version}",
-        "policy": " ".join([question.policy, *(["(privileged)"] if question.privileged else []), version]).strip(),
-    }
 
 
 def _tell(told: Mapping[str, Any]) -> None:

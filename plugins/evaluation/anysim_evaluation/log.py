@@ -5,14 +5,51 @@ import os
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Self
+from typing import NamedTuple, Self
 
 from anysim.errors import RecordError
 from anysim.record.incoming import claim
+from anysim.task.env import TaskEnv
+from anysim.task.snapshot import spec_hash
 from anysim_evaluation.driver import Episode
 
 FORMAT = "anysim-evaluation-1"
 FILE = "episodes.jsonl"
+
+
+def identity(env: TaskEnv, policy: str, privileged: bool) -> dict[str, str]:
+    """What an episode's outcome depends on, besides its seed."""
+    return {
+        "task": env.name,
+        "spec": spec_hash(env.spec),
+        "world": env.engine.world.hash,
+        "engine": f"{env.engine.name} {env.engine.version}",
+        "policy": policy + (" (privileged)" if privileged else ""),
+    }
+
+
+class Logged(NamedTuple):
+    """What a log holds: what was evaluated, the episodes by seed, and how many bytes of it are whole lines."""
+
+    what: Mapping[str, str]
+    episodes: dict[int, Episode]
+    length: int
+
+
+def read_log(path: Path) -> Logged:
+    """The whole lines of a log; nothing where there is none.
+
+    Raises:
+        RecordError: it is no log of episodes.
+    """
+    lines = (path.read_bytes() if path.exists() else b"").split(b"\n")[:-1]
+    try:
+        data = [json.loads(line) for line in lines]
+        what: dict[str, str] = data[0] if data else {}
+        episodes = {row["seed"]: Episode(**row) for row in data[1:]}
+    except (ValueError, TypeError, KeyError) as error:
+        raise RecordError(f"{path} is no log of episodes: {error}; evaluate into another directory") from None
+    return Logged(what, episodes, sum(len(line) + 1 for line in lines))
 
 
 class EpisodeLog:
@@ -35,24 +72,16 @@ class EpisodeLog:
 
     def _read(self, what: Mapping[str, str]) -> dict[int, Episode]:
         """The episodes that are there; a line that a killed process left unfinished is cut off."""
-        whole = self._path.read_bytes() if self._path.exists() else b""
-        lines = whole.split(b"\n")
-        try:
-            data = [json.loads(line) for line in lines[:-1]]
-            theirs: dict[str, Any] = data[0] if data else {}
-            episodes = {row["seed"]: Episode(**row) for row in data[1:]}
-        except (ValueError, TypeError, KeyError) as error:
-            raise RecordError(f"{self._path} is no log of episodes: {error}; evaluate into another directory") from None
-        if not data:
+        theirs, episodes, length = read_log(self._path)
+        if not theirs:
             self._path.write_bytes((json.dumps(what) + "\n").encode())
             return {}
         if theirs != what:
             differing = sorted(key for key in {*theirs, *what} if theirs.get(key) != what.get(key))
             words = ", ".join(f"{key} {theirs.get(key)!r} and now {what.get(key)!r}" for key in differing)
             raise RecordError(f"{self._path} has episodes of something else: {words}; evaluate into another directory")
-        if lines[-1]:
-            with self._path.open("r+b") as file:
-                file.truncate(len(whole) - len(lines[-1]))
+        with self._path.open("r+b") as file:
+            file.truncate(length)
         return episodes
 
     def add(self, episode: Episode) -> None:

@@ -11,10 +11,15 @@ WIDTH, HEIGHT = 240, 16
 
 def page(told: Mapping[str, Any]) -> str:
     """HTML that is also well-formed XML; the same bytes for the same evaluation."""
-    css = files("anysim_evaluation").joinpath("page.css").read_text("utf-8")
     title = escape(f"{told['policy']} on {told['task']}")
+    return whole(title, _body(told, title))
+
+
+def whole(title: str, lines: Iterator[str]) -> str:
+    """A page that needs no other file."""
+    css = files("anysim_evaluation").joinpath("page.css").read_text("utf-8")
     head = f'<meta charset="utf-8"/><title>{title}</title><style>\n{css}</style>'
-    body = "\n".join(_body(told, title))
+    body = "\n".join(lines)
     return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head>\n<body>\n{body}\n</body></html>\n'
 
 
@@ -26,17 +31,17 @@ def _body(told: Mapping[str, Any], title: str) -> Iterator[str]:
         [
             escape(name),
             f"{one['successes']} of {one['attempts']}",
-            _drawn(one["success_rate"], one["interval"]),
+            drawn(one["success_rate"], one["interval"]),
             "{:.0%} to {:.0%}".format(*one["interval"]),
             "" if one["steps"] is None else f"{one['steps']:g}",
             str(one["faults"]),
         ]
         for name, one in engines.items()
     ]
-    yield from _table("Success", ("engine", "solved", "", "95 %", "steps", "faults"), rows)
+    yield from table("Success", ("engine", "solved", "", "95 %", "steps", "faults"), rows)
     kinds = sorted({kind for one in engines.values() for kind in one["failures"]})
     counts = [[escape(kind), *(str(one["failures"].get(kind, 0)) for one in engines.values())] for kind in kinds]
-    yield from _table("Failures", ("type", *engines), counts)
+    yield from table("Failures", ("type", *engines), counts)
     pairs = [
         [
             f"{escape(pair['first'])} and {escape(pair['second'])}",
@@ -48,10 +53,11 @@ def _body(told: Mapping[str, Any], title: str) -> Iterator[str]:
         for pair in told["agreement"]
         if pair["seeds"]
     ]
-    yield from _table("Agreement, seed by seed", ("engines", "same outcome", "kappa", "one alone", "p"), pairs)
+    yield from table("Agreement, seed by seed", ("engines", "same outcome", "kappa", "one alone", "p"), pairs)
 
 
-def _drawn(share: float | None, interval: Sequence[float]) -> str:
+def drawn(share: float | None, interval: Sequence[float]) -> str:
+    """A share with its interval as a picture."""
     if share is None:
         return ""
     low, high = (WIDTH * value for value in interval)
@@ -63,7 +69,8 @@ def _drawn(share: float | None, interval: Sequence[float]) -> str:
     )
 
 
-def _table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """A table under its title, cells as they are; nothing without rows."""
     if rows:
         yield f"<h2>{title}</h2><table><tr>" + "".join(f"<th>{escape(column)}</th>" for column in columns) + "</tr>"
         yield from ("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)

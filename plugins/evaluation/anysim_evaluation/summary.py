@@ -1,15 +1,18 @@
 """Summaries of episodes: rates with intervals, and how far two engines agree on the same seeds."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import asdict
 from itertools import combinations
 from statistics import median
-from typing import Any
+from typing import Any, TypeVar
 
 from anysim.math.statistics import wilson
 from anysim.task.contract import Status
 from anysim_evaluation.driver import FAULT, Episode
+
+K = TypeVar("K", bound=Hashable)
+"""A seed, or a task and a seed."""
 
 
 def summary(episodes: Sequence[Episode]) -> dict[str, Any]:
@@ -33,8 +36,8 @@ def summary(episodes: Sequence[Episode]) -> dict[str, Any]:
     }
 
 
-def agreement(a: Mapping[int, Episode], b: Mapping[int, Episode]) -> dict[str, Any]:
-    """How far two engines agree on the seeds that both have run without a fault.
+def agreement(a: Mapping[K, Episode], b: Mapping[K, Episode]) -> dict[str, Any]:
+    """How far two engines, or two policies, agree on the seeds that both have run without a fault.
 
     `agree` is the share of seeds with the same outcome; `kappa` is Cohen's (1960), None where one outcome is all there
     is; `p` is McNemar's exact test of equal success (1947), two-sided, on the seeds that differ.
