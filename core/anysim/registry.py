@@ -53,7 +53,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
         " gripper_multi_finger holonomic_drive mink_ik operational_space pd pink_ik planar_drive",
         "planners": "numba_ik",
     },
-    "anysim-evaluation": {"commands": "evaluate", "env_policies": "expert random zero"},
+    "anysim-evaluation": {"commands": "benchmark evaluate", "env_policies": "expert random zero"},
     "anysim-film": {"commands": "render"},
     "anysim-inspect": {"commands": "audit doctor explain replay snapshot verify"},
     "anysim-learning": {"commands": "train", "learners": "clone rsl-rl sb3-ppo"},

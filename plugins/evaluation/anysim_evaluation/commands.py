@@ -10,7 +10,9 @@ if TYPE_CHECKING:
 
 @hookimpl
 def add_cli(app: "typer.Typer") -> None:
-    """`anysim evaluate`."""
+    """`anysim evaluate` and `anysim benchmark`."""
     from anysim_evaluation import cli
+    from anysim_evaluation.benchmark import cli as benchmark
 
     app.command("evaluate")(cli.evaluate)
+    app.add_typer(benchmark.app, name="benchmark")

@@ -1,0 +1,242 @@
+"""Running a benchmark: jobs of one task on one engine in worker processes, which go on where they were cut off."""
+
+import json
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from anysim.api import make
+from anysim.errors import AnysimError, CapabilityError, RecordError, TaskError
+from anysim.record.commit import write_whole
+from anysim.record.incoming import FileLock, claim
+from anysim_evaluation.benchmark.freezing import of_cell
+from anysim_evaluation.benchmark.protocol import Protocol, overrides
+from anysim_evaluation.benchmark.results import Cell
+from anysim_evaluation.driver import Episode, drive
+from anysim_evaluation.log import FILE, EpisodeLog, identity, read_log
+from anysim_evaluation.policy import make_policy
+
+WATCH_S = 0.2
+"""How often a worker looks whether its parent is there, and a parent what its workers have done [s]."""
+ABSENT = "absent.json"
+"""Why a policy cannot be run on an engine, in the folder of the cell."""
+WORKER = ".worker"
+"""The end of the name of a file that a worker keeps locked."""
+
+Tell = Callable[[str], object]
+
+
+class Job(NamedTuple):
+    """The policies that are left on one task and engine.
+
+    Attributes:
+        parts: what is frozen, of which each log says what it depends on.
+    """
+
+    protocol: Protocol
+    parts: Mapping[str, str]
+    out: Path
+    task: str
+    engine: str
+    policies: Sequence[str]
+
+
+def cells(protocol: Protocol, only: str = "") -> list[Cell]:
+    """The cells of a protocol; `only` is TASK/ENGINE/POLICY, where what is left out or `*` stands for all.
+
+    Raises:
+        TaskError: it names something that the protocol does not have.
+    """
+    spec = protocol.spec
+    known = (spec.tasks, spec.engines, spec.policies)
+    wanted = [word if word != "*" else "" for word in only.split("/")]
+    for word, there, kind in zip(wanted, known, ("task", "engine", "policy"), strict=False):
+        if word and word not in there:
+            raise TaskError(f"--only {only}: the protocol has no {kind} '{word}'; it has {', '.join(there)}")
+    if len(wanted) > len(known):
+        raise TaskError(f"--only {only}: expected TASK/ENGINE/POLICY, as in reach/mujoco or */*/expert")
+    chosen = [*wanted, "", "", ""]
+    return [
+        Cell(task, engine, policy)
+        for task in spec.tasks
+        for engine in spec.engines
+        for policy in spec.policies
+        if chosen[0] in ("", task) and chosen[1] in ("", engine) and chosen[2] in ("", policy)
+    ]
+
+
+def folder(out: Path, cell: Cell) -> Path:
+    """Where the episodes of a cell are."""
+    return out.joinpath(*cell)
+
+
+def logged(protocol: Protocol, parts: Mapping[str, str], out: Path) -> dict[Cell, dict[int, Episode]]:
+    """The episodes that are there, of all cells.
+
+    Raises:
+        RecordError: those of another protocol, or no logs.
+    """
+    seeds = protocol.seeds()
+    found: dict[Cell, dict[int, Episode]] = {}
+    for cell in cells(protocol):
+        path = folder(out, cell) / FILE
+        log = read_log(path)
+        if log.what and log.what.get("frozen") != of_cell(parts, *cell):
+            raise RecordError(
+                f"{path} has episodes of a protocol that was frozen otherwise; run into another directory"
+            )
+        found[cell] = {seed: log.episodes[seed] for seed in seeds if seed in log.episodes}
+    return found
+
+
+def absences(protocol: Protocol, out: Path) -> Iterator[dict[str, str]]:
+    """The cells that cannot be run, each with the reason."""
+    for cell in cells(protocol):
+        path = folder(out, cell) / ABSENT
+        if path.exists():
+            yield {**cell._asdict(), "why": json.loads(path.read_text("utf-8"))["why"]}
+
+
+def run(
+    protocol: Protocol, parts: Mapping[str, str], out: Path, *, only: str = "", workers: int = 1, tell: Tell
+) -> None:
+    """Run what is left. Each episode is on the disk once it has ended, whatever becomes of this process.
+
+    Results depend neither on the number of workers nor on how often it was cut off. `tell` is called with a line for
+    each episode. With more than one worker the main module of a program that calls this is guarded.
+
+    Raises:
+        RecordError: the directory has other episodes, or another process runs there.
+        TaskError: a worker process died; what it had done is kept.
+    """
+    with claim(out):
+        _wait_for_orphans(out)
+        there = logged(protocol, parts, out)
+        episodes = len(protocol.seeds())
+        left: dict[tuple[str, str], list[str]] = {}
+        for cell in cells(protocol, only):
+            if len(there[cell]) < episodes:
+                left.setdefault((cell.task, cell.engine), []).append(cell.policy)
+        work = [Job(protocol, parts, out, task, engine, policies) for (task, engine), policies in left.items()]
+        work.sort(key=lambda job: -len(job.policies) * int(parts[f"tasks.{job.task}.horizon"].split()[0]))
+        if workers == 1 or len(work) < 2:
+            for job in work:
+                run_job(job, tell)
+        else:
+            _share(work, out, min(workers, len(work)), tell)
+            _wait_for_orphans(out)
+
+
+def run_job(job: Job, tell: Tell) -> None:
+    """Run the policies of one task on one engine, in one env after the other."""
+    protocol, spec = job.protocol, job.protocol.spec
+    chosen, task = spec.engines[job.engine], spec.tasks[job.task]
+    at = [Cell(job.task, job.engine, policy) for policy in job.policies]
+    engine: dict[str, Any] = {"name": chosen.engine, "options": chosen.options}
+    num_envs = min(spec.num_envs, spec.seeds.episodes)
+    try:
+        env = make(protocol.source(job.task), engine=engine, num_envs=num_envs, overrides=overrides(task))
+    except CapabilityError as error:
+        for cell in at:
+            _absent(job, cell, error, tell)
+        return
+    with env:
+        for cell in at:
+            policy = spec.policies[cell.policy]
+            try:
+                driven = make_policy(env, policy.policy)
+            except TaskError as error:
+                _absent(job, cell, error, tell)
+                continue
+            what = identity(env, policy.policy, policy.privileged) | {"frozen": of_cell(job.parts, *cell)}
+            (folder(job.out, cell) / ABSENT).unlink(missing_ok=True)
+            with EpisodeLog(folder(job.out, cell), what) as log:
+                left = [seed for seed in protocol.seeds() if seed not in log.episodes]
+                for episode in drive(env, driven, left, privileged=policy.privileged, groups=spec.modality):
+                    log.add(episode)
+                    tell(f"{'/'.join(cell)} seed {episode.seed}: {episode.failure or 'success'}")
+
+
+def _absent(job: Job, cell: Cell, error: AnysimError, tell: Tell) -> None:
+    where = folder(job.out, cell)
+    where.mkdir(parents=True, exist_ok=True)
+    write_whole(where, {ABSENT: json.dumps({"why": str(error)}) + "\n"})
+    tell(f"{'/'.join(cell)} cannot be run: {error}")
+
+
+# ------------------------------------------------------------------ worker processes
+
+
+class _Stopped(Exception):
+    """The parent wants no more episodes."""
+
+
+_told: Any = None
+"""The queue of a worker to its parent."""
+_stop: Any = None
+_alive: FileLock | None = None
+"""What says that a worker lives; the kernel lets go of it."""
+
+
+def _share(work: Sequence[Job], out: Path, workers: int, tell: Tell) -> None:
+    context = get_context("spawn")
+    queue, stop = context.SimpleQueue(), context.Event()
+    with ProcessPoolExecutor(workers, context, initializer=_begin, initargs=(os.getpid(), out, queue, stop)) as pool:
+        waiting: set[Future[None]] = {pool.submit(_work, job) for job in work}
+        try:
+            while waiting:
+                done, waiting = wait(waiting, timeout=WATCH_S)
+                while not queue.empty():
+                    tell(queue.get())
+                for future in done:
+                    future.result()
+        except BrokenProcessPool:
+            words = "a worker process died; the same command again goes on where it was"
+            raise TaskError(f"{words}, and with --workers 1 it says why") from None
+        except BaseException:
+            stop.set()
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _wait_for_orphans(out: Path) -> None:
+    """Wait until no worker of a process that is gone writes there; they look after their parent."""
+    for path in out.glob(f"*{WORKER}"):
+        lock = FileLock.take(path, wait=True)
+        if lock is not None:
+            lock.release()
+
+
+def _begin(parent: int, out: Path, queue: Any, stop: Any) -> None:
+    global _told, _stop, _alive
+    _told, _stop, _alive = queue, stop, FileLock.take(out / f"{os.getpid()}{WORKER}")
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # it reaches the parent, which says that no more are begun
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(WATCH_S)
+        os._exit(1)  # what had ended is on the disk
+
+    threading.Thread(target=watch, name="anysim-benchmark-parent", daemon=True).start()
+
+
+def _tell(line: str) -> None:
+    _told.put(line)
+    if _stop.is_set():
+        raise _Stopped
+
+
+def _work(job: Job) -> None:
+    try:
+        run_job(job, _tell)
+    except _Stopped:
+        return
+    except AnysimError as error:
+        raise TaskError(str(error)) from None  # errors that hold more than words do not survive the way back
