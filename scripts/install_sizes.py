@@ -27,7 +27,7 @@ WORDS = {
     "bench": "`anysim bench`: what anysim costs on top of an engine",
     "collect": "`anysim run`: episodes by scripted solutions, and reports of them",
     "control": "tools by inverse kinematics and operational space, vehicles, hands, cameras",
-    "evaluation": "`anysim evaluate`: how often a policy solves a task, on one engine or all",
+    "evaluation": "`anysim evaluate`, `anysim benchmark`: how often policies solve tasks, and whether engines agree",
     "film": "`anysim render`: videos of recorded episodes, with other sizes, looks or engines",
     "inspect": "`anysim doctor`, `audit`, `explain`, `replay`, `snapshot`: what is here, was built, drawn, recorded",
     "kinematics": "mechanics of robots (Pinocchio), for controllers of your own",

@@ -33,6 +33,8 @@ control_rate: 50
 num_envs: 2
 """
 
+GUIDE = Path(__file__).parents[3] / "docs" / "examples" / "benchmarks" / "arms.yaml"
+
 
 def invoke(*words: object) -> Any:
     return CliRunner().invoke(cli.app, [str(word) for word in words])
@@ -167,6 +169,16 @@ def test_what_an_engine_cannot_run_is_told(tiny: Path) -> None:
     assert [(one["task"], one["engine"]) for one in told["absent"]] == [("lift", "still")] * 2
     assert "null cannot run 'pick_cube'" in told["absent"][0]["why"]
     assert told["left"] == 32 - 8
+
+
+def test_the_protocol_of_the_guide_runs(tmp_path: Path) -> None:
+    path = tmp_path / "arms.yaml"
+    path.write_text(GUIDE.read_text())
+    assert invoke("freeze", path).exit_code == 0
+    assert "as frozen" in invoke("show", path).output
+    done = invoke("run", path, "--out", tmp_path / "out", "--only", "short_reach/mujoco/random", "--json")
+    assert done.exit_code == 0, done.exception
+    assert json.loads(done.output)["left"] == 2 * 2 * 3 * 4 - 4
 
 
 @pytest.mark.slow

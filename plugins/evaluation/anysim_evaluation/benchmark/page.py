@@ -64,10 +64,10 @@ def _tasks(rows: Sequence[Told], engines: Sequence[str]) -> Iterator[str]:
     policies = list(dict.fromkeys(one["policy"] for one in rows))
     lines: list[list[str]] = []
     for task in dict.fromkeys(one["task"] for one in rows):
-        cells = ("".join(_shade(by_cell.get((task, policy, engine))) for engine in engines) for policy in policies)
-        lines.append([escape(task), *cells])
+        shades = ("".join(_shade(by_cell.get((task, policy, engine))) for engine in engines) for policy in policies)
+        lines.append([escape(task), *(f'<span class="cells">{cell}</span>' for cell in shades)])
     title = f"Success by task in percent: {', '.join(map(escape, engines))}"
-    yield from table(title, ("task", *map(escape, policies)), lines)
+    yield from table(title, ("task", *(p.replace("_", " ") for p in policies)), lines)
 
 
 def _shade(one: Told | None) -> str:

@@ -1,0 +1,75 @@
+"""The results of the shipped benchmark in docs/benchmark.md, from docs/benchmark.json.
+
+    python scripts/benchmark_table.py [--check]
+
+The figures are made by two commands; the first goes on where it was cut off:
+
+    anysim benchmark run core12 --workers 2 --out runs/core12
+    cp runs/core12/results.json docs/benchmark.json
+
+`--check` writes nothing and exits with 1 if the page has drifted from docs/benchmark.json.
+"""
+
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from generated import ROOT, main
+
+from anysim_evaluation.benchmark.page import agreement, ranks
+
+STORE = ROOT / "docs" / "benchmark.json"
+
+
+def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table of Markdown."""
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in (columns, ["---"] * len(columns), *rows))
+
+
+def percent(share: float | None) -> str:
+    """A share, or nothing."""
+    return "" if share is None else f"{share:.0%}"
+
+
+def section() -> str:
+    """What is said of the results."""
+    told: Mapping[str, Any] = json.loads(STORE.read_text("utf-8"))
+    engines = list(dict.fromkeys(one["engine"] for one in told["means"]))
+    policies = list(dict.fromkeys(one["policy"] for one in told["means"]))
+    means = {(one["policy"], one["engine"]): one for one in told["means"]}
+    success = {(one["task"], one["policy"], one["engine"]): one["success"] for one in told["rows"]}
+    versions = ", ".join(told["parts"][f"engines.{engine}"] for engine in engines)
+    unfinished = f" {told['left']} episodes are still to be run." if told["left"] else ""
+    by_mean = [
+        [
+            f"`{p}`",
+            *("{:.0%} ({:.0%} to {:.0%})".format(means[p, e]["success"], *means[p, e]["interval"]) for e in engines),
+        ]
+        for p in policies
+    ]
+    by_task = [
+        [f"`{task}`", *(" / ".join(percent(success.get((task, policy, e))) for e in engines) for policy in policies)]
+        for task in dict.fromkeys(one["task"] for one in told["rows"])
+    ]
+    columns, orders = ranks({"ranks": [one for one in told["ranks"] if one["task"] is None]})
+    pairs = agreement({"engines": [one for one in told["engines"] if one["policy"] is None]})
+    return "\n\n".join(
+        [
+            f"The protocol `{told['protocol']}`, {told['episodes']} episodes of each task, engine and policy (seeds "
+            f"{told['parts']['seeds']}), on {versions}; frozen as `{told['frozen'][:16]}`.{unfinished}",
+            "Mean success over the tasks, with the interval of a bootstrap that draws whole tasks (it leaves out "
+            "how few the episodes of each task are):",
+            table(["policy", *engines], by_mean),
+            f"Success by task on {', '.join(engines)}:",
+            table(["task", *(f"`{policy}`" for policy in policies)], by_task),
+            "Order of the policies by their means:",
+            table(columns, orders),
+            "Agreement of engines, seed by seed:",
+            table(*pairs),
+        ]
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main(__doc__, "benchmark", "benchmark_table.py", ("docs/benchmark.md",), section))
