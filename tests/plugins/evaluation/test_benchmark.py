@@ -97,12 +97,16 @@ def test_a_frozen_file_is_its_hash(tiny: Path) -> None:
         freezing.moved(loaded, {})
 
 
-def test_shipped_protocols_are_what_they_say() -> None:
+def test_shipped_protocols_are_what_they_say(tmp_path: Path) -> None:
     spec = load_protocol("core12").spec
     assert (len(spec.tasks), len(spec.policies), len(spec.engines)) == (12, 7, 3)
     assert "core12" in shipped()
     with pytest.raises(TaskError, match="there is no protocol 'core13'; shipped are"):
         load_protocol("core13")
+    mine = tmp_path / "mine.yaml"
+    mine.write_text("extends: benchmark:core12\nname: mine\nseeds: {episodes: 2}\n")
+    changed = load_protocol(str(mine))
+    assert (changed.spec.tasks, changed.seeds(), changed.path) == (spec.tasks, [20000, 20001], mine)
     listed = invoke("list", "--json")
     assert [one["name"] for one in json.loads(listed.output)] == list(shipped())
 
@@ -137,6 +141,10 @@ def test_a_run_goes_on_and_comes_out_the_same(tiny: Path) -> None:
 def test_episodes_of_another_protocol_are_not_mixed(tiny: Path) -> None:
     out = tiny.parent / "out"
     assert invoke("run", tiny, "--out", out, "--only", "short/mujoco/zero").exit_code == 0
+    tiny.write_text(TEXT.replace("horizon: 12", "horizon: 13"))
+    told = json.loads(invoke("run", tiny, "--out", out, "--moved", "--only", "short/mujoco/zero", "--json").output)
+    assert "tasks.reach.horizon was 12 steps and is 13 steps" in told["moved"]
+    assert "These are no results of the protocol" in (out / "results.html").read_text()
     tiny.write_text(TEXT.replace("horizon: 6", "horizon: 7"))
     done = invoke("run", tiny, "--out", out, "--moved")
     assert "has episodes of a protocol that was frozen otherwise" in str(done.exception)
