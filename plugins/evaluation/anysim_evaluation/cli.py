@@ -135,7 +135,7 @@ def _evaluate(question: Question, engine: str | None, folder: Path, quiet: bool)
     with make(question.task, engine=engine, num_envs=question.num_envs, overrides=overrides) as env:
         driven = make_policy(env, question.policy)
         name = env.engine.name
-        with EpisodeLog(folder / name, identity(env, question.policy, question.privileged)) as log:
+        with EpisodeLog(folder / name, identity(env, question.policy, driven, question.privileged)) as log:
             left = [seed for seed in question.seeds if seed not in log.episodes]
             won = sum(log.episodes[seed].status == "success" for seed in question.seeds if seed in log.episodes)
             with counting(f"{question.policy} on {env.name}, {name}", len(left), quiet) as tell:

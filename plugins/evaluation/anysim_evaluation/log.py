@@ -12,19 +12,20 @@ from anysim.record.incoming import claim
 from anysim.task.env import TaskEnv
 from anysim.task.snapshot import spec_hash
 from anysim_evaluation.driver import Episode
+from anysim_evaluation.policy import Policy
 
 FORMAT = "anysim-evaluation-1"
 FILE = "episodes.jsonl"
 
 
-def identity(env: TaskEnv, policy: str, privileged: bool) -> dict[str, str]:
-    """What an episode's outcome depends on, besides its seed."""
+def identity(env: TaskEnv, policy: str, driven: Policy, privileged: bool) -> dict[str, str]:
+    """What an episode's outcome depends on, besides its seed; `policy` is what `driven` was made of."""
     return {
         "task": env.name,
         "spec": spec_hash(env.spec),
         "world": env.engine.world.hash,
         "engine": f"{env.engine.name} {env.engine.version}",
-        "policy": policy + (" (privileged)" if privileged else ""),
+        "policy": " ".join([policy, *(["(privileged)"] if privileged else []), getattr(driven, "version", "")]).strip(),
     }
 
 

@@ -155,7 +155,7 @@ def run_job(job: Job, tell: Tell) -> None:
             except TaskError as error:
                 _absent(job, cell, error, tell)
                 continue
-            what = identity(env, policy.policy, policy.privileged) | {"frozen": of_cell(job.parts, *cell)}
+            what = identity(env, policy.policy, driven, policy.privileged) | {"frozen": of_cell(job.parts, *cell)}
             (folder(job.out, cell) / ABSENT).unlink(missing_ok=True)
             with EpisodeLog(folder(job.out, cell), what) as log:
                 left = [seed for seed in protocol.seeds() if seed not in log.episodes]
