@@ -164,6 +164,16 @@ _PEG = Case(
     _towards("peg", lambda env: level(offset(seen(env, "block.hole"), z=0.051), seen(env, "block"))),
     [_shifted("peg", z=0.02), _shifted("peg", x=0.01), _tilted("peg", 0.15), _moving("peg")],
 )
+
+
+def _plugged(height: float) -> Case:
+    """A plug whose frame is `height` [m] above the end of its prongs, from its stand to its socket."""
+    return Case(
+        _towards("charger", lambda env: offset(seen(env, "socket.hole"), z=height)),
+        [_shifted("charger", z=0.01), _shifted("charger", x=0.01), _tilted("charger", 0.3)],
+    )
+
+
 CASES: dict[str, Case] = {
     "reach": Case(_reach, [_off_goal], ()),
     "push_cube": Case(
@@ -184,6 +194,15 @@ CASES: dict[str, Case] = {
     "peg_in_hole_2mm": _PEG,
     "peg_in_hole_1mm": _PEG,
     "press_button": Case(_opening("button.cap", 0.0, 0.9), [lambda env: set_opening(env, "button.cap", 0.7)]),
+    "insert_round_peg": _PEG,
+    "turn_faucet": Case(_opening("faucet.lever", 0.0, 0.95), [lambda env: set_opening(env, "faucet.lever", 0.85)]),
+    "flip_switch": Case(_opening("switch.rocker", 0.0, 0.95), [lambda env: set_opening(env, "switch.rocker", 0.85)]),
+    "plug_charger": _plugged(0.036),
+    "usb_insert": _plugged(0.034),
+    "unplug_charger": Case(
+        _towards("charger", lambda env: offset(seen(env, "socket.mouth"), z=0.1)),
+        [_shifted("charger", z=-0.05), _shifted("charger", x=0.1), _moving("charger")],
+    ),
     "put_away": Case(
         _put_away, [lambda env: set_opening(env, _DRAWER, 0.2), _shifted("cube", z=0.1), _moving("cube")], ()
     ),

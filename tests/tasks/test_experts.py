@@ -16,10 +16,16 @@ TASKS = [
     "close_drawer",
     "press_button",
     "peg_in_hole_1mm",
+    "insert_round_peg",
+    "turn_faucet",
+    "flip_switch",
+    "plug_charger",
+    "usb_insert",
+    "unplug_charger",
     "handover",
     "put_away",
 ]
-LEAST = {"put_away": 6}
+LEAST = {"put_away": 6, "usb_insert": 4}
 """Of eight; where nothing is said seven."""
 
 

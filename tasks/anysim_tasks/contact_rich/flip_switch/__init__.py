@@ -1,0 +1,1 @@
+"""Flip a rocker switch."""

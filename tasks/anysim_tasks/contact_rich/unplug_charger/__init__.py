@@ -1,0 +1,1 @@
+"""Pull a charger out of its socket."""

@@ -1,0 +1,1 @@
+"""Put a USB plug into its port with 0.3 mm of clearance."""
