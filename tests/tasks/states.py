@@ -174,6 +174,23 @@ def _plugged(height: float) -> Case:
     )
 
 
+_BEADS = [f"bead_{number}" for number in range(4)]
+_TO_TRAY = _towards("cup", lambda env: seen(env, "tray"))
+
+
+def _pour(env: TaskEnv, share: float) -> None:
+    """The cup to where the tray is; there the beads lie in the tray, side by side."""
+    _TO_TRAY(env, share)
+    for number, bead in enumerate(_BEADS):
+        if share == 1.0:
+            put(env, bead, offset(seen(env, "tray"), x=0.03 * number - 0.045, z=0.04))
+
+
+def _spilled(env: TaskEnv) -> None:
+    for bead in _BEADS[:2]:
+        put(env, bead, offset(seen(env, bead), x=0.3))
+
+
 CASES: dict[str, Case] = {
     "reach": Case(_reach, [_off_goal], ()),
     "push_cube": Case(
@@ -197,6 +214,7 @@ CASES: dict[str, Case] = {
     "insert_round_peg": _PEG,
     "turn_faucet": Case(_opening("faucet.lever", 0.0, 0.95), [lambda env: set_opening(env, "faucet.lever", 0.85)]),
     "flip_switch": Case(_opening("switch.rocker", 0.0, 0.95), [lambda env: set_opening(env, "switch.rocker", 0.85)]),
+    "pour_beads": Case(_pour, [_spilled]),
     "plug_charger": _plugged(0.036),
     "usb_insert": _plugged(0.034),
     "unplug_charger": Case(

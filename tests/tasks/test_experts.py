@@ -20,6 +20,7 @@ TASKS = [
     "turn_faucet",
     "flip_switch",
     "plug_charger",
+    "pour_beads",
     "usb_insert",
     "unplug_charger",
     "handover",

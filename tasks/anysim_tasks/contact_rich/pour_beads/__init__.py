@@ -1,0 +1,1 @@
+"""Pour beads out of a cup into a tray."""
