@@ -21,12 +21,11 @@ TASKS = [
     "flip_switch",
     "plug_charger",
     "pour_beads",
-    "usb_insert",
     "unplug_charger",
     "handover",
     "put_away",
 ]
-LEAST = {"put_away": 6, "usb_insert": 4}
+LEAST = {"put_away": 6}
 """Of eight; where nothing is said seven."""
 
 
