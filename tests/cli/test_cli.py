@@ -10,6 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from anysim.engine.capability import Capability
+from anysim.engine.factory import runnable
+
 FAST = ["-o", "record.cameras=[]"]
 
 
@@ -215,3 +218,20 @@ def test_a_command_of_a_package_that_is_not_installed_names_the_package(monkeypa
         PluginError, match="`anysim robot` comes with anysim-robots, which is not installed: pip install"
     ):
         group.resolve_command(group.context_class(group), ["robot", "show"])
+
+
+def test_list_tasks_says_what_each_is() -> None:
+    rows = {row["name"]: row for row in json.loads(anysim("list", "tasks", "--json").stdout)}
+    cube = rows["pick_cube"]
+    assert (cube["family"], cube["horizon"], cube["expert"]) == ("tabletop", 400, "pick")
+    assert cube["robots"] == ["franka_panda"]
+    assert cube["levels"] == ["L0", "L1", "L2"]
+    assert rows["put_away"]["expert"] == "commands"
+    assert rows["turn_faucet"]["family"] == "contact_rich"
+
+
+@pytest.mark.slow
+def test_list_tasks_asks_the_engines() -> None:
+    rows = {row["name"]: row for row in json.loads(anysim("list", "tasks", "--engines", "--json").stdout)}
+    assert "null" not in rows["pick_cube"]["engines"], "it has no physics"
+    assert set(rows["pick_cube"]["engines"]) == set(runnable(Capability.DYNAMICS))

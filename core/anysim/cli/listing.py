@@ -14,6 +14,9 @@ def list_(
             metavar="KIND", help="engines, tasks, robots, controllers, terms, skills, planners, devices, writers…"
         ),
     ],
+    engines: Annotated[
+        bool, typer.Option("--engines", help="Of tasks: which engines can run them, which takes a moment for each.")
+    ] = False,
     json: AsJson = False,
 ) -> None:
     """List what is installed of a kind, and where it comes from."""
@@ -25,8 +28,8 @@ def list_(
         raise PluginError(
             f"there is no kind '{kind}'{suggest(kind, list(registry.KINDS))} (kinds: {listing(registry.KINDS, 20)})"
         )
-    if kind == "robots":
-        _robots(json)
+    if kind in ("robots", "tasks"):
+        _robots(json) if kind == "robots" else _tasks(engines, json)
         return
     rows = [{"name": name, "from": _origin(kind, name), "what": _what(kind, name)} for name in registry.names(kind)]
     if json:
@@ -65,6 +68,53 @@ def _robots(json: bool) -> None:
     for line, row in zip(told, rows, strict=True):
         line[4] = "yes" if row["available"] else row.get("remedy") or row["what"]
     print_table("robots: dof counts the joints that are commanded; see `anysim robot NAME`", columns, told)
+
+
+def _tasks(ask_engines: bool, json: bool) -> None:
+    """The catalogue of tasks; the family of one is the folder that its own is in."""
+    from anysim import registry
+    from anysim.api import load, task_path
+    from anysim.cli.output import print_json, print_table
+    from anysim.errors import AnysimError, PluginError
+
+    rows: list[dict[str, object]] = []
+    for name in registry.names("tasks"):
+        row: dict[str, object] = {"name": name, "from": _origin("tasks", name)}
+        rows.append(row)
+        try:
+            loaded = load(task_path(name))
+            spec, task = loaded.spec, loaded.spec.task
+            if task is None:
+                raise PluginError(f"its file {task_path(name)} has no task")
+            expert = task.expert.skill if task.expert else "commands" if spec.collect and spec.collect.commands else ""
+            row |= {"family": task_path(name).parent.parent.name, "horizon": task.horizon, "expert": expert}
+            row |= {"robots": [one.robot for one in spec.world.robots.values()], "levels": list(spec.levels)}
+            row |= {"what": task.description}
+            if ask_engines:
+                row["engines"] = _able(name)
+        except AnysimError as error:
+            row["what"] = f"does not load: {error}"
+    if json:
+        print_json(rows)
+        return
+    columns = ("name", "family", "robots", "horizon", "levels", *(["engines"] if ask_engines else []), "expert")
+    told = [
+        [", ".join(map(str, v)) if isinstance(v := row.get(c, ""), list) else v for c in (*columns, "from", "what")]
+        for row in rows
+    ]
+    print_table("tasks: `anysim run NAME` collects with the expert", (*columns, "from", "what"), told)
+
+
+def _able(name: str) -> list[str]:
+    """The engines with physics that can run a task."""
+    from anysim.cli.check import report_on
+    from anysim.engine.capability import Capability
+    from anysim.engine.factory import runnable
+
+    answers = report_on(name, None, True, []).answers
+    return [
+        answer.engine for answer in answers if not answer.refusal and answer.engine in runnable(Capability.DYNAMICS)
+    ]
 
 
 def _capabilities() -> None:
@@ -120,11 +170,6 @@ def _line(kind: str, name: str) -> str:
 
         here = availability(name)
         return here.version if here.available else f"not available: {'; '.join(here.missing)}. {here.remedy}"
-    if kind == "tasks":
-        from anysim.api import load, task_path
-
-        task = load(task_path(name)).spec.task
-        return task.description if task else ""
     if kind == "terms":
         from anysim.task.term_registry import term_names
 

@@ -116,7 +116,7 @@ def _engines(engine: str | None) -> list[str | None]:
     from anysim.engine.capability import Capability
     from anysim.engine.factory import runnable
 
-    return [*runnable(Capability.CONTACTS_STATIC)] if engine == "all" else [engine]
+    return [*runnable(Capability.DYNAMICS)] if engine == "all" else [engine]
 
 
 def _plain(text: str) -> str:
