@@ -18,7 +18,9 @@ from anysim.task.contract import Obs
 from anysim.task.env import TaskEnv
 
 MODELS = (".onnx", ".pt", ".jit")
-"""How the files of models end; the policy `file` runs them."""
+"""How the files of models end."""
+FILE = "file"
+"""The policy that runs them."""
 
 
 class Policy(Protocol):
@@ -71,7 +73,7 @@ def parse(text: str) -> PolicyName:
         TaskError: it is of none of the four forms.
     """
     if text.endswith(MODELS):
-        return PolicyName("file", {"path": text})
+        return PolicyName(FILE, {"path": text})
     name, colon, rest = text.partition(":")
     if colon and "=" not in rest and name not in registry.names("env_policies"):
         if not all(part.isidentifier() for part in [*name.split("."), rest]):

@@ -87,6 +87,18 @@ def test_what_is_not_as_asked_for_is_refused_with_its_place(tiny: Path) -> None:
         assert said in str(found.value)
 
 
+def test_the_file_of_a_policy_is_frozen(tiny: Path, tmp_path: Path) -> None:
+    model = tmp_path / "policy.onnx"
+    tiny.write_text(TEXT.replace("zero: zero", f"zero: {model}"))
+    with pytest.raises(SpecError, match=r"tiny\.yaml:6:18: policies\.zero: .*policy\.onnx cannot be read"):
+        freezing.parts(load_protocol(str(tiny)))
+    said = set()
+    for content in (b"one", b"other"):
+        model.write_bytes(content)
+        said.add(freezing.parts(load_protocol(str(tiny)))["policies.zero"])
+    assert len(said) == 2
+
+
 def test_a_frozen_file_is_its_hash(tiny: Path) -> None:
     loaded = load_protocol(str(tiny))
     loaded.frozen.write_text(loaded.frozen.read_text().replace("12 steps", "13 steps"))

@@ -84,6 +84,11 @@ def _policy_parts(protocol: Protocol) -> Iterator[tuple[str, str]]:
                 raise protocol.fault(key, str(error)) from None
             except SpecError as error:
                 raise protocol.fault(key, "; ".join(f"{i.path}: {i.message}" for i in error.issues)) from None
+            if said.name == policies.FILE:
+                try:
+                    words += f" ({_hash(iter([Path(said.options['path'])]))})"
+                except OSError as error:
+                    raise protocol.fault(key, f"{policy.policy} cannot be read: {error.strerror}") from None
         yield key, words + (" (privileged)" if policy.privileged else "")
 
 
