@@ -96,7 +96,8 @@ def train(
     if json:
         print_json({"policy": str(folder / "policy.onnx"), **numbers})
     else:
-        typer.echo(f"the best exam: {numbers['best']:.0%} of {_EXAMINED} episodes of the validation split solved")
+        best = f"{numbers['best']:.0%} of {_EXAMINED} episodes of the validation split solved"
+        typer.echo(f"the best of {exams} exams: {best}, which flatters; the test split says how good the policy is")
         shown = " --privileged" if len(groups) > 1 else ""
         typer.echo(f"next: anysim evaluate {task} --policy {folder / 'policy.onnx'}{shown} --split test --engine all")
 

@@ -79,7 +79,9 @@ def _read(path: Path, groups: Sequence[str]) -> Demonstration | None:
     if lacking:
         raise TaskError(f"{path} was recorded without the observations {', '.join(lacking)}; record it anew")
     obs = {
-        group: np.concatenate([reader.initial_obs[group][None], reader.obs[group][:-1]]).astype(np.float32)
+        group: np.nan_to_num(np.concatenate([reader.initial_obs[group][None], reader.obs[group][:-1]])).astype(
+            np.float32
+        )
         for group in groups
     }
     return Demonstration(obs, reader.actions.astype(np.float32))

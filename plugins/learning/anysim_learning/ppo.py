@@ -7,6 +7,7 @@ import numpy as np
 import torch  # pyright: ignore[reportMissingImports]
 from pydantic import Field
 from stable_baselines3 import PPO  # pyright: ignore[reportMissingImports]
+from stable_baselines3.common.logger import Logger  # pyright: ignore[reportMissingImports]
 from stable_baselines3.common.vec_env import VecNormalize  # pyright: ignore[reportMissingImports]
 
 from anysim_learning.learner import Lesson
@@ -58,6 +59,7 @@ class Sb3Ppo:
             seed=lesson.seed,
             device="cpu",
         )
+        self._model.set_logger(Logger(folder=None, output_formats=[]))  # its own writes into the temporary folder
 
     @property
     def steps(self) -> int:

@@ -57,9 +57,9 @@ def train(
             board.add_scalar("exam", passed, learner.steps)
             tell(numbers)
             rows.append(numbers)
+            checkpoint.save(out / CHECKPOINT, learner.state())
             if passed >= best:
                 export(network, about, out / POLICY)
-            checkpoint.save(out / CHECKPOINT, learner.state())
             write_whole(out, {CURVE: "".join(json.dumps(row) + "\n" for row in rows)})
     return numbers
 

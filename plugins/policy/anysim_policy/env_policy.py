@@ -39,7 +39,8 @@ class About(Spec):
 class FileEnvPolicy:
     """A model of observation groups, (1, D) float32 each, to actions (1, A) or chunks (1, K, A) in the env's units.
 
-    It is run row by row: a batch may be summed in another order, and an episode would depend on its neighbours.
+    It is run row by row: a batch may be summed in another order, and an episode would depend on its neighbours. What is
+    not a number is 0 to it, as it is to learners.
 
     Attributes:
         version: of the file: the digest of its bytes.
@@ -94,7 +95,9 @@ class FileEnvPolicy:
             raise TaskError(f"the policy {self._path} observes {listing(hidden)}; --privileged shows it")
         rows: list[Any] = []
         for k in range(len(env_ids)):
-            seen = {group: obs[group][k : k + 1].astype(np.float32) for group in self._about.observations}
+            seen = {
+                group: np.nan_to_num(obs[group][k : k + 1]).astype(np.float32) for group in self._about.observations
+            }
             rows.append(self._run(seen)[0])
         given = np.array(rows, dtype=np.float64)
         if given.shape[-1] != self._dim or given.ndim not in (2, 3):

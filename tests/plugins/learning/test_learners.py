@@ -2,6 +2,7 @@
 
 import importlib
 import json
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -136,6 +137,16 @@ def test_the_view_of_sb3_is_one_that_sb3_accepts() -> None:
                 assert all(info["TimeLimit.truncated"] and info["episode"]["l"] == 5 for info in infos)
                 assert not np.array_equal(infos[0]["terminal_observation"], obs[0]), "that of the next episode"
         assert view.finished == ["truncated"] * 6
+
+
+def test_training_leaves_nothing_in_the_temporary_folder(
+    runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with anysim.make("reach", engine="mujoco", num_envs=4, overrides=QUIET) as env:
+        made, _ = learner("sb3-ppo", env, runs)
+        made.advance()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_critic_of_rsl_rl_sees_what_the_actor_does_not() -> None:
