@@ -332,7 +332,7 @@ def make(
         loaded = _loaded(source, [*more, f"engine={_as_text(engine)}"])
     spec = loaded.spec
     if spec.task is None:  # before the world is built
-        raise TaskError(NO_TASK)
+        raise TaskError(f"{loaded.files[-1]}: {NO_TASK}" if loaded.files else NO_TASK)
     crowd = _announce_instances(loaded, base)
     world = compile_world(loaded, base=base)
     name = str(source) if isinstance(source, str) and "/" not in str(source) else world.name

@@ -90,3 +90,9 @@ def test_a_file_without_a_task_is_refused_before_its_world_is_built(monkeypatch:
     monkeypatch.setattr(api, "compile_world", lambda *_, **__: pytest.fail("the world was built"))
     with pytest.raises(TaskError, match="this file has no `task`"):
         anysim.make({"world": {}}, engine="null")
+
+
+def test_a_file_without_a_task_is_named(tmp_path: Path) -> None:
+    (tmp_path / "world.yaml").write_text("world: {name: w}\n")
+    with pytest.raises(TaskError, match=r"world\.yaml: this file has no `task`"):
+        anysim.make(tmp_path / "world.yaml", engine="null")
