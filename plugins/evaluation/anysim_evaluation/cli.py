@@ -55,6 +55,9 @@ def evaluate(
     privileged: Annotated[
         bool, typer.Option("--privileged", help="Show the policy the observations that only a simulator knows, too.")
     ] = False,
+    videos: Annotated[
+        int, typer.Option(min=0, help="How many first successes, and first failures, are filmed on each engine.")
+    ] = 0,
     override: Overrides = None,
     out: Annotated[Path | None, typer.Option(help="Directory of the results; default runs/evaluate-….")] = None,
     json: AsJson = False,
@@ -69,7 +72,7 @@ def evaluate(
     that are carried out step by step.
 
     Examples:
-      anysim evaluate pick_cube --engine all --episodes 100
+      anysim evaluate pick_cube --engine all --episodes 100 --videos 2
       anysim evaluate pick_cube --policy expert:sigma=0.1 --level L2
       anysim evaluate reach --policy my_policies:reach --split test
     """
@@ -85,9 +88,12 @@ def evaluate(
     question = Question(task, policy, split, seeds, overrides, min(num_envs or MOST_ENVS, episodes), privileged)
     folder = out or Path("runs") / "-".join(["evaluate", *map(_plain, (Path(task).stem, policy, level or "", split))])
     done: dict[str, dict[int, Episode]] = {}
+    films: dict[str, list[str]] = {}
     for name in _engines(engine):
         try:
-            done |= _evaluate(question, name, folder, json)
+            found = _evaluate(question, name, folder, json)
+            done |= found
+            films |= _filmed(question, found, videos, folder) if videos else {}
         except AnysimError as error:
             if engine != "all" or isinstance(error, TaskError):
                 raise
@@ -103,6 +109,7 @@ def evaluate(
         "num_episodes": episodes,
         "engines": {name: summary(list(found.values())) for name, found in done.items()},
         "agreement": agreements(done),
+        "videos": films,
     }
     write_whole(folder, {"evaluation.json": dumps(told, indent=2) + "\n", PAGE: page(told)})
     if json:
@@ -144,6 +151,26 @@ def _evaluate(question: Question, engine: str | None, folder: Path, quiet: bool)
                     won += episode.status == "success"
                     tell(f"{name} seed {episode.seed}: {episode.failure or 'success'}", f"{won} solved")
             return {name: {seed: log.episodes[seed] for seed in question.seeds}}
+
+
+def _filmed(
+    question: Question, done: "Mapping[str, Mapping[int, Episode]]", count: int, folder: Path
+) -> dict[str, list[str]]:
+    """The videos of one engine's first successes and failures, by its name: paths in `folder`."""
+    from anysim.api import make
+    from anysim.errors import EngineError
+    from anysim_evaluation.policy import make_policy
+    from anysim_evaluation.videos import chosen, film
+
+    ((name, episodes),) = done.items()
+    with make(question.task, engine=name, num_envs=1, overrides=[*question.overrides, "record.cameras=[]"]) as env:
+        wanted, policy = chosen(episodes, count), make_policy(env, question.policy)
+        try:
+            paths = film(env, policy, wanted, folder / name, privileged=question.privileged)
+        except EngineError as error:
+            typer.echo(f"no videos on {name}: {error}", err=True)
+            paths = []
+    return {name: [f"{name}/{path}" for path in paths]}
 
 
 def _tell(told: Mapping[str, Any]) -> None:

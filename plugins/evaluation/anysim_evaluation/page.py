@@ -1,8 +1,9 @@
-"""An evaluation as one self-contained page: rates with their intervals drawn, failures by type, agreement."""
+"""An evaluation as one page: rates with their intervals drawn, failures by type, agreement, videos beside it."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 WIDTH, HEIGHT = 240, 16
@@ -54,6 +55,12 @@ def _body(told: Mapping[str, Any], title: str) -> Iterator[str]:
         if pair["seeds"]
     ]
     yield from table("Agreement, seed by seed", ("engines", "same outcome", "kappa", "one alone", "p"), pairs)
+    films = [
+        [escape(name), " ".join(f'<img src="{escape(path)}" alt="{escape(Path(path).stem)}"/>' for path in paths)]
+        for name, paths in told.get("videos", {}).items()
+        if paths
+    ]
+    yield from table("The first successes and failures", ("engine", ""), films)
 
 
 def drawn(share: float | None, interval: Sequence[float]) -> str:

@@ -8,11 +8,13 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import typer
+from PIL import Image
 from typer.testing import CliRunner
 
 import anysim
 from anysim.errors import AnysimError, RecordError, SpecError, TaskError
 from anysim.skills.phases import MovingSkill
+from anysim.testing.engines import require_drawing
 from anysim_evaluation import cli, policy as policies
 from anysim_evaluation.driver import Episode, drive, episode_seeds
 from anysim_evaluation.expert import ExpertPolicy
@@ -204,6 +206,24 @@ def test_from_the_command_line_and_again(tmp_path: Path) -> None:
     assert ElementTree.fromstring(text.partition("\n")[2]) is not None
     other = CliRunner().invoke(app, [*words, "--policy", "zero"])
     assert "has episodes of something else: policy 'expert' and now 'zero'" in str(other.exception)
+
+
+def test_first_successes_and_failures_are_filmed(tmp_path: Path) -> None:
+    require_drawing("mujoco")
+    words = ["reach", "-e", "mujoco", "-k", "5", "-p", "expert:sigma=0.5", "--out", str(tmp_path), "--json"]
+    small = ["-o", "task.horizon=130", "-o", "world.cameras.front.size=[64, 48]"]
+    told = json.loads(CliRunner().invoke(app, [*words, *small, "--videos", "1"]).output)
+    by_seed = {e["seed"]: e for e in told["engines"]["mujoco"]["episodes"]}
+    paths = told["videos"]["mujoco"]
+    assert len(paths) == len({e["status"] for e in by_seed.values()}), "one of each kind that there is"
+    for path in paths:
+        kind, seed = Path(path).stem.split("-")
+        episode = by_seed[int(seed)]
+        assert (kind == "success") == (episode["status"] == "success")
+        with Image.open(tmp_path / path) as video:
+            assert video.size == (64, 48)
+            assert video.n_frames == -(-episode["steps"] // 4), "12.5 images in a second of 50 control steps"
+    assert all(f'src="{path}"' in (tmp_path / "evaluation.html").read_text() for path in paths)
 
 
 def test_all_engines_and_levels(tmp_path: Path) -> None:
