@@ -22,6 +22,8 @@ from anysim_schemas.cameras import CameraSpec
 
 _POSE = ("from_", "look_at_offset", "position", "roll_pitch_yaw")
 
+_CALLED = {"rgb": "colours"}
+
 _MOST_LIGHT = 1e6
 """Exposure and noise of a snapshot beyond this are nonsense."""
 
@@ -123,7 +125,8 @@ class CaptureManager(Manager):
                 issues.append(SpecIssue("", path, text))
             elif lacking := set(images[name].channels) - set(cameras[name].channels):
                 text = (
-                    f"the camera gives no {' and no '.join(sorted(lacking))}; add it to world.cameras.{name}.channels"
+                    f"the camera gives no {' and no '.join(_CALLED.get(c, c) for c in sorted(lacking))}; add "
+                    f"{' and '.join(sorted(lacking))} to world.cameras.{name}.channels"
                 )
                 issues.append(SpecIssue("", path, text))
         if issues:

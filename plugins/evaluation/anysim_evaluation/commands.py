@@ -11,8 +11,7 @@ if TYPE_CHECKING:
 @hookimpl
 def add_cli(app: "typer.Typer") -> None:
     """`anysim evaluate` and `anysim benchmark`."""
-    from anysim_evaluation import cli
-    from anysim_evaluation.benchmark import cli as benchmark
+    from anysim_evaluation.cli import benchmark, evaluate
 
-    app.command("evaluate")(cli.evaluate)
+    app.command("evaluate")(evaluate.evaluate)
     app.add_typer(benchmark.app, name="benchmark")

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -61,7 +62,7 @@ def train(
     from anysim import registry
     from anysim.api import make
     from anysim.cli.output import print_json
-    from anysim.errors import PluginError
+    from anysim.errors import PluginError, listing
     from anysim.plugin_parameters import checked, options_model, parameters
     from anysim_learning.batch import POLICY
     from anysim_learning.gymnasium import PRIVILEGED
@@ -70,15 +71,10 @@ def train(
 
     folder = out or Path("runs") / "-".join(["train", Path(task).stem, *([level] if level else []), learner, str(seed)])
     overrides = [*(override or ()), *([] if level is None else [f"level={level}"]), "record.cameras=[]"]
-    try:
-        made = registry.load("learners", learner)
-    except PluginError as error:
-        if isinstance(error.__cause__, ImportError):
-            raise PluginError(
-                f"the learner '{learner}' cannot run here: {error.__cause__}. pip install "
-                f"'anysim-learning[{_EXTRAS.get(learner, 'torch')}]'"
-            ) from error
-        raise
+    made = registry.load("learners", learner)
+    if missing := [name for name in getattr(made, "needs", ()) if find_spec(name) is None]:
+        remedy = f"pip install 'anysim-learning[{_EXTRAS.get(learner, 'torch')}]', best in an environment of its own"
+        raise PluginError(f"the learner '{learner}' needs {listing(missing)}, which is not installed: {remedy}")
     given = checked(options_model(made), _options(option or ()), "option")
     with (
         make(task, engine=engine, num_envs=num_envs, overrides=overrides) as env,

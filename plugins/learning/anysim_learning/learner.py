@@ -4,7 +4,7 @@ A learner is an entry point of the group `anysim.learners`: a class that is made
 hyperparameters.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
@@ -35,6 +35,8 @@ class Learner(Protocol):
 
     steps: int
     """How far it is: control steps of all envs together, or steps of descent."""
+    needs: Sequence[str]
+    """The modules that it cannot be made without; its own module is imported without them."""
     chunk: int
     """How many actions the network gives for an observation."""
 

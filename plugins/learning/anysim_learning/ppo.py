@@ -1,30 +1,26 @@
 """The learner `sb3-ppo`: proximal policy optimisation of Stable-Baselines3 (Schulman et al. 2017)."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-import torch  # pyright: ignore[reportMissingImports]
 from pydantic import Field
-from stable_baselines3 import PPO  # pyright: ignore[reportMissingImports]
-from stable_baselines3.common.logger import Logger  # pyright: ignore[reportMissingImports]
-from stable_baselines3.common.vec_env import VecNormalize  # pyright: ignore[reportMissingImports]
 
 from anysim_learning.learner import Lesson
-from anysim_learning.sb3 import Sb3VecEnv
-from anysim_learning.tensors import tensors
 from anysim_schemas.base import Positive
+
+if TYPE_CHECKING:
+    import torch  # pyright: ignore[reportMissingImports]
 
 RECENT = 100
 """Episodes over which success and reward are averaged."""
-
-_CLIP = 10.0
 
 
 class Sb3Ppo:
     """PPO with running normalisation of observations and rewards, both folded into what is exported."""
 
     chunk = 1
+    needs = ("stable_baselines3", "torch", "tensorboard", "onnx")
 
     def __init__(
         self,
@@ -41,8 +37,14 @@ class Sb3Ppo:
         width: Annotated[int, Field(ge=1, description="of the two hidden layers")] = 256,
         noise: Annotated[float, Field(gt=0, description="initial deviation of actions, in half ranges")] = 0.6,
     ) -> None:
+        from stable_baselines3 import PPO  # pyright: ignore[reportMissingImports]
+        from stable_baselines3.common.logger import Logger  # pyright: ignore[reportMissingImports]
+        from stable_baselines3.common.vec_env import VecNormalize  # pyright: ignore[reportMissingImports]
+
+        from anysim_learning.sb3 import CLIP, Sb3VecEnv
+
         self._view = Sb3VecEnv(lesson.env, lesson.groups, lesson.seed)
-        self._normal = VecNormalize(self._view, clip_obs=_CLIP, gamma=gamma)
+        self._normal = VecNormalize(self._view, clip_obs=CLIP, gamma=gamma)
         self._stretch = n_steps * lesson.env.num_envs
         self._model = PPO(
             "MlpPolicy",
@@ -95,6 +97,8 @@ class Sb3Ppo:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Go on from there, with episodes that follow from the seed and how far it is."""
+        from anysim_learning.tensors import tensors
+
         self._model.policy.load_state_dict(tensors(state["policy"]))
         self._model.policy.optimizer.load_state_dict(tensors(state["optimizer"]))
         for name, rms in (("obs", self._normal.obs_rms), ("reward", self._normal.ret_rms)):
@@ -104,22 +108,9 @@ class Sb3Ppo:
         self._view.seed(self._view.start + self._model.num_timesteps)
         self._model.set_random_seed(self._view.start + self._model.num_timesteps)
 
-    def network(self) -> torch.nn.Module:
+    def network(self) -> "torch.nn.Module":
         """The mean action, in the units of the env."""
+        from anysim_learning.sb3 import Actor
+
         rms, batch = self._normal.obs_rms, self._view.batch
-        return _Actor(self._model.policy, rms.mean, rms.var, self._normal.epsilon, batch.middle, batch.half)
-
-
-class _Actor(torch.nn.Module):
-    """The normalisation, the policy's mean, and the range of the actions."""
-
-    def __init__(self, policy: Any, mean: Any, var: Any, epsilon: float, middle: Any, half: Any) -> None:
-        super().__init__()
-        self.body, self.head = policy.mlp_extractor.policy_net, policy.action_net
-        for name, value in (("mean", mean), ("deviation", np.sqrt(var + epsilon)), ("middle", middle), ("span", half)):
-            self.register_buffer(name, torch.as_tensor(np.asarray(value), dtype=torch.float32))
-
-    def forward(self, *groups: Any) -> Any:
-        x = torch.cat(groups, dim=1)
-        x = torch.clamp((x - self.mean) / self.deviation, -_CLIP, _CLIP)
-        return self.middle + self.span * torch.clamp(self.head(self.body(x)), -1.0, 1.0)
+        return Actor(self._model.policy, rms.mean, rms.var, self._normal.epsilon, batch.middle, batch.half)

@@ -5,11 +5,15 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+import torch  # pyright: ignore[reportMissingImports]
 from stable_baselines3.common.vec_env import VecEnv  # pyright: ignore[reportMissingImports]
 
 from anysim.conventions import Array
 from anysim.task.env import TaskEnv
 from anysim_learning.batch import POLICY, Batch
+
+CLIP = 10.0
+"""Normalised observations are cut off there."""
 
 
 class Sb3VecEnv(VecEnv):
@@ -91,3 +95,18 @@ class Sb3VecEnv(VecEnv):
 
     def _asked(self, indices: Any) -> Iterable[int]:
         return self._get_indices(indices)
+
+
+class Actor(torch.nn.Module):
+    """The normalisation, the policy's mean, and the range of the actions."""
+
+    def __init__(self, policy: Any, mean: Any, var: Any, epsilon: float, middle: Any, half: Any) -> None:
+        super().__init__()
+        self.body, self.head = policy.mlp_extractor.policy_net, policy.action_net
+        for name, value in (("mean", mean), ("deviation", np.sqrt(var + epsilon)), ("middle", middle), ("span", half)):
+            self.register_buffer(name, torch.as_tensor(np.asarray(value), dtype=torch.float32))
+
+    def forward(self, *groups: Any) -> Any:
+        x = torch.cat(groups, dim=1)
+        x = torch.clamp((x - self.mean) / self.deviation, -CLIP, CLIP)
+        return self.middle + self.span * torch.clamp(self.head(self.body(x)), -1.0, 1.0)

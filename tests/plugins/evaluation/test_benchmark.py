@@ -14,10 +14,11 @@ import pytest
 from typer.testing import CliRunner
 
 from anysim.errors import RecordError, SpecError, TaskError
-from anysim_evaluation.benchmark import cli, freezing
+from anysim_evaluation.benchmark import freezing
 from anysim_evaluation.benchmark.page import matrix, page
 from anysim_evaluation.benchmark.protocol import load_protocol, shipped
 from anysim_evaluation.benchmark.results import Cell, figures
+from anysim_evaluation.cli import benchmark as cli
 from anysim_evaluation.driver import Episode
 from anysim_schemas.benchmark import BenchmarkSpec
 

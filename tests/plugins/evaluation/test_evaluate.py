@@ -15,7 +15,8 @@ import anysim
 from anysim.errors import AnysimError, RecordError, SpecError, TaskError
 from anysim.skills.phases import MovingSkill
 from anysim.testing.engines import require_drawing
-from anysim_evaluation import cli, policy as policies
+from anysim_evaluation import policy as policies
+from anysim_evaluation.cli import evaluate as cli
 from anysim_evaluation.driver import Episode, drive, episode_seeds
 from anysim_evaluation.expert import ExpertPolicy
 from anysim_evaluation.log import EpisodeLog

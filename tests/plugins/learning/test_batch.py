@@ -1,20 +1,25 @@
 """Batches, demonstrations and checkpoints: what learners are fed with, without any learner."""
 
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
+from typer.testing import CliRunner
 
 import anysim
-from anysim.errors import RecordError, TaskError
+from anysim.errors import PluginError, RecordError, TaskError
 from anysim.record.collector import Collector
 from anysim.record.reader import open_trajectory
 from anysim.skills.runner import SkillPolicy
-from anysim_learning import checkpoint
+from anysim_learning import checkpoint, cli
 from anysim_learning.batch import Batch
 from anysim_learning.demonstrations import Demonstrations
 
 QUIET = ["record.cameras=[]"]
+app = typer.Typer()
+app.command()(cli.train)
 
 
 def test_a_batch_is_the_env_with_actions_of_unit_range() -> None:
@@ -79,6 +84,16 @@ def test_demonstrations_pair_what_was_seen_with_what_was_done(tmp_path: Path) ->
     (tmp_path / "empty").mkdir()
     with pytest.raises(TaskError, match="has no successful trajectory"):
         Demonstrations([tmp_path / "empty"], ("policy",))
+
+
+@pytest.mark.skipif(find_spec("torch") is not None, reason="torch is installed")
+@pytest.mark.parametrize("learner", ["sb3-ppo", "rsl-rl", "clone"])
+def test_without_torch_the_remedy_is_said(learner: str, tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["reach", "--learner", learner, "--out", str(tmp_path / "t")])
+    assert isinstance(done.exception, PluginError)
+    assert f"the learner '{learner}' needs " in str(done.exception)
+    assert "pip install 'anysim-learning[" in str(done.exception)
+    assert not (tmp_path / "t").exists()
 
 
 def test_a_checkpoint_comes_back_as_it_was(tmp_path: Path) -> None:

@@ -108,7 +108,7 @@ ROWS: dict[str, Row] = {
     "ImageSpec.channels": row(
         "task.images.eye.channels=[depth]",
         given=OBSERVED,
-        error=r"task\.images\.eye: the camera gives no depth; add it to world\.cameras\.eye\.channels",
+        error=r"task\.images\.eye: the camera gives no depth; add depth to world\.cameras\.eye\.channels",
     ),
     "ImageSpec.markers": row("task.images.eye.markers=true", given=OBSERVED, seen="filmed"),
     "RewardTermSpec.weight": row("task.rewards.close.weight=-2.0", seen="episode"),

@@ -1,0 +1,61 @@
+"""The view for rsl_rl 5: a `VecEnv` with all observation groups, and its actor as a network of plain tensors."""
+
+from typing import Any
+
+import numpy as np
+import torch  # pyright: ignore[reportMissingImports]
+from rsl_rl.env import VecEnv  # pyright: ignore[reportMissingImports]
+from tensordict import TensorDict  # pyright: ignore[reportMissingImports]
+
+from anysim.conventions import Array
+from anysim.task.env import TaskEnv
+from anysim_learning.batch import Batch
+
+
+class RslVecEnv(VecEnv):
+    """All envs with all their observation groups; which model sees which is said in the runner's `obs_groups`."""
+
+    def __init__(self, env: TaskEnv, seed: int = 0) -> None:
+        self.batch = Batch(env, tuple(env.observation_sizes))
+        assert env.spec.task is not None
+        self.num_envs, self.num_actions, self.device = env.num_envs, env.action_dim, "cpu"
+        self.max_episode_length = env.spec.task.horizon
+        self.cfg: dict[str, Any] = {"task": env.name, "engine": env.engine.name}
+        self.episode_length_buf = torch.zeros(env.num_envs, dtype=torch.long)
+        self.finished: list[tuple[str, float, int]] = []
+        """How the episodes ended so far: status, reward, steps."""
+        self._obs = self.batch.reset(seed)
+
+    def get_observations(self) -> TensorDict:
+        """The present observations (N, D) by group."""
+        return TensorDict({name: torch.from_numpy(rows.copy()) for name, rows in self._obs.items()}, [self.num_envs])
+
+    def step(self, actions: torch.Tensor) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict[str, Any]]:
+        """One control step; episodes that only ran out of time are `time_outs`."""
+        moment = self.batch.step(actions.detach().numpy())
+        self._obs = moment.obs
+        self.finished += [(one.status, one.total_reward, one.steps) for one in moment.ended]
+        self.episode_length_buf = torch.from_numpy(self.batch.env.scene.elapsed.astype(np.int64))
+        extras = {"time_outs": torch.from_numpy(moment.truncated.copy())}
+        return self.get_observations(), _tensor(moment.reward), _tensor(moment.done).long(), extras
+
+    def begin(self, seed: int) -> None:
+        """Begin other episodes."""
+        self._obs = self.batch.reset(seed)
+
+
+class Actor(torch.nn.Module):
+    """rsl_rl's actor without its TensorDict, and the range of the actions."""
+
+    def __init__(self, actor: Any, batch: Batch) -> None:
+        super().__init__()
+        self.inner = actor.as_onnx(verbose=False)
+        self.register_buffer("middle", _tensor(batch.middle))
+        self.register_buffer("span", _tensor(batch.half))
+
+    def forward(self, *groups: Any) -> Any:
+        return self.middle + self.span * torch.clamp(self.inner(torch.cat(groups, dim=1)), -1.0, 1.0)
+
+
+def _tensor(rows: Array) -> torch.Tensor:
+    return torch.as_tensor(np.asarray(rows, dtype=np.float32))
