@@ -78,6 +78,11 @@ def test_a_plain_file_has_no_notes(load: Callable[..., ImportedModel]) -> None:
         ("inner", "<light/>", "lights: are left out"),
         ("rest", '<sensor><jointpos name="s" joint="turn"/></sensor>', "sensors: are left out"),
         ("rest", '<actuator><motor joint="turn" ctrlrange="-1 2"/></actuator>', "actuator ctrlrange: [-1, 2] is one-"),
+        (
+            "rest",
+            '<actuator><general joint="turn" gainprm="5" biastype="affine" biasprm="3" ctrlrange="-1 2"/></actuator>',
+            "actuator ctrlrange: [-1, 2] is one-",
+        ),
         ("rest", '<actuator><position joint="turn" kp="1" delay="0.1" nsample="9"/></actuator>', "actuator delay: 0.1"),
         ("rest", '<equality><joint joint1="grip" active="false"/></equality>', "equality active: is inactive"),
         ("rest", '<equality><joint joint1="grip" joint2="turn" solref="0.1 1"/></equality>', "equality solref: 0.1 1"),

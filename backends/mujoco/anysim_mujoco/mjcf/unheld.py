@@ -277,4 +277,6 @@ def _lopsided(limits: Any) -> str:
 
 
 def _motor(drive: Any) -> bool:
-    return drive.biastype == mujoco.mjtBias.mjBIAS_NONE and bool(drive.ctrllimited)
+    """Whether a control is an effort, and bounded: nothing, or only a constant, is added to it."""
+    constant = drive.biastype == mujoco.mjtBias.mjBIAS_AFFINE and not drive.biasprm[1:3].any()
+    return (drive.biastype == mujoco.mjtBias.mjBIAS_NONE or constant) and bool(drive.ctrllimited)
