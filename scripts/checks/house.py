@@ -11,7 +11,7 @@ from checks.tree import Fault, Tree
 
 CORE = Path("core/anysim")
 TESTING = CORE / "testing"
-CORE_LINES, CORE_FILES = 30_100, 224
+CORE_LINES, CORE_FILES = 30_000, 222
 """What there is, and 2 % for contracts to come. What looks on, and what reads one format of files, is a plugin."""
 PACKAGE_LINES, PACKAGE_MODULES = 4_000, 26
 BACKEND_LINES = {"mujoco": 2_310, "pybullet": 3_300, "sapien": 3_700}
