@@ -1,10 +1,14 @@
 """`anysim list`: what is installed."""
 
-from typing import Annotated
+from contextlib import suppress
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from anysim.cli.options import AsJson
+
+if TYPE_CHECKING:
+    from anysim_schemas.load import LoadedRun
 
 
 def list_(
@@ -28,8 +32,11 @@ def list_(
         raise PluginError(
             f"there is no kind '{kind}'{suggest(kind, list(registry.KINDS))} (kinds: {listing(registry.KINDS, 20)})"
         )
-    if kind in ("robots", "tasks"):
-        _robots(json) if kind == "robots" else _tasks(engines, json)
+    if kind == "robots":
+        _robots(json)
+        return
+    if kind == "tasks":
+        _tasks(engines, json)
         return
     rows = [{"name": name, "from": _origin(kind, name), "what": _what(kind, name)} for name in registry.names(kind)]
     if json:
@@ -91,7 +98,7 @@ def _tasks(ask_engines: bool, json: bool) -> None:
             row |= {"robots": [one.robot for one in spec.world.robots.values()], "levels": list(spec.levels)}
             row |= {"what": task.description}
             if ask_engines:
-                row["engines"] = _able(name)
+                row["engines"] = _able(loaded, name)
         except AnysimError as error:
             row["what"] = f"does not load: {error}"
     if json:
@@ -105,16 +112,19 @@ def _tasks(ask_engines: bool, json: bool) -> None:
     print_table("tasks: `anysim run NAME` collects with the expert", (*columns, "from", "what"), told)
 
 
-def _able(name: str) -> list[str]:
+def _able(loaded: "LoadedRun", name: str) -> list[str]:
     """The engines with physics that can run a task."""
-    from anysim.cli.check import report_on
+    from anysim.api import check_engine, compile_world
     from anysim.engine.capability import Capability
-    from anysim.engine.factory import runnable
+    from anysim.engine.factory import engine_class, runnable
+    from anysim.errors import CapabilityError
 
-    answers = report_on(name, None, True, []).answers
-    return [
-        answer.engine for answer in answers if not answer.refusal and answer.engine in runnable(Capability.DYNAMICS)
-    ]
+    world, able = compile_world(loaded), list[str]()
+    for engine in runnable(Capability.DYNAMICS):
+        with suppress(CapabilityError):
+            check_engine(loaded, world, engine_class(engine), name)
+            able.append(engine)
+    return able
 
 
 def _capabilities() -> None:

@@ -16,7 +16,7 @@ from anysim.managers.markers import paint
 from anysim.math import pose as P
 from anysim.model.frames import find_frame
 from anysim.model.slots import ABSENT, active_entity, single
-from anysim.model.world import World
+from anysim.model.world import Camera, World
 from anysim.randomization.draw import draw_rows, is_random
 from anysim_schemas.cameras import CameraSpec
 
@@ -241,20 +241,23 @@ class CaptureManager(Manager):
 
     def _blank(self, camera: str, channel: str, rows: int) -> Array:
         """Images of nothing, of a camera's size; what a camera gives in a run that only looks its names up."""
-        found = self.engine.world.cameras[self.engine.index.camera(camera)]
+        found = self._camera(camera)
         return blank_images((rows, found.height, found.width), [channel])[channel]
+
+    def _camera(self, name: str) -> Camera:
+        return self.engine.world.cameras[self.engine.index.camera(name)]
 
     def _shoot(
         self, camera: str, env_ids: Array, ticks: Array, channels: Sequence[str], body_pose: Array | None = None
     ) -> dict[str, Array]:
-        if not set(channels) <= set(self.engine.world.cameras[self.engine.index.camera(camera)].channels):
+        lens = self._camera(camera)
+        if not set(channels) <= set(lens.channels):
             return {channel: self._blank(camera, channel, len(env_ids)) for channel in channels}
         began = time.perf_counter()
         found = self.engine.render(camera, env_ids=env_ids, channels=channels, body_pose=body_pose)
         self.draw_seconds += time.perf_counter() - began
         if "depth" in found:  # finite, for policies and snapshots
-            far = self.engine.world.cameras[self.engine.index.camera(camera)].far
-            np.minimum(found["depth"], np.float32(far), out=found["depth"])
+            np.minimum(found["depth"], np.float32(lens.far), out=found["depth"])
         if "rgb" in found:
             self._expose(camera, env_ids, ticks, found["rgb"])
         return found
@@ -277,16 +280,15 @@ class CaptureManager(Manager):
         data: dict[str, Array] = {}
         for name in self._specs:
             data |= {f"exposure.{name}": self._exposure[name][env_ids], f"noise.{name}": self._noise[name][env_ids]}
-        for name in self._lasting():  # an image of an earlier moment cannot be taken again
+        for camera, channel in self._lasting():  # an image of an earlier moment cannot be taken again
+            name = _kept_as(camera, channel)
             if name in self._latest:
                 data |= {f"latest.{name}": self._latest[name][env_ids], f"taken.{name}": self._taken[name][env_ids]}
         return data
 
-    def _lasting(self) -> list[str]:
-        """Which observed images show more than one control step, as `_kept_as` names them."""
-        return [
-            _kept_as(camera, c) for camera, every in self.observed.items() if every > 1 for c in self._channels[camera]
-        ]
+    def _lasting(self) -> list[tuple[str, str]]:
+        """The cameras and channels of observed images that show more than one control step."""
+        return [(camera, c) for camera, every in self.observed.items() if every > 1 for c in self._channels[camera]]
 
     def refuse_rows(self, data: Mapping[str, Array]) -> None:
         for name in self._specs:
@@ -299,10 +301,9 @@ class CaptureManager(Manager):
             self._noise[name][env_ids] = data[f"noise.{name}"]
         for taken in self._taken.values():
             taken[env_ids] = -1
-        for name in self._lasting():
-            if f"latest.{name}" in data:
-                camera, _, channel = name.partition("/")
-                self._room(camera, channel or "rgb")
+        for camera, channel in self._lasting():
+            if f"latest.{_kept_as(camera, channel)}" in data:
+                name = self._room(camera, channel)
                 self._latest[name][env_ids], self._taken[name][env_ids] = data[f"latest.{name}"], data[f"taken.{name}"]
 
 
