@@ -1,5 +1,6 @@
 """A batch of envs as learners want it: an env whose episode ends begins the next one in the same step."""
 
+from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -12,6 +13,10 @@ from anysim.task.env import TaskEnv
 
 POLICY = "policy"
 """The group of observations that every policy may see."""
+
+
+RECENT = 100
+"""Episodes over which success, reward and steps are averaged."""
 
 
 class Ended(NamedTuple):
@@ -50,10 +55,26 @@ class Moment(NamedTuple):
     ended: tuple[Ended, ...]
 
 
+def action_range(env: TaskEnv) -> tuple[Array, Array]:
+    """The middle and half of the range of each action (A,), in the units of the env.
+
+    Raises:
+        TaskError: an action has no bounds.
+    """
+    low, high = (np.asarray(bound, dtype=np.float64) for bound in env.action_bounds)
+    if not (np.isfinite(low) & np.isfinite(high)).all():
+        raise TaskError(f"the actions of '{env.name}' have no bounds, which learners need: bound its controllers")
+    return (low + high) / 2, (high - low) / 2
+
+
 class Batch:
     """Envs that begin their next episode in the step that ends one.
 
     Actions are in [-1, 1], which stand for the bounds of the env's.
+
+    Attributes:
+        middle, half: (A,) of the bounds of the env's actions.
+        recent: the last episodes that have ended.
     """
 
     def __init__(self, env: TaskEnv, groups: Sequence[str] = (POLICY,)) -> None:
@@ -70,14 +91,22 @@ class Batch:
                 )
         self.env, self.groups = env, tuple(groups)
         self.sizes = {group: env.observation_sizes[group] for group in groups}
-        low, high = (np.asarray(bound, dtype=np.float64) for bound in env.action_bounds)
-        if not (np.isfinite(low) & np.isfinite(high)).all():
-            raise TaskError(f"the actions of '{env.name}' have no bounds, which learners need: bound its controllers")
-        self.middle, self.half = (low + high) / 2, (high - low) / 2
+        self.middle, self.half = action_range(env)
+        self.recent: deque[Ended] = deque(maxlen=RECENT)
         self._total = np.zeros(env.num_envs)
 
-    def reset(self, seed: int) -> dict[str, Array]:
-        """Begin an episode in each env; the episodes to come follow from `seed`."""
+    def averages(self) -> dict[str, float]:
+        """`reward`, `steps_per_episode` and `success` of recent episodes; nothing before the first has ended."""
+        if not self.recent:
+            return {}
+        return {
+            "reward": float(np.mean([one.total_reward for one in self.recent])),
+            "steps_per_episode": float(np.mean([one.steps for one in self.recent])),
+            "success": float(np.mean([one.status == Status.SUCCESS for one in self.recent])),
+        }
+
+    def reset(self, seed: int | None = None) -> dict[str, Array]:
+        """Begin an episode in each env; the episodes to come follow from `seed`, or go on where it is None."""
         self.env.reset(seed=seed)
         self._total[:] = 0.0
         return self._obs()
@@ -105,6 +134,7 @@ class Batch:
                 )
                 for i in np.flatnonzero(done).tolist()
             )
+            self.recent += ended
             env.reset(mask=done)
             self._total[done] = 0.0
         return Moment(self._obs(), reward.astype(np.float32), done, truncated, ended)

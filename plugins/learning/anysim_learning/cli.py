@@ -64,10 +64,11 @@ def train(
     from anysim.cli.output import print_json
     from anysim.errors import PluginError, listing
     from anysim.plugin_parameters import checked, options_model, parameters
+    from anysim.record.incoming import claim
     from anysim_learning.batch import POLICY
     from anysim_learning.gymnasium import PRIVILEGED
     from anysim_learning.learner import Lesson
-    from anysim_learning.train import claim, train as run
+    from anysim_learning.train import describe_training, train as run
 
     folder = out or Path("runs") / "-".join(["train", Path(task).stem, *([level] if level else []), learner, str(seed)])
     overrides = [*(override or ()), *([] if level is None else [f"level={level}"]), "record.cameras=[]"]
@@ -77,12 +78,13 @@ def train(
         raise PluginError(f"the learner '{learner}' needs {listing(missing)}, which is not installed: {remedy}")
     given = checked(options_model(made), _options(option or ()), "option")
     with (
+        claim(folder),
         make(task, engine=engine, num_envs=num_envs, overrides=overrides) as env,
         make(task, engine=engine, num_envs=_EXAMINED, overrides=overrides) as examined,
     ):
         groups = (POLICY, PRIVILEGED) if privileged and PRIVILEGED in env.observation_sizes else (POLICY,)
         runs = tuple(path.resolve() for path in data or ())
-        claim(folder, _about(env, learner, groups, seed, given.model_dump(), runs))
+        describe_training(folder, _about(env, learner, groups, seed, given.model_dump(), runs))
         lesson = Lesson(env, groups, seed, runs)
         with registry.using("learners", learner, (ValueError,)):
             driven = made(lesson, **{key: getattr(given, key) for key in parameters(made)})
@@ -103,16 +105,20 @@ _EXAMINED = 64
 
 
 def _options(pairs: Sequence[str]) -> dict[str, Any]:
-    import yaml
-
     from anysim.errors import TaskError
+    from anysim_schemas.nodes import Fault
+    from anysim_schemas.yaml import parse
 
     options: dict[str, Any] = {}
     for pair in pairs:
         key, equals, value = pair.partition("=")
         if not equals or not re.fullmatch(r"\w+", key) or key in options:
             raise TaskError(f"--option {pair}: expected KEY=VALUE, each key once, as in --option gamma=0.99")
-        options[key] = float(value) if re.fullmatch(r"[-+]?\d+(\.\d*)?e[-+]?\d+", value) else yaml.safe_load(value)
+        faults: list[Fault] = []
+        node = parse(value, f"--option {pair}", faults)
+        if node is None or faults:
+            raise TaskError(f"--option {pair}: the value cannot be read: {faults[0].message}")
+        options[key] = node.plain()
     return options
 
 

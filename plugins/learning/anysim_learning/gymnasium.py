@@ -89,9 +89,10 @@ class GymEnv(gym.Env[dict[str, Array], Any]):
         self.env = env
         self.metadata = _metadata(env)
         self.render_mode = render_mode
-        self.observation_space: gym.spaces.Space[Any] = observation_space(env, privileged)
+        shown = observation_space(env, privileged)
+        self.observation_space: gym.spaces.Space[Any] = shown
+        self._shown = tuple(shown)
         self.action_space: gym.spaces.Space[Any] = action_space(env, action)
-        self._shown = tuple(observation_space(env, privileged))
         self._form: ActionForm = action
 
     def reset(

@@ -10,6 +10,7 @@ import torch  # pyright: ignore[reportMissingImports]
 from torch import nn  # pyright: ignore[reportMissingImports]
 
 from anysim_learning.learner import Lesson
+from anysim_learning.tensors import InUnits
 
 _CLIP = 5.0
 
@@ -19,15 +20,9 @@ class Rows:
 
     def __init__(self, arrays: Any, lesson: Lesson) -> None:
         obs, action, mask = arrays
-        middle, half = _range(lesson)
         self.obs = torch.as_tensor(np.concatenate([obs[group] for group in lesson.groups], axis=1))
-        self.action = (torch.as_tensor(action) - middle) / half
+        self.action = InUnits(lesson.env).inverse(torch.as_tensor(action))
         self.mask = torch.as_tensor(mask)
-
-
-def _range(lesson: Lesson) -> tuple[torch.Tensor, torch.Tensor]:
-    low, high = (np.asarray(bound, dtype=np.float32) for bound in lesson.env.action_bounds)
-    return torch.as_tensor((low + high) / 2), torch.as_tensor(np.maximum((high - low) / 2, 1e-6))
 
 
 def error(given: torch.Tensor, wanted: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
@@ -40,18 +35,16 @@ class Policy(nn.Module):
 
     def __init__(self, body: nn.Module, mean: Any, deviation: Any, lesson: Lesson, carried_out: int) -> None:
         super().__init__()
-        self.body, self._kept = body, carried_out
-        middle, half = _range(lesson)
-        for name, value in (("mean", mean), ("deviation", deviation), ("middle", middle), ("span", half)):
-            self.register_buffer(name, value)
+        self.body, self._kept, self.in_units = body, carried_out, InUnits(lesson.env)
+        self.register_buffer("mean", mean)
+        self.register_buffer("deviation", deviation)
 
     def normal(self, obs: Any) -> Any:
         """Observations in deviations from their mean."""
         return torch.clamp((obs - self.mean) / self.deviation, -_CLIP, _CLIP)
 
     def forward(self, *groups: Any) -> Any:
-        chunk = self.body(self.normal(torch.cat(groups, dim=1)))[:, : self._kept]
-        return self.middle + self.span * torch.clamp(chunk, -1.0, 1.0)
+        return self.in_units(self.body(self.normal(torch.cat(groups, dim=1)))[:, : self._kept])
 
 
 class Mlp(nn.Module):

@@ -7,13 +7,11 @@ import numpy as np
 from pydantic import Field
 
 from anysim_learning.learner import Lesson
+from anysim_learning.parameters import Discount, Entropy, Epochs, Noise, RolloutSteps, TraceDecay, Width
 from anysim_schemas.base import Positive
 
 if TYPE_CHECKING:
     import torch  # pyright: ignore[reportMissingImports]
-
-RECENT = 100
-"""Episodes over which success and reward are averaged."""
 
 
 class Sb3Ppo:
@@ -27,15 +25,15 @@ class Sb3Ppo:
         lesson: Lesson,
         *,
         learning_rate: Positive = 3e-4,
-        n_steps: Annotated[int, Field(ge=2, description="control steps of each env between two updates")] = 128,
+        n_steps: RolloutSteps = 128,
         batch_size: Annotated[int, Field(ge=2)] = 1024,
-        n_epochs: Annotated[int, Field(ge=1)] = 5,
-        gamma: Annotated[float, Field(gt=0, le=1)] = 0.98,
-        gae_lambda: Annotated[float, Field(ge=0, le=1)] = 0.95,
-        ent_coef: Annotated[float, Field(ge=0)] = 0.0,
+        n_epochs: Epochs = 5,
+        gamma: Discount = 0.98,
+        gae_lambda: TraceDecay = 0.95,
+        ent_coef: Entropy = 0.0,
         target_kl: Positive = 0.05,
-        width: Annotated[int, Field(ge=1, description="of the two hidden layers")] = 256,
-        noise: Annotated[float, Field(gt=0, description="initial deviation of actions, in half ranges")] = 0.6,
+        width: Width = 256,
+        noise: Noise = 0.6,
     ) -> None:
         from stable_baselines3 import PPO  # pyright: ignore[reportMissingImports]
         from stable_baselines3.common.logger import Logger  # pyright: ignore[reportMissingImports]
@@ -71,15 +69,7 @@ class Sb3Ppo:
     def advance(self) -> Mapping[str, float]:
         """Collect one rollout and learn from it."""
         self._model.learn(self._stretch, reset_num_timesteps=False)
-        finished, told = self._view.finished[-RECENT:], self._model.ep_info_buffer or []
-        self._view.finished[:-RECENT] = []
-        numbers = {"noise": float(self._model.policy.log_std.exp().mean().item())}
-        if told:
-            numbers["reward"] = float(np.mean([one["r"] for one in told]))
-            numbers["steps_per_episode"] = float(np.mean([one["l"] for one in told]))
-        if finished:
-            numbers["success"] = finished.count("success") / len(finished)
-        return numbers
+        return {"noise": float(self._model.policy.log_std.exp().mean().item()), **self._view.batch.averages()}
 
     def state(self) -> dict[str, Any]:
         """Weights, the optimiser's moments, and what the normalisation has seen."""
@@ -105,12 +95,11 @@ class Sb3Ppo:
             kept = state["seen"][name]
             rms.mean, rms.var, rms.count = kept["mean"], kept["var"], kept["count"]
         self._model.num_timesteps = int(state["steps"])
-        self._view.seed(self._view.start + self._model.num_timesteps)
         self._model.set_random_seed(self._view.start + self._model.num_timesteps)
 
     def network(self) -> "torch.nn.Module":
         """The mean action, in the units of the env."""
         from anysim_learning.sb3 import Actor
 
-        rms, batch = self._normal.obs_rms, self._view.batch
-        return Actor(self._model.policy, rms.mean, rms.var, self._normal.epsilon, batch.middle, batch.half)
+        seen = self._normal.obs_rms
+        return Actor(self._model.policy, seen.mean, np.sqrt(seen.var + self._normal.epsilon), self._view.batch.env)

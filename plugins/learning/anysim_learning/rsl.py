@@ -8,17 +8,14 @@ from collections.abc import Mapping
 from contextlib import redirect_stdout
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 from pydantic import Field
 
 from anysim_learning.learner import Lesson
+from anysim_learning.parameters import Discount, Entropy, Epochs, Noise, RolloutSteps, TraceDecay, Width
 from anysim_schemas.base import Positive
 
 if TYPE_CHECKING:
     import torch  # pyright: ignore[reportMissingImports]
-
-RECENT = 100
-"""Episodes over which success and reward are averaged."""
 
 
 class RslPpo:
@@ -32,15 +29,15 @@ class RslPpo:
         lesson: Lesson,
         *,
         learning_rate: Positive = 1e-3,
-        n_steps: Annotated[int, Field(ge=2, description="control steps of each env between two updates")] = 64,
-        n_epochs: Annotated[int, Field(ge=1)] = 5,
+        n_steps: RolloutSteps = 64,
+        n_epochs: Epochs = 5,
         n_batches: Annotated[int, Field(ge=1, description="parts that a rollout is learnt from in")] = 4,
-        gamma: Annotated[float, Field(gt=0, le=1)] = 0.98,
-        lam: Annotated[float, Field(ge=0, le=1)] = 0.95,
-        entropy_coef: Annotated[float, Field(ge=0)] = 0.0,
+        gamma: Discount = 0.98,
+        lam: TraceDecay = 0.95,
+        entropy_coef: Entropy = 0.0,
         desired_kl: Positive = 0.01,
-        width: Annotated[int, Field(ge=1, description="of the two hidden layers")] = 256,
-        noise: Annotated[float, Field(gt=0, description="initial deviation of actions, in half ranges")] = 0.6,
+        width: Width = 256,
+        noise: Noise = 0.6,
     ) -> None:
         import torch  # pyright: ignore[reportMissingImports]
         from rsl_rl.runners import OnPolicyRunner  # pyright: ignore[reportMissingImports]
@@ -82,13 +79,8 @@ class RslPpo:
         with redirect_stdout(io.StringIO()):
             self._runner.learn(1)
         self.steps += self._stretch
-        recent = self._view.finished = self._view.finished[-RECENT:]
-        numbers = {"noise": float(self._runner.alg.get_policy().output_std.mean().item())}
-        if recent:
-            status, reward, steps = zip(*recent, strict=True)
-            numbers["reward"], numbers["steps_per_episode"] = float(np.mean(reward)), float(np.mean(steps))
-            numbers["success"] = status.count("success") / len(status)
-        return numbers
+        noise = float(self._runner.alg.get_policy().output_std.mean().item())
+        return {"noise": noise, **self._view.batch.averages()}
 
     def state(self) -> dict[str, Any]:
         """What rsl_rl saves, and how far it is."""
@@ -110,4 +102,4 @@ class RslPpo:
         """The mean action, in the units of the env."""
         from anysim_learning.rsl_env import Actor
 
-        return Actor(self._runner.alg.get_policy(), self._view.batch)
+        return Actor(self._runner.alg.get_policy(), self._lesson.env)

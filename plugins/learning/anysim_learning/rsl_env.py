@@ -10,6 +10,7 @@ from tensordict import TensorDict  # pyright: ignore[reportMissingImports]
 from anysim.conventions import Array
 from anysim.task.env import TaskEnv
 from anysim_learning.batch import Batch
+from anysim_learning.tensors import InUnits
 
 
 class RslVecEnv(VecEnv):
@@ -22,8 +23,6 @@ class RslVecEnv(VecEnv):
         self.max_episode_length = env.spec.task.horizon
         self.cfg: dict[str, Any] = {"task": env.name, "engine": env.engine.name}
         self.episode_length_buf = torch.zeros(env.num_envs, dtype=torch.long)
-        self.finished: list[tuple[str, float, int]] = []
-        """How the episodes ended so far: status, reward, steps."""
         self._obs = self.batch.reset(seed)
 
     def get_observations(self) -> TensorDict:
@@ -34,7 +33,6 @@ class RslVecEnv(VecEnv):
         """One control step; episodes that only ran out of time are `time_outs`."""
         moment = self.batch.step(actions.detach().numpy())
         self._obs = moment.obs
-        self.finished += [(one.status, one.total_reward, one.steps) for one in moment.ended]
         self.episode_length_buf = torch.from_numpy(self.batch.env.scene.elapsed.astype(np.int64))
         extras = {"time_outs": torch.from_numpy(moment.truncated.copy())}
         return self.get_observations(), _tensor(moment.reward), _tensor(moment.done).long(), extras
@@ -47,14 +45,12 @@ class RslVecEnv(VecEnv):
 class Actor(torch.nn.Module):
     """rsl_rl's actor without its TensorDict, and the range of the actions."""
 
-    def __init__(self, actor: Any, batch: Batch) -> None:
+    def __init__(self, actor: Any, env: TaskEnv) -> None:
         super().__init__()
-        self.inner = actor.as_onnx(verbose=False)
-        self.register_buffer("middle", _tensor(batch.middle))
-        self.register_buffer("span", _tensor(batch.half))
+        self.inner, self.in_units = actor.as_onnx(verbose=False), InUnits(env)
 
     def forward(self, *groups: Any) -> Any:
-        return self.middle + self.span * torch.clamp(self.inner(torch.cat(groups, dim=1)), -1.0, 1.0)
+        return self.in_units(self.inner(torch.cat(groups, dim=1)))
 
 
 def _tensor(rows: Array) -> torch.Tensor:

@@ -11,6 +11,7 @@ from stable_baselines3.common.vec_env import VecEnv  # pyright: ignore[reportMis
 from anysim.conventions import Array
 from anysim.task.env import TaskEnv
 from anysim_learning.batch import POLICY, Batch
+from anysim_learning.tensors import InUnits
 
 CLIP = 10.0
 """Normalised observations are cut off there."""
@@ -33,16 +34,12 @@ class Sb3VecEnv(VecEnv):
         )
         self.start, self._begun = seed, False
         self._actions: Array = np.zeros((env.num_envs, env.action_dim))
-        self.finished: list[str] = []
-        """How the episodes ended so far, in order: a status each."""
 
     def reset(self) -> Array:
         """First observations (N, D). Later calls go on with the seeds of the first."""
-        if self._begun:
-            self.batch.env.reset()
-            return self._joined({group: self.batch.env.obs[group] for group in self.batch.groups})
+        seed = None if self._begun else self.start
         self._begun = True
-        return self._joined(self.batch.reset(self.start))
+        return self._joined(self.batch.reset(seed))
 
     def step_async(self, actions: Array) -> None:
         """Note the actions (N, A) of the next step."""
@@ -53,7 +50,6 @@ class Sb3VecEnv(VecEnv):
         moment = self.batch.step(self._actions)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for one in moment.ended:
-            self.finished.append(one.status)
             infos[one.env] = {
                 "terminal_observation": np.concatenate([one.obs[group] for group in self.batch.groups]),
                 "TimeLimit.truncated": bool(moment.truncated[one.env]),
@@ -100,13 +96,13 @@ class Sb3VecEnv(VecEnv):
 class Actor(torch.nn.Module):
     """The normalisation, the policy's mean, and the range of the actions."""
 
-    def __init__(self, policy: Any, mean: Any, var: Any, epsilon: float, middle: Any, half: Any) -> None:
+    def __init__(self, policy: Any, mean: Array, deviation: Array, env: TaskEnv) -> None:
         super().__init__()
-        self.body, self.head = policy.mlp_extractor.policy_net, policy.action_net
-        for name, value in (("mean", mean), ("deviation", np.sqrt(var + epsilon)), ("middle", middle), ("span", half)):
-            self.register_buffer(name, torch.as_tensor(np.asarray(value), dtype=torch.float32))
+        self.body, self.head, self.in_units = policy.mlp_extractor.policy_net, policy.action_net, InUnits(env)
+        self.register_buffer("mean", torch.as_tensor(mean, dtype=torch.float32))
+        self.register_buffer("deviation", torch.as_tensor(deviation, dtype=torch.float32))
 
     def forward(self, *groups: Any) -> Any:
         x = torch.cat(groups, dim=1)
         x = torch.clamp((x - self.mean) / self.deviation, -CLIP, CLIP)
-        return self.middle + self.span * torch.clamp(self.head(self.body(x)), -1.0, 1.0)
+        return self.in_units(self.head(self.body(x)))

@@ -64,7 +64,7 @@ def train(
     return numbers
 
 
-def claim(out: Path, about: Mapping[str, Any]) -> None:
+def describe_training(out: Path, about: Mapping[str, Any]) -> None:
     """Say in `out` what is trained there, or see that it is the same.
 
     Raises:

@@ -96,6 +96,13 @@ def test_without_torch_the_remedy_is_said(learner: str, tmp_path: Path) -> None:
     assert not (tmp_path / "t").exists()
 
 
+def test_a_hyperparameter_is_yaml_and_what_is_none_is_a_sentence() -> None:
+    assert cli._options(["a=1e-3", "b=64", "c=mlp"]) == {"a": 1e-3, "b": 64, "c": "mlp"}
+    for wrong, message in (("a", "expected KEY=VALUE"), ("a=[1", r"--option a=\[1: the value cannot be read")):
+        with pytest.raises(TaskError, match=message):
+            cli._options([wrong])
+
+
 def test_a_checkpoint_comes_back_as_it_was(tmp_path: Path) -> None:
     tree = {
         "weights": {"a": np.arange(6.0).reshape(2, 3), "b": np.array(3)},

@@ -8,12 +8,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+import typer
+from typer.testing import CliRunner
 
 import anysim
 from anysim.errors import TaskError
+from anysim.record import incoming
 from anysim.record.collector import Collector
 from anysim.skills.runner import SkillPolicy
 from anysim.testing.engines import require_engine
+from anysim_learning import cli
 
 torch = pytest.importorskip("torch", reason="the learners need torch: make test-learning")
 pytestmark = pytest.mark.full
@@ -90,14 +94,14 @@ def test_a_learner_goes_on_where_it_was_put_away(name: str, runs: Path, tmp_path
 
 
 def test_a_training_is_interrupted_and_goes_on(runs: Path, tmp_path: Path) -> None:
-    from anysim_learning.train import CURVE, POLICY, claim, train
+    from anysim_learning.train import CURVE, POLICY, describe_training, train
 
     told: list[Any] = []
     with (
         anysim.make("reach", engine="mujoco", num_envs=4, overrides=QUIET) as env,
         anysim.make("reach", engine="mujoco", num_envs=2, overrides=QUIET) as examined,
     ):
-        claim(tmp_path, {"seed": 0})
+        describe_training(tmp_path, {"seed": 0})
         made, lesson = learner("sb3-ppo", env, runs)
 
         def stop(numbers: Any) -> None:
@@ -110,7 +114,7 @@ def test_a_training_is_interrupted_and_goes_on(runs: Path, tmp_path: Path) -> No
         rows = [json.loads(line) for line in (tmp_path / CURVE).read_text().splitlines()]
         assert [row["steps"] for row in rows] == [32, 64]
         again, lesson = learner("sb3-ppo", env, runs)
-        claim(tmp_path, {"seed": 0})
+        describe_training(tmp_path, {"seed": 0})
         numbers = train(again, lesson, examined, 128, 4, tmp_path, told.append)
         assert numbers["steps"] == 128
         rows = [json.loads(line) for line in (tmp_path / CURVE).read_text().splitlines()]
@@ -119,7 +123,20 @@ def test_a_training_is_interrupted_and_goes_on(runs: Path, tmp_path: Path) -> No
         assert (tmp_path / POLICY).exists()
         assert list((tmp_path / "tensorboard").iterdir())
         with pytest.raises(TaskError, match=r"another training \(seed 0 there and 1 here\)"):
-            claim(tmp_path, {"seed": 1})
+            describe_training(tmp_path, {"seed": 1})
+
+
+def test_two_trainings_do_not_share_a_directory(tmp_path: Path) -> None:
+    app = typer.Typer()
+    app.command()(cli.train)
+    words = ["reach", "-n", "2", "--steps", "32", "--exams", "1", "--option", "n_steps=8", "--out", str(tmp_path)]
+    words += ["--option", "learning_rate=1e-3", "-e", "mujoco", "-o", "task.horizon=20", "--json"]
+    with incoming.claim(tmp_path):
+        assert "another run" in str(CliRunner().invoke(app, words).exception)
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.exception
+    assert json.loads(done.output)["steps"] == 32
+    assert json.loads((tmp_path / "train.json").read_text())["options"]["learning_rate"] == 1e-3
 
 
 def test_the_view_of_sb3_is_one_that_sb3_accepts() -> None:
@@ -136,7 +153,7 @@ def test_the_view_of_sb3_is_one_that_sb3_accepts() -> None:
             if done.all():
                 assert all(info["TimeLimit.truncated"] and info["episode"]["l"] == 5 for info in infos)
                 assert not np.array_equal(infos[0]["terminal_observation"], obs[0]), "that of the next episode"
-        assert view.finished == ["truncated"] * 6
+        assert [one.status for one in view.batch.recent] == ["truncated"] * 6
 
 
 def test_training_leaves_nothing_in_the_temporary_folder(
