@@ -1,45 +1,41 @@
 """Networks as ONNX files that say what they observe and command; `anysim evaluate --policy FILE.onnx` runs them."""
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Sequence
 from json import dumps
 from pathlib import Path
-from typing import Any
 
 import torch  # pyright: ignore[reportMissingImports]
 
 from anysim.record.commit import write_whole
 from anysim.task.env import TaskEnv
-
-FORMAT = "anysim-policy-1"
-METADATA = "anysim"
-"""The key of the file's metadata under which all of it is, as JSON."""
+from anysim_schemas.policy_file import FORMAT, METADATA, PolicyFileSpec
 
 
-def described(env: TaskEnv, sizes: Mapping[str, int], chunk: int = 1) -> dict[str, Any]:
+def described(env: TaskEnv, groups: Sequence[str], chunk: int = 1) -> PolicyFileSpec:
     """What a file says of itself: observation groups with their sizes, actions, and where it was trained."""
-    return {
-        "format": FORMAT,
-        "task": env.name,
-        "world": env.engine.world.hash,
-        "engine": f"{env.engine.name} {env.engine.version}",
-        "control_dt": env.engine.world.physics.control_dt,
-        "observations": dict(sizes),
-        "actions": env.action_dim,
-        "chunk": chunk,
-    }
+    return PolicyFileSpec(
+        format=FORMAT,
+        task=env.name,
+        world=env.engine.world.hash,
+        engine=f"{env.engine.name} {env.engine.version}",
+        control_dt=env.engine.world.physics.control_dt,
+        observations={group: env.observation_sizes[group] for group in groups},
+        actions=env.action_dim,
+        chunk=chunk,
+    )
 
 
-def export(network: torch.nn.Module, about: Mapping[str, Any], path: Path) -> None:
+def export(network: torch.nn.Module, about: PolicyFileSpec, path: Path) -> None:
     """Write a network whole or not at all.
 
-    The network takes the groups of `about["observations"]` in order, (n, D) float32 each, and gives actions (n, A), or
+    The network takes the groups of `about.observations` in order, (n, D) float32 each, and gives actions (n, A), or
     chunks (n, K, A), in the units of the env.
     """
     import onnx  # pyright: ignore[reportMissingImports]
 
-    groups = list(about["observations"])
-    example = tuple(torch.zeros(1, size) for size in about["observations"].values())
+    groups = list(about.observations)
+    example = tuple(torch.zeros(1, size) for size in about.observations.values())
     axes = {name: {0: "n"} for name in [*groups, "action"]}
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_suffix(".draft")
@@ -59,7 +55,7 @@ def export(network: torch.nn.Module, about: Mapping[str, Any], path: Path) -> No
             )
         model = onnx.load(str(draft))
         note = model.metadata_props.add()
-        note.key, note.value = METADATA, dumps(dict(about), sort_keys=True)
+        note.key, note.value = METADATA, dumps(about.model_dump(), sort_keys=True)
         write_whole(path.parent, {path.name: model.SerializeToString()})
     finally:
         draft.unlink(missing_ok=True)

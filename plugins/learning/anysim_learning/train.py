@@ -42,7 +42,7 @@ def train(
     if (out / CHECKPOINT).exists():
         learner.restore(checkpoint.load(out / CHECKPOINT))
     rows = [row for row in rows if row["steps"] <= learner.steps]  # what was learnt after it is learnt again
-    about = described(lesson.env, {g: lesson.env.observation_sizes[g] for g in lesson.groups}, learner.chunk)
+    about = described(lesson.env, lesson.groups, learner.chunk)
     numbers: dict[str, float] = rows[-1] if rows else {}
     with closing(SummaryWriter(str(out / "tensorboard"), purge_step=learner.steps)) as board:
         for goal in _goals(learner.steps, steps, exams):

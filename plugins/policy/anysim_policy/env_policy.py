@@ -13,27 +13,9 @@ from anysim.errors import TaskError, listing
 from anysim.task.contract import Obs
 from anysim.task.env import TaskEnv
 from anysim_policy.runtimes import described_model
-from anysim_schemas.base import Name, Spec
 from anysim_schemas.files import RefusedFileError, read_plain
 from anysim_schemas.limits import POLICY_BYTES
-
-FORMAT = "anysim-policy-1"
-
-
-Whole = Annotated[int, Field(ge=1)]
-
-
-class About(Spec):
-    """What a file says of itself: under the key `anysim` of ONNX metadata, or in TorchScript's extra file `anysim`."""
-
-    format: str = Field(description=FORMAT)
-    task: str = Field(default="", description="the task that it was trained on")
-    world: str = Field(default="", description="the hash of the world that it was trained in")
-    engine: str = Field(default="", description="the engine that it was trained on, and its version")
-    control_dt: float = Field(default=0.0, ge=0, description="seconds between two actions; 0 if it does not matter")
-    observations: dict[Name, Whole] = Field(description="its inputs in order: observation groups and their sizes")
-    actions: Whole = Field(description="how many numbers are an action")
-    chunk: Whole = Field(default=1, description="how many actions it gives for an observation")
+from anysim_schemas.policy_file import FORMAT, METADATA, PolicyFileSpec
 
 
 class FileEnvPolicy:
@@ -62,15 +44,15 @@ class FileEnvPolicy:
         text, self._run = described_model(self._path)
         self._about = self._checked(text, env)
 
-    def _checked(self, text: str, env: TaskEnv) -> About:
+    def _checked(self, text: str, env: TaskEnv) -> PolicyFileSpec:
         try:
-            about = About.model_validate(json.loads(text))
+            about = PolicyFileSpec.model_validate(json.loads(text))
             if about.format != FORMAT:
                 raise ValueError(f"its format is '{about.format}'")
         except ValueError as error:
             raise TaskError(
                 f"the policy {self._path} does not say what it observes ({error}); expected JSON of the format "
-                f"{FORMAT} under the key 'anysim' of its metadata, as `anysim train` writes it"
+                f"{FORMAT} under the key '{METADATA}' of its metadata, as `anysim train` writes it"
             ) from None
         sizes = env.observation_sizes
         for group, size in about.observations.items():

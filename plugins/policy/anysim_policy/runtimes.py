@@ -15,6 +15,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.errors import PluginError, TaskError
 from anysim_policy.trust import check_onnx, check_torch
+from anysim_schemas.policy_file import METADATA
 
 
 class Runtime(Protocol):
@@ -60,7 +61,7 @@ def described_model(path: Path) -> tuple[str, Callable[[Mapping[str, Array]], Ar
     """
     if path.suffix == ".onnx":
         session = _session(path)
-        said = str(session.get_modelmeta().custom_metadata_map.get("anysim", ""))
+        said = str(session.get_modelmeta().custom_metadata_map.get(METADATA, ""))
         return said, lambda inputs: np.asarray(session.run(None, dict(inputs))[0])
     if path.suffix not in (".pt", ".jit"):
         raise TaskError(f"the policy {path} is of no known kind; expected .onnx, .pt, .jit")
@@ -135,9 +136,9 @@ def _module(path: Path) -> tuple[Any, Any, str]:
         with warnings.catch_warnings():
             # Newer versions would rather have exported programs; the policies that people publish are TorchScript.
             warnings.simplefilter("ignore", DeprecationWarning)
-            extra = {"anysim": ""}
+            extra = {METADATA: ""}
             module = torch.jit.load(str(path), map_location="cpu", _extra_files=extra).eval()
     except Exception as error:
         raise TaskError(f"the policy {path} is no TorchScript module: {error}") from error
-    said: str | bytes = extra["anysim"]
+    said: str | bytes = extra[METADATA]
     return torch, module, said.decode() if isinstance(said, bytes) else said

@@ -54,11 +54,11 @@ def test_what_is_exported_does_what_the_network_does(name: str, runs: Path, tmp_
     from anysim_policy.env_policy import FileEnvPolicy
 
     with anysim.make("reach", engine="mujoco", num_envs=4, overrides=QUIET) as env:
-        made, _ = learner(name, env, runs)
+        made, lesson = learner(name, env, runs)
         numbers = made.advance()
         assert all(np.isfinite(value) for value in numbers.values())
         network = made.network()
-        export(network, described(env, {"policy": env.observation_sizes["policy"]}, made.chunk), tmp_path / "p.onnx")
+        export(network, described(env, lesson.groups, made.chunk), tmp_path / "p.onnx")
         policy = FileEnvPolicy(env, path=str(tmp_path / "p.onnx"))
         obs, _ = env.reset(seed=5)
         given = policy.act(obs, np.arange(4))
