@@ -50,7 +50,7 @@ test-full: $(TEST) test-learning  ## run every test, those that are marked full 
 	$(PYTEST) $(ARGS)
 
 test-learning: $(TORCH)  ## run the tests of the learners, in an environment with torch (gigabytes where CUDA is)
-	OMP_NUM_THREADS=1 .venv-torch/bin/python -m pytest -n 0 tests/plugins/learning/test_learners.py $(ARGS)
+	OMP_NUM_THREADS=1 .venv-torch/bin/python -m pytest -n 0 tests/plugins/learning/test_learners.py tests/plugins/policy $(ARGS)
 
 # The packages of .venv, and what the learners need beside them.
 $(TORCH): $(TEST) plugins/learning/pyproject.toml

@@ -55,12 +55,13 @@ def _body(told: Mapping[str, Any], title: str) -> Iterator[str]:
         if pair["seeds"]
     ]
     yield from table("Agreement, seed by seed", ("engines", "same outcome", "kappa", "one alone", "p"), pairs)
-    films = [
-        [escape(name), " ".join(f'<img src="{escape(path)}" alt="{escape(Path(path).stem)}"/>' for path in paths)]
-        for name, paths in told.get("videos", {}).items()
-        if paths
-    ]
+    films = [[escape(name), "".join(map(_film, paths))] for name, paths in told.get("videos", {}).items() if paths]
     yield from table("The first successes and failures", ("engine", ""), films)
+
+
+def _film(path: str) -> str:
+    name = escape(Path(path).stem)
+    return f'<figure><img src="{escape(path)}" alt="{name}"/><figcaption>{name}</figcaption></figure>'
 
 
 def drawn(share: float | None, interval: Sequence[float]) -> str:

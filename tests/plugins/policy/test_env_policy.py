@@ -1,6 +1,8 @@
 """Policies of whole envs from files: what they say of themselves, rows, chunks, and files that do not fit."""
 
 import json
+import warnings
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ from onnx import TensorProto, helper, numpy_helper
 import anysim
 from anysim.errors import TaskError
 from anysim_policy.env_policy import FileEnvPolicy
+from anysim_policy.trust import TRUSTED
 
 
 def env_net(path: Path, about: Any = None, chunk: int = 1, size: int = 36, actions: int = 8) -> Path:
@@ -92,3 +95,25 @@ def test_what_is_hidden_from_a_policy_is_named(tmp_path: Path) -> None:
         policy = FileEnvPolicy(env, path=str(path))
         with pytest.raises(TaskError, match="observes policy; --privileged shows it"):
             policy.act({}, np.arange(1))
+
+
+@pytest.mark.skipif(find_spec("torch") is None, reason="torch is not installed: make test-learning")
+def test_torchscript_gives_what_onnx_gives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import torch  # pyright: ignore[reportMissingImports]
+
+    env_net(tmp_path / "p.onnx")
+    weights = np.random.default_rng(0).normal(0.0, 0.3, (36, 8)).astype(np.float32)
+    layer = torch.nn.Linear(36, 8, bias=False)
+    layer.load_state_dict({"weight": torch.from_numpy(weights.T.copy())})
+    said = {"format": "anysim-policy-1", "observations": {"policy": 36}, "actions": 8}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # as the loader does, see there
+        scripted = torch.jit.script(torch.nn.Sequential(layer, torch.nn.Tanh()))
+        torch.jit.save(scripted, str(tmp_path / "p.pt"), _extra_files={"anysim": json.dumps(said)})
+    with reach(2) as env:
+        obs, _ = env.reset(seed=1)
+        with pytest.raises(TaskError, match="lies in no trusted folder"):
+            FileEnvPolicy(env, path=str(tmp_path / "p.pt"))
+        monkeypatch.setenv(TRUSTED, str(tmp_path))
+        given = [FileEnvPolicy(env, path=str(tmp_path / name)).act(obs, np.arange(2)) for name in ("p.onnx", "p.pt")]
+        assert np.abs(given[0] - given[1]).max() < 1e-5
