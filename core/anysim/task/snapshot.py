@@ -31,8 +31,11 @@ def _hash_of(text: str) -> str:
 
 
 def spec_hash(spec: RunSpec) -> str:
-    """SHA-256 of what a spec says of world and task: managers and terms of equal hashes hold the same state."""
-    said = {key: value for key, value in spec.to_dict().items() if key not in _ELSEWHERE}
+    """SHA-256 of what a spec says of world and task: managers and terms of equal hashes hold the same state.
+
+    Levels count where one is merged in, not as what else could be chosen.
+    """
+    said = {key: value for key, value in {**spec.to_dict(), "levels": {}}.items() if key not in _ELSEWHERE}
     return _hash_of(json.dumps(said))
 
 
