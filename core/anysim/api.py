@@ -281,11 +281,22 @@ def _loaded(source: str | Path | LoadedRun | Mapping[str, Any], overrides: Seque
     return replace(load(source.data, overrides=overrides), files=source.files) if overrides else source
 
 
+def _only_robot(loaded: LoadedRun) -> str:
+    names = list(loaded.spec.world.robots)
+    if len(names) != 1:
+        raise TaskError(
+            f"robot= replaces the only robot of a task, and this one has {listing(names)}; "
+            "say which: overrides=['world.robots.NAME.robot=…']"
+        )
+    return names[0]
+
+
 def make(
     source: str | Path | LoadedRun | Mapping[str, Any],
     *,
     engine: str | Mapping[str, Any] | None = None,
     num_envs: int | None = None,
+    robot: str | None = None,
     seed: int | None = None,
     overrides: Sequence[str] = (),
     base: Path | None = None,
@@ -299,6 +310,8 @@ def make(
         engine: an installed engine by name; wins over the file, whose options are kept for the engine it names. Or what
             the key `engine` of a file holds, in its place: `{"name": "pybullet", "shards": 2}`.
         num_envs: parallel environments; wins over the file.
+        robot: another robot in the place of the task's own, by its name in the catalogue; it needs the channels and tools
+            that the task uses. A task with several robots takes `overrides` that say which.
         seed: seeds the envs now; otherwise the first `reset(seed=...)` does.
         overrides: dotted overrides, as `-o` on the command line.
         base: the folder that relative asset paths are relative to; that of the file where there is one.
@@ -328,6 +341,9 @@ def make(
         seed = whole("seed", seed, TaskError)
     more = [*overrides, *([] if num_envs is None else [f"num_envs={num_envs}"])]
     loaded = _loaded(source, more)
+    if robot is not None:
+        more.append(f"world.robots.{_only_robot(loaded)}.robot={robot}")
+        loaded = _loaded(source, more)
     if engine is not None and loaded.spec.engine.name != engine:  # the options of a file are those of its own engine
         loaded = _loaded(source, [*more, f"engine={_as_text(engine)}"])
     spec = loaded.spec

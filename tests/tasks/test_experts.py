@@ -2,10 +2,11 @@
 
 import pytest
 
+import anysim
 from anysim.skills.runner import SkillPolicy
 from anysim.testing.engines import require_engine
 from tests.plugins.skills.test_pick import rollout
-from tests.tasks.states import blind
+from tests.tasks.states import BLIND, blind
 
 TASKS = [
     "reach",
@@ -27,6 +28,19 @@ TASKS = [
 ]
 LEAST = {"put_away": 6}
 """Of eight; where nothing is said seven."""
+
+
+@pytest.mark.parametrize("robot", ["ur5_gripper", pytest.param("xarm7_gripper", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("task", ["pick_cube", "stack_cube"])
+def test_another_robot_solves_the_task(task: str, robot: str) -> None:
+    """With no change but its name; cameras ride on tools, so they ride on its tool."""
+    require_engine("mujoco")
+    with anysim.make(task, engine="mujoco", robot=robot, num_envs=4, overrides=BLIND) as env:
+        assert env.spec.task is not None
+        assert env.spec.world.robots["panda"].robot == robot
+        env.reset(seed=4001)
+        words = rollout(env, SkillPolicy(env), env.spec.task.horizon)
+    assert words.count("success") == 4, words
 
 
 @pytest.mark.slow
