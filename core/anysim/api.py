@@ -310,8 +310,8 @@ def make(
         engine: an installed engine by name; wins over the file, whose options are kept for the engine it names. Or what
             the key `engine` of a file holds, in its place: `{"name": "pybullet", "shards": 2}`.
         num_envs: parallel environments; wins over the file.
-        robot: another robot in the place of the task's own, by its name in the catalogue; it needs the channels and tools
-            that the task uses. A task with several robots takes `overrides` that say which.
+        robot: another robot in the place of the task's own, by its name in the catalogue; it needs the channels and
+            tools that the task uses. A task with several robots takes `overrides` that say which.
         seed: seeds the envs now; otherwise the first `reset(seed=...)` does.
         overrides: dotted overrides, as `-o` on the command line.
         base: the folder that relative asset paths are relative to; that of the file where there is one.
