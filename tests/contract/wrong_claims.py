@@ -290,6 +290,24 @@ class ClaimsLessError(Right):
     caught_by = ("test_approximations.py::test_an_error_is_no_larger_than_declared",)
 
 
+class HidesAnError(Right):
+    """Declares none of the numbers that it has, so that it is held to what an exact engine may be off by."""
+
+    capabilities = Capabilities(
+        {**MujocoEngine.capabilities.supported, C.JOINT_LIMITS: Support(False, "a stiff soft constraint")}
+    )
+    caught_by = ("test_approximations.py::test_an_error_is_no_larger_than_declared",)
+
+
+class SaysABareNumber(Right):
+    """Has a number in a note that is not data."""
+
+    capabilities = Capabilities(
+        {**MujocoEngine.capabilities.supported, C.RENDER_LIGHTS: Support(False, "within 80 degrees of its direction")}
+    )
+    caught_by = ("test_approximations.py::test_numbers_of_a_note_are_measured",)
+
+
 class DeclaresAnOddNumber(Right):
     """Declares an error that nobody measures."""
 

@@ -13,17 +13,19 @@ LIBRARY = LibraryRequirement(
 
 _APPROXIMATE = {
     Capability.CONTACTS_STATIC: approximately(
-        "friction multiplies in Bullet: within 0.02 of the pair rule as built, by several shapes a geom where it takes "
-        "them; where coefficients are changed later it can be off by 0.45 (0.2 and 0.2 on a ground of 0.8, built with "
-        "0.8 throughout). Surfaces are rigid: softness is not simulated. A cylinder rolls {rolling:.0%} too fast down "
-        "15 degrees",
+        "friction multiplies in Bullet: by the pair rule as built, with several shapes a geom where it takes them; "
+        "where coefficients are changed later, by {remixed:g} off it between things of 0.2 above a ground of 0.8, "
+        "built with 0.8 throughout, and by more where links of a robot meet both. Surfaces are rigid: softness is not "
+        "simulated. A cylinder rolls {rolling:.0%} too fast down 15 degrees",
+        remixed=0.05,
         rolling=0.02,
     ),
     Capability.CONTACTS_MOVING: "friction multiplies, as with static things",
     Capability.RESTITUTION: approximately(
-        "within {bounce:g} of the coefficient at 1, 2 and 4.2 ms; an impact sinks up to one step's way; "
-        "where coefficients are changed later, as near as those of friction",
+        "within {bounce:g} of the coefficient; a ball sinks {dent:g} m for each m/s at 2 ms; where coefficients are "
+        "changed later, as near as those of friction",
         bounce=0.05,
+        dent=2e-3,
     ),
     Capability.MATERIALS: "their colour alone: TinyRenderer has neither gloss nor transparency, and nothing shines",
     Capability.TORSIONAL_FRICTION: "exact on a surface of equal friction; else off as the friction of the pair is",
@@ -33,17 +35,23 @@ _APPROXIMATE = {
     ),
     Capability.MIMIC_JOINTS: approximately("a gear constraint: {lag:g} m in a grip, fingers of 15 g", lag=2.5e-6),
     Capability.JOINT_LIMITS: approximately(
-        "met up to one step's way late (21 mm at 11 m/s and 2 ms); at rest under 87 N m within {beyond:g} rad",
-        beyond=1e-6,
+        "met {late:g} step late; at rest under 87 N m within {beyond:g} rad", late=1.01, beyond=1e-6
     ),
-    Capability.CONTROL_POSITION: (
-        "computed in each step: within 1.3e-3 rad of MuJoCo on a Panda in motion, 1e-7 at rest; what presses against "
-        "something builds its force up: within 2 % after 0.37 s for a finger of 15 g, 0.05 s for 1 kg"
+    Capability.CONTROL_POSITION: approximately(
+        "computed in each step: within {track:g} rad of the solution in motion, {settled:g} rad at rest (kp 400, kd 40 "
+        "on 0.5 kg m^2); what presses against something builds its force up, the lighter the slower: within "
+        "{buildup:.0%} after 0.1 s for a finger of 1 kg",
+        track=3e-3,
+        settled=1e-7,
+        buildup=0.02,
     ),
-    Capability.ACTUATION_NATIVE: (
-        "motors that aim at a velocity: a Panda in free motion within 3.8e-3 rad of the law, 4e-4 at rest; blocked "
-        "it pushes with anything up to its effort limit, whatever its error, and its fingers with three quarters of "
-        "their command; compensated gravity is worked out in every tenth step; no dry friction on driven joints"
+    Capability.ACTUATION_NATIVE: approximately(
+        "motors that aim at a velocity: within {astray:g} rad of the law in motion (kp 400, kd 40 on 0.5 kg m^2); "
+        "blocked they push with anything up to their effort limit, whatever their error ({stalled:.0%} off where 20 N "
+        "are asked for and 87 N allowed); compensated gravity is not worked out in every step; no dry friction on "
+        "driven joints",
+        astray=3e-3,
+        stalled=3.4,
     ),
     Capability.RENDER_SHADOWS: "faint and with gaps: the light sees the scene as coarsely as the camera",
     Capability.RENDER_LIGHTS: (

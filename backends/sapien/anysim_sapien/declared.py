@@ -17,26 +17,25 @@ _APPROXIMATE = {
         "a cylinder is a prism of many sides: it rolls {rolling:.0%} slower than a round one down 15 degrees",
         rolling=0.13,
     ),
-    Capability.SHAPE_MESH: (
-        "PhysX cooks hulls and drops corners within 0.7 mm of the rest: 0.2 % of a hand's volume, up to 6 % at 3 cm"
-    ),
+    Capability.SHAPE_MESH: "PhysX cooks hulls anew and drops corners near others: a small one loses some of its volume",
     Capability.MIMIC_JOINTS: approximately(
         "a stiff spring: {lag:g} m at 20 N on a gripper's finger; only links with one parent, or a link and its child",
         lag=5e-5,
     ),
-    Capability.ACTUATION_NATIVE: (
-        "PhysX takes the stiffness implicitly too: a Panda in free motion within 3.3e-3 rad of the law, 1e-4 at rest; "
-        "blocked within 0.6 %. The effort limit bounds a driven joint's own damping with the drive"
+    Capability.ACTUATION_NATIVE: approximately(
+        "PhysX takes the stiffness implicitly too: within {astray:g} rad of the law in motion (kp 400, kd 40 on 0.5 kg "
+        "m^2), blocked within {stalled:.1%}. The effort limit bounds a driven joint's own damping with the drive",
+        astray=2.5e-3,
+        stalled=0.006,
     ),
     Capability.TORSIONAL_FRICTION: approximately(
-        "faces resist through their several points, within 4 % of MuJoCo; where one point touches {torsion:.0%} of the "
-        "torque are missing: a ball spins on",
+        "faces resist through their several points; where one point touches {torsion:.0%} of the torque are missing: a "
+        "ball spins on",
         torsion=1.0,
     ),
     Capability.CONTACT_SENSORS: approximately(
         "friction follows from momentum: within {felt:.1%} of the net force on a body; on a link above a joint with "
-        "dry friction off by more (0.37 N above a sliding joint of 0.2 N, 0.65 N above a turning one of 0.2 N m); how "
-        "several fixed things share the friction of one body is a guess",
+        "dry friction off by some of that friction; how several fixed things share the friction of one body is a guess",
         felt=0.005,
     ),
     Capability.MATERIALS: (

@@ -7,22 +7,20 @@ an error of a capability is held to what engines that are exact are held to.
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import cos, radians, sin, sqrt
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capabilities, Capability as C
-from anysim.model.world import Box, ContactSensor, ControlMode, Cylinder, Mimic, Sphere, Surface, World
-from anysim.testing import tolerances, worlds
+from anysim.model.world import Box, ContactSensor, ControlMode, Cylinder, Sphere, Surface
+from anysim.testing import drive_errors as drives, tolerances, worlds
+from anysim.testing.drive_errors import Build
 from anysim.testing.sketch import Sketch, inertial
+from anysim.testing.varying import having, reduced, shared_bodies, varied
 
 G = 9.81
-
-
-class _Build(Protocol):
-    def __call__(self, world: World, num_envs: int = 1) -> SimEngine: ...
 
 
 class Measure(NamedTuple):
@@ -31,7 +29,7 @@ class Measure(NamedTuple):
     capability: C
     what: str
     exact: float
-    found: Callable[[_Build], float]
+    found: Callable[[Build], float]
 
 
 def allowed(capabilities: Capabilities, name: str) -> float:
@@ -45,15 +43,63 @@ def _heights(engine: SimEngine) -> Array:
     return engine.get_state().body_pose[0, :, 2]
 
 
-def sink(build: _Build) -> float:
+def sink(build: Build) -> float:
     """[m] of a box of 1 kg into the ground under its own weight."""
     engine = build(worlds.resting(Box((0.1, 0.1, 0.1)), 0.1))
     engine.step(1000)
     return abs(float(_heights(engine)[0]) - 0.1)
 
 
-def creep(build: _Build) -> float:
-    """[m/s] of a box on a slope of 15 degrees, a third below the coefficient at which it would slide."""
+def pressed(build: Build) -> float:
+    """[m] of a box of 1 kg into the ground under 49 kg that stand on it."""
+    s = Sketch("pressed")
+    s.ground()
+    under = s.free("under", Box((0.1, 0.1, 0.1)), (0.0, 0.0, 0.1), 1.0)
+    s.free("load", Box((0.1, 0.1, 0.1)), (0.0, 0.0, 0.3), 49.0)
+    engine = build(s.world())
+    engine.step(1500)
+    return abs(float(_heights(engine)[under]) - 0.1)
+
+
+def squeezed(build: Build) -> float:
+    """[m] of a finger of 50 g into a fixed thing, pressed with 3 N."""
+    s = Sketch("squeezed", gravity=worlds.WEIGHTLESS)
+    base = s.robot("hand")
+    tip = Box((0.01, 0.01, 0.03))
+    link = s.link("finger", base, worlds.PRISMATIC, worlds.X, inertial(tip, 0.05))
+    s.shape(link, tip)
+    s.drive(link, ControlMode.EFFORT, limit=20.0)
+    s.fixed("stop", Box((0.05, 0.05, 0.05)), (0.061, 0.0, 0.0))
+    engine = build(s.world())
+    engine.set_control(effort=3.0)
+    engine.step(1000)
+    return abs(float(engine.get_state().joint_pos[0, 0]) - 0.001)
+
+
+def remixed(build: Build) -> float:
+    """Absolute, on the friction of a thing of 0.2 on one of 0.2 above a ground of 0.8, built with 0.8 throughout."""
+    rough = Surface(friction=0.8)
+    s = Sketch("remixed")
+    s.ground(rough)
+    s.free("slab", Box((1.0, 0.9, 0.1)), (0.0, 0.0, 0.1), 2000.0, surface=rough)
+    box = s.free("box", Box((0.1, 0.1, 0.02)), (-0.8, 0.0, 0.22), surface=rough)
+    engine = build(s.world())
+    if "geom.friction" not in engine.parameters:
+        return 0.0
+    engine.set_parameters("geom.friction", [[0.8, 0.2, 0.2]])
+    engine.step(250)
+    twist = np.array(engine.get_state().body_twist[0, box])
+    twist[0] += 3.0
+    engine.set_body_state(twist=twist[None, None], bodies=[box])
+    engine.step(25)
+    early = np.array(engine.get_state().body_twist[0, box])
+    engine.step(75)
+    change = engine.get_state().body_twist[0, box] - early
+    return abs(float(-change[0] / (75 * 0.002 * G + change[2])) - 0.2)
+
+
+def creep(build: Build) -> float:
+    """[m/s] of a box on a slope of 15 degrees with a coefficient of 0.4, at which it should not slide."""
     engine = build(worlds.slope(radians(15), 0.4))
     engine.step(500)
     start = engine.get_state().body_pose[0, 1, :3]
@@ -61,7 +107,7 @@ def creep(build: _Build) -> float:
     return float(np.linalg.norm(engine.get_state().body_pose[0, 1, :3] - start))
 
 
-def rolling(build: _Build) -> float:
+def rolling(build: Build) -> float:
     """Relative, on the way of a solid cylinder that rolls down 15 degrees for 0.6 s: 2/3 g sin a."""
     angle, radius = radians(15), 0.1
     s = Sketch("roll", 0.001)
@@ -78,7 +124,7 @@ def rolling(build: _Build) -> float:
     return abs(gained / (0.4 * 2 / 3 * G * sin(angle)) - 1)
 
 
-def _bounces(build: _Build, *coefficients: float) -> float:
+def _bounces(build: Build, *coefficients: float) -> float:
     """The largest difference of a ratio of speeds after and before the touch of a ball from its coefficient."""
     s = Sketch("bounces", 0.001)
     s.ground()
@@ -93,17 +139,31 @@ def _bounces(build: _Build, *coefficients: float) -> float:
     return float(np.abs(best / sqrt(2 * G * 0.3) - coefficients).max())
 
 
-def bounce(build: _Build) -> float:
+def bounce(build: Build) -> float:
     """Absolute, on the ratio of a ball's speeds after and before a touch, for coefficients from 0.2 to 0.9."""
     return _bounces(build, 0.2, 0.35, 0.5, 0.7, 0.9)
 
 
-def dead(build: _Build) -> float:
+def dead(build: Build) -> float:
     """The ratio of the speeds after and before a touch where nothing bounces, beside things that do."""
     return _bounces(build, 0.0)
 
 
-def torsion(build: _Build) -> float:
+def dent(build: Build) -> float:
+    """[m for each m/s] that balls sink into the ground when they touch it, at 2 ms."""
+    s = Sketch("dents")
+    s.ground()
+    for i, e in enumerate((0.0, 0.2, 0.5, 0.9)):
+        s.free(f"ball{i}", Sphere(0.1), (float(i), 0.0, 0.4), surface=Surface(restitution=e))
+    engine = build(s.world())
+    lowest = 0.4
+    for _ in range(180):
+        engine.step()
+        lowest = min(lowest, float(_heights(engine).min()))
+    return (0.1 - lowest) / sqrt(2 * G * 0.3)
+
+
+def torsion(build: Build) -> float:
     """Relative, on the torque that resists a ball spinning where it stands: its weight times the coefficient [m]."""
     surface = Surface(friction=1.0, torsional=True, torsional_friction=0.01)
     world = worlds.resting(Sphere(0.1), 0.1)
@@ -118,38 +178,7 @@ def torsion(build: _Build) -> float:
     return abs(lost / (0.01 * G / moment * 0.2) - 1)
 
 
-def lag(build: _Build) -> float:
-    """[m] of a finger of 15 g behind the one that it follows, pressed with 20 N against something fixed."""
-    s = Sketch("grip", gravity=worlds.WEIGHTLESS)
-    base = s.robot("hand")
-    finger = inertial(Box((0.01, 0.01, 0.03)), 0.015)
-    left = s.link("left", base, worlds.PRISMATIC, worlds.Y, finger, lower=0.0, upper=0.1, armature=0.1)
-    right = s.link(
-        "right", base, worlds.PRISMATIC, (0.0, -1.0, 0.0), finger, position=(0.0, -0.1, 0.0), mimic=Mimic(0, 1.0, 0.0)
-    )
-    s.shape(right, Box((0.01, 0.01, 0.03)))
-    s.drive(left, ControlMode.EFFORT, limit=20.0)
-    s.fixed("stop", Box((0.05, 0.05, 0.05)), (0.0, -0.18, 0.0))
-    engine = build(s.world())
-    engine.set_control(effort=20.0)
-    engine.step(1000)
-    place = engine.get_state().joint_pos[0]
-    return abs(float(place[1] - place[0]))
-
-
-def beyond(build: _Build) -> float:
-    """[rad] beyond a joint's limit, pressed on it with 87 N m, on 0.1 kg m^2."""
-    s = Sketch("stop", gravity=worlds.WEIGHTLESS)
-    base = s.robot("arm")
-    link = s.link("link", base, worlds.REVOLUTE, worlds.Z, inertial(Sphere(0.5), 1.0), lower=-1.0, upper=0.1)
-    s.drive(link, ControlMode.EFFORT, limit=87.0)
-    engine = build(s.world())
-    engine.set_control(effort=87.0)
-    engine.step(1000)
-    return float(engine.get_state().joint_pos[0, 0]) - 0.1
-
-
-def felt(build: _Build) -> float:
+def felt(build: Build) -> float:
     """Relative to the weight: the force that a sensor reads on a box at rest on a slope of 20 degrees."""
     world = replace(worlds.slope(radians(20), 0.8), contact_sensors=(ContactSensor("box", (1,)),))
     engine = build(world)
@@ -158,24 +187,19 @@ def felt(build: _Build) -> float:
     return float(np.abs(engine.get_state().contact_force[0, 0] - weight).max() / G)
 
 
-def swing(build: _Build) -> float:
-    """[rad] off the solution: a stiff drive (kp 4500, kd 450 on 0.05 kg m^2) clipped in motion at 87 N m."""
-    kp, kd, limit, moment, dt = 4500.0, 450.0, 87.0, 0.05, 0.002
-    s = Sketch("stiff", dt, worlds.WEIGHTLESS)
-    base = s.robot("arm")
-    even = inertial(Sphere(0.1), 1.0)._replace(inertia=(moment, moment, moment, 0.0, 0.0, 0.0))
-    link = s.link("link", base, worlds.REVOLUTE, worlds.Z, even)
-    s.drive(link, ControlMode.POSITION, kp, kd, limit)
-    engine = build(s.world())
-    engine.set_control(position=0.5)
-    q = v = worst = 0.0
-    for _ in range(150):
-        engine.step()
-        for _ in range(200):  # the law in fine steps
-            torque = float(np.clip(kp * (0.5 - q) - kd * v, -limit, limit))
-            v += dt / 200 * torque / moment
-            q += dt / 200 * v
-        worst = max(worst, abs(float(engine.get_state().joint_pos[0, 0]) - q))
+def shift(build: Build) -> float:
+    """[m] of what is there over 3.6 s, contacts included, against a world without what is absent."""
+    whole = varied(build(worlds.falling_ball()).capabilities)
+    less = reduced(whole, "mug~2", "chest~1")
+    engine, alone = build(whole), build(less)
+    engine.reset(present=having(whole, "mug~2", "chest~1"))
+    ours, theirs = shared_bodies(whole, less)
+    worst = 0.0
+    for _ in range(60):
+        engine.step(30)
+        alone.step(30)
+        off = engine.get_state().body_pose[:, ours] - alone.get_state().body_pose[:, theirs]
+        worst = max(worst, float(np.abs(off).max()))
     return worst
 
 
@@ -183,15 +207,27 @@ MEASURES: Mapping[str, Measure] = {
     function.__name__: Measure(capability, str(function.__doc__).splitlines()[0], exact, function)
     for function, capability, exact in (
         (sink, C.CONTACTS_STATIC, tolerances.REST_HEIGHT),
+        (pressed, C.CONTACTS_STATIC, tolerances.REST_HEIGHT),
+        (squeezed, C.CONTACTS_STATIC, tolerances.REST_HEIGHT),
+        (remixed, C.CONTACTS_STATIC, tolerances.FRICTION),
         (creep, C.CONTACTS_STATIC, tolerances.CREEP),
         (rolling, C.CONTACTS_STATIC, tolerances.ROLLING),
         (bounce, C.RESTITUTION, tolerances.RESTITUTION["exact"]),
         (dead, C.RESTITUTION, tolerances.RESTITUTION["exact"]),
+        (dent, C.RESTITUTION, tolerances.DENT),
         (torsion, C.TORSIONAL_FRICTION, tolerances.SLIDING),
-        (lag, C.MIMIC_JOINTS, tolerances.FOLLOWER),
-        (beyond, C.JOINT_LIMITS, tolerances.LIMIT),
-        (swing, C.EFFORT_LIMITS, tolerances.TRANSIENT),
         (felt, C.CONTACT_SENSORS, tolerances.WEIGHT),
+        (shift, C.VARYING_ENTITIES, tolerances.ABSENT),
+        (drives.lag, C.MIMIC_JOINTS, tolerances.FOLLOWER),
+        (drives.beyond, C.JOINT_LIMITS, tolerances.LIMIT),
+        (drives.late, C.JOINT_LIMITS, tolerances.LATE),
+        (drives.chatter, C.JOINT_LIMITS, tolerances.BLOCKED),
+        (drives.swing, C.EFFORT_LIMITS, tolerances.TRANSIENT),
+        (drives.track, C.CONTROL_POSITION, tolerances.TRANSIENT),
+        (drives.settled, C.CONTROL_POSITION, tolerances.AT_REST),
+        (drives.buildup, C.CONTROL_POSITION, tolerances.BLOCKED),
+        (drives.astray, C.ACTUATION_NATIVE, tolerances.TRANSIENT),
+        (drives.stalled, C.ACTUATION_NATIVE, tolerances.BLOCKED),
     )
 }
 """By name."""

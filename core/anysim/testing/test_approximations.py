@@ -1,5 +1,6 @@
 """Declared approximations: the numbers of a note are data, and no error is larger than the engine says."""
 
+import re
 from math import isfinite
 
 import pytest
@@ -18,6 +19,23 @@ def test_declared_errors_are_known_and_finite(engine_class):
             assert isfinite(error), f"'{capability}': '{name}' is {error}"
             assert error >= 0.0, f"'{capability}': '{name}' is {error}"
             assert not support.exact, f"'{capability}' is declared exact, with an error of {error}"
+
+
+NUMBER = re.compile(r"(?<![\w.^])\d+(?:\.\d+)?(?:e-?\d+)?%?")
+
+
+def test_numbers_of_a_note_are_measured(engine_class):
+    """A note has the numbers of its errors, and of the worlds in which they are measured; no others."""
+    for capability, support in engine_class.capabilities.supported.items():
+        known = {form.format(error) for error in support.errors.values() for form in ("{:g}", "{:.0%}", "{:.1%}")}
+        for measure in MEASURES.values():
+            if measure.capability is capability:
+                known.update(NUMBER.findall(measure.what))
+        bare = [number for number in NUMBER.findall(support.note) if number not in known]
+        assert not bare, (
+            f"'{capability}' says {', '.join(bare)} in its note, which no test measures; declare it by "
+            "approximately(note, NAME=…) with a NAME of anysim.testing.errors.MEASURES, or say it without a number"
+        )
 
 
 @needs(C.DYNAMICS)

@@ -75,6 +75,12 @@ BLOCKED = 2e-2
 LIMIT = 2e-2
 """[rad or m]: overshoot of a joint pressed against its limit; limits are soft constraints in most engines."""
 
+LATE = 0.5
+"""In ways of one step: a joint that meets its limit within a step is stopped there by engines that look ahead."""
+
+DENT = 2e-3
+"""[m for each m/s]: the way of one step of 2 ms, by which discrete time may catch an impact late."""
+
 FOLLOWER = 2e-3
 """[m or rad]: lag of a mimic joint during motion, where it is a soft constraint."""
 
