@@ -191,7 +191,52 @@ def _spilled(env: TaskEnv) -> None:
         put(env, bead, offset(seen(env, bead), x=0.3))
 
 
+_BESIDE = _towards("beside", lambda env: level(seen(env, "spot"), seen(env, "beside")))
+_ON_BOTH = _towards("top", lambda env: level(offset(seen(env, "spot"), z=0.04), seen(env, "top")))
+
+
+def _pyramid(env: TaskEnv, share: float) -> None:
+    """The second cube beside the first, then the third between and above them: half of the way each."""
+    if share == 0.0:
+        _ON_BOTH(env, 0.0)
+    _BESIDE(env, min(2.0 * share, 1.0))
+    if share == 1.0:
+        put(env, "top", level(seen(env, "peak"), seen(env, "top")))
+    elif share > 0.5:
+        _ON_BOTH(env, 2.0 * share - 1.0)
+
+
+_LITTER = {"bar": 0.015, "cube": 0.02, "can": 0.03, "ball": 0.025}
+"""What is tidied away, and how far above a floor its middle is."""
+
+
+def _into_bin(number: int, thing: str) -> Callable[[TaskEnv, float], None]:
+    side = 0.05 * number - 0.075
+    return _towards(thing, lambda env: offset(seen(env, "bin.inside"), x=side, y=-0.08, z=_LITTER[thing]))
+
+
+_TIDY = [_into_bin(number, thing) for number, thing in enumerate(_LITTER)]
+
+
+def _tidied(env: TaskEnv, share: float) -> None:
+    """One after the other, a quarter of the way each."""
+    for number, path in enumerate(_TIDY):
+        path(env, min(max(4.0 * share - number, 0.0), 1.0))
+
+
 CASES: dict[str, Case] = {
+    "lift_cube": Case(
+        _towards("cube", lambda env: level(offset(seen(env, "goal"), z=0.02), seen(env, "cube"))),
+        [_shifted("cube", z=-0.03), _shifted("cube", z=0.5)],
+    ),
+    "place_sphere": Case(
+        _towards("ball", lambda env: offset(seen(env, "bin.inside"), z=0.02)),
+        [_shifted("ball", x=0.006), _shifted("ball", z=0.006), _moving("ball")],
+    ),
+    "stack_pyramid": Case(
+        _pyramid, [_shifted("beside", z=0.006), _shifted("top", z=0.006), _shifted("top", y=0.06), _moving("top")], ()
+    ),
+    "tidy_bin": Case(_tidied, [_shifted("can", x=0.2), _shifted("ball", z=0.15)], ()),
     "reach": Case(_reach, [_off_goal], ()),
     "push_cube": Case(
         _towards("cube", lambda env: level(seen(env, "goal"), seen(env, "cube"))),

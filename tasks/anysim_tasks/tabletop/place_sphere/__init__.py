@@ -1,0 +1,1 @@
+"""Put a ball into a shallow bin."""

@@ -1,0 +1,1 @@
+"""Two cubes side by side, and a third on top of both."""

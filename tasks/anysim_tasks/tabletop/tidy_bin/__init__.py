@@ -1,0 +1,1 @@
+"""Four things of different shapes into a bin."""
