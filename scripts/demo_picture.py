@@ -5,6 +5,7 @@ film shows several trajectories side by side, through the first camera of each. 
 """
 
 import argparse
+import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,8 +18,6 @@ FILM_BYTES = 1_000_000
 
 FILM_SIZES = ((320, 240, 256, 2), (280, 210, 256, 2), (240, 180, 128, 4), (160, 120, 64, 6), (80, 60, 32, 8))
 """Of a trajectory: width and height [px], colours, and every how many images one is shown; the first that fits."""
-
-FPS = 25.0
 
 
 def spread(video: Path, count: int) -> list[Any]:
@@ -50,9 +49,10 @@ def draw(videos: Sequence[Path], out: Path) -> None:
 
 
 def words(video: Path) -> str:
-    """What a video shows: `world 1, episode 2: camera wrist`."""
+    """What a video shows: `pick_cube: world 1, episode 2: camera wrist`."""
     env, episode = (int(number) for number in video.parent.name.removeprefix("env_").split("_episode_"))
-    return f"world {env + 1}, episode {episode + 1}: camera {video.stem}"
+    run = json.loads((video.parents[2] / "run.json").read_text("utf-8"))
+    return f"{run['task']}: world {env + 1}, episode {episode + 1}: camera {video.stem}"
 
 
 def film(videos: Sequence[Path], out: Path) -> None:
@@ -64,8 +64,10 @@ def film(videos: Sequence[Path], out: Path) -> None:
     from anysim.cli.montage import montage
 
     shown = []
+    fps = 25.0
     for video in videos:
         with av.open(str(video)) as container:
+            fps = float(container.streams.video[0].average_rate or fps)
             shown.append([frame.to_image() for frame in container.decode(video=0)])
     longest = max(map(len, shown))
     for width, height, colors, every in FILM_SIZES:
@@ -76,7 +78,7 @@ def film(videos: Sequence[Path], out: Path) -> None:
         # one palette for all, which keeps colours that few pixels have: those of the goal and the cube
         palette = pages[0].quantize(colors, method=Image.Quantize.MAXCOVERAGE)
         pages = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in pages]
-        pages[0].save(out, save_all=True, append_images=pages[1:], duration=round(1000 * every / FPS), loop=0)
+        pages[0].save(out, save_all=True, append_images=pages[1:], duration=round(1000 * every / fps), loop=0)
         if out.stat().st_size < FILM_BYTES:
             return
     out.unlink()

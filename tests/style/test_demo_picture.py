@@ -14,6 +14,7 @@ def run(tmp_path: Path) -> Path:
     """A run of two trajectories, each with a video of ten images that grow brighter."""
     import av
 
+    (tmp_path / "run.json").write_text('{"task": "pick_cube"}')
     for name in ("env_0000_episode_0000", "env_0001_episode_0000"):
         folder = tmp_path / "episodes" / name
         folder.mkdir(parents=True)
@@ -47,7 +48,7 @@ def test_the_program_writes_a_picture(run: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "2 of 2 trajectories" in done.stdout
     assert (run / "demo.png").read_bytes().startswith(b"\x89PNG")
-    assert "env_0001_episode_0000/front.mp4: world 2, episode 1: camera front" in done.stdout
+    assert "env_0001_episode_0000/front.mp4: pick_cube: world 2, episode 1: camera front" in done.stdout
 
 
 def test_the_film_moves_to_the_end_and_is_small(run: Path) -> None:
