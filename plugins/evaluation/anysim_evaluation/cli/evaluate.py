@@ -86,7 +86,8 @@ def evaluate(
     overrides = [*(override or ()), *([] if level is None else [f"level={level}"])]
     seeds = episode_seeds(split, first, episodes)
     question = Question(task, policy, split, seeds, overrides, min(num_envs or MOST_ENVS, episodes), privileged)
-    folder = out or Path("runs") / "-".join(["evaluate", *map(_plain, (Path(task).stem, policy, level or "", split))])
+    said = [Path(task).stem, policy, *([level] if level else []), split]
+    folder = out or Path("runs") / "-".join(["evaluate", *map(_plain, said)])
     done: dict[str, dict[int, Episode]] = {}
     films: dict[str, list[str]] = {}
     for name in _engines(engine):
