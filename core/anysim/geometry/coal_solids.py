@@ -1,5 +1,10 @@
 """Solids as Coal, the collision library, has them: for whoever measures distances between shapes."""
 
+from typing import Any
+
+import numpy as np
+
+from anysim.conventions import Array
 from anysim.model.shapes import Box, Capsule, Cylinder, Shape, Sphere
 
 
@@ -18,3 +23,24 @@ def coal_solid(shape: Shape) -> object | None:
             return coal.Cylinder(radius, 2 * half_length)
         case _:
             return None
+
+
+def coal_hull(vertices: Array) -> Any:
+    """The convex hull of vertices (V, 3) [m] that are not all in one plane: what a convex mesh is for the engines."""
+    import coal  # pyright: ignore[reportMissingImports]  (found by its .pth file)
+
+    points = coal.StdVec_Vec3s()
+    points.extend(np.asarray(vertices, dtype=float))
+    return coal.Convex.convexHull(points, True, "Qt")
+
+
+def coal_triangles(vertices: Array, faces: Array) -> Any:
+    """A surface of triangles, faces (F, 3) of vertices (V, 3) [m]: ground, or another concave mesh."""
+    import coal  # pyright: ignore[reportMissingImports]  (found by its .pth file)
+
+    model = coal.BVHModelOBBRSS()
+    model.beginModel(len(faces), len(vertices))
+    model.addVertices(np.asarray(vertices, dtype=float))
+    model.addTriangles(np.asarray(faces, dtype=np.uint32))
+    model.endModel()
+    return model

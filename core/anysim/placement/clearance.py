@@ -11,9 +11,8 @@ import numpy as np
 
 from anysim.conventions import WORLD
 from anysim.geometry.bounds import ground_top
-from anysim.geometry.coal_solids import coal_solid
+from anysim.geometry.coal_solids import coal_hull, coal_solid
 from anysim.geometry.convex_parts import IDENTITY, Part, Placed, PlacedPart, Pose, Vec, boxed, pose_of, turned
-from anysim.math import pose as P
 from anysim.model.world import Box, Capsule, Cylinder, HeightFieldShape, MeshShape, Plane, Shape, Sphere, World
 
 TOUCH = 1e-4
@@ -89,7 +88,8 @@ class ClearanceQuery:
 
         a, b = self._geometry(one.part), self._geometry(other.part)
         request, result = coal.DistanceRequest(), coal.DistanceResult()
-        return float(coal.distance(a, _transform(coal, one.pose), b, _transform(coal, other.pose), request, result))
+        at = [coal.Transform3s(np.array(p.pose.rotation), np.array(p.pose.position)) for p in (one, other)]
+        return float(coal.distance(a, at[0], b, at[1], request, result))
 
     def _geometry(self, part: Part) -> Any:
         found = self._geometries.get(id(part))
@@ -124,38 +124,13 @@ def _apart(low: Vec, high: Vec, other_low: Vec, other_high: Vec, limit: float) -
     )
 
 
-def _transform(coal: Any, pose: Pose) -> Any:
-    return coal.Transform3s(np.array(pose.rotation), np.array(pose.position))
-
-
 def _geometry(part: Part) -> Any:
-    """The shape as Coal has it; meshes are convex hulls, as they are for the engines."""
+    """The shape as Coal has it."""
     if (solid := coal_solid(part.shape)) is not None:
         return solid
     if part.vertices is None:
         raise ValueError(f"a {type(part.shape).__name__} has no distance to anything")
-    import coal  # pyright: ignore[reportMissingImports]  (found by its .pth file)
-
-    return _hull(coal, part.vertices)
-
-
-def _hull(coal: Any, vertices: Any) -> Any:
-    from scipy.spatial import ConvexHull
-
-    hull = ConvexHull(vertices)
-    used = np.sort(hull.vertices)
-    number = np.full(len(vertices), -1)
-    number[used] = np.arange(len(used))
-    points, faces = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-    middle = vertices[used].mean(axis=0)
-    for point in vertices[used]:
-        points.append(point)
-    for simplex in hull.simplices:
-        a, b, c = vertices[simplex]
-        outward = float(P.dot(np.cross(b - a, c - a), a - middle)) > 0
-        i, j, k = (int(number[v]) for v in (simplex if outward else simplex[::-1]))
-        faces.append(coal.Triangle(i, j, k))
-    return coal.Convex(points, faces)
+    return coal_hull(part.vertices)
 
 
 def _low_points(one: PlacedPart) -> list[Vec]:

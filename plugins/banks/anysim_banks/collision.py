@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.geometry.coal_solids import coal_solid
+from anysim.geometry.coal_solids import coal_hull, coal_solid
 from anysim.math import pose as P
 from anysim_banks.gripper import SPARE, Gripper
 from anysim_banks.pieces import Piece, bounding_radius
@@ -28,7 +28,7 @@ class CollisionFilter:
         self._boxes, self._half = gripper.boxes
         self._side = np.where(np.abs(self._boxes[:, 1]) > 1e-9, np.sign(self._boxes[:, 1]), 0.0)
         self._stroke = gripper.stroke
-        self._pieces = [(_geometry(coal, piece), self._transform(piece.pose)) for piece in pieces]
+        self._pieces = [(_geometry(piece), self._transform(piece.pose)) for piece in pieces]
         self._middle = np.array([piece.pose[:3] for piece in pieces]).reshape(-1, 3)
         self._radius = np.array([bounding_radius(piece) for piece in pieces])
 
@@ -74,14 +74,8 @@ class CollisionFilter:
         return self._coal.Transform3s(P.to_matrix(pose[3:]), pose[:3])
 
 
-def _geometry(coal: Any, piece: Piece) -> Any:
+def _geometry(piece: Piece) -> Any:
     if (solid := coal_solid(piece.shape)) is not None:
         return solid
     assert piece.hull is not None  # of a mesh; pieces have no other shapes
-    corners, numbers = np.unique(piece.hull.corners.reshape(-1, 3), axis=0, return_inverse=True)
-    points, faces = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-    for corner in corners:
-        points.append(corner)
-    for a, b, c in numbers.reshape(-1, 3).tolist():
-        faces.append(coal.Triangle(a, b, c))
-    return coal.Convex(points, faces)
+    return coal_hull(piece.hull.corners.reshape(-1, 3))

@@ -9,7 +9,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.errors import EngineError
 from anysim.geometry.bounds import shape_bounds
-from anysim.geometry.coal_solids import coal_solid
+from anysim.geometry.coal_solids import coal_hull, coal_solid, coal_triangles
 from anysim.math import pose as P
 from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.pairs import may_meet
@@ -92,14 +92,8 @@ class Touching:
         if isinstance(shape, Plane):
             return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
         if isinstance(shape, MeshShape):
-            mesh, model = self._meshes[shape.mesh], coal.BVHModelOBBRSS()
-            model.beginModel(len(mesh.faces), len(mesh.vertices))
-            model.addVertices(np.asarray(mesh.vertices, dtype=float))
-            model.addTriangles(np.asarray(mesh.faces, dtype=np.uint32))
-            model.endModel()
-            if not shape.concave:
-                model.buildConvexHull(True, "Qt")
-            return model if shape.concave else model.convex
+            mesh = self._meshes[shape.mesh]
+            return coal_triangles(mesh.vertices, mesh.faces) if shape.concave else coal_hull(mesh.vertices)
         if (solid := coal_solid(shape)) is None:
             raise EngineError(f"paths over a {type(shape).__name__} cannot be checked; choose a task on a plane")
         return solid

@@ -11,7 +11,7 @@ import numpy as np
 
 from anysim.conventions import WORLD, Array
 from anysim.errors import AnysimError, NameLookupError, listing, suggest
-from anysim.geometry.coal_solids import coal_solid
+from anysim.geometry.coal_solids import coal_hull, coal_solid, coal_triangles
 from anysim.kinematics.pinocchio_model import pinocchio, se3
 from anysim.math import pose as P
 from anysim.model.pairs import may_meet
@@ -250,30 +250,16 @@ def _coal_shape(world: World, shape: Shape, padding: float) -> Any:
             made = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
         case MeshShape(name, concave):
             mesh = next(m for m in world.meshes if m.name == name)
-            made = _mesh(mesh.vertices, mesh.faces, concave)
+            made = coal_triangles(mesh.vertices, mesh.faces) if concave else coal_hull(mesh.vertices)
         case HeightFieldShape(name):
             field = next(f for f in world.heightfields if f.name == name)
-            made = _mesh(*surface_triangles(field.heights, field.size), concave=True)
+            made = coal_triangles(*surface_triangles(field.heights, field.size))
         case _:
             made = coal_solid(shape)
     if padding and hasattr(made, "setSweptSphereRadius"):
         made.setSweptSphereRadius(padding)
     made.computeLocalAABB()
     return made
-
-
-def _mesh(vertices: Array, faces: Array, concave: bool) -> Any:
-    import coal  # pyright: ignore[reportMissingImports]  (found by its .pth file)
-
-    model = coal.BVHModelOBBRSS()
-    model.beginModel(len(faces), len(vertices))
-    model.addVertices(np.asarray(vertices, dtype=float))
-    model.addTriangles(np.asarray(faces, dtype=np.uint32))
-    model.endModel()
-    if concave:
-        return model
-    model.buildConvexHull(True, "Qt")
-    return model.convex
 
 
 def surface_triangles(heights: Array, size: tuple[float, float]) -> tuple[Array, Array]:
