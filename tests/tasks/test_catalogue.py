@@ -5,6 +5,7 @@ from importlib.metadata import entry_points
 import numpy as np
 import pytest
 
+from anysim.api import load, task_path
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
 from tests.tasks.states import CASES, blind, failed, judged, put, rewarded, seen, set_opening
@@ -111,3 +112,14 @@ def test_a_peg_falls_to_the_bottom_of_its_hole(task: str, engine: str) -> None:
             env.step(np.zeros((2, env.action_dim)), env.running)
         depth = seen(env, "peg.tip")[:, 2] - seen(env, "block.hole")[:, 2]
         assert env.status.tolist() == ["success"] * 2, depth
+
+
+@pytest.mark.parametrize("task", [*CASES, "pick_cube"])
+def test_a_task_has_a_page_with_its_levels_and_a_picture(task: str) -> None:
+    folder = task_path(task).parent
+    levels = list(load(task).spec.levels)
+    assert levels == [] or levels[:3] == ["L0", "L1", "L2"]
+    page = (folder / "README.md").read_text()
+    assert ("| levels | " in page) == bool(levels)
+    assert "![" in page
+    assert (folder / "picture.jpg").stat().st_size < 100_000

@@ -97,6 +97,8 @@ def _tasks(ask_engines: bool, json: bool) -> None:
             row |= {"family": task_path(name).parent.parent.name, "horizon": task.horizon, "expert": expert}
             row |= {"robots": [one.robot for one in spec.world.robots.values()], "levels": list(spec.levels)}
             row |= {"what": task.description}
+            if (picture := task_path(name).with_name("picture.jpg")).exists():
+                row["picture"] = str(picture)
             if ask_engines:
                 row["engines"] = _able(loaded, name)
         except AnysimError as error:
