@@ -12,6 +12,7 @@ from anysim.skills.bank import Bank
 from anysim_banks.anchors import Anchor, anchored, read_anchors
 from anysim_banks.gripper import Gripper, gripper as gripper_by_name
 from anysim_banks.making import Order, made, stamp, tried_on
+from anysim_banks.reach import Base
 from anysim_banks.store import bank_path, stored, write
 from anysim_banks.subject import GRASPED, Subject, subjects
 from anysim_schemas.object_source import MESH_ENDINGS, PROCEDURAL
@@ -32,6 +33,8 @@ class Wish(NamedTuple):
     seed: int = 0
     anchors: Path | None = None
     out: Path = Path("banks")
+    robot: str = ""
+    bases: tuple[Base, ...] = ()
 
 
 class Work(NamedTuple):
@@ -101,9 +104,9 @@ def works(wish: Wish) -> list[Work]:
 
 def build_all(todo: Sequence[Work], wish: Wish) -> Iterator[Row]:
     """Make, or complete, one bank after the other; each is written as soon as an engine is done with it."""
-    order = Order(wish.raw, wish.keep, wish.seed)
+    order = Order(wish.raw, wish.keep, wish.seed, wish.robot, wish.bases)
     for work in todo:
-        path = bank_path(wish.out, work.name, work.subject, work.gripper)
+        path = bank_path(wish.out, work.name, work.subject, work.gripper, wish.robot)
         name = f"{work.name}.{work.subject.affordance.name}"
         said: list[str] = []
         bank, rate = stored(path, work.subject, work.gripper, order), 0.0

@@ -49,6 +49,18 @@ def build(
             "physics becomes a bank, and nothing else of it is ever executed.",
         ),
     ] = None,
+    robot: Annotated[
+        str,
+        typer.Option(help="A robot of the catalogue: only grasps that inverse kinematics has its arm reach are kept."),
+    ] = "",
+    base: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="X,Y,Z,YAW",
+            help="Where the robot stands, in the frame of the asset [m, rad]; several may be given. Default: the best "
+            "of sampled ones, on the plane that the asset stands on.",
+        ),
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder of the banks, one file for each affordance.")] = Path("banks"),
     json: AsJson = False,
 ) -> None:
@@ -60,12 +72,15 @@ def build(
     Examples:
       anysim bank build procedural:cabinet -a drawer_1.handle -e mujoco,pybullet,sapien
       anysim bank build pick_cube --object cube --keep 32 --out banks
+      anysim bank build procedural:cabinet -a drawer_1.handle --robot mobile_panda
     """
     from anysim.cli.output import counting, print_json, print_table
     from anysim.errors import AssetError
     from anysim_banks.building import Row, Wish, build_all, works
+    from anysim_banks.reach import parse_bases
 
     wish = Wish(what, object, affordance, tuple(engine.split(",")), gripper, raw, keep, seed, anchors, out)
+    wish = wish._replace(robot=robot, bases=parse_bases(base or [], robot))
     todo = works(wish)
     rows: list[Row] = []
     with counting("banks", len(todo), quiet=json) as show:

@@ -28,7 +28,7 @@ class CollisionFilter:
         self._boxes, self._half = gripper.boxes
         self._side = np.where(np.abs(self._boxes[:, 1]) > 1e-9, np.sign(self._boxes[:, 1]), 0.0)
         self._stroke = gripper.stroke
-        self._pieces = [(_geometry(piece), self._transform(piece.pose)) for piece in pieces]
+        self._pieces = [(geometry_of(piece), self._transform(piece.pose)) for piece in pieces]
         self._middle = np.array([piece.pose[:3] for piece in pieces]).reshape(-1, 3)
         self._radius = np.array([bounding_radius(piece) for piece in pieces])
 
@@ -74,7 +74,8 @@ class CollisionFilter:
         return self._coal.Transform3s(P.to_matrix(pose[3:]), pose[:3])
 
 
-def _geometry(piece: Piece) -> Any:
+def geometry_of(piece: Piece) -> Any:
+    """A piece as Coal has it, in its own frame."""
     if (solid := coal_solid(piece.shape)) is not None:
         return solid
     assert piece.hull is not None  # of a mesh; pieces have no other shapes

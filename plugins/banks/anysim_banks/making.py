@@ -14,6 +14,7 @@ from anysim.skills.bank import Bank
 from anysim_banks.collision import CollisionFilter
 from anysim_banks.diversity import diverse
 from anysim_banks.gripper import Gripper
+from anysim_banks.reach import Base, Reach
 from anysim_banks.sampling import Candidates, sample
 from anysim_banks.subject import Subject
 from anysim_banks.trial import CREEP, HARDEST, LONG, SHIFT, TURN, Trial
@@ -28,11 +29,18 @@ _POSE_DIGITS = 9
 
 @dataclass(frozen=True)
 class Order:
-    """How many grasps are sampled, how many are kept, and the seed of the sampling."""
+    """How many grasps are sampled, how many are kept, the seed, and a robot that is to reach them, from where."""
 
     raw: int = 2000
     keep: int = 64
     seed: int = 0
+    robot: str = ""
+    bases: tuple[Base, ...] = ()
+
+    @property
+    def asked(self) -> list[object]:
+        """What makes another bank of the same subject and seed."""
+        return [self.raw, self.keep, *([self.robot, [list(base) for base in self.bases]] if self.robot else [])]
 
 
 def made(
@@ -54,7 +62,12 @@ def made(
         found = found.take(np.flatnonzero(P.norm(found.pose[:, :3] - there) <= radius))
     raw = len(found.width)
     free = found.take(np.flatnonzero(CollisionFilter(gripper, subject.around).free(found.pose, found.width)))
-    say(f"{len(free.width)} of {raw} are free of collision")
+    clear = len(free.width)
+    say(f"{clear} of {raw} are free of collision")
+    standing: dict[str, object] = {}
+    if order.robot:
+        free, standing = _within_reach(free, subject, order, rng)
+        say(f"{len(free.width)} of those within reach of {order.robot}")
     with Trial(gripper, subject, engine) as trial:
         easy = trial.run(free, hard=False)
         held = np.flatnonzero(easy.margin >= 1.0)
@@ -71,22 +84,23 @@ def made(
     if len(best) == 0:
         wide = f"nothing there is narrower than {gripper.max_width:g} m" if raw == 0 else f"{raw} grasps were sampled"
         raise AssetError(
-            f"no grasp of {subject.asset} {subject.affordance.name} was held: {wide}, {len(free.width)} free of "
+            f"no grasp of {subject.asset} {subject.affordance.name} was held: {wide}, {clear} free of "
             f"collision, {len(held)} held, none of those for half a second; another gripper, or an affordance with "
             "other pieces or approaches, may do"
         )
     kept = tried[best]
     counts: dict[str, object] = {
         "raw": raw,
-        "free": len(free.width),
+        "free": clear,
         "held": len(held),
         "kept": len(kept),
         "seed": order.seed,
-        "asked": [order.raw, order.keep],
+        "asked": order.asked,
         "place": subject.place,
         "link": subject.link,
         "stroke": round(gripper.stroke, _POSE_DIGITS),
         "test": {"hardest": HARDEST, "shift": SHIFT, "turn": TURN, "long": LONG, "creep": list(CREEP)},
+        **standing,
         **(about or {}),
     }
     bank = Bank(
@@ -103,6 +117,15 @@ def made(
         counts,
     )
     return _best_first(bank), rate
+
+
+def _within_reach(
+    free: Candidates, subject: Subject, order: Order, rng: np.random.Generator
+) -> tuple[Candidates, dict[str, object]]:
+    """What of the candidates the robot reaches, and where it stands, for the bank's provenance."""
+    found = Reach(order.robot, order.bases).of(subject, free.pose, rng)
+    stands = {"bases": [list(base) for base in found.bases], "reached": found.grasps.sum(axis=1).tolist()}
+    return free.take(np.flatnonzero(found.grasps.any(axis=0))), {"robot": order.robot, **stands}
 
 
 def tried_on(bank: Bank, subject: Subject, gripper: Gripper, engines: Sequence[str], say: Say) -> Bank:

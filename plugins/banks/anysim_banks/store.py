@@ -12,10 +12,10 @@ from anysim_banks.making import Order
 from anysim_banks.subject import Subject
 
 
-def bank_path(folder: Path, name: str, subject: Subject, gripper: Gripper) -> Path:
+def bank_path(folder: Path, name: str, subject: Subject, gripper: Gripper, robot: str = "") -> Path:
     """Where the bank of an affordance is, `name` being what its asset is called; what differs has a name of its own."""
     digest = hashlib.sha256(f"{subject.hash} {subject.place} {gripper.hash}".encode()).hexdigest()[:8]
-    parts = (name, subject.affordance.name, gripper.name, digest)
+    parts = (name, subject.affordance.name, gripper.name, *filter(None, [robot]), digest)
     return folder / (".".join(re.sub(r"[^\w.=-]+", "_", part).strip("_") for part in parts) + ".json")
 
 
@@ -26,7 +26,7 @@ def stored(path: Path, subject: Subject, gripper: Gripper, order: Order) -> Bank
     except AssetError:
         return None
     same = (bank.asset_hash, bank.gripper_hash) == (subject.hash, gripper.hash)
-    about = {"place": subject.place, "asked": [order.raw, order.keep], "seed": order.seed}
+    about = {"place": subject.place, "asked": order.asked, "seed": order.seed}
     return bank if same and all(bank.provenance.get(key) == value for key, value in about.items()) else None
 
 

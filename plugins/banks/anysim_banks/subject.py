@@ -17,6 +17,7 @@ from anysim.model.affordance_lookup import (
     resolve_affordance,
 )
 from anysim.model.affordances import Affordance, AffordanceKind
+from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.slots import single
 from anysim.model.world import Body, BodyKind, Entity, JointType, Vec3, World
 from anysim_banks.pieces import Piece, piece_of
@@ -25,6 +26,11 @@ GRASPED = frozenset(
     {AffordanceKind.HANDLE, AffordanceKind.RIM, AffordanceKind.BODY, AffordanceKind.LEVER, AffordanceKind.TIP}
 )
 """Kinds that fingers close on; the others are pressed, or something goes into them."""
+
+STATIONS = 5
+"""Points of a joint's way."""
+OPENED = 0.8
+"""Of its range."""
 
 Region = tuple[Vec3, float]
 
@@ -41,6 +47,8 @@ class Subject:
         around: all that collides of the entity, at its joints' initial positions, in the body's frame.
         body: the body, to be held freely: its mass and inertia.
         world: the body alone, with what of it collides.
+        way: (S, 7) of the body in the asset's frame along the way of the joint that moves it, from its initial position
+            on; one where it is carried.
         pull: what its joint lets it move along at the affordance, unit, in the body's frame; None: it is carried.
         hash: a digest of the entity (`anysim.model.affordance_lookup.asset_hash`).
         link: the body's number among the entity's.
@@ -54,6 +62,7 @@ class Subject:
     around: tuple[Piece, ...]
     body: Body
     world: World
+    way: Array
     pull: Array | None
     hash: str
     link: int
@@ -129,6 +138,7 @@ def subject(world: World, found: FoundAffordance, region: Region | None = None) 
         tuple(_around(world, owner, number)),
         alone,
         World("subject", bodies=(alone,), geoms=geoms, meshes=meshes),
+        _way(world, found),
         _pull(world, found),
         asset_hash(world, owner, number),
         number - owner.body_start,
@@ -146,6 +156,19 @@ def _around(world: World, owner: Entity, number: int) -> list[Piece]:
             if piece is not None:
                 found.append(piece._replace(pose=P.compose(relative, piece.pose)))
     return found
+
+
+def _way(world: World, found: FoundAffordance) -> Array:
+    """From its initial position towards its farther limit, for as much of that as skills open a part."""
+    joint_pos = np.array([[joint.initial for joint in world.joints]])
+    if found.joint >= 0:
+        joint = world.joints[found.joint]
+        end = max(joint.lower, joint.upper, key=lambda limit: abs(limit - joint.initial))
+        joint_pos = np.tile(joint_pos, (STATIONS, 1))
+        if np.isfinite(end):
+            joint_pos[:, found.joint] += np.linspace(0.0, OPENED, STATIONS) * (end - joint.initial)
+    poses = forward_kinematics(world, np.tile(world.initial_body_pose, (len(joint_pos), 1, 1)), joint_pos)
+    return P.compose(P.inverse(poses[:, world.entities[found.entity].root]), poses[:, found.frame.body])
 
 
 def _pull(world: World, found: FoundAffordance) -> Array | None:
