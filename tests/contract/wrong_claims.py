@@ -290,15 +290,6 @@ class ClaimsLessError(Right):
     caught_by = ("test_approximations.py::test_an_error_is_no_larger_than_declared",)
 
 
-class HidesAnError(Right):
-    """Declares none of the numbers that it has, so that it is held to what an exact engine may be off by."""
-
-    capabilities = Capabilities(
-        {**MujocoEngine.capabilities.supported, C.JOINT_LIMITS: Support(False, "a stiff soft constraint")}
-    )
-    caught_by = ("test_approximations.py::test_an_error_is_no_larger_than_declared",)
-
-
 class SaysABareNumber(Right):
     """Has a number in a note that is not data."""
 

@@ -21,6 +21,11 @@ def test_a_hull_is_as_far_away_as_the_cube_whose_corners_it_was_made_of():
     assert _to_ball(hull, np.array([3.0, 3.0, 3.0])) == pytest.approx(np.sqrt(12) - 0.5, abs=1e-6)
 
 
+def test_too_few_points_are_an_error():
+    with pytest.raises(ValueError, match="four points that are not in one plane, got 3"):
+        coal_hull(CORNERS[:3])
+
+
 def test_the_hull_closes_a_notch_that_triangles_leave_open():
     # a gutter along y, whose walls rise from the origin to height 1 on both sides
     vertices = np.array([[-1.0, -2, 1], [-1, 2, 1], [0, -2, 0], [0, 2, 0], [1, -2, 1], [1, 2, 1]])

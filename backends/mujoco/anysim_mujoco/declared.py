@@ -21,33 +21,30 @@ _APPROXIMATE = {
     ),
     Capability.CONTACTS_MOVING: "soft, as with static things",
     Capability.EFFORT_LIMITS: approximately(
-        "clipped at the speed of the step's beginning: exact when blocked; a stiff drive that is clipped in motion "
-        "swings about its limit (kp 4500, kd 450 on 0.05 kg m^2 at 2 ms: {swing:g} rad off the solution)",
+        "clipped at the speed of the step's beginning: exact when blocked; a stiff drive clipped in motion swings about "
+        "its limit (kp 4500, kd 450 on 0.05 kg m^2 at 2 ms: {swing:g} rad off the solution)",
         swing=0.034,
     ),
     Capability.MIMIC_JOINTS: approximately("a stiff soft constraint: {lag:g} m at 20 N on a finger of 15 g", lag=3e-4),
     Capability.JOINT_LIMITS: approximately(
-        "a stiff soft constraint, met {late:g} step late: {beyond:g} rad beyond, pressed with 87 N m on 0.1 kg m^2; "
-        "where the dt kd of a drive is above the inertia it moves, its force on a limit swings (kd 300 on 0.115 kg at "
-        "2 ms: by {chatter:.0%} of 20 N)",
+        "a stiff soft constraint, met {late:g} step late: {beyond:g} rad beyond at 87 N m on 0.1 kg m^2; a drive whose "
+        "dt kd is above its inertia swings on it (kd 300 on 0.115 kg at 2 ms: by {chatter:.0%} of 20 N)",
         late=1.01,
         beyond=5e-4,
         chatter=0.85,
     ),
     Capability.RESTITUTION: approximately(
-        "an underdamped contact: within {bounce:g} of the coefficient; a ball sinks {dent:g} m for each m/s at 2 ms; "
-        "where nothing should bounce {dead:g} of the speed is left",
+        "an underdamped contact: within {bounce:g} of the coefficient, {dead:g} left where nothing should bounce; a ball "
+        "sinks {dent:g} m for each m/s at 2 ms",
         bounce=0.07,
-        dent=7.5e-3,
         dead=0.13,
+        dent=7.5e-3,
     ),
     Capability.RENDER_LIGHTS: "one with a place shines in a wide cone about its direction alone",
-    Capability.MATERIALS: (
-        "one lamp's highlight: as strong as specular or metallic says, as small as it is smooth; nothing is mirrored"
-    ),
+    Capability.MATERIALS: "one lamp's highlight, as strong as specular or metallic says, as small as it is smooth",
     Capability.VARYING_ENTITIES: approximately(
-        "what is absent stays in the model, where nothing meets it: the rest moves within {shift:g} m over 3.6 s of a "
-        "world without it, contacts included. It still takes time in each step",
+        "what is absent stays in the model and takes time, but nothing meets it: the rest moves within {shift:g} m over "
+        "3.6 s of a world without it, contacts included",
         shift=3e-10,
     ),
 }

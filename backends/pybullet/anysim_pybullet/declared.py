@@ -39,17 +39,15 @@ _APPROXIMATE = {
     ),
     Capability.CONTROL_POSITION: approximately(
         "computed in each step: within {track:g} rad of the solution in motion, {settled:g} rad at rest (kp 400, kd 40 "
-        "on 0.5 kg m^2); what presses against something builds its force up, the lighter the slower: within "
-        "{buildup:.0%} after 0.1 s for a finger of 1 kg",
+        "on 0.5 kg m^2); a force against something builds up: within {buildup:.0%} after 0.1 s for a finger of 1 kg",
         track=3e-3,
         settled=1e-7,
         buildup=0.02,
     ),
     Capability.ACTUATION_NATIVE: approximately(
         "motors that aim at a velocity: within {astray:g} rad of the law in motion (kp 400, kd 40 on 0.5 kg m^2); "
-        "blocked they push with anything up to their effort limit, whatever their error ({stalled:.0%} off where 20 N "
-        "are asked for and 87 N allowed); compensated gravity is not worked out in every step; no dry friction on "
-        "driven joints",
+        "blocked they push with anything up to their effort limit ({stalled:.0%} off where 20 N are asked for and 87 N "
+        "allowed); compensated gravity is not worked out in every step; no dry friction on driven joints",
         astray=3e-3,
         stalled=3.4,
     ),

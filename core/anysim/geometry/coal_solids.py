@@ -29,6 +29,8 @@ def coal_hull(vertices: Array) -> Any:
     """The convex hull of vertices (V, 3) [m] that are not all in one plane: what a convex mesh is for the engines."""
     import coal  # pyright: ignore[reportMissingImports]  (found by its .pth file)
 
+    if len(vertices) < 4:  # Coal would end the process
+        raise ValueError(f"a hull needs four points that are not in one plane, got {len(vertices)}")
     points = coal.StdVec_Vec3s()
     points.extend(np.asarray(vertices, dtype=float))
     return coal.Convex.convexHull(points, True, "Qt")
