@@ -21,8 +21,8 @@ _APPROXIMATE = {
     ),
     Capability.CONTACTS_MOVING: "soft, as with static things",
     Capability.EFFORT_LIMITS: approximately(
-        "clipped at the speed of the step's beginning: exact when blocked; a stiff drive clipped in motion swings about "
-        "its limit (kp 4500, kd 450 on 0.05 kg m^2 at 2 ms: {swing:g} rad off the solution)",
+        "clipped at the speed of the step's beginning: exact when blocked; a stiff drive clipped in motion swings "
+        "about its limit (kp 4500, kd 450 on 0.05 kg m^2 at 2 ms: {swing:g} rad off the solution)",
         swing=0.034,
     ),
     Capability.MIMIC_JOINTS: approximately("a stiff soft constraint: {lag:g} m at 20 N on a finger of 15 g", lag=3e-4),
@@ -34,18 +34,16 @@ _APPROXIMATE = {
         chatter=0.85,
     ),
     Capability.RESTITUTION: approximately(
-        "an underdamped contact: within {bounce:g} of the coefficient, {dead:g} left where nothing should bounce; a ball "
-        "sinks {dent:g} m for each m/s at 2 ms",
+        "an underdamped contact: within {bounce:g} of the coefficient, {dead:g} left where nothing should bounce; a "
+        "ball sinks {dent:g} m for each m/s at 2 ms",
         bounce=0.07,
         dead=0.13,
         dent=7.5e-3,
     ),
     Capability.RENDER_LIGHTS: "one with a place shines in a wide cone about its direction alone",
-    Capability.MATERIALS: "one lamp's highlight, as strong as specular or metallic says, as small as it is smooth",
+    Capability.MATERIALS: "one lamp's highlight, as strong as specular or metallic says; nothing is mirrored",
     Capability.VARYING_ENTITIES: approximately(
-        "what is absent stays in the model and takes time, but nothing meets it: the rest moves within {shift:g} m over "
-        "3.6 s of a world without it, contacts included",
-        shift=3e-10,
+        "what is absent takes time, and moves the rest by up to {shift:g} m within 3.6 s", shift=3e-10
     ),
 }
 _ABSENT = (Capability.SOLVER_SETTINGS, Capability.TERRAIN_TRIMESH)  # MuJoCo collides the convex hull of a mesh
