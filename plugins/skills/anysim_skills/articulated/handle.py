@@ -76,8 +76,7 @@ class AtHandle(PhasedSkill):
         self.phase[env_ids] = 1
 
     def retry(self, rung: Rung, env: int) -> int | None:
-        again = rung in (Rung.RESAMPLE, Rung.BACK_OFF) or (rung is Rung.CANDIDATE and self._choice.next(env))
-        return 0 if again else None
+        return self._choice.retry(rung, env)
 
     def approach_phases(self) -> list[Phase]:
         """Away from the part, choose, before the handle, to the handle."""
@@ -117,9 +116,7 @@ class AtHandle(PhasedSkill):
             self.part.moved(at, grasps, np.repeat((share * to_go)[:, None], g, axis=1))
             for share in np.linspace(0.0, 1.0, STATIONS)
         ]
-        targets = np.stack([clear, *way], axis=2)
-        effort = self.arm.reach(ids, targets.reshape(n, -1, 7))[1].reshape(n, g, -1).max(axis=2)
-        self._turn[ids] = TURNS[self._choice.choose(ids, effort)]
+        self._turn[ids] = TURNS[self._choice.least_motion(self.arm, ids, np.stack([clear, *way], axis=2))]
 
     def _chosen(self, ids: Array, at: Array) -> Array:
         del at

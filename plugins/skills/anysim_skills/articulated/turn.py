@@ -17,7 +17,7 @@ from anysim.task.joints import JointView
 from anysim.task.scene import RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.articulated.part import JointedPart
-from anysim_skills.choice import Choice
+from anysim_skills.choice import Choice, turns_against
 from anysim_skills.grasping.grasp import Metres, Speed
 
 YAWS = 8
@@ -98,8 +98,7 @@ class Turn(PhasedSkill):
         self.phase[env_ids] = 1
 
     def retry(self, rung: Rung, env: int) -> int | None:
-        again = rung in (Rung.RESAMPLE, Rung.BACK_OFF) or (rung is Rung.CANDIDATE and self._choice.next(env))
-        return 0 if again else None
+        return self._choice.retry(rung, env)
 
     # ------------------------------------------------------------------ where the hand is to be
 
@@ -142,16 +141,13 @@ class Turn(PhasedSkill):
         new = np.isnan(self._goal[ids])  # a retry goes on to the same goal
         self._goal[ids[new]] = self.part.position(at[new]) + self._angle
         to_go = self._goal[ids] - self.part.position(at)
-        half = np.pi / YAWS * np.arange(YAWS)
-        against = np.stack([np.cos(half), np.sin(half), 0 * half, 0 * half], axis=1)  # z against the axis
-        turns = P.multiply(self.handle.quaternion[at][:, None], against[None])
+        turns = turns_against(self.handle.quaternion[at], YAWS)
         back = self._back(at)
         stations = [self._beside_it(at, turns, np.repeat(back[:, None], YAWS, axis=1), self._clear)]
         for share in np.linspace(0.0, 1.0, STATIONS):
             stations.append(self._beside_it(at, turns, np.repeat((share * to_go)[:, None], YAWS, axis=1), 0.0))
-        targets = np.stack(stations, axis=2)
-        effort = self.arm.reach(ids, targets.reshape(len(ids), -1, 7))[1].reshape(len(ids), YAWS, -1).max(axis=2)
-        self._turn[ids] = turns[np.arange(len(ids)), self._choice.choose(ids, effort)]
+        chosen = self._choice.least_motion(self.arm, ids, np.stack(stations, axis=2))
+        self._turn[ids] = turns[np.arange(len(ids)), chosen]
 
     def _chosen(self, ids: Array, at: Array) -> Array:
         del at

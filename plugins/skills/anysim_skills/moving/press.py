@@ -14,7 +14,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.joints import RangedJointView
 from anysim.task.scene import Frame, RobotView
 from anysim_skills.arm import Arm
-from anysim_skills.choice import Choice
+from anysim_skills.choice import Choice, turns_against
 from anysim_skills.grasping.grasp import Speed
 
 TURNS = 8
@@ -62,8 +62,7 @@ class Press(PhasedSkill):
         self._choice.again(env_ids)
 
     def retry(self, rung: Rung, env: int) -> int | None:
-        again = rung is Rung.BACK_OFF or (rung in (Rung.CANDIDATE, Rung.RESAMPLE) and self._choice.next(env))
-        return 0 if again else None
+        return self._choice.retry(rung, env, same=(Rung.BACK_OFF,))
 
     def _at(self, at: Array, turn: Array, out: float) -> Array:
         """Tool poses (n, 7), `out` [m] above the button along its normal."""
@@ -72,22 +71,10 @@ class Press(PhasedSkill):
         return np.concatenate([button[:, :3] + out * normal, turn], axis=1)
 
     def _choose(self, ids: Array, at: Array) -> None:
-        button = self._button.pose[at]
-        angle = 2 * np.pi / TURNS * np.arange(TURNS)
-        half = 0.5 * angle
-        against = np.stack([np.cos(half), np.sin(half), 0 * half, 0 * half], axis=1)  # z against the normal
-        turns = P.multiply(
-            np.repeat(button[:, None, 3:], TURNS, axis=1), np.broadcast_to(against, (len(ids), TURNS, 4))
-        )
-        targets = np.stack(
-            [
-                np.stack([self._at(at, turns[:, k], out) for out in (self._clear, -self._beyond)], axis=1)
-                for k in range(TURNS)
-            ],
-            axis=1,
-        )
-        effort = self.arm.reach(ids, targets.reshape(len(ids), -1, 7))[1].reshape(len(ids), TURNS, 2).max(axis=2)
-        self._turn[ids] = turns[np.arange(len(ids)), self._choice.choose(ids, effort)]
+        turns = turns_against(self._button.pose[at][:, 3:], TURNS)
+        ways = [[self._at(at, turns[:, k], out) for out in (self._clear, -self._beyond)] for k in range(TURNS)]
+        targets = np.moveaxis(np.array(ways), 2, 0)
+        self._turn[ids] = turns[np.arange(len(ids)), self._choice.least_motion(self.arm, ids, targets)]
         self.arm.closed[ids] = True
 
     def _chosen(self, ids: Array, at: Array) -> Array:

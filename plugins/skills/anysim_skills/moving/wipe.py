@@ -13,7 +13,7 @@ from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, RobotView
 from anysim_skills.arm import LEAD, SLIPPED, Arm
-from anysim_skills.choice import Choice
+from anysim_skills.choice import Choice, turns_against
 from anysim_skills.grasping.grasp import Metres, Speed
 from anysim_skills.moving.raster import Coverage, Raster
 
@@ -102,8 +102,7 @@ class Wipe(PhasedSkill):
 
     def retry(self, rung: Rung, env: int) -> int | None:
         """Once more over it with what is covered; the next turn of the hand where the way was at fault."""
-        again = rung is Rung.BACK_OFF or (rung in (Rung.CANDIDATE, Rung.RESAMPLE) and self._choice.next(env))
-        return 0 if again else None
+        return self._choice.retry(rung, env, same=(Rung.BACK_OFF,))
 
     def covered(self, ids: Array) -> Array:
         """(n,) share of the rectangle that the tip has been over while in contact."""
@@ -146,15 +145,12 @@ class Wipe(PhasedSkill):
 
     def _choose(self, ids: Array, at: Array) -> None:
         self.arm.closed[ids] = True
-        half = np.pi / TURNS * np.arange(TURNS)
-        against = np.stack([np.cos(half), np.sin(half), 0 * half, 0 * half], axis=1)  # z against the normal
-        turns = P.multiply(self._patch.quaternion[at][:, None], against[None])
+        turns = turns_against(self._patch.quaternion[at], TURNS)
         x, y = 0.5 * self._size[0], 0.5 * self._size[1]
         corners = [(-x, -y, self._clear), *((sx * x, sy * y, 0.0) for sx in (-1, 1) for sy in (-1, 1))]
         shape = (len(ids), TURNS, 3)
         targets = np.stack([self._at(at, turns, np.broadcast_to(np.array(c), shape)) for c in corners], axis=2)
-        effort = self.arm.reach(ids, targets.reshape(len(ids), -1, 7))[1].reshape(len(ids), TURNS, -1).max(axis=2)
-        self._turn[ids] = turns[np.arange(len(ids)), self._choice.choose(ids, effort)]
+        self._turn[ids] = turns[np.arange(len(ids)), self._choice.least_motion(self.arm, ids, targets)]
 
     def _chosen(self, ids: Array, at: Array) -> Array:
         del at

@@ -66,8 +66,7 @@ class GraspSide(PhasedSkill):
         self.phase[env_ids] = 1
 
     def retry(self, rung: Rung, env: int) -> int | None:
-        again = rung in (Rung.RESAMPLE, Rung.BACK_OFF) or (rung is Rung.CANDIDATE and self._choice.next(env))
-        return 0 if again else None
+        return self._choice.retry(rung, env)
 
     # ------------------------------------------------------------------ phases
 
@@ -91,12 +90,11 @@ class GraspSide(PhasedSkill):
         grasps = np.concatenate([np.repeat(self._place(at)[:, None], turns.shape[1], axis=1), turns], axis=-1)
         raised = grasps + np.array([0.0, 0.0, self._lift, 0.0, 0.0, 0.0, 0.0])
         targets = np.stack([_before(grasps, self._clear), grasps, raised], axis=2)
-        effort = self.arm.reach(ids, targets.reshape(len(ids), -1, 7))[1].reshape(len(ids), -1, 3).max(axis=2)
         low, high = self._shapes.box(ids)
         wide = (high - low)[:, [1, 0, 1, 0]] > self.arm.aperture - ROOM
         deep = np.concatenate([-low[:, :2], high[:, :2]], axis=1) > FINGER  # towards a hand that comes along +x, ...
-        effort[np.repeat(wide | deep, len(SLOPES), axis=1)] = np.inf
-        self._turn[ids] = turns[np.arange(len(ids)), self._choice.choose(ids, effort)]
+        misfits = np.repeat(wide | deep, len(SLOPES), axis=1)
+        self._turn[ids] = turns[np.arange(len(ids)), self._choice.least_motion(self.arm, ids, targets, misfits)]
 
     def _chosen(self, ids: Array, at: Array) -> Array:
         absent = ~self._object.present[at]
