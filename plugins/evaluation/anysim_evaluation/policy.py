@@ -59,7 +59,7 @@ class Judging(Protocol):
 
 
 class PolicyName(NamedTuple):
-    """`NAME`, or `NAME:KEY=VALUE,KEY=VALUE`, or `MODULE:FUNCTION`, or a model file."""
+    """`NAME`, or `NAME:KEY=VALUE,KEY=VALUE`, or `NAME:SCHEME://ADDRESS,KEY=VALUE`, or `MODULE:FUNCTION`, or a file."""
 
     name: str
     options: dict[str, Any]
@@ -70,18 +70,20 @@ def parse(text: str) -> PolicyName:
     """What a policy's name on the command line says.
 
     Raises:
-        TaskError: it is of none of the four forms.
+        TaskError: it is of none of these forms.
     """
     if text.endswith(MODELS):
         return PolicyName(FILE, {"path": text})
     name, colon, rest = text.partition(":")
-    if colon and "=" not in rest and name not in registry.names("env_policies"):
+    if colon and "=" not in rest and "://" not in rest and name not in registry.names("env_policies"):
         if not all(part.isidentifier() for part in [*name.split("."), rest]):
             raise TaskError(f"--policy {text}: expected NAME, NAME:KEY=VALUE,…, MODULE:FUNCTION or FILE.onnx")
         return PolicyName(name, {}, rest)
     options: dict[str, Any] = {}
-    for pair in rest.split(",") if colon else ():
+    for place, pair in enumerate(rest.split(",") if colon else ()):
         key, equals, value = pair.partition("=")
+        if place == 0 and "://" in key:
+            key, equals, value = "url", "=", pair
         if not equals or not key.isidentifier() or key in options:
             raise TaskError(f"--policy {text}: '{pair}' is no KEY=VALUE of its own, as in expert:sigma=0.03")
         options[key] = _value(value)
