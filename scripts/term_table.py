@@ -9,7 +9,8 @@ import inspect
 import re
 import sys
 from collections.abc import Callable, Collection
-from typing import Any, get_args, get_origin
+from types import NoneType, UnionType
+from typing import Any, Union, get_args, get_origin
 
 from generated import main
 from pydantic.fields import FieldInfo
@@ -57,6 +58,8 @@ def spelled(annotation: Any) -> str:
         return " or ".join(f"`{value}`" for value in get_args(annotation))
     if "Range" in text or "Choice" in text:
         return "3 values, each may be drawn" if "tuple" in text else "a value, may be drawn"
+    if get_origin(annotation) in (Union, UnionType) and NoneType not in get_args(annotation):
+        return " or ".join(", ".join(filter(None, typed(part))) for part in get_args(annotation))
     if text == "tuple[str, ...]":
         return "words"
     if text.startswith("tuple["):

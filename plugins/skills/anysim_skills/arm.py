@@ -22,7 +22,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.env_lifetime import PerEnv
 from anysim_skills.planned_moves import PlannedMoves, Stage
-from anysim_skills.planning import LATENCY, planner_of
+from anysim_skills.planning import LATENCY, Latency, planner_of
 
 ARRIVED = 0.004
 """[m] distance of the tool at which a straight move counts as done."""
@@ -96,14 +96,14 @@ class Arm(Mover):
         tool: str = "tool",
         solver: str = "numba_ik",
         planner: str = "",
-        latency: int = LATENCY,
+        latency: Latency = LATENCY,
     ) -> Self:
         """The arm of an env, shared by all skills that drive it.
 
         Args:
             env, robot, channel, gripper, tool, solver: whose arm it is, and how it is moved.
             planner: what plans its moves, by name; empty: this skill has no moves planned.
-            latency: control steps until a plan takes effect.
+            latency: control steps until a plan takes effect; `realtime`: as soon as it is ready.
 
         Raises:
             NameLookupError, TaskError: the robot has no such channels or tool, or they have no controllers; two skills
@@ -116,7 +116,7 @@ class Arm(Mover):
             arm.plan_with(planner, latency, tool)
         return arm  # pyright: ignore[reportReturnType]
 
-    def plan_with(self, planner: str, latency: int, tool: str) -> None:
+    def plan_with(self, planner: str, latency: Latency, tool: str) -> None:
         """Have moves planned from now on."""
         if self.plans is None:
             made = planner_of(self.env, planner)

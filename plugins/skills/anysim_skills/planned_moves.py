@@ -4,6 +4,7 @@ An answer takes effect a fixed number of control steps after its question, by th
 earlier waits. So what an env does depends on no other env, nor on the number of workers.
 """
 
+import warnings
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from time import perf_counter
@@ -19,7 +20,7 @@ from anysim.planning.service import PlanFuture
 from anysim.skills.base import OUTCOMES, Outcome
 from anysim.task.env import TaskEnv
 from anysim.task.scene import ObjectView
-from anysim_skills.planning import EnvPlanner
+from anysim_skills.planning import REALTIME, EnvPlanner, Latency
 
 PADDING = 0.01
 """[m] kept from obstacles: more than an arm strays from its trajectory."""
@@ -58,7 +59,7 @@ class Question:
     Attributes:
         future: of the answer.
         scenes: the scene that it was asked in.
-        due: the control step of the episode at which the answer takes effect.
+        due: the control step of the episode at which the answer takes effect; None: when it is ready.
         goals: (G, 7) tool poses.
         then: (7,) the end of a straight line after the move that has to be free too, or None.
         touched: the entity that the robot may touch on that line, or None.
@@ -66,7 +67,7 @@ class Question:
 
     future: PlanFuture
     scenes: Scenes
-    due: int
+    due: int | None
     goals: Array
     then: Array | None
     touched: str | None
@@ -85,12 +86,18 @@ class PlannedMoves:
         self,
         env: TaskEnv,
         planner: EnvPlanner,
-        latency: int,
+        latency: Latency,
         solver: InverseKinematics,
         tool: tuple[str, str],
         joints: Array,
     ) -> None:
         """`tool` is of a robot, by their names; `joints` (N, K) is what the arm tells its joints, written here."""
+        if latency == REALTIME:
+            warnings.warn(
+                "plans take effect once they are ready (latency: realtime): what is recorded replays, but the run "
+                "cannot be repeated; a number of control steps as latency makes it so",
+                stacklevel=2,
+            )
         self.planner, self.latency = planner, latency
         self._env, self._solver, self._chain, self._joints = env, solver, solver.chain, joints
         self._robot, self._tool = tool
@@ -149,7 +156,7 @@ class PlannedMoves:
         scene = self._env.scene
         scenes = self.planner.scenes(scene.state.body_pose[env], scene.presence[env])
         future = self.planner.service.submit(request, scenes.scene(0), env=env, latency=None)
-        due = int(scene.elapsed[env]) + self.latency
+        due = int(scene.elapsed[env]) + self.latency if isinstance(self.latency, int) else None
         self._questions[env] = Question(future, scenes, due, request.goals[0].poses, then, touched)
 
     def _seed(self, env: int) -> int:
@@ -169,7 +176,8 @@ class PlannedMoves:
     def move(self, ids: Array) -> Array:
         """Tell the joints where to be in this control step; (n,) bool: in which envs that was told."""
         for i in ids[self.stage[ids] == Stage.PLANNING].tolist():
-            if self._env.scene.elapsed[i] >= self._questions[i].due:
+            question = self._questions[i]
+            if question.future.done if question.due is None else self._env.scene.elapsed[i] >= question.due:
                 self._answered(i)
         led = np.isin(self.stage[ids], (Stage.PLANNING, Stage.FOLLOWING))
         following = ids[self.stage[ids] == Stage.FOLLOWING]

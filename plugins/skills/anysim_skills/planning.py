@@ -1,7 +1,7 @@
 """Planners of an env: one service and one collision check for all of its arms, closed with the env."""
 
 import os
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -18,7 +18,12 @@ WORKERS_VARIABLE = "ANYSIM_PLANNER_WORKERS"
 """The environment variable that says how many workers plan; no result depends on it."""
 
 PlannerName = Annotated[str, Field(description="plans moves around obstacles, such as rrt; empty: straight lines")]
-Latency = Annotated[int, Field(ge=1, description="control steps from a question to the planner until its answer")]
+Latency = Annotated[
+    Annotated[int, Field(ge=1)] | Literal["realtime"],
+    Field(description="control steps from a question to the planner until its answer, or once it is ready"),
+]
+REALTIME = "realtime"
+"""Plans take effect as soon as they are ready: no two runs need be the same."""
 LATENCY = 5
 """Control steps."""
 

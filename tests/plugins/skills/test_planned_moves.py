@@ -1,6 +1,7 @@
 """Planned moves: around what is in the way, honest about what cannot be done, and the same however many plan."""
 
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -90,6 +91,27 @@ def test_the_arm_waits_for_its_latency_and_then_follows() -> None:
         assert [OUTCOMES[said] for said in arm.planned(np.arange(2))] == [Outcome.OK] * 2
         env.scene.look(None)
         assert np.linalg.norm(arm.tool.position - [0.42, 0.32, 0.6], axis=1).max() < 0.02
+
+
+def test_in_real_time_an_answer_takes_effect_once_it_is_ready() -> None:
+    with behind_wall() as env:
+        ids = np.arange(2)
+        with pytest.warns(UserWarning, match="the run cannot be repeated"):
+            arm = Arm.of(env, env.scene.robot("panda"), planner="rrt", latency="realtime")
+        env.scene.look(ids)
+        arm.renew(ids)
+        arm.prepare(ids)
+        begin = arm.joints.copy()
+        arm.plan(ids, np.tile([0.42, 0.32, 0.6, 1.0, 0.0, 0.0, 0.0], (2, 1, 1)))
+        assert arm.plans is not None
+        futures = [question.future for question in arm.plans._questions.values()]
+        while not all(future.done for future in futures):
+            assert arm.plans.planner.service.counts.late == 0  # nobody waits
+            time.sleep(0.01)
+        driven(env, arm, 1)
+        assert (arm.joints != begin).any(axis=1).all()
+        assert arm.plans.describe()["latency"] == "realtime"
+        assert arm.plans.planner.service.counts.late == 0
 
 
 def test_another_command_takes_the_place_of_a_plan() -> None:
