@@ -98,6 +98,7 @@ def test_what_is_hidden_from_a_policy_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(find_spec("torch") is None, reason="torch is not installed: make test-learning")
+@pytest.mark.filterwarnings("ignore:.torch.jit:FutureWarning")  # torch 2.14 still writes and reads such files
 def test_torchscript_gives_what_onnx_gives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import torch  # pyright: ignore[reportMissingImports]
 

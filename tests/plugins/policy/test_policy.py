@@ -208,6 +208,7 @@ def test_without_torch_the_remedy_is_said(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 @pytest.mark.skipif(importlib.util.find_spec("torch") is None, reason="torch is not installed")
+@pytest.mark.filterwarnings("ignore:.torch.jit:FutureWarning")  # torch 2.14 still writes and reads such files
 def test_torchscript_gives_what_numpy_gives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(TRUSTED, str(tmp_path))
     import torch  # pyright: ignore[reportMissingImports]
