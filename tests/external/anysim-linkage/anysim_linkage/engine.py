@@ -7,7 +7,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
-from anysim.engine.capability import Capabilities, Capability
+from anysim.engine.capability import Capabilities, Capability, approximately
 from anysim.engine.control import POSITION, VELOCITY, Control
 from anysim.engine.state import Availability, SnapshotLevel
 from anysim.model.world import World
@@ -22,7 +22,6 @@ class LinkageEngine(SimEngine):
     capabilities: ClassVar[Capabilities] = Capabilities.of(
         Capability.ARTICULATIONS,
         Capability.ARMATURE,
-        Capability.JOINT_LIMITS,
         Capability.EFFORT_LIMITS,
         Capability.GRAVITY_COMPENSATION,
         Capability.CONTROL_POSITION,
@@ -31,6 +30,13 @@ class LinkageEngine(SimEngine):
         Capability.SNAPSHOT_STATE,
         Capability.SNAPSHOT_TRAJECTORY,
         Capability.DYNAMICS,
+        approximate={
+            Capability.JOINT_LIMITS: approximately(
+                "a stop at the end of a step: a drive whose dt kd is above its inertia swings on it "
+                "(kd 300 on 0.115 kg at 2 ms: by {chatter:.0%} of 20 N)",
+                chatter=0.85,
+            )
+        },
     )
 
     @classmethod
