@@ -90,3 +90,19 @@ def run_elsewhere(name: str, options: Mapping[str, Any]) -> dict[str, Array]:
 
     with load_engine(name)(**options) as engine:
         return run_and_read(engine, worlds.buildable(engine))
+
+
+def sliding_friction(engine: SimEngine, boxes: Sequence[int]) -> Array:
+    """(len(boxes),) the coefficients by which boxes that rest at 2 ms are slowed down, set off along x at 3 m/s.
+
+    Soft contacts let a box hop: the impulse along is taken over the impulse up, which is not its weight throughout.
+    """
+    engine.step(250)
+    twist = np.array(engine.get_state().body_twist[0, boxes])
+    twist[:, 0] += 3.0
+    engine.set_body_state(twist=twist[None], bodies=boxes)
+    engine.step(25)
+    early = np.array(engine.get_state().body_twist[0, boxes])
+    engine.step(75)
+    change = engine.get_state().body_twist[0, boxes] - early
+    return -change[:, 0] / (75 * 0.002 * 9.81 + change[:, 2])

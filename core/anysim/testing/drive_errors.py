@@ -1,6 +1,6 @@
 """Errors of drives and joints that engines may declare, each with the world in which it is measured."""
 
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -9,11 +9,39 @@ from anysim.model.world import Actuation, Box, ContactSensor, ControlMode, Mimic
 from anysim.testing import worlds
 from anysim.testing.sketch import Sketch, inertial
 
+STEP = 0.002
+"""[s] of all worlds here."""
+
 
 class Build(Protocol):
     """Makes an engine with a world; skips the running test where the engine declares that it cannot."""
 
     def __call__(self, world: World, num_envs: int = 1) -> SimEngine: ...
+
+
+class _Law:
+    """A drive on a joint that nothing else moves, integrated in fine steps: where it should be."""
+
+    def __init__(self, kp: float, kd: float, limit: float, moment: float) -> None:
+        self.kp, self.kd, self.limit, self.moment = kp, kd, limit, moment
+        self.position = self.speed = 0.0
+
+    def advance(self, target: float, dt: float, parts: int) -> float:
+        """The position [rad] after `dt` [s] towards the target, in so many steps."""
+        for _ in range(parts):
+            torque = float(np.clip(self.kp * (target - self.position) - self.kd * self.speed, -self.limit, self.limit))
+            self.speed += dt / parts * torque / self.moment
+            self.position += dt / parts * self.speed
+        return self.position
+
+    def world(self) -> World:
+        """The same as a world of one link."""
+        s = Sketch("law", STEP, worlds.WEIGHTLESS)
+        moments = (self.moment, self.moment, self.moment, 0.0, 0.0, 0.0)
+        link = inertial(Sphere(0.1), 1.0)._replace(inertia=moments)
+        joint = s.link("link", s.robot("arm"), worlds.REVOLUTE, worlds.Z, link)
+        s.drive(joint, ControlMode.POSITION, self.kp, self.kd, self.limit)
+        return s.world()
 
 
 def lag(build: Build) -> float:
@@ -49,22 +77,13 @@ def beyond(build: Build) -> float:
 
 def swing(build: Build) -> float:
     """[rad] off the solution: a stiff drive (kp 4500, kd 450 on 0.05 kg m^2 at 2 ms) clipped in motion at 87 N m."""
-    kp, kd, limit, moment, dt = 4500.0, 450.0, 87.0, 0.05, 0.002
-    s = Sketch("stiff", dt, worlds.WEIGHTLESS)
-    base = s.robot("arm")
-    even = inertial(Sphere(0.1), 1.0)._replace(inertia=(moment, moment, moment, 0.0, 0.0, 0.0))
-    link = s.link("link", base, worlds.REVOLUTE, worlds.Z, even)
-    s.drive(link, ControlMode.POSITION, kp, kd, limit)
-    engine = build(s.world())
+    law = _Law(4500.0, 450.0, 87.0, 0.05)
+    engine = build(law.world())
     engine.set_control(position=0.5)
-    q = v = worst = 0.0
+    worst = 0.0
     for _ in range(150):
         engine.step()
-        for _ in range(200):  # the law in fine steps
-            torque = float(np.clip(kp * (0.5 - q) - kd * v, -limit, limit))
-            v += dt / 200 * torque / moment
-            q += dt / 200 * v
-        worst = max(worst, abs(float(engine.get_state().joint_pos[0, 0]) - q))
+        worst = max(worst, abs(float(engine.get_state().joint_pos[0, 0]) - law.advance(0.5, STEP, 200)))
     return worst
 
 
@@ -76,7 +95,7 @@ def late(build: Build) -> float:
     for _ in range(60):
         engine.step()
         furthest = max(furthest, float(engine.get_state().joint_pos[0, 0]))
-    return max(furthest - 0.1, 0.0) / (5.0 * 0.002)
+    return max(furthest - 0.1, 0.0) / (5.0 * STEP)
 
 
 def chatter(build: Build) -> float:
@@ -92,60 +111,56 @@ def chatter(build: Build) -> float:
     return float(np.abs(np.array(forces) / 20.0 - 1.0).max())
 
 
-class _Tracking(NamedTuple):
-    """Distances [rad] from the solution of the law: the largest on the way, and that at the end."""
-
-    worst: float
-    last: float
+_TRACKED = (400.0, 40.0, 87.0, 0.5)
+"""kp, kd, limit [N m] and inertia [kg m^2] of a drive that is neither stiff nor slow."""
 
 
-def _tracking(build: Build, actuation: Actuation) -> _Tracking:
-    """A joint (kp 400, kd 40 on 0.5 kg m^2) follows a sine of 0.5 rad and 0.5 Hz for 2 s, then rests for 2 s."""
-    kp, kd, limit, moment, dt = 400.0, 40.0, 87.0, 0.5, 0.002
-    s = Sketch("tracking", dt, worlds.WEIGHTLESS)
-    base = s.robot("arm")
-    even = inertial(Sphere(0.1), 1.0)._replace(inertia=(moment, moment, moment, 0.0, 0.0, 0.0))
-    s.drive(s.link("link", base, worlds.REVOLUTE, worlds.Z, even), ControlMode.POSITION, kp, kd, limit)
-    engine = build(worlds.actuated(s.world(), actuation))
-    q = v = worst = off = 0.0
+def _off_the_law(build: Build, actuation: Actuation) -> float:
+    """The largest distance [rad] from the law on a sine of 0.5 rad and 0.5 Hz, and on a jump to 0.3 rad after it."""
+    law = _Law(*_TRACKED)
+    engine = build(worlds.actuated(law.world(), actuation))
+    worst = 0.0
     for tick in range(200):
         target = 0.5 * float(np.sin(np.pi * 0.02 * tick)) if tick < 100 else 0.3
         engine.set_control(position=target)
         engine.step(10)
-        for _ in range(200):  # the law in fine steps
-            torque = float(np.clip(kp * (target - q) - kd * v, -limit, limit))
-            v += dt / 20 * torque / moment
-            q += dt / 20 * v
-        off = abs(float(engine.get_state().joint_pos[0, 0]) - q)
-        worst = max(worst, off)
-    return _Tracking(worst, off)
+        worst = max(worst, abs(float(engine.get_state().joint_pos[0, 0]) - law.advance(target, 10 * STEP, 200)))
+    return worst
 
 
 def track(build: Build) -> float:
     """[rad] off the solution: a joint in motion, kp 400 and kd 40 on 0.5 kg m^2."""
-    return _tracking(build, Actuation.IMPLICIT_PD).worst
+    return _off_the_law(build, Actuation.IMPLICIT_PD)
 
 
 def settled(build: Build) -> float:
     """[rad] off the target: a joint at rest, kp 400 and kd 40 on 0.5 kg m^2."""
-    return _tracking(build, Actuation.IMPLICIT_PD).last
+    engine = build(_Law(*_TRACKED).world())
+    engine.set_control(position=0.3)
+    engine.step(1000)
+    return abs(float(engine.get_state().joint_pos[0, 0]) - 0.3)
 
 
 def astray(build: Build) -> float:
     """[rad] off the solution of the law: the engine's own drive in motion, kp 400 and kd 40 on 0.5 kg m^2."""
-    return _tracking(build, Actuation.NATIVE).worst
+    return _off_the_law(build, Actuation.NATIVE)
 
 
-def _pressing(build: Build, actuation: Actuation) -> float:
-    s = Sketch("pressing", gravity=worlds.WEIGHTLESS)
-    base = s.robot("hand")
+def pressing(mode: ControlMode, mass: float, kp: float = 0.0, kd: float = 0.0) -> World:
+    """A finger on a rail, 1 mm before a fixed thing, whose drive may take 87 N."""
+    s = Sketch("pressing", STEP, worlds.WEIGHTLESS)
     tip = Box((0.01, 0.01, 0.03))
-    link = s.link("finger", base, worlds.PRISMATIC, worlds.X, inertial(tip, 1.0))
+    link = s.link("finger", s.robot("hand"), worlds.PRISMATIC, worlds.X, inertial(tip, mass))
     s.shape(link, tip)
-    s.drive(link, ControlMode.POSITION, 1000.0, 50.0, 87.0)
+    s.drive(link, mode, kp, kd, 87.0)
     s.fixed("stop", Box((0.05, 0.05, 0.05)), (0.061, 0.0, 0.0))
-    s.sensors.append(ContactSensor("finger", (link,)))
-    engine = build(worlds.actuated(s.world(), actuation))
+    if mode is ControlMode.POSITION:
+        s.sensors.append(ContactSensor("finger", (link,)))
+    return s.world()
+
+
+def _force_off(build: Build, actuation: Actuation) -> float:
+    engine = build(worlds.actuated(pressing(ControlMode.POSITION, 1.0, 1000.0, 50.0), actuation))
     engine.set_control(position=0.021)
     engine.step(50)
     state = engine.get_state()
@@ -155,9 +170,9 @@ def _pressing(build: Build, actuation: Actuation) -> float:
 
 def buildup(build: Build) -> float:
     """Relative, on the force of a finger of 1 kg that has pressed for 0.1 s with 20 N."""
-    return _pressing(build, Actuation.IMPLICIT_PD)
+    return _force_off(build, Actuation.IMPLICIT_PD)
 
 
 def stalled(build: Build) -> float:
     """Relative, on the force of a finger whose own drive asks for 20 N and may take 87 N, and is blocked."""
-    return _pressing(build, Actuation.NATIVE)
+    return _force_off(build, Actuation.NATIVE)

@@ -16,11 +16,14 @@ from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capabilities, Capability as C
 from anysim.model.world import Box, ContactSensor, ControlMode, Cylinder, Sphere, Surface
 from anysim.testing import drive_errors as drives, tolerances, worlds
+from anysim.testing.compare import sliding_friction
 from anysim.testing.drive_errors import Build
-from anysim.testing.sketch import Sketch, inertial
+from anysim.testing.sketch import Sketch
 from anysim.testing.varying import having, reduced, shared_bodies, varied
 
 G = 9.81
+MEETING = sqrt(2 * G * 0.3)
+"""[m/s] at which a ball meets the ground after 0.3 m."""
 
 
 class Measure(NamedTuple):
@@ -63,14 +66,7 @@ def pressed(build: Build) -> float:
 
 def squeezed(build: Build) -> float:
     """[m] of a finger of 50 g into a fixed thing, pressed with 3 N."""
-    s = Sketch("squeezed", gravity=worlds.WEIGHTLESS)
-    base = s.robot("hand")
-    tip = Box((0.01, 0.01, 0.03))
-    link = s.link("finger", base, worlds.PRISMATIC, worlds.X, inertial(tip, 0.05))
-    s.shape(link, tip)
-    s.drive(link, ControlMode.EFFORT, limit=20.0)
-    s.fixed("stop", Box((0.05, 0.05, 0.05)), (0.061, 0.0, 0.0))
-    engine = build(s.world())
+    engine = build(drives.pressing(ControlMode.EFFORT, 0.05))
     engine.set_control(effort=3.0)
     engine.step(1000)
     return abs(float(engine.get_state().joint_pos[0, 0]) - 0.001)
@@ -87,15 +83,7 @@ def remixed(build: Build) -> float:
     if "geom.friction" not in engine.parameters:
         return 0.0
     engine.set_parameters("geom.friction", [[0.8, 0.2, 0.2]])
-    engine.step(250)
-    twist = np.array(engine.get_state().body_twist[0, box])
-    twist[0] += 3.0
-    engine.set_body_state(twist=twist[None, None], bodies=[box])
-    engine.step(25)
-    early = np.array(engine.get_state().body_twist[0, box])
-    engine.step(75)
-    change = engine.get_state().body_twist[0, box] - early
-    return abs(float(-change[0] / (75 * 0.002 * G + change[2])) - 0.2)
+    return abs(float(sliding_friction(engine, [box])[0]) - 0.2)
 
 
 def creep(build: Build) -> float:
@@ -124,19 +112,24 @@ def rolling(build: Build) -> float:
     return abs(gained / (0.4 * 2 / 3 * G * sin(angle)) - 1)
 
 
-def _bounces(build: Build, *coefficients: float) -> float:
-    """The largest difference of a ratio of speeds after and before the touch of a ball from its coefficient."""
-    s = Sketch("bounces", 0.001)
+def _balls(build: Build, dt: float, *coefficients: float) -> SimEngine:
+    """Balls of these coefficients whose lowest points are 0.3 m above the ground."""
+    s = Sketch("bounces", dt)
     s.ground()
     for i, e in enumerate(coefficients):
         s.free(f"ball{i}", Sphere(0.1), (float(i), 0.0, 0.4), surface=Surface(restitution=e))
-    engine = build(s.world())
+    return build(s.world())
+
+
+def _bounces(build: Build, *coefficients: float) -> float:
+    """The largest difference of a ratio of speeds after and before the touch of a ball from its coefficient."""
+    engine = _balls(build, 0.001, *coefficients)
     engine.step(240)
     best = np.zeros(len(coefficients))
     for _ in range(60):
         engine.step(2)
         best = np.maximum(best, engine.get_state().body_twist[0, :, 2])
-    return float(np.abs(best / sqrt(2 * G * 0.3) - coefficients).max())
+    return float(np.abs(best / MEETING - coefficients).max())
 
 
 def bounce(build: Build) -> float:
@@ -151,16 +144,12 @@ def dead(build: Build) -> float:
 
 def dent(build: Build) -> float:
     """[m for each m/s] that balls sink into the ground when they touch it, at 2 ms."""
-    s = Sketch("dents")
-    s.ground()
-    for i, e in enumerate((0.0, 0.2, 0.5, 0.9)):
-        s.free(f"ball{i}", Sphere(0.1), (float(i), 0.0, 0.4), surface=Surface(restitution=e))
-    engine = build(s.world())
+    engine = _balls(build, 0.002, 0.0, 0.2, 0.5, 0.9)
     lowest = 0.4
     for _ in range(180):
         engine.step()
         lowest = min(lowest, float(_heights(engine).min()))
-    return (0.1 - lowest) / sqrt(2 * G * 0.3)
+    return (0.1 - lowest) / MEETING
 
 
 def torsion(build: Build) -> float:
