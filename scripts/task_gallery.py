@@ -15,6 +15,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from benchmark_table import STORE as BENCHMARK, table
 from generated import ROOT, main
 from PIL import Image
 
@@ -24,7 +25,6 @@ from anysim.record.commit import write_whole
 from anysim.task.snapshot import spec_hash
 
 STORE = ROOT / "docs" / "tasks.json"
-BENCHMARK = ROOT / "docs" / "benchmark.json"
 ENGINES = ("mujoco", "pybullet", "sapien")
 POLICIES = ("random", "expert")
 EPISODES, SPLIT = 16, "test"
@@ -96,8 +96,8 @@ def _anysim(*words: str) -> None:
 def page() -> str:
     """A table of all tasks, then each with its picture."""
     known = stored()
-    rows = ["| task | robots | steps | levels | expert | solved by it on MuJoCo, PyBullet, SAPIEN | by chance |"]
-    rows.append("|---|---|---|---|---|---|---|")
+    columns = ("task", "robots", "steps", "levels", "expert", "solved by it on MuJoCo, PyBullet, SAPIEN", "by chance")
+    rows: list[list[str]] = []
     parts: list[str] = []
     family = ""
     for name in tasks():
@@ -108,8 +108,7 @@ def page() -> str:
         expert = f"`{task.expert.skill}`" if task.expert else f"{len(commands)} commands"
         robots = ", ".join(dict.fromkeys(one.robot for one in spec.world.robots.values()))
         solved = [_rates(known.get(name, {}).get(policy, {})) for policy in ("expert", "random")]
-        levels = " ".join(spec.levels)
-        rows.append(f"| [`{name}`](#{name}) | {robots} | {task.horizon} | {levels} | {expert} | {' | '.join(solved)} |")
+        rows.append([f"[`{name}`](#{name})", robots, str(task.horizon), " ".join(spec.levels), expert, *solved])
         if folder.parent.name != family:
             family = folder.parent.name
             parts.append(f"## {family.replace('_', ' ')}")
@@ -117,7 +116,7 @@ def page() -> str:
         parts.append(
             f"### {name}\n\n{task.description} {link}\n\n![{name}, drawn by three engines](../{folder}/picture.jpg)"
         )
-    return "\n\n".join(["\n".join(rows), *parts])
+    return "\n\n".join([table(columns, rows), *parts])
 
 
 def _rates(found: dict[str, list[int]]) -> str:

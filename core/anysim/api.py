@@ -335,17 +335,19 @@ def make(
         raise TaskError(
             f"engine is the name of an installed engine, or what a file's `engine` holds, got {shown(engine)}"
         )
+    if robot is not None and not isinstance(cast("object", robot), str):
+        raise TaskError(f"robot is the name of a robot of the catalogue, got {shown(robot)}")
     if num_envs is not None:
         num_envs = whole("num_envs", num_envs, TaskError, least=1)
     if seed is not None:  # before the env is built
         seed = whole("seed", seed, TaskError)
     more = [*overrides, *([] if num_envs is None else [f"num_envs={num_envs}"])]
     loaded = _loaded(source, more)
-    if robot is not None:
-        more.append(f"world.robots.{_only_robot(loaded)}.robot={robot}")
-        loaded = _loaded(source, more)
+    others = [] if robot is None else [f"world.robots.{_only_robot(loaded)}.robot={json.dumps(robot)}"]
     if engine is not None and loaded.spec.engine.name != engine:  # the options of a file are those of its own engine
-        loaded = _loaded(source, [*more, f"engine={_as_text(engine)}"])
+        others.append(f"engine={_as_text(engine)}")
+    if others:
+        loaded = _loaded(source, [*more, *others])
     spec = loaded.spec
     if spec.task is None:  # before the world is built
         raise TaskError(f"{loaded.files[-1]}: {NO_TASK}" if loaded.files else NO_TASK)

@@ -105,3 +105,7 @@ def test_another_robot_takes_the_place_of_the_only_one() -> None:
         anysim.make("pick_cube", robot="unitree_go1")
     with pytest.raises(SpecError, match="did you mean 'ur5_gripper'"):
         anysim.make("pick_cube", robot="ur5_griper")
+    with pytest.raises(TaskError, match="robot is the name of a robot of the catalogue, got 5"):
+        anysim.make("pick_cube", robot=5)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(SpecError, match="no robot named 'null'"):
+        anysim.make("pick_cube", robot="null")

@@ -15,8 +15,8 @@ _APPROXIMATE = {
     Capability.CONTACTS_STATIC: approximately(
         "friction multiplies in Bullet: by the pair rule as built, with several shapes a geom where it takes them; "
         "where coefficients are changed later, by {remixed:g} off it between things of 0.2 above a ground of 0.8, "
-        "built with 0.8 throughout, and by more where links of a robot meet both. Surfaces are rigid: softness is not "
-        "simulated. A cylinder rolls {rolling:.0%} too fast down 15 degrees",
+        "built with 0.8 throughout, and by more where more pairs contradict each other. Surfaces are rigid: softness "
+        "is not simulated. A cylinder rolls {rolling:.0%} too fast down 15 degrees",
         remixed=0.05,
         rolling=0.02,
     ),

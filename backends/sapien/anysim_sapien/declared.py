@@ -35,7 +35,7 @@ _APPROXIMATE = {
     ),
     Capability.CONTACT_SENSORS: approximately(
         "friction follows from momentum: within {felt:.1%} of the net force on a body; on a link above a joint with "
-        "dry friction off by some of that friction; how several fixed things share the friction of one body is a guess",
+        "dry friction off by more; how several fixed things share the friction of one body is a guess",
         felt=0.005,
     ),
     Capability.MATERIALS: (

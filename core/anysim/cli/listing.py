@@ -89,15 +89,16 @@ def _tasks(ask_engines: bool, json: bool) -> None:
         row: dict[str, object] = {"name": name, "from": _origin("tasks", name)}
         rows.append(row)
         try:
-            loaded = load(task_path(name))
+            path = task_path(name)
+            loaded = load(path)
             spec, task = loaded.spec, loaded.spec.task
             if task is None:
-                raise PluginError(f"its file {task_path(name)} has no task")
+                raise PluginError(f"its file {path} has no task")
             expert = task.expert.skill if task.expert else "commands" if spec.collect and spec.collect.commands else ""
-            row |= {"family": task_path(name).parent.parent.name, "horizon": task.horizon, "expert": expert}
+            row |= {"family": path.parent.parent.name, "horizon": task.horizon, "expert": expert}
             row |= {"robots": [one.robot for one in spec.world.robots.values()], "levels": list(spec.levels)}
             row |= {"what": task.description}
-            if (picture := task_path(name).with_name("picture.jpg")).exists():
+            if (picture := path.with_name("picture.jpg")).exists():
                 row["picture"] = str(picture)
             if ask_engines:
                 row["engines"] = _able(loaded, name)

@@ -244,3 +244,15 @@ def test_engines_agree_on_reach(tmp_path: Path) -> None:
     told = json.loads(done.stdout)
     assert {"mujoco", "pybullet", "sapien"} <= set(told["engines"])
     assert all(pair["agree"] == 1.0 for pair in told["agreement"])
+
+
+def test_the_default_folder_names_a_level_where_there_is_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = ["pick_cube", "-e", "mujoco", "-k", "1", "-p", "zero", "-o", "task.horizon=2"]
+    for more in ([], ["--level", "L0"]):
+        done = CliRunner().invoke(app, [*words, *more])
+        assert done.exit_code == 0, done.output
+    assert {path.name for path in (tmp_path / "runs").iterdir()} == {
+        "evaluate-pick_cube-zero-validation",
+        "evaluate-pick_cube-zero-L0-validation",
+    }

@@ -17,6 +17,9 @@ from anysim.skills.runner import SkillPolicy
 from anysim.task.contract import Status
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
+from anysim_planning import queued
+from anysim_planning.rrt import RrtPlanner
+from anysim_skills import planned_moves
 from anysim_skills.arm import Arm
 from anysim_skills.planning import WORKERS_VARIABLE
 from tests.plugins.skills.test_pick import rollout
@@ -112,6 +115,30 @@ def test_in_real_time_an_answer_takes_effect_once_it_is_ready() -> None:
         assert (arm.joints != begin).any(axis=1).all()
         assert arm.plans.describe()["latency"] == "realtime"
         assert arm.plans.planner.service.counts.late == 0
+
+
+def test_in_real_time_a_planner_that_hangs_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    go_on = threading.Event()
+    monkeypatch.setattr(RrtPlanner, "plan", lambda *_: go_on.wait(30.0))
+    monkeypatch.setattr(planned_moves, "DEADLINE", 0.05)
+    monkeypatch.setattr(queued, "GRACE", 0.05)
+    with behind_wall() as env:
+        with pytest.warns(UserWarning, match="the run cannot be repeated"):
+            arm = Arm.of(env, env.scene.robot("panda"), planner="rrt", latency="realtime")
+        env.scene.look(None)
+        ids = np.arange(2)
+        arm.renew(ids)
+        arm.prepare(ids)
+        arm.plan(ids, np.tile([0.42, 0.32, 0.6, 1.0, 0.0, 0.0, 0.0], (2, 1, 1)))
+        try:
+            for _ in range(500):
+                driven(env, arm, 1)
+                if (arm.planned(ids) != STAY).all():
+                    break
+                time.sleep(0.01)
+            assert [OUTCOMES[said] for said in arm.planned(ids)] == [Outcome.TIMEOUT] * 2
+        finally:
+            go_on.set()
 
 
 def test_another_command_takes_the_place_of_a_plan() -> None:
