@@ -42,8 +42,9 @@ def _measure(quantity: str, lines: Mapping[str, Sequence[AuditLine]]) -> Measure
         values[name] = max(_error(line) for line in reported)
         if values[name] > tolerance:
             worst = max(reported, key=_error)
+            who = f"{name} declares of {quantity}" if worst.ok else name  # the audit knows what an engine may be off by
             note = f", {worst.note}" if worst.note else ""
-            reasons.append(f"{name}: {worst.subject} has {_text(worst.found)} for {_text(worst.expected)}{note}")
+            reasons.append(f"{who}: {worst.subject} has {_text(worst.found)} for {_text(worst.expected)}{note}")
     unit = "" if quantity in _OF_ORDER_ONE else "relative"
     return Measure(quantity, unit, values, 0.0, tolerance, "; ".join(reasons))
 

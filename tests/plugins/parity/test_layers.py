@@ -1,9 +1,11 @@
 """A wrong engine is found, in the layer where it is wrong."""
 
 from functools import partial
+from typing import ClassVar
 
 import pytest
 
+from anysim.engine.capability import Allowance
 from anysim.engine.factory import create_simulation
 from anysim.engine.kinematic import NullEngine
 from anysim_parity.actuation import actuation_layer
@@ -49,6 +51,21 @@ def test_a_wrong_mass_is_a_matter_of_the_asset() -> None:
     measure = next(m for m in layer.measures if m.subject == "mass")
     assert measure.values["wrong"] == pytest.approx(0.1, rel=1e-6)
     assert "wrong: arm.first has 2.2 for 2" in measure.explanation
+
+
+def test_what_an_engine_may_be_off_by_is_declared_and_no_more() -> None:
+    class Admits(wrong.Heavier):
+        audit_allowances: ClassVar = {
+            name: Allowance(by, "it rounds") for name, by in (("mass", 0.11), ("total mass", 0.01))
+        }
+
+    layer = asset_layer(wrong.arm(), {"right": NullEngine, "wrong": Admits})
+    beyond = {
+        f.subject: f.declared for f in findings(layer) if {f.first, f.second} == {"right", "wrong"} and not f.agree
+    }
+    assert beyond == {"mass": True, "total mass": False}
+    measure = next(m for m in layer.measures if m.subject == "mass")
+    assert "wrong declares of mass: arm.first has 2.2 for 2, within the declared 11 %: it rounds" in measure.explanation
 
 
 def test_a_mass_that_is_not_admitted_shows_in_the_mass_matrix() -> None:
