@@ -31,6 +31,9 @@ EPISODES, SPLIT = 16, "test"
 WIDTH, HEIGHT = 300, 225
 """Of one engine's part of a picture [px]."""
 
+ABOVE = "{from: [-0.35, -0.95, 1.45], look_at: [0.42, 0.0, 0.5], fov: 45.0}"
+"""Where a cabinet's drawers are seen, which open towards the robot: the camera of the tasks is behind it."""
+
 Figures = dict[str, Any]
 
 
@@ -85,7 +88,8 @@ def draw(name: str, path: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
         whole = Path(folder) / "whole.png"
         words = ["picture", name, "--engines", ",".join(ENGINES), "-n", "1", "--seed", "1"]
-        _anysim(*words, "--size", str(WIDTH), str(HEIGHT), "--out", str(whole))
+        view = ["-o", f"world.cameras.front={ABOVE}"] if "cabinet" in load(name).spec.world.objects else []
+        _anysim(*words, *view, "--size", str(WIDTH), str(HEIGHT), "--out", str(whole))
         Image.open(whole).convert("RGB").save(path, quality=75, optimize=True)
 
 
