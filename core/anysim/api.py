@@ -219,11 +219,11 @@ def check_engine(loaded: LoadedRun, world: "World", engine: "type[SimEngine]", s
 
 def blind_env(loaded: LoadedRun, world: "World", name: str) -> "TaskEnv":
     """One env on the kinematic engine, which draws no images and can run any world."""
-    from anysim.engine.kinematic import NullEngine
+    from anysim.engine.factory import engine_class
 
     blind = replace(world, cameras=tuple(replace(camera, channels=()) for camera in world.cameras))
     try:
-        return _env(loaded, blind, NullEngine(), 1, name, _proposals(loaded, None))
+        return _env(loaded, blind, engine_class("null")(), 1, name, _proposals(loaded, None))
     except SpecError as error:
         raise located(error, loaded) from None
 
@@ -301,6 +301,7 @@ def make(
     overrides: Sequence[str] = (),
     base: Path | None = None,
     proposals: Any = None,
+    curriculum: bool = False,
     strict_observers: bool = False,
 ) -> "TaskEnv":
     """An env of a task: `env = anysim.make("pick_cube", engine="mujoco", num_envs=16)`.
@@ -317,6 +318,7 @@ def make(
         base: the folder that relative asset paths are relative to; that of the file where there is one.
         proposals: poses of objects that come from outside: a mapping, a JSON file, or a callable that takes a
             `anysim.placement.proposals.Request` and gives one; wins over `world.layout_source` of the file.
+        curriculum: whether `task.curriculum` is followed, as learners do; otherwise all spreads are whole.
         strict_observers: an observer that raises ends the run; otherwise it is told once and counted.
 
     Raises:
@@ -348,6 +350,9 @@ def make(
         others.append(f"engine={_as_text(engine)}")
     if others:
         loaded = _loaded(source, [*more, *others])
+    if loaded.spec.task is not None and not curriculum:
+        whole_spread = loaded.spec.task.model_copy(update={"curriculum": None})
+        loaded = replace(loaded, spec=loaded.spec.model_copy(update={"task": whole_spread}))
     spec = loaded.spec
     if spec.task is None:  # before the world is built
         raise TaskError(f"{loaded.files[-1]}: {NO_TASK}" if loaded.files else NO_TASK)

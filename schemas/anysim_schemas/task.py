@@ -2,9 +2,9 @@
 
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import ConfigDict, Field, field_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
 
-from anysim_schemas.base import Flag, Integer, Name, NamedByKey, Number, Positive, Spec
+from anysim_schemas.base import Flag, Fraction, Integer, Name, NamedByKey, Number, Positive, Spec
 from anysim_schemas.cameras import Channel
 from anysim_schemas.errors import KeyFault
 from anysim_schemas.values import FloatValue, WholeValue, unshared
@@ -91,6 +91,32 @@ class EventTermSpec(TermSpec):
     when: Literal["reset", "step"] = Field(default="reset", description="at each reset, or at each control step")
 
 
+class CurriculumSpec(Spec):
+    """Values whose spread grows with an env's success rate, and shrinks where it fails."""
+
+    widens: tuple[str, ...] = Field(
+        min_length=1, description="dotted paths of values that are drawn in each episode, as in `overrides`"
+    )
+    around: Fraction = Field(
+        default=0.5, description="the quantile that all is drawn at on level 0: 0 the low end, 1 the high end"
+    )
+    start: Fraction = Field(default=0.0, description="the level at first: the share of the spread that is drawn from")
+    step: Positive = Field(default=0.1, le=1.0, description="by how much the level moves")
+    episodes: Integer = Field(
+        default=10, gt=0, description="finished episodes of an env after which its level may move"
+    )
+    promote: Fraction = Field(default=0.8, description="success rate over these episodes from which on the level rises")
+    demote: Fraction = Field(default=0.4, description="success rate below which it falls")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "CurriculumSpec":
+        if self.demote > self.promote:
+            raise KeyFault(
+                f"{self.demote:g} is above `promote`, {self.promote:g}; a level would rise and fall", "demote"
+            )
+        return self
+
+
 class ExpertSpec(Spec):
     """A scripted solution: a skill with its parameters, run by `anysim run` where no policy is given."""
 
@@ -151,6 +177,9 @@ class TaskSpec(Spec):
     on_success: Literal["end", "continue"] = Field(default="end", description="whether success ends the episode")
     ended: Literal["error", "hold"] = Field(
         default="error", description="stepping an ended env is an error, or holds it still until it is reset"
+    )
+    curriculum: dict[Name, CurriculumSpec] | None = Field(
+        default=None, description="values whose spread follows the success rate of each env, where learners ask for it"
     )
     expert: ExpertSpec | None = Field(default=None, description="a scripted solution")
 

@@ -10,7 +10,7 @@ import pytest
 
 ROTTEN = {
     "engine.py": """
-from anysim.engine.kinematic import NullEngine
+from anysim.testing.kinematic import NullEngine
 
 
 class Engine(NullEngine):

@@ -5,7 +5,7 @@ from typing import ClassVar
 import numpy as np
 
 from anysim.engine.capability import Capabilities, Capability, Support
-from anysim.engine.kinematic import NullEngine
+from anysim.testing.kinematic import NullEngine
 
 
 def also(*capabilities: Capability) -> Capabilities:

@@ -3,9 +3,9 @@
 import pytest
 
 from anysim.engine.capability import Capabilities, Capability, Support
-from anysim.engine.kinematic import NullEngine
 from anysim.errors import CannotDraw, EngineError
 from anysim.testing.engines import MUST_DRAW, drawing_trouble, require_drawing
+from anysim.testing.kinematic import NullEngine
 
 
 def _drawing(error):

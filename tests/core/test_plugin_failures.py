@@ -107,7 +107,7 @@ def test_the_doctor_goes_on_past_a_plugin_that_kills_its_process(install: Instal
 
 
 ENGINE = """
-from anysim.engine.kinematic import NullEngine
+from anysim.testing.kinematic import NullEngine
 
 
 class Engine(NullEngine):

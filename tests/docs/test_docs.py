@@ -145,9 +145,9 @@ def _table(marker: str) -> list[list[str]]:
 
 def test_the_fields_of_the_guide_are_those_of_the_state() -> None:
     """Names, and shapes in an engine that has all of them and in the words of `State`."""
-    from anysim.engine.kinematic import NullEngine
     from anysim.engine.state import FIELDS, State
     from anysim.testing import worlds
+    from anysim.testing.kinematic import NullEngine
 
     rows = {cells[0].strip("`"): cells[1] for cells in _table("fields of _read")}
     assert tuple(rows) == FIELDS

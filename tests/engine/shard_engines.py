@@ -4,8 +4,8 @@ import os
 import signal
 import time
 
-from anysim.engine.kinematic import NullEngine
 from anysim.errors import CapabilityError
+from anysim.testing.kinematic import NullEngine
 
 
 class Moody(NullEngine):

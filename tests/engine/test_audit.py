@@ -9,10 +9,10 @@ import anysim
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Allowance
 from anysim.engine.factory import create_simulation
-from anysim.engine.kinematic import NullEngine
 from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.world import World
 from anysim.testing.audit import audit
+from anysim.testing.kinematic import NullEngine
 from tests.task.helpers import BLIND
 
 

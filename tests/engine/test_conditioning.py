@@ -6,8 +6,8 @@ import pytest
 
 from anysim.api import compile_world
 from anysim.engine.conditioning import PhysicsWarning, damping_ratio, doubts
-from anysim.engine.kinematic import NullEngine
 from anysim.model.world import World
+from anysim.testing.kinematic import NullEngine
 
 
 def stacked(mass: float, size: float = 0.1, dt: float = 0.002, place: tuple[float, float] = (0.0, 0.15)) -> World:

@@ -7,8 +7,8 @@ import pytest
 
 from anysim import registry
 from anysim.engine.factory import availability, create_simulation, engine_class
-from anysim.engine.kinematic import NullEngine
 from anysim.errors import PluginError
+from anysim.testing.kinematic import NullEngine
 
 
 class Unsure(NullEngine):

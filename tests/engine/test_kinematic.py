@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from anysim.engine.capability import Capability
-from anysim.engine.kinematic import NullEngine
 from anysim.model.world import ControlMode
 from anysim.testing import worlds
+from anysim.testing.kinematic import NullEngine
 
 
 def test_an_unlimited_position_drive_arrives_in_one_step_on_the_targets_own_bits():

@@ -10,10 +10,10 @@ import pytest
 
 import anysim
 from anysim.engine.factory import runnable
-from anysim.engine.kinematic import NullEngine
 from anysim.engine.lifetime import FEW
 from anysim.errors import EngineError
 from anysim.task.env import TaskEnv
+from anysim.testing.kinematic import NullEngine
 
 FALL = {
     "world": {

@@ -7,9 +7,9 @@ import pytest
 
 from anysim.compile.edit import without_entity
 from anysim.compile.world import compile_world
-from anysim.engine.kinematic import NullEngine
 from anysim.errors import CapabilityError, EngineError
 from anysim.model.world import Slot, World
+from anysim.testing.kinematic import NullEngine
 from anysim_schemas.run import WorldSpec
 
 

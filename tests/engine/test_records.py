@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from anysim.engine.kinematic import NullEngine
 from anysim.engine.records import EnvRecords
 from anysim.errors import SnapshotError
 from anysim.testing import worlds
+from anysim.testing.kinematic import NullEngine
 
 
 @pytest.mark.parametrize("name", ["ticks", "cameras", "fov", "commands.mode"])

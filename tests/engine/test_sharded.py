@@ -7,13 +7,13 @@ import pytest
 
 from anysim.engine import factory
 from anysim.engine.capability import Capability
-from anysim.engine.kinematic import NullEngine
 from anysim.engine.sharded.blocks import Blocks, joined, shard_count, usable_cores
 from anysim.engine.sharded.engine import ShardedEngine, sharded
 from anysim.errors import EngineError, SnapshotError
 from anysim.testing import worlds
 from anysim.testing.compare import assert_same, play, read, spread, tape
 from anysim.testing.engines import require_engine
+from anysim.testing.kinematic import NullEngine
 from tests.engine.shards_help import children, descriptors, program
 from tests.task.helpers import arm
 

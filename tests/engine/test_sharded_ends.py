@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anysim.engine.kinematic import NullEngine
 from anysim.engine.sharded.engine import sharded
 from anysim.engine.sharded.pool import keeping_workers
 from anysim.testing import worlds
 from anysim.testing.compare import assert_same, read
+from anysim.testing.kinematic import NullEngine
 from tests.engine.shards_help import PROC, alive, children, gone, segments
 
 pytestmark = pytest.mark.skipif(not PROC.exists(), reason="no /proc here: processes cannot be seen from outside")

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anysim.engine.kinematic import NullEngine
 from anysim.engine.sharded.engine import WorkerWarning, sharded
 from anysim.errors import CapabilityError, EngineError
 from anysim.testing import worlds
 from anysim.testing.compare import FIELDS, assert_same, play, read, spread, tape
+from anysim.testing.kinematic import NullEngine
 from tests.engine.shards_help import alive, children, descriptors
 from tests.task.helpers import arm
 

@@ -15,7 +15,6 @@ from anysim import registry
 from anysim.compile.edit import with_object
 from anysim.engine.capability import Capability
 from anysim.engine.factory import runnable
-from anysim.engine.kinematic import NullEngine
 from anysim.errors import SpecError
 from anysim.managers.randomized_parameters import SceneParameterManager
 from anysim.model.world import Slot, World
@@ -23,6 +22,7 @@ from anysim.randomization.streams import Streams
 from anysim.task.env import TaskEnv
 from anysim.task.joints import JointView, RangedJointView
 from anysim.task.scene import SceneView
+from anysim.testing.kinematic import NullEngine
 
 KITCHEN: dict[str, Any] = {
     "engine": "null",

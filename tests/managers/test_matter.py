@@ -8,11 +8,11 @@ import pytest
 
 import anysim
 from anysim.api import compile_world, load
-from anysim.engine.kinematic import NullEngine
 from anysim.errors import AssetError, SpecError
 from anysim.managers.object_parameters import SceneManager
 from anysim.model.world import Slot
 from anysim.randomization.streams import Streams
+from anysim.testing.kinematic import NullEngine
 from anysim_inspect.draws import explain
 from tests.task.helpers import BLOCKS
 

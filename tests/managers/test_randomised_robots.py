@@ -8,11 +8,11 @@ import pytest
 import anysim
 from anysim.api import check_engine, compile_world, load
 from anysim.engine.factory import engine_class
-from anysim.engine.kinematic import NullEngine
 from anysim.errors import CapabilityError, SpecError
 from anysim.randomization.draw import noise_rows
 from anysim.randomization.streams import Streams
 from anysim.task.env import TaskEnv
+from anysim.testing.kinematic import NullEngine
 from anysim_inspect.draws import explain
 from anysim_schemas.values import Choice, Normal, NormalParameters, Range
 from tests.task.helpers import BLIND, arm, blocks

@@ -6,8 +6,8 @@ import pytest
 
 from anysim.api import check_engine, compile_world, load
 from anysim.engine.capability import Capabilities, Capability as C
-from anysim.engine.kinematic import NullEngine
 from anysim.errors import CapabilityError
+from anysim.testing.kinematic import NullEngine
 
 WORLD = """\
 physics:

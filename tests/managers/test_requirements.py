@@ -8,10 +8,10 @@ import pytest
 import yaml
 
 from anysim.api import check_engine, compile_world, load, make
-from anysim.engine.kinematic import NullEngine
 from anysim.engine.options import EngineOptions
 from anysim.engine.sharded.engine import sharded
 from anysim.errors import CapabilityError
+from anysim.testing.kinematic import NullEngine
 
 YAML = """\
 engine: mujoco

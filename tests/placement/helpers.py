@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from anysim.api import compile_world, load
-from anysim.engine.kinematic import NullEngine
 from anysim.geometry.convex_parts import pose_of
 from anysim.managers.standard import standard_managers
 from anysim.placement.clearance import ClearanceQuery
 from anysim.placement.context import PlacementContext
+from anysim.testing.kinematic import NullEngine
 
 TABLE = {"table": {"source": {"box": [0.8, 1.0, 0.4]}, "fixed": True}}
 ON_TABLE = {"table": {"position": [0.0, 0.0, 0.2]}}

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from anysim.api import compile_world, load
-from anysim.engine.kinematic import NullEngine
 from anysim.managers.standard import standard_managers
 from anysim.model.world import Slot, World
+from anysim.testing.kinematic import NullEngine
 from anysim_schemas.layout import PlacementSpec
 from anysim_schemas.run import RunSpec
 

@@ -135,7 +135,7 @@ def world_of(spec: Any, _out: Path) -> Any:
 def episodes_of(spec: Any, _out: Path, *, heed: bool = True) -> Any:
     """What two envs draw, observe and earn, and where everything is."""
     out: list[Any] = []
-    with anysim.make(spec, num_envs=2) as env:
+    with anysim.make(spec, num_envs=2, curriculum=True) as env:
         for _ in range(EPISODES):
             out.append(repr(env.reset()))
             out += [repr(dict(draws)) for draws in env.streams.draws]

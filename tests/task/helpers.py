@@ -51,9 +51,9 @@ BLIND = ("record.cameras=[]", "world.cameras.front.channels=[]", "world.cameras.
 
 def blocks(num_envs: int = 1, *overrides: str) -> TaskEnv:
     """The blocks task on the kinematic engine. Without robots its action has no components."""
-    return anysim.make(BLOCKS, num_envs=num_envs, overrides=overrides)
+    return anysim.make(BLOCKS, num_envs=num_envs, overrides=overrides, curriculum=True)
 
 
 def arm(num_envs: int = 1, *overrides: str, engine: str = "null") -> TaskEnv:
     """pick_cube without cameras, by default on the kinematic engine."""
-    return anysim.make("pick_cube", engine=engine, num_envs=num_envs, overrides=[*BLIND, *overrides])
+    return anysim.make("pick_cube", engine=engine, num_envs=num_envs, overrides=[*BLIND, *overrides], curriculum=True)

@@ -27,6 +27,7 @@ from anysim_schemas.run import RunSpec
 WORLD = "world."
 
 RESET_ORDER = (
+    "curriculum",
     "terrain",
     "population",
     "layout",
@@ -39,8 +40,9 @@ RESET_ORDER = (
     "capture",
     "task",
 )
-"""The ground first, then what is there, where it is and what it is like, how its joints stand and what pulls at it,
-then the robots and what their drives hold, the lights and the cameras, and the task last, on the settled scene."""
+"""How much of each spread is drawn from, then the ground, what is there, where it is and what it is like, how its
+joints stand and what pulls at it, then the robots and what their drives hold, the lights and the cameras, and the task
+last, on the settled scene."""
 
 
 class Overridable(NamedTuple):
@@ -86,12 +88,16 @@ class Episodes:
 
     Attributes:
         origin: (N, 3) [m] where an env's scene stands on the ground; the terrain manager writes it.
-        elapsed: (N,) control steps since an env's reset; the env's loop writes it.
+        elapsed: (N,) control steps since an env's reset; the env's loop writes it, and what follows.
+        code: (N,) int8 the place of an env's word among those of `Status`: 0 while it runs, -1 before its first reset.
+        succeeded: (N,) bool what was judged at an env's last step.
     """
 
     def __init__(self, num_envs: int) -> None:
         self.origin = np.zeros((num_envs, 3))
         self.elapsed = np.zeros(num_envs, dtype=np.int64)
+        self.code = np.full(num_envs, -1, dtype=np.int8)
+        self.succeeded = np.zeros(num_envs, dtype=bool)
 
 
 class Manager(ABC):

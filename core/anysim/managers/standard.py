@@ -8,6 +8,7 @@ from anysim.engine.requirements import needs_of
 from anysim.managers.action import ActionManager
 from anysim.managers.base import Episodes, Manager
 from anysim.managers.camera import CameraManager, CaptureManager
+from anysim.managers.curriculum import CurriculumManager
 from anysim.managers.layout import LayoutManager
 from anysim.managers.layout_proposals import Proposed
 from anysim.managers.object_parameters import SceneManager
@@ -27,6 +28,8 @@ def standard_managers(spec: RunSpec, world: World, num_envs: int, proposals: Pro
         TerrainManager(), PopulationManager(), LayoutManager(proposals), SceneManager(), SceneParameterManager(),
         RobotResetManager(), ActionManager(), LightManager(), CameraManager(), CaptureManager(),
     ]  # fmt: skip
+    if spec.task is not None and spec.task.curriculum:
+        managers.append(CurriculumManager())
     for manager in managers:
         manager.configure(spec, streams, episodes)
         manager.build(world)

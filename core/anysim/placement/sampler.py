@@ -88,7 +88,7 @@ class _Aside(Streams):
     """Streams whose notes are put aside."""
 
     def __init__(self, streams: Streams) -> None:
-        self._of, self.overridden = streams, streams.overridden
+        self._of, self.overridden, self.narrowed = streams, streams.overridden, streams.narrowed
         self.noted: dict[str, tuple[object, Origin]] = {}
 
     def generator(self, env: int, name: str, tick: int = 0) -> np.random.Generator:

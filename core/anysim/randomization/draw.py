@@ -38,7 +38,9 @@ def draw(value: Any, name: str, streams: Streams, env: int, tick: int = 0, *, so
     if value.ratio < 1.0 and streams.shared_generator(env, f"{name}/ratio", tick).random() >= value.ratio:
         stream, drawn = f"{name}/ratio", nominal(value)
     else:
-        drawn = draw_one(value, streams.shared_generator(env, stream, tick if value.shared is None else 0).random)
+        quantiles = streams.shared_generator(env, stream, tick if value.shared is None else 0).random
+        narrowing = streams.narrowed.get(source)
+        drawn = draw_one(value, quantiles if narrowing is None else narrowing.of(env, quantiles))
     streams.note(env, name if tick == 0 else f"{name}@{tick}", drawn, Origin(stream, source))
     return drawn
 

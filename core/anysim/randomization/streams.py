@@ -7,7 +7,7 @@ from its `episode_seed`.
 """
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -24,6 +24,7 @@ def stream_key(name: str) -> int:
     return int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "little")
 
 
+_HIGHEST = np.nextafter(1.0, 0.0)
 OVERRIDDEN = "overridden"
 """The stream of a value that was not drawn, but set for the episode when it began or went on."""
 
@@ -33,6 +34,18 @@ class Origin(NamedTuple):
 
     stream: str
     source: str = ""
+
+
+class Narrowing(NamedTuple):
+    """Draws from a part of a value's spread: `level` (N,) of it, grown from the quantile `around`."""
+
+    level: Array
+    around: float
+
+    def of(self, env: int, quantiles: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        """The quantiles of an env, drawn towards `around`; below 1 as they were."""
+        share = float(self.level[env])
+        return lambda shape: np.minimum(self.around + share * (quantiles(shape) - self.around), _HIGHEST)
 
 
 def _master(entropy: Sequence[int]) -> np.random.Generator:
@@ -67,6 +80,7 @@ class Streams:
         draws: for each env, what was drawn in its current episode by name.
         origins: for each env, where each of its draws comes from, by the same names.
         overridden: for each env, the values that its current episode has instead of its draws, by dotted path.
+        narrowed: of which part of their spread values are drawn, by their dotted path.
     """
 
     def __init__(self, num_envs: int, seed: int = 0) -> None:
@@ -76,6 +90,7 @@ class Streams:
         self.draws: list[dict[str, object]] = [{} for _ in range(num_envs)]
         self.origins: list[dict[str, Origin]] = [{} for _ in range(num_envs)]
         self.overridden: list[dict[str, Any]] = [{} for _ in range(num_envs)]
+        self.narrowed: dict[str, Narrowing] = {}
         self._turning = np.random.Generator(np.random.Philox(key=0))
         self._state: Any = {
             "bit_generator": "Philox",

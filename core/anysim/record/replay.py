@@ -202,7 +202,7 @@ def rebuild(manifest: Manifest, engine: str | None = None, base: Path | None = N
     spec: dict[str, Any] = dict(manifest.spec) | {"num_envs": 1}
     if engine is not None and engine != manifest.engine:
         spec["engine"] = {"name": engine}
-    return make(spec, base=base)
+    return make(spec, base=base, curriculum=True)  # where it was followed, the recorded spec says it
 
 
 def replay(directory: str | Path, engine: str | None = None, base: Path | None = None) -> ReplayResult:

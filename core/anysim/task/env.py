@@ -16,6 +16,7 @@ from anysim.hooks import Observing
 from anysim.managers.action import ActionManager
 from anysim.managers.base import RESET_ORDER, Manager
 from anysim.managers.camera import CaptureManager
+from anysim.managers.curriculum import CurriculumManager
 from anysim.managers.terrain import TerrainManager
 from anysim.math import arrays
 from anysim.task.bindings import Bindings
@@ -74,10 +75,12 @@ class TaskEnv:
         self.capture.goals = self.scene.goals
         self.scene.last_action = np.zeros((self.num_envs, self.action_dim))
         self.counterfactuals = Counterfactuals(self.managers, self.mdp, engine, self.streams)
+        for manager in self.managers:
+            if isinstance(manager, CurriculumManager):
+                manager.narrow(self.counterfactuals.paths)
         self._task = spec.task
-        self._code = np.full(self.num_envs, -1, dtype=np.int8)  # -1: never reset
+        self._code, self._success = self._episodes.code, self._episodes.succeeded
         self._fault = np.zeros(self.num_envs, dtype=bool)
-        self._success = np.zeros(self.num_envs, dtype=bool)
         self._closed = False
         self.physics_seconds = 0.0
         """Wall time [s] of the engine's steps so far, for tables of where time goes; nothing else depends on it."""

@@ -79,7 +79,7 @@ def train(
     given = checked(options_model(made), _options(option or ()), "option")
     with (
         claim(folder),
-        make(task, engine=engine, num_envs=num_envs, overrides=overrides) as env,
+        make(task, engine=engine, num_envs=num_envs, overrides=overrides, curriculum=True) as env,
         make(task, engine=engine, num_envs=_EXAMINED, overrides=overrides) as examined,
     ):
         groups = (POLICY, PRIVILEGED) if privileged and PRIVILEGED in env.observation_sizes else (POLICY,)

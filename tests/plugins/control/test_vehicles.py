@@ -8,9 +8,9 @@ import pytest
 from anysim.api import compile_world, load
 from anysim.controllers.base import ChannelView
 from anysim.controllers.robot import ControlledRobot
-from anysim.engine.kinematic import NullEngine
 from anysim.errors import TaskError
 from anysim.model.world import ControlMode
+from anysim.testing.kinematic import NullEngine
 from anysim_control.vehicles import wheels as W
 from anysim_control.vehicles.ackermann import AckermannDrive
 from anysim_control.vehicles.differential import DifferentialDrive

@@ -12,7 +12,7 @@ from anysim_inspect.engines import Examination, examine
 
 BASE = """
 import os, sys, time
-from anysim.engine.kinematic import NullEngine
+from anysim.testing.kinematic import NullEngine
 from anysim.engine.capability import Capabilities, Capability, Support
 from anysim.engine.state import Availability
 

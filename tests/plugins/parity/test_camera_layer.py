@@ -7,11 +7,11 @@ import pytest
 
 from anysim import compile_world
 from anysim.engine.cameras import CameraView
-from anysim.engine.kinematic import NullEngine
 from anysim.math import pose as P
 from anysim.model.world import Box, Camera, Capsule, Cylinder, Geom, Sphere, World
 from anysim.testing import worlds
 from anysim.testing.engines import require_drawing
+from anysim.testing.kinematic import NullEngine
 from anysim_mujoco.engine import MujocoEngine
 from anysim_parity.camera import alone, bent, camera_layer, middle
 from anysim_parity.judge import agreement, outside

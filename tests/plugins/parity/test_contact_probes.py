@@ -9,10 +9,10 @@ import pytest
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capabilities, Capability
 from anysim.engine.factory import create_simulation
-from anysim.engine.kinematic import NullEngine
 from anysim.errors import EngineError
 from anysim.model.world import Surface, World
 from anysim.testing.engines import require_engine
+from anysim.testing.kinematic import NullEngine
 from anysim_mujoco.engine import MujocoEngine
 from anysim_parity.contact import PROBES, contact_layer
 from anysim_parity.judge import outside

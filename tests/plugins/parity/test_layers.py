@@ -7,7 +7,7 @@ import pytest
 
 from anysim.engine.capability import Allowance
 from anysim.engine.factory import create_simulation
-from anysim.engine.kinematic import NullEngine
+from anysim.testing.kinematic import NullEngine
 from anysim_parity.actuation import actuation_layer
 from anysim_parity.asset import asset_layer
 from anysim_parity.kinematics import kinematics_layer, random_positions

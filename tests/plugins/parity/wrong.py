@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 from anysim.engine.factory import create_simulation
-from anysim.engine.kinematic import NullEngine
 from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.shapes import Box
 from anysim.model.world import BodyKind, JointType, World
+from anysim.testing.kinematic import NullEngine
 from anysim.testing.sketch import Sketch, inertial
 
 

@@ -21,6 +21,8 @@ RANGED = "collect={bind: {x: {range: [0.1, 0.2]}}, commands: [{do: pick, object:
 CHOICE = "collect={commands: [{choose: [{do: pick, object: red, goal: goal}, release], weights: [1, 0]}]}"
 RELEASE = (*EXPERT[1:], "task.horizon=300", "collect={commands: [release, {do: reach, goal: goal}]}")
 REPEATED = "collect={commands: [{repeat: 1, body: release}, {do: reach, goal: goal}]}"
+WIDENED = "task.curriculum={spread: {widens: [task.command.goal.height], episodes: 1, step: 0.2}}"
+WINNING, LOSING = (WIDENED, EASY), (WIDENED, "task.horizon=2", "task.curriculum.spread.start=0.5")
 
 ROWS: dict[str, Row] = {
     "RunSpec.engine": row("engine=mujoco", seen="engine"),
@@ -64,6 +66,14 @@ ROWS: dict[str, Row] = {
     "TaskSpec.ended": row(
         "task.ended=error", given=(SOME, "task.ended=hold"), seen="stepped", error="cannot be stepped"
     ),
+    "TaskSpec.curriculum": row(WIDENED, seen="episode"),
+    "CurriculumSpec.widens": row("task.curriculum.spread.widens=[layout.ball.x]", given=WIDENED, seen="episode"),
+    "CurriculumSpec.around": row("task.curriculum.spread.around=0.1", given=WIDENED, seen="episode"),
+    "CurriculumSpec.start": row("task.curriculum.spread.start=0.3", given=WIDENED, seen="episode"),
+    "CurriculumSpec.step": row("task.curriculum.spread.step=0.4", given=WINNING, seen="episode"),
+    "CurriculumSpec.episodes": row("task.curriculum.spread.episodes=2", given=WINNING, seen="episode"),
+    "CurriculumSpec.promote": row("task.curriculum.spread={promote: 0, demote: 0}", given=LOSING, seen="episode"),
+    "CurriculumSpec.demote": row("task.curriculum.spread.demote=0", given=LOSING, seen="episode"),
     "TaskSpec.expert": row("task.expert=null", given=EXPERT, seen="expert", error="has no expert"),
     "RunSpec.collect": row("collect=null", given=COMMANDS, seen="expert", error="has no expert"),
     "CollectSpec.commands": row("collect.commands=[{do: reach, goal: goal}]", given=COMMANDS, seen="expert"),

@@ -2,7 +2,7 @@
 
 from importlib import import_module
 
-from anysim.engine.kinematic import NullEngine
+from anysim.testing.kinematic import NullEngine
 
 solver = import_module("warp_drive_solver")
 

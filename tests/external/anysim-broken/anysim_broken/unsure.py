@@ -1,7 +1,7 @@
 """An engine that breaks the rule that `availability` never raises."""
 
-from anysim.engine.kinematic import NullEngine
 from anysim.engine.state import Availability
+from anysim.testing.kinematic import NullEngine
 
 
 class UnsureEngine(NullEngine):
