@@ -85,6 +85,49 @@ def step(
         print_json([c._asdict() | {"missed": c.missed} for c in costs])
 
 
+TASKS = "reach,pick_cube,place_on_pad,stack_cube,push_cube,open_drawer,peg_in_hole,press_button,handover,plug_charger"
+
+
+@app.command("tasks")
+def tasks(
+    task: Annotated[str, typer.Option("--tasks", help="Installed tasks, separated by commas.")] = TASKS,
+    engine: Annotated[
+        str, typer.Option("--engine", "-e", help="Engines, separated by commas; `all` are those with a raw loop.")
+    ] = "all",
+    num_envs: Annotated[int, typer.Option("--num-envs", "-n", min=1, help="Envs.")] = 16,
+    rounds: Annotated[int, typer.Option(min=1, help="Interleaved rounds; the best of each side counts.")] = 5,
+    seconds: Annotated[
+        float, typer.Option(min=0.0, help="After this long a row ends, once three rounds are done.")
+    ] = 4.0,
+    json: AsJson = False,
+) -> None:
+    """Control steps per second of whole tasks: actions, physics, rewards, status and observations, without images.
+
+    Beside them is the engine's own loop over as many physics steps of the same world, in the same run, and the ratio of
+    the two. A control step of one env counts as one.
+    """
+    from anysim.api import load
+    from anysim.cli.output import print_json
+    from anysim_bench.rows import Rows
+    from anysim_bench.step import engines_with_raw_loop, env_cost
+
+    chosen = [name.strip() for name in task.split(",")]
+    names = engines_with_raw_loop() if engine == "all" else [name.strip() for name in engine.split(",")]
+    substeps = {name: load(name).spec.physics.substeps for name in chosen}  # unknown names end it before any work
+    heads = ("task", "engine", "envs", "control steps/s", "raw loop", "ratio (wall)", "ratio (cpu)")
+    rows = Rows("Control steps per second, all envs together", heads, (16, 9), quiet=json)
+    found: list[dict[str, Any]] = []
+    for done, (name, where) in enumerate((name, where) for name in chosen for where in names):
+        typer.echo(f"measuring {name} on {where} ({done + 1} of {len(chosen) * len(names)})…", err=True)
+        cost = env_cost(where, num_envs, name, rounds, seconds)
+        ours, raw = cost.ours / substeps[name], cost.raw / substeps[name]
+        rows.add(name, where, num_envs, f"{ours:,.0f}", f"{raw:,.0f}", f"{cost.ratio:.2f}", f"{cost.cpu_ratio:.2f}")
+        said = {"task": name, "engine": where, "num_envs": num_envs, "control_steps_per_second": ours, "raw": raw}
+        found.append(said | {"ratio": cost.ratio, "cpu_ratio": cost.cpu_ratio})
+    if json:
+        print_json(found)
+
+
 @app.command("shards")
 def shards(
     engine: Annotated[str | None, typer.Option("--engine", "-e", help="An installed engine.")] = None,

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from anysim import api
+from anysim import api, registry
 from anysim.engine.base import SimEngine
 from anysim.engine.control import NUDGE
 from anysim.engine.factory import create_simulation
@@ -110,3 +110,17 @@ def test_any_world_can_be_stepped(tmp_path, monkeypatch):
     cost = step.engine_cost("mujoco", 1, 1, world_file=str(file))
     assert cost.ours > 0
     assert cost.budget is None
+
+
+def test_tasks_are_told_in_control_steps(monkeypatch, capsys):
+    """Ten substeps of physics are one control step, on either side."""
+    cost = step.StepCost("mujoco", "env", "implicit_pd", 4, 900.0, 1000.0, 0.9, 0.95, None)
+    monkeypatch.setattr(step, "env_cost", lambda *_: cost)
+    cli.tasks(task="reach, pick_cube", engine="mujoco", num_envs=4, json=True)
+    found = json.loads(capsys.readouterr().out)
+    assert [row["task"] for row in found] == ["reach", "pick_cube"]
+    assert (found[0]["control_steps_per_second"], found[0]["raw"]) == (90.0, 100.0)
+
+
+def test_the_tasks_that_are_measured_are_installed():
+    assert set(cli.TASKS.split(",")) <= set(registry.names("tasks"))
