@@ -257,6 +257,10 @@ CASES: dict[str, Case] = {
     "peg_in_hole_1mm": _PEG,
     "press_button": Case(_opening("button.cap", 0.0, 0.9), [lambda env: set_opening(env, "button.cap", 0.7)]),
     "insert_round_peg": _PEG,
+    "peg_insertion_side": Case(
+        _towards("peg", lambda env: P.compose(seen(env, "block"), np.array([[-0.06, 0.0, 0.08, 0.0, 0.0, 1.0, 0.0]]))),
+        [_shifted("peg", x=-0.05), _shifted("peg", y=0.03)],
+    ),
     "turn_faucet": Case(_opening("faucet.lever", 0.0, 0.95), [lambda env: set_opening(env, "faucet.lever", 0.85)]),
     "flip_switch": Case(_opening("switch.rocker", 0.0, 0.95), [lambda env: set_opening(env, "switch.rocker", 0.85)]),
     "pour_beads": Case(_pour, [_spilled]),

@@ -19,24 +19,32 @@ def peg(
     section: Section = "square",
     width: Positive = 0.03,
     length: Positive = 0.1,
+    along: Literal["x", "z"] = "z",
     density: Positive = 1100.0,
     color: Color = (0.85, 0.55, 0.15),
 ) -> ImportedModel:
-    """A peg along z, its frame in its middle. Frames: `tip` in the middle of its lower end, `head` of its upper one.
+    """A peg, its frame in its middle. Frames: `tip` in the middle of its lower end, `head` of its upper one.
 
     Args:
         section: of the peg.
         width: edge length of a square peg, diameter of a round one [m].
         length: [m].
+        along: the axis from `tip` to `head`; a peg along x lies where it is put. The frames' z is that axis.
         density: [kg/m^3].
         color: of the peg.
     """
     body = Assembly("peg")
     half = width / 2
     shape = Box((half, half, length / 2)) if section == "square" else Cylinder(half, length / 2)
-    body.solid(0, "shaft", shape, (0.0, 0.0, 0.0), density, color)
-    body.site(0, "tip", (0.0, 0.0, -length / 2))
-    body.site(0, "head", (0.0, 0.0, length / 2))
+    if along == "z":
+        body.solid(0, "shaft", shape, (0.0, 0.0, 0.0), density, color)
+        body.site(0, "tip", (0.0, 0.0, -length / 2))
+        body.site(0, "head", (0.0, 0.0, length / 2))
+        return body.model()
+    turn = turned((0.0, 1.0, 0.0), pi / 2)
+    body.solid(0, "shaft", shape, (0.0, 0.0, 0.0), density, color, turn)
+    body.site(0, "tip", (-length / 2, 0.0, 0.0), turn)
+    body.site(0, "head", (length / 2, 0.0, 0.0), turn)
     return body.model()
 
 
@@ -93,4 +101,46 @@ def hole_block(
             body.solid(0, f"piece_{i + 1}", wide, place, density, color, turn, filled=sector)
     body.site(0, "hole", (0.0, 0.0, 0.0))
     body.site(0, "mouth", (0.0, 0.0, height))
+    return body.model()
+
+
+def side_hole(
+    *,
+    width: Positive = 0.04,
+    clearance: Positive = 0.003,
+    depth: Positive = 0.08,
+    size: Positive = 0.16,
+    density: Positive = 1100.0,
+    color: Color = (0.35, 0.42, 0.55),
+) -> ImportedModel:
+    """A standing block with a square hole through it along x, in the middle of its height; its frame is at its bottom.
+
+    Four boxes around the hole. Frames: `hole`, the far end of the hole, and `mouth`, the near one, both with z out of
+    the mouth, against the block's x.
+
+    Args:
+        width: edge length of the peg [m].
+        clearance: between the peg in the middle and the hole, on each side [m].
+        depth: of the block along x [m].
+        size: of the block along y and z [m].
+        density: [kg/m^3].
+        color: of the block.
+
+    Raises:
+        KeyFault: the hole is not smaller than the block.
+    """
+    inner, outer, half = width / 2 + clearance, size / 2, depth / 2
+    if inner >= 0.9 * outer:
+        raise KeyFault(f"a hole of {2 * inner:g} m leaves no walls in a block of {size:g} m", "size")
+    body = Assembly("side_hole")
+    for name, low, high in (
+        ("below", (-half, -outer, 0.0), (half, outer, outer - inner)),
+        ("above", (-half, -outer, outer + inner), (half, outer, size)),
+        ("right", (-half, -outer, outer - inner), (half, -inner, outer + inner)),
+        ("left", (-half, inner, outer - inner), (half, outer, outer + inner)),
+    ):
+        body.board(0, name, low, high, density, color)
+    out = turned((0.0, 1.0, 0.0), -pi / 2)
+    body.site(0, "hole", (half, 0.0, outer), out)
+    body.site(0, "mouth", (-half, 0.0, outer), out)
     return body.model()

@@ -53,6 +53,25 @@ def test_a_ring_weighs_what_a_ring_weighs() -> None:
     assert model.bodies[0].inertial.mass == pytest.approx(ring, rel=5e-3)
 
 
+def test_a_lying_peg_fits_into_a_hole_in_a_side() -> None:
+    """Its axis is the hole's, its tip the hole's end, and no board of the block is nearer than the clearance."""
+    peg, block = (
+        build("peg", {"along": "x", "width": 0.04, "length": 0.2}),
+        build("side_hole", {"width": 0.04, "clearance": 0.003, "depth": 0.08, "size": 0.16}),
+    )
+    tip, head = (next(site for site in peg.sites if site.name == name) for name in ("tip", "head"))
+    hole, mouth = (next(site for site in block.sites if site.name == name) for name in ("hole", "mouth"))
+    up = np.array([0.0, 0.0, 1.0])
+    assert np.allclose(P.rotate(np.array(tip.quaternion), up), (1.0, 0.0, 0.0))
+    assert np.allclose(np.subtract(head.position, tip.position), (0.2, 0.0, 0.0))
+    assert np.allclose(P.rotate(np.array(mouth.quaternion), up), (-1.0, 0.0, 0.0))
+    assert np.allclose(np.subtract(mouth.position, hole.position), (-0.08, 0.0, 0.0))
+    for geom in block.geoms:
+        assert isinstance(geom.shape, Box)
+        gap = np.abs(np.subtract(geom.position, mouth.position))[1:] - np.array(geom.shape.half_size)[1:]
+        assert gap.max() == pytest.approx(0.023)
+
+
 def test_a_button_is_pressed_down() -> None:
     [joint] = build("button", {"travel": 0.01}).joints
     assert (joint.axis, joint.lower, joint.upper) == ((0.0, 0.0, -1.0), 0.0, 0.01)
@@ -68,6 +87,7 @@ def test_a_tray_is_open_at_the_top() -> None:
 def test_what_leaves_nothing_is_said_with_its_key() -> None:
     for name, params, key in (
         ("hole_block", {"size": 0.03}, "size"),
+        ("side_hole", {"size": 0.04}, "size"),
         ("button", {"radius": 0.06}, "radius"),
         ("tray", {"wall": 0.2}, "size"),
     ):

@@ -22,12 +22,19 @@ ALIGNING_STEPS = 75
 SEARCHING_STEPS = 300
 FOUND = 0.004
 """[m] a tip that is this much lower than where it first touched has found the hole."""
+UPRIGHT = 0.999
+"""The height of a mouth's axis from which on what is put into it rises straight up."""
+TURNED = 1e-6
+"""Of the vector part of a quaternion: a tip's axes that are turned further are not those of the object."""
 TURN = 0.35
 """[rad] of the spiral in a control step."""
 
 
 class Insert(PutsDown):
-    """Put the held `object` into a hole: its frame `tip` goes through `mouth` to `hole`, whose z point out of it."""
+    """Put the held `object` into a hole: its frame `tip` goes through `mouth` to `hole`, whose z point out of it.
+
+    The z axis of `tip` points back along the object.
+    """
 
     def __init__(
         self,
@@ -76,17 +83,20 @@ class Insert(PutsDown):
     # ------------------------------------------------------------------ where the tip is, and is to be
 
     def _fitting(self, at: Array, offset: Array) -> Array:
-        """Poses (n, 7) of the object along the hole's axis, with the tip at offsets (n, 3) from the mouth."""
-        thing, mouth, tip = self.object.root.pose[at], self._mouth.pose[at], self._tip.pose[at]
-        seen = P.multiply(P.conjugate(mouth[:, 3:]), thing[:, 3:])
+        """Poses (n, 7) of the object, its tip's axes along the hole's, with the tip at offsets (n, 3) from the mouth."""
+        thing, mouth = self.object.root.pose[at], self._mouth.pose[at]
+        to_tip = P.compose(P.inverse(thing), self._tip.pose[at])
+        turned = P.norm(to_tip[:, 3:6]) > TURNED
+        along = np.where(turned[:, None], P.multiply(thing[:, 3:], to_tip[:, 3:]), thing[:, 3:])
+        seen = P.multiply(P.conjugate(mouth[:, 3:]), along)
         yaw = 2.0 * np.arctan2(seen[:, 2], seen[:, 3])
         fit = 2.0 * np.pi / self._symmetry
         half = 0.5 * fit * np.round(yaw / fit)
         zero = np.zeros_like(half)
         turn = P.multiply(mouth[:, 3:], np.stack([zero, zero, np.sin(half), np.cos(half)], axis=1))
+        turn = np.where(turned[:, None], P.multiply(turn, P.conjugate(to_tip[:, 3:])), turn)
         point = mouth[:, :3] + P.rotate(mouth[:, 3:], offset)
-        to_tip = P.compose(P.inverse(thing), tip)[:, :3]
-        return np.concatenate([point - P.rotate(turn, to_tip), turn], axis=1)
+        return np.concatenate([point - P.rotate(turn, to_tip[:, :3]), turn], axis=1)
 
     def _goal(self, at: Array, offset: Array) -> Array:
         """Tool poses (n, 7) with the object along the hole's axis and the tip at offsets (n, 3) from the mouth."""
@@ -113,13 +123,17 @@ class Insert(PutsDown):
     # ------------------------------------------------------------------ phases
 
     def _transport(self, ids: Array, at: Array) -> Array:
-        """Up first where the tip is lower than it is to pass, then across."""
+        """Out along the axis first where the tip is lower than it is to pass, then across."""
         found, over = self._found(at), np.zeros((len(ids), 3))
         over[:, 2] = 2 * self._above
         goal = self._goal(at, over)
         far = P.norm(found[:, :2]) > 0.03
         rise = far & (found[:, 2] < self._above)
-        goal[rise, :2], goal[rise, 3:] = self.arm.command[ids[rise], :2], self.arm.command[ids[rise], 3:]
+        out = P.rotate(self._mouth.quaternion[at[rise]], np.array([0.0, 0.0, 1.0]))
+        here = self.arm.command[ids[rise]]
+        ahead = here[:, :3] + out * ((goal[rise, :3] - here[:, :3]) * out).sum(axis=1, keepdims=True)
+        up = np.concatenate([here[:, :2], goal[rise, 2:3]], axis=1)
+        goal[rise, :3], goal[rise, 3:] = np.where(out[:, 2:] > UPRIGHT, up, ahead), here[:, 3:]
         self.arm.go(ids, goal, self.moves.speed)
         return self.held(ids, at, np.where(~far & ~rise, GO_ON, STAY))
 
