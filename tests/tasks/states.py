@@ -257,6 +257,10 @@ CASES: dict[str, Case] = {
     "peg_in_hole_1mm": _PEG,
     "press_button": Case(_opening("button.cap", 0.0, 0.9), [lambda env: set_opening(env, "button.cap", 0.7)]),
     "insert_round_peg": _PEG,
+    "nut_on_peg": Case(
+        _towards("nut", lambda env: offset(seen(env, "post.tip"), z=0.001)),
+        [_shifted("nut", z=0.02), _shifted("nut", x=0.015), _moving("nut")],
+    ),
     "peg_insertion_side": Case(
         _towards("peg", lambda env: P.compose(seen(env, "block"), np.array([[-0.06, 0.0, 0.08, 0.0, 0.0, 1.0, 0.0]]))),
         [_shifted("peg", x=-0.05), _shifted("peg", y=0.03)],

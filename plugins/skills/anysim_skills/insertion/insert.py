@@ -83,7 +83,7 @@ class Insert(PutsDown):
     # ------------------------------------------------------------------ where the tip is, and is to be
 
     def _fitting(self, at: Array, offset: Array) -> Array:
-        """Poses (n, 7) of the object, its tip's axes along the hole's, with the tip at offsets (n, 3) from the mouth."""
+        """Poses (n, 7) of the object, its tip along the hole's axes at offsets (n, 3) from the mouth."""
         thing, mouth = self.object.root.pose[at], self._mouth.pose[at]
         to_tip = P.compose(P.inverse(thing), self._tip.pose[at])
         turned = P.norm(to_tip[:, 3:6]) > TURNED

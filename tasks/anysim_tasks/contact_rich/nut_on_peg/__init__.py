@@ -1,0 +1,1 @@
+"""Put a square nut over a peg and let go of it."""
