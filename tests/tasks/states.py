@@ -174,6 +174,15 @@ def _plugged(height: float) -> Case:
     )
 
 
+_STANDING = np.array([[0.0, 0.0, 0.0, *P.from_roll_pitch_yaw(np.array([0.0, -np.pi / 2, 0.0]))]])
+"""The pose of a lying peg that stands up, its head above."""
+
+
+def _lain(env: TaskEnv) -> None:
+    """The peg, down again."""
+    put(env, "peg", P.compose(seen(env, "peg"), P.inverse(_STANDING)))
+
+
 _BEADS = [f"bead_{number}" for number in range(4)]
 _TO_TRAY = _towards("cup", lambda env: seen(env, "tray"))
 
@@ -257,6 +266,10 @@ CASES: dict[str, Case] = {
     "peg_in_hole_1mm": _PEG,
     "press_button": Case(_opening("button.cap", 0.0, 0.9), [lambda env: set_opening(env, "button.cap", 0.7)]),
     "insert_round_peg": _PEG,
+    "lift_peg_upright": Case(
+        _towards("peg", lambda env: P.compose(offset(seen(env, "table"), 0.1, -0.25, 0.32), _STANDING)),
+        [_shifted("peg", z=0.02), _moving("peg"), _lain],
+    ),
     "nut_on_peg": Case(
         _towards("nut", lambda env: offset(seen(env, "post.tip"), z=0.001)),
         [_shifted("nut", z=0.02), _shifted("nut", x=0.015), _moving("nut")],

@@ -13,8 +13,8 @@ from tests.tasks.states import CASES, blind, failed, judged, put, rewarded, seen
 NEAR = 1e-5
 """[m, rad] engines keep poses in single precision."""
 ENGINES = ["mujoco", pytest.param("pybullet", marks=pytest.mark.slow), pytest.param("sapien", marks=pytest.mark.slow)]
-VARIANTS = {"peg_in_hole_2mm", "insert_round_peg", "usb_insert", "unplug_charger"}
-"""Those that differ from another task in sizes alone, or share its world."""
+VARIANTS = {"peg_in_hole_2mm", "insert_round_peg", "nut_on_peg", "usb_insert", "unplug_charger"}
+"""Those that differ from another task in sizes alone, or share its world or its way."""
 TASKS = [pytest.param(task, marks=pytest.mark.slow) if task in VARIANTS else task for task in CASES]
 
 

@@ -18,6 +18,7 @@ TASKS = [
     "press_button",
     "peg_in_hole_1mm",
     "insert_round_peg",
+    "lift_peg_upright",
     "nut_on_peg",
     "peg_insertion_side",
     "turn_faucet",

@@ -1,0 +1,1 @@
+"""Stand a lying peg up and let go of it."""
