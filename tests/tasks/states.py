@@ -266,6 +266,10 @@ CASES: dict[str, Case] = {
     "peg_in_hole_1mm": _PEG,
     "press_button": Case(_opening("button.cap", 0.0, 0.9), [lambda env: set_opening(env, "button.cap", 0.7)]),
     "insert_round_peg": _PEG,
+    "pull_cube_tool": Case(
+        _towards("cube", lambda env: offset(seen(env, "table"), x=0.1, z=0.22)),
+        [_shifted("cube", x=0.3), _shifted("cube", z=0.05)],
+    ),
     "lift_peg_upright": Case(
         _towards("peg", lambda env: P.compose(offset(seen(env, "table"), 0.1, -0.25, 0.32), _STANDING)),
         [_shifted("peg", z=0.02), _moving("peg"), _lain],

@@ -19,6 +19,7 @@ TASKS = [
     "peg_in_hole_1mm",
     "insert_round_peg",
     "lift_peg_upright",
+    "pull_cube_tool",
     "nut_on_peg",
     "peg_insertion_side",
     "turn_faucet",

@@ -3,6 +3,7 @@
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.geometry.bounds import shape_bounds
 from anysim.task.scene import ObjectView, SceneView
 
 _UPRIGHT = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -27,6 +28,23 @@ class ObjectShapes:
         """(n, 3) [m] along its own axes."""
         which = self._which(ids)
         return self._high[which] - self._low[which]
+
+    def size_at(self, ids: Array, point: Array) -> Array:
+        """(n, 3) [m] along its own axes, of those of its parts alone that are at a point (3,) of its own frame.
+
+        The whole object's where no part is there: the handle of a hook, not the hook.
+        """
+        sizes = np.array([self._part_at(number, point) for number in range(len(self._shapes))])
+        return sizes[self._which(ids)]
+
+    def _part_at(self, number: int, point: Array) -> Array:
+        """(3,) the size of the parts of an entity that are at a point (3,)."""
+        meshes = {mesh.name: mesh for mesh in self._scene.engine.world.meshes}
+        boxes = [np.array(shape_bounds(placed.shape, placed.pose, meshes)) for placed in self._shapes[number].shapes]
+        own = [box for box in boxes if ((box[0] <= point) & (point <= box[1])).all()]
+        if not own:
+            return self._high[number] - self._low[number]
+        return np.max([box[1] for box in own], axis=0) - np.min([box[0] for box in own], axis=0)
 
     def box(self, ids: Array) -> tuple[Array, Array]:
         """Its lowest and highest corners (n, 3) [m] in its own frame."""

@@ -72,6 +72,17 @@ def test_a_lying_peg_fits_into_a_hole_in_a_side() -> None:
         assert gap.max() == pytest.approx(0.023)
 
 
+def test_a_hook_pulls_with_its_inner_side() -> None:
+    """What pulls is where the hook begins, and looks back along the handle; the handle's mass is its volume's."""
+    model = build("hook", {"length": 0.26, "reach": 0.08, "width": 0.03, "density": 1000.0})
+    grip, inner = (next(site for site in model.sites if site.name == name) for name in ("grip", "inner"))
+    assert np.allclose(inner.position, (0.1, 0.055, 0.0))
+    assert np.allclose(P.rotate(np.array(inner.quaternion), np.array([1.0, 0.0, 0.0])), (-1.0, 0.0, 0.0))
+    assert grip.position[0] == pytest.approx(-0.1)
+    assert model.bodies[0].inertial is not None
+    assert model.bodies[0].inertial.mass == pytest.approx(1000 * 0.03 * 0.03 * (0.26 + 0.08))
+
+
 def test_a_button_is_pressed_down() -> None:
     [joint] = build("button", {"travel": 0.01}).joints
     assert (joint.axis, joint.lower, joint.upper) == ((0.0, 0.0, -1.0), 0.0, 0.01)
@@ -88,6 +99,7 @@ def test_what_leaves_nothing_is_said_with_its_key() -> None:
     for name, params, key in (
         ("hole_block", {"size": 0.03}, "size"),
         ("side_hole", {"size": 0.04}, "size"),
+        ("hook", {"length": 0.08}, "length"),
         ("button", {"radius": 0.06}, "radius"),
         ("tray", {"wall": 0.2}, "size"),
     ):

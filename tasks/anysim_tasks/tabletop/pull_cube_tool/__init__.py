@@ -1,0 +1,1 @@
+"""Pull a cube nearer with a hook."""
