@@ -241,6 +241,15 @@ def _taken(env: TaskEnv, share: float) -> None:
     _ALOFT(env, max(2.0 * share - 1.0, 0.0))
 
 
+def _roll(env: TaskEnv, share: float, turn: float = 0.0) -> None:
+    """The cart a share of the way to the goal, and turned [rad]."""
+    way = P.compose(P.inverse(seen(env, "cart")), seen(env, "goal"))[:, :2]
+    joints = [env.engine.index.joint(f"cart.{name}") for name in ("along", "aside", "body")]
+    places = np.concatenate([share * way, np.full((env.num_envs, 1), turn)], axis=1)
+    env.engine.set_joint_state(places, np.zeros_like(places), None, joints)
+    env.scene.look(None)
+
+
 CASES: dict[str, Case] = {
     "lift_cube": Case(
         _towards("cube", lambda env: level(offset(seen(env, "goal"), z=0.02), seen(env, "cube"))),
@@ -302,4 +311,8 @@ CASES: dict[str, Case] = {
         [_shifted("cube", x=0.1), _moving("cube"), _moving("rover")],
         (),
     ),
+    "mobile_open_drawer": Case(
+        _opening(_DRAWER, 0.0, 0.8), [lambda env: set_opening(env, _DRAWER, 0.7), _moving("rover")], ("drive", "reach")
+    ),
+    "push_cart": Case(_roll, [lambda env: _roll(env, 0.7), lambda env: _roll(env, 1.0, 0.3)]),
 }
