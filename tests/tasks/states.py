@@ -1,4 +1,4 @@
-"""States of the tasks on a table, from the beginning of an episode to its goal: what the catalogue's tests set."""
+"""States of the tasks, from the beginning of an episode to its goal: what the catalogue's tests set."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -233,6 +233,32 @@ def _tidied(env: TaskEnv, share: float) -> None:
         path(env, min(max(4.0 * share - number, 0.0), 1.0))
 
 
+def _beside_the_cube(env: TaskEnv) -> Array:
+    """Where the base is with the hand where the cube is to be lifted to."""
+    base = seen(env, "rover")
+    base[:, :3] += (seen(env, "aloft") - seen(env, "rover.tool"))[:, :3]
+    return base
+
+
+_TO_COUNTER = _towards("rover", _beside_the_cube)
+_ALOFT = _towards("cube", lambda env: seen(env, "aloft"))
+
+
+def _taken(env: TaskEnv, share: float) -> None:
+    """The base to the counter, so that the hand is above the cube; then the cube into the hand."""
+    _TO_COUNTER(env, min(2.0 * share, 1.0))
+    _ALOFT(env, max(2.0 * share - 1.0, 0.0))
+
+
+def _roll(env: TaskEnv, share: float, turn: float = 0.0) -> None:
+    """The cart a share of the way to the goal, and turned [rad]."""
+    way = P.compose(P.inverse(seen(env, "cart")), seen(env, "goal"))[:, :2]
+    joints = [env.engine.index.joint(f"cart.{name}") for name in ("along", "aside", "body")]
+    places = np.concatenate([share * way, np.full((env.num_envs, 1), turn)], axis=1)
+    env.engine.set_joint_state(places, np.zeros_like(places), None, joints)
+    env.scene.look(None)
+
+
 CASES: dict[str, Case] = {
     "lift_cube": Case(
         _towards("cube", lambda env: level(offset(seen(env, "goal"), z=0.02), seen(env, "cube"))),
@@ -299,4 +325,19 @@ CASES: dict[str, Case] = {
         [lambda env: put(env, "bar", seen(env, "panda.tool")), _shifted("bar", z=-0.25), _moving("bar")],
         ("give",),
     ),
+    "nav_to_pose": Case(
+        _towards("rover", lambda env: seen(env, "goal")),
+        [_shifted("rover", x=0.11), _tilted("rover", 0.15), _moving("rover")],
+        (),
+    ),
+    "mobile_grasp": Case(_taken, [_shifted("cube", x=0.04), _moving("rover")], ("drive", "reach")),
+    "mobile_pick_place": Case(
+        _towards("cube", lambda env: offset(seen(env, "tray.inside"), z=0.021)),
+        [_shifted("cube", x=0.1), _moving("cube"), _moving("rover")],
+        (),
+    ),
+    "mobile_open_drawer": Case(
+        _opening(_DRAWER, 0.0, 0.8), [lambda env: set_opening(env, _DRAWER, 0.7), _moving("rover")], ("drive", "reach")
+    ),
+    "push_cart": Case(_roll, [lambda env: _roll(env, 0.7), lambda env: _roll(env, 1.0, 0.3)]),
 }

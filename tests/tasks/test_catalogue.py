@@ -1,4 +1,4 @@
-"""The tasks on a table: their worlds on each engine, and what counts as success, failure and progress in them."""
+"""The tasks: their worlds on each engine, and what counts as success, failure and progress in them."""
 
 from importlib.metadata import entry_points
 

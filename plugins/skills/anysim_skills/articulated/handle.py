@@ -17,7 +17,7 @@ from anysim_skills.arm import Arm
 from anysim_skills.articulated.bar_grasps import TURNS, bar_grasps
 from anysim_skills.articulated.part import Part
 from anysim_skills.choice import Choice
-from anysim_skills.grasping.grasp import Speed
+from anysim_skills.grasping.grasp import CLOSING_STEPS, SETTLED, Speed
 
 STATIONS = 5
 """Points of the part's way at which a grasp must be reachable."""
@@ -91,6 +91,10 @@ class AtHandle(PhasedSkill):
         """(n,) [m] how far beyond the handle's middle the tool goes."""
         return np.zeros(len(ids))
 
+    def to_go(self, at: Array) -> Array:
+        """(n,) [m, rad] that the part is to be moved."""
+        return self.part.closed + self.share * self.part.span - self.part.position(at)
+
     # ------------------------------------------------------------------ to the handle and away from it
 
     def _leave_handle(self, ids: Array, at: Array) -> None:
@@ -111,7 +115,7 @@ class AtHandle(PhasedSkill):
         grasps[..., :3] += (self.depth(ids)[:, None] * _into(handle))[:, None]
         n, g = grasps.shape[:2]
         clear = grasps - CLEAR * np.concatenate([_along(grasps), np.zeros((n, g, 4))], axis=-1)
-        to_go = self.part.closed + self.share * self.part.span - self.part.position(at)
+        to_go = self.to_go(at)
         way = [
             self.part.moved(at, grasps, np.repeat((share * to_go)[:, None], g, axis=1))
             for share in np.linspace(0.0, 1.0, STATIONS)
@@ -137,6 +141,20 @@ class AtHandle(PhasedSkill):
         self.arm.go(ids, self._at_handle(ids, at, 0.0), self.speed / 2, 0.02)
         there = self.arm.arrived(ids, at, 0.006, 0.06)
         return np.where(there | ((self.steps[ids] >= 10) & self.arm.touching(ids, at)), GO_ON, STAY)
+
+    def closing_phase(self) -> Phase:
+        """Close the fingers on the handle."""
+        return Phase("close", self._close, self._closing, CLOSING_STEPS + 1)
+
+    def _close(self, ids: Array, at: Array) -> None:
+        del at
+        self.arm.closed[ids] = True
+        self.arm.stay(ids)
+
+    def _closing(self, ids: Array, at: Array) -> Array:
+        del at
+        settled = (self.steps[ids] >= 5) & (self.arm.finger_speed(ids) < SETTLED)
+        return np.where(settled | (self.steps[ids] >= CLOSING_STEPS), GO_ON, STAY)
 
     # ------------------------------------------------------------------ with the part
 

@@ -9,7 +9,6 @@ from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.phases import GO_ON, STAY, Phase
 from anysim.task.env import TaskEnv
 from anysim_skills.articulated.handle import AtHandle, Share
-from anysim_skills.grasping.grasp import CLOSING_STEPS, SETTLED
 
 SLIP = 0.04
 """[m] a hand that is further than this from where it took hold of the part has lost it."""
@@ -28,20 +27,10 @@ class Open(AtHandle):
     def make_phases(self) -> Sequence[Phase]:
         return (
             *self.approach_phases(),
-            Phase("close", self._close, self._closing, CLOSING_STEPS + 1),
+            self.closing_phase(),
             Phase("pull", self.take, self._pull, 3 * self.late),
             *self.phases_away(),
         )
-
-    def _close(self, ids: Array, at: Array) -> None:
-        del at
-        self.arm.closed[ids] = True
-        self.arm.stay(ids)
-
-    def _closing(self, ids: Array, at: Array) -> Array:
-        del at
-        settled = (self.steps[ids] >= 5) & (self.arm.finger_speed(ids) < SETTLED)
-        return np.where(settled | (self.steps[ids] >= CLOSING_STEPS), GO_ON, STAY)
 
     def _pull(self, ids: Array, at: Array) -> Array:
         slip = self.follow(ids, at)

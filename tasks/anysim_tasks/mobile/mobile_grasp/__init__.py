@@ -1,0 +1,1 @@
+"""Drive to a counter and take a cube from it."""

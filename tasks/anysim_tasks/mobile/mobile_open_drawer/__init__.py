@@ -1,0 +1,1 @@
+"""Drive to a cabinet and pull its top drawer open."""

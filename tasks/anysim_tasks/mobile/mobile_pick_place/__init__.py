@@ -1,0 +1,1 @@
+"""Take a cube from one counter and put it into a tray on another."""

@@ -1,0 +1,1 @@
+"""Drive a base to a pose on the ground and stop there."""

@@ -1,0 +1,1 @@
+"""Drive to a cart, take hold of its bar and push it to a goal."""
