@@ -1,0 +1,1 @@
+"""Tasks of a hand with several fingers."""

@@ -1,0 +1,1 @@
+"""Close a hand with four fingers around a bottle and lift it."""
