@@ -64,11 +64,19 @@ def measure(only: list[str]) -> None:
         sys.stderr.write(f"{name}: evaluating\n")
         rows = [row for row in benchmark["rows"] if row["task"] == name and row["policy"] in POLICIES]
         if benchmark["parts"].get(f"tasks.{name}.spec") != spec:
-            rows = [row for policy in POLICIES for row in evaluated(name, policy)]
+            rows = [
+                row for policy in POLICIES if policy != "expert" or solvable(name) for row in evaluated(name, policy)
+            ]
         known[name] = {"spec": spec, **{policy: {} for policy in POLICIES}}
         for row in rows:
             known[name][row["policy"]][row["engine"]] = [round(row["success"] * row["attempts"]), row["attempts"]]
         write_whole(STORE.parent, {STORE.name: json.dumps(known, indent=1, sort_keys=True) + "\n"})
+
+
+def solvable(name: str) -> bool:
+    """Whether a task has an expert, which hard ones may lack."""
+    spec = load(name).spec
+    return bool(spec.task and spec.task.expert) or bool(spec.collect and spec.collect.commands)
 
 
 def evaluated(name: str, policy: str) -> list[Figures]:
@@ -109,7 +117,7 @@ def page() -> str:
         task, folder = spec.task, task_path(name).parent.relative_to(ROOT)
         assert task is not None
         commands = spec.collect.commands if spec.collect else ()
-        expert = f"`{task.expert.skill}`" if task.expert else f"{len(commands)} commands"
+        expert = f"`{task.expert.skill}`" if task.expert else f"{len(commands)} commands" if commands else "none"
         robots = ", ".join(dict.fromkeys(one.robot for one in spec.world.robots.values()))
         solved = [_rates(known.get(name, {}).get(policy, {})) for policy in ("expert", "random")]
         rows.append([f"[`{name}`](#{name})", robots, str(task.horizon), " ".join(spec.levels), expert, *solved])

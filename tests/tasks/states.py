@@ -178,6 +178,9 @@ _STANDING = np.array([[0.0, 0.0, 0.0, *P.from_roll_pitch_yaw(np.array([0.0, -np.
 """The pose of a lying peg that stands up, its head above."""
 
 
+_TURNED = np.array([[0.0, 0.0, 0.0, *P.from_roll_pitch_yaw(np.array([0.0, 0.0, 0.2]))]])
+
+
 def _lain(env: TaskEnv) -> None:
     """The peg, down again."""
     put(env, "peg", P.compose(seen(env, "peg"), P.inverse(_STANDING)))
@@ -296,6 +299,10 @@ CASES: dict[str, Case] = {
     "peg_in_hole_1mm": _PEG,
     "press_button": Case(_opening("button.cap", 0.0, 0.9), [lambda env: set_opening(env, "button.cap", 0.7)]),
     "insert_round_peg": _PEG,
+    "push_t": Case(
+        _towards("tee", lambda env: seen(env, "goal")),
+        [_shifted("tee", x=0.01), lambda env: put(env, "tee", P.compose(seen(env, "tee"), _TURNED))],
+    ),
     "pull_cube_tool": Case(
         _towards("cube", lambda env: offset(seen(env, "table"), x=0.1, z=0.22)),
         [_shifted("cube", x=0.3), _shifted("cube", z=0.05)],

@@ -44,7 +44,7 @@ def at_most(bound: float) -> Callable[[Reward], Reward]:
     """Mark a reward term that is never more than a bound; `anysim check` sees by it what success has to be worth."""
 
     def marked(reward: Reward) -> Reward:
-        vars(reward)[MOST] = bound
+        setattr(reward, MOST, bound)
         return reward
 
     return marked

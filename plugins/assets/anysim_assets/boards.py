@@ -1,4 +1,4 @@
-"""Things of boards: a hook to reach with."""
+"""Things of two boards: a hook to reach with, and a T to push about."""
 
 from anysim.assets.model import ImportedModel
 from anysim.model.affordances import Affordance, AffordanceKind
@@ -41,4 +41,42 @@ def hook(
     body.afford(
         Affordance("grip", AffordanceKind.HANDLE, "grip", ("base.handle",), ("carry", "drag"), ((0.0, 0.0, -1.0),))
     )
+    return body.model()
+
+
+def tee(
+    *,
+    bar: tuple[Positive, Positive] = (0.2, 0.05),
+    stem: tuple[Positive, Positive] = (0.15, 0.05),
+    height: Positive = 0.04,
+    density: Positive = 1140.0,
+    color: Color = (0.35, 0.50, 0.75),
+) -> ImportedModel:
+    """A T that lies on its side: a bar along x, and a stem from its middle towards -y.
+
+    Its frame is where its mass is in the middle, half its height up. Frames: `bar` and `stem`, the middles of the two.
+
+    Args:
+        bar: length and width [m].
+        stem: length and width [m].
+        height: [m].
+        density: [kg/m^3]; 1140 makes 0.8 kg of the size that is set.
+        color: of the T.
+
+    Raises:
+        KeyFault: the stem is wider than the bar is long.
+    """
+    if stem[1] >= bar[0]:
+        raise KeyFault(f"a stem {stem[1]:g} m wide does not fit below a bar {bar[0]:g} m long", "stem")
+    areas = bar[0] * bar[1], stem[0] * stem[1]
+    far = (bar[1] + stem[0]) / 2  # between the middles of the two
+    top = far * areas[1] / sum(areas)
+    low, half = top - far, height / 2
+    body = Assembly("tee")
+    for name, (length, width), middle in (("bar", bar, top), ("stem", (stem[1], stem[0]), low)):
+        corner = (length / 2, width / 2)
+        body.board(
+            0, name, (-corner[0], middle - corner[1], -half), (corner[0], middle + corner[1], half), density, color
+        )
+        body.site(0, name, (0.0, middle, 0.0))
     return body.model()

@@ -83,6 +83,14 @@ def test_a_hook_pulls_with_its_inner_side() -> None:
     assert model.bodies[0].inertial.mass == pytest.approx(1000 * 0.03 * 0.03 * (0.26 + 0.08))
 
 
+def test_the_frame_of_a_t_is_its_centre_of_mass() -> None:
+    model = build("tee", {})
+    inertial = model.bodies[0].inertial
+    assert inertial is not None
+    assert np.allclose(inertial.com, 0.0, atol=1e-12)
+    assert inertial.mass == pytest.approx(1140 * 0.04 * (0.2 * 0.05 + 0.15 * 0.05))
+
+
 def test_a_button_is_pressed_down() -> None:
     [joint] = build("button", {"travel": 0.01}).joints
     assert (joint.axis, joint.lower, joint.upper) == ((0.0, 0.0, -1.0), 0.0, 0.01)
@@ -100,6 +108,7 @@ def test_what_leaves_nothing_is_said_with_its_key() -> None:
         ("hole_block", {"size": 0.03}, "size"),
         ("side_hole", {"size": 0.04}, "size"),
         ("hook", {"length": 0.08}, "length"),
+        ("tee", {"stem": [0.1, 0.3]}, "stem"),
         ("button", {"radius": 0.06}, "radius"),
         ("tray", {"wall": 0.2}, "size"),
     ):

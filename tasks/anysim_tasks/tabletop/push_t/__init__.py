@@ -1,0 +1,1 @@
+"""Push a T into a pose on the table."""
