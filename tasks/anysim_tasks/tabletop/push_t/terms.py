@@ -16,53 +16,41 @@ GRID = 0.0025
 """[m] between the points at which outlines are compared, at most."""
 
 
-class Footprint:
-    """The outline of an object of upright boxes on the ground, as points of its own frame.
+class Overlap:
+    """The share of an object's outline that is where it would be at the goal, seen from above.
+
+    The outline is that of the boxes of the object, whose edges are along its own axes.
 
     Raises:
-        TaskError: the object has other solids, which have no outline here.
+        TaskError: the object consists of more, which has no outline here.
     """
-
-    def __init__(self, scene: SceneView, thing: ObjectView) -> None:
-        shapes = scene.entity_shape(thing.entity.name).shapes
-        if any(not isinstance(placed.shape, Box) or abs(placed.pose[3:5]).max() > 1e-6 for placed in shapes):
-            raise TaskError(f"'{thing.name}' is compared by its outline, and consists of more than upright boxes")
-        self._boxes = [(placed.pose, np.array(placed.shape.half_size)) for placed in shapes]  # pyright: ignore
-        grids = [self._grid(pose, half) for pose, half in self._boxes]
-        self.points = np.concatenate(grids)
-        """(K, 3) [m], at height 0."""
-
-    @staticmethod
-    def _grid(pose: Array, half: Array) -> Array:
-        counts = [int(np.ceil(2 * size / GRID - 1e-9)) for size in half[:2]]
-        sides = [size * ((2 * np.arange(count) + 1) / count - 1) for size, count in zip(half, counts, strict=False)]
-        x, y = (side.ravel() for side in np.meshgrid(*sides, indexing="ij"))
-        return np.broadcast_to(pose[:3], (len(x), 3)) * [1, 1, 0] + P.rotate(
-            np.broadcast_to(pose[3:], (len(x), 4)), np.stack([x, y, np.zeros_like(x)], axis=1)
-        )
-
-    def holds(self, points: Array) -> Array:
-        """(...) bool: whether points (..., 3) of the object's frame are in the outline."""
-        inside = np.zeros(points.shape[:-1], dtype=bool)
-        for pose, half in self._boxes:
-            local = P.rotate_inverse(np.broadcast_to(pose[3:], (*points.shape[:-1], 4)), points - pose[:3])
-            inside |= (np.abs(local[..., :2]) <= half[:2]).all(axis=-1)
-        return inside
-
-
-class Overlap:
-    """The share of an object's outline that is where it would be at the goal, seen from above."""
 
     def __init__(self, scene: SceneView, *, object: ObjectView, goal: Frame) -> None:
         self._object, self._goal = object, goal
-        self._outline = Footprint(scene, object)
+        corners: list[tuple[Array, Array]] = []
+        for shape, pose in scene.entity_shape(object.entity.name).shapes:
+            if not isinstance(shape, Box) or np.abs(pose[3:6]).max() > 1e-6:
+                raise TaskError(f"'{object.name}' is compared by its outline, and consists of more than upright boxes")
+            half = np.array(shape.half_size)[:2]
+            corners.append((pose[:2] - half, pose[:2] + half))
+        self._corners = corners
+        self._points = np.concatenate([_grid(low, high) for low, high in corners])
 
     def __call__(self) -> Array:
-        thing, goal = self._object.root.pose, self._goal.pose
-        points = np.broadcast_to(self._outline.points, (len(thing), *self._outline.points.shape))
-        there = goal[:, None, :3] + P.rotate(np.broadcast_to(goal[:, None, 3:], (*points.shape[:2], 4)), points)
-        turn = np.broadcast_to(thing[:, None, 3:], (*points.shape[:2], 4))
-        return self._outline.holds(P.rotate_inverse(turn, there - thing[:, None, :3])).mean(axis=1)
+        seen = P.compose(P.inverse(self._object.root.pose), self._goal.pose)
+        axes = [P.rotate(seen[:, 3:], np.eye(3)[axis])[:, :2] for axis in range(2)]
+        x, y = (np.stack(axes, axis=2) @ self._points.T + seen[:, :2, None]).transpose(1, 0, 2)
+        inside = np.zeros(x.shape, dtype=bool)
+        for low, high in self._corners:
+            inside |= (low[0] <= x) & (x <= high[0]) & (low[1] <= y) & (y <= high[1])
+        return inside.mean(axis=1)
+
+
+def _grid(low: Array, high: Array) -> Array:
+    """Points (K, 2) in the middles of equal cells of a rectangle."""
+    counts = np.ceil((high - low) / GRID - 1e-9).astype(int)
+    sides = [a + (b - a) * (np.arange(n) + 0.5) / n for a, b, n in zip(low, high, counts, strict=True)]
+    return np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
 @at_most(1.0)
