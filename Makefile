@@ -9,6 +9,7 @@ TEST  := .venv/with-test
 CHECK := .venv/with-check
 SITE  := .venv/with-site
 TORCH := .venv-torch/installed
+PEERS := .venv-peers/installed
 
 # The demo: a scripted robot picks cubes in four worlds at once, records it, and a picture shows what happened. Then
 # every installed engine gets the same world, and a page shows how far they agree.
@@ -20,7 +21,7 @@ ARGS ?=
 PYTEST = $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist loadgroup
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test test-slow test-full test-learning check format lock schema docs site bench wheels clean
+.PHONY: help venv demo test test-slow test-full test-learning test-maniskill check format lock schema docs site bench wheels clean
 
 help:  ## list the targets
 	@echo "make TARGET, where TARGET is one of"
@@ -59,6 +60,20 @@ $(TORCH): $(TEST) plugins/learning/pyproject.toml
 	  > .venv-torch/lib/$$($(BIN)/python -c 'import sys; print("python%d.%d" % sys.version_info[:2])')/site-packages/anysim.pth
 	.venv-torch/bin/python -m pip install --quiet torch
 	.venv-torch/bin/python -m pip install --quiet $$($(BIN)/python scripts/extra_requirements.py plugins/learning torch sb3 rsl)
+	@touch $@
+
+test-maniskill: $(PEERS)  ## run the checks against ManiSkill and robosuite, in an environment with torch
+	.venv-peers/bin/python -m pytest -n 0 tests/plugins/maniskill $(ARGS)
+
+# robosuite without its dependencies: it pins a package that needs an older numpy, and its verdicts do not use it.
+$(PEERS): $(TEST) plugins/maniskill/pyproject.toml
+	$(BIN)/python -m venv .venv-peers
+	$(BIN)/python -c 'import sysconfig; print("import site; site.addsitedir(%r)" % sysconfig.get_path("purelib"))' \
+	  > .venv-peers/lib/$$($(BIN)/python -c 'import sys; print("python%d.%d" % sys.version_info[:2])')/site-packages/anysim.pth
+	.venv-peers/bin/python -m pip install --quiet torch
+	.venv-peers/bin/python -m pip install --quiet $$($(BIN)/python scripts/extra_requirements.py plugins/maniskill torch maniskill)
+	.venv-peers/bin/python -m pip install --quiet --no-deps robosuite==1.5.2
+	.venv-peers/bin/python -m pip install --quiet termcolor opencv-python-headless
 	@touch $@
 
 CHECKS := check-lint check-format check-style check-layers check-schema check-tables check-types check-site

@@ -33,6 +33,7 @@ WORDS = {
     "kinematics": "mechanics of robots (Pinocchio), for controllers of your own",
     "learning": "`anysim train`, tasks for gymnasium, views for learners; torch is `anysim-learning[sb3]` or `[rsl]`",
     "legged": "a trot, balance and walking",
+    "maniskill": "`anysim verdicts`: peers judge our states; with them `anysim-maniskill[maniskill]`",
     "mcap": "recordings: MCAP files and videos",
     "mujoco": "the engine MuJoCo, and MJCF files",
     "parity": "`anysim compare` and `anysim picture`",

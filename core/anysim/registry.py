@@ -57,6 +57,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-film": {"commands": "render"},
     "anysim-inspect": {"commands": "audit doctor explain replay snapshot verify"},
     "anysim-learning": {"commands": "train", "learners": "clone rsl-rl sb3-ppo"},
+    "anysim-maniskill": {"commands": "verdicts"},
     "anysim-mcap": {"readers": "mcap", "writers": "mcap"},
     "anysim-mujoco": {"engines": "mujoco", "importers": "mjcf", "oracles": "mjcf"},
     "anysim-parity": {"commands": "compare picture"},

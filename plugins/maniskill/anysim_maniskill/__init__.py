@@ -1,0 +1,1 @@
+"""Peers as outside checks: the verdicts of ManiSkill and robosuite on states of anysim's tasks."""
