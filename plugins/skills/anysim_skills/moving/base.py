@@ -45,6 +45,7 @@ class Base(Mover):
     Attributes:
         frame: the frame that is moved.
         target: (N, 3) where it is to go: x, y [m] and yaw [rad] in the world.
+        sideways: bool, whether it moves to all sides while it turns.
         pace: how fast.
         close: [m] from there the rest of the way is not worth another turn.
     """
@@ -60,7 +61,7 @@ class Base(Mover):
                 f"the base of '{robot.name}' takes ({', '.join(labels)}) by the controller of '{channel}'; expected "
                 f"one of {known}, as of holonomic_drive, planar_drive and differential_drive"
             )
-        self._sideways = labels == HOLONOMIC
+        self.sideways = labels == HOLONOMIC
         self.target = np.zeros((env.num_envs, 3))
         self.pace, self.close = Pace(), 0.01
         self._fresh = np.ones(env.num_envs, dtype=bool)
@@ -116,7 +117,7 @@ class Base(Mover):
         turn = wrapped(self.target[ids, 2] - now[:, 2])
         cosine, sine = np.cos(now[:, 2]), np.sin(now[:, 2])
         forward, aside = cosine * way[:, 0] + sine * way[:, 1], cosine * way[:, 1] - sine * way[:, 0]
-        drive = self._straight if self._sideways else self._turning
+        drive = self._straight if self.sideways else self._turning
         action[ids, self._slice.start : self._slice.stop] = drive(ids, forward, aside, turn)
 
     def _straight(self, ids: Array, forward: Array, aside: Array, turn: Array) -> Array:
