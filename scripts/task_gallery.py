@@ -96,7 +96,8 @@ def draw(name: str, path: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
         whole = Path(folder) / "whole.png"
         words = ["picture", name, "--engines", ",".join(ENGINES), "-n", "1", "--seed", "1"]
-        view = ["-o", f"world.cameras.front={ABOVE}"] if "cabinet" in load(name).spec.world.objects else []
+        on_table = {"cabinet", "table"} <= set(load(name).spec.world.objects)
+        view = ["-o", f"world.cameras.front={ABOVE}"] if on_table else []
         _anysim(*words, *view, "--size", str(WIDTH), str(HEIGHT), "--out", str(whole))
         Image.open(whole).convert("RGB").save(path, quality=75, optimize=True)
 

@@ -253,6 +253,18 @@ def _taken(env: TaskEnv, share: float) -> None:
     _ALOFT(env, max(2.0 * share - 1.0, 0.0))
 
 
+_PACK = [
+    _towards(thing, lambda env, side=side, height=height: offset(seen(env, "crate.inside"), y=side, z=height))
+    for thing, side, height in (("bar", -0.1, 0.015), ("cube", 0.0, 0.02), ("can", 0.1, 0.03))
+]
+
+
+def _packed(env: TaskEnv, share: float) -> None:
+    """One after the other, a third of the way each."""
+    for number, path in enumerate(_PACK):
+        path(env, min(max(3.0 * share - number, 0.0), 1.0))
+
+
 def _roll(env: TaskEnv, share: float, turn: float = 0.0) -> None:
     """The cart a share of the way to the goal, and turned [rad]."""
     way = P.compose(P.inverse(seen(env, "cart")), seen(env, "goal"))[:, :2]
@@ -350,5 +362,11 @@ CASES: dict[str, Case] = {
     "mobile_open_drawer": Case(
         _opening(_DRAWER, 0.0, 0.8), [lambda env: set_opening(env, _DRAWER, 0.7), _moving("rover")], ("drive", "reach")
     ),
+    "pack": Case(_packed, [_shifted("can", y=0.1), _shifted("bar", z=0.1), _moving("crate")], ()),
     "push_cart": Case(_roll, [lambda env: _roll(env, 0.7), lambda env: _roll(env, 1.0, 0.3)]),
+    "fetch_from_drawer": Case(
+        _towards("cube", lambda env: offset(seen(env, "tray.inside"), z=0.021)),
+        [lambda env: set_opening(env, _DRAWER, 0.1), _shifted("cube", x=0.1), _moving("rover")],
+        (),
+    ),
 }

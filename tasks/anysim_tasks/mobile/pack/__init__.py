@@ -1,0 +1,1 @@
+"""Three things from a counter into a crate on a stand beside it."""
