@@ -31,8 +31,9 @@ TASKS = [
     "stack_pyramid",
     "tidy_bin",
     "dex_grasp",
+    "rope_straighten",
 ]
-LEAST = {"put_away": 6}
+LEAST = {"put_away": 6, "rope_straighten": 5}
 """Of eight; where nothing is said seven."""
 
 
