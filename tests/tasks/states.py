@@ -248,7 +248,20 @@ def _bent(env: TaskEnv) -> None:
     _bend(env, angles)
 
 
+_TO_HAND = _in_reach_of_the_hand("bottle", "robot.tool")
+
+
+def _to_goal_in_hand(env: TaskEnv, share: float) -> None:
+    """The goal is where the hand is, and the bottle goes there."""
+    env.scene.goals["goal"][:] = seen(env, "robot.tool")
+    env.scene.moment += 1
+    _TO_HAND(env, share)
+
+
 CASES: dict[str, Case] = {
+    "dex_relocate": Case(
+        _to_goal_in_hand, [_shifted("bottle", x=0.06), _shifted("bottle", z=-0.06), _moving("bottle")]
+    ),
     "rope_straighten": Case(_straighten, [_bent, _shifted("rope", x=0.035), _shifted("rope", y=-0.04)], ()),
     "lift_cube": Case(
         _towards("cube", lambda env: level(offset(seen(env, "goal"), z=0.02), seen(env, "cube"))),

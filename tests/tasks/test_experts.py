@@ -31,6 +31,7 @@ TASKS = [
     "stack_pyramid",
     "tidy_bin",
     "dex_grasp",
+    "dex_relocate",
     "rope_straighten",
 ]
 LEAST = {"put_away": 6, "rope_straighten": 5}
