@@ -51,7 +51,7 @@ def offset(pose: Array, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Array
 
 def level(pose: Array, like: Array) -> Array:
     """Positions of the one, orientations of the other."""
-    return np.concatenate([pose[:, :3], like[:, 3:]], axis=1)
+    return np.concatenate([pose[:, :3], np.broadcast_to(like[:, 3:], (len(pose), 4))], axis=1)
 
 
 def judged(env: TaskEnv) -> Array:
@@ -274,7 +274,45 @@ def _roll(env: TaskEnv, share: float, turn: float = 0.0) -> None:
     env.scene.look(None)
 
 
+def _bend(env: TaskEnv, angles: Array) -> None:
+    """The joints of the rope at angles (N, J) [rad], at rest."""
+    numbers = [k for k, joint in enumerate(env.engine.world.joints) if joint.name.startswith("rope.")]
+    env.engine.set_joint_state(angles, np.zeros_like(angles), None, numbers)
+    env.scene.look(None)
+
+
+_PULL = _towards("rope", lambda env: level(seen(env, "pull"), np.array([[0, 0, 0, 0, 0, -np.sqrt(0.5), np.sqrt(0.5)]])))
+
+
+def _straighten(env: TaskEnv, share: float) -> None:
+    """All bends become less as the rope goes to its line."""
+    _PULL(env, share)
+    angles = np.zeros((env.num_envs, 11))
+    angles[:, ::2] = 0.2 * (1.0 - share)
+    _bend(env, angles)
+
+
+def _bent(env: TaskEnv) -> None:
+    angles = np.zeros((env.num_envs, 11))
+    angles[:, 4] = 0.3
+    _bend(env, angles)
+
+
+_TO_HAND = _in_reach_of_the_hand("bottle", "robot.tool")
+
+
+def _to_goal_in_hand(env: TaskEnv, share: float) -> None:
+    """The goal is where the hand is, and the bottle goes there."""
+    env.scene.goals["goal"][:] = seen(env, "robot.tool")
+    env.scene.moment += 1
+    _TO_HAND(env, share)
+
+
 CASES: dict[str, Case] = {
+    "dex_relocate": Case(
+        _to_goal_in_hand, [_shifted("bottle", x=0.06), _shifted("bottle", z=-0.06), _moving("bottle")]
+    ),
+    "rope_straighten": Case(_straighten, [_bent, _shifted("rope", x=0.035), _shifted("rope", y=-0.04)], ()),
     "lift_cube": Case(
         _towards("cube", lambda env: level(offset(seen(env, "goal"), z=0.02), seen(env, "cube"))),
         [_shifted("cube", z=-0.03), _shifted("cube", z=0.5)],

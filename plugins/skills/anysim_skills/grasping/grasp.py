@@ -58,7 +58,7 @@ class Grasp(PhasedSkill):
         tool: str = "tool",
         solver: str = "numba_ik",
         offset: Offset = (0.0, 0.0, 0.0),
-        part: Annotated[bool, Field(description="the fingers span what is at `offset`, not the whole object")] = False,
+        part_only: Annotated[bool, Field(description="the fingers span what is at `offset` alone")] = False,
         hover: Metres = 0.1,
         lift: Annotated[float, Field(ge=0, description="[m]; 0 leaves that to the next skill")] = 0.1,
         speed: Speed = 0.4,
@@ -75,7 +75,7 @@ class Grasp(PhasedSkill):
         self._plans = bool(planner)
         self._object, self._then, self._lift = object, then, lift
         self._speed, self._descend_speed, self._steps = speed, descend_speed, phase_steps
-        self._offset, self._part = np.array(offset), part
+        self._offset, self._part_only = np.array(offset), part_only
         self._back = np.array([*(-hover * DOWN), 0.0, 0.0, 0.0, 0.0])
         n = env.num_envs
         self.turn = np.zeros((n, 4))
@@ -165,7 +165,7 @@ class Grasp(PhasedSkill):
             return self._bank.goals(ids, thing, self._hover)
         grasps = from_above(thing)
         grasps[..., :3] = self._place(ids, at)[:, None]
-        return grasps, across(self._shapes.size_at(ids, self._offset) if self._part else self._shapes.size(ids))
+        return grasps, across(self._shapes.size_at(ids, self._offset) if self._part_only else self._shapes.size(ids))
 
     def _before(self, grasps: Array) -> Array:
         """Tool poses (..., 7) from which these are approached."""

@@ -1,0 +1,1 @@
+"""Lay a rope straight by one of its ends."""
