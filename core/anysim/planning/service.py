@@ -19,7 +19,7 @@ class PlanFuture:
     """An answer to come. `due` is the control step at which it takes effect, None for as soon as it is ready."""
 
     def __init__(
-        self, service: "PlannerService", request: PlanRequest, scene: Scene, env: int, due: int | None
+        self, service: "PlannerService", request: PlanRequest, scene: Scene, env: int | None, due: int | None
     ) -> None:
         self.request, self.scene, self.env, self.due = request, scene, env, due
         self.budget = Budget(request.deadline)
@@ -75,9 +75,11 @@ class PlannerService(ABC):
 
     @abstractmethod
     def submit(
-        self, request: PlanRequest, scene: Scene, *, env: int = 0, now: int = 0, latency: int | None = 0
+        self, request: PlanRequest, scene: Scene, *, env: int | None = None, now: int = 0, latency: int | None = 0
     ) -> PlanFuture:
         """Ask for a plan at control step `now`; it begins with the next `flush`, `harvest` or `result`.
+
+        Until then a newer request of the same `env` and joints supersedes it: it ends `cancelled`. None: none does.
 
         Raises:
             AnysimError: the request is malformed; nothing was submitted. Or the service is closed.

@@ -64,7 +64,7 @@ class QueuedService(PlannerService):
         self._seats = [self._started() for _ in range(workers)]
 
     def submit(
-        self, request: PlanRequest, scene: Scene, *, env: int = 0, now: int = 0, latency: int | None = 0
+        self, request: PlanRequest, scene: Scene, *, env: int | None = None, now: int = 0, latency: int | None = 0
     ) -> PlanFuture:
         """Ask; see `PlannerService`."""
         request.check()
@@ -72,6 +72,7 @@ class QueuedService(PlannerService):
         with self._changed:
             if self._closed:
                 raise AnysimError("the planner service is closed; make a new one")
+            self._supersede(future)
             self._pending.append(future)
             self._waiting.append(future)
             self.counts.submitted += 1
@@ -131,6 +132,15 @@ class QueuedService(PlannerService):
     @abstractmethod
     def _work(self, seat: Seat) -> None:
         """The thread of a worker: answer what `_next` gives, until that is None."""
+
+    def _supersede(self, newer: PlanFuture) -> None:
+        """Under the lock: what an env asked for before in this tick, for the same joints, has no use any more.
+
+        What was flushed stays: whether a worker has begun it depends on the machine.
+        """
+        for older in self._pending if newer.env is not None else ():
+            if older.env == newer.env and older.request.joints == newer.request.joints:
+                self._cancelled(older, f"env {newer.env} asked anew for the same joints before it began")
 
     def _stop(self, seat: Seat, future: PlanFuture) -> None:
         """Under the lock: a request that a worker has was given up, as its budget says."""

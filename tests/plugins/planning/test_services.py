@@ -82,6 +82,42 @@ def test_a_request_that_breaks_its_planner_fails_alone(kind: Kind, seed: int, er
         assert plans.submit(asked(7), SCENE).result().status is PlanStatus.OK
 
 
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_newer_request_of_an_env_supersedes_what_has_not_begun(kind: Kind, workers: int) -> None:
+    with kind(World(), Scripted, workers) as plans:
+        older = [plans.submit(asked(seed), SCENE, env=env) for seed, env in ((1, 0), (2, 1))]
+        other_joints = plans.submit(asked(3, joints=3), SCENE, env=0)
+        newer = plans.submit(asked(4), SCENE, env=0)
+        assert older[0].done  # at once: not only when a worker comes to it
+        assert older[0].result().status is PlanStatus.CANCELLED
+        assert "env 0 asked anew" in older[0].result().message
+        assert plans.harvest(0) == [*older, other_joints, newer]
+        assert seeds([older[1], other_joints, newer]) == [2, 3, 4]
+        assert (plans.counts.answered, plans.counts.cancelled) == (4, 1)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    asks=st.lists(st.tuples(st.integers(1, 9), st.integers(1, 3), st.none() | st.integers(0, 2), st.booleans())),
+    workers=st.integers(1, 2),
+)
+def test_what_is_superseded_depends_on_the_submissions_alone(
+    asks: list[tuple[int, int, int | None, bool]], workers: int
+) -> None:
+    with ThreadedService(World(), Scripted, workers) as plans:
+        futures, expected, open_rows = [], [], {}
+        for row, (seed, joints, env, flushed) in enumerate(asks):
+            if env is not None and (env, joints) in open_rows:
+                expected[open_rows[env, joints]] = PlanStatus.CANCELLED
+            futures.append(plans.submit(asked(seed, joints), SCENE, env=env))
+            expected.append(PlanStatus.OK)
+            open_rows[env, joints] = row
+            if flushed:
+                plans.flush()
+                open_rows.clear()
+        assert [future.result().status for future in futures] == expected
+
+
 def test_a_planner_that_hangs_is_given_up_and_replaced(kind: Kind, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(queued, "GRACE", 0.05)
     with kind(World(), Scripted) as plans:
