@@ -6,18 +6,22 @@ from typing import NamedTuple
 import numpy as np
 
 import anysim
+from anysim.api import load
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.model.world import BodyKind
 from anysim.task.env import TaskEnv
 from anysim.task.joints import RangedJointView
 
-BLIND = ("record.cameras=[]", "world.cameras.front.channels=[]", "world.cameras.wrist.channels=[]")
-
 
 def blind(task: str, engine: str, num_envs: int = 2, *overrides: str) -> TaskEnv:
     """A task without its cameras."""
-    return anysim.make(task, engine=engine, num_envs=num_envs, overrides=[*BLIND, *overrides])
+    return anysim.make(task, engine=engine, num_envs=num_envs, overrides=[*blinding(task), *overrides])
+
+
+def blinding(task: str) -> list[str]:
+    """Overrides by which a task's cameras draw nothing."""
+    return ["record.cameras=[]", *(f"world.cameras.{name}.channels=[]" for name in load(task).spec.world.cameras)]
 
 
 def put(env: TaskEnv, name: str, pose: Array) -> None:
@@ -178,7 +182,9 @@ _STANDING = np.array([[0.0, 0.0, 0.0, *P.from_roll_pitch_yaw(np.array([0.0, -np.
 """The pose of a lying peg that stands up, its head above."""
 
 
-_TURNED = np.array([[0.0, 0.0, 0.0, *P.from_roll_pitch_yaw(np.array([0.0, 0.0, 0.2]))]])
+def _turned(thing: str, angle: float) -> Callable[[TaskEnv], None]:
+    turn = np.array([[0.0, 0.0, 0.0, *P.from_roll_pitch_yaw(np.array([0.0, 0.0, angle]))]])
+    return lambda env: put(env, thing, P.compose(seen(env, thing), turn))
 
 
 def _lain(env: TaskEnv) -> None:
@@ -349,10 +355,7 @@ CASES: dict[str, Case] = {
     "peg_in_hole_1mm": _PEG,
     "press_button": Case(_opening("button.cap", 0.0, 0.9), [lambda env: set_opening(env, "button.cap", 0.7)]),
     "insert_round_peg": _PEG,
-    "push_t": Case(
-        _towards("tee", lambda env: seen(env, "goal")),
-        [_shifted("tee", x=0.01), lambda env: put(env, "tee", P.compose(seen(env, "tee"), _TURNED))],
-    ),
+    "push_t": Case(_towards("tee", lambda env: seen(env, "goal")), [_shifted("tee", x=0.01), _turned("tee", 0.2)]),
     "pull_cube_tool": Case(
         _towards("cube", lambda env: offset(seen(env, "table"), x=0.1, z=0.22)),
         [_shifted("cube", x=0.3), _shifted("cube", z=0.05)],
@@ -390,6 +393,9 @@ CASES: dict[str, Case] = {
         _towards("rover", lambda env: seen(env, "goal")),
         [_shifted("rover", x=0.11), _tilted("rover", 0.15), _moving("rover")],
         (),
+    ),
+    "walk_to_pose": Case(
+        _towards("dog", lambda env: seen(env, "goal")), [_shifted("dog", x=0.27), _turned("dog", 0.4)], ()
     ),
     "mobile_grasp": Case(_taken, [_shifted("cube", x=0.04), _moving("rover")], ("drive", "reach")),
     "mobile_pick_place": Case(

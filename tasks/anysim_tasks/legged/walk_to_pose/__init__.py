@@ -1,0 +1,1 @@
+"""Walk to a pose on four legs and stand there."""
