@@ -111,7 +111,8 @@ def test_every_builder_makes_a_sound_model(name: str) -> None:
     for things in (model.bodies, model.joints, model.geoms, model.sites):
         names = [thing.name for thing in things]
         assert len(set(names)) == len(names)
-    assert any(site.name.endswith((".handle", "tcp", "top", "lens", "head", "mouth", "inside")) for site in model.sites)
+    held = (".handle", "tcp", "top", "lens", "head", "mouth", "inside", "grip", "bar", "first")
+    assert any(site.name.endswith(held) for site in model.sites)
     assert build(name, {}) == model
 
 
