@@ -17,7 +17,7 @@ from anysim_skills.arm import Arm
 from anysim_skills.articulated.bar_grasps import TURNS, bar_grasps
 from anysim_skills.articulated.part import Part
 from anysim_skills.choice import Choice
-from anysim_skills.grasping.grasp import CLOSING_STEPS, SETTLED, Speed
+from anysim_skills.grasping.grasp import CLOSING_STEPS, Speed, closed
 
 STATIONS = 5
 """Points of the part's way at which a grasp must be reachable."""
@@ -153,8 +153,7 @@ class AtHandle(PhasedSkill):
 
     def _closing(self, ids: Array, at: Array) -> Array:
         del at
-        settled = (self.steps[ids] >= 5) & (self.arm.finger_speed(ids) < SETTLED)
-        return np.where(settled | (self.steps[ids] >= CLOSING_STEPS), GO_ON, STAY)
+        return closed(ids, self.steps[ids], self.arm)
 
     # ------------------------------------------------------------------ with the part
 

@@ -15,7 +15,7 @@ from anysim.task.scene import ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.choice import Choice
 from anysim_skills.grasping.candidates import DOWN, TOP_DOWN, across, from_above
-from anysim_skills.grasping.grasp import CLOSING_STEPS, ROOM, SETTLED, Metres, Speed
+from anysim_skills.grasping.grasp import CLOSING_STEPS, ROOM, Metres, Speed, closed
 from anysim_skills.object_shapes import ObjectShapes
 
 BEHIND = 0.03
@@ -159,9 +159,7 @@ class BiLift(PhasedSkill):
 
     def _closing(self, ids: Array, at: Array) -> Array:
         del at
-        steps = self.steps[ids]
-        speed = np.maximum(*(arm.finger_speed(ids) for arm in self.arms))
-        return np.where((steps >= CLOSING_STEPS) | ((steps >= 5) & (speed < SETTLED)), GO_ON, STAY)
+        return closed(ids, self.steps[ids], *self.arms)
 
     # ------------------------------------------------------------------ up
 

@@ -37,6 +37,12 @@ Metres = Annotated[float, Field(gt=0, description="[m]")]
 Speed = Annotated[float, Field(gt=0, description="[m/s] of the tool")]
 
 
+def closed(ids: Array, steps: Array, *arms: Arm) -> Array:
+    """(n,) GO_ON where the fingers of all arms have come to rest, or their control steps (n,) are over; else STAY."""
+    settled = (steps >= 5) & (np.max([arm.finger_speed(ids) for arm in arms], axis=0) < SETTLED)
+    return np.where(settled | (steps >= CLOSING_STEPS), GO_ON, STAY)
+
+
 class TakesOver(Protocol):
     """A skill that goes on with what a grasp holds."""
 

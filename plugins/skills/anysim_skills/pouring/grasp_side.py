@@ -14,7 +14,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.choice import Choice
-from anysim_skills.grasping.grasp import CLOSING_STEPS, ROOM, SETTLED, Metres, Offset, Speed
+from anysim_skills.grasping.grasp import CLOSING_STEPS, ROOM, Metres, Offset, Speed, closed
 from anysim_skills.object_shapes import ObjectShapes
 
 SIDES = 4
@@ -123,8 +123,7 @@ class GraspSide(PhasedSkill):
 
     def _closing(self, ids: Array, at: Array) -> Array:
         del at
-        settled = (self.steps[ids] >= 5) & (self.arm.finger_speed(ids) < SETTLED)
-        return np.where(settled | (self.steps[ids] >= CLOSING_STEPS), GO_ON, STAY)
+        return closed(ids, self.steps[ids], self.arm)
 
     def _raise(self, ids: Array, at: Array) -> None:
         self._rest[ids] = self._object.root.position[at, 2]
