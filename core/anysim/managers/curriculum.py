@@ -78,6 +78,7 @@ class CurriculumManager(Manager):
     def reset(self, env_ids: Array) -> None:
         """Count the episodes that have ended here, and move the levels that are due."""
         ended = env_ids[self.episodes.code[env_ids] > 0]
+        recalled = {env: self._recalled.pop(env, {}) for env in env_ids.tolist()}
         for name, spec in self._specs.items():
             level, tried, won = self.level[name], self._tried[name], self._won[name]
             tried[ended] += 1
@@ -87,10 +88,8 @@ class CurriculumManager(Manager):
             moved = level[due] + spec.step * ((rate >= spec.promote).astype(float) - (rate < spec.demote))
             level[due], tried[due], won[due] = np.clip(moved, 0.0, 1.0), 0, 0
             for env in env_ids.tolist():
-                level[env] = self._recalled.get(env, {}).get(name, level[env])
+                level[env] = recalled[env].get(name, level[env])
                 self.streams.note(env, f"curriculum/{name}", float(level[env]), Origin("", f"task.curriculum.{name}"))
-        for env in env_ids.tolist():
-            self._recalled.pop(env, None)
 
     def snapshot(self, env_ids: Array) -> dict[str, Array]:
         kept = {"level": self.level, "tried": self._tried, "won": self._won}

@@ -48,13 +48,13 @@ def step(
     from anysim.errors import EngineError
     from anysim.model.world import Actuation
     from anysim_bench.rows import Rows
-    from anysim_bench.step import StepCost, engine_cost, engines_with_raw_loop, env_cost
+    from anysim_bench.step import StepCost, engine_cost, engines_of, env_cost
 
     try:
         sizes = [int(n) for n in num_envs.split(",")]
     except ValueError:
         raise EngineError(f"--num-envs takes whole numbers separated by commas, got '{num_envs}'") from None
-    names = engines_with_raw_loop() if engine == "all" else [name.strip() for name in engine.split(",")]
+    names = engines_of(engine)
     costs: list[StepCost] = []
 
     def measured(name: str, n: int) -> Iterator[StepCost]:
@@ -109,10 +109,10 @@ def tasks(
     from anysim.api import load
     from anysim.cli.output import print_json
     from anysim_bench.rows import Rows
-    from anysim_bench.step import engines_with_raw_loop, env_cost
+    from anysim_bench.step import engines_of, env_cost
 
     chosen = [name.strip() for name in task.split(",")]
-    names = engines_with_raw_loop() if engine == "all" else [name.strip() for name in engine.split(",")]
+    names = engines_of(engine)
     substeps = {name: load(name).spec.physics.substeps for name in chosen}  # unknown names end it before any work
     heads = ("task", "engine", "envs", "control steps/s", "raw loop", "ratio (wall)", "ratio (cpu)")
     rows = Rows("Control steps per second, all envs together", heads, (16, 9), quiet=json)
@@ -175,9 +175,9 @@ def managers(
     """
     from anysim.cli.output import print_json, print_table
     from anysim_bench.managers import RESET_BUDGET_MS, STEP_BUDGET, reset_costs, step_costs, task_env
-    from anysim_bench.step import engines_with_raw_loop
+    from anysim_bench.step import engines_of
 
-    names = engines_with_raw_loop() if engine == "all" else [name.strip() for name in engine.split(",")]
+    names = engines_of(engine)
     steps, resets = [], []
     for name in names:
         typer.echo(f"measuring {num_envs} envs on {name}…", err=True)

@@ -115,6 +115,11 @@ def engines_with_raw_loop() -> list[str]:
     return [name for name in runnable() if engine_class(name).raw_loop is not SimEngine.raw_loop]
 
 
+def engines_of(words: str) -> list[str]:
+    """The engines of a list with commas; `all` are those with a raw loop."""
+    return engines_with_raw_loop() if words == "all" else [name.strip() for name in words.split(",")]
+
+
 def engine_cost(
     engine_name: str,
     num_envs: int,
