@@ -18,6 +18,8 @@ from anysim.model.frames import find_frame
 from anysim.model.world import BodyKind, EntityKind, MeshShape, World
 from anysim_urdf.load import import_urdf
 
+pytestmark = pytest.mark.xdist_group("example robots")  # one worker imports them, once, for all tests
+
 ROBOTS = {  # path: moving joints, followers, mass [kg]
     "ur_description/urdf/ur5_robot.urdf": (6, 0, 20.994),
     "xarm_description/urdf/xarm7.urdf": (7, 0, 11.317),

@@ -10,12 +10,12 @@ import pytest
 CONFTEST = Path(__file__).parents[1] / "conftest.py"
 
 
-def outcome(folder: Path, test: str) -> str:
+def outcome(folder: Path, test: str, *options: str) -> str:
     """What pytest prints about one test in a repository that has our conftest."""
     (folder / "tests").mkdir()
     shutil.copy(CONFTEST, folder / "tests")
     (folder / "tests" / "test_it.py").write_text(test, "utf-8")
-    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--rootdir", str(folder), "tests"]
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--rootdir", str(folder), *options, "tests"]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120).stdout
 
 
@@ -39,6 +39,22 @@ def test_what_a_test_leaves_behind_is_an_error(tmp_path: Path, test: str, compla
     said = outcome(tmp_path, test)
     assert "1 error" in said
     assert complaint in said
+
+
+def test_one_worker_runs_all_tests_of_a_group(tmp_path: Path) -> None:
+    """What a group shares is set up once. Versions of pytest and pytest-xdist that do not fit say nothing about it."""
+    test = """
+import pytest
+
+RUN = []
+
+@pytest.mark.parametrize("number", range(8))
+@pytest.mark.xdist_group("together")
+def test(number):
+    RUN.append(number)
+    assert RUN == list(range(number + 1))
+"""
+    assert "8 passed" in outcome(tmp_path, test, "-n", "2", "--dist", "loadgroup")
 
 
 def test_the_cache_of_the_tests_is_not_the_users(tmp_path: Path) -> None:
