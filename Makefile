@@ -63,7 +63,7 @@ $(TORCH): $(TEST) plugins/learning/pyproject.toml
 	@touch $@
 
 test-maniskill: $(PEERS)  ## run the checks against ManiSkill and robosuite, in an environment with torch
-	.venv-peers/bin/python -m pytest -n 0 tests/plugins/maniskill $(ARGS)
+	.venv-peers/bin/python -m pytest -n 0 tests/plugins/maniskill tests/plugins/evaluation/test_external.py $(ARGS)
 
 # robosuite without its dependencies: it pins a package that needs an older numpy, and its verdicts do not use it.
 $(PEERS): $(TEST) plugins/maniskill/pyproject.toml
@@ -71,7 +71,8 @@ $(PEERS): $(TEST) plugins/maniskill/pyproject.toml
 	$(BIN)/python -c 'import sysconfig; print("import site; site.addsitedir(%r)" % sysconfig.get_path("purelib"))' \
 	  > .venv-peers/lib/$$($(BIN)/python -c 'import sys; print("python%d.%d" % sys.version_info[:2])')/site-packages/anysim.pth
 	.venv-peers/bin/python -m pip install --quiet torch
-	.venv-peers/bin/python -m pip install --quiet $$($(BIN)/python scripts/extra_requirements.py plugins/maniskill torch maniskill)
+	.venv-peers/bin/python -m pip install --quiet $$($(BIN)/python scripts/extra_requirements.py plugins/maniskill torch maniskill) \
+	  $$($(BIN)/python scripts/extra_requirements.py plugins/evaluation gymnasium-robotics)
 	.venv-peers/bin/python -m pip install --quiet --no-deps robosuite==1.5.2
 	.venv-peers/bin/python -m pip install --quiet termcolor opencv-python-headless
 	@touch $@

@@ -5,6 +5,7 @@ parameters. Nothing about an episode may depend on which env it runs in: draws c
 """
 
 import importlib
+from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -114,16 +115,25 @@ def make_policy(env: TaskEnv, text: str) -> Policy:
     return made(env, **{key: getattr(given, key) for key in parameters(made)})
 
 
+def load_function(module: str, function: str) -> Callable[[Obs], Any]:
+    """The function of `MODULE:FUNCTION`.
+
+    Raises:
+        TaskError: the module or the function is not there.
+    """
+    try:
+        return getattr(importlib.import_module(module), function)
+    except (ImportError, AttributeError) as error:
+        raise TaskError(
+            f"--policy {module}:{function}: {error}; expected a module on the Python path, and a function in it"
+        ) from None
+
+
 class FunctionPolicy:
     """`MODULE:FUNCTION`: a function of the observations that gives actions (n, A), or chunks (n, K, A)."""
 
     def __init__(self, env: TaskEnv, module: str, function: str) -> None:
-        try:
-            self._function = getattr(importlib.import_module(module), function)
-        except (ImportError, AttributeError) as error:
-            raise TaskError(
-                f"--policy {module}:{function}: {error}; expected a module on the Python path, and a function in it"
-            ) from None
+        self._function = load_function(module, function)
 
     def reset(self, env_ids: Array) -> None:
         """Nothing: a function remembers nothing."""

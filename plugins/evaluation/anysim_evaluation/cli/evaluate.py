@@ -1,7 +1,7 @@
 """`anysim evaluate`: how often a policy solves a task."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -68,6 +68,8 @@ def evaluate(
     the end `evaluation.json` and `evaluation.html` have rates with 95 % intervals, failures by type, and how far the
     engines agree seed by seed.
 
+    BENCHMARK:TASK is a task of an external benchmark (`anysim list benchmarks`), judged by its own rule.
+
     A function of your own gets the observation groups (n, …) by name and returns actions (n, A), or chunks (n, K, A)
     that are carried out step by step.
 
@@ -75,11 +77,13 @@ def evaluate(
       anysim evaluate pick_cube --engine all --episodes 100 --videos 2
       anysim evaluate pick_cube --policy expert:sigma=0.1 --level L2
       anysim evaluate reach --policy my_policies:reach --split test
+      anysim evaluate maniskill:PickCube-v1 --policy my_policies:pick
     """
     from anysim.cli.output import print_json
     from anysim.errors import AnysimError, TaskError
     from anysim.record.commit import write_whole
     from anysim_evaluation.driver import episode_seeds
+    from anysim_evaluation.external.benchmark import is_external
     from anysim_evaluation.page import page
     from anysim_evaluation.summary import agreements, summary
 
@@ -90,7 +94,11 @@ def evaluate(
     folder = out or Path("runs") / "-".join(["evaluate", *map(_plain, said)])
     done: dict[str, dict[int, Episode]] = {}
     films: dict[str, list[str]] = {}
-    for name in _engines(engine):
+    if is_external(task):
+        given = {"--engine": engine, "--level": level, "--override": override, "--num-envs": num_envs}
+        _refuse_for_external(task, {**given, "--privileged": privileged, "--videos": videos})
+        done = _evaluate_external(question, folder, json)
+    for name in [] if done else _engines(engine):
         try:
             found = _evaluate(question, name, folder, json)
             done |= found
@@ -134,24 +142,70 @@ def _plain(text: str) -> str:
 def _evaluate(question: Question, engine: str | None, folder: Path, quiet: bool) -> "dict[str, dict[int, Episode]]":
     """The episodes of one engine by seed, those of earlier runs among them."""
     from anysim.api import make
-    from anysim.cli.output import counting
     from anysim_evaluation.driver import drive
-    from anysim_evaluation.log import EpisodeLog, identity
+    from anysim_evaluation.log import identity
     from anysim_evaluation.policy import make_policy
 
     overrides = [*question.overrides, "record.cameras=[]"]
     with make(question.task, engine=engine, num_envs=question.num_envs, overrides=overrides) as env:
         driven = make_policy(env, question.policy)
-        name = env.engine.name
-        with EpisodeLog(folder / name, identity(env, question.policy, driven, question.privileged)) as log:
-            left = [seed for seed in question.seeds if seed not in log.episodes]
-            won = sum(log.episodes[seed].status == "success" for seed in question.seeds if seed in log.episodes)
-            with counting(f"{question.policy} on {env.name}, {name}", len(left), quiet) as tell:
-                for episode in drive(env, driven, left, privileged=question.privileged):
-                    log.add(episode)
-                    won += episode.status == "success"
-                    tell(f"{name} seed {episode.seed}: {episode.failure or 'success'}", f"{won} solved")
-            return {name: {seed: log.episodes[seed] for seed in question.seeds}}
+        what = identity(env, question.policy, driven, question.privileged)
+
+        def run(seeds: Sequence[int]) -> "Iterator[Episode]":
+            return drive(env, driven, seeds, privileged=question.privileged)
+
+        return {env.engine.name: _logged(question, env.engine.name, folder, what, run, quiet)}
+
+
+def _logged(
+    question: Question,
+    name: str,
+    folder: Path,
+    what: Mapping[str, str],
+    run: "Callable[[Sequence[int]], Iterator[Episode]]",
+    quiet: bool,
+) -> "dict[int, Episode]":
+    """The episodes of `question` by seed: those that are in the log of `name`, and those that `run` adds to them."""
+    from anysim.cli.output import counting
+    from anysim_evaluation.log import EpisodeLog
+
+    with EpisodeLog(folder / name, what) as log:
+        left = [seed for seed in question.seeds if seed not in log.episodes]
+        won = sum(log.episodes[seed].status == "success" for seed in question.seeds if seed in log.episodes)
+        with counting(f"{question.policy} on {what['task']}, {name}", len(left), quiet) as tell:
+            for episode in run(left):
+                log.add(episode)
+                won += episode.status == "success"
+                tell(f"{name} seed {episode.seed}: {episode.failure or 'success'}", f"{won} solved")
+        return {seed: log.episodes[seed] for seed in question.seeds}
+
+
+def _refuse_for_external(task: str, given: Mapping[str, object]) -> None:
+    """An external benchmark has its own engine, levels and pictures: what asks for ours is not left aside silently."""
+    from anysim.errors import TaskError
+
+    for option, value in given.items():
+        if value:
+            raise TaskError(f"{option}: '{task}' is a task of an external benchmark, which takes no such option")
+
+
+def _evaluate_external(question: Question, folder: Path, quiet: bool) -> "dict[str, dict[int, Episode]]":
+    """The episodes of an external task by seed, by the name of its benchmark."""
+    from anysim_evaluation.external.benchmark import SEPARATOR, open_task
+    from anysim_evaluation.external.driving import drive_external, external_policy
+
+    name = question.task.partition(SEPARATOR)[0]
+    benchmark, env = open_task(question.task)
+    try:
+        policy = external_policy(env, question.policy)
+        what = {"task": question.task, "benchmark": benchmark.version, "policy": question.policy}
+
+        def run(seeds: Sequence[int]) -> "Iterator[Episode]":
+            return drive_external(env, policy, seeds)
+
+        return {name: _logged(question, name, folder, what, run, quiet)}
+    finally:
+        env.close()
 
 
 def _filmed(

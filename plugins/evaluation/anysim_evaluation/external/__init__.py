@@ -1,0 +1,1 @@
+"""External benchmarks: environments of other projects, evaluated as our own tasks are."""
