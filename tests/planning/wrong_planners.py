@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from anysim.planning.motion import Budget, PlanStatus
+from anysim.planning.motion import Budget, PlanAnswer, PlanStatus
 from anysim_planning.rrt import RrtPlanner
 
 
@@ -123,3 +123,47 @@ class ForgetsTheScene(RrtPlanner):
 
     def plan(self, request, scene, budget):
         return replace(super().plan(request, scene, budget), world_version=0)
+
+
+class BesideThePose(RrtPlanner):
+    """test_ik.py::test_joint_positions"""
+
+    def plan(self, request, scene, budget):
+        answer = super().plan(request, scene, budget)
+        return answer if answer.joint_pos is None else replace(answer, joint_pos=answer.joint_pos + 0.001)
+
+
+class ReachesThroughWalls(ThroughWalls):
+    """test_ik.py::test_joint_positions"""
+
+
+class TurnsBeyondItsLimits(RrtPlanner):
+    """test_ik.py::test_joint_positions"""
+
+    def plan(self, request, scene, budget):
+        answer = super().plan(request, scene, budget)
+        if answer.joint_pos is None:
+            return answer
+        turned = answer.joint_pos.copy()
+        turned[0] += 2 * np.pi
+        return replace(answer, joint_pos=turned)
+
+
+class WantsAFreeStart(RrtPlanner):
+    """test_ik.py::test_a_start_in_collision"""
+
+    def plan(self, request, scene, budget):
+        if not request.path and not self.is_free(request, scene, request.start[None]):
+            return PlanAnswer(PlanStatus.START_IN_COLLISION, message="it begins in a collision")
+        return super().plan(request, scene, budget)
+
+
+class MixesAnswers(RrtPlanner):
+    """test_ik.py::test_many_together"""
+
+    def plan_all(self, requests, scenes, budgets):
+        return super().plan_all(requests, scenes, budgets)[::-1]
+
+
+class PairsNoPostures(PairsNothing):
+    """test_ik.py::test_two_tools"""

@@ -34,6 +34,15 @@ class PlanStatus(StrEnum):
     FAILED = "failed"
 
 
+class RequestKind(StrEnum):
+    """What is asked for, by how many tools: joint positions at a goal, or a motion to it."""
+
+    IK = "ik"
+    DUAL_IK = "dual_ik"
+    MOTION = "motion"
+    DUAL_MOTION = "dual_motion"
+
+
 class Pairing(StrEnum):
     """How several tools choose: all the same candidate, or each its own."""
 
@@ -82,6 +91,8 @@ class PlanRequest:
         goals: one or several tools, or none with a `joint_goal`.
         pairing: how several tools choose among their candidates.
         joint_goal: (K,)
+        path: False asks for joint positions at the goals alone (`ik`, `dual_ik`): free ones, the nearest to `start`,
+            which may itself be in collision then.
         straight: [m] how far the tools may leave the straight line to their pose; None for any path.
         attached: what is held.
         allowed: pairs of names, of bodies or of entities, that may touch.
@@ -97,6 +108,7 @@ class PlanRequest:
     goals: tuple[ToolGoal, ...] = ()
     pairing: Pairing = Pairing.PAIRED
     joint_goal: Array | None = None
+    path: bool = True
     straight: float | None = None
     attached: tuple[Attachment, ...] = ()
     allowed: tuple[tuple[str, str], ...] = ()
@@ -105,6 +117,13 @@ class PlanRequest:
     acceleration: float = 10.0
     seed: int = 0
     deadline: float = 5.0
+
+    @property
+    def kind(self) -> RequestKind:
+        """By whether a path is asked for, and whether several tools are."""
+        if sum(goal.enabled for goal in self.goals) > 1:
+            return RequestKind.DUAL_MOTION if self.path else RequestKind.DUAL_IK
+        return RequestKind.MOTION if self.path else RequestKind.IK
 
     def check(self) -> None:
         """Look for what no planner can answer.
@@ -115,6 +134,8 @@ class PlanRequest:
         used = [goal for goal in self.goals if goal.enabled]
         if bool(used) == (self.joint_goal is not None):
             raise AnysimError("a plan needs either goals of tools or a joint_goal; give one of the two")
+        if not self.path and (self.joint_goal is not None or self.straight is not None):
+            raise AnysimError(f"{self.kind} asks for the joints at poses of tools: leave joint_goal and straight out")
         arrays = {"start": (self.start, (len(self.joints),)), "joint_goal": (self.joint_goal, (len(self.joints),))}
         arrays |= {f"poses of '{goal.tool}'": (goal.poses, (len(goal.poses), 7)) for goal in used}
         arrays |= {f"offset of '{held.entity}'": (held.offset, (7,)) for held in self.attached}
@@ -160,7 +181,8 @@ class PlanAnswer:
         status: of the whole.
         goal_status: (G) of each candidate of the (first) goal set; what was not tried is the status of the whole.
         chosen: for each goal the index of its candidate, -1 where there is none.
-        trajectory: None unless `ok`.
+        trajectory: None unless `ok`, and where no path was asked for.
+        joint_pos: (K,) at the chosen goals; None unless no path was asked for and it is `ok`.
         margins: by name: distance to the nearest joint limit, clearance at the goal.
         timings: [s] by stage; measured, so not part of what is reproducible.
         solver: the planner's name and version.
@@ -172,6 +194,7 @@ class PlanAnswer:
     goal_status: tuple[PlanStatus, ...] = ()
     chosen: tuple[int, ...] = ()
     trajectory: Trajectory | None = None
+    joint_pos: Array | None = None
     margins: Mapping[str, float] = field(default_factory=dict)
     timings: Mapping[str, float] = field(default_factory=dict)
     solver: str = ""
@@ -210,12 +233,14 @@ class MotionPlanner(ABC):
 
     Attributes:
         name, version: for answers and manifests.
-        capabilities: of `straight`, `paired`, `independent`, `attached`, `joint_goal`: what it can do.
+        capabilities: of `straight`, `paired`, `independent`, `attached`, `joint_goal`, `ik`: what it can do.
+        fused: kinds of requests that its `plan_all`, where it overrides that, answers faster together.
     """
 
     name: ClassVar[str]
     version: ClassVar[str]
     capabilities: ClassVar[frozenset[str]]
+    fused: ClassVar[frozenset[RequestKind]] = frozenset(RequestKind)
 
     def __init__(self, world: World) -> None:
         self.world = world

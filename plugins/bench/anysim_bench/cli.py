@@ -299,6 +299,8 @@ def plan(
             most = f"{c.step_p99_ms + STALL_GOAL_MS:.2f}"
             rows.add(f"{one.service}: the same with {requests} in flight", f"{one.busy_p99_ms:.2f}", most)
     rows.add("inverse kinematics/s", f"{c.ik:,.0f}", f"{IK_GOAL:,}")
+    for name, rate in (c.postures or {}).items():
+        rows.add(f"joint positions without a path/s, {name}", f"{rate:,.0f}", "")
     if c.pairs is not None:
         p = c.pairs
         rows.add(f"two arms of {p.robot}: reached, solved, free", f"{p.reached}, {p.solved}, {p.free}", f"{p.pairs}")

@@ -8,6 +8,7 @@ is looked at after all planning is over, with nothing of the planner.
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +32,8 @@ STALL_GOAL_MS = 2.0
 IK_GOAL = 20_000
 """Solutions a second."""
 WORKERS = (1, 2)
+POSTURES = 1_000
+"""Requests for joint positions alone, one candidate each."""
 ROUNDS = 3
 """Turns of all sides on the requests."""
 BLOCKS, STEPS = 4, 100
@@ -93,6 +96,8 @@ class PlanCost(NamedTuple):
         alone: plans a second of the planner called directly.
         services: what runs around it.
         ik: solutions of inverse kinematics a second, from random configurations.
+        postures: requests a second for free joint positions without a path, by who answers: the planner `alone`, one by
+            one, and each service with one worker. None where the planner answers motions only.
         step_p99_ms: 99th percentile of a control step of 16 envs with nothing to plan.
         pairs: two arms, where asked for.
     """
@@ -114,6 +119,7 @@ class PlanCost(NamedTuple):
     alone: float
     services: list[ServiceCost]
     ik: float
+    postures: dict[str, float] | None
     step_p99_ms: float
     pairs: PairCost | None
 
@@ -165,6 +171,7 @@ def plan_cost(
             one._replace(busy_p99_ms=1e3 * float(np.quantile(busy[one.service], 0.99))) if one.workers == 1 else one
             for one in found
         ]
+        postures = _posture_rates(world, made, planner, services, asked, scene) if "ik" in made.capabilities else None
         robot, tool = world.robots[0], next(iter(arms.tools))
         chain = Chain.from_world(world, robot.name, next(iter(robot.channels)), tool, joints=arms.tools[tool])
     return PlanCost(
@@ -185,6 +192,7 @@ def plan_cost(
         requests / sum(spent),
         found,
         _ik_rate(chain),
+        postures,
         1e3 * float(np.quantile(idle, 0.99)),
         _pairs(planner, dual, pairs) if pairs else None,
     )
@@ -321,6 +329,28 @@ def _ik_rate(chain: Chain, count: int = 4_000) -> float:
         solved = solver.solve(targets, base, seeds, random_restarts=50, rng_seeds=keys).converged.sum()
         best = max(best, float(solved) / (time.perf_counter() - begun))
     return best
+
+
+def _posture_rates(
+    world: World, made: MotionPlanner, planner: str, names: Sequence[str], asked: list[PlanRequest], scene: Scene
+) -> dict[str, float]:
+    """Requests a second for joint positions at the first candidate of each goal, in the best of some turns."""
+    some = [replace(r, path=False, goals=tuple(replace(g, poses=g.poses[:1]) for g in r.goals)) for r in asked]
+    many = [replace(some[k % len(some)], seed=k) for k in range(POSTURES)]
+    best = dict.fromkeys(("alone", *names), np.inf)
+    with ExitStack() as stack:
+        running = {name: stack.enter_context(planner_service(world, planner, 1, name)) for name in names}
+        for service in running.values():
+            service.submit(many[0], scene).result()
+        for _ in range(ROUNDS):
+            best["alone"] = min(best["alone"], sum(_one_by_one(made, many, scene)[1]))
+            for name, service in running.items():
+                begun = time.perf_counter()
+                for future in [service.submit(request, scene) for request in many]:
+                    future.result()
+                best[name] = min(best[name], time.perf_counter() - begun)
+                service.harvest(0)
+    return {name: POSTURES / seconds for name, seconds in best.items()}
 
 
 def _same(a: PlanAnswer, b: PlanAnswer) -> bool:

@@ -9,6 +9,8 @@ from anysim import registry
 from anysim.model.world import World
 from anysim.planning.motion import Budget, MotionPlanner, PlanAnswer, PlanRequest, PlanStatus, Scene, motion_planner
 
+IK = "ik"
+"""The capability of planners that answer requests without a path."""
 PlannerMaker = Callable[[], MotionPlanner]
 
 
@@ -62,7 +64,10 @@ class PlannerHost:
     def _together(self, jobs: Sequence[Job]) -> list[PlanAnswer] | None:
         """Answers of a planner that saves time by seeing all requests; None where it does not, or broke."""
         planner = self.prepare()
-        if len(jobs) < 2 or type(planner).plan_all is MotionPlanner.plan_all:
+        kinds = {job.request.kind for job in jobs}
+        if len(jobs) < 2 or type(planner).plan_all is MotionPlanner.plan_all or not kinds <= planner.fused:
+            return None
+        if any(_undeclared(planner, job.request) for job in jobs):
             return None
         try:
             for job in jobs:
@@ -77,11 +82,20 @@ class PlannerHost:
     def _alone(self, job: Job) -> PlanAnswer:
         try:
             planner = self.prepare()
+            if missing := _undeclared(planner, job.request):
+                return PlanAnswer(PlanStatus.FAILED, message=missing)
             planner.warm_up(job.request, job.scene)
             job.budget.begin()
             return planner.plan(*job)
         except BaseException as error:  # noqa: BLE001  (as above)
             return _failure(error)
+
+
+def _undeclared(planner: MotionPlanner, request: PlanRequest) -> str:
+    """Why a planner is not asked for a request of this kind; empty where it is."""
+    if request.path or IK in planner.capabilities:
+        return ""
+    return f"the planner '{planner.name}' does not declare '{IK}': it answers motions alone; ask 'rrt' or 'roboplan'"
 
 
 def _failure(error: BaseException) -> PlanAnswer:

@@ -1,6 +1,7 @@
 """Goal sets by inverse kinematics: joint positions that reach candidate poses, free ones only, the nearest first."""
 
-from itertools import product
+from collections.abc import Callable, Sequence
+from itertools import islice, product
 from typing import NamedTuple
 
 import numpy as np
@@ -40,6 +41,25 @@ class Reach(NamedTuple):
 
     found: list[Reached]
     reachable: Array
+
+
+class Asked(NamedTuple):
+    """A request, its scene, and what gives the collision world with everything where that scene has it."""
+
+    request: PlanRequest
+    scene: Scene
+    world: Callable[[], PlanningWorld]
+
+
+class Part(NamedTuple):
+    """Some candidates of one tool of a request: the goal's place, the goal, what moves it, and which candidates."""
+
+    request: PlanRequest
+    scene: Scene
+    tool: int
+    goal: ToolGoal
+    arm: Arm
+    which: Array
 
 
 class GoalSolver:
@@ -86,85 +106,132 @@ class GoalSolver:
 
     def reach(self, request: PlanRequest, scene: Scene, world: PlanningWorld) -> Reach:
         """Free configurations for a request's goals."""
-        used = [(t, goal) for t, goal in enumerate(request.goals) if goal.enabled]
-        arms = [self.arm(request, goal) for _, goal in used]
-        columns = np.concatenate([arm.columns for arm in arms])
-        if len(set(columns.tolist())) < len(columns):
-            raise AnysimError("two tools that share a joint cannot be planned together yet: plan one after the other")
-        width = len(used[0][1].poses)
-        reachable, found = np.zeros(width, bool), list[Reached]()
-        open_ = np.arange(width)  # candidates without a free configuration
-        paired = request.pairing is Pairing.PAIRED or len(used) == 1
-        if not paired:
-            return self._independent(request, scene, world, used, arms)
-        for draw in range(DRAWS):
-            q = np.tile(np.asarray(request.start, dtype=float), (len(open_), 1))
-            good = np.ones(len(open_), bool)
-            for (t, goal), arm in zip(used, arms, strict=True):
-                q[:, arm.columns], ok = self._solve(request, goal, arm, scene, t, open_, draw)
-                good &= ok
-            reachable[open_[good]] = True
-            free = good.copy()
-            free[good] = ~world.hits(q[good]) if good.any() else False
-            for row in np.flatnonzero(free):
-                chosen = [-1] * len(request.goals)
-                for t, _ in used:
-                    chosen[t] = int(open_[row])
-                found.append(Reached(tuple(chosen), q[row]))
-            open_ = open_[~free]
-            if not len(open_) or (draw and not good.any()):  # what random starts do not reach either is out of reach
-                break
-        start = np.asarray(request.start)
-        found.sort(key=lambda one: (float(np.linalg.norm(one.joint_pos - start)), one.chosen))
-        return Reach(found, reachable)
+        return self.reach_all([Asked(request, scene, lambda: world)])[0]
 
-    def _independent(
-        self,
-        request: PlanRequest,
-        scene: Scene,
-        world: PlanningWorld,
-        used: list[tuple[int, ToolGoal]],
-        arms: list[Arm],
-    ) -> Reach:
+    def reach_all(self, asked: Sequence[Asked]) -> list[Reach]:
+        """Those of several requests, each as if it were alone; candidates of one tool are solved together.
+
+        Raises:
+            AnysimError: two tools of a request share a joint.
+        """
+        searches = [_Search(one, [(t, g, self.arm(one.request, g)) for t, g in enabled(one.request)]) for one in asked]
+        for draw in range(DRAWS):
+            going = [search for search in searches if search.paired and len(search.open)]
+            solved = iter(self._solve([part for search in going for part in search.parts()], draw))
+            for search in going:
+                search.take(list(islice(solved, len(search.tools))), draw)
+        return [search.reach() if search.paired else self._independent(search) for search in searches]
+
+    def _independent(self, search: "_Search") -> Reach:
+        request, scene = search.asked.request, search.asked.scene
         start = np.asarray(request.start, dtype=float)
         options: list[list[tuple[float, int, Array]]] = []
-        reachable = np.zeros(len(used[0][1].poses), bool)
-        for (t, goal), arm in zip(used, arms, strict=True):
+        for t, goal, arm in search.tools:
             rows: list[tuple[float, int, Array]] = []
             for draw in range(2):
-                q, ok = self._solve(request, goal, arm, scene, t, np.arange(len(goal.poses)), draw)
+                ((q, ok),) = self._solve([Part(request, scene, t, goal, arm, np.arange(len(goal.poses)))], draw)
                 cost = np.linalg.norm(q - start[arm.columns], axis=1)
                 rows += [(float(cost[g]), int(g), q[g]) for g in np.flatnonzero(ok)]
                 if not options:
-                    reachable |= ok
+                    search.reachable |= ok
             options.append(sorted(rows, key=lambda row: row[:2])[:COMBINATIONS])
-        some = max(1, int(COMBINATIONS ** (1.0 / len(used))))
+        some = max(1, int(COMBINATIONS ** (1.0 / len(search.tools))))
         choices = sorted(product(*(rows[:some] for rows in options)), key=lambda c: sum(row[0] for row in c))
-        found: list[Reached] = []
+        found, world = list[Reached](), search.asked.world()
         for choice in choices:
             q, chosen = start.copy(), [-1] * len(request.goals)
-            for (t, _), arm, (_, g, part) in zip(used, arms, choice, strict=True):
+            for (t, _, arm), (_, g, part) in zip(search.tools, choice, strict=True):
                 q[arm.columns], chosen[t] = part, g
             if not world.hits(q[None])[0]:
                 found.append(Reached(tuple(chosen), q))
-        return Reach(found, reachable)
+        return Reach(found, search.reachable)
 
-    def _solve(
-        self, request: PlanRequest, goal: ToolGoal, arm: Arm, scene: Scene, tool: int, which: Array, draw: int
-    ) -> tuple[Array, Array]:
-        """Positions (n, columns) for some candidates, and which are right (n,). A row depends on its own key alone."""
-        chain, keys = arm.solver.chain, [np.random.SeedSequence([request.seed, tool, int(g), draw]) for g in which]
-        live = np.clip(np.asarray(request.start, dtype=float)[arm.columns], chain.lower, chain.upper)
-        seeds = np.tile(live, (len(which), 1))
-        if draw:
-            low = np.where(np.isfinite(chain.lower), chain.lower, -np.pi)
-            high = np.where(np.isfinite(chain.upper), chain.upper, np.pi)
-            seeds = np.array([np.random.default_rng(key).uniform(low, high) for key in keys])
-        base = np.tile(self.base(arm, scene), (len(which), 1))
-        rng_seeds = np.array([key.generate_state(1, np.uint64)[0] for key in keys], dtype=np.uint64)
-        targets = np.asarray(goal.poses, dtype=float)[which]
-        weight = goal.rotation_weight
-        answer = arm.solver.solve(
-            targets, base, seeds, random_restarts=RESTARTS, rng_seeds=rng_seeds, rotation_weight=weight
-        )
-        return answer.joint_pos, answer.converged
+    def _solve(self, parts: Sequence[Part], draw: int) -> list[tuple[Array, Array]]:
+        """Positions (n, columns) for the candidates of each part, and which are right (n,)."""
+        solved: list[tuple[Array, Array]] = [(np.empty(0), np.empty(0))] * len(parts)
+        alike: dict[object, list[int]] = {}
+        for number, part in enumerate(parts):
+            alike.setdefault((id(part.arm), tuple(part.goal.rotation_weight)), []).append(number)
+        for numbers in alike.values():
+            rows = [_rows(self.base(parts[k].arm, parts[k].scene), parts[k], draw) for k in numbers]
+            targets, bases, seeds, keys = (np.concatenate(column) for column in zip(*rows, strict=True))
+            first = parts[numbers[0]]
+            answer = first.arm.solver.solve(
+                targets,
+                bases,
+                seeds,
+                random_restarts=RESTARTS,
+                rng_seeds=keys,
+                rotation_weight=first.goal.rotation_weight,
+            )
+            ends = np.cumsum([len(parts[k].which) for k in numbers])[:-1]
+            for k, q, good in zip(
+                numbers, np.split(answer.joint_pos, ends), np.split(answer.converged, ends), strict=True
+            ):
+                solved[k] = q, good
+        return solved
+
+
+class _Search:
+    """The candidates of one request while some have no free configuration."""
+
+    def __init__(self, asked: Asked, tools: list[tuple[int, ToolGoal, Arm]]) -> None:
+        self.asked, self.tools = asked, tools
+        columns = np.concatenate([arm.columns for _, _, arm in tools])
+        if len(set(columns.tolist())) < len(columns):
+            raise AnysimError("two tools that share a joint cannot be planned together yet: plan one after the other")
+        width = len(tools[0][1].poses)
+        self.paired = asked.request.pairing is Pairing.PAIRED or len(tools) == 1
+        self.reachable, self.found = np.zeros(width, bool), list[Reached]()
+        self.open = np.arange(width)
+        """Candidates without a free configuration that may still get one."""
+
+    def parts(self) -> list[Part]:
+        """What is to be solved next."""
+        return [Part(*self.asked[:2], t, goal, arm, self.open) for t, goal, arm in self.tools]
+
+    def take(self, solved: list[tuple[Array, Array]], draw: int) -> None:
+        """Look what of a draw's positions, in the order of the tools, is right and free."""
+        request = self.asked.request
+        q = np.tile(np.asarray(request.start, dtype=float), (len(self.open), 1))
+        good = np.ones(len(self.open), bool)
+        for (_, _, arm), (part, ok) in zip(self.tools, solved, strict=True):
+            q[:, arm.columns] = part
+            good &= ok
+        self.reachable[self.open[good]] = True
+        free = good.copy()
+        free[good] = ~self.asked.world().hits(q[good]) if good.any() else False
+        for row in np.flatnonzero(free):
+            chosen = [-1] * len(request.goals)
+            for t, _, _ in self.tools:
+                chosen[t] = int(self.open[row])
+            self.found.append(Reached(tuple(chosen), q[row]))
+        self.open = self.open[~free]
+        if draw and not good.any():  # what random starts do not reach either is out of reach
+            self.open = self.open[:0]
+
+    def reach(self) -> Reach:
+        """What was found, the nearest first."""
+        start = np.asarray(self.asked.request.start)
+        self.found.sort(key=lambda one: (float(np.linalg.norm(one.joint_pos - start)), one.chosen))
+        return Reach(self.found, self.reachable)
+
+
+def enabled(request: PlanRequest) -> list[tuple[int, ToolGoal]]:
+    """The goals that count, with their places."""
+    return [(t, goal) for t, goal in enumerate(request.goals) if goal.enabled]
+
+
+def _rows(base: Array, part: Part, draw: int) -> tuple[Array, Array, Array, Array]:
+    """Targets, bases, seeds and keys of a part's candidates. A row depends on its own key alone."""
+    chain, arm = part.arm.solver.chain, part.arm
+    keys = [np.random.SeedSequence([part.request.seed, part.tool, int(g), draw]) for g in part.which]
+    live = np.clip(np.asarray(part.request.start, dtype=float)[arm.columns], chain.lower, chain.upper)
+    seeds = np.tile(live, (len(keys), 1))
+    if draw:
+        low = np.where(np.isfinite(chain.lower), chain.lower, -np.pi)
+        high = np.where(np.isfinite(chain.upper), chain.upper, np.pi)
+        seeds = np.array([np.random.default_rng(key).uniform(low, high) for key in keys])
+    numbers = np.array([key.generate_state(1, np.uint64)[0] for key in keys], dtype=np.uint64)
+    targets = np.asarray(part.goal.poses, dtype=float)[part.which]
+    return targets, np.tile(base, (len(keys), 1)), seeds, numbers

@@ -1,6 +1,9 @@
 """The planner of motion `rrt`: own goal sets, the straight line first, RRT-Connect, a time law, and a last check."""
 
 from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from time import perf_counter
 from typing import Any
 
@@ -8,8 +11,17 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.model.world import World
-from anysim.planning.motion import Budget, MotionPlanner, PlanAnswer, PlanRequest, PlanStatus, Scene, Trajectory
-from anysim_planning.goals import GoalSolver, Reached
+from anysim.planning.motion import (
+    Budget,
+    MotionPlanner,
+    PlanAnswer,
+    PlanRequest,
+    PlanStatus,
+    RequestKind,
+    Scene,
+    Trajectory,
+)
+from anysim_planning.goals import Asked, GoalSolver, Reached
 from anysim_planning.lines import straight_line
 from anysim_planning.scene import PlanningWorld, topology
 from anysim_planning.search import connect, dense, edge_check, shortened
@@ -30,7 +42,8 @@ class RrtPlanner(MotionPlanner):
 
     name = "rrt"
     version = "1"
-    capabilities = frozenset({"attached", "independent", "joint_goal", "paired", "straight"})
+    capabilities = frozenset({"attached", "ik", "independent", "joint_goal", "paired", "straight"})
+    fused = frozenset({RequestKind.IK, RequestKind.DUAL_IK})
 
     def __init__(self, world: World, solver: str = "numba_ik") -> None:
         """`solver`: of inverse kinematics, by name."""
@@ -62,8 +75,10 @@ class RrtPlanner(MotionPlanner):
         return _free(self.world_of(request, scene), joint_pos)
 
     def plan(self, request: PlanRequest, scene: Scene, budget: Budget) -> PlanAnswer:
-        """Search."""
+        """Search, or where no path is asked for solve the goals."""
         request.check()
+        if not request.path:
+            return self._solved([request], [scene], [budget])[0]
         clock, timings = perf_counter(), dict[str, float]()
         world = self.world_of(request, scene)
         start = np.asarray(request.start, dtype=float)
@@ -71,8 +86,8 @@ class RrtPlanner(MotionPlanner):
 
         def answer(status: PlanStatus, message: str = "", **more: Any) -> PlanAnswer:
             more.setdefault("goal_status", (status,) * width)
-            who = f"{self.name} {self.version}"
-            return PlanAnswer(status, timings=timings, solver=who, world_version=scene.version, message=message, **more)
+            more |= {"timings": timings, "solver": self._signature, "world_version": scene.version}
+            return PlanAnswer(status, message=message, **more)
 
         def passed(stage: str) -> None:
             nonlocal clock
@@ -91,24 +106,18 @@ class RrtPlanner(MotionPlanner):
                 return answer(PlanStatus.NO_IK, "the joint positions asked for collide, or are beyond a joint's limit")
         else:
             found, reachable = self._goals.reach(request, scene, world)
-            free = {one.chosen[next(t for t, c in enumerate(one.chosen) if c >= 0)] for one in found}
-            statuses = [PlanStatus.OK if g in free else PlanStatus.NO_IK for g in range(width)]
+            statuses = _statuses(found, width)
             if not found:
-                why = f"{int(reachable.sum())} of {width} candidates can be reached, all of them in collision"
-                return answer(PlanStatus.NO_IK, why)
+                return answer(PlanStatus.NO_IK, _unreached(reachable))
         passed("ik")
         for one in found[:CANDIDATES]:
             trajectory = self._motion(request, scene, world, one, budget, passed)
             if spent := budget.spent:
                 return answer(spent, "it was stopped before a path was found")
-            first = next(c for c in one.chosen if c >= 0)
+            first = _first(one)
             if trajectory is not None:
                 whole = tuple(PlanStatus.OK if g == first else status for g, status in enumerate(statuses))
-                q = trajectory.joint_pos
-                margins = {
-                    "joint_limit": float(np.minimum(q - world.lower, world.upper - q).min()),
-                    "clearance": world.clearance(q[-1]),
-                }
+                margins = _margins(world, trajectory.joint_pos)
                 passed("margins")
                 return answer(
                     PlanStatus.OK, goal_status=whole, chosen=one.chosen, trajectory=trajectory, margins=margins
@@ -119,6 +128,44 @@ class RrtPlanner(MotionPlanner):
         return answer(
             PlanStatus.NO_PATH, f"no free {kind} to the nearest {CANDIDATES} configurations", goal_status=tried
         )
+
+    def plan_all(
+        self, requests: Sequence[PlanRequest], scenes: Sequence[Scene], budgets: Sequence[Budget]
+    ) -> list[PlanAnswer]:
+        """Joint positions are solved together, motions one after the other."""
+        if any(request.path for request in requests):
+            return super().plan_all(requests, scenes, budgets)
+        for request in requests:
+            request.check()
+        return self._solved(requests, scenes, budgets)
+
+    def _solved(
+        self, requests: Sequence[PlanRequest], scenes: Sequence[Scene], budgets: Sequence[Budget]
+    ) -> list[PlanAnswer]:
+        """Answers of requests without a path."""
+        begun, answers = perf_counter(), list[PlanAnswer]()
+        for budget in budgets:
+            budget.begin()
+        asked = [Asked(r, s, partial(self.world_of, r, s)) for r, s in zip(requests, scenes, strict=True)]
+        for one, reach, budget in zip(asked, self._goals.reach_all(asked), budgets, strict=True):
+            width = len(reach.reachable)
+            more: dict[str, Any] = {"solver": self._signature, "world_version": one.scene.version}
+            more["goal_status"] = tuple(_statuses(reach.found, width))
+            if spent := budget.spent:
+                more["goal_status"] = (spent,) * width
+                answers.append(PlanAnswer(spent, message="it was stopped before it was answered", **more))
+            elif not reach.found:
+                answers.append(PlanAnswer(PlanStatus.NO_IK, message=_unreached(reach.reachable), **more))
+            else:
+                best = reach.found[0]
+                more["margins"] = _margins(one.world(), best.joint_pos[None])
+                answers.append(PlanAnswer(PlanStatus.OK, chosen=best.chosen, joint_pos=best.joint_pos, **more))
+        spent_each = (perf_counter() - begun) / len(asked)
+        return [replace(answer, timings={"ik": spent_each}) for answer in answers]
+
+    @property
+    def _signature(self) -> str:
+        return f"{self.name} {self.version}"
 
     def search(
         self,
@@ -156,6 +203,26 @@ class RrtPlanner(MotionPlanner):
             if good:
                 return trajectory
         return None
+
+
+def _first(one: Reached) -> int:
+    """The candidate of the first tool that counts."""
+    return next(c for c in one.chosen if c >= 0)
+
+
+def _statuses(found: Sequence[Reached], width: int) -> list[PlanStatus]:
+    free = {_first(one) for one in found}
+    return [PlanStatus.OK if g in free else PlanStatus.NO_IK for g in range(width)]
+
+
+def _unreached(reachable: Array) -> str:
+    return f"{int(reachable.sum())} of {len(reachable)} candidates can be reached, all of them in collision"
+
+
+def _margins(world: PlanningWorld, joint_pos: Array) -> dict[str, float]:
+    """How far a path (T, K) stays from the joints' limits, and its end from what it may not touch."""
+    limit = float(np.minimum(joint_pos - world.lower, world.upper - joint_pos).min())
+    return {"joint_limit": limit, "clearance": world.clearance(joint_pos[-1])}
 
 
 def _free(world: PlanningWorld, joint_pos: Array) -> bool:

@@ -18,6 +18,9 @@ def test_paths_are_free_and_services_answer_as_their_planner_does():
     ]
     assert 0.0 < cost.step_p99_ms
     assert cost.pairs is not None
+    assert cost.postures is not None
+    assert list(cost.postures) == ["alone", "processes", "threads"]
+    assert min(cost.postures.values()) > 0.0
     assert cost.pairs.reached == cost.pairs.solved == cost.pairs.free == 3
 
 
