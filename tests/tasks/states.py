@@ -368,6 +368,10 @@ CASES: dict[str, Case] = {
         _towards("nut", lambda env: offset(seen(env, "post.tip"), z=0.001)),
         [_shifted("nut", z=0.02), _shifted("nut", x=0.015), _moving("nut")],
     ),
+    "gear_mesh": Case(
+        _towards("gear", lambda env: offset(seen(env, "stand.shaft"), z=0.001)),
+        [_shifted("gear", z=0.016), _shifted("gear", x=0.006), _moving("gear")],
+    ),
     "peg_insertion_side": Case(
         _towards("peg", lambda env: P.compose(seen(env, "block"), np.array([[-0.06, 0.0, 0.08, 0.0, 0.0, 1.0, 0.0]]))),
         [_shifted("peg", x=-0.05), _shifted("peg", y=0.03)],

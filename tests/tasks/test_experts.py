@@ -20,6 +20,7 @@ TASKS = [
     "insert_round_peg",
     "lift_peg_upright",
     "pull_cube_tool",
+    "gear_mesh",
     "nut_on_peg",
     "peg_insertion_side",
     "turn_faucet",
