@@ -36,7 +36,7 @@ def draw(curves: dict[str, dict[str, list[float]]]) -> None:
         axis.plot([steps / 1e6 for steps in found["steps"]], [100 * exam for exam in found["exam"]], label=name)
     axis.set_xlabel("control steps of all envs [million]")
     axis.set_ylabel("solved in the exam [%]")
-    axis.set_ylim(0, 100)
+    axis.set_ylim(0, 102)
     axis.grid(alpha=0.3)
     figure.legend(fontsize=8, loc="outside lower left")
     figure.savefig(PICTURE, dpi=110)
