@@ -12,6 +12,7 @@ from pydantic import Field
 
 from anysim_learning.learner import Lesson
 from anysim_learning.parameters import Discount, Entropy, Epochs, Noise, RolloutSteps, TraceDecay, Width
+from anysim_learning.return_scale import ReturnScale
 from anysim_schemas.base import Positive
 
 if TYPE_CHECKING:
@@ -45,7 +46,9 @@ class RslPpo:
         from anysim_learning.rsl_env import RslVecEnv
 
         torch.manual_seed(lesson.seed)
-        self._lesson, self._view = lesson, RslVecEnv(lesson.env, lesson.seed)
+        # Its critic moves by 0.2 in an update at most, whatever the rewards add up to.
+        self._scale = ReturnScale(lesson.env.num_envs, gamma)
+        self._lesson, self._view = lesson, RslVecEnv(lesson.env, lesson.seed, self._scale)
         self._stretch = n_steps * lesson.env.num_envs
         self.steps = 0
         network = {
@@ -83,8 +86,9 @@ class RslPpo:
         return {"noise": noise, **self._view.batch.averages()}
 
     def state(self) -> dict[str, Any]:
-        """What rsl_rl saves, and how far it is."""
-        return {"saved": self._runner.alg.save(), "rate": self._runner.alg.learning_rate, "steps": self.steps}
+        """What rsl_rl saves, the scale of rewards, and how far it is."""
+        alg = self._runner.alg
+        return {"saved": alg.save(), "rate": alg.learning_rate, "scale": self._scale.state(), "steps": self.steps}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Go on from there, with episodes that follow from the seed and how far it is."""
@@ -94,6 +98,7 @@ class RslPpo:
 
         self._runner.alg.load(tensors(state["saved"]), None, True)
         self._runner.alg.learning_rate = float(state["rate"])
+        self._scale.restore(state["scale"])
         self.steps = int(state["steps"])
         torch.manual_seed(self._lesson.seed + self.steps)
         self._view.begin(self._lesson.seed + self.steps)

@@ -10,14 +10,16 @@ from tensordict import TensorDict  # pyright: ignore[reportMissingImports]
 from anysim.conventions import Array
 from anysim.task.env import TaskEnv
 from anysim_learning.batch import Batch
+from anysim_learning.return_scale import ReturnScale
 from anysim_learning.tensors import InUnits
 
 
 class RslVecEnv(VecEnv):
     """All envs with all their observation groups; which model sees which is said in the runner's `obs_groups`."""
 
-    def __init__(self, env: TaskEnv, seed: int = 0) -> None:
-        self.batch = Batch(env, tuple(env.observation_sizes))
+    def __init__(self, env: TaskEnv, seed: int = 0, scale: ReturnScale | None = None) -> None:
+        """With `scale`, rewards are in deviations of the return; else they are the task's."""
+        self.batch, self.scale = Batch(env, tuple(env.observation_sizes)), scale
         assert env.spec.task is not None
         self.num_envs, self.num_actions, self.device = env.num_envs, env.action_dim, "cpu"
         self.max_episode_length = env.spec.task.horizon
@@ -34,11 +36,14 @@ class RslVecEnv(VecEnv):
         moment = self.batch.step(actions.detach().numpy())
         self._obs = moment.obs
         self.episode_length_buf = torch.from_numpy(self.batch.env.scene.elapsed.astype(np.int64))
+        reward = moment.reward if self.scale is None else self.scale(moment.reward, moment.done)
         extras = {"time_outs": torch.from_numpy(moment.truncated.copy())}
-        return self.get_observations(), _tensor(moment.reward), _tensor(moment.done).long(), extras
+        return self.get_observations(), _tensor(reward), _tensor(moment.done).long(), extras
 
     def begin(self, seed: int) -> None:
         """Begin other episodes."""
+        if self.scale is not None:
+            self.scale.begin()
         self._obs = self.batch.reset(seed)
 
 

@@ -177,3 +177,43 @@ def test_the_critic_of_rsl_rl_sees_what_the_actor_does_not() -> None:
         sizes = env.observation_sizes
         assert algorithm.actor.obs_dim == sizes["policy"]
         assert algorithm.critic.obs_dim == sizes["policy"] + sizes["privileged"]
+
+
+def test_rewards_are_scaled_by_the_deviation_of_the_return() -> None:
+    from anysim_learning.return_scale import ReturnScale
+
+    rng, scale = np.random.default_rng(0), ReturnScale(16, 0.9)
+    returns, seen = np.zeros(16), []
+    for _ in range(200):
+        reward, done = rng.uniform(0.0, 50.0, 16), rng.random(16) < 0.05
+        returns = 0.9 * returns + reward
+        seen.append(returns.copy())
+        scaled = scale(reward, done)
+        returns[done] = 0.0
+        assert np.allclose(scaled, np.clip(reward / np.std(seen), -10.0, 10.0), rtol=1e-6)
+    again = ReturnScale(16, 0.9)
+    again.restore(scale.state())
+    again.begin(), scale.begin()
+    late = np.full(16, 5.0)
+    assert np.array_equal(again(late, late < 0), scale(late, late < 0))
+
+
+def test_rsl_rl_learns_from_scaled_rewards() -> None:
+    """Its updates move a value by 0.2 at most: returns of hundreds would take thousands of them."""
+    from anysim_learning.learner import Lesson
+    from anysim_learning.return_scale import ReturnScale
+    from anysim_learning.rsl import RslPpo
+    from anysim_learning.rsl_env import RslVecEnv
+
+    with anysim.make("reach", engine="mujoco", num_envs=4, overrides=QUIET) as env:
+        action, scale = torch.zeros(4, env.action_dim), ReturnScale(4, 0.98)
+        view = RslVecEnv(env, seed=1)
+        raw = torch.stack([view.step(action)[1] for _ in range(8)])
+        view = RslVecEnv(env, 1, scale)
+        rows = [view.step(action)[1] * scale.variance**0.5 for _ in range(8)]
+        assert torch.allclose(torch.stack(rows), raw, rtol=1e-5)
+        made = RslPpo(Lesson(env, ("policy",), 0), n_steps=16, width=8)
+        made.advance()
+        kept = made.state()["scale"]
+        assert kept["count"] == 64
+        assert kept["variance"] > 0.0
