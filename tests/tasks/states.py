@@ -410,6 +410,14 @@ CASES: dict[str, Case] = {
     "walk_to_pose": Case(
         _towards("dog", lambda env: seen(env, "goal")), [_shifted("dog", x=0.27), _turned("dog", 0.4)], ()
     ),
+    "loco_reach": Case(
+        _towards("dog", lambda env: level(seen(env, "goal"), seen(env, "dog"))), [_shifted("dog", x=0.37)], ()
+    ),
+    "loco_room_nav": Case(
+        _towards("dog", lambda env: seen(env, "goal")),
+        [_shifted("dog", x=0.27), _turned("dog", 0.4), _moving("dog")],
+        (),
+    ),
     "stand_still": Case(
         _rising("dog", 0.3, 0.6), [_shifted("dog", z=-0.11), _tilted("dog", 0.36)], unheld=(), lasting=True
     ),

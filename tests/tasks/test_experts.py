@@ -35,6 +35,8 @@ TASKS = [
     "tidy_bin",
     "nav_to_pose",
     "walk_to_pose",
+    "loco_reach",
+    "loco_room_nav",
     "stand_still",
     "stand_on_two_legs",
     "mobile_grasp",
