@@ -413,6 +413,11 @@ CASES: dict[str, Case] = {
     "loco_reach": Case(
         _towards("dog", lambda env: level(seen(env, "goal"), seen(env, "dog"))), [_shifted("dog", x=0.37)], ()
     ),
+    "loco_push_box": Case(
+        _towards("box", lambda env: seen(env, "goal")),
+        [_shifted("box", x=0.16), _tilted("box", 0.6), _moving("box")],
+        ("approach",),
+    ),
     "loco_room_nav": Case(
         _towards("dog", lambda env: seen(env, "goal")),
         [_shifted("dog", x=0.27), _turned("dog", 0.4), _moving("dog")],

@@ -35,6 +35,7 @@ TASKS = [
     "tidy_bin",
     "nav_to_pose",
     "walk_to_pose",
+    "loco_push_box",
     "loco_reach",
     "loco_room_nav",
     "stand_still",
