@@ -90,6 +90,8 @@ class Case(NamedTuple):
     """Changes of the goal's state, each of which makes it none."""
     unheld: tuple[str, ...] = ("reach",)
     """Rewards for where the hand is, which stays at home on the way."""
+    lasting: bool = False
+    """The goal is where an episode begins, and has to last; the way to it begins elsewhere."""
 
 
 def _towards(thing: str, goal: Callable[[TaskEnv], Array]) -> Callable[[TaskEnv, float], None]:
@@ -190,6 +192,17 @@ def _turned(thing: str, angle: float) -> Callable[[TaskEnv], None]:
 def _lain(env: TaskEnv) -> None:
     """The peg, down again."""
     put(env, "peg", P.compose(seen(env, "peg"), P.inverse(_STANDING)))
+
+
+def _rising(robot: str, height: float, angle: float) -> Callable[[TaskEnv, float], None]:
+    """A robot that comes up from so far below where it stands [m], leaning aside [rad] less and less."""
+
+    def path(env: TaskEnv, share: float) -> None:
+        lean = P.from_roll_pitch_yaw(np.array([angle * (1.0 - share), 0.0, 0.0]))
+        here = np.array([[0.0, 0.0, height * share, *lean]])
+        put(env, robot, np.repeat(here, env.num_envs, axis=0))
+
+    return path
 
 
 _BEADS = [f"bead_{number}" for number in range(4)]
@@ -400,6 +413,28 @@ CASES: dict[str, Case] = {
     ),
     "walk_to_pose": Case(
         _towards("dog", lambda env: seen(env, "goal")), [_shifted("dog", x=0.27), _turned("dog", 0.4)], ()
+    ),
+    "loco_reach": Case(
+        _towards("dog", lambda env: level(seen(env, "goal"), seen(env, "dog"))), [_shifted("dog", x=0.37)], ()
+    ),
+    "loco_push_box": Case(
+        _towards("box", lambda env: seen(env, "goal")),
+        [_shifted("box", x=0.16), _tilted("box", 0.6), _moving("box")],
+        ("approach",),
+    ),
+    "loco_room_nav": Case(
+        _towards("dog", lambda env: seen(env, "goal")),
+        [_shifted("dog", x=0.27), _turned("dog", 0.4), _moving("dog")],
+        (),
+    ),
+    "stand_still": Case(
+        _rising("dog", 0.3, 0.6), [_shifted("dog", z=-0.11), _tilted("dog", 0.36)], unheld=(), lasting=True
+    ),
+    "stand_on_two_legs": Case(
+        _rising("walker", 0.76, 0.8),
+        [_shifted("walker", z=-0.27), _shifted("walker", z=0.25), _tilted("walker", 0.62)],
+        unheld=(),
+        lasting=True,
     ),
     "mobile_grasp": Case(_taken, [_shifted("cube", x=0.04), _moving("rover")], ("drive", "reach")),
     "mobile_pick_place": Case(

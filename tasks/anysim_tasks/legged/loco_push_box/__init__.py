@@ -1,0 +1,1 @@
+"""Push a box to a place on four legs."""

@@ -1,0 +1,1 @@
+"""Walk to a point on four legs."""

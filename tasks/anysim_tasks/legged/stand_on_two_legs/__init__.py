@@ -1,0 +1,1 @@
+"""Stand on two legs for five seconds, against pushes."""

@@ -1,0 +1,1 @@
+"""Stand on four legs for five seconds, by joint positions, against pushes."""
