@@ -317,6 +317,24 @@ def _bent(env: TaskEnv) -> None:
     _bend(env, angles)
 
 
+_TIPS = ("index", "middle", "ring", "thumb")
+
+
+def _at_tips(env: TaskEnv, share: float) -> None:
+    """The goals come to where the finger tips are."""
+    for tip in _TIPS:
+        env.scene.goals[tip][:] = offset(seen(env, f"hand.{tip}_tip"), x=0.1 * (1.0 - share))
+    env.scene.moment += 1
+
+
+def _off_tip(tip: str) -> Callable[[TaskEnv], None]:
+    def off(env: TaskEnv) -> None:
+        env.scene.goals[tip][:, 2] += 0.011
+        env.scene.moment += 1
+
+    return off
+
+
 _TO_HAND = _in_reach_of_the_hand("bottle", "robot.tool")
 
 
@@ -328,6 +346,7 @@ def _to_goal_in_hand(env: TaskEnv, share: float) -> None:
 
 
 CASES: dict[str, Case] = {
+    "dex_reach_tips": Case(_at_tips, [_off_tip(tip) for tip in _TIPS], ()),
     "dex_relocate": Case(
         _to_goal_in_hand, [_shifted("bottle", x=0.06), _shifted("bottle", z=-0.06), _moving("bottle")]
     ),

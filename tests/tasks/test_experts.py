@@ -49,6 +49,7 @@ TASKS = [
     "dex_grasp",
     "fetch_from_drawer",
     "dex_relocate",
+    "dex_reach_tips",
     "rope_straighten",
 ]
 LONG = {"mobile_pick_place", "pack", "fetch_from_drawer", "rope_straighten", "dex_relocate"}

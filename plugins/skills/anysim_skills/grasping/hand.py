@@ -1,7 +1,8 @@
 """A hand with several fingers as skills close it: along a grasp posture, each finger until it touches something.
 
 A synergy of the catalogue is a posture q; a finger goes from `opened` along s in [0, 1] to opened + s (q - opened). It
-stops where it touches, and then goes on by `press`: that far beyond contact is how hard it presses.
+stops where it touches, and then goes on by `press`: that far beyond contact is how hard it presses. A skill that knows
+where each joint is to be says that instead.
 """
 
 from collections.abc import Mapping
@@ -34,6 +35,8 @@ class Hand(Mover):
         rate: [1/s] of s.
         press: of s, beyond contact.
         s: (N, F) how far each finger is closed.
+        joints: (K,) world indices of the channel's joints.
+        told: (N, K) where the joints are to be, in envs that are told so; NaN in the others.
         stopped: (N, F) bool: it has touched something, or is closed.
     """
 
@@ -50,6 +53,7 @@ class Hand(Mover):
             )
         self.fingers, self.synergies = tuple(entry.groups), tuple(entry.synergies)
         joints = [world.actuators[a].joint for a in view.actuators]
+        self.joints = np.array(joints, dtype=np.int64)
         names = [world.joints[j].name.removeprefix(f"{robot.name}.") for j in joints]
         owner = {name: f for f, group in enumerate(entry.groups.values()) for name in group}
         self._finger = np.array([owner.get(name, -1) for name in names], dtype=int)
@@ -62,6 +66,7 @@ class Hand(Mover):
         n = env.num_envs
         self.closing, self.synergy = np.zeros(n, dtype=bool), np.zeros(n, dtype=np.int64)
         self.s, self.stopped = np.zeros((n, len(self.fingers))), np.zeros((n, len(self.fingers)), dtype=bool)
+        self.told = np.full((n, len(joints)), np.nan)
         self.rate, self.press = 1.5, 0.25
         self._fresh = np.ones(n, dtype=bool)
 
@@ -98,11 +103,15 @@ class Hand(Mover):
 
     def open(self, ids: Array) -> None:
         """Open all fingers."""
-        self.closing[ids], self.s[ids], self.stopped[ids] = False, 0.0, False
+        self.closing[ids], self.s[ids], self.stopped[ids], self.told[ids] = False, 0.0, False, np.nan
 
     def close(self, ids: Array, synergy: int) -> None:
         """Close towards a posture."""
-        self.closing[ids], self.synergy[ids] = True, synergy
+        self.closing[ids], self.synergy[ids], self.told[ids] = True, synergy, np.nan
+
+    def go(self, ids: Array, targets: Array) -> None:
+        """Bring the joints to positions (n, K), whatever the fingers touch."""
+        self.told[ids] = targets
 
     def closed(self, ids: Array) -> Array:
         """(n,) bool: no finger moves on."""
@@ -137,6 +146,7 @@ class Hand(Mover):
             self.stopped[own] |= touched | (self.s[own] >= 1.0)
         share = np.where(self._finger >= 0, self.s[ids][:, self._finger], self.s[ids].min(axis=1)[:, None])
         targets = self._opened + share * self._ways[self.synergy[ids]]
+        targets = np.where(np.isnan(self.told[ids]), targets, self.told[ids])
         action[ids, self._slice.start : self._slice.stop] = self._slice.controller.action_for(targets, ids)
 
 

@@ -1,0 +1,1 @@
+"""Bring the four finger tips of a hand to a goal each."""
