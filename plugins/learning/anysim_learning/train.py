@@ -6,7 +6,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from anysim.errors import TaskError
+from anysim.errors import RecordError, TaskError
 from anysim.record.commit import write_whole
 from anysim.task.env import TaskEnv
 from anysim_learning import checkpoint
@@ -40,7 +40,7 @@ def train(
 
     rows = [json.loads(line) for line in _lines(out / CURVE)]
     if (out / CHECKPOINT).exists():
-        learner.restore(checkpoint.load(out / CHECKPOINT))
+        _restore(learner, out / CHECKPOINT)
     rows = [row for row in rows if row["steps"] <= learner.steps]  # what was learnt after it is learnt again
     about = described(lesson.env, lesson.groups, learner.chunk)
     numbers: dict[str, float] = rows[-1] if rows else {}
@@ -79,6 +79,21 @@ def describe_training(out: Path, about: Mapping[str, Any]) -> None:
             raise TaskError(f"{out} holds another training ({told}); give another --out, or delete it")
     out.mkdir(parents=True, exist_ok=True)
     write_whole(out, {ABOUT: json.dumps(dict(about), indent=2) + "\n"})
+
+
+def _restore(learner: Learner, path: Path) -> None:
+    """Go on from a checkpoint.
+
+    Raises:
+        RecordError: it lacks something that this version of the learner keeps.
+    """
+    state = checkpoint.load(path)
+    try:
+        learner.restore(state)
+    except KeyError as error:
+        raise RecordError(
+            f"the checkpoint {path} has no {error}: another version wrote it; delete it, and training begins anew"
+        ) from None
 
 
 def _goals(done: int, steps: int, exams: int) -> Iterator[int]:

@@ -12,7 +12,7 @@ import typer
 from typer.testing import CliRunner
 
 import anysim
-from anysim.errors import TaskError
+from anysim.errors import RecordError, TaskError
 from anysim.record import incoming
 from anysim.record.collector import Collector
 from anysim.skills.runner import SkillPolicy
@@ -94,7 +94,8 @@ def test_a_learner_goes_on_where_it_was_put_away(name: str, runs: Path, tmp_path
 
 
 def test_a_training_is_interrupted_and_goes_on(runs: Path, tmp_path: Path) -> None:
-    from anysim_learning.train import CURVE, POLICY, describe_training, train
+    from anysim_learning import checkpoint
+    from anysim_learning.train import CHECKPOINT, CURVE, POLICY, describe_training, train
 
     told: list[Any] = []
     with (
@@ -124,6 +125,10 @@ def test_a_training_is_interrupted_and_goes_on(runs: Path, tmp_path: Path) -> No
         assert list((tmp_path / "tensorboard").iterdir())
         with pytest.raises(TaskError, match=r"another training \(seed 0 there and 1 here\)"):
             describe_training(tmp_path, {"seed": 1})
+        kept = checkpoint.load(tmp_path / CHECKPOINT)
+        checkpoint.save(tmp_path / CHECKPOINT, {key: kept[key] for key in list(kept)[1:]})
+        with pytest.raises(RecordError, match=f"checkpoint.npz has no '{next(iter(kept))}': another version wrote it"):
+            train(again, lesson, examined, 256, 4, tmp_path, told.append)
 
 
 def test_two_trainings_do_not_share_a_directory(tmp_path: Path) -> None:
