@@ -55,7 +55,6 @@ def test_the_smallest_engine_with_one_world_per_env_passes():
     assert skipped > 400
 
 
-@pytest.mark.slow
 def test_an_honest_limited_engine_passes():
     """Spheres on a plane, without joints, pictures and parameters: green, and it is said what was skipped for what."""
     passed, skipped, why = _summary(_run(ROOT, "--engine", "tests.contract.limited_engine:MarbleEngine"))
