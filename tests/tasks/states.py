@@ -381,6 +381,7 @@ CASES: dict[str, Case] = {
         [_shifted("cube", x=0.04), _shifted("cube", z=0.01), _moving("cube")],
     ),
     "open_drawer": Case(_opening(_DRAWER, 0.0, 0.8), [lambda env: set_opening(env, _DRAWER, 0.7)]),
+    "dex_open_drawer": Case(_opening(_DRAWER, 0.0, 0.8), [lambda env: set_opening(env, _DRAWER, 0.7)]),
     "close_drawer": Case(_opening(_DRAWER, 0.7, 0.02), [lambda env: set_opening(env, _DRAWER, 0.1)]),
     "peg_in_hole": _PEG,
     "peg_in_hole_2mm": _PEG,

@@ -49,6 +49,7 @@ TASKS = [
     "dex_grasp",
     "fetch_from_drawer",
     "dex_relocate",
+    "dex_open_drawer",
     "dex_reach_tips",
     "rope_straighten",
 ]

@@ -42,6 +42,14 @@ class AtHandle(PhasedSkill):
     first_rungs: ClassVar[Mapping[Outcome, Rung]] = {**FIRST_RUNGS, Outcome.JAMMED: Rung.BACK_OFF}
     share: float
     """Where the part is to go."""
+    turns: ClassVar[Array] = TURNS
+    """(G, 4) orientations of the tool in the handle's frame."""
+    place: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """[m] the bar's middle in the tool's frame."""
+    onto: ClassVar[tuple[float, float, float]] = (0.0, 0.0, 1.0)
+    """The direction in the tool's frame in which the hand comes to the bar."""
+    closing_steps: ClassVar[int] = CLOSING_STEPS
+    """Control steps after which fingers count as closed."""
 
     def __init__(
         self,
@@ -61,7 +69,7 @@ class AtHandle(PhasedSkill):
         self.handle = self.part.handle()
         self.speed, self.part_speed, self.lead, self.late = speed, part_speed, lead, steps
         n = env.num_envs
-        self._choice = Choice(n, len(TURNS))
+        self._choice = Choice(n, len(self.turns))
         self._turn = np.zeros((n, 4))
         """The chosen orientation in the handle's frame."""
         self._grip = np.zeros((n, 7))
@@ -81,9 +89,9 @@ class AtHandle(PhasedSkill):
     def approach_phases(self) -> list[Phase]:
         """Away from the part, choose, before the handle, to the handle."""
         return [
-            Phase("back off", self._leave_handle, self.leaving, self.late),
+            Phase("back off", self.leave_handle, self.leaving, self.late),
             Phase("choose", self._choose, self._chosen, 1),
-            Phase("approach", None, self._approach, self.late),
+            Phase("approach", None, self.approach, self.late),
             Phase("reach in", None, self._reach_in, self.late),
         ]
 
@@ -91,15 +99,21 @@ class AtHandle(PhasedSkill):
         """(n,) [m] how far beyond the handle's middle the tool goes."""
         return np.zeros(len(ids))
 
+    def excluded(self, grasps: Array) -> Array | None:
+        """(n, G) bool of tool poses (n, G, 7): those that are not to be chosen."""
+        del grasps
+        return None
+
     def to_go(self, at: Array) -> Array:
         """(n,) [m, rad] that the part is to be moved."""
         return self.part.closed + self.share * self.part.span - self.part.position(at)
 
     # ------------------------------------------------------------------ to the handle and away from it
 
-    def _leave_handle(self, ids: Array, at: Array) -> None:
+    def leave_handle(self, ids: Array, at: Array) -> None:
+        """Begin to let go of it, and to go back."""
         self.arm.closed[ids] = False
-        away = P.compose(self.arm.tool.pose[at], np.array([[0.0, 0.0, -CLEAR, 0.0, 0.0, 0.0, 1.0]]))
+        away = P.compose(self.arm.tool.pose[at], np.array([[*(-CLEAR * np.array(self.onto)), 0.0, 0.0, 0.0, 1.0]]))
         self.arm.command[ids] = self.arm.tool.pose[at]
         self.arm.go(ids, away, self.speed)
 
@@ -111,47 +125,52 @@ class AtHandle(PhasedSkill):
 
     def _choose(self, ids: Array, at: Array) -> None:
         handle = self.handle.pose[at]
-        grasps = bar_grasps(handle)
-        grasps[..., :3] += (self.depth(ids)[:, None] * _into(handle))[:, None]
+        grasps = bar_grasps(handle, self.turns)
+        grasps[..., :3] += (self.depth(ids)[:, None] * _into(handle))[:, None] - in_world(grasps, self.place)
         n, g = grasps.shape[:2]
-        clear = grasps - CLEAR * np.concatenate([_along(grasps), np.zeros((n, g, 4))], axis=-1)
+        clear = grasps - CLEAR * np.concatenate([in_world(grasps, self.onto), np.zeros((n, g, 4))], axis=-1)
         to_go = self.to_go(at)
         way = [
             self.part.moved(at, grasps, np.repeat((share * to_go)[:, None], g, axis=1))
             for share in np.linspace(0.0, 1.0, STATIONS)
         ]
-        self._turn[ids] = TURNS[self._choice.least_motion(self.arm, ids, np.stack([clear, *way], axis=2))]
+        ways = np.stack([clear, *way], axis=2)
+        self._turn[ids] = self.turns[self._choice.least_motion(self.arm, ids, ways, self.excluded(grasps))]
 
     def _chosen(self, ids: Array, at: Array) -> Array:
         del at
         return np.where(self._choice.none_left(ids), _NO_IK, GO_ON)
 
-    def _at_handle(self, ids: Array, at: Array, short_of: float) -> Array:
-        """Tool poses (n, 7) at the handle, or short of it along the tool's z [m]."""
+    def at_handle(self, ids: Array, at: Array, short_of: float) -> Array:
+        """Tool poses (n, 7) at the handle, or short of it on the hand's way [m]."""
         handle = self.handle.pose[at]
         grasp = np.concatenate([handle[:, :3], P.multiply(handle[:, 3:], self._turn[ids])], axis=1)
-        grasp[:, :3] += self.depth(ids)[:, None] * _into(handle) - short_of * _along(grasp)
+        grasp[:, :3] += self.depth(ids)[:, None] * _into(handle) - short_of * in_world(grasp, self.onto)
+        grasp[:, :3] -= in_world(grasp, self.place)
         return grasp
 
-    def _approach(self, ids: Array, at: Array) -> Array:
-        self.arm.go(ids, self._at_handle(ids, at, CLEAR), self.speed)
+    def approach(self, ids: Array, at: Array) -> Array:
+        """To where the hand comes to the bar from."""
+        self.arm.go(ids, self.at_handle(ids, at, CLEAR), self.speed)
         return np.where(self.arm.arrived(ids, at), GO_ON, STAY)
 
     def _reach_in(self, ids: Array, at: Array) -> Array:
-        self.arm.go(ids, self._at_handle(ids, at, 0.0), self.speed / 2, 0.02)
+        self.arm.go(ids, self.at_handle(ids, at, 0.0), self.speed / 2, 0.02)
         there = self.arm.arrived(ids, at, 0.006, 0.06)
         return np.where(there | ((self.steps[ids] >= 10) & self.arm.touching(ids, at)), GO_ON, STAY)
 
     def closing_phase(self) -> Phase:
         """Close the fingers on the handle."""
-        return Phase("close", self._close, self._closing, CLOSING_STEPS + 1)
+        return Phase("close", self.close, self.closing, self.closing_steps + 1)
 
-    def _close(self, ids: Array, at: Array) -> None:
+    def close(self, ids: Array, at: Array) -> None:
+        """Begin to close the fingers."""
         del at
         self.arm.closed[ids] = True
         self.arm.stay(ids)
 
-    def _closing(self, ids: Array, at: Array) -> Array:
+    def closing(self, ids: Array, at: Array) -> Array:
+        """Until they are."""
         del at
         return closed(ids, self.steps[ids], self.arm)
 
@@ -183,7 +202,7 @@ class AtHandle(PhasedSkill):
 
     def phases_away(self) -> Sequence[Phase]:
         """Let go, and away from the part."""
-        return (Phase("retreat", self._leave_handle, self.leaving, self.late),)
+        return (Phase("retreat", self.leave_handle, self.leaving, self.late),)
 
 
 def _into(handle: Array) -> Array:
@@ -191,9 +210,9 @@ def _into(handle: Array) -> Array:
     return P.rotate(handle[:, 3:], np.broadcast_to(np.array([-1.0, 0.0, 0.0]), (len(handle), 3)))
 
 
-def _along(tools: Array) -> Array:
-    """(..., 3) the z axis of tool poses (..., 7)."""
-    return P.rotate(tools[..., 3:], np.broadcast_to(np.array([0.0, 0.0, 1.0]), (*tools.shape[:-1], 3)))
+def in_world(tools: Array, vector: Sequence[float]) -> Array:
+    """(..., 3) a vector in the frame of tool poses (..., 7), in the world's axes."""
+    return P.rotate(tools[..., 3:], np.broadcast_to(np.array(vector), (*tools.shape[:-1], 3)))
 
 
 _NO_IK = OUTCOMES.index(Outcome.NO_IK)

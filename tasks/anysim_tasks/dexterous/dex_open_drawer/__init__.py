@@ -1,0 +1,1 @@
+"""Open a drawer with fingers hooked behind the bar of its handle."""
