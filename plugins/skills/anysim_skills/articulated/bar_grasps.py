@@ -40,7 +40,7 @@ def hooks(tilts: Array) -> Array:
     return np.array(turns)
 
 
-def bar_grasps(handle: Array, turns: Array) -> Array:
+def bar_grasps(handle: Array, turns: Array = TURNS) -> Array:
     """Tool poses (n, G, 7) at the middle of handles (n, 7), turned as `turns` (G, 4) in their frames."""
     count = len(turns)
     turned = P.multiply(
