@@ -148,6 +148,14 @@ def _off_goal(env: TaskEnv) -> None:
 _DRAWER = "cabinet.drawer_1"
 
 
+def _opening_beside_the_hand(env: TaskEnv, share: float) -> None:
+    """An open drawer would be at the hand where that begins, so the arm is turned aside."""
+    aside = np.full((env.num_envs, 1), 0.8)
+    number = [joint.name for joint in env.engine.world.joints].index("robot.joint1")
+    env.engine.set_joint_state(aside, np.zeros_like(aside), None, [number])
+    set_opening(env, _DRAWER, 0.8 * share)
+
+
 def _in_drawer(env: TaskEnv) -> Array:
     return level(offset(seen(env, f"{_DRAWER}.inside"), z=0.021), seen(env, "cube"))
 
@@ -381,7 +389,7 @@ CASES: dict[str, Case] = {
         [_shifted("cube", x=0.04), _shifted("cube", z=0.01), _moving("cube")],
     ),
     "open_drawer": Case(_opening(_DRAWER, 0.0, 0.8), [lambda env: set_opening(env, _DRAWER, 0.7)]),
-    "dex_open_drawer": Case(_opening(_DRAWER, 0.0, 0.8), [lambda env: set_opening(env, _DRAWER, 0.7)]),
+    "dex_open_drawer": Case(_opening_beside_the_hand, [lambda env: set_opening(env, _DRAWER, 0.7)]),
     "close_drawer": Case(_opening(_DRAWER, 0.7, 0.02), [lambda env: set_opening(env, _DRAWER, 0.1)]),
     "peg_in_hole": _PEG,
     "peg_in_hole_2mm": _PEG,
