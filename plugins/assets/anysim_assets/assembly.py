@@ -1,7 +1,7 @@
 """Links made of solids, which a builder adds up to a model, with masses and inertias that follow from the solids."""
 
 from collections.abc import Sequence
-from math import inf
+from math import cos, inf, pi, sin, tan
 
 import numpy as np
 
@@ -156,3 +156,28 @@ def turned(axis: Vec3, angle: float) -> Quat:
     """The quaternion of a turn by `angle` [rad] about `axis`."""
     x, y, z, w = P.from_axis_angle(np.array(axis), np.array(angle)).tolist()
     return (x, y, z, w)
+
+
+def ring(
+    body: Assembly,
+    link: int,
+    name: str,
+    radii: tuple[float, float],
+    height: float,
+    pieces: int,
+    density: float,
+    color: Colour,
+) -> None:
+    """A ring about a link's z of boxes that stand on its frame, the first towards x, between two radii [m].
+
+    They meet at their inner edges: what they overlap by outside counts once, by the mean width of a sector.
+    """
+    inner, outer = radii
+    wall, middle = outer - inner, (inner + outer) / 2
+    wide = Box((wall / 2, outer * tan(pi / pieces), height / 2))
+    sector = Box((wall / 2, middle * tan(pi / pieces), height / 2))
+    for i in range(pieces):
+        angle = 2 * pi * i / pieces
+        place = (middle * cos(angle), middle * sin(angle), height / 2)
+        turn = turned((0.0, 0.0, 1.0), angle)
+        body.solid(link, f"{name}_{i + 1}", wide, place, density, color, turn, filled=sector)

@@ -1,13 +1,13 @@
 """Spur gears: one that is put over a shaft, and the stand with that shaft between two gears that turn."""
 
-from math import cos, pi, sin, tan
+from math import cos, pi, sin
 from typing import Annotated
 
 from pydantic import Field
 
 from anysim.assets.model import ImportedModel
 from anysim.model.world import Box, Cylinder, JointType
-from anysim_assets.assembly import Assembly, turned
+from anysim_assets.assembly import Assembly, ring, turned
 from anysim_schemas.base import Color, NonNegative, Positive
 from anysim_schemas.errors import KeyFault
 
@@ -16,7 +16,8 @@ ADDENDUM, DEDENDUM = 1.0, 1.25
 """Of a tooth beyond and within the pitch circle, in modules (ISO 53)."""
 THICKNESS = 1.05
 """Of a tooth, in modules: two thirds of half a pitch, since straight teeth need more play than involute ones."""
-_PIECES = 12
+PIECES = 12
+"""Boxes of a hub."""
 
 
 def gear(
@@ -59,14 +60,7 @@ def gear(
     if hub_height < height:
         raise KeyFault(f"the hub of {hub_height:g} m is lower than the teeth of {height:g} m", "hub_height")
     body = Assembly("gear")
-    wall, middle = outer - inner, (inner + outer) / 2
-    wide = Box((wall / 2, outer * tan(pi / _PIECES), hub_height / 2))
-    sector = Box((wall / 2, middle * tan(pi / _PIECES), hub_height / 2))
-    for i in range(_PIECES):
-        angle = 2 * pi * i / _PIECES
-        place = (middle * cos(angle), middle * sin(angle), hub_height / 2)
-        turn = turned((0.0, 0.0, 1.0), angle)
-        body.solid(0, f"hub_{i + 1}", wide, place, density, color, turn, filled=sector)
+    ring(body, 0, "hub", (inner, outer), hub_height, PIECES, density, color)
     _teeth(body, 0, teeth, module, outer, height, 0.0, density, color)
     body.site(0, "hole", (0.0, 0.0, 0.0))
     body.site(0, "mouth", (0.0, 0.0, hub_height))

@@ -1,13 +1,13 @@
 """Pegs and the blocks with a hole that they fit into, square and round."""
 
-from math import cos, pi, sin, tan
+from math import pi
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from anysim.assets.model import ImportedModel
 from anysim.model.world import Box, Cylinder
-from anysim_assets.assembly import Assembly, turned
+from anysim_assets.assembly import Assembly, ring, turned
 from anysim_schemas.base import Color, Positive
 from anysim_schemas.errors import KeyFault
 
@@ -90,15 +90,7 @@ def hole_block(
         ):
             body.board(0, name, low, high, density, color)
     else:
-        # boxes that meet at their inner edges: what they overlap by outside counts once, by the sector's mean width
-        wall, middle = outer - inner, (inner + outer) / 2
-        wide = Box((wall / 2, outer * tan(pi / pieces), height / 2))
-        sector = Box((wall / 2, middle * tan(pi / pieces), height / 2))
-        for i in range(pieces):
-            angle = 2 * pi * i / pieces
-            place = (middle * cos(angle), middle * sin(angle), height / 2)
-            turn = turned((0.0, 0.0, 1.0), angle)
-            body.solid(0, f"piece_{i + 1}", wide, place, density, color, turn, filled=sector)
+        ring(body, 0, "piece", (inner, outer), height, pieces, density, color)
     body.site(0, "hole", (0.0, 0.0, 0.0))
     body.site(0, "mouth", (0.0, 0.0, height))
     return body.model()
