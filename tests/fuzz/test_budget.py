@@ -20,8 +20,8 @@ def test_time_and_memory_are_measured() -> None:
     with pytest.raises(OverBudgetError, match=r"took more than 0.05 s"), within(0.05):
         _busy(1.0)
     gc.collect()  # what is freed on the way would count against what is taken
-    with pytest.raises(OverBudgetError, match=r"took \d+ MiB"), within(5.0, 40 << 20):
-        np.ones(15 << 20).sum()
+    with pytest.raises(OverBudgetError, match=r"took \d+ MiB"), within(5.0, 100 << 20):
+        np.ones(45 << 20).sum()  # far more: the system may take back other pages of the process meanwhile
     with pytest.raises(MemoryError), within(5.0, 20 << 20):
         np.ones(100 << 20)
     with within(5.0, 200 << 20):
