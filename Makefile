@@ -66,7 +66,7 @@ test-maniskill: $(PEERS)  ## run the checks against ManiSkill and robosuite, in 
 	.venv-peers/bin/python -m pytest -n 0 tests/plugins/maniskill tests/plugins/evaluation/test_external.py $(ARGS)
 
 # robosuite without its dependencies: it pins a package that needs an older numpy, and its verdicts do not use it.
-$(PEERS): $(TEST) plugins/maniskill/pyproject.toml
+$(PEERS): $(TEST) plugins/maniskill/pyproject.toml plugins/evaluation/pyproject.toml
 	$(BIN)/python -m venv .venv-peers
 	$(BIN)/python -c 'import sysconfig; print("import site; site.addsitedir(%r)" % sysconfig.get_path("purelib"))' \
 	  > .venv-peers/lib/$$($(BIN)/python -c 'import sys; print("python%d.%d" % sys.version_info[:2])')/site-packages/anysim.pth

@@ -135,8 +135,9 @@ class RrtPlanner(MotionPlanner):
         """Joint positions are solved together, motions one after the other."""
         if any(request.path for request in requests):
             return super().plan_all(requests, scenes, budgets)
-        for request in requests:
+        for request, budget in zip(requests, budgets, strict=True):
             request.check()
+            budget.begin()
         return self._solved(requests, scenes, budgets)
 
     def _solved(
@@ -144,8 +145,6 @@ class RrtPlanner(MotionPlanner):
     ) -> list[PlanAnswer]:
         """Answers of requests without a path."""
         begun, answers = perf_counter(), list[PlanAnswer]()
-        for budget in budgets:
-            budget.begin()
         asked = [Asked(r, s, partial(self.world_of, r, s)) for r, s in zip(requests, scenes, strict=True)]
         for one, reach, budget in zip(asked, self._goals.reach_all(asked), budgets, strict=True):
             width = len(reach.reachable)
