@@ -6,6 +6,7 @@ more than `lead`, which bounds the force with which it presses on what it cannot
 skill asks for a planned move instead.
 """
 
+from collections.abc import Callable
 from typing import Self
 
 import numpy as np
@@ -17,11 +18,11 @@ from anysim.math import pose as P
 from anysim.model.world import JointType
 from anysim.planning.api import inverse_kinematics
 from anysim.planning.service import PlannerService
-from anysim.skills.phases import GO_ON, STAY, Mover
+from anysim.skills.phases import GO_ON, STAY, Mover, Phase
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.env_lifetime import PerEnv
-from anysim_skills.planned_moves import PlannedMoves, Stage
+from anysim_skills.planned_moves import PLANNED_STEPS, PlannedMoves, Stage
 from anysim_skills.planning import LATENCY, Latency, planner_of
 
 ARRIVED = 0.004
@@ -187,8 +188,9 @@ class Arm(Mover):
             ids: the envs.
             goals: the goal set of each; the planner chooses what is nearest and free.
             held: the object in the hand, which is to hit nothing either.
-            then: (n, 7) the end of a straight line after the move, on which nothing may be in the way but `touched`.
-            touched: what the robot may touch on that line.
+            then: (n, 7) or (n, S, 7) the ends of straight lines after the move, on which nothing may be in the way but
+                `touched`.
+            touched: what the robot may touch on those lines.
 
         Raises:
             TaskError: the arm has no planner.
@@ -204,6 +206,12 @@ class Arm(Mover):
         stage = self.plans.stage[ids]
         failed = np.where(stage == Stage.FAILED, self.plans.failure[ids], STAY)
         return np.where(stage == Stage.ARRIVED, GO_ON, failed)
+
+    def planned_phase(self, goals: Callable[[Array, Array], Array]) -> Phase:
+        """A phase that moves to one of the tool poses (n, G, 7) that `goals` says for envs and their rows."""
+        return Phase(
+            "plan", lambda ids, at: self.plan(ids, goals(ids, at)), lambda ids, _: self.planned(ids), PLANNED_STEPS
+        )
 
     def arrived(self, ids: Array, at: Array, distance: float = ARRIVED, angle: float = TURNED) -> Array:
         """(n,) bool: the tool is at its target. `at` are the rows of these envs in the scene."""

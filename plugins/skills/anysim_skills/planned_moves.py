@@ -8,6 +8,7 @@ import warnings
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,13 +34,17 @@ LAG = 0.15
 """[rad] an arm may be behind what it is told; the trajectory then waits for it."""
 NEAR = 0.02
 """[rad] from the end of a trajectory at which the arm has arrived."""
+PLANNED_STEPS = 500
+"""Control steps that a planned move may take; the planner's limits end it long before."""
 PATIENCE = 50
 """Control steps without getting on after which the controller has not followed."""
 RESTARTS = 20
 LINE_POINTS = 8
-"""Of the straight line after a planned move, from which its joint positions are interpolated."""
+"""Of each straight line after a planned move, from which its joint positions are interpolated."""
 JUMP = 0.5
 """[rad] that no joint moves between two of them: more is another posture."""
+POSTURES = 24
+"""Seeds of other postures at a goal, where the lines after it cannot be gone from the nearest one."""
 
 
 class Stage(IntEnum):
@@ -52,6 +57,22 @@ class Stage(IntEnum):
     FAILED = 4
 
 
+class Way(NamedTuple):
+    """What a move is to lead to.
+
+    Attributes:
+        goals: (G, 7) tool poses.
+        then: (S, 7) the ends of straight lines after the move that have to be free too, or None.
+        touched: the entity that the robot may touch on those lines, or None.
+        settled: the posture at the goal is not to be changed any more.
+    """
+
+    goals: Array
+    then: Array | None
+    touched: str | None
+    settled: bool = False
+
+
 @dataclass(eq=False)
 class Question:
     """What was asked for one env.
@@ -60,17 +81,13 @@ class Question:
         future: of the answer.
         scenes: the scene that it was asked in.
         due: the control step of the episode at which the answer takes effect; None: when it is ready.
-        goals: (G, 7) tool poses.
-        then: (7,) the end of a straight line after the move that has to be free too, or None.
-        touched: the entity that the robot may touch on that line, or None.
+        way: what for.
     """
 
     future: PlanFuture
     scenes: Scenes
     due: int | None
-    goals: Array
-    then: Array | None
-    touched: str | None
+    way: Way
 
 
 class PlannedMoves:
@@ -148,16 +165,17 @@ class PlannedMoves:
                 seed=self._seed(i),
                 deadline=DEADLINE,
             )
-            self._submit(i, request, None if then is None else then[row].copy(), touching.get(i))
+            lines = None if then is None else then[row].reshape(-1, 7).copy()
+            self._submit(i, request, Way(request.goals[0].poses, lines, touching.get(i)))
         self.stage[ids] = Stage.PLANNING
         self.planner.service.flush()
 
-    def _submit(self, env: int, request: PlanRequest, then: Array | None, touched: str | None) -> None:
+    def _submit(self, env: int, request: PlanRequest, way: Way) -> None:
         scene = self._env.scene
         scenes = self.planner.scenes(scene.state.body_pose[env], scene.presence[env])
         future = self.planner.service.submit(request, scenes.scene(0), env=env, latency=None)
         due = int(scene.elapsed[env]) + self.latency if isinstance(self.latency, int) else None
-        self._questions[env] = Question(future, scenes, due, request.goals[0].poses, then, touched)
+        self._questions[env] = Question(future, scenes, due, way)
 
     def _seed(self, env: int) -> int:
         """Of the next question: it depends on the episode, and on how many were asked in it."""
@@ -211,16 +229,40 @@ class PlannedMoves:
         question = self._questions.pop(env)
         answer, request = self._wait(question.future), question.future.request
         if answer.status is PlanStatus.START_IN_COLLISION and request.padding:
-            self._submit(env, replace(request, padding=0.0), question.then, question.touched)
+            self._submit(env, replace(request, padding=0.0), question.way)
             self.planner.service.flush()
             return
         why = self._judged(env, question, answer)
+        if why is None and question.way.then is not None and answer.trajectory is not None:
+            why = self._after(env, question, answer.trajectory.joint_pos[-1])
+            if why is not None and self._otherwise(env, question, answer):
+                return
         if why is not None or answer.trajectory is None:
             self._fail(env, why or Outcome.NO_PATH)
             return
         self._paths[env] = self._told(answer.trajectory)
         self._row[env] = self._waited[env] = 0
-        self.goal[env], self.stage[env] = question.goals[answer.chosen[0]], Stage.FOLLOWING
+        chosen = answer.chosen[0] if answer.chosen else 0
+        self.goal[env], self.stage[env] = question.way.goals[chosen], Stage.FOLLOWING
+
+    def _otherwise(self, env: int, question: Question, answer: PlanAnswer) -> bool:
+        """Whether a posture at the chosen goal from which the lines can be gone is there, and now asked for."""
+        request, way = question.future.request, question.way
+        if way.settled:
+            return False
+        count, rng = POSTURES, np.random.default_rng(request.seed)
+        seeds = rng.uniform(self._chain.lower, self._chain.upper, (count, len(self._chain)))
+        goal, base = np.tile(way.goals[answer.chosen[0]], (count, 1)), np.tile(self._base(env), (count, 1))
+        found = self._solver.solve(goal, base, seeds, random_restarts=0, rng_seeds=np.zeros(count, dtype=np.uint64))
+        postures, scene = found.joint_pos[found.converged], question.scenes.scene(0)
+        for posture in postures[np.argsort(np.abs(postures - request.start).max(axis=1), kind="stable")]:
+            free = self.planner.checker.is_free(request, scene, posture[None])
+            if free and self._after(env, question, posture) is None:
+                wanted = replace(request, goals=(), joint_goal=posture, seed=self._seed(env))
+                self._submit(env, wanted, way._replace(goals=goal[:1], settled=True))
+                self.planner.service.flush()
+                return True
+        return False
 
     def _told(self, trajectory: Trajectory) -> Array:
         """(S, K) what the joints are told in each control step: ahead by what their drives stay behind."""
@@ -245,15 +287,14 @@ class PlannedMoves:
     def _judged(self, env: int, question: Question, answer: PlanAnswer) -> Outcome | None:
         """Why an answer is of no use; None where it is."""
         if answer.status is PlanStatus.NO_IK:
-            return Outcome.COLLISION if self._reachable(env, question.goals) else Outcome.NO_IK
+            return Outcome.COLLISION if self._reachable(env, question.way.goals) else Outcome.NO_IK
         if answer.status is not PlanStatus.OK or answer.trajectory is None:
             return _OUTCOMES.get(answer.status, Outcome.NO_PATH)
         request, path = question.future.request, answer.trajectory.joint_pos
         scenes, state = question.scenes, self._env.scene.state
         scenes.update(state.body_pose[env][None], self._env.scene.presence[env][None])
-        if scenes.is_stale(0, answer) and not self.planner.checker.is_free(request, scenes.scene(0), path):
-            return Outcome.NO_PATH
-        return None if question.then is None else self._after(env, question, path[-1])
+        stale = scenes.is_stale(0, answer) and not self.planner.checker.is_free(request, scenes.scene(0), path)
+        return Outcome.NO_PATH if stale else None
 
     def _reachable(self, env: int, goals: Array) -> bool:
         """Whether the arm reaches one of the tool poses (G, 7), free or not."""
@@ -263,18 +304,20 @@ class PlannedMoves:
         return bool(found.converged.any())
 
     def _after(self, env: int, question: Question, joints: Array) -> Outcome | None:
-        """Why the straight line from joint positions (K,) to the pose after the move cannot be gone."""
-        assert question.then is not None
+        """Why the straight lines from joint positions (K,) to the poses after the move cannot be gone."""
+        assert question.way.then is not None
         begin, keys = self._chain.tool_pose(self._base(env), joints), np.zeros(1, dtype=np.uint64)
-        reach, turn = P.norm((question.then - begin)[None, :3])[0], 2 * np.pi
         rows = [joints]
-        for part in np.linspace(0.0, 1.0, LINE_POINTS)[1:]:
-            pose = P.step_toward(begin[None], question.then[None], part * reach, part * turn)
-            found = self._solver.solve(pose, self._base(env)[None], rows[-1][None], random_restarts=0, rng_seeds=keys)
-            if not found.converged[0] or np.abs(found.joint_pos[0] - rows[-1]).max() > JUMP:
-                return Outcome.NO_IK
-            rows.append(found.joint_pos[0])
-        touching = () if question.touched is None else ((self._robot, question.touched),)
+        for end in question.way.then:
+            reach, turn = P.norm((end - begin)[None, :3])[0], 2 * np.pi
+            for part in np.linspace(0.0, 1.0, LINE_POINTS)[1:]:
+                pose, seed = P.step_toward(begin[None], end[None], part * reach, part * turn), rows[-1][None]
+                found = self._solver.solve(pose, self._base(env)[None], seed, random_restarts=0, rng_seeds=keys)
+                if not found.converged[0] or np.abs(found.joint_pos[0] - rows[-1]).max() > JUMP:
+                    return Outcome.NO_IK
+                rows.append(found.joint_pos[0])
+            begin = end
+        touching = () if question.way.touched is None else ((self._robot, question.way.touched),)
         request = replace(question.future.request, allowed=touching, padding=0.0)
         free = self.planner.checker.is_free(request, question.scenes.scene(0), np.array(rows))
         return None if free else Outcome.COLLISION

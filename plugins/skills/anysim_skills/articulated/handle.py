@@ -18,6 +18,8 @@ from anysim_skills.articulated.bar_grasps import TURNS, bar_grasps
 from anysim_skills.articulated.part import Part
 from anysim_skills.choice import Choice
 from anysim_skills.grasping.grasp import CLOSING_STEPS, Speed, closed
+from anysim_skills.planned_moves import PLANNED_STEPS
+from anysim_skills.planning import LATENCY, Latency, PlannerName
 
 STATIONS = 5
 """Points of the part's way at which a grasp must be reachable."""
@@ -63,8 +65,11 @@ class AtHandle(PhasedSkill):
         part_speed: Annotated[float, Field(gt=0, description="[m/s] of the handle")] = 0.1,
         lead: Annotated[float, Field(gt=0, description="[m] the command is at most this far ahead of the hand")] = 0.05,
         steps: Annotated[int, Field(ge=1, description="control steps that a move may take")] = 200,
+        planner: PlannerName = "",
+        latency: Latency = LATENCY,
     ) -> None:
-        self.arm = Arm.of(env, robot, tool=tool, solver=solver)
+        self.arm = Arm.of(env, robot, tool=tool, solver=solver, planner=planner, latency=latency)
+        self._plans = bool(planner)
         self.part = Part(env.scene, part)
         self.handle = self.part.handle()
         self.speed, self.part_speed, self.lead, self.late = speed, part_speed, lead, steps
@@ -84,13 +89,15 @@ class AtHandle(PhasedSkill):
         self.phase[env_ids] = 1
 
     def retry(self, rung: Rung, env: int) -> int | None:
-        return self._choice.retry(rung, env)
+        phase = self._choice.retry(rung, env)
+        return 1 if phase == 0 and self.phases[self.phase[env]] == "plan" else phase  # it is away from the part already
 
     def approach_phases(self) -> list[Phase]:
         """Away from the part, choose, before the handle, to the handle."""
         return [
             Phase("back off", self.leave_handle, self.leaving, self.late),
             Phase("choose", self._choose, self._chosen, 1),
+            *([Phase("plan", self._plan, self._planned, PLANNED_STEPS)] if self._plans else ()),
             Phase("approach", None, self.approach, self.late),
             Phase("reach in", None, self._reach_in, self.late),
         ]
@@ -129,13 +136,14 @@ class AtHandle(PhasedSkill):
         grasps[..., :3] += (self.depth(ids)[:, None] * _into(handle))[:, None] - in_world(grasps, self.place)
         n, g = grasps.shape[:2]
         clear = grasps - CLEAR * np.concatenate([in_world(grasps, self.onto), np.zeros((n, g, 4))], axis=-1)
-        to_go = self.to_go(at)
-        way = [
-            self.part.moved(at, grasps, np.repeat((share * to_go)[:, None], g, axis=1))
-            for share in np.linspace(0.0, 1.0, STATIONS)
-        ]
-        ways = np.stack([clear, *way], axis=2)
+        ways = np.concatenate([clear[:, :, None], self._stations(at, grasps)], axis=2)
         self._turn[ids] = self.turns[self._choice.least_motion(self.arm, ids, ways, self.excluded(grasps))]
+
+    def _stations(self, at: Array, grasps: Array) -> Array:
+        """(n, G, S, 7) where tools at (n, G, 7) are on the way of the part."""
+        shares = np.linspace(0.0, 1.0, STATIONS)
+        by = np.repeat((shares * self.to_go(at)[:, None])[:, None], grasps.shape[1], axis=1)
+        return np.stack([self.part.moved(at, grasps, by[..., s]) for s in range(STATIONS)], axis=2)
 
     def _chosen(self, ids: Array, at: Array) -> Array:
         del at
@@ -148,6 +156,15 @@ class AtHandle(PhasedSkill):
         grasp[:, :3] += self.depth(ids)[:, None] * _into(handle) - short_of * in_world(grasp, self.onto)
         grasp[:, :3] -= in_world(grasp, self.place)
         return grasp
+
+    def _plan(self, ids: Array, at: Array) -> None:
+        """To before the handle, in a posture from which the arm can go the whole way of the part."""
+        way = self._stations(at, self.at_handle(ids, at, 0.0)[:, None])[:, 0]
+        self.arm.plan(ids, self.at_handle(ids, at, CLEAR)[:, None], then=way, touched=self.part.owner)
+
+    def _planned(self, ids: Array, at: Array) -> Array:
+        del at
+        return self.arm.planned(ids)
 
     def approach(self, ids: Array, at: Array) -> Array:
         """To where the hand comes to the bar from."""

@@ -7,11 +7,14 @@ from anysim.errors import TaskError
 from anysim.math import pose as P
 from anysim.model.world import JointType
 from anysim.task.joints import JointView, RangedJointView
-from anysim.task.scene import Frame, SceneView
+from anysim.task.scene import Frame, ObjectView, SceneView
 
 
 class JointedPart:
     """The moving part of a joint.
+
+    Attributes:
+        owner: the object that it is a part of.
 
     Raises:
         TaskError: the reference stands for joints of several objects.
@@ -25,6 +28,10 @@ class JointedPart:
         self.scene, self._joint = scene, joint
         self._number = next(j for j, other in enumerate(world.joints) if other is found)
         self.body = world.body_joint.index(self._number)
+        entity = world.body_entity[self.body]
+        self.owner = ObjectView(
+            scene, next(name for name, slot in world.logical_objects.items() if entity in slot.entities)
+        )
         self._slides = found.type is JointType.PRISMATIC
         self._axis, self._anchor = np.array(found.axis, dtype=float), np.array(found.anchor, dtype=float)
 

@@ -13,8 +13,9 @@ from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.arm import Arm
-from anysim_skills.grasping.grasp import PLANNED_STEPS, Metres, Speed
+from anysim_skills.grasping.grasp import Metres, Speed
 from anysim_skills.grasping.held import RAISED, turned_about
+from anysim_skills.planned_moves import PLANNED_STEPS
 from anysim_skills.planning import LATENCY, Latency, PlannerName
 
 STILL = 0.05

@@ -17,6 +17,7 @@ from anysim_skills.choice import Choice
 from anysim_skills.grasping.banked import BankedGrasps, BankFile, CountsFolder, Pinned, before
 from anysim_skills.grasping.candidates import DOWN, TOP_DOWN, across, from_above
 from anysim_skills.object_shapes import ObjectShapes
+from anysim_skills.planned_moves import PLANNED_STEPS
 from anysim_skills.planning import LATENCY, Latency, PlannerName
 
 ROOM = 0.004
@@ -27,8 +28,6 @@ SETTLED = 0.02
 
 CHOOSE, PLAN = 1, 2
 """Phases."""
-PLANNED_STEPS = 500
-"""Control steps that a planned move may take; the planner's limits end it long before."""
 
 Offset = Annotated[
     tuple[float, float, float], Field(description="[m] from the object's origin to the grasp, in the object's frame")

@@ -13,9 +13,10 @@ from anysim.skills.phases import GO_ON, STAY, Phase, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.arm import Arm
-from anysim_skills.grasping.grasp import PLANNED_STEPS, Metres, Speed
+from anysim_skills.grasping.grasp import Metres, Speed
 from anysim_skills.grasping.held import RAISED, RESTING, Moves, PutsDown, turned_about
 from anysim_skills.object_shapes import ObjectShapes
+from anysim_skills.planned_moves import PLANNED_STEPS
 from anysim_skills.planning import LATENCY, Latency, PlannerName
 
 GENTLE = 0.015

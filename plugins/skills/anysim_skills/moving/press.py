@@ -16,6 +16,7 @@ from anysim.task.scene import Frame, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.choice import Choice, turns_against
 from anysim_skills.grasping.grasp import Speed
+from anysim_skills.planning import LATENCY, Latency, PlannerName
 
 TURNS = 8
 """Orientations of the hand about the normal that are tried."""
@@ -40,8 +41,11 @@ class Press(PhasedSkill):
         speed: Speed = 0.3,
         press_speed: Speed = 0.08,
         hold: Annotated[int, Field(ge=1, description="control steps")] = 5,
+        planner: PlannerName = "",
+        latency: Latency = LATENCY,
     ) -> None:
-        self.arm = Arm.of(env, robot, tool=tool, solver=solver)
+        self.arm = Arm.of(env, robot, tool=tool, solver=solver, planner=planner, latency=latency)
+        self._plans = bool(planner)
         self._button, self._part, self._fraction = button, part, fraction
         self._clear, self._beyond, self._speed, self._press_speed, self._hold = clear, beyond, speed, press_speed, hold
         n = env.num_envs
@@ -52,6 +56,7 @@ class Press(PhasedSkill):
     def make_phases(self) -> Sequence[Phase]:
         return (
             Phase("choose", self._choose, self._chosen, 1),
+            *([self.arm.planned_phase(self._before)] if self._plans else ()),
             Phase("approach", None, self._approach, 200),
             Phase("press", self._forget, self._press, 120),
             Phase("retreat", None, self._retreat, 100),
@@ -80,6 +85,9 @@ class Press(PhasedSkill):
     def _chosen(self, ids: Array, at: Array) -> Array:
         del at
         return np.where(self._choice.none_left(ids), OUTCOMES.index(Outcome.NO_IK), GO_ON)
+
+    def _before(self, ids: Array, at: Array) -> Array:
+        return self._at(at, self._turn[ids], self._clear)[:, None]
 
     def _approach(self, ids: Array, at: Array) -> Array:
         self.arm.go(ids, self._at(at, self._turn[ids], self._clear), self._speed)

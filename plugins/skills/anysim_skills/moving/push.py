@@ -16,6 +16,8 @@ from anysim_skills.arm import Arm
 from anysim_skills.grasping.grasp import Metres, Speed
 from anysim_skills.moving.push_mpc import StrokePlanner
 from anysim_skills.object_shapes import ObjectShapes
+from anysim_skills.planned_moves import PLANNED_STEPS
+from anysim_skills.planning import LATENCY, Latency, PlannerName
 
 ASTRAY = np.deg2rad(35.0)
 """[rad] the object is pushed off its way when the goal lies further to the side of the stroke than this."""
@@ -47,8 +49,11 @@ class Push(PhasedSkill):
         stroke_speed: Speed = 0.1,
         backend: Literal["planner", "mpc"] = "planner",
         samples: Annotated[int, Field(ge=4, description="of backend mpc: motions tried out at a time")] = 16,
+        planner: PlannerName = "",
+        latency: Latency = LATENCY,
     ) -> None:
-        self.arm = Arm.of(env, robot, tool=tool, solver=solver)
+        self.arm = Arm.of(env, robot, tool=tool, solver=solver, planner=planner, latency=latency)
+        self._plans = bool(planner)
         self._object, self._goal = object, goal
         self._tolerance, self._height, self._clearance, self._hover = tolerance, height, clearance, hover
         self._speed, self._stroke_speed = speed, stroke_speed
@@ -67,7 +72,8 @@ class Push(PhasedSkill):
     def make_phases(self) -> Sequence[Phase]:
         return (
             Phase("rise", self._rise, self._rising, 100),
-            Phase("above", self._aim, self._above, 200),
+            *([Phase("plan", self._plan, self._planned, PLANNED_STEPS)] if self._plans else ()),
+            Phase("above", None if self._plans else self._aim, self._above, 200),
             Phase("descend", None, self._descend, 150),
             Phase("stroke", self._begin_stroke, self._stroke, 400),
             Phase("retreat", self._rise, self._rising, 100),
@@ -117,10 +123,23 @@ class Push(PhasedSkill):
         place[:, 2] = self._object.root.position[at, 2] + self._height
         return place
 
-    def _above(self, ids: Array, at: Array) -> Array:
+    def _plan(self, ids: Array, at: Array) -> None:
+        self._aim(ids, at)
+        behind = np.concatenate([self._behind(ids, at), self._turn[ids]], axis=1)
+        self.arm.plan(ids, self._over(ids, at)[:, None], then=behind)
+
+    def _planned(self, ids: Array, at: Array) -> Array:
+        del at
+        return np.where(self._blocked[ids], _NO_IK, self.arm.planned(ids))
+
+    def _over(self, ids: Array, at: Array) -> Array:
+        """(n, 7) the tool above where the stroke begins."""
         place = self._behind(ids, at)
         place[:, 2] += self._hover
-        self.arm.go(ids, np.concatenate([place, self._turn[ids]], axis=1), self._speed)
+        return np.concatenate([place, self._turn[ids]], axis=1)
+
+    def _above(self, ids: Array, at: Array) -> Array:
+        self.arm.go(ids, self._over(ids, at), self._speed)
         return np.where(self._blocked[ids], _NO_IK, np.where(self.arm.arrived(ids, at, 0.01, 0.1), GO_ON, STAY))
 
     def _descend(self, ids: Array, at: Array) -> Array:

@@ -14,6 +14,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.grasping.grasp import Metres, Speed
+from anysim_skills.planning import LATENCY, Latency, PlannerName
 
 STUCK = 25
 """Control steps without inverse kinematics after which a goal counts as out of reach."""
@@ -35,8 +36,11 @@ class Reach(PhasedSkill):
         tolerance: Metres = 0.01,
         hold: Annotated[int, Field(ge=1, description="control steps")] = 10,
         steps: Annotated[int, Field(ge=1, description="control steps that the way may take")] = 200,
+        planner: PlannerName = "",
+        latency: Latency = LATENCY,
     ) -> None:
-        self.arm = Arm.of(env, robot, tool=tool, solver=solver)
+        self.arm = Arm.of(env, robot, tool=tool, solver=solver, planner=planner, latency=latency)
+        self._plans = bool(planner)
         self._goal, self._turning, self._speed, self._tolerance = goal, orientation, speed, tolerance
         self._hold, self._late = hold, steps
         self._turn = np.zeros((env.num_envs, 4))
@@ -44,7 +48,16 @@ class Reach(PhasedSkill):
         super().__init__(env, [self.arm])
 
     def make_phases(self) -> Sequence[Phase]:
-        return (Phase("move", self._enter, self._move, self._late),)
+        move = Phase("move", self._enter, self._move, self._late)
+        return (self.arm.planned_phase(self._goals), move) if self._plans else (move,)
+
+    def _goals(self, ids: Array, at: Array) -> Array:
+        self._enter(ids, at)
+        return self._target(ids, at)[:, None]
+
+    def _target(self, ids: Array, at: Array) -> Array:
+        goal = self._goal.pose[at]
+        return goal if self._turning else np.concatenate([goal[:, :3], self._turn[ids]], axis=1)
 
     def _enter(self, ids: Array, at: Array) -> None:
         self._turn[ids] = self.arm.tool.quaternion[at]
@@ -52,8 +65,7 @@ class Reach(PhasedSkill):
 
     def _move(self, ids: Array, at: Array) -> Array:
         goal = self._goal.pose[at]
-        target = goal if self._turning else np.concatenate([goal[:, :3], self._turn[ids]], axis=1)
-        self.arm.go(ids, target, self._speed)
+        self.arm.go(ids, self._target(ids, at), self._speed)
         there = P.norm(goal[:, :3] - self.arm.tool.position[at]) < self._tolerance
         if self._turning:
             there &= P.angle_between(self.arm.tool.quaternion[at], goal[:, 3:]) < 10 * self._tolerance
