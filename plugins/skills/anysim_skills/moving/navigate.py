@@ -1,5 +1,6 @@
 """Navigate: drive a base to a pose on the ground, and stop there."""
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -24,8 +25,8 @@ STOPPED = 0.02
 """[m/s, rad/s]"""
 
 
-class Navigate(PhasedSkill):
-    """Drive the base of `robot` to x, y and yaw of `goal` in free space, within `tolerance` and `angle`, and stop.
+class DriveTo(PhasedSkill):
+    """A skill that drives a base straight to a pose on the ground, and stops there.
 
     A base that is held up fails with `controller`; it backs off once and tries again. Arms that are told where to go in
     the world would stay behind: those named in `carried` keep their place on the base.
@@ -36,10 +37,8 @@ class Navigate(PhasedSkill):
         env: TaskEnv,
         *,
         robot: RobotView,
-        goal: Frame,
         channel: str = "base",
         link: Annotated[str, Field(description="of the robot, that is driven there; its own frame where empty")] = "",
-        heading: Annotated[bool, Field(description="whether the yaw of the goal counts")] = True,
         tolerance: Metres = 0.02,
         angle: Annotated[float, Field(gt=0, description="[rad]")] = 0.035,
         speed: Annotated[float, Field(gt=0, description="[m/s]")] = 0.6,
@@ -55,7 +54,7 @@ class Navigate(PhasedSkill):
         self._arms = [Arm.of(env, robot, tool=tool, solver=solver) for tool in carried]
         self._tools = np.zeros((env.num_envs, len(carried), 7))
         """(N, T, 7) where their commands stand in the frame of the base."""
-        self._goal, self._heading, self._back = goal, heading, back_off
+        self._back = back_off
         self._tolerance, self._angle, self._late = tolerance, angle, steps
         self._pace = Pace(speed, rate)
         self._best, self._nearest = np.zeros(env.num_envs), np.zeros(env.num_envs, dtype=np.int64)
@@ -92,17 +91,12 @@ class Navigate(PhasedSkill):
         for number, arm in enumerate(self._arms):
             self._tools[ids, number] = P.compose(P.inverse(self.base.frame.pose[at]), arm.command[ids])
         self.base.pace, self.base.close = self._pace, 0.5 * self._tolerance
-        self.base.go(ids, self._wanted(at))
+        self.base.go(ids, self.wanted_stand(ids, at))
         self._best[ids], self._nearest[ids] = np.inf, 0
 
-    def _wanted(self, at: Array) -> Array:
-        goal = self._goal.pose[at]
-        if self._heading:
-            yaw = yaw_of(goal[:, 3:])
-        else:
-            way = goal[:, :2] - self.base.pose(at)[:, :2]
-            yaw = np.arctan2(way[:, 1], way[:, 0])
-        return np.concatenate([goal[:, :2], yaw[:, None]], axis=1)
+    @abstractmethod
+    def wanted_stand(self, ids: Array, at: Array) -> Array:
+        """(n, 3) where these envs' bases are to go: x, y [m] and yaw [rad]."""
 
     def _drive(self, ids: Array, at: Array) -> Array:
         distance, turn = self.base.left(ids, at)
@@ -114,6 +108,31 @@ class Navigate(PhasedSkill):
         self._nearest[ids] = np.where(moved, self.steps[ids], self._nearest[ids])
         held = self.steps[ids] - self._nearest[ids] > HELD_UP
         return np.where(there, GO_ON, np.where(held, _CONTROLLER, STAY))
+
+
+class Navigate(DriveTo):
+    """Drive the base of `robot` to x, y and yaw of `goal` in free space, within `tolerance` and `angle`, and stop."""
+
+    def __init__(
+        self,
+        env: TaskEnv,
+        *,
+        goal: Frame,
+        heading: Annotated[bool, Field(description="whether the yaw of the goal counts")] = True,
+        **options: object,
+    ) -> None:
+        self._goal, self._heading = goal, heading
+        super().__init__(env, **options)  # pyright: ignore[reportArgumentType]
+
+    def wanted_stand(self, ids: Array, at: Array) -> Array:
+        del ids
+        goal = self._goal.pose[at]
+        if self._heading:
+            yaw = yaw_of(goal[:, 3:])
+        else:
+            way = goal[:, :2] - self.base.pose(at)[:, :2]
+            yaw = np.arctan2(way[:, 1], way[:, 0])
+        return np.concatenate([goal[:, :2], yaw[:, None]], axis=1)
 
 
 _CONTROLLER = OUTCOMES.index(Outcome.CONTROLLER)
