@@ -56,9 +56,18 @@ class LookAt(PhasedSkill):
         self._held[ids] = self._since[ids] = 0
         self._best[ids] = np.inf
 
-    def _turn(self, ids: Array, at: Array) -> Array:
+    def point(self, at: Array) -> Array:
+        """(n, 3) [m] what is looked at."""
+        return self._target.position[at]
+
+    def off_axis(self, ids: Array, at: Array) -> Array:
+        """(n,) [rad] between the optical axis and the way to the target."""
         self.gaze.look(ids, self._target.position[at])
-        left = self.gaze.angle(ids)
+        return self.gaze.angle(ids)
+
+    def _turn(self, ids: Array, at: Array) -> Array:
+        left = self.off_axis(ids, at)
+        self.gaze.look(ids, self.point(at))
         self._held[ids] = (self._held[ids] + 1) * (left < self._angle)
         closer = left < self._best[ids] - 1e-3
         self._best[ids] = np.where(closer, left, self._best[ids])
