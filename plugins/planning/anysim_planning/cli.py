@@ -16,17 +16,23 @@ def retarget(
     shift: Annotated[
         tuple[float, float, float], typer.Option(help="Moves the motion in the frame of the robot's base [m].")
     ] = (0.0, 0.0, 0.0),
+    within: Annotated[
+        str | None,
+        typer.Option(help="A task or a world file in which the robot stands, by its name there; default: it alone."),
+    ] = None,
     seed: Annotated[int, typer.Option(help="Of the postures that it may begin in.")] = 0,
     out: Annotated[Path | None, typer.Option(help="A file .npz for times, joint positions and errors.")] = None,
     json: AsJson = False,
 ) -> None:
     """Carry the motion of a recorded tool to another robot, seen from its base; nothing is simulated.
 
-    Exit code 1 says that a part of the motion is out of reach.
+    Exit code 1 says that a part of the motion is out of reach, or that the robot touches itself or what stands around
+    it; things that lie loose, as what it grasps, may be touched.
 
     Examples:
       anysim run pick_cube -k 1 --out runs/a && anysim retarget runs/a/episodes/* --robot ur5 --out ur5.npz
       anysim retarget runs/a/episodes/* --robot dual_ur5 --tool right --shift 0 -0.8 0
+      anysim retarget runs/a/episodes/* --robot panda --within stack_cube
     """
     import numpy as np
 
@@ -41,17 +47,23 @@ def retarget(
     source = compile_world(reader.manifest.spec)
     first, its_tool = motions.only_tool(source, *(of.partition(".")[::2] if of else (None, None)))
     done = motions.tool_motion(reader, source, first, its_tool)
-    world = compile_world({"world": {"terrain": "none", "robots": {robot: {"robot": robot}}}})
+    alone = {"world": {"terrain": "none", "robots": {robot: {"robot": robot}}}}
+    world = compile_world(alone if within is None else within)
     arm = motions.arm_of(world, *motions.only_tool(world, robot, tool))
     base = world.initial_body_pose[arm.root]
     wanted = motions.carried(done.poses, done.base, base, P.pose(shift, IDENTITY_QUATERNION))
-    made = motions.retarget(arm, base, done.times, wanted, seed=seed)
+    around = motions.Surroundings(world, arm)
+    made = motions.retarget(arm, base, done.times, wanted, seed=seed, around=around)
+    bad = None if made.free.all() else int(np.argmin(made.free))
+    touch = None if bad is None else (float(made.times[bad]), *around.touching(made.joint_pos[bad]))
     found = {
         "rows": len(made.times),
         "reached": int(made.reached.sum()),
         "position_error_m": float(made.position_error.max()),
         "rotation_error_rad": float(made.rotation_error.max()),
         "slowed_by": float(np.ptp(made.times) / max(np.ptp(done.times), 1e-9)),
+        "free": int(made.free.sum()),
+        "first_touch": None if touch is None else dict(zip(("time", "a", "b"), touch, strict=True)),
         "out": None if out is None else str(out),
     }
     if out is not None:
@@ -65,4 +77,9 @@ def retarget(
             f"{found['position_error_m'] * 1e3:.3g} mm and {found['rotation_error_rad']:.3g} rad off, "
             f"slowed by {found['slowed_by']:.3g}" + (f" -> {out}" if out else "")
         )
-    raise typer.Exit(int(not made.reached.all()))
+        if touch is not None:
+            typer.echo(
+                f"{len(made.free) - found['free']} rows are not free: first at {touch[0]:.2f} s '{touch[1]}' touches "
+                f"'{touch[2]}'; expected a way past it: move the motion with --shift, or take another --seed"
+            )
+    raise typer.Exit(int(not (made.reached & made.free).all()))

@@ -12,9 +12,12 @@ from anysim.conventions import Array
 from anysim.errors import AnysimError, NameLookupError, RecordError, listing, suggest
 from anysim.kinematics.chain import Chain
 from anysim.math import pose as P
-from anysim.model.world import World
+from anysim.model.world import BodyKind, EntityKind, World
 from anysim.planning.api import ALL_AXES, inverse_kinematics
+from anysim.planning.motion import PlanRequest
+from anysim.planning.scenes import Scene
 from anysim.record.reader import TrajectoryReader
+from anysim_planning.scene import PlanningWorld
 
 JUMP = 0.5
 """[rad] or [m] that no joint moves between two rows: more is another posture."""
@@ -31,6 +34,7 @@ class Retargeted(NamedTuple):
         reached: (T,) bool, both errors are within the tolerances and no joint has jumped.
         position_error: (T,) [m]
         rotation_error: (T,) [rad]
+        free: (T,) bool, the robot touches neither itself nor what stands around it; all True where nobody looked.
     """
 
     times: Array
@@ -38,6 +42,31 @@ class Retargeted(NamedTuple):
     reached: Array
     position_error: Array
     rotation_error: Array
+    free: Array
+
+
+class Surroundings:
+    """What the arm of a chain may not touch in a world as it begins: its own robot, and all that is not loose."""
+
+    def __init__(self, world: World, chain: Chain) -> None:
+        scene = Scene(0, world.initial_body_pose, world.initial_presence)
+        robot = world.entities[world.body_entity[chain.root]].name
+        loose = [
+            e for e in world.entities if e.kind is not EntityKind.ROBOT and world.bodies[e.root].kind is BodyKind.FREE
+        ]
+        allowed = tuple((robot, entity.name) for entity in loose)
+        self._checks = PlanningWorld(
+            world, PlanRequest(chain.joint_names, chain.initial, allowed=allowed), {}, every_link=True
+        )
+        self._checks.take(scene, ())
+
+    def hits(self, joint_pos: Array) -> Array:
+        """(n,) bool: which joint positions (n, K) touch something."""
+        return self._checks.hits(np.ascontiguousarray(joint_pos))
+
+    def touching(self, joint_pos: Array) -> tuple[str, str]:
+        """Names of the first two geoms that touch in joint positions (K,) that hit."""
+        return self._checks.touching(joint_pos)[0]
 
 
 class ToolMotion(NamedTuple):
@@ -117,11 +146,13 @@ def retarget(
     rotation_tolerance: float = 1e-3,
     rotation_weight: tuple[float, float, float] = ALL_AXES,
     solver: str = "numba_ik",
+    around: Surroundings | None = None,
 ) -> Retargeted:
     """Follow world poses (T, 7) of a tool at times (T,) with an arm whose root body is at `base` (7,).
 
     The objective is that of the planners' goals: each row is solved from the row before, without restarts, so that the
-    arm keeps its posture; a row out of reach is the nearest that the solver finds.
+    arm keeps its posture; a row out of reach is the nearest that the solver finds. With `around` it begins in the
+    posture from which the most rows are both reached and free.
 
     Raises:
         AnysimError: times that do not rise, or poses of another shape.
@@ -152,10 +183,14 @@ def retarget(
         rows.append(q)
         errors.append((found.position_error, found.rotation_error))
     path, reached = np.array(rows), np.array(good)  # (T, starts, K), (T, starts)
+    free = np.ones(reached.shape, dtype=bool)
+    if around is not None:
+        free = ~around.hits(path.reshape(-1, len(chain))).reshape(reached.shape)
     travel = np.abs(np.diff(path, axis=0)).sum(axis=(0, 2))
-    best = int(np.lexsort((travel, -reached.sum(axis=0)))[0])
+    best = int(np.lexsort((travel, -(reached & free).sum(axis=0)))[0])
     position, rotation = (np.array([pair[i][best] for pair in errors]) for i in (0, 1))
-    return Retargeted(_slowed(times, path[:, best], chain), path[:, best], reached[:, best], position, rotation)
+    slowed = _slowed(times, path[:, best], chain)
+    return Retargeted(slowed, path[:, best], reached[:, best], position, rotation, free[:, best])
 
 
 def _tool(world: World, robot: str, tool: str) -> int:

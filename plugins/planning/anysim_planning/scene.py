@@ -14,7 +14,7 @@ from anysim.errors import AnysimError, NameLookupError, listing, suggest
 from anysim.geometry.coal_solids import coal_hull, coal_solid, coal_triangles
 from anysim.kinematics.pinocchio_model import pinocchio, se3
 from anysim.math import pose as P
-from anysim.model.pairs import may_meet
+from anysim.model.pairs import could_meet, may_meet
 from anysim.model.parts import BodyKind, EntityKind
 from anysim.model.shapes import HeightFieldShape, MeshShape, Plane, Shape
 from anysim.model.world import Geom, JointType, World
@@ -40,8 +40,11 @@ class PlanningWorld:
         geoms, padding: (G) the World's geoms in the order of `geometry`, and by how much [m] each is grown.
     """
 
-    def __init__(self, world: World, request: PlanRequest, shapes: dict[object, Any]) -> None:
+    def __init__(self, world: World, request: PlanRequest, shapes: dict[object, Any], every_link: bool = False) -> None:
         """`shapes` keeps Coal's hulls of meshes, to be shared between worlds.
+
+        With `every_link` links of one robot may not touch each other either where engines let them pass: most robots
+        of the catalogue have no self-collision.
 
         Raises:
             AnysimError: a joint, body or entity is not known, or a joint that follows another is planned.
@@ -60,7 +63,7 @@ class PlanningWorld:
         self._anchor_of = self._anchors()
         self._attached = self._holders(request.attached)
         self._build(request, shapes)
-        self._pairs(request)
+        self._pairs(request, every_link)
         self._seen: bytes | None = None
 
     # ------------------------------------------------------------------ building
@@ -117,13 +120,16 @@ class PlanningWorld:
             self._bodies.append(geom.body)
             self._local.append(P.pose(geom.position, geom.quaternion))
 
-    def _pairs(self, request: PlanRequest) -> None:
+    def _pairs(self, request: PlanRequest, every_link: bool) -> None:
         """Pairs that move against each other and may meet; not those of one robot that touch when it is at home."""
         pin, world = self._pin, self._world
         bodies = np.array(self._bodies, dtype=int)
         anchors = self._anchor_of[bodies]
-        meet = may_meet(world, bodies) & (anchors[:, None] != anchors)
         entities = np.array([*world.body_entity, -1])[bodies]
+        meet = may_meet(world, bodies)
+        if every_link:
+            meet |= could_meet(world, bodies) & (entities[:, None] == entities)
+        meet &= anchors[:, None] != anchors
         for first, second in request.allowed:
             a, b = self._named(first, bodies, entities), self._named(second, bodies, entities)
             meet &= ~((a[:, None] & b) | (b[:, None] & a))

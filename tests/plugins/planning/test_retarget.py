@@ -13,7 +13,7 @@ from anysim.errors import AnysimError
 from anysim.kinematics.chain import Chain
 from anysim.math import pose as P
 from anysim.record.reader import open_trajectory
-from anysim_planning.retarget import arm_of, carried, retarget, tool_motion
+from anysim_planning.retarget import Surroundings, arm_of, carried, retarget, tool_motion
 
 ROOM = """
 world:
@@ -79,6 +79,50 @@ def test_what_is_out_of_reach_is_told_row_by_row(tmp_path: Path) -> None:
     assert (made.position_error[75:] > 1.0).all()
     with pytest.raises(AnysimError, match="rising times"):
         retarget(other, to_base, times[::-1], away)
+
+
+def test_what_the_robot_touches_is_told_row_by_row(tmp_path: Path) -> None:
+    """A pillar where the tool goes; a loose cube is not in its way."""
+    panda, other, from_base, to_base = chains(tmp_path, "ur5", "tool")
+    times, poses = motion(panda, from_base)
+    wanted = carried(poses, from_base, to_base)
+    place = [round(float(x), 3) for x in wanted[75, :3]]
+    (tmp_path / "pillar.yaml").write_text(
+        ROOM.replace("ROBOT", "ur5")
+        + f"""
+  objects:
+    pillar: {{source: {{box: [0.04, 0.04, 0.04]}}, fixed: true}}
+    cube: {{source: {{box: [0.04, 0.04, 0.04]}}}}
+  layout:
+    pillar: {{position: {place}, checked: false}}
+    cube: {{position: {[*place[:2], 0.02]}, checked: false}}
+"""
+    )
+    made = retarget(other, to_base, times, wanted, seed=3)
+    assert made.free.all()  # nobody has looked
+    for name, hit in (("room", False), ("pillar", True)):
+        world = compile_world(tmp_path / f"{name}.yaml")
+        around = Surroundings(world, other)
+        made = retarget(other, to_base, times, wanted, seed=3, around=around)
+        assert made.reached.all()
+        assert (not made.free.all()) == hit
+    assert not made.free[75]
+    assert "pillar.shape" in around.touching(made.joint_pos[75])
+
+
+def test_links_of_the_robot_may_not_touch_though_engines_let_them(tmp_path: Path) -> None:
+    _, other, _, base = chains(tmp_path, "ur5", "tool")
+    world = compile_world(tmp_path / "room.yaml")
+    inwards = np.tile(base, (41, 1))
+    inwards[:, :3] += np.array([[0.0, 0.0, 0.25]]) + np.linspace(0.45, 0.12, 41)[:, None] * [[0.8, 0.6, 0.0]]
+    inwards[:, 3:] = np.array([0.1895, -0.1994, 0.9476, 0.1596]) / np.linalg.norm([0.1895, 0.1994, 0.9476, 0.1596])
+    around = Surroundings(world, other)
+    made = retarget(other, base, np.linspace(0.0, 2.0, 41), inwards, around=around)
+    assert made.reached.all()
+    assert made.free[:20].all()
+    assert not made.free[-1]
+    links = around.touching(made.joint_pos[-1])
+    assert all(link.startswith("other.") for link in links), links
 
 
 @pytest.mark.slow
