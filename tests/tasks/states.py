@@ -353,7 +353,26 @@ def _to_goal_in_hand(env: TaskEnv, share: float) -> None:
     _TO_HAND(env, share)
 
 
+def _spun(thing: str, angle: float) -> tuple[Callable[[TaskEnv, float], None], Callable[[TaskEnv], None]]:
+    """An object that is turned about the vertical, judged on the way as turns are counted; and turned back by a bit."""
+    start, turned = dict[int, Array](), dict[int, float]()
+
+    def path(env: TaskEnv, share: float) -> None:
+        base, now = start.setdefault(id(env), seen(env, thing)), turned.get(id(env), 0.0)
+        for part in np.linspace(now, share * angle, 1 + int(np.ceil(abs(share * angle - now) / 0.5)))[1:]:
+            turn = P.from_axis_angle(np.tile([0.0, 0.0, 1.0], (len(base), 1)), np.full(len(base), part))
+            put(env, thing, np.concatenate([base[:, :3], P.multiply(turn, base[:, 3:])], axis=1))
+            env.scene.elapsed += 1
+            failed(env), rewarded(env)
+        turned[id(env)] = share * angle
+
+    return path, lambda env: path(env, 0.95)
+
+
+_REORIENT = _spun("cube", 6.3)
+
 CASES: dict[str, Case] = {
+    "reorient_in_hand": Case(_REORIENT[0], [_REORIENT[1]], ()),
     "dex_reach_tips": Case(_at_tips, [_off_tip(tip) for tip in _TIPS], ()),
     "dex_relocate": Case(
         _to_goal_in_hand, [_shifted("bottle", x=0.06), _shifted("bottle", z=-0.06), _moving("bottle")]

@@ -1,0 +1,1 @@
+"""Turn a cube on the palm of a hand."""
