@@ -32,13 +32,13 @@ def put(env: TaskEnv, name: str, pose: Array) -> None:
     env.scene.look(None)
 
 
-def set_opening(env: TaskEnv, name: str, share: float) -> None:
-    """Open a joint by a share of its range, at rest."""
+def set_opening(env: TaskEnv, name: str, share: float, speed: float = 0.0) -> None:
+    """Open a joint by a share of its range, at rest unless a speed [rad/s, m/s] is given."""
     joint = RangedJointView(env.scene, name)
     number = env.engine.world.joints.index(joint.found[0])
     low, high = joint.found[0].lower, joint.found[0].upper
     column = np.full((env.num_envs, 1), low + share * (high - low))
-    env.engine.set_joint_state(column, np.zeros_like(column), None, [number])
+    env.engine.set_joint_state(column, np.full_like(column, speed), None, [number])
     env.scene.look(None)
 
 
@@ -146,6 +146,13 @@ def _off_goal(env: TaskEnv) -> None:
 
 
 _DRAWER = "cabinet.drawer_1"
+
+
+def _cap_in_hand(env: TaskEnv) -> None:
+    """The jar is where its cap is in the hand, which has not let go of it."""
+    pose = seen(env, "jar")
+    pose[:, :3] += seen(env, "panda.tool")[:, :3] - seen(env, "jar.cap.handle")[:, :3]
+    put(env, "jar", pose)
 
 
 def _opening_beside_the_hand(env: TaskEnv, share: float) -> None:
@@ -437,6 +444,14 @@ CASES: dict[str, Case] = {
         [_shifted("peg", x=-0.05), _shifted("peg", y=0.03)],
     ),
     "turn_faucet": Case(_opening("faucet.lever", 0.0, 0.95), [lambda env: set_opening(env, "faucet.lever", 0.85)]),
+    "screw_cap": Case(
+        _opening("jar.cap", 0.0, 0.95),
+        [
+            lambda env: set_opening(env, "jar.cap", 0.88),
+            lambda env: set_opening(env, "jar.cap", 0.95, 0.1),
+            _cap_in_hand,
+        ],
+    ),
     "flip_switch": Case(_opening("switch.rocker", 0.0, 0.95), [lambda env: set_opening(env, "switch.rocker", 0.85)]),
     "pour_beads": Case(_pour, [_spilled]),
     "plug_charger": _plugged(0.036),

@@ -24,6 +24,7 @@ TASKS = [
     "nut_on_peg",
     "peg_insertion_side",
     "turn_faucet",
+    "screw_cap",
     "flip_switch",
     "plug_charger",
     "pour_beads",

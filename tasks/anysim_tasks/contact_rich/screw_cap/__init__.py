@@ -1,0 +1,1 @@
+"""A Panda screws the cap of a jar tight, with several grasps."""
