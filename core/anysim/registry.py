@@ -66,7 +66,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-mcap": {"readers": "mcap", "writers": "mcap"},
     "anysim-mujoco": {"engines": "mujoco", "importers": "mjcf", "oracles": "mjcf"},
     "anysim-parity": {"commands": "compare picture"},
-    "anysim-policy": {"controllers": "policy", "env_policies": "file openpi"},
+    "anysim-policy": {"controllers": "policy", "env_policies": "file lerobot openpi"},
     "anysim-planning": {"commands": "retarget", "planners": "roboplan rrt threads"},
     "anysim-pybullet": {"engines": "pybullet"},
     "anysim-robots": {"commands": "gallery robot"},

@@ -22,5 +22,8 @@ class PolicyFileSpec(Spec):
     engine: str = Field(default="", description="the engine that it was trained on, and its version")
     control_dt: float = Field(default=0.0, ge=0, description="seconds between two actions; 0 if it does not matter")
     observations: dict[Name, Count] = Field(description="its inputs in order: observation groups and their sizes")
+    images: dict[str, tuple[Count, Count, Count]] = Field(
+        default_factory=dict, description="its further inputs: colour images by name, with height, width and 3"
+    )
     actions: Count = Field(description="how many numbers are an action")
     chunk: Count = Field(default=1, description="how many actions it gives for an observation")

@@ -5,7 +5,9 @@ parameters. Nothing about an episode may depend on which env it runs in: draws c
 """
 
 import importlib
+import os
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -60,7 +62,10 @@ class Judging(Protocol):
 
 
 class PolicyName(NamedTuple):
-    """`NAME`, or `NAME:KEY=VALUE,KEY=VALUE`, or `NAME:SCHEME://ADDRESS,KEY=VALUE`, or `MODULE:FUNCTION`, or a file."""
+    """`NAME`, `NAME:KEY=VALUE,KEY=VALUE`, `MODULE:FUNCTION`, or a file.
+
+    The first of the options may be a value alone: an address (`NAME:SCHEME://ADDRESS`), or a path (`NAME:FOLDER/NAME`).
+    """
 
     name: str
     options: dict[str, Any]
@@ -83,11 +88,11 @@ def parse(text: str) -> PolicyName:
     options: dict[str, Any] = {}
     for place, pair in enumerate(rest.split(",") if colon else ()):
         key, equals, value = pair.partition("=")
-        if place == 0 and "://" in key:
-            key, equals, value = "url", "=", pair
+        if place == 0 and ("://" in key or os.sep in key or (not equals and Path(key).is_dir())):
+            key, equals, value = "url" if "://" in key else "path", "=", pair
         if not equals or not key.isidentifier() or key in options:
             raise TaskError(f"--policy {text}: '{pair}' is no KEY=VALUE of its own, as in expert:sigma=0.03")
-        options[key] = _value(value)
+        options[key] = value if key in ("url", "path") else _value(value)
     return PolicyName(name, options)
 
 

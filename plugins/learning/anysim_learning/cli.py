@@ -48,7 +48,7 @@ def train(
 
     The same command again goes on from the last checkpoint. `tensorboard --logdir DIR` draws the curves while it
     learns; curve.jsonl has the exams: success without noise in 64 episodes of the validation split. The policy of the
-    best exam is the one that is kept.
+    best exam is the one that is kept. `clone` sees the images that the task observes, too.
 
     Needs torch: pip install 'anysim-learning[sb3]' (or [rsl], or [torch] for `clone`), best in an environment of its
     own.
@@ -84,8 +84,10 @@ def train(
     ):
         groups = (POLICY, PRIVILEGED) if privileged and PRIVILEGED in env.observation_sizes else (POLICY,)
         runs = tuple(path.resolve() for path in data or ())
-        describe_training(folder, _about(env, learner, groups, seed, given.model_dump(), runs))
-        lesson = Lesson(env, groups, seed, runs)
+        coloured = tuple(name for name, shape in env.image_shapes.items() if len(shape) == 3)
+        images = coloured if getattr(made, "sees_images", False) else ()
+        describe_training(folder, _about(env, learner, (*groups, *images), seed, given.model_dump(), runs))
+        lesson = Lesson(env, groups, seed, runs, images)
         with registry.using("learners", learner, (ValueError,)):
             driven = made(lesson, **{key: getattr(given, key) for key in parameters(made)})
         total = steps or getattr(made, "default_steps", 1_000_000)

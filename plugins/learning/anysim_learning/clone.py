@@ -10,22 +10,29 @@ import numpy as np
 from pydantic import Field
 
 from anysim.errors import TaskError
-from anysim_learning.demonstrations import Demonstrations
+from anysim_learning.demonstrations import Demonstrations, check_cameras
 from anysim_learning.learner import Lesson
 from anysim_schemas.base import Positive
 
 if TYPE_CHECKING:
     import torch  # pyright: ignore[reportMissingImports]
 
+    from anysim_learning.networks import Rows
+
 STRETCH = 100
 """Steps of descent between two numbers of the curve."""
+_AT_ONCE = 1024
 
 
 class Clone:
-    """Regression from observations to the actions that followed, with the least mean absolute error."""
+    """Regression from observations to the actions that followed, with the least mean absolute error.
+
+    Images of the task are observations too, each camera with an encoder of its own.
+    """
 
     default_steps = 20_000
     needs = ("torch", "tensorboard", "onnx")
+    sees_images = True
 
     def __init__(
         self,
@@ -43,16 +50,27 @@ class Clone:
         average: Annotated[
             float, Field(ge=0, lt=1, description="how much of the mean weights each step keeps")
         ] = 0.998,
+        shift: Annotated[int, Field(ge=0, description="pixels by which images are moved at random")] = 2,
         held_out: Annotated[float, Field(gt=0, lt=1, description="share of trajectories for validation")] = 0.1,
     ) -> None:
         import torch  # pyright: ignore[reportMissingImports]
         from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn  # pyright: ignore[reportMissingImports]
 
-        from anysim_learning.networks import Mlp, Policy, Rows, Transformer
+        from anysim_learning.images import Eye, Seeing, reduced, reduction
+        from anysim_learning.networks import Mlp, Policy, Transformer
 
         if not lesson.data:
             raise TaskError("the learner 'clone' learns from recorded runs; name them with --data RUN")
-        data = Demonstrations(lesson.data, lesson.groups, chunk)
+        env = lesson.env
+        shapes = {name: env.image_shapes[name] for name in lesson.images}
+        check_cameras(lesson.data, shapes, env.capture.observed)
+        data = Demonstrations(
+            lesson.data,
+            lesson.groups,
+            chunk,
+            images=lesson.images,
+            prepare=lambda images: reduced(images, reduction(*images.shape[1:3])),
+        )
         if data.trajectories[0].action.shape[1] != lesson.env.action_dim:
             raise TaskError(
                 f"the runs command {data.trajectories[0].action.shape[1]} actions, '{lesson.env.name}' has "
@@ -60,23 +78,33 @@ class Clone:
             )
         order = np.random.default_rng(lesson.seed).permutation(len(data.trajectories))
         apart = max(1, round(held_out * len(order))) if len(order) > 1 else 0
-        self._train = Rows(data.arrays(order[apart:].tolist()), lesson)
-        self._held_out = Rows(data.arrays(order[:apart].tolist()), lesson) if apart else None
+        self._train = self._samples(data, order[apart:].tolist(), lesson)
+        self._held_out = self._samples(data, order[:apart].tolist(), lesson) if apart else None
         torch.manual_seed(lesson.seed)
         obs = self._train.obs
-        body = (Mlp if model == "mlp" else Transformer)(obs.shape[1], lesson.env.action_dim, chunk, width, layers)
+        eyes = [Eye(*(side // reduction(*shape[:2]) for side in shape[:2])) for shape in shapes.values()]
+        size = obs.shape[1] + sum(eye.size for eye in eyes)
+        body = (Mlp if model == "mlp" else Transformer)(size, env.action_dim, chunk, width, layers)
+        body = Seeing(body, eyes) if eyes else body
         self._body, self._mean = body, AveragedModel(body, multi_avg_fn=get_ema_multi_avg_fn(average))
         self._network = Policy(self._mean.module, obs.mean(0), obs.std(0).clamp(min=1e-3), lesson, carried_out or chunk)
         self.chunk = carried_out or chunk
         self._optimizer = torch.optim.AdamW(body.parameters(), lr=learning_rate, weight_decay=weight_decay)
-        self._rate, self._batch_size, self._noise = learning_rate, batch_size, noise
+        self._rate, self._batch_size, self._noise, self._shift = learning_rate, batch_size, noise, shift
         self._draws = torch.Generator().manual_seed(lesson.seed)
         self.steps = 0
+
+    @staticmethod
+    def _samples(data: Demonstrations, chosen: list[int], lesson: Lesson) -> "Rows":
+        from anysim_learning.networks import Rows
+
+        return Rows(data.arrays(chosen), data.frames(chosen), lesson)
 
     def advance(self) -> Mapping[str, float]:
         """Some steps of descent; the rate falls with the square root of how far it is."""
         import torch  # pyright: ignore[reportMissingImports]
 
+        from anysim_learning.images import shifted
         from anysim_learning.networks import error
 
         total = 0.0
@@ -86,7 +114,8 @@ class Clone:
             rows = torch.randint(len(self._train.obs), (self._batch_size,), generator=self._draws)
             obs = self._network.normal(self._train.obs[rows])
             obs = obs + self._noise * torch.randn(obs.shape, generator=self._draws)
-            loss = error(self._body(obs), self._train.action[rows], self._train.mask[rows])
+            images = [shifted(seen, self._shift, self._draws) for seen in self._train.images(rows)]
+            loss = error(self._body(obs, *images), self._train.action[rows], self._train.mask[rows])
             self._optimizer.zero_grad()
             loss.backward()
             torch.nn.utils.clip_grad_norm_(self._body.parameters(), 1.0)
@@ -96,10 +125,21 @@ class Clone:
             self.steps += 1
         numbers = {"loss": total / STRETCH}
         if self._held_out is not None:
-            with torch.inference_mode():
-                given = self._network.body(self._network.normal(self._held_out.obs))
-            numbers["held_out_loss"] = float(error(given, self._held_out.action, self._held_out.mask).item())
+            numbers["held_out_loss"] = self._error(self._held_out)
         return numbers
+
+    def _error(self, samples: "Rows") -> float:
+        """Of the mean weights, in samples that nothing is done to."""
+        import torch  # pyright: ignore[reportMissingImports]
+
+        from anysim_learning.networks import error
+
+        with torch.inference_mode():
+            given = [
+                self._network.body(self._network.normal(samples.obs[rows]), *samples.images(rows))
+                for rows in torch.arange(len(samples.obs)).split(_AT_ONCE)
+            ]
+            return float(error(torch.cat(given), samples.action, samples.mask).item())
 
     def state(self) -> dict[str, Any]:
         """Weights and their mean, the optimiser's moments, the generator, and how far it is."""

@@ -14,13 +14,16 @@ FIRST = 10_000
 
 
 def exam(env: TaskEnv, groups: Sequence[str], network: torch.nn.Module) -> float:
-    """The share of episodes that a policy solves: one in each env, of the first seeds of the validation split."""
+    """The share of episodes that a policy solves: one in each env, of the first seeds of the validation split.
+
+    `groups` are its inputs in order: observation groups and images.
+    """
     network.eval()
     env.reset(episode_seeds=list(range(FIRST, FIRST + env.num_envs)))
     chunk = np.zeros((env.num_envs, 0, env.action_dim))
     while (active := env.running).any():
         if chunk.shape[1] == 0:
-            chunk = _acted(network, [np.nan_to_num(env.obs[group]) for group in groups])
+            chunk = _acted(network, [env.obs[group] for group in groups])
         action, chunk = chunk[:, 0], chunk[:, 1:]
         env.step(action, None if active.all() else active)
         env.retire(np.flatnonzero(active & (env.status != Status.RUNNING)))
@@ -28,7 +31,8 @@ def exam(env: TaskEnv, groups: Sequence[str], network: torch.nn.Module) -> float
 
 
 def _acted(network: torch.nn.Module, rows: Sequence[Array]) -> Array:
-    """Chunks (n, K, A) for rows of observation groups."""
+    """Chunks (n, K, A) for rows of observation groups and images."""
+    seen = [row if row.dtype == np.uint8 else np.nan_to_num(row).astype(np.float32) for row in rows]
     with torch.inference_mode():
-        given = network(*(torch.as_tensor(row, dtype=torch.float32) for row in rows)).double().numpy()
+        given = network(*(torch.as_tensor(row) for row in seen)).double().numpy()
     return given[:, None] if given.ndim == 2 else given

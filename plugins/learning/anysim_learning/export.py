@@ -12,8 +12,8 @@ from anysim.task.env import TaskEnv
 from anysim_schemas.policy_file import FORMAT, METADATA, PolicyFileSpec
 
 
-def described(env: TaskEnv, groups: Sequence[str], chunk: int = 1) -> PolicyFileSpec:
-    """What a file says of itself: observation groups with their sizes, actions, and where it was trained."""
+def described(env: TaskEnv, groups: Sequence[str], chunk: int = 1, images: Sequence[str] = ()) -> PolicyFileSpec:
+    """What a file says of itself: what it observes, with sizes, its actions, and where it was trained."""
     return PolicyFileSpec(
         format=FORMAT,
         task=env.name,
@@ -21,6 +21,7 @@ def described(env: TaskEnv, groups: Sequence[str], chunk: int = 1) -> PolicyFile
         engine=f"{env.engine.name} {env.engine.version}",
         control_dt=env.engine.world.physics.control_dt,
         observations={group: env.observation_sizes[group] for group in groups},
+        images={name: env.image_shapes[name] for name in images},
         actions=env.action_dim,
         chunk=chunk,
     )
@@ -29,14 +30,15 @@ def described(env: TaskEnv, groups: Sequence[str], chunk: int = 1) -> PolicyFile
 def export(network: torch.nn.Module, about: PolicyFileSpec, path: Path) -> None:
     """Write a network whole or not at all.
 
-    The network takes the groups of `about.observations` in order, (n, D) float32 each, and gives actions (n, A), or
-    chunks (n, K, A), in the units of the env.
+    The network takes the groups of `about.observations` in order, (n, D) float32 each, and then `about.images`,
+    (n, H, W, 3) uint8 each. It gives actions (n, A), or chunks (n, K, A), in the units of the env.
     """
     import onnx  # pyright: ignore[reportMissingImports]
 
-    groups = list(about.observations)
-    example = tuple(torch.zeros(1, size) for size in about.observations.values())
-    axes = {name: {0: "n"} for name in [*groups, "action"]}
+    names = [*about.observations, *about.images]
+    pictures = [torch.zeros(1, *shape, dtype=torch.uint8) for shape in about.images.values()]
+    example = (*(torch.zeros(1, size) for size in about.observations.values()), *pictures)
+    axes = {name: {0: "n"} for name in [*names, "action"]}
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_suffix(".draft")
     try:
@@ -47,7 +49,7 @@ def export(network: torch.nn.Module, about: PolicyFileSpec, path: Path) -> None:
                 network.eval(),
                 example,
                 str(draft),
-                input_names=groups,
+                input_names=names,
                 output_names=["action"],
                 dynamic_axes=axes,
                 opset_version=17,

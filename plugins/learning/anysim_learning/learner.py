@@ -22,12 +22,14 @@ class Lesson(NamedTuple):
         groups: observation groups that the policy may see.
         seed: of the episodes, and of everything that a learner draws.
         data: recorded runs, for learners that need them.
+        images: colour images that the policy may see as well, as `images/front`.
     """
 
     env: TaskEnv
     groups: tuple[str, ...]
     seed: int
     data: tuple[Path, ...] = ()
+    images: tuple[str, ...] = ()
 
 
 class Learner(Protocol):
@@ -53,8 +55,9 @@ class Learner(Protocol):
         ...
 
     def network(self) -> "torch.nn.Module":
-        """The policy without noise: from observation groups (n, D) each, as the lesson names them, to actions.
+        """The policy without noise: from what the lesson names to actions.
 
-        Actions (n, A), or chunks (n, K, A), in the units of the env.
+        It is given observation groups (n, D) and then images (n, H, W, 3) uint8, and gives actions (n, A), or chunks
+        (n, K, A), in the units of the env.
         """
         ...

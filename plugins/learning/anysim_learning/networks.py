@@ -3,12 +3,14 @@
 The chunks follow Zhao et al. 2023 (ACT) without its latent variable.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import torch  # pyright: ignore[reportMissingImports]
 from torch import nn  # pyright: ignore[reportMissingImports]
 
+from anysim_learning.images import Reduce, reduction
 from anysim_learning.learner import Lesson
 from anysim_learning.tensors import InUnits
 
@@ -16,13 +18,18 @@ _CLIP = 5.0
 
 
 class Rows:
-    """Samples as tensors; actions are in half ranges of the env's."""
+    """Samples as tensors; actions are in half ranges of the env's, images are kept once for all samples."""
 
-    def __init__(self, arrays: Any, lesson: Lesson) -> None:
+    def __init__(self, arrays: Any, frames: Mapping[str, Any], lesson: Lesson) -> None:
         obs, action, mask = arrays
         self.obs = torch.as_tensor(np.concatenate([obs[group] for group in lesson.groups], axis=1))
         self.action = InUnits(lesson.env).inverse(torch.as_tensor(action))
         self.mask = torch.as_tensor(mask)
+        self._frames = [tuple(torch.as_tensor(part) for part in frames[name]) for name in lesson.images]
+
+    def images(self, rows: Any) -> list[torch.Tensor]:
+        """Those of some samples (n, H, W, 3) uint8, of each camera."""
+        return [frames[shown[rows]] for frames, shown in self._frames]
 
 
 def error(given: torch.Tensor, wanted: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
@@ -36,6 +43,9 @@ class Policy(nn.Module):
     def __init__(self, body: nn.Module, mean: Any, deviation: Any, lesson: Lesson, carried_out: int) -> None:
         super().__init__()
         self.body, self._kept, self.in_units = body, carried_out, InUnits(lesson.env)
+        self._groups = len(lesson.groups)
+        shapes = [lesson.env.image_shapes[name] for name in lesson.images]
+        self.reduce = nn.ModuleList([Reduce(reduction(shape[0], shape[1])) for shape in shapes])
         self.register_buffer("mean", mean)
         self.register_buffer("deviation", deviation)
 
@@ -43,8 +53,10 @@ class Policy(nn.Module):
         """Observations in deviations from their mean."""
         return torch.clamp((obs - self.mean) / self.deviation, -_CLIP, _CLIP)
 
-    def forward(self, *groups: Any) -> Any:
-        return self.in_units(self.body(self.normal(torch.cat(groups, dim=1)))[:, : self._kept])
+    def forward(self, *seen: Any) -> Any:
+        obs = self.normal(torch.cat(seen[: self._groups], dim=1))
+        images = [reduce(image) for reduce, image in zip(self.reduce, seen[self._groups :], strict=True)]
+        return self.in_units(self.body(obs, *images)[:, : self._kept])
 
 
 class Mlp(nn.Module):

@@ -42,7 +42,7 @@ def train(
     if (out / CHECKPOINT).exists():
         _restore(learner, out / CHECKPOINT)
     rows = [row for row in rows if row["steps"] <= learner.steps]  # what was learnt after it is learnt again
-    about = described(lesson.env, lesson.groups, learner.chunk)
+    about = described(lesson.env, lesson.groups, learner.chunk, lesson.images)
     numbers: dict[str, float] = rows[-1] if rows else {}
     with closing(SummaryWriter(str(out / "tensorboard"), purge_step=learner.steps)) as board:
         for goal in _goals(learner.steps, steps, exams):
@@ -52,7 +52,10 @@ def train(
                     board.add_scalar(name, value, learner.steps)
                 tell(numbers)
             network = learner.network()
-            passed, best = exam(examined, lesson.groups, network), max((row["exam"] for row in rows), default=0.0)
+            passed, best = (
+                exam(examined, (*lesson.groups, *lesson.images), network),
+                max((row["exam"] for row in rows), default=0.0),
+            )
             numbers = {**numbers, "steps": learner.steps, "exam": passed, "best": max(passed, best)}
             board.add_scalar("exam", passed, learner.steps)
             tell(numbers)

@@ -19,7 +19,9 @@ from anysim_schemas.policy_file import FORMAT, METADATA, PolicyFileSpec
 
 
 class FileEnvPolicy:
-    """A model of observation groups, (1, D) float32 each, to actions (1, A) or chunks (1, K, A) in the env's units.
+    """A model of observation groups, (1, D) float32 each, and images, (1, H, W, 3) uint8 each, to actions.
+
+    These are actions (1, A) or chunks (1, K, A) in the env's units.
 
     It is run row by row: a batch may be summed in another order, and an episode would depend on its neighbours. What is
     not a number is 0 to it, as it is to learners.
@@ -59,6 +61,14 @@ class FileEnvPolicy:
             if sizes.get(group) != size:
                 here = f"has {sizes[group]}" if group in sizes else f"has no such group (groups: {listing(sizes)})"
                 raise TaskError(f"the policy {self._path} observes {size} numbers of '{group}'; '{env.name}' {here}")
+        for name, shape in about.images.items():
+            there = env.image_shapes.get(name)
+            if there != shape:
+                here = "does not show it" if there is None else f"shows {there[1]} x {there[0]}"
+                raise TaskError(
+                    f"the policy {self._path} observes '{name}' of {shape[1]} x {shape[0]} pixels, '{env.name}' "
+                    f"{here}: set task.images and world.cameras.CAMERA.size as they were when it was trained"
+                )
         dt = env.engine.world.physics.control_dt
         if about.actions != env.action_dim or (about.control_dt and abs(about.control_dt - dt) > 1e-9):
             raise TaskError(
@@ -72,7 +82,8 @@ class FileEnvPolicy:
 
     def act(self, obs: Obs, env_ids: Array) -> Array:
         """Actions (n, A), or chunks (n, K, A)."""
-        hidden = [group for group in self._about.observations if group not in obs]
+        images = list(self._about.images)
+        hidden = [name for name in [*self._about.observations, *images] if name not in obs]
         if hidden:
             raise TaskError(f"the policy {self._path} observes {listing(hidden)}; --privileged shows it")
         rows: list[Any] = []
@@ -80,6 +91,7 @@ class FileEnvPolicy:
             seen = {
                 group: np.nan_to_num(obs[group][k : k + 1]).astype(np.float32) for group in self._about.observations
             }
+            seen |= {name: np.ascontiguousarray(obs[name][k : k + 1]) for name in images}
             rows.append(self._run(seen)[0])
         given = np.array(rows, dtype=np.float64)
         if given.shape[-1] != self._dim or given.ndim not in (2, 3):

@@ -12,6 +12,7 @@ from anysim.conventions import Array
 from anysim.errors import PluginError, TaskError, listing
 from anysim.task.contract import Obs
 from anysim.task.env import TaskEnv
+from anysim_policy.names import named
 
 MESSAGE_BYTES = 64 << 20
 """The longest answer that is read."""
@@ -75,16 +76,12 @@ class OpenPiEnvPolicy:
         known = [*self._env.observation_sizes, *self._env.image_shapes]
         if not text:
             return {name: name for name in known if name != "privileged"}
-        pairs = [(theirs, ours) for theirs, _, ours in (part.rpartition(":") for part in text.split("+"))]
-        for theirs, ours in pairs:
-            if not theirs or ours not in known:
-                raise TaskError(
-                    f"policy.keys: '{theirs}:{ours}' is no THEIRS:OURS with an observation of '{self._env.name}' "
-                    f"(observations: {listing(known, 20)}); as in keys=observation/state:{known[0]}"
-                )
-        if len({theirs for theirs, _ in pairs} - {PROMPT}) < len(pairs):
-            raise TaskError(f"policy.keys: each of the server's names once, and none is '{PROMPT}'; got {text}")
-        return dict(pairs)
+        pairs = named(text, known, self._env.name, "observation/state")
+        if PROMPT in pairs:
+            raise TaskError(
+                f"policy.keys: '{PROMPT}' is the task in words, so no observation has this name; got {text}"
+            )
+        return pairs
 
     def reset(self, env_ids: Array) -> None:
         """Nothing: the server is not told of episodes."""

@@ -105,11 +105,18 @@ def test_what_are_no_actions_is_refused() -> None:
         run("reach", lambda env: Chunked(env, columns=1))
 
 
-def test_policies_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_policies_by_name(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     assert policies.parse("expert:sigma=0.5") == ("expert", {"sigma": 0.5}, "")
     assert policies.parse("my.module:act") == ("my.module", {}, "act")
     assert policies.parse("runs/a.b=c/policy.onnx") == ("file", {"path": "runs/a.b=c/policy.onnx"}, "")
     assert policies.parse("expert:retries=off").options == {"retries": False}
+    assert policies.parse("lerobot:runs/lr=1/act,steps=5") == ("lerobot", {"path": "runs/lr=1/act", "steps": 5.0}, "")
+    assert policies.parse("lerobot:path=17").options == {"path": "17"}
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(TaskError, match=r"'act' is no KEY=VALUE"):
+        policies.parse("lerobot:act")
+    (tmp_path / "act").mkdir()
+    assert policies.parse("lerobot:act").options == {"path": "act"}
     for wrong in ("expert:=1", "expert:sigma=1,sigma=2", "a b:c d"):
         with pytest.raises(TaskError, match="--policy"):
             policies.parse(wrong)

@@ -15,6 +15,7 @@ import anysim
 from anysim.errors import RecordError, TaskError
 from anysim.record import incoming
 from anysim.record.collector import Collector
+from anysim.record.reader import open_trajectory
 from anysim.skills.runner import SkillPolicy
 from anysim.testing.engines import require_engine
 from anysim_learning import cli
@@ -222,3 +223,128 @@ def test_rsl_rl_learns_from_scaled_rewards() -> None:
         kept = made.state()["scale"]
         assert kept["count"] == 64
         assert kept["variance"] > 0.0
+
+
+SEEN = [*QUIET, "task.images={front: {fps: 25.0}}", "world.cameras.front.size=[96, 66]"]
+FRONT = "images/front"
+
+
+@pytest.fixture(scope="module")
+def filmed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two episodes of reach whose front camera is recorded as it is observed."""
+    require_engine("mujoco")
+    out = tmp_path_factory.mktemp("runs") / "filmed"
+    overrides = [*SEEN, "record.cameras=[front]", "record.fps=25.0"]
+    with anysim.make("reach", engine="mujoco", num_envs=2, overrides=overrides) as env:
+        assert all(result.status == "success" for result in Collector(env, SkillPolicy(env), out, 2, seed=3).run())
+    return out
+
+
+def test_recorded_images_are_those_that_were_observed(filmed: Path) -> None:
+    """The latest image before each action, but for what the video loses."""
+    from anysim_learning.demonstrations import Demonstrations
+    from anysim_learning.images import reduced
+
+    data = Demonstrations([filmed], ("policy",), 2, images=(FRONT,), prepare=lambda images: reduced(images, 2))
+    one = data.trajectories[0]
+    assert one.images[FRONT].shape[1:] == (33, 48, 3)
+    assert one.shown[FRONT].tolist() == [step // 2 for step in range(len(one.action))]
+    with anysim.make("reach", engine="mujoco", num_envs=2, overrides=SEEN) as env:
+        folders = sorted((filmed / "episodes").iterdir())
+        env.reset(episode_seeds=[open_trajectory(folder).manifest.episode_seed for folder in folders])
+        for step in range(min(len(trajectory.action) for trajectory in data.trajectories) - 1):
+            assert np.abs(data[step][0]["policy"] - env.obs["policy"][0]).max() < 1e-4
+            seen = reduced(env.obs[FRONT], 2)[0].astype(float)
+            far = np.abs(one.images[FRONT] - seen).mean(axis=(1, 2, 3))
+            assert far[one.shown[FRONT][step]] < 5.0
+            assert abs(int(far.argmin()) - one.shown[FRONT][step]) <= 1, "neighbours may look alike"
+            assert np.array_equal(data[step][0][FRONT], one.images[FRONT][one.shown[FRONT][step]])
+            env.step(np.stack([trajectory.action[step] for trajectory in data.trajectories]))
+    frames, shown = data.frames([1])[FRONT]
+    assert len(shown) == len(data.trajectories[1].action)
+    assert np.array_equal(frames[shown[3]], data[len(one.action) + 3][0][FRONT])
+
+
+def test_images_are_reduced_alike_outside_and_inside_of_a_network() -> None:
+    from anysim_learning.images import Reduce, reduced, reduction, shifted
+
+    assert [reduction(*size) for size in ((48, 64), (48, 65), (240, 320), (8, 8))] == [1, 2, 5, 1]
+    images = np.random.default_rng(0).integers(0, 256, (2, 14, 19, 3), dtype=np.uint8)
+    for factor in (1, 3, 5):
+        within = Reduce(factor)(torch.as_tensor(images)).numpy()
+        assert np.array_equal(within, reduced(images, factor).astype(np.float32))
+    still = torch.as_tensor(np.repeat(images[:1], 40, axis=0))
+    moved = shifted(still, 2, torch.Generator().manual_seed(0)).numpy()
+    middles = {bytes(image[4:9, 4:9]) for image in moved}
+    wanted = {bytes(images[0, 4 + y : 9 + y, 4 + x : 9 + x]) for y in range(-2, 3) for x in range(-2, 3)}
+    assert middles <= wanted
+    assert len(middles) > 10
+    assert shifted(still, 0, torch.Generator()) is still
+
+
+@pytest.mark.parametrize("model", ["mlp", "transformer"])
+def test_cloning_from_images(model: str, filmed: Path, tmp_path: Path) -> None:
+    """It learns a tiny run by heart with what the images show, and the file gives the same actions."""
+    from anysim_learning.clone import Clone
+    from anysim_learning.export import described, export
+    from anysim_learning.learner import Lesson
+    from anysim_policy.env_policy import FileEnvPolicy
+
+    with anysim.make("reach", engine="mujoco", num_envs=2, overrides=SEEN) as env:
+        lesson = Lesson(env, ("policy",), 0, (filmed,), (FRONT,))
+        options: Any = {"width": 32, "layers": 2, "chunk": 3, "batch_size": 16, "noise": 0.0, "average": 0.9}
+        made = Clone(lesson, model=model, shift=0, **options)  # pyright: ignore[reportArgumentType]
+        losses = [made.advance()["loss"] for _ in range(4)]
+        assert losses[-1] < 0.5 * losses[0]
+        network = made.network().eval()
+        export(network, described(env, lesson.groups, made.chunk, lesson.images), tmp_path / "p.onnx")
+        obs, _ = env.reset(seed=5)
+        policy = FileEnvPolicy(env, path=str(tmp_path / "p.onnx"))
+        given = policy.act(obs, np.arange(2))
+        with torch.inference_mode():
+            wanted = network(torch.from_numpy(obs["policy"]), torch.from_numpy(obs[FRONT])).numpy()
+        assert given.shape == (2, 3, 8)
+        assert np.abs(given - wanted).max() < 1e-5
+        dark = policy.act(obs | {FRONT: np.zeros_like(obs[FRONT])}, np.arange(2))
+        assert np.abs(dark - given).max() > 1e-3, "it looks at them"
+        with pytest.raises(TaskError, match="observes images/front; --privileged shows it"):
+            policy.act({"policy": obs["policy"]}, np.arange(2))
+    for overrides, message in (
+        (QUIET, r"observes 'images/front' of 96 x 66 pixels, 'reach' does not show it: set task\.images"),
+        ([*SEEN, "world.cameras.front.size=[64, 48]"], r"'reach' shows 64 x 48: set"),
+    ):
+        with anysim.make("reach", engine="mujoco", num_envs=1, overrides=overrides) as env:
+            with pytest.raises(TaskError, match=message):
+                FileEnvPolicy(env, path=str(tmp_path / "p.onnx"))
+
+
+def test_runs_that_do_not_show_what_the_task_shows(runs: Path, filmed: Path) -> None:
+    from anysim_learning.clone import Clone
+    from anysim_learning.learner import Lesson
+
+    for data, override, message in (
+        (runs, "world.cameras.front.size=[96, 66]", r"recorded without images of 'front' from the start"),
+        (filmed, "world.cameras.front.size=[64, 48]", r"'front' with 96 x 66 pixels in every 2\. step; .* 64 x 48 in"),
+        (filmed, "task.images.front.fps=50", r"96 x 66 in every 1\.: set .* task\.images\.front\.fps"),
+    ):
+        with anysim.make("reach", engine="mujoco", num_envs=1, overrides=[*SEEN, override]) as env:
+            with pytest.raises(TaskError, match=message):
+                Clone(Lesson(env, ("policy",), 0, (data,), (FRONT,)))
+
+
+def test_the_command_clones_from_images_and_evaluates(filmed: Path, tmp_path: Path) -> None:
+    """The images that the task observes are inputs of the file, and the examiner shows them to it."""
+    app = typer.Typer()
+    app.command()(cli.train)
+    words = ["reach", "-l", "clone", "-n", "1", "--steps", "100", "--exams", "1", "--data", str(filmed), "-e", "mujoco"]
+    words += [word for override in [*SEEN[1:], "task.horizon=4"] for word in ("-o", override)]
+    words += ["--option", "width=8", "--option", "batch_size=8", "--out", str(tmp_path / "out"), "--json"]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.exception
+    assert json.loads((tmp_path / "out" / "train.json").read_text())["groups"] == ["policy", FRONT]
+    with anysim.make("reach", engine="mujoco", num_envs=2, overrides=[*SEEN, "task.horizon=4"]) as env:
+        from anysim_evaluation.driver import drive
+        from anysim_evaluation.policy import make_policy
+
+        policy = make_policy(env, str(tmp_path / "out" / "policy.onnx"))
+        assert [one.status for one in drive(env, policy, [10_000, 10_001])] == ["truncated"] * 2
