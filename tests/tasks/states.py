@@ -479,6 +479,11 @@ CASES: dict[str, Case] = {
     "loco_reach": Case(
         _towards("dog", lambda env: level(seen(env, "goal"), seen(env, "dog"))), [_shifted("dog", x=0.37)], ()
     ),
+    "loco_open_door": Case(
+        _opening("door.leaf", 0.0, 0.18),
+        [lambda env: set_opening(env, "door.leaf", 0.12), _tilted("dog", 0.4)],
+        ("approach",),
+    ),
     "loco_push_box": Case(
         _towards("box", lambda env: seen(env, "goal")),
         [_shifted("box", x=0.16), _tilted("box", 0.6), _moving("box")],

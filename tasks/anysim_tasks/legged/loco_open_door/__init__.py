@@ -1,0 +1,1 @@
+"""Push a door open on four legs."""
