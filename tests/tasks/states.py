@@ -509,6 +509,11 @@ CASES: dict[str, Case] = {
         [_shifted("cube", x=0.1), _moving("cube"), _moving("rover")],
         (),
     ),
+    "mobile_open_door": Case(
+        _opening("door.leaf", 0.0, 0.18),
+        [lambda env: set_opening(env, "door.leaf", 0.12), _moving("rover")],
+        ("drive", "reach"),
+    ),
     "mobile_open_drawer": Case(
         _opening(_DRAWER, 0.0, 0.8), [lambda env: set_opening(env, _DRAWER, 0.7), _moving("rover")], ("drive", "reach")
     ),

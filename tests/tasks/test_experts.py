@@ -45,6 +45,7 @@ TASKS = [
     "stand_on_two_legs",
     "mobile_grasp",
     "mobile_pick_place",
+    "mobile_open_door",
     "mobile_open_drawer",
     "pack",
     "push_cart",

@@ -1,0 +1,1 @@
+"""Drive to a door and pull it open."""
