@@ -9,7 +9,8 @@ from anysim.api import load, task_path
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
-from tests.tasks.states import CASES, blind, failed, judged, put, rewarded, seen, set_opening
+from tests.tasks.cases import CASES
+from tests.tasks.states import blind, failed, judged, put, rewarded, seen, set_opening
 
 NEAR = 1e-5
 """[m, rad] engines keep poses in single precision."""

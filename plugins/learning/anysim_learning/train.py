@@ -52,10 +52,8 @@ def train(
                     board.add_scalar(name, value, learner.steps)
                 tell(numbers)
             network = learner.network()
-            passed, best = (
-                exam(examined, (*lesson.groups, *lesson.images), network),
-                max((row["exam"] for row in rows), default=0.0),
-            )
+            passed = exam(examined, (*lesson.groups, *lesson.images), network)
+            best = max((row["exam"] for row in rows), default=0.0)
             numbers = {**numbers, "steps": learner.steps, "exam": passed, "best": max(passed, best)}
             board.add_scalar("exam", passed, learner.steps)
             tell(numbers)

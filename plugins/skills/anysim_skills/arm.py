@@ -207,11 +207,9 @@ class Arm(Mover):
         failed = np.where(stage == Stage.FAILED, self.plans.failure[ids], STAY)
         return np.where(stage == Stage.ARRIVED, GO_ON, failed)
 
-    def planned_phase(self, goals: Callable[[Array, Array], Array]) -> Phase:
-        """A phase that moves to one of the tool poses (n, G, 7) that `goals` says for envs and their rows."""
-        return Phase(
-            "plan", lambda ids, at: self.plan(ids, goals(ids, at)), lambda ids, _: self.planned(ids), PLANNED_STEPS
-        )
+    def planned_phase(self, ask: Callable[[Array, Array], None]) -> Phase:
+        """A phase that begins with `ask`, which calls `plan` for envs and their rows, and ends where the move does."""
+        return Phase("plan", ask, lambda ids, _: self.planned(ids), PLANNED_STEPS)
 
     def arrived(self, ids: Array, at: Array, distance: float = ARRIVED, angle: float = TURNED) -> Array:
         """(n,) bool: the tool is at its target. `at` are the rows of these envs in the scene."""

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from anysim import make
-from anysim.skills.base import OUTCOMES, Outcome
-from anysim.skills.runner import SkillPolicy
+from anysim.skills.base import Outcome
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
 from anysim_skills.arm import Arm
 from anysim_skills.moving.footprint import CLEAR, Footprint
+from tests.plugins.skills.test_navigate import driven
 
 WORLD = Path(__file__).parent / "worlds/approach.yaml"
 NUM_ENVS = 4
@@ -23,20 +23,10 @@ def made(engine: str, *overrides: str) -> TaskEnv:
     return env
 
 
-def outcomes(env: TaskEnv) -> list[Outcome]:
-    policy, everyone = SkillPolicy(env), np.arange(NUM_ENVS)
-    policy.begin(everyone)
-    for _ in range(500):
-        env.step(policy.act(everyone))
-        if policy.skill.outcome.all():
-            break
-    return [OUTCOMES[code] for code in policy.skill.outcome]
-
-
 def fetches(engine: str) -> None:
     require_engine(engine)
     with made(engine) as env:
-        assert outcomes(env) == [Outcome.OK] * NUM_ENVS
+        assert driven(env, 500) == [Outcome.OK] * NUM_ENVS
         env.scene.look(None)
         assert (env.scene.frame("cube").position[:, 2] > 0.5).all()
 
@@ -53,7 +43,7 @@ def test_it_is_grasped_on_the_other_engines(engine: str) -> None:
 
 def test_what_no_place_on_the_ground_is_near_enough_to_is_unreachable() -> None:
     with made("mujoco", "world.objects.table.source={box: [3.0, 3.0, 0.4]}") as env:
-        assert outcomes(env) == [Outcome.UNREACHABLE_BASE] * NUM_ENVS
+        assert driven(env, 500) == [Outcome.UNREACHABLE_BASE] * NUM_ENVS
 
 
 def test_a_footprint_ends_where_the_base_does() -> None:
@@ -67,7 +57,7 @@ def test_a_footprint_ends_where_the_base_does() -> None:
         for yaw, reach in ((0.0, 0.3), (np.pi, 0.3), (np.pi / 2, side), (-np.pi / 2, side)):  # the base is .6 x .5 m
             touching = 1.5 - 0.15 - reach - CLEAR  # the middle of the crate, and half of its length
             stands = np.array([[touching - 0.002, 0.85, yaw], [touching + 0.002, 0.85, yaw], [1.5, 0.85, yaw + 0.4]])
-            free = footprint.free(everyone, everyone, np.tile(stands, (NUM_ENVS, 1, 1)))
+            free = footprint.free(footprint.look(everyone, everyone), np.tile(stands, (NUM_ENVS, 1, 1)))
             assert free.tolist() == [[True, False, False]] * NUM_ENVS
 
 
@@ -82,4 +72,4 @@ def test_a_corner_that_passes_a_corner_is_free() -> None:
         yaw = np.pi / 4 - np.arctan2(0.25 + CLEAR, 0.3 + CLEAR)
         off = np.array([np.cos(np.pi / 4), np.sin(np.pi / 4)])
         stands = np.array([[*(corner - (tip + gap) * off), yaw] for gap in (0.01, -0.06)])
-        assert footprint.free(one, one, stands[None]).tolist() == [[True, False]]
+        assert footprint.free(footprint.look(one, one), stands[None]).tolist() == [[True, False]]

@@ -7,9 +7,9 @@ import pytest
 
 from anysim import make
 from anysim.math import pose as P
-from anysim.skills.base import OUTCOMES, Outcome
-from anysim.skills.runner import SkillPolicy
+from anysim.skills.base import Outcome
 from anysim.testing.engines import require_engine
+from tests.plugins.skills.test_navigate import driven
 
 WORLD = Path(__file__).parent / "worlds/pull_with_tool.yaml"
 NUM_ENVS = 4
@@ -19,16 +19,10 @@ def pulled(engine: str, *overrides: str) -> tuple[list[Outcome], np.ndarray]:
     """The outcomes, and how far [m] the cubes are from the goal in the end."""
     require_engine(engine)
     with make(WORLD, engine=engine, num_envs=NUM_ENVS, overrides=overrides) as env:
-        env.reset(seed=11)
-        policy, everyone = SkillPolicy(env), np.arange(NUM_ENVS)
-        policy.begin(everyone)
-        for _ in range(950):
-            if policy.skill.outcome.all():
-                break
-            env.step(policy.act(everyone))
+        outcomes = driven(env, 950)
         env.scene.look(None)
         off = env.scene.frame("cube").position[:, :2] - env.scene.frame("spot").position[:, :2]
-        return [OUTCOMES[code] for code in policy.skill.outcome], P.norm(off)
+        return outcomes, P.norm(off)
 
 
 def test_a_cube_is_drawn_to_the_goal_with_a_hook() -> None:

@@ -18,7 +18,6 @@ from anysim_skills.articulated.bar_grasps import TURNS, bar_grasps
 from anysim_skills.articulated.part import Part
 from anysim_skills.choice import Choice
 from anysim_skills.grasping.grasp import CLOSING_STEPS, Speed, closed
-from anysim_skills.planned_moves import PLANNED_STEPS
 from anysim_skills.planning import LATENCY, Latency, PlannerName
 
 STATIONS = 5
@@ -97,7 +96,7 @@ class AtHandle(PhasedSkill):
         return [
             Phase("back off", self.leave_handle, self.leaving, self.late),
             Phase("choose", self._choose, self._chosen, 1),
-            *([Phase("plan", self._plan, self._planned, PLANNED_STEPS)] if self._plans else ()),
+            *([self.arm.planned_phase(self._plan)] if self._plans else ()),
             Phase("approach", None, self.approach, self.late),
             Phase("reach in", None, self._reach_in, self.late),
         ]
@@ -161,10 +160,6 @@ class AtHandle(PhasedSkill):
         """To before the handle, in a posture from which the arm can go the whole way of the part."""
         way = self._stations(at, self.at_handle(ids, at, 0.0)[:, None])[:, 0]
         self.arm.plan(ids, self.at_handle(ids, at, CLEAR)[:, None], then=way, touched=self.part.owner)
-
-    def _planned(self, ids: Array, at: Array) -> Array:
-        del at
-        return self.arm.planned(ids)
 
     def approach(self, ids: Array, at: Array) -> Array:
         """To where the hand comes to the bar from."""

@@ -17,7 +17,6 @@ from anysim_skills.choice import Choice
 from anysim_skills.grasping.banked import BankedGrasps, BankFile, CountsFolder, Pinned, before
 from anysim_skills.grasping.candidates import DOWN, TOP_DOWN, across, from_above
 from anysim_skills.object_shapes import ObjectShapes
-from anysim_skills.planned_moves import PLANNED_STEPS
 from anysim_skills.planning import LATENCY, Latency, PlannerName
 
 ROOM = 0.004
@@ -97,7 +96,7 @@ class Grasp(PhasedSkill):
         phases = [
             Phase("back off", self._open, self._backing_off, late),
             Phase("choose", self._choose, self._chosen, 1),
-            *([Phase("plan", self._plan, self._planned, PLANNED_STEPS)] if self._plans else ()),
+            *([self.arm.planned_phase(self._plan)] if self._plans else ()),
             Phase("approach", None, self._approach, late),
             Phase("descend", None, self._descend, late),
             Phase("close", self._close, self._closing, CLOSING_STEPS + 1),
@@ -195,10 +194,6 @@ class Grasp(PhasedSkill):
     def _plan(self, ids: Array, at: Array) -> None:
         grasp = self._grasp(ids, at)
         self.arm.plan(ids, self._before(grasp)[:, None], then=grasp, touched=self._object)
-
-    def _planned(self, ids: Array, at: Array) -> Array:
-        del at
-        return self.arm.planned(ids)
 
     def _approach(self, ids: Array, at: Array) -> Array:
         self.arm.go(ids, self._before(self._grasp(ids, at)), self._speed)

@@ -14,7 +14,8 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.choice import Choice
-from anysim_skills.grasping.candidates import DOWN, TOP_DOWN, from_above
+from anysim_skills.grasping.banked import before
+from anysim_skills.grasping.candidates import TOP_DOWN, from_above
 from anysim_skills.moving.base import wrapped
 from anysim_skills.moving.footprint import Footprint
 from anysim_skills.moving.navigate import DriveTo
@@ -95,9 +96,9 @@ class Approach(DriveTo):
         way = stands - here[:, None]
         way[..., 2] = wrapped(way[..., 2])
         effort = P.norm(way[..., :2]) + TURN_COST * np.abs(way[..., 2])
-        free = np.ones(effort.shape, dtype=bool)
+        around, free = self._footprint.look(ids, at), np.ones(effort.shape, dtype=bool)
         for share in np.linspace(0.0, 1.0, WAY_POINTS + 1)[1:]:
-            free &= self._footprint.free(ids, at, here[:, None] + share * way)
+            free &= self._footprint.free(around, here[:, None] + share * way)
         reached = self._reached(ids, at, stands)
         effort += MISSING_COST * (1.0 - reached / TOP_DOWN)
         effort[~free | (reached == 0) | ~self._object.present[at][:, None]] = np.inf
@@ -112,8 +113,7 @@ class Approach(DriveTo):
         bases = np.stack([stands[..., 0], stands[..., 1], height, zero, zero, np.sin(half), np.cos(half)], axis=-1)
         bases = P.compose(bases, np.broadcast_to(root[:, None], bases.shape))
         grasps = from_above(self._object.root.pose[at])
-        above = grasps - HOVER * np.array([*DOWN, 0.0, 0.0, 0.0, 0.0])
-        goals = np.stack([above, grasps], axis=2)[:, None]
+        goals = np.stack([before(grasps, HOVER), grasps], axis=2)[:, None]
         shape = (*stands.shape[:2], *goals.shape[2:4])
         goals = np.broadcast_to(goals, (*shape, 7)).reshape(-1, 7)
         rows = np.broadcast_to(bases[:, :, None, None], (*shape, 7)).reshape(-1, 7)

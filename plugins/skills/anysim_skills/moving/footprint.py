@@ -1,5 +1,7 @@
 """Footprints: where a base can stand, by the boxes of what stands between its lowest and its highest point."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from anysim.conventions import WORLD, Array
@@ -14,6 +16,21 @@ CLEAR = 0.03
 LOW = 0.03
 """[m] above the lowest point of a base: what is lower, as the ground, is driven over."""
 _CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=bool)
+
+
+class Around(NamedTuple):
+    """A base and what stands at its height, as they are now in n envs.
+
+    Attributes:
+        low, high: (n, 2) [m] corners of the base's rectangle in its own frame, with room around it.
+        things: (n, g, 8, 2) [m] corners of boxes in the world, seen from above.
+        there: (n, g) bool: which of them are in the way of something at the base's height.
+    """
+
+    low: Array
+    high: Array
+    things: Array
+    there: Array
 
 
 class Footprint:
@@ -48,8 +65,8 @@ class Footprint:
         self._boxes, self._bodies, self._entities = np.array(boxes), np.array(bodies), np.array(entities)
         self._own = np.array(own, dtype=bool)
 
-    def free(self, ids: Array, at: Array, stands: Array) -> Array:
-        """(n, c) bool: the base overlaps nothing at stands (n, c, 3) of x, y [m] and yaw [rad] of its frame."""
+    def look(self, ids: Array, at: Array) -> Around:
+        """Where base and boxes are in these envs; `at` are their rows in the scene."""
         points = self._points(ids)
         base = points[:, self._own].reshape(len(ids), -1, 3)
         here = self._frame.pose[at]
@@ -59,8 +76,13 @@ class Footprint:
         bottom, top = base[..., 2].min(axis=1) + LOW, base[..., 2].max(axis=1)
         there = self._env.scene.presence[ids][:, self._entities[~self._own]] | (self._entities[~self._own] < 0)
         there &= (things[..., 2].max(axis=2) > bottom[:, None]) & (things[..., 2].min(axis=2) < top[:, None])
-        hit = self._overlap(stands, low, high, things[..., :2])
-        return ~(hit & there[:, None]).any(axis=2)
+        return Around(low, high, things[..., :2], there)
+
+    @classmethod
+    def free(cls, around: Around, stands: Array) -> Array:
+        """(n, c) bool: the base overlaps nothing at stands (n, c, 3) of x, y [m] and yaw [rad] of its frame."""
+        hit = cls._overlap(stands, around.low, around.high, around.things) & around.there[:, None]
+        return np.logical_not(hit.any(axis=2))
 
     def _points(self, ids: Array) -> Array:
         """(n, G, 8, 3) the corners of all boxes in the world."""

@@ -97,21 +97,21 @@ class Gaze(Mover):
         """Hold still."""
         self.turning[ids] = False
 
-    def seen(self, ids: Array) -> tuple[Array, Array]:
-        """(n, 3) the eyes [m], and (n, 3) the rotation [rad] from the optical axis to the point, world axes."""
+    def rotation(self, ids: Array, points: Array) -> Array:
+        """(n, 3) [rad] from the optical axis to points (n, 3), world axes."""
         poses = self.env.engine.camera_poses(self.camera, ids)
         axis = P.rotate(poses[:, 3:], np.broadcast_to(_FORWARD, (len(ids), 3)))
-        way = self.point[ids] - poses[:, :3]
+        way = points - poses[:, :3]
         way = way / np.maximum(P.norm(way), 1e-9)[:, None]
         across = P.cross(axis, way)
         size = P.norm(across)
         side = P.cross(axis, np.eye(3)[np.argmin(np.abs(axis), axis=1)])  # where it lies right behind
         turn = np.where((size < 1e-9)[:, None], side / P.norm(side)[:, None], across / np.maximum(size, 1e-9)[:, None])
-        return poses[:, :3], turn * np.arctan2(size, P.dot(axis, way))[:, None]
+        return turn * np.arctan2(size, P.dot(axis, way))[:, None]
 
-    def angle(self, ids: Array) -> Array:
-        """(n,) [rad] between the optical axis and the way to the point."""
-        return P.norm(self.seen(ids)[1])
+    def angle(self, ids: Array, points: Array) -> Array:
+        """(n,) [rad] between the optical axis and the way to points (n, 3)."""
+        return P.norm(self.rotation(ids, points))
 
     def act(self, ids: Array, action: Array) -> None:
         """Write the action of these envs: one step of the joints."""
@@ -123,7 +123,7 @@ class Gaze(Mover):
 
     def _step(self, ids: Array) -> None:
         dt = self.env.engine.world.physics.control_dt
-        wanted, ways = self.seen(ids)[1], self._ways(ids)
+        wanted, ways = self.rotation(ids, self.point[ids]), self._ways(ids)
         square = P.dot(ways[:, :, None], ways[:, None]) + DAMPING**2 * np.eye(3)
         solved = np.linalg.solve(square, wanted[..., None])
         step = GAIN * dt * P.dot(np.swapaxes(ways, 1, 2), np.swapaxes(solved, 1, 2))

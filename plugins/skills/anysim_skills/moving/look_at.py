@@ -60,13 +60,8 @@ class LookAt(PhasedSkill):
         """(n, 3) [m] what is looked at."""
         return self._target.position[at]
 
-    def off_axis(self, ids: Array, at: Array) -> Array:
-        """(n,) [rad] between the optical axis and the way to the target."""
-        self.gaze.look(ids, self._target.position[at])
-        return self.gaze.angle(ids)
-
     def _turn(self, ids: Array, at: Array) -> Array:
-        left = self.off_axis(ids, at)
+        left = self.gaze.angle(ids, self._target.position[at])
         self.gaze.look(ids, self.point(at))
         self._held[ids] = (self._held[ids] + 1) * (left < self._angle)
         closer = left < self._best[ids] - 1e-3

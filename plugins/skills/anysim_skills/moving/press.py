@@ -56,7 +56,7 @@ class Press(PhasedSkill):
     def make_phases(self) -> Sequence[Phase]:
         return (
             Phase("choose", self._choose, self._chosen, 1),
-            *([self.arm.planned_phase(self._before)] if self._plans else ()),
+            *([self.arm.planned_phase(self._plan)] if self._plans else ()),
             Phase("approach", None, self._approach, 200),
             Phase("press", self._forget, self._press, 120),
             Phase("retreat", None, self._retreat, 100),
@@ -86,8 +86,8 @@ class Press(PhasedSkill):
         del at
         return np.where(self._choice.none_left(ids), OUTCOMES.index(Outcome.NO_IK), GO_ON)
 
-    def _before(self, ids: Array, at: Array) -> Array:
-        return self._at(at, self._turn[ids], self._clear)[:, None]
+    def _plan(self, ids: Array, at: Array) -> None:
+        self.arm.plan(ids, self._at(at, self._turn[ids], self._clear)[:, None])
 
     def _approach(self, ids: Array, at: Array) -> Array:
         self.arm.go(ids, self._at(at, self._turn[ids], self._clear), self._speed)

@@ -15,13 +15,12 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.grasping.grasp import Grasp, Metres, Offset, Speed
+from anysim_skills.moving.push import astray, level_way
 from anysim_skills.moving.reach import STUCK
 from anysim_skills.object_shapes import ObjectShapes
 
 AHEAD = 0.03
 """[m] the hook is told to be at most this far ahead of where it touches the object."""
-ASTRAY = np.deg2rad(35.0)
-"""[rad] an object has slipped out of the hook when its goal lies further to the side of the way than this."""
 
 Inner = Annotated[Frame, Field(description="of what is held: the middle of the side that pulls, its x along the pull")]
 
@@ -88,7 +87,7 @@ class Pull(PhasedSkill):
         return self._held(ids, at, np.where(self.arm.arrived(ids, at, 0.01, 0.1), GO_ON, STAY))
 
     def _aim(self, ids: Array, at: Array) -> None:
-        way = self._to_goal(at)
+        way = level_way(self._object, self._goal, at)
         self._line[ids] = way / np.maximum(P.norm(way), 1e-9)[:, None]
         self._aloft[ids] = self._inner.position[at, 2]
 
@@ -104,12 +103,12 @@ class Pull(PhasedSkill):
         return self._held(ids, at, np.where(down, GO_ON, STAY))
 
     def _pull(self, ids: Array, at: Array) -> Array:
-        way = self._to_goal(at)
-        left, ahead = P.norm(way), P.dot(way, self._line[ids])
-        place = self._behind(ids, at, 0.0) + np.clip(ahead, 0.0, AHEAD)[:, None] * self._line[ids]
+        way = level_way(self._object, self._goal, at)
+        line, left = self._line[ids], P.norm(way)
+        place = self._behind(ids, at, 0.0) + np.clip(P.dot(way, line), 0.0, AHEAD)[:, None] * line
         self.arm.go(ids, self._tool_for(ids, at, place), self._pull_speed)
-        astray = (left > 2 * self._tolerance) & (ahead < np.cos(ASTRAY) * left)
-        return self._held(ids, at, np.where(left < self._tolerance, GO_ON, np.where(astray, _LOST, STAY)))
+        said = np.where(astray(way, line, self._tolerance), _LOST, STAY)  # it has slipped out of the hook
+        return self._held(ids, at, np.where(left < self._tolerance, GO_ON, said))
 
     def _draw_off(self, ids: Array, at: Array) -> Array:
         """Off the object, so that it comes to rest."""
@@ -119,15 +118,9 @@ class Pull(PhasedSkill):
 
     def succeeded(self, env_ids: Array, at: Array) -> Array:
         del env_ids
-        return np.where(P.norm(self._to_goal(at)) < 1.5 * self._tolerance, GO_ON, _LOST)
+        return np.where(P.norm(level_way(self._object, self._goal, at)) < 1.5 * self._tolerance, GO_ON, _LOST)
 
     # ------------------------------------------------------------------ where
-
-    def _to_goal(self, at: Array) -> Array:
-        """(n, 3) from the object to the goal, horizontally."""
-        way = self._goal.position[at] - self._object.root.position[at]
-        way[:, 2] = 0.0
-        return way
 
     def _behind(self, ids: Array, at: Array, clearance: float) -> Array:
         """(n, 3) where the inner side is, so far behind the object."""

@@ -20,7 +20,20 @@ from anysim_skills.planned_moves import PLANNED_STEPS
 from anysim_skills.planning import LATENCY, Latency, PlannerName
 
 ASTRAY = np.deg2rad(35.0)
-"""[rad] the object is pushed off its way when the goal lies further to the side of the stroke than this."""
+"""[rad] an object has left its way when its goal lies further to the side of that than this."""
+
+
+def level_way(object: ObjectView, goal: Frame, at: Array) -> Array:
+    """(n, 3) from an object to its goal, horizontally; `at` are rows of the scene."""
+    way = goal.position[at] - object.root.position[at]
+    way[:, 2] = 0.0
+    return way
+
+
+def astray(way: Array, line: Array, tolerance: float) -> Array:
+    """(n,) bool: what is left of ways (n, 3) is not ahead along lines (n, 3) any more, and not within the tolerance."""
+    left = P.norm(way)
+    return (left > 2 * tolerance) & (P.dot(way, line) < np.cos(ASTRAY) * left)
 
 
 class Push(PhasedSkill):
@@ -84,12 +97,6 @@ class Push(PhasedSkill):
         del env
         return 0 if rung is not Rung.RECOVER else None
 
-    def _to_goal(self, at: Array) -> Array:
-        """(n, 3) from the object to the goal, horizontally."""
-        way = self._goal.position[at] - self._object.root.position[at]
-        way[:, 2] = 0.0
-        return way
-
     def _rise(self, ids: Array, at: Array) -> None:
         pose = self.arm.tool.pose[at]
         low = self._object.root.position[at, 2] + self._hover
@@ -103,7 +110,7 @@ class Push(PhasedSkill):
 
     def _aim(self, ids: Array, at: Array) -> None:
         """Stroke towards the goal, the hand's fingers across it: of the two turns the one nearer to the present."""
-        way = self._to_goal(at)
+        way = level_way(self._object, self._goal, at)
         length = P.norm(way)
         self._way[ids] = way / np.maximum(length, 1e-9)[:, None]
         yaw = np.arctan2(way[:, 1], way[:, 0])
@@ -153,7 +160,7 @@ class Push(PhasedSkill):
 
     def _stroke(self, ids: Array, at: Array) -> Array:
         """Push on along the line; sideways corrections would drag the object along by friction, the wrong way."""
-        thing, way = self._object.root.position[at], self._to_goal(at)
+        thing, way = self._object.root.position[at], level_way(self._object, self._goal, at)
         left = P.norm(way)
         line = self._way[ids]
         ahead = P.dot(way, line)
@@ -167,11 +174,11 @@ class Push(PhasedSkill):
         target[:, 2] = thing[:, 2] + self._height
         self.arm.go(ids, np.concatenate([target, self._turn[ids]], axis=1), speed)
         there = left < self._tolerance
-        astray = (left > 2 * self._tolerance) & (ahead < np.cos(ASTRAY) * left)
-        return np.where(there, GO_ON, np.where(astray, _LOST, STAY))
+        lost = astray(way, line, self._tolerance)
+        return np.where(there, GO_ON, np.where(lost, _LOST, STAY))
 
     def succeeded(self, env_ids: Array, at: Array) -> Array:
-        return np.where(P.norm(self._to_goal(at)) < 1.5 * self._tolerance, GO_ON, _LOST)
+        return np.where(P.norm(level_way(self._object, self._goal, at)) < 1.5 * self._tolerance, GO_ON, _LOST)
 
 
 def _down(yaw: Array) -> Array:

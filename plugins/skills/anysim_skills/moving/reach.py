@@ -49,11 +49,11 @@ class Reach(PhasedSkill):
 
     def make_phases(self) -> Sequence[Phase]:
         move = Phase("move", self._enter, self._move, self._late)
-        return (self.arm.planned_phase(self._goals), move) if self._plans else (move,)
+        return (self.arm.planned_phase(self._plan), move) if self._plans else (move,)
 
-    def _goals(self, ids: Array, at: Array) -> Array:
+    def _plan(self, ids: Array, at: Array) -> None:
         self._enter(ids, at)
-        return self._target(ids, at)[:, None]
+        self.arm.plan(ids, self._target(ids, at)[:, None])
 
     def _target(self, ids: Array, at: Array) -> Array:
         goal = self._goal.pose[at]

@@ -48,9 +48,8 @@ class Track(LookAt):
         self._seen[ids] = self._lost[ids] = 0
 
     def _follow(self, ids: Array, at: Array) -> Array:
-        off = self.off_axis(ids, at)
+        within = self.gaze.angle(ids, self._target.position[at]) < self._angle
         self.gaze.look(ids, self.point(at))
-        within = off < self._angle
         self._seen[ids] += within
         self._lost[ids] = np.where(within, 0, self._lost[ids] + 1)
         done = np.where(self.steps[ids] >= self._duration - 1, GO_ON, STAY)
