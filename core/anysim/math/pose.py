@@ -63,20 +63,32 @@ def dot(a: Array, b: Array) -> Array:
     return _summed(a * b)
 
 
+def _components(a: Array, b: Array) -> tuple[Array, Array]:
+    """Both with their axes reversed, so that a component is one block of memory once it was taken."""
+    missing = a.ndim - b.ndim
+    if missing > 0:
+        b = b.reshape((1,) * missing + b.shape)
+    elif missing < 0:
+        a = a.reshape((1,) * -missing + a.shape)
+    return a.T, b.T
+
+
 def cross(a: Array, b: Array) -> Array:
     """Cross product along the last axis. Shape (..., 3)."""
     # a few operations on whole rows: with few envs it is their number that takes time
-    products = a.take(_LEFT, axis=-1) * b.take(_RIGHT, axis=-1)
-    return products[..., :3] - products[..., 3:]
+    a, b = _components(a, b)
+    products = a.take(_LEFT, axis=0) * b.take(_RIGHT, axis=0)
+    return (products[:3] - products[3:]).T
 
 
 def rotate(q: Array, v: Array) -> Array:
     """Rotate vectors v (..., 3) by unit quaternions q (..., 4)."""
-    left = q.take(_LEFT, axis=-1)
-    products = left * v.take(_RIGHT, axis=-1)
-    t = 2.0 * (products[..., :3] - products[..., 3:])
-    products = left * t.take(_RIGHT, axis=-1)
-    return v + q[..., 3:4] * t + (products[..., :3] - products[..., 3:])
+    q, v = _components(q, v)
+    left = q.take(_LEFT, axis=0)
+    products = left * v.take(_RIGHT, axis=0)
+    t = 2.0 * (products[:3] - products[3:])
+    products = left * t.take(_RIGHT, axis=0)
+    return (v + q[3:4] * t + (products[:3] - products[3:])).T
 
 
 def rotate_inverse(q: Array, v: Array) -> Array:
