@@ -47,6 +47,13 @@ def test_one_pose_is_composed_with_many_as_if_it_were_written_out() -> None:
         assert P.compose(A[:4], one).tobytes() == spread[:4].tobytes()
 
 
+@pytest.mark.parametrize("rows", [1, 16, 1024])
+def test_a_fixed_pose_is_seen_from_frames_as_composition_has_it(rows: int) -> None:
+    frames = np.resize(poses(1), (rows, 7))
+    fixed = poses(2)[0]
+    assert P.Offset(fixed).seen_from(frames).tobytes() == P.compose(frames, fixed[None]).tobytes()
+
+
 def test_sums_are_in_index_order() -> None:
     """0.1 + 0.2 + 0.3 is another number than 0.1 + (0.2 + 0.3)."""
     row = np.array([[0.1, 0.2, 0.3]])

@@ -48,10 +48,12 @@ class JointDeltaPosition(Controller):
         self._target[env_ids] = targets
 
     def apply(self, action: Array, env_ids: Array | None) -> Command:
-        rows = slice(None) if env_ids is None else env_ids
-        moved = self._target[rows] + self.scale * action
-        self._target[rows] = np.minimum(np.maximum(moved, self.channel.lower), self.channel.upper)
-        return Command(position=self._target[rows])
+        moved = self.scale * action
+        moved += self._target if env_ids is None else self._target[env_ids]
+        np.maximum(moved, self.channel.lower, out=moved)
+        np.minimum(moved, self.channel.upper, out=moved)
+        self._target[slice(None) if env_ids is None else env_ids] = moved
+        return Command(position=moved)
 
     def action_for(self, targets: Array, env_ids: Array) -> Array:
         wanted = (targets - self._target[env_ids]) / self.scale

@@ -225,14 +225,14 @@ class BodyFrame(Frame):
         super().__init__(scene, name)
         self.index = frame
         local = np.array([*frame.position, *frame.quaternion])
-        self._local = None if (local == [0, 0, 0, 0, 0, 0, 1]).all() else local[None]
+        self._local = None if (local == [0, 0, 0, 0, 0, 0, 1]).all() else P.Offset(local)
+        self._fixed = local[None]
 
     def _compute(self) -> Array:
         if self.index.body < 0:
-            fixed = np.array([[0, 0, 0, 0, 0, 0, 1.0]]) if self._local is None else self._local
-            return np.repeat(fixed, len(self.scene.env_ids), axis=0)
+            return np.repeat(self._fixed, len(self.scene.env_ids), axis=0)
         body = self.scene.state.body_pose[self.scene.rows, self.index.body]
-        return body if self._local is None else P.compose(body, self._local)
+        return body if self._local is None else self._local.seen_from(body)
 
     @property
     def twist(self) -> Array:

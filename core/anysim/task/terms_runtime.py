@@ -81,11 +81,14 @@ class Mdp:
 
         self._commands = terms("command", spec.command, "command")
         rewards = terms("reward", spec.rewards, "rewards")
-        self._success = list(terms("predicate", spec.success, "success").values())
-        self._failure = list(terms("predicate", spec.failure, "failure").values())
+        success = terms("predicate", spec.success, "success").values()
+        self._judged = [*success, *terms("predicate", spec.failure, "failure").values()]
+        """Predicates of success, then those of failure."""
+        self._conditions = len(success)
+        """How many of them are of success."""
         self._worth = sum(term.reward for term in spec.success.values())
         """Of success, beside the rewards."""
-        self._penalties = np.array([term.reward for term in spec.failure.values()])
+        self._penalties = [term.reward for term in spec.failure.values()]
         self._ending = np.zeros(0)
         """What success and failure are worth (n,) in this step, as of the last `judge`."""
         events = terms("event", spec.events, "events")
@@ -200,13 +203,15 @@ class Mdp:
         """(success, failure) (n,) bool for the rows at hand; counts how long success has held."""
         rows = self.scene.rows
         held = self.held[rows]
-        success = _each(self._success, held.shape)
-        failures = _each(self._failure, held.shape)
+        values = _values(self._judged)
+        for term, value in zip(self._judged, values, strict=True):
+            _fit(term, value, held.shape, "truth values")
+        success, failures = values[: self._conditions], values[self._conditions :]
         self.held[rows] = held = (held + 1) * _combined(np.logical_and, success, held.shape)
         succeeded = held >= self.spec.hold
-        if self._worth or self._penalties.any():
+        if self._worth or any(self._penalties):
             self._ending = self._worth * succeeded
-            for worth, failure in zip(self._penalties.tolist(), failures, strict=True):
+            for worth, failure in zip(self._penalties, failures, strict=True):
                 self._ending = self._ending + worth * failure
         return succeeded, _combined(np.logical_or, failures, held.shape)
 
@@ -256,14 +261,6 @@ class Mdp:
         self.scene.moment += 1
         for term in self._altered:
             term.restore(env_ids, data)
-
-
-def _each(predicates: Sequence[BoundTerm], shape: tuple[int, ...]) -> list[Array]:
-    """What each predicate says (n,) bool."""
-    values = _values(predicates)
-    for term, value in zip(predicates, values, strict=True):
-        _fit(term, value, shape, "truth values")
-    return values
 
 
 def _combined(both: np.ufunc, values: Sequence[Array], shape: tuple[int, ...]) -> Array:
