@@ -30,7 +30,9 @@ def run(*words: str, folder: Path | None = None) -> subprocess.CompletedProcess[
     )
 
 
-@pytest.mark.parametrize("planner", ["rrt", pytest.param("roboplan", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "planner", ["rrt", *(pytest.param(name, marks=pytest.mark.slow) for name in ("roboplan", "rrt_topp_ra"))]
+)
 def test_a_right_planner_passes(planner: str, tmp_path: Path) -> None:
     if planner == "roboplan":
         pytest.importorskip("roboplan.rrt", reason="roboplan is an extra")

@@ -281,7 +281,7 @@ def plan(
     )
     rows.add("solved", f"{c.solved:.0%}", "")
     rows.add("paths that are free at 0.005 rad", f"{c.free:.0%}", "100%")
-    rows.add("mean length [rad]", f"{c.length:.2f}", "")
+    rows.add("mean length [rad], mean duration [s]", f"{c.length:.2f}, {c.duration:.2f}", "")
     rows.add("a plan [ms], median and 95th percentile", f"{c.plan_ms:.1f}, {c.plan_p95_ms:.1f}", "")
     rows.add("the first plan [ms]", f"{c.first_ms:.0f}", "")
     rows.add("a planning world for all envs", f"{c.world_ms:.0f} ms, {c.world_mib:.2f} MiB", "")

@@ -89,6 +89,7 @@ class PlanCost(NamedTuple):
         requests, goals: how many requests, of how many candidates each.
         solved, free: shares of the requests, and of the paths found.
         length: [rad] mean length of a path.
+        duration: [s] mean time of a trajectory.
         plan_ms, plan_p95_ms: median and 95th percentile of a plan alone.
         first_ms: the first plan, in which the planning world is built and kernels are loaded.
         world_ms, world_mib: time and memory [MiB] of another planning world, which serves all envs.
@@ -109,6 +110,7 @@ class PlanCost(NamedTuple):
     solved: float
     free: float
     length: float
+    duration: float
     plan_ms: float
     plan_p95_ms: float
     first_ms: float
@@ -182,6 +184,7 @@ def plan_cost(
         sum(answer.status is PlanStatus.OK for answer in answers) / requests,
         float(np.mean(free)) if free else 0.0,
         float(np.mean([np.linalg.norm(np.diff(path, axis=0), axis=1).sum() for path in paths] or [0.0])),
+        float(np.mean([a.trajectory.times[-1] for a in answers if a.trajectory is not None] or [0.0])),
         1e3 * float(np.median(spent)),
         1e3 * float(np.quantile(spent, 0.95)),
         1e3 * first,

@@ -25,7 +25,7 @@ from anysim_planning.goals import Asked, GoalSolver, Reached
 from anysim_planning.lines import straight_line
 from anysim_planning.scene import PlanningWorld, topology
 from anysim_planning.search import connect, dense, edge_check, shortened
-from anysim_planning.time_law import timed
+from anysim_planning.time_law import cautious_speeds, timed
 
 CHECKED = 0.005
 """[rad] or [m] between the configurations of the last check."""
@@ -181,6 +181,10 @@ class RrtPlanner(MotionPlanner):
         path = connect(start, goal, world.lower, world.upper, free, rng, budget)
         return path if path is None else shortened(path, free, rng, budget)
 
+    def speeds(self, s: Array, q: Array, first: Array, velocity: Array, acceleration: float) -> Array:
+        """Squares (M,) of the speed along a path, as `time_law.Speeds` has them."""
+        return cautious_speeds(s, q, first, velocity, acceleration)
+
     def _motion(
         self, request: PlanRequest, scene: Scene, world: PlanningWorld, goal: Reached, budget: Budget, passed: Any
     ) -> Trajectory | None:
@@ -195,7 +199,7 @@ class RrtPlanner(MotionPlanner):
             passed("search")
             if path is None or budget.spent:
                 return None
-            trajectory = timed(path, velocity, request.acceleration, blend)
+            trajectory = timed(path, velocity, request.acceleration, blend, self.speeds)
             passed("time_law")
             good = _free(world, trajectory.joint_pos)
             passed("check")

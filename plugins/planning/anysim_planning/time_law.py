@@ -1,5 +1,7 @@
 """The time law of a path: as fast as velocity and acceleration limits let it be, at rest at both ends."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from anysim.conventions import Array
@@ -8,12 +10,35 @@ from anysim.planning.motion import Trajectory
 KNOTS = 240
 PERIOD = 0.01
 """[s] between the rows of a trajectory."""
+Speeds = Callable[[Array, Array, Array, Array, float], Array]
+"""Of lengths (M,) along a path, evenly spaced, positions and their derivatives (M, K) there, velocity limits (K,) and
+the acceleration limit: squares (M,) of the speed along the path, which begins and ends at rest."""
 
 
-def timed(path: Array, velocity: Array, acceleration: float, blend: float) -> Trajectory:
-    """A trajectory along a path (M, K), whose corners are cut within `blend` of them; with 0 it rests at each."""
+def cautious_speeds(s: Array, q: Array, first: Array, velocity: Array, acceleration: float) -> Array:
+    """Squares (M,) of the speed, as `Speeds` has them: what bends the path and what speeds up are limited apart."""
+    del q
+    step, second = s[1], np.gradient(first, s, axis=0)
+    slope, bend = np.maximum(np.abs(first), 1e-9), np.abs(second)
+    most = np.minimum((velocity / slope) ** 2, 0.7 * acceleration / np.maximum(bend, 1e-9)).min(axis=1)
+    most[[0, -1]] = 0.0
+    for order in (range(len(most) - 1), range(len(most) - 1, 0, -1)):
+        for i in order:
+            j = i + 1 if order.step > 0 else i - 1
+            gain = ((acceleration - bend[i] * most[i]) / slope[i]).min()
+            most[j] = min(most[j], most[i] + 2 * step * max(gain, 0.0))
+    return most
+
+
+def timed(
+    path: Array, velocity: Array, acceleration: float, blend: float, speeds: Speeds = cautious_speeds
+) -> Trajectory:
+    """A trajectory along a path (M, K), whose corners are cut within `blend` of them; with 0 it rests at each.
+
+    Where samples of it are beyond limits in spite of `speeds`, all of it is slowed down.
+    """
     if len(path) > 2 and blend == 0.0:
-        parts = [timed(path[i : i + 2], velocity, acceleration, blend) for i in range(len(path) - 1)]
+        parts = [timed(path[i : i + 2], velocity, acceleration, blend, speeds) for i in range(len(path) - 1)]
         return _joined(parts)
     dense = _rounded(path, blend)
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(dense, axis=0), axis=1))])
@@ -24,8 +49,7 @@ def timed(path: Array, velocity: Array, acceleration: float, blend: float) -> Tr
     s = np.linspace(0.0, length[-1], KNOTS)
     q = np.column_stack([np.interp(s, length, column) for column in dense.T])
     first = np.gradient(q, s, axis=0)
-    second = np.gradient(first, s, axis=0)
-    speed2 = _speeds(s[1], first, second, velocity, acceleration)
+    speed2 = speeds(s, q, first, velocity, acceleration)
     return _sampled(s, q, first, speed2, velocity, acceleration)
 
 
@@ -42,19 +66,6 @@ def _rounded(path: Array, blend: float) -> Array:
         a, b = corner + into / size[0] * radius, corner + out / size[1] * radius
         rows.append((1 - t) ** 2 * a + 2 * t * (1 - t) * corner + t**2 * b)
     return np.concatenate([*rows, path[-1:]])
-
-
-def _speeds(step: float, first: Array, second: Array, velocity: Array, acceleration: float) -> Array:
-    """Squares (KNOTS,) of the speed along the path: the largest within the limits, forward and backward."""
-    slope, bend = np.maximum(np.abs(first), 1e-9), np.abs(second)
-    most = np.minimum((velocity / slope) ** 2, 0.7 * acceleration / np.maximum(bend, 1e-9)).min(axis=1)
-    most[[0, -1]] = 0.0
-    for order in (range(len(most) - 1), range(len(most) - 1, 0, -1)):
-        for i in order:
-            j = i + 1 if order.step > 0 else i - 1
-            gain = ((acceleration - bend[i] * most[i]) / slope[i]).min()
-            most[j] = min(most[j], most[i] + 2 * step * max(gain, 0.0))
-    return most
 
 
 def _sampled(s: Array, q: Array, first: Array, speed2: Array, velocity: Array, acceleration: float) -> Trajectory:
@@ -96,6 +107,14 @@ def _hermite(q: Array, first: Array, step: float, i: Array, u: Array) -> tuple[A
     )
     slope = (6 * u**2 - 6 * u) * (a - b) + (3 * u**2 - 4 * u + 1) * da + (3 * u**2 - 2 * u) * db
     return position, slope / step
+
+
+def hermite_bend(q: Array, first: Array, step: float, u: float) -> tuple[Array, Array]:
+    """First and second derivatives (M - 1, K) of the cubics between all knots, `u` of the way along each."""
+    a, b, da, db = q[:-1], q[1:], first[:-1] * step, first[1:] * step
+    slope = (6 * u**2 - 6 * u) * (a - b) + (3 * u**2 - 4 * u + 1) * da + (3 * u**2 - 2 * u) * db
+    bend = (12 * u - 6) * (a - b) + (6 * u - 4) * da + (6 * u - 2) * db
+    return slope / step, bend / step**2
 
 
 def _joined(parts: list[Trajectory]) -> Trajectory:

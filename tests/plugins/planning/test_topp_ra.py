@@ -1,0 +1,100 @@
+"""The planner `rrt_topp_ra`: limits hold everywhere, and there is little to gain within them."""
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from anysim.conventions import Array
+from anysim.model.world import World
+from anysim.planning.motion import Budget, PlanStatus, Scene, Trajectory, motion_planner
+from anysim_planning.time_law import cautious_speeds, hermite_bend, timed
+from anysim_planning.topp_ra import reachable_speeds
+from tests.plugins.planning.conftest import across
+
+SPEED = np.array([2.175] * 4 + [2.61] * 3)
+ACCELERATION = 10.0
+BLEND = 0.15
+
+
+def path(seed: int) -> Array:
+    """Three to five random configurations of seven joints."""
+    rng = np.random.default_rng(seed)
+    return rng.uniform(-1.5, 1.5, (rng.integers(3, 6), 7))
+
+
+def worst(trajectory: Trajectory) -> float:
+    """The largest velocity and acceleration of its samples, in their limits."""
+    times, q, rate = trajectory
+    spans = np.diff(times)[:, None]
+    speed = max(float((np.abs(np.diff(q, axis=0)) / spans / SPEED).max()), float((np.abs(rate) / SPEED).max()))
+    return max(speed, float((np.abs(np.diff(rate, axis=0)) / spans).max()) / ACCELERATION)
+
+
+def test_limits_hold_and_ends_are_exact_without_being_slowed_down() -> None:
+    for seed in range(100):
+        points = path(seed)
+        made = list[Array]()
+
+        def kept(s: Array, *more: Array, made: list[Array] = made) -> Array:
+            made.append(reachable_speeds(s, *more))
+            made.append(np.diff(s)[0] * 2.0 / np.maximum(np.sqrt(made[-1][1:]) + np.sqrt(made[-1][:-1]), 1e-9))
+            return made[0]
+
+        trajectory = timed(points, SPEED, ACCELERATION, BLEND, kept)
+        assert worst(trajectory) <= 1.0 + 1e-6
+        np.testing.assert_allclose(trajectory.times[-1], made[1].sum(), rtol=1e-9)
+        np.testing.assert_array_equal(trajectory.joint_pos[[0, -1]], points[[0, -1]])
+        assert not trajectory.joint_vel[[0, -1]].any()
+
+
+def test_a_straight_way_takes_the_time_of_full_acceleration_and_full_speed() -> None:
+    for way, time in ((0.2, 2 * np.sqrt(0.2 / ACCELERATION)), (2.0, 2.0 / SPEED[0] + SPEED[0] / ACCELERATION)):
+        ends = np.zeros((2, 7))
+        ends[1, 0] = way
+        times = timed(ends, SPEED, ACCELERATION, BLEND, reachable_speeds).times
+        assert times[-1] == pytest.approx(time, rel=0.005)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_it_is_as_fast_as_a_linear_program_makes_it(seed: int) -> None:
+    """The largest sum of squares of the speed, with limits at five places between two points alone."""
+    asked = list[tuple[Array, Array, Array]]()
+
+    def kept(s: Array, q: Array, first: Array, velocity: Array, acceleration: float) -> Array:
+        asked.append((s, q, first))
+        return reachable_speeds(s, q, first, velocity, acceleration)
+
+    taken = timed(path(seed), SPEED, ACCELERATION, BLEND, kept).times[-1]
+    s, q, first = asked[0]
+    count, step = len(s), s[1]
+    rows, at = list[Array](), np.arange(count - 1)
+    for share in np.linspace(0.0, 1.0, 5):
+        slope, bend = hermite_bend(q, first, step, float(share))
+        for joint in range(7):
+            block = np.zeros((count - 1, count))  # q' u + q'' x, where u = (x' - x) / (2 step)
+            block[at, at] = -slope[:, joint] / (2 * step) + bend[:, joint] * (1 - share)
+            block[at, at + 1] = slope[:, joint] / (2 * step) + bend[:, joint] * share
+            rows += [block, -block]
+    highest = (SPEED / np.maximum(np.abs(first), 1e-9)).min(axis=1) ** 2
+    highest[[0, -1]] = 0.0
+    matrix = np.concatenate(rows)
+    best = linprog(
+        -np.ones(count), A_ub=matrix, b_ub=np.full(len(matrix), ACCELERATION), bounds=[(0.0, most) for most in highest]
+    ).x
+    least = (2 * step / (np.sqrt(best[1:]) + np.sqrt(best[:-1]))).sum()
+    assert taken <= 1.05 * least  # a joint is held within the hull of its quadratic, which the program does not ask for
+    assert taken < timed(path(seed), SPEED, ACCELERATION, BLEND, cautious_speeds).times[-1]
+
+
+def test_its_paths_are_those_of_rrt_in_less_time(world: World, scene: Scene) -> None:
+    """The way over the wall has corners; the plan is the same when it is asked for again."""
+    request = across(world, seed=1)
+    made = motion_planner(world, "rrt_topp_ra")
+    first, again = (made.plan(request, scene, Budget(request.deadline)) for _ in range(2))
+    plain = motion_planner(world, "rrt").plan(request, scene, Budget(request.deadline))
+    assert first.status is plain.status is PlanStatus.OK
+    assert first.trajectory is not None
+    assert first.solver == "rrt_topp_ra 1"
+    assert first.trajectory.times[-1] < 0.97 * plain.trajectory.times[-1]
+    assert made.is_free(request, scene, first.trajectory.joint_pos)
+    assert all(np.array_equal(a, b) for a, b in zip(first.trajectory, again.trajectory, strict=True))
