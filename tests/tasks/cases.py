@@ -8,7 +8,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.env import TaskEnv
-from tests.tasks.states import failed, level, offset, put, rewarded, seen, set_opening
+from tests.tasks.states import failed, level, offset, put, rewarded, seen, set_joint, set_opening
 
 
 class Case(NamedTuple):
@@ -290,15 +290,28 @@ def _to_goal_in_hand(env: TaskEnv, share: float) -> None:
     _TO_HAND(env, share)
 
 
-def _spun(thing: str, angle: float) -> tuple[Callable[[TaskEnv, float], None], Callable[[TaskEnv], None]]:
-    """An object that is turned about the vertical, judged on the way as turns are counted; and turned back by a bit."""
-    start, turned = dict[int, Array](), dict[int, float]()
+def _turned_cube() -> Callable[[TaskEnv, float], None]:
+    """Turns the cube about the vertical, to an angle from where it is at first."""
+    start: dict[int, Array] = {}
+
+    def turn(env: TaskEnv, angle: float) -> None:
+        base = start.setdefault(id(env), seen(env, "cube"))
+        turned = P.from_axis_angle(np.tile([0.0, 0.0, 1.0], (len(base), 1)), np.full(len(base), angle))
+        put(env, "cube", np.concatenate([base[:, :3], P.multiply(turned, base[:, 3:])], axis=1))
+
+    return turn
+
+
+def _spun(
+    turn: Callable[[TaskEnv, float], None], angle: float
+) -> tuple[Callable[[TaskEnv, float], None], Callable[[TaskEnv], None]]:
+    """What turns something to an angle, judged on the way as turns are counted; and turned back by a bit."""
+    turned: dict[int, float] = {}
 
     def path(env: TaskEnv, share: float) -> None:
-        base, now = start.setdefault(id(env), seen(env, thing)), turned.get(id(env), 0.0)
+        now = turned.get(id(env), 0.0)
         for part in np.linspace(now, share * angle, 1 + int(np.ceil(abs(share * angle - now) / 0.5)))[1:]:
-            turn = P.from_axis_angle(np.tile([0.0, 0.0, 1.0], (len(base), 1)), np.full(len(base), part))
-            put(env, thing, np.concatenate([base[:, :3], P.multiply(turn, base[:, 3:])], axis=1))
+            turn(env, float(part))
             env.scene.elapsed += 1
             failed(env), rewarded(env)
         turned[id(env)] = share * angle
@@ -306,10 +319,12 @@ def _spun(thing: str, angle: float) -> tuple[Callable[[TaskEnv, float], None], C
     return path, lambda env: path(env, 0.95)
 
 
-_REORIENT = _spun("cube", 6.3)
+_REORIENT = _spun(_turned_cube(), 6.3)
+_VALVE = _spun(lambda env, angle: set_joint(env, "valve.wheel", angle), 3.2)
 
 CASES: dict[str, Case] = {
     "reorient_in_hand": Case(_REORIENT[0], [_REORIENT[1]], ()),
+    "rotate_valve": Case(_VALVE[0], [_VALVE[1], lambda env: set_joint(env, "valve.wheel", 3.2, 0.2)]),
     "dex_reach_tips": Case(_at_tips, [_off_tip(tip) for tip in _TIPS], ()),
     "dex_relocate": Case(
         _to_goal_in_hand, [_shifted("bottle", x=0.06), _shifted("bottle", z=-0.06), _moving("bottle")]

@@ -31,10 +31,14 @@ def put(env: TaskEnv, name: str, pose: Array) -> None:
 def set_opening(env: TaskEnv, name: str, share: float, speed: float = 0.0) -> None:
     """Open a joint by a share of its range, at rest unless a speed [rad/s, m/s] is given."""
     joint = RangedJointView(env.scene, name)
-    number = env.engine.world.joints.index(joint.found[0])
     low, high = joint.found[0].lower, joint.found[0].upper
-    column = np.full((env.num_envs, 1), low + share * (high - low))
-    env.engine.set_joint_state(column, np.full_like(column, speed), None, [number])
+    set_joint(env, joint.found[0].name, low + share * (high - low), speed)
+
+
+def set_joint(env: TaskEnv, name: str, position: float, speed: float = 0.0) -> None:
+    """Put a joint at a position [rad, m], at rest unless a speed [rad/s, m/s] is given."""
+    column = np.full((env.num_envs, 1), position)
+    env.engine.set_joint_state(column, np.full_like(column, speed), None, [env.engine.index.joint(name)])
     env.scene.look(None)
 
 

@@ -54,6 +54,7 @@ TASKS = [
     "dex_relocate",
     "dex_open_drawer",
     "dex_reach_tips",
+    "rotate_valve",
     "rope_straighten",
 ]
 LONG = {"mobile_pick_place", "pack", "fetch_from_drawer", "rope_straighten", "dex_relocate"}

@@ -1,4 +1,4 @@
-"""A valve: a wheel or a lever on a stem."""
+"""A valve: a wheel, bare spokes or a lever on a stem."""
 
 from math import cos, inf, pi, sin
 from typing import Annotated, Literal
@@ -19,7 +19,7 @@ _SEGMENTS = 24  # capsules of a rim: their middles leave the circle by 0.9 % of 
 
 def valve(
     *,
-    style: Literal["wheel", "lever"] = "wheel",
+    style: Literal["wheel", "spokes", "lever"] = "wheel",
     radius: Positive = 0.08,
     thickness: Positive = 0.008,
     spokes: Annotated[int, Field(ge=1, le=12)] = 4,
@@ -35,14 +35,15 @@ def valve(
     color: Color = (0.45, 0.47, 0.50),
     wheel_color: Color = (0.75, 0.12, 0.10),
 ) -> ImportedModel:
-    """A valve whose wheel or lever turns about +z; its frame is in the middle of the bottom of its base plate.
+    """A valve whose wheel, spokes or lever turn about +z; its frame is in the middle of the bottom of its base plate.
 
     The link and joint `wheel` turns without end unless `limits` says otherwise; positive is counter-clockwise, seen
-    from above. The frame `wheel.handle` is on the rim where the first spoke ends (of a lever: its end), x outwards.
+    from above. The frame `wheel.handle` is where the first spoke ends, on the rim if there is one, or at the end of the
+    lever; x outwards.
 
     Args:
-        style: a wheel with spokes and a rim, or one lever.
-        radius: from the axis to the middle of the rim, or the length of the lever [m].
+        style: a wheel with spokes and a rim, the spokes alone, or one lever.
+        radius: from the axis to the middle of the rim, or the length of the spokes or the lever [m].
         thickness: radius of the rim's, spokes' and lever's round section [m].
         spokes: how many.
         height: of the middle of the wheel above the bottom [m].
@@ -55,7 +56,7 @@ def valve(
         damping: [N m s/rad].
         density: of all parts [kg/m^3].
         color: of the base and the stem.
-        wheel_color: of the wheel or lever.
+        wheel_color: of what turns.
 
     Raises:
         KeyFault: the parts do not fit.
@@ -92,26 +93,25 @@ def valve(
         body.solid(link, name, shape, (*middle, 0.0), density, wheel_color, (x, y, z, w), filled=mass)
 
     arms = 1 if style == "lever" else spokes
-    # a spoke ends where the rim begins, a lever with its round end at the radius
-    inner = hub + thickness
-    outer = radius - thickness if style == "lever" else radius - 2 * thickness
+    # a spoke ends where the rim begins, without one with its round end at the radius
+    inner, rimmed = hub + thickness, style == "wheel"
+    outer = radius - 2 * thickness if rimmed else radius - thickness
     for i in range(arms):
         angle, reach = 2 * pi * i / arms, (inner + outer) / 2
         rod(f"spoke_{i + 1}", (reach * cos(angle), reach * sin(angle)), (outer - inner) / 2, angle)
-    if style == "wheel":
+    if rimmed:
         for i in range(_SEGMENTS):
             angle = 2 * pi * (i + 0.5) / _SEGMENTS
             half = radius * sin(pi / _SEGMENTS)
             middle = (radius * cos(angle), radius * sin(angle))
             rod(f"rim_{i + 1}", middle, half, angle + pi / 2, Cylinder(thickness, half))  # its round ends overlap
     body.site(link, "wheel.handle", (radius, 0.0, 0.0))
-    lever = style == "lever"
     body.afford(
         Affordance(
             "wheel.handle",
-            AffordanceKind.LEVER if lever else AffordanceKind.RIM,
+            AffordanceKind.RIM if rimmed else AffordanceKind.LEVER,
             "wheel.handle",
-            ("wheel.spoke_1",) if lever else tuple(f"wheel.rim_{i + 1}" for i in range(_SEGMENTS)),
+            tuple(f"wheel.rim_{i + 1}" for i in range(_SEGMENTS)) if rimmed else ("wheel.spoke_1",),
             ("turn",),
             ((0.0, 0.0, -1.0),),
             joint="wheel",

@@ -91,6 +91,18 @@ class Hand(Mover):
             raise TaskError(f"the hand has no synergy '{synergy}'{suggest(synergy, known)} (it has: {listing(known)})")
         return self.synergies.index(synergy)
 
+    def pointing(self, finger: str, synergy: str) -> Array:
+        """(K,) joint positions of a posture in which one finger is open.
+
+        Raises:
+            TaskError: the hand has no such finger or posture.
+        """
+        if finger not in self.fingers:
+            known = list(self.fingers)
+            raise TaskError(f"the hand has no finger '{finger}'{suggest(finger, known)} (it has: {listing(known)})")
+        bent = self._finger != self.fingers.index(finger)
+        return self._opened + bent * self._ways[self.named(synergy)]
+
     def renew(self, ids: Array) -> None:
         """These envs have just been reset."""
         self._fresh[ids] = True

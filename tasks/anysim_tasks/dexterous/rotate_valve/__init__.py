@@ -1,0 +1,1 @@
+"""Turn a valve of bare spokes with a finger."""
