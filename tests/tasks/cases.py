@@ -47,10 +47,10 @@ def _tilted(thing: str, angle: float) -> Callable[[TaskEnv], None]:
     return lambda env: put(env, thing, P.compose(seen(env, thing), np.array([[0.0, 0.0, 0.0, *turn]])))
 
 
-def _moving(thing: str) -> Callable[[TaskEnv], None]:
+def _moving(thing: str, speed: float = 0.1) -> Callable[[TaskEnv], None]:
     def push(env: TaskEnv) -> None:
         root, twist = env.engine.index.entity(thing).root, np.zeros((env.num_envs, 1, 6))
-        twist[:, 0, 0] = 0.1
+        twist[:, 0, 0] = speed
         env.engine.set_body_state(None, twist, None, [root])
 
     return push
@@ -216,6 +216,17 @@ def _taken(env: TaskEnv, share: float) -> None:
     _TO_COUNTER(env, min(2.0 * share, 1.0))
     _ALOFT(env, max(2.0 * share - 1.0, 0.0))
 
+
+def _in_the_jaws(env: TaskEnv, share: float) -> None:
+    """The dog to where its jaws are above the box; then the box between them, up in the air with the dog."""
+    for_box = env.scene.frame("aloft").pose.copy()
+    start = _STAND.setdefault(id(env), (seen(env, "dog"), seen(env, "box"), seen(env, "dog.between")))
+    dog, box, jaws = start
+    put(env, "dog", dog + share * np.pad(for_box[:, :3] - jaws[:, :3], ((0, 0), (0, 4))))
+    put(env, "box", box + max(2.0 * share - 1.0, 0.0) * np.pad(for_box[:, :3] - box[:, :3], ((0, 0), (0, 4))))
+
+
+_STAND: dict[int, tuple[Array, Array, Array]] = {}
 
 _PACK = [
     _towards(thing, lambda env, side=side, height=height: offset(seen(env, "crate.inside"), y=side, z=height))
@@ -423,6 +434,9 @@ CASES: dict[str, Case] = {
     ),
     "loco_reach": Case(
         _towards("dog", lambda env: level(seen(env, "goal"), seen(env, "dog"))), [_shifted("dog", x=0.37)], ()
+    ),
+    "loco_grasp": Case(
+        _in_the_jaws, [_shifted("box", x=0.05), _shifted("box", z=-0.05), _moving("dog", 0.2)], ("walk",)
     ),
     "loco_open_door": Case(
         _opening("door.leaf", 0.0, 0.18),

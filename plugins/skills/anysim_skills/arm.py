@@ -24,6 +24,7 @@ from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.env_lifetime import PerEnv
 from anysim_skills.planned_moves import PLANNED_STEPS, PlannedMoves, Stage
 from anysim_skills.planning import LATENCY, Latency, planner_of
+from anysim_skills.sag import Sag
 
 ARRIVED = 0.004
 """[m] distance of the tool at which a straight move counts as done."""
@@ -81,6 +82,8 @@ class Arm(Mover):
         self.closed, self.stuck = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
         self.grip = np.zeros((n, 3))
         self.joints = np.zeros((n, len(self.chain)))
+        entry = self.robot.model.entry
+        self._sag = Sag(n, self._dt) if entry is not None and not entry.gravity_compensation else None
         self._fresh = np.ones(n, dtype=bool)
         self._stalled, self._detour = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=bool)
         self._way = np.zeros((n, len(self.chain)))
@@ -158,6 +161,8 @@ class Arm(Mover):
         self.joints[ids] = self.env.scene.state.joint_pos[np.ix_(ids, self.chain.joints)]
         self.speed[ids], self.lead[ids], self.closed[ids], self.stuck[ids] = 0.2, LEAD, False, False
         self._stalled[ids], self._detour[ids] = 0, False
+        if self._sag is not None:
+            self._sag.forget(ids)
 
     def go(self, ids: Array, target: Array, speed: float, lead: float = LEAD) -> None:
         """Move straight towards tool poses (n, 7) at a speed [m/s]."""
@@ -301,9 +306,12 @@ class Arm(Mover):
             distance = self.speed[rows] * self._dt
             self.command[rows] = P.step_toward(self.command[rows], self.target[rows], distance, TURN_RATE * distance)
         keys = self.env.streams.episode_seed[ids]
-        found = self.solver.solve(
-            self.command[ids], self._base(ids), self.joints[ids], random_restarts=0, rng_seeds=keys
-        )
+        command = self.command[ids]
+        if self._sag is not None:
+            rests = P.norm(self.target[ids, :3] - command[:, :3]) < 1e-6
+            self._sag.learn(ids[rests], (command[:, :3] - tool)[rests])
+            command[:, :3] += self._sag.offset[ids]
+        found = self.solver.solve(command, self._base(ids), self.joints[ids], random_restarts=0, rng_seeds=keys)
         self.stuck[ids] = ~found.converged
         if self._detour.any() or not found.converged.all():
             self._around(ids)
