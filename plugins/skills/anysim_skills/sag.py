@@ -1,4 +1,4 @@
-"""What the joints of an arm that carries its own weight stop short of, made up for once the tool rests."""
+"""Sag of an arm that carries its own weight, made up for once its tool rests."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What skills make up for in an arm that its own weight bends."""
+"""Sag of an arm that carries its own weight, as skills make up for it."""
 
 import numpy as np
 import pytest
