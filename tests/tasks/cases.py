@@ -353,6 +353,11 @@ CASES: dict[str, Case] = {
         _pyramid, [_shifted("beside", z=0.006), _shifted("top", z=0.006), _shifted("top", y=0.06), _moving("top")], ()
     ),
     "tidy_bin": Case(_tidied, [_shifted("can", x=0.2), _shifted("ball", z=0.15)], ()),
+    "bi_dex_lift": Case(
+        _towards("tray", lambda env: seen(env, "aloft")),
+        [_shifted("tray", z=-0.03), _tilted("tray", 0.35), _moving("tray")],
+        ("reach", "reach_too"),
+    ),
     "dex_grasp": Case(
         _in_reach_of_the_hand("bottle", "robot.tool"),
         [_shifted("bottle", x=0.13), _shifted("bottle", z=-0.1), _moving("bottle")],

@@ -17,7 +17,7 @@ NEAR = 1e-5
 ENGINES = ["mujoco", pytest.param("pybullet", marks=pytest.mark.slow), pytest.param("sapien", marks=pytest.mark.slow)]
 VARIANTS = {"peg_in_hole_2mm", "insert_round_peg", "nut_on_peg", "usb_insert", "unplug_charger"}
 """Those that differ from another task in sizes alone, or share its world or its way."""
-SETTLING = "robot.hand_", "hand.", "dog.", "walker."
+SETTLING = "robot.hand_", "partner.hand_", "hand.", "dog.", "walker."
 """Joints of a hand, which an action of zero sends to the middle of their ranges, and of legs that take up a weight."""
 TASKS = [pytest.param(task, marks=pytest.mark.slow) if task in VARIANTS else task for task in CASES]
 

@@ -56,6 +56,7 @@ TASKS = [
     "dex_open_drawer",
     "dex_reach_tips",
     "rotate_valve",
+    "bi_dex_lift",
     "rope_straighten",
 ]
 LONG = {"mobile_pick_place", "pack", "fetch_from_drawer", "rope_straighten", "dex_relocate"}

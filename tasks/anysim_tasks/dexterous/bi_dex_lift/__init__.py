@@ -1,0 +1,1 @@
+"""Lift a tray level with two hands."""
