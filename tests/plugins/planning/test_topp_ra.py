@@ -86,6 +86,19 @@ def test_it_is_as_fast_as_a_linear_program_makes_it(seed: int) -> None:
     assert taken < timed(path(seed), SPEED, ACCELERATION, BLEND, cautious_speeds).times[-1]
 
 
+@pytest.mark.parametrize(("configurations", "share"), [(2, 1.0), (3, 0.9), (5, 0.75)])
+def test_corners_take_less_time_than_with_the_cautious_law(configurations: int, share: float) -> None:
+    """The figures of the package's page: the mean over random paths of the time, in that of the other law."""
+    shares = []
+    for seed in range(30):
+        points = np.random.default_rng(seed).uniform(-1.5, 1.5, (configurations, 7))
+        times = [
+            timed(points, SPEED, ACCELERATION, BLEND, law).times[-1] for law in (reachable_speeds, cautious_speeds)
+        ]
+        shares.append(times[0] / times[1])
+    assert np.mean(shares) == pytest.approx(share, abs=0.03)
+
+
 def test_its_paths_are_those_of_rrt_in_less_time(world: World, scene: Scene) -> None:
     """The way over the wall has corners; the plan is the same when it is asked for again."""
     request = across(world, seed=1)
