@@ -200,33 +200,22 @@ def _tidied(env: TaskEnv, share: float) -> None:
         path(env, min(max(4.0 * share - number, 0.0), 1.0))
 
 
-def _beside_the_cube(env: TaskEnv) -> Array:
-    """Where the base is with the hand where the cube is to be lifted to."""
-    base = seen(env, "rover")
-    base[:, :3] += (seen(env, "aloft") - seen(env, "rover.tool"))[:, :3]
-    return base
+def _taken(robot: str, tool: str, thing: str) -> Callable[[TaskEnv, float], None]:
+    """The robot to where its tool is where a thing is to be lifted to; then the thing into its hand."""
 
+    def beside(env: TaskEnv) -> Array:
+        base = seen(env, robot)
+        base[:, :3] += (seen(env, "aloft") - seen(env, f"{robot}.{tool}"))[:, :3]
+        return base
 
-_TO_COUNTER = _towards("rover", _beside_the_cube)
-_ALOFT = _towards("cube", lambda env: seen(env, "aloft"))
+    there, up = _towards(robot, beside), _towards(thing, lambda env: seen(env, "aloft"))
 
+    def path(env: TaskEnv, share: float) -> None:
+        there(env, min(2.0 * share, 1.0))
+        up(env, max(2.0 * share - 1.0, 0.0))
 
-def _taken(env: TaskEnv, share: float) -> None:
-    """The base to the counter, so that the hand is above the cube; then the cube into the hand."""
-    _TO_COUNTER(env, min(2.0 * share, 1.0))
-    _ALOFT(env, max(2.0 * share - 1.0, 0.0))
+    return path
 
-
-def _in_the_jaws(env: TaskEnv, share: float) -> None:
-    """The dog to where its jaws are above the box; then the box between them, up in the air with the dog."""
-    for_box = env.scene.frame("aloft").pose.copy()
-    start = _STAND.setdefault(id(env), (seen(env, "dog"), seen(env, "box"), seen(env, "dog.between")))
-    dog, box, jaws = start
-    put(env, "dog", dog + share * np.pad(for_box[:, :3] - jaws[:, :3], ((0, 0), (0, 4))))
-    put(env, "box", box + max(2.0 * share - 1.0, 0.0) * np.pad(for_box[:, :3] - box[:, :3], ((0, 0), (0, 4))))
-
-
-_STAND: dict[int, tuple[Array, Array, Array]] = {}
 
 _PACK = [
     _towards(thing, lambda env, side=side, height=height: offset(seen(env, "crate.inside"), y=side, z=height))
@@ -441,7 +430,9 @@ CASES: dict[str, Case] = {
         _towards("dog", lambda env: level(seen(env, "goal"), seen(env, "dog"))), [_shifted("dog", x=0.37)], ()
     ),
     "loco_grasp": Case(
-        _in_the_jaws, [_shifted("box", x=0.05), _shifted("box", z=-0.05), _moving("dog", 0.2)], ("walk",)
+        _taken("dog", "between", "box"),
+        [_shifted("box", x=0.05), _shifted("box", z=-0.05), _moving("dog", 0.2)],
+        ("walk",),
     ),
     "loco_open_door": Case(
         _opening("door.leaf", 0.0, 0.18),
@@ -467,7 +458,9 @@ CASES: dict[str, Case] = {
         unheld=(),
         lasting=True,
     ),
-    "mobile_grasp": Case(_taken, [_shifted("cube", x=0.04), _moving("rover")], ("drive", "reach")),
+    "mobile_grasp": Case(
+        _taken("rover", "tool", "cube"), [_shifted("cube", x=0.04), _moving("rover")], ("drive", "reach")
+    ),
     "mobile_pick_place": Case(
         _towards("cube", lambda env: offset(seen(env, "tray.inside"), z=0.021)),
         [_shifted("cube", x=0.1), _moving("cube"), _moving("rover")],

@@ -43,7 +43,7 @@ class ControlledRobot:
         self.drive_columns = np.array([world.actuators[i].joint - entity.joint_start for i in owned], dtype=int)
         self.dt, self.control_dt = world.physics.dt, world.physics.control_dt
         self._state: State | None = None
-        self._frames: dict[str, tuple[int, Array]] = {}
+        self._frames: dict[str, tuple[int, P.Offset]] = {}
 
     @cached_property
     def kinematics(self) -> RobotModel:
@@ -96,9 +96,9 @@ class ControlledRobot:
         """
         if name not in self._frames:
             frame = find_frame(self.world, f"{self.name}.{name}")
-            self._frames[name] = (frame.body, P.pose(frame.position, frame.quaternion))
+            self._frames[name] = (frame.body, P.Offset(P.pose(frame.position, frame.quaternion)))
         body, local = self._frames[name]
-        return P.compose(self.state.body_pose[_rows(env_ids), body], local)
+        return local.seen_from(self.state.body_pose[_rows(env_ids), body])
 
 
 def _base_of(world: World, robot: Robot, root: int) -> int:

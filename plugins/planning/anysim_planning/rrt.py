@@ -25,7 +25,7 @@ from anysim_planning.goals import Asked, GoalSolver, Reached
 from anysim_planning.lines import straight_line
 from anysim_planning.scene import PlanningWorld, topology
 from anysim_planning.search import connect, dense, edge_check, shortened
-from anysim_planning.time_law import cautious_speeds, timed
+from anysim_planning.time_law import Speeds, cautious_speeds, timed
 
 CHECKED = 0.005
 """[rad] or [m] between the configurations of the last check."""
@@ -44,6 +44,8 @@ class RrtPlanner(MotionPlanner):
     version = "1"
     capabilities = frozenset({"attached", "ik", "independent", "joint_goal", "paired", "straight"})
     fused = frozenset({RequestKind.IK, RequestKind.DUAL_IK})
+    speeds: Speeds = staticmethod(cautious_speeds)
+    """How fast paths are gone along."""
 
     def __init__(self, world: World, solver: str = "numba_ik") -> None:
         """`solver`: of inverse kinematics, by name."""
@@ -180,10 +182,6 @@ class RrtPlanner(MotionPlanner):
         free = edge_check(world, step)
         path = connect(start, goal, world.lower, world.upper, free, rng, budget)
         return path if path is None else shortened(path, free, rng, budget)
-
-    def speeds(self, s: Array, q: Array, first: Array, velocity: Array, acceleration: float) -> Array:
-        """Squares (M,) of the speed along a path, as `time_law.Speeds` has them."""
-        return cautious_speeds(s, q, first, velocity, acceleration)
 
     def _motion(
         self, request: PlanRequest, scene: Scene, world: PlanningWorld, goal: Reached, budget: Budget, passed: Any

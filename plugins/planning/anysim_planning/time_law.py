@@ -105,16 +105,19 @@ def _hermite(q: Array, first: Array, step: float, i: Array, u: Array) -> tuple[A
     position = (
         (2 * u**3 - 3 * u**2 + 1) * a + (u**3 - 2 * u**2 + u) * da + (3 * u**2 - 2 * u**3) * b + (u**3 - u**2) * db
     )
-    slope = (6 * u**2 - 6 * u) * (a - b) + (3 * u**2 - 4 * u + 1) * da + (3 * u**2 - 2 * u) * db
-    return position, slope / step
+    return position, _slope(a, b, da, db, u) / step
 
 
-def hermite_bend(q: Array, first: Array, step: float, u: float) -> tuple[Array, Array]:
+def hermite_derivatives(q: Array, first: Array, step: float, u: float) -> tuple[Array, Array]:
     """First and second derivatives (M - 1, K) of the cubics between all knots, `u` of the way along each."""
     a, b, da, db = q[:-1], q[1:], first[:-1] * step, first[1:] * step
-    slope = (6 * u**2 - 6 * u) * (a - b) + (3 * u**2 - 4 * u + 1) * da + (3 * u**2 - 2 * u) * db
     bend = (12 * u - 6) * (a - b) + (6 * u - 4) * da + (6 * u - 2) * db
-    return slope / step, bend / step**2
+    return _slope(a, b, da, db, u) / step, bend / step**2
+
+
+def _slope(a: Array, b: Array, da: Array, db: Array, u: Array | float) -> Array:
+    """The derivative by `u` of the cubic from `a` to `b` that has `da` and `db` at its ends."""
+    return (6 * u**2 - 6 * u) * (a - b) + (3 * u**2 - 4 * u + 1) * da + (3 * u**2 - 2 * u) * db
 
 
 def _joined(parts: list[Trajectory]) -> Trajectory:

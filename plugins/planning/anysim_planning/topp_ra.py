@@ -10,21 +10,10 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim_planning.rrt import RrtPlanner
-from anysim_planning.time_law import hermite_bend
+from anysim_planning.time_law import hermite_derivatives
 
 _FLAT = 1e-9
 """Change of a joint along the path that counts as none."""
-
-
-class ToppRaPlanner(RrtPlanner):
-    """As `rrt`, but as fast along its paths as the limits of velocity and acceleration permit."""
-
-    name = "rrt_topp_ra"
-    version = "1"
-
-    def speeds(self, s: Array, q: Array, first: Array, velocity: Array, acceleration: float) -> Array:
-        """Squares (M,) of the speed along a path, as `time_law.Speeds` has them."""
-        return reachable_speeds(s, q, first, velocity, acceleration)
 
 
 def reachable_speeds(s: Array, q: Array, first: Array, velocity: Array, acceleration: float) -> Array:
@@ -60,7 +49,7 @@ class _Bounds(NamedTuple):
         """
         along, bent = [], []
         for share in (0.0, 0.5, 1.0):
-            slope, bend = hermite_bend(q, first, step, share)
+            slope, bend = hermite_derivatives(q, first, step, share)
             along.append(slope + 2.0 * share * step * bend)  # x has grown by 2 u on the way
             bent.append(bend)
         for values in (along, bent):
@@ -89,3 +78,11 @@ class _Bounds(NamedTuple):
     def gain(self, i: int, x: float) -> float:
         """The largest u from x at the start of an interval."""
         return float((self.reach[i] - self.fall[i] * x).min())
+
+
+class ToppRaPlanner(RrtPlanner):
+    """As `rrt`, but as fast along its paths as the limits of velocity and acceleration permit."""
+
+    name = "rrt_topp_ra"
+    version = "1"
+    speeds = staticmethod(reachable_speeds)

@@ -308,8 +308,8 @@ class Arm(Mover):
         keys = self.env.streams.episode_seed[ids]
         command = self.command[ids]
         if self._sag is not None:
-            rests = P.norm(self.target[ids, :3] - command[:, :3]) < 1e-6
-            self._sag.learn(ids[rests], (command[:, :3] - tool)[rests])
+            there = P.norm(self.target[ids, :3] - command[:, :3]) < 1e-6
+            self._sag.learn(ids[there], (command[:, :3] - tool)[there])
             command[:, :3] += self._sag.offset[ids]
         found = self.solver.solve(command, self._base(ids), self.joints[ids], random_restarts=0, rng_seeds=keys)
         self.stuck[ids] = ~found.converged

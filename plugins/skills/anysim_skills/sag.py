@@ -1,4 +1,4 @@
-"""Sag of an arm that carries its own weight, made up for once its tool rests."""
+"""Sag of an arm that carries its own weight, made up for once its command is at its end."""
 
 import numpy as np
 
@@ -23,6 +23,6 @@ class Sag:
         self.offset[ids] = 0.0
 
     def learn(self, ids: Array, missing: Array) -> None:
-        """In these envs the tool rests, `missing` (n, 3) [m] before the end of its command."""
+        """In these envs the command is at its end, and the tool `missing` (n, 3) [m] before it."""
         offset = self.offset[ids] + self._share * missing
         self.offset[ids] = offset * np.minimum(1.0, MOST / np.maximum(P.norm(offset), 1e-9))[:, None]

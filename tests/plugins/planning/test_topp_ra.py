@@ -7,7 +7,7 @@ from scipy.optimize import linprog
 from anysim.conventions import Array
 from anysim.model.world import World
 from anysim.planning.motion import Budget, PlanStatus, Scene, Trajectory, motion_planner
-from anysim_planning.time_law import cautious_speeds, hermite_bend, timed
+from anysim_planning.time_law import cautious_speeds, hermite_derivatives, timed
 from anysim_planning.topp_ra import reachable_speeds
 from tests.plugins.planning.conftest import across
 
@@ -30,19 +30,31 @@ def worst(trajectory: Trajectory) -> float:
     return max(speed, float((np.abs(np.diff(rate, axis=0)) / spans).max()) / ACCELERATION)
 
 
+def gone_along(points: Array) -> tuple[Trajectory, tuple[Array, Array, Array], float]:
+    """A trajectory along points; lengths, positions and derivatives of its path; and the time that its speeds take."""
+    asked = list[tuple[Array, Array, Array]]()
+    speeds = list[Array]()
+
+    def law(s: Array, q: Array, first: Array, velocity: Array, acceleration: float) -> Array:
+        asked.append((s, q, first))
+        speeds.append(reachable_speeds(s, q, first, velocity, acceleration))
+        return speeds[-1]
+
+    trajectory = timed(points, SPEED, ACCELERATION, BLEND, law)
+    return trajectory, asked[0], duration(asked[0][0], speeds[0])
+
+
+def duration(s: Array, squares: Array) -> float:
+    """[s] along a path with these squares of its speed."""
+    return float((2.0 * s[1] / np.maximum(np.sqrt(squares[1:]) + np.sqrt(squares[:-1]), 1e-9)).sum())
+
+
 def test_limits_hold_and_ends_are_exact_without_being_slowed_down() -> None:
     for seed in range(100):
         points = path(seed)
-        made = list[Array]()
-
-        def kept(s: Array, *more: Array, made: list[Array] = made) -> Array:
-            made.append(reachable_speeds(s, *more))
-            made.append(np.diff(s)[0] * 2.0 / np.maximum(np.sqrt(made[-1][1:]) + np.sqrt(made[-1][:-1]), 1e-9))
-            return made[0]
-
-        trajectory = timed(points, SPEED, ACCELERATION, BLEND, kept)
+        trajectory, _, planned = gone_along(points)
         assert worst(trajectory) <= 1.0 + 1e-6
-        np.testing.assert_allclose(trajectory.times[-1], made[1].sum(), rtol=1e-9)
+        np.testing.assert_allclose(trajectory.times[-1], planned, rtol=1e-9)
         np.testing.assert_array_equal(trajectory.joint_pos[[0, -1]], points[[0, -1]])
         assert not trajectory.joint_vel[[0, -1]].any()
 
@@ -58,18 +70,12 @@ def test_a_straight_way_takes_the_time_of_full_acceleration_and_full_speed() -> 
 @pytest.mark.parametrize("seed", range(4))
 def test_it_is_as_fast_as_a_linear_program_makes_it(seed: int) -> None:
     """The largest sum of squares of the speed, with limits at five places between two points alone."""
-    asked = list[tuple[Array, Array, Array]]()
-
-    def kept(s: Array, q: Array, first: Array, velocity: Array, acceleration: float) -> Array:
-        asked.append((s, q, first))
-        return reachable_speeds(s, q, first, velocity, acceleration)
-
-    taken = timed(path(seed), SPEED, ACCELERATION, BLEND, kept).times[-1]
-    s, q, first = asked[0]
+    trajectory, (s, q, first), _ = gone_along(path(seed))
+    taken = trajectory.times[-1]
     count, step = len(s), s[1]
     rows, at = list[Array](), np.arange(count - 1)
     for share in np.linspace(0.0, 1.0, 5):
-        slope, bend = hermite_bend(q, first, step, float(share))
+        slope, bend = hermite_derivatives(q, first, step, float(share))
         for joint in range(7):
             block = np.zeros((count - 1, count))  # q' u + q'' x, where u = (x' - x) / (2 step)
             block[at, at] = -slope[:, joint] / (2 * step) + bend[:, joint] * (1 - share)
@@ -81,7 +87,7 @@ def test_it_is_as_fast_as_a_linear_program_makes_it(seed: int) -> None:
     best = linprog(
         -np.ones(count), A_ub=matrix, b_ub=np.full(len(matrix), ACCELERATION), bounds=[(0.0, most) for most in highest]
     ).x
-    least = (2 * step / (np.sqrt(best[1:]) + np.sqrt(best[:-1]))).sum()
+    least = duration(s, best)
     assert taken <= 1.05 * least  # a joint is held within the hull of its quadratic, which the program does not ask for
     assert taken < timed(path(seed), SPEED, ACCELERATION, BLEND, cautious_speeds).times[-1]
 

@@ -11,7 +11,6 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import RobotView
 from anysim_skills.grasping.bi_lift import BiLift
 from anysim_skills.grasping.candidates import TOP_DOWN
-from anysim_skills.grasping.grasp import Metres
 from anysim_skills.grasping.hand import Hand
 
 
@@ -31,13 +30,13 @@ class BiScoop(BiLift):
         partner: RobotView,
         place: Annotated[tuple[float, float, float], Field(description="[m] in the tool's frame")],
         hand: Annotated[str, Field(description="the channel of the fingers")] = "eef",
-        under: Metres = 0.05,
+        hover: Annotated[float, Field(gt=0, description="[m] below the ends, from where the hands come")] = 0.05,
         **options: object,
     ) -> None:
         self.hands = tuple(Hand.of(env, one, channel=hand) for one in (robot, partner))
         self._place = np.array(place)
-        super().__init__(env, robot=robot, partner=partner, **options)  # pyright: ignore[reportArgumentType]
-        self._back = np.array([0.0, 0.0, -under, 0.0, 0.0, 0.0, 0.0])
+        super().__init__(env, robot=robot, partner=partner, hover=hover, **options)  # pyright: ignore[reportArgumentType]
+        self._back = -self._back
         self.movers = (*self.arms, *self.hands)
 
     def _grasps(self, at: Array) -> Array:

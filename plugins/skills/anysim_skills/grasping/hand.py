@@ -86,10 +86,7 @@ class Hand(Mover):
         Raises:
             TaskError: the hand has no such one.
         """
-        if synergy not in self.synergies:
-            known = list(self.synergies)
-            raise TaskError(f"the hand has no synergy '{synergy}'{suggest(synergy, known)} (it has: {listing(known)})")
-        return self.synergies.index(synergy)
+        return _index("synergy", synergy, self.synergies)
 
     def pointing(self, finger: str, synergy: str) -> Array:
         """(K,) joint positions of a posture in which one finger is open.
@@ -97,10 +94,7 @@ class Hand(Mover):
         Raises:
             TaskError: the hand has no such finger or posture.
         """
-        if finger not in self.fingers:
-            known = list(self.fingers)
-            raise TaskError(f"the hand has no finger '{finger}'{suggest(finger, known)} (it has: {listing(known)})")
-        bent = self._finger != self.fingers.index(finger)
+        bent = self._finger != _index("finger", finger, self.fingers)
         return self._opened + bent * self._ways[self.named(synergy)]
 
     def renew(self, ids: Array) -> None:
@@ -160,6 +154,12 @@ class Hand(Mover):
         targets = self._opened + share * self._ways[self.synergy[ids]]
         targets = np.where(np.isnan(self.told[ids]), targets, self.told[ids])
         action[ids, self._slice.start : self._slice.stop] = self._slice.controller.action_for(targets, ids)
+
+
+def _index(what: str, name: str, known: tuple[str, ...]) -> int:
+    if name not in known:
+        raise TaskError(f"the hand has no {what} '{name}'{suggest(name, list(known))} (it has: {listing(list(known))})")
+    return known.index(name)
 
 
 def _fingers_of_bodies(env: TaskEnv, robot: str, fingers: Mapping[int, int]) -> Array:
