@@ -44,7 +44,7 @@ def bind_skill(name: str, params: Mapping[str, Any], env: TaskEnv, path: str) ->
         keys = [(f"{path}.{issue.path}", issue.message) for issue in error.issues]
         raise SpecError([SpecIssue(_place(env, key), key, words) for key, words in keys]) from None
     except BaseException as error:  # noqa: BLE001 - told with the key
-        registry.blame(error, f"{env.located(path)}: the skill '{name}'", registry.origin(skill_class))
+        registry.blame(error, f"{env.located(path)}: the skill '{name}'", registry.origin(skill_class), prefix=True)
 
 
 def _from_file(env: TaskEnv, key: str, path: Path) -> Path:
