@@ -42,6 +42,7 @@ WORDS = {
     "pybullet": "the engine PyBullet",
     "robots": "the robot catalogue with its files, `anysim robot`, `anysim gallery`",
     "sapien": "the engine SAPIEN",
+    "sharded": "worker processes: `engine: {name: pybullet, shards: 2}`",
     "skills": "scripted solutions: grasp, place, push, press, open, close, insert, hand over",
     "tasks": "twenty tasks on a table, with their experts",
     "teleop": "`anysim teleop`: demonstrations, driven by an input device",

@@ -268,7 +268,7 @@ def _env(
 
 def simulation(spec: "RunSpec") -> "SimEngine":
     """The engine that a spec asks for, without a world."""
-    from anysim.engine.sharded.blocks import shard_count
+    from anysim.engine.executor import shard_count
 
     chosen = spec.engine
     shards = shard_count(chosen.shards, engine_class(chosen.name), spec.num_envs)

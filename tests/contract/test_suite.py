@@ -97,7 +97,7 @@ def test_an_engine_in_worker_processes_passes(tmp_path):
     assert _summary(done)[0] > 215
 
 
-@pytest.mark.full  # what an engine computes in processes is compared in tests/engine/test_sharded.py
+@pytest.mark.full  # what an engine computes in processes is compared in tests/plugins/sharded/test_sharded.py
 @pytest.mark.parametrize("name", DYNAMIC)
 def test_an_engine_with_dynamics_lives_in_worker_processes(name, tmp_path):
     """Its own part of the contract that processes could break: life, steps and snapshots."""

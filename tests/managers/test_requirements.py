@@ -9,9 +9,9 @@ import yaml
 
 from anysim.api import check_engine, compile_world, load, make
 from anysim.engine.options import EngineOptions
-from anysim.engine.sharded.engine import sharded
 from anysim.errors import CapabilityError
 from anysim.testing.kinematic import NullEngine
+from anysim_sharded.engine import sharded
 
 YAML = """\
 engine: mujoco

@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import anysim
-from anysim.engine.sharded.engine import ShardedEngine, WorkerWarning
 from anysim.record.collector import Collector
+from anysim_sharded.engine import ShardedEngine, WorkerWarning
 from tests.runtime import light
 
 ENVS, EPISODES = 4, 48

@@ -9,11 +9,11 @@ import pytest
 
 import anysim
 from anysim.conventions import Array
-from anysim.engine.sharded.engine import ShardedEngine, WorkerWarning
 from anysim.record.collector import RERUNS, Collector, EpisodeResult
 from anysim.record.reader import open_trajectory
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
+from anysim_sharded.engine import ShardedEngine, WorkerWarning
 from tests.task.helpers import BLIND
 
 SHARDED = [*BLIND, "record.keep=all", "task.horizon=6", "engine.shards=2"]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from anysim.own_process import Ended, how_it_ended, run_module
+from anysim.processes.own_process import Ended, how_it_ended, run_module
 
 
 @pytest.fixture(autouse=True)

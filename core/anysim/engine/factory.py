@@ -82,7 +82,8 @@ def create_simulation(
         options: those of the engine.
 
     Raises:
-        PluginError: no such engine; lists what is installed and what could be. Or it does not load; says why.
+        PluginError: no such engine, or nothing that makes shards; lists what is installed and what could be. Or it
+            does not load; says why.
         EngineError: it is installed but cannot run here; says what is missing and the remedy.
     """
     chosen = name or default_engine()
@@ -91,11 +92,10 @@ def create_simulation(
         raise EngineError(f"engine '{chosen}' cannot run here: {'; '.join(here.missing)}. {here.remedy}")
     simulation = engine_class(chosen)
     if shards != 1:
-        from anysim.engine.sharded.blocks import shard_count
-        from anysim.engine.sharded.engine import TIMEOUT_S, sharded
+        from anysim.engine.executor import executor, shard_count
 
         count = shard_count(shards, simulation)
         if count != 1:
-            simulation = sharded(simulation, count, TIMEOUT_S if shard_timeout is None else shard_timeout)
+            simulation = executor().engine_class(simulation, count, shard_timeout)
     with registry.using("engines", chosen):
         return simulation(**options)

@@ -146,11 +146,20 @@ class EngineLifecycle(EngineLifetime, Primitives):
             try:
                 self._build_envs()
             except BaseException:
-                self._release()
-                self._world = None
+                self._clear()
                 raise
             self._reset_rows(self._all)
             return self
+
+    def _host(self, world: World, num_envs: int) -> None:
+        """Build envs of which another engine, in another process, checks arguments and keeps presence and commands."""
+        self._install(world, num_envs)
+        try:
+            self._build(world, num_envs)
+        except BaseException:
+            self._world = None
+            raise
+        self._built = True
 
     def _check(self, world: World) -> list[Need]:
         return check(
@@ -182,6 +191,13 @@ class EngineLifecycle(EngineLifetime, Primitives):
         if self._built:
             self._built = False
             self._free()
+
+    def _clear(self) -> None:
+        """Free the world, if there is one."""
+        if self._world is not None:
+            self._retire_state()
+            self._release()
+            self._world = None
 
     def _rebuild(self, world: World) -> None:
         """Replace the world, carrying by name all that both worlds have. On failure the old one is built again."""
@@ -216,10 +232,7 @@ class EngineLifecycle(EngineLifetime, Primitives):
     def destroy(self) -> None:
         """Free the world. May be called any number of times."""
         with self._lock:
-            if self._world is not None:
-                self._retire_state()
-                self._release()
-                self._world = None
+            self._clear()
             self._destroyed = True
 
     def __enter__(self) -> Self:

@@ -138,6 +138,10 @@ class Primitives(ABC):
         """What draws the images (driver, software or GPU), for `anysim doctor`; empty if nothing does."""
         return ""
 
+    def processor_times(self) -> tuple[float, ...]:
+        """Processor time [s] that each process which steps envs for this one has spent so far, for benchmarks."""
+        return ()
+
     def raw_loop(self) -> Callable[[int], None] | None:
         """The engine's own loop without anysim, for benchmarks: a function of the number of physics steps.
 

@@ -14,8 +14,6 @@ from anysim.engine.primitives import Primitives
 from anysim.errors import EngineError
 
 _PACKAGE = "anysim.engine."
-_WHOLE = f"{_PACKAGE}sharded."
-"""Its engine is a whole one, and nobody's base."""
 _STORE = bytes([dis.opmap["STORE_ATTR"]])
 
 
@@ -59,7 +57,6 @@ def reserved(engine: type) -> dict[str, str]:
     names: dict[str, str] = {}
     for base in reversed(engine.__mro__):
         ours = base.__module__.startswith(_PACKAGE) and base is not Primitives
-        ours = ours and not base.__module__.startswith(_WHOLE)
         if ours and not isinstance(vars(base).get("name"), str):
             names |= dict.fromkeys(_own(base) - names.keys(), base.__name__)
     return names

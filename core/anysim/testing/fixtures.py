@@ -1,14 +1,15 @@
 """The fixtures of the contract suite: the engine under test, with worlds built on demand and freed afterwards."""
 
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from typing import Any, Protocol
 
 import pytest
 
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capability
+from anysim.engine.executor import executor
 from anysim.engine.requirements import needs_of
-from anysim.engine.sharded.pool import keeping_workers
 from anysim.model.world import World
 from anysim.testing import plugin
 from anysim.testing.engines import require_drawing
@@ -30,9 +31,9 @@ def engine_class(pytestconfig: pytest.Config) -> type[SimEngine]:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _workers() -> Iterator[None]:
+def _workers(pytestconfig: pytest.Config) -> Iterator[None]:
     """An engine in worker processes is made for each test; its workers serve one after the other."""
-    with keeping_workers():
+    with executor().keeping() if pytestconfig.getoption("shards") else nullcontext():
         yield
 
 

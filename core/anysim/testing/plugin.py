@@ -108,9 +108,9 @@ def engine_class(config: pytest.Config) -> Any:
     engine = load_engine(str(config.getoption("engine")))
     if not (shards := config.getoption("shards")):
         return engine
-    from anysim.engine.sharded.engine import sharded
+    from anysim.engine.executor import executor
 
-    return sharded(engine, shards)
+    return executor().engine_class(engine, shards, None)
 
 
 def load_engine(name: str) -> Any:

@@ -6,7 +6,6 @@ from contextlib import ExitStack
 from typing import NamedTuple
 
 from anysim.engine.base import SimEngine
-from anysim.engine.sharded.engine import ShardedEngine
 from anysim.errors import EngineError
 from anysim_bench.step import control_loop, panda_and_boxes
 
@@ -70,13 +69,10 @@ def shard_gains(engine_name: str, num_envs: int, shards: Sequence[int], rounds: 
 
 def _timed(engine: SimEngine, loop: Callable[[], None], calls: int) -> tuple[float, float]:
     """Wall time, and processor time of the parent and the slowest worker one after the other [s]."""
-    workers = _processor_times(engine)
+    workers = engine.processor_times()
     wall, cpu = time.perf_counter(), time.process_time()
     for _ in range(calls):
         loop()
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-    return wall, cpu + max(after - before for after, before in zip(_processor_times(engine), workers, strict=True))
-
-
-def _processor_times(engine: SimEngine) -> tuple[float, ...]:
-    return engine.processor_times() if isinstance(engine, ShardedEngine) else (0.0,)
+    spent = [after - before for after, before in zip(engine.processor_times(), workers, strict=True)]
+    return wall, cpu + max(spent, default=0.0)

@@ -10,9 +10,9 @@ from importlib import import_module
 from multiprocessing.connection import Connection
 from operator import attrgetter
 
-from anysim.engine.sharded.shared_memory import Layout, SharedArrays
-from anysim.own_process import hang_on
 from anysim.planning.motion import Budget, MotionPlanner, PlanStatus
+from anysim.processes.own_process import hang_on
+from anysim.processes.shared_memory import Layout, SharedArrays
 from anysim_planning.answering import Job, PlannerHost, planner_maker
 from anysim_planning.queued import BATCH
 

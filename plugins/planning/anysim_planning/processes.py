@@ -9,13 +9,12 @@ import os
 import sys
 from time import perf_counter
 
-from anysim.engine.sharded.pool import THREAD_POOLS
-from anysim.engine.sharded.shared_memory import SharedArrays
-from anysim.engine.sharded.worker_handle import Worker, WorkerLost
 from anysim.errors import AnysimError
 from anysim.model.world import World
 from anysim.planning.motion import PlanAnswer, PlanStatus
 from anysim.planning.service import PlanFuture
+from anysim.processes.shared_memory import SharedArrays
+from anysim.processes.worker_handle import THREAD_POOLS, Worker, WorkerLost
 from anysim_planning.answering import PlannerMaker, planner_maker
 from anysim_planning.planner_process import NOTES
 from anysim_planning.queued import GRACE, QueuedService, Seat, overdue

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anysim.engine.sharded.engine import sharded
 from anysim.errors import CapabilityError, EngineError
 from anysim.model.world import Body, BodyKind, Box, JointType, Sphere, Surface, World
 from anysim.testing.sketch import Sketch, inertial
@@ -15,6 +14,7 @@ from anysim_sapien.exclusions import Group, apart_of
 from anysim_sapien.layout import Layout
 from anysim_sapien.meeting import Meeting
 from anysim_sapien.surfaces import copies_of
+from anysim_sharded.engine import sharded
 
 
 def rule(a, b):

@@ -17,9 +17,9 @@ from anysim.model.world import World
 from anysim.planning.motion import Budget, PlanAnswer, PlanStatus, Scene, motion_planner
 from anysim_planning import queued
 from anysim_planning.processes import ProcessService
-from tests.engine.shards_help import alive, children, descriptors, gone
 from tests.plugins.planning.conftest import across, down, reach
 from tests.plugins.planning.scripted import DIES, HANGS, RAISES, SCENE, SLEEPS, Scripted, Together, asked
+from tests.plugins.sharded.shards_help import alive, children, descriptors, gone
 
 
 @pytest.fixture(autouse=True)

@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anysim.engine.sharded.engine import sharded
-from anysim.engine.sharded.pool import keeping_workers
 from anysim.testing import worlds
 from anysim.testing.compare import assert_same, read
 from anysim.testing.kinematic import NullEngine
-from tests.engine.shards_help import PROC, alive, children, gone, segments
+from anysim_sharded.engine import sharded
+from anysim_sharded.pool import keeping_workers
+from tests.plugins.sharded.shards_help import PROC, alive, children, gone, segments
 
 pytestmark = pytest.mark.skipif(not PROC.exists(), reason="no /proc here: processes cannot be seen from outside")
 
@@ -196,7 +196,7 @@ def test_a_fork_does_not_keep_the_workers(tmp_path, shared_memory):
 def test_the_module_of_the_worker_is_light():
     """A worker imports what it needs: starting one costs little more than Python and numpy."""
     code = (
-        "import sys; import anysim.engine.sharded.worker; "
+        "import sys; import anysim_sharded.worker; "
         "loaded = {name.split('.')[0] for name in sys.modules}; "
         "assert not loaded & {'mujoco', 'pybullet', 'sapien', 'scipy', 'trimesh', 'numba', 'typer'}, loaded"
     )

@@ -19,14 +19,15 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.cameras import CameraView
 from anysim.engine.control import Control
-from anysim.engine.sharded.blocks import Blocks, joined, joined_by_name, joined_contacts, rows_of, usable_cores
-from anysim.engine.sharded.hosted import News
-from anysim.engine.sharded.pool import START_S, Crew, dismiss, hire, importable_path
-from anysim.engine.sharded.shared_memory import SharedArrays, state_layout
-from anysim.engine.sharded.worker_handle import WorkerLost
+from anysim.engine.executor import usable_cores
 from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
 from anysim.errors import EngineError, EngineFailure
 from anysim.model.world import World
+from anysim.processes.shared_memory import SharedArrays
+from anysim.processes.worker_handle import WorkerLost
+from anysim_sharded.blocks import Blocks, joined, joined_by_name, joined_contacts, rows_of, state_layout
+from anysim_sharded.hosted import News
+from anysim_sharded.pool import START_S, Crew, dismiss, hire, importable_path
 
 TIMEOUT_S = 300.0
 """The longest that a worker may take for a control step or another command, but to build or draw, if not set [s]."""
@@ -84,7 +85,7 @@ class ShardedEngine(SimEngine):
         return self._lost.copy()
 
     def processor_times(self) -> tuple[float, ...]:
-        """Processor time [s] that each worker has spent so far, for benchmarks."""
+        """Those of the workers."""
         with self._lock:
             self._require_world()
             return tuple(self._ask("processor_time", self._everyone()).values())

@@ -5,16 +5,16 @@ import warnings
 import numpy as np
 import pytest
 
-from anysim.engine import factory
+from anysim.engine import executor, factory
 from anysim.engine.capability import Capability
-from anysim.engine.sharded.blocks import Blocks, joined, shard_count, usable_cores
-from anysim.engine.sharded.engine import ShardedEngine, sharded
 from anysim.errors import EngineError, SnapshotError
 from anysim.testing import worlds
 from anysim.testing.compare import assert_same, play, read, spread, tape
 from anysim.testing.engines import require_engine
 from anysim.testing.kinematic import NullEngine
-from tests.engine.shards_help import children, descriptors, program
+from anysim_sharded.blocks import Blocks, joined
+from anysim_sharded.engine import ShardedEngine, sharded
+from tests.plugins.sharded.shards_help import children, descriptors, program
 from tests.task.helpers import arm
 
 
@@ -162,16 +162,14 @@ def test_more_shards_than_envs_are_not_started():
 
 def test_auto(monkeypatch):
     """One per usable core, at most one per env; none where the engine is parallel by itself."""
-    from anysim.engine.sharded import blocks as module
-
-    monkeypatch.setattr(module, "usable_cores", lambda: 6)
+    monkeypatch.setattr(executor, "usable_cores", lambda: 6)
     parallel = type("Parallel", (NullEngine,), {"parallel": True})
-    assert shard_count("auto", NullEngine) == 6
-    assert shard_count("auto", NullEngine, 4) == 4
-    assert shard_count("auto", parallel, 4) == 1
-    assert shard_count(3, parallel, 4) == 3
-    assert shard_count(3, NullEngine, 1) == 1
-    assert usable_cores() >= 1
+    assert executor.shard_count("auto", NullEngine) == 6
+    assert executor.shard_count("auto", NullEngine, 4) == 4
+    assert executor.shard_count("auto", parallel, 4) == 1
+    assert executor.shard_count(3, parallel, 4) == 3
+    assert executor.shard_count(3, NullEngine, 1) == 1
+    assert executor.usable_cores() >= 1
 
 
 def test_create_simulation_takes_shards(monkeypatch):

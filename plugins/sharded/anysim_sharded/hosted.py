@@ -11,9 +11,9 @@ from anysim.engine.base import SimEngine
 from anysim.engine.cameras import CameraView
 from anysim.engine.control import Control
 from anysim.engine.parameters import PARAMETERS
-from anysim.engine.sharded.shared_memory import Layout, SharedArrays
 from anysim.engine.state import SnapshotLevel
 from anysim.model.world import World
+from anysim.processes.shared_memory import Layout, SharedArrays
 
 
 class News(NamedTuple):
@@ -57,19 +57,11 @@ class HostedEngine(SimEngine):
         """Build the envs [first, stop) of the parent, with the memory of a descriptor."""
         self.free_hosted()
         self.__shard.memory, self.__shard.rows = SharedArrays(layout, descriptor), slice(first, stop)
-        self._install(world, stop - first)
-        try:
-            self._build(world, self.num_envs)
-        except BaseException:
-            self._world = None
-            raise
+        self._host(world, stop - first)
 
     def free_hosted(self) -> None:
         """Free the world, if there is one."""
-        if self._world is not None:
-            self._retire_state()
-            self._free()
-            self._world = None
+        self._clear()
         if self.__shard.memory is not None:
             self.__shard.memory.close()
             self.__shard.memory = None

@@ -11,17 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from anysim.engine.base import SimEngine
-from anysim.engine.sharded.blocks import Blocks
-from anysim.engine.sharded.shared_memory import SharedArrays
-from anysim.engine.sharded.worker_handle import Worker, WorkerLost
 from anysim.errors import AnysimError, EngineError, EngineFailure
 from anysim.model.world import World
+from anysim.processes.shared_memory import SharedArrays
+from anysim.processes.worker_handle import THREAD_POOLS, Worker, WorkerLost
+from anysim_sharded.blocks import Blocks
 
 START_S = 300.0
 """The least time to load an engine, to build a world and to draw: a short limit is meant for steps [s]."""
-
-THREAD_POOLS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "LP_NUM_THREADS")
-"""The variables that size the thread pools of the libraries engines compute and draw with."""
 
 Answers = tuple[dict[int, Any], dict[int, AnysimError], dict[int, WorkerLost]]
 """Results, errors that engines raised, and workers that were lost, by worker."""
@@ -86,7 +83,8 @@ class Crew:
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir()
         limits = {name: str(self._threads) for name in THREAD_POOLS}
-        self._workers[k] = Worker({**limits, **os.environ, "TMPDIR": str(folder)}, self._timeout)
+        environment = {**limits, **os.environ, "TMPDIR": str(folder)}
+        self._workers[k] = Worker(environment, self._timeout, "anysim_sharded.worker")
 
     def _load(self, places: Iterable[int]) -> None:
         self._settle({k: ("load", None, self._path, self._options) for k in places})

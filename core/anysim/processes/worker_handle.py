@@ -19,7 +19,7 @@ from typing import Any
 
 from anysim import errors
 from anysim.errors import AnysimError, EngineError
-from anysim.own_process import Lifeline, how_it_ended
+from anysim.processes.own_process import Lifeline, how_it_ended
 
 _PROGRAM = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
@@ -27,6 +27,10 @@ _PROGRAM = (
 )
 GRACE_S = 10.0
 """How long a worker may take to free its engine and end by itself [s]."""
+
+
+THREAD_POOLS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "LP_NUM_THREADS")
+"""The variables that size the thread pools of the libraries engines compute and draw with."""
 
 
 class WorkerLost(Exception):
@@ -39,9 +43,7 @@ class Worker:
     `module` has `main(connection, lifeline)`, which gets two file descriptors.
     """
 
-    def __init__(
-        self, environment: dict[str, str], timeout_s: float, module: str = "anysim.engine.sharded.worker"
-    ) -> None:
+    def __init__(self, environment: dict[str, str], timeout_s: float, module: str) -> None:
         self._timeout = timeout_s
         self._sent = 0
         own, theirs = socket.socketpair()

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anysim.engine.sharded.engine import WorkerWarning, sharded
 from anysim.errors import CapabilityError, EngineError
 from anysim.testing import worlds
 from anysim.testing.compare import FIELDS, assert_same, play, read, spread, tape
 from anysim.testing.kinematic import NullEngine
-from tests.engine.shards_help import alive, children, descriptors
+from anysim_sharded.engine import WorkerWarning, sharded
+from tests.plugins.sharded.shards_help import alive, children, descriptors
 from tests.task.helpers import arm
 
 
@@ -242,7 +242,7 @@ def test_an_interrupted_call_leaves_a_usable_engine(moody, monkeypatch):
     """Ctrl-C while the workers step: their late answers are not taken for those to the next question."""
     alone, engine = _pair()
     with alone, engine:
-        from anysim.engine.sharded.worker_handle import Worker
+        from anysim.processes.worker_handle import Worker
 
         def interrupted(*_):
             raise KeyboardInterrupt

@@ -1,16 +1,14 @@
 """Blocks of envs by worker, and joins of the rows of several workers into one array."""
 
-import os
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.state import ContactPoints
-
-if TYPE_CHECKING:
-    from anysim.engine.base import SimEngine
+from anysim.model.world import World
+from anysim.processes.shared_memory import Layout
 
 
 class WorkerRows(NamedTuple):
@@ -41,11 +39,6 @@ class Blocks:
     def split_query(self, ids: Array) -> list[WorkerRows]:
         """The same; a query for no env goes to the first worker, which knows the shapes of nothing."""
         return self.split(ids) or [WorkerRows(0, np.arange(0), ids)]
-
-
-def usable_cores() -> int:
-    """The cores that this process may run on."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def joined(pieces: Sequence[tuple[Array, Array]], size: int) -> Array:
@@ -79,10 +72,21 @@ def rows_of(rows: Array, *arrays: Array | None) -> list[Array | None]:
     return [None if array is None else array[rows] for array in arrays]
 
 
-def shard_count(shards: int | Literal["auto"], engine_class: "type[SimEngine]", num_envs: int | None = None) -> int:
-    """How many workers `shards` means: `auto` is one per usable core, and one for an engine that is parallel itself.
-
-    With `num_envs`, no more than that.
-    """
-    wanted = shards if isinstance(shards, int) else 1 if engine_class.parallel else usable_cores()
-    return wanted if num_envs is None else min(wanted, num_envs)
+def state_layout(world: World, num_envs: int) -> Layout:
+    """The arrays of an engine: the commands, the wrenches and the fields of a `State`, of all envs."""
+    n, a, b, j = num_envs, len(world.actuators), len(world.bodies), len(world.joints)
+    double = np.dtype(np.float64).str
+    return {
+        "control.position": ((n, a), double),
+        "control.velocity": ((n, a), double),
+        "control.effort": ((n, a), double),
+        "control.mode": ((n, a), np.dtype(np.int8).str),
+        "wrench": ((n, b, 6), double),
+        "body_pose": ((n, b, 7), double),
+        "body_twist": ((n, b, 6), double),
+        "joint_pos": ((n, j), double),
+        "joint_vel": ((n, j), double),
+        "joint_effort": ((n, j), double),
+        "contact_force": ((n, len(world.contact_sensors), 3), double),
+        "fault": ((n,), np.dtype(bool).str),
+    }

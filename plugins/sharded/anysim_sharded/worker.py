@@ -11,11 +11,11 @@ from collections.abc import Mapping
 from multiprocessing.connection import Connection
 from typing import Any
 
-from anysim.engine.sharded.hosted import HostedEngine, hosted_class
-from anysim.engine.sharded.shared_memory import Layout
 from anysim.errors import AnysimError
 from anysim.model.world import World
-from anysim.own_process import hang_on
+from anysim.processes.own_process import hang_on
+from anysim.processes.shared_memory import Layout
+from anysim_sharded.hosted import HostedEngine, hosted_class
 
 LINGER_S = 3e-4
 """How long a worker waits awake for its next message [s]. One that sleeps is often woken on a core that is in use, and

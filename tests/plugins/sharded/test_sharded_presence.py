@@ -6,10 +6,10 @@ import signal
 import numpy as np
 import pytest
 
-from anysim.engine.sharded.engine import WorkerWarning, sharded
 from anysim.testing.compare import FIELDS, assert_same, play, read, tape
 from anysim.testing.engines import require_engine
 from anysim.testing.varying import having, random_presence, varied
+from anysim_sharded.engine import WorkerWarning, sharded
 
 WITHOUT_FAULTS = [field for field in FIELDS if field != "fault"]
 

@@ -12,32 +12,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.model.world import World
 
 Layout = Mapping[str, tuple[tuple[int, ...], str]]
 """Shape and dtype of each array by name."""
 
 _ALIGNMENT = 64  # bytes of a cache line
-
-
-def state_layout(world: World, num_envs: int) -> Layout:
-    """The arrays of an engine: the commands, the wrenches and the fields of a `State`, of all envs."""
-    n, a, b, j = num_envs, len(world.actuators), len(world.bodies), len(world.joints)
-    double = np.dtype(np.float64).str
-    return {
-        "control.position": ((n, a), double),
-        "control.velocity": ((n, a), double),
-        "control.effort": ((n, a), double),
-        "control.mode": ((n, a), np.dtype(np.int8).str),
-        "wrench": ((n, b, 6), double),
-        "body_pose": ((n, b, 7), double),
-        "body_twist": ((n, b, 6), double),
-        "joint_pos": ((n, j), double),
-        "joint_vel": ((n, j), double),
-        "joint_effort": ((n, j), double),
-        "contact_force": ((n, len(world.contact_sensors), 3), double),
-        "fault": ((n,), np.dtype(bool).str),
-    }
 
 
 class SharedArrays:
