@@ -34,7 +34,7 @@ ANY_IN_SIGNATURES = 132
 """How many parameters and results of core's public functions may name `Any`, as a whole (72) or inside, as
 `Mapping[str, Any]` does; the number only falls."""
 
-SENTENCE = re.compile(r"(What|Who|Whose|Where|How|Whether|When|Why|From|Whoever)\b")
+SENTENCE = re.compile(r"(What|Who|Whose|Where|How|Whether|When|Why|From|Whoeve[r])\b")
 PUBLIC = frozenset({"anysim.skills.living_bank"})
 """Documented for authors of skills, and used by one distribution so far: banks that change while a run goes on."""
 

@@ -233,7 +233,7 @@ class ClaimsDynamics(Right):
 
 
 class PresenceOfAll(Right):
-    """A change of who is there resets the other envs as well."""
+    """A change of what is present resets the other envs as well."""
 
     caught_by = ("test_varying.py::test_other_envs_do_not_notice",)
 

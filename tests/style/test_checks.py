@@ -215,7 +215,15 @@ def test_words_of_one_machine_are_found(make_tree: MakeTree, text: str) -> None:
     assert [(fault.path.as_posix(), fault.line) for fault in faults] == [("docs/page.md", 2)]
 
 
-@pytest.mark.parametrize("text", ["~/data", "$HOME/data", "the root/ folder", "https://x.com/home/ada", "a/work/b"])
+@pytest.mark.parametrize("text", ["for whoeve" + "r reads it", "Who is ther" + "e now", "nobody'" + "s wish"])
+def test_persons_for_things_are_found(make_tree: MakeTree, text: str) -> None:
+    (fault,) = words.check(make_tree({"docs/page.md": f"first\n{text}\n"}))
+    assert (fault.line, "not plain English" in fault.message) == (2, True)
+
+
+@pytest.mark.parametrize(
+    "text", ["~/data", "$HOME/data", "the root/ folder", "https://x.com/home/ada", "a/work/b", "it is there"]
+)
 def test_other_paths_are_allowed(make_tree: MakeTree, text: str) -> None:
     assert list(words.check(make_tree({"docs/page.md": text}))) == []
 
