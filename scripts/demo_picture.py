@@ -61,7 +61,7 @@ def film(videos: Sequence[Path], out: Path) -> None:
     import numpy as np
     from PIL import Image
 
-    from anysim.cli.montage import montage
+    from anysim_parity.world_pictures import montage
 
     shown = []
     fps = 25.0

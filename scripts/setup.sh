@@ -45,7 +45,7 @@ find_uv() {
 }
 
 # Install what the arguments say. A terminal gets the installer's progress bars; a pipe its lines, without the list of
-# every package. Byte code is compiled here and not by whoever comes first: without it a process takes twice as long to
+# every package. Byte code is compiled here and not by the first process: without it a process takes twice as long to
 # start, and where PYTHONDONTWRITEBYTECODE is set or .venv is read-only it would be missing for good.
 install() {
     set -- "$uv" pip install --python .venv/bin/python --constraint constraints.txt --compile-bytecode "$@"

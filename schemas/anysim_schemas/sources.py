@@ -106,7 +106,7 @@ class Reader:
         if node.value is None:
             node = Node({}, node.mark)
         if not isinstance(node.value, dict):
-            # not which value: the file may be no spec at all, and nobody's business
+            # not which value: the file may be no spec at all, and its text is not to be shown
             found = describe(node.plain()) if isinstance(node.value, list) else "a single value"
             self.fatal.append(Fault(node.mark, "", f"a spec is a mapping of keys at its top, got {found}"))
             return None

@@ -7,24 +7,36 @@ from collections.abc import Collection, Iterator
 from functools import cache
 from pathlib import Path
 
-from checks.tree import Fault, Tree
+from checks.tree import Fault, Member, Tree
 
 CORE = Path("core/anysim")
 TESTING = CORE / "testing"
-CORE_LINES, CORE_FILES = 30_000, 222
-"""What there is, and 2 % for contracts to come. What looks on, and what reads one format of files, is a plugin."""
+CORE_LINES, CORE_FILES = 30_000, 219
+"""What a run imports; what looks on, and what reads one format of files, is a plugin. Not 210 files: of those that are
+left under 50 lines most serve several neighbours, and the one neighbour of the others is full (`task/scene`,
+`record/collector`) or about something else."""
 PACKAGE_LINES, PACKAGE_MODULES = 4_000, 26
 BACKEND_LINES = {"mujoco": 2_310, "pybullet": 3_300, "sapien": 3_700}
 """To come down to 2,500 each, by what engines with one scene per env share."""
+PLUGIN_LINES = 3_000
+"""Of a plugin, and of each folder of a larger one, where what is deeper counts too."""
+LARGE_PLUGINS = {
+    "assets": 3_890,  # builders of one kind (things, rooms, ground) that share their shapes and their parameters
+    "control": 3_600,  # controllers of tools, vehicles and cameras: one kind of entry points, with an extra a solver
+    "parity": 3_650,  # one comparison: its layers and probes are read together, and its page shows all of them
+    "skills": 8_000,  # one library of arms and phases that every group of skills builds on, a folder a group
+}
+"""Plugins that stay whole although they are larger, with what they may have; the numbers only fall."""
 
 FMT_SKIPS = 77
 """How many `# fmt: skip` there may be; it marks tables alone, and the number only falls."""
-ANY_IN_SIGNATURES = 75
-"""How many parameters and results of core's public functions may be `Any`; the number only falls."""
+ANY_IN_SIGNATURES = 132
+"""How many parameters and results of core's public functions may name `Any`, as a whole (72) or inside, as
+`Mapping[str, Any]` does; the number only falls."""
 
-SENTENCE = re.compile(r"(What|Who|Whose|Where|How|Whether|When|Why|From|Whoever)\b")
-PUBLIC = frozenset({"anysim.model.affordance_lookup", "anysim.planning.scenes", "anysim.skills.living_bank"})
-"""Documented modules for users and for authors of plugins, which core itself does not need."""
+SENTENCE = re.compile(r"(What|Who|Whose|Where|How|Whether|When|Why|From|Whoeve[r])\b")
+PUBLIC = frozenset({"anysim.skills.living_bank"})
+"""Documented for authors of skills, and used by one distribution so far: banks that change while a run goes on."""
 
 LOCAL_NAMES = frozenset({"__init__", "__main__", "base"})
 """File names that are the same in many packages on purpose."""
@@ -85,6 +97,23 @@ def _sizes(tree: Tree) -> Iterator[Fault]:
             limit = BACKEND_LINES.get(member.folder.name, 2_500)
             if lines > limit:
                 yield Fault(package, 0, f"{lines} lines, {limit} at most: what two engines share belongs into core")
+        if member.folder.parts[0] == "plugins":
+            yield from _plugin_size(tree, member)
+
+
+def _plugin_size(tree: Tree, member: Member) -> Iterator[Fault]:
+    package = member.folder / member.package
+    folders: dict[Path, int] = defaultdict(int)
+    for path in tree.under("plugins", suffixes=(".py",)):
+        if package in path.parents:
+            inside = path.relative_to(package).parts[:-1]
+            folders[package.joinpath(*inside[:1])] += _lines(tree, path)
+    lines, limit = sum(folders.values()), LARGE_PLUGINS.get(member.folder.name, PLUGIN_LINES)
+    if lines > limit:
+        yield Fault(package, 0, f"{lines} lines, {limit} at most: split it into distributions")
+    for folder, lines in folders.items() if limit > PLUGIN_LINES else ():
+        if lines > PLUGIN_LINES:
+            yield Fault(folder, 0, f"{lines} lines, {PLUGIN_LINES} at most: split the group")
 
 
 def _dotted(path: Path) -> str:
@@ -179,13 +208,17 @@ def _falling(tree: Tree) -> Iterator[Fault]:
     anything = sum(_anys(node) for path in _core(tree) for node in ast.walk(_module(tree, path)))
     if anything > ANY_IN_SIGNATURES:
         yield Fault(
-            CORE, 0, f"`Any` stands {anything} times in public signatures, {ANY_IN_SIGNATURES} at most: name the type"
+            CORE, 0, f"`Any` is in {anything} hints of public signatures, {ANY_IN_SIGNATURES} at most: name the type"
         )
 
 
 def _anys(node: ast.AST) -> int:
-    """How many parameters and results of a public function are `Any` as a whole."""
+    """How many parameters and results of a public function name `Any`."""
     if not isinstance(node, ast.FunctionDef) or node.name.startswith("_"):
         return 0
     hints = [argument.annotation for argument in [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]]
-    return sum(isinstance(hint, ast.Name) and hint.id == "Any" for hint in [*hints, node.returns])
+    return sum(_names_any(hint) for hint in [*hints, node.returns] if hint is not None)
+
+
+def _names_any(hint: ast.expr) -> bool:
+    return any(isinstance(part, ast.Name) and part.id == "Any" for part in ast.walk(hint))

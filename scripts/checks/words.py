@@ -1,4 +1,4 @@
-"""Words that no file may hold: they would tie the repository to one machine or one mirror.
+"""Words that no file may hold: they would tie the repository to one machine or one mirror, or say a person for a thing.
 
 The patterns are written so that they do not match themselves.
 """
@@ -18,11 +18,12 @@ FORBIDDEN = (
         r"|debia[n]\.org/debian|archive\.ubunt[u]\.com|crate[s]\.io)\b",
         "the host of a package registry; name the package alone",
     ),
+    (r"(?i)\bwhoeve[r]\b|\bwho is ther[e]\b|\bnobody'[s]\b", "not plain English here; name the person, or the thing"),
 )
 
 
 def check(tree: Tree) -> Iterator[Fault]:
-    """Machine paths and registry hosts, in any text file."""
+    """Machine paths, registry hosts and words for persons, in any text file."""
     rules = [(re.compile(pattern), why) for pattern, why in FORBIDDEN]
     for path in tree.files:
         for number, line in enumerate((tree.text(path) or "").splitlines(), 1):

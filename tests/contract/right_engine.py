@@ -34,6 +34,6 @@ class Right(NullEngine):
         for _ in range(n_steps):
             if self._wrench is not None:
                 push = self._wrench[rows] * self.world.physics.dt
-                self._twists[rows, :, :3] += push[..., :3] / self._mass
-                self._twists[rows, :, 3:] += push[..., 3:] / self._moment
+                self._envs.twists[rows, :, :3] += push[..., :3] / self._mass
+                self._envs.twists[rows, :, 3:] += push[..., 3:] / self._moment
             super()._step(1, ids)

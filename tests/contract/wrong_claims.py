@@ -300,7 +300,7 @@ class SaysABareNumber(Right):
 
 
 class DeclaresAnOddNumber(Right):
-    """Declares an error that nobody measures."""
+    """Declares an error without a measurement."""
 
     capabilities = Capabilities(
         {**MujocoEngine.capabilities.supported, C.RESTITUTION: approximately("{charm:g} of charm", charm=0.1)}

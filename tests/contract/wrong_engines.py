@@ -28,9 +28,9 @@ class ResetLeavesVelocities(Right):
     caught_by = ("test_lifecycle.py::test_reset_leaves_nothing_over",)
 
     def _reset(self, ids):
-        twists, velocity = self._twists[ids], self._velocity[ids]
+        twists, velocity = self._envs.twists[ids], self._envs.velocity[ids]
         super()._reset(ids)
-        self._twists[ids], self._velocity[ids] = twists, velocity
+        self._envs.twists[ids], self._envs.velocity[ids] = twists, velocity
 
 
 class StandsStill(Right):
@@ -70,8 +70,10 @@ class ForgetsCommands(Right):
 
     def _step(self, n_steps, ids):
         super()._step(n_steps, ids)
-        here = self._position[:, self._driven]
-        self._control = Control(here, np.zeros_like(here), np.zeros_like(here), np.zeros(here.shape, dtype=np.int8))
+        here = self._envs.position[:, self._envs.driven]
+        self._envs.control = Control(
+            here, np.zeros_like(here), np.zeros_like(here), np.zeros(here.shape, dtype=np.int8)
+        )
 
 
 class WrenchesStay(Right):
@@ -148,8 +150,8 @@ class ParametersForgottenAtReset(Right):
 
     def _reset(self, ids):
         super()._reset(ids)
-        for name, values in self._table.values.items():
-            values[ids] = self._table.default(name)
+        for name, values in self._envs.table.values.items():
+            values[ids] = self._envs.table.default(name)
 
 
 class SwallowsMisuse(Right):
@@ -170,7 +172,7 @@ class HalfDone(Right):
     caught_by = ("test_parameters.py::test_bounds_are_kept",)
 
     def set_parameters(self, name, values, env_ids=None, indices=None):
-        self._table.values[name][0, 0] = np.asarray(values, dtype=float).reshape(-1)[0]
+        self._envs.table.values[name][0, 0] = np.asarray(values, dtype=float).reshape(-1)[0]
         super().set_parameters(name, values, env_ids, indices)
 
 
@@ -181,7 +183,7 @@ class DependsOnNumber(Right):
 
     def _step(self, n_steps, ids):
         super()._step(n_steps, ids)
-        self._position *= 1.0 + 1e-15 * self.num_envs
+        self._envs.position *= 1.0 + 1e-15 * self.num_envs
 
 
 class DestroysOnce(Right):
@@ -205,7 +207,7 @@ class SharedCommands(Right):
         self._shared[control.position.shape] = Control(*(part.copy() for part in control))
 
     def _step(self, n_steps, ids):
-        self._control = self._shared[self._commands.control.position.shape]
+        self._envs.control = self._shared[self._commands.control.position.shape]
         super()._step(n_steps, ids)
 
 
@@ -215,11 +217,11 @@ class Races(Right):
     caught_by = ("test_threads.py::test_steps_from_threads_add_up",)
 
     def _step(self, n_steps, ids):
-        before = self._roots.copy()
+        before = self._envs.roots.copy()
         self._lock.release()
         time.sleep(1e-4)
         self._lock.acquire()
-        self._roots = before
+        self._envs.roots = before
         super()._step(n_steps, ids)
 
 
@@ -261,7 +263,7 @@ class DependsOnProcess(Right):
 
     def _step(self, n_steps, ids):
         super()._step(n_steps, ids)
-        self._twists *= 1.0 + 1e-12 * os.getpid()
+        self._envs.twists *= 1.0 + 1e-12 * os.getpid()
 
 
 class MovesOnRefusal(Right):

@@ -22,7 +22,7 @@ class Aliasing(Right):
     )
 
     def _read(self, name):
-        return self._position[:] if name == "joint_pos" else super()._read(name)
+        return self._envs.position[:] if name == "joint_pos" else super()._read(name)
 
 
 class ScalarFirst(Right):
@@ -86,7 +86,7 @@ class BodyAxes(Right):
     def _write_bodies(self, ids, bodies, pose, twist):
         super()._write_bodies(ids, bodies, pose, None)
         if twist is not None:
-            turn = self._roots[np.ix_(ids, bodies)][..., 3:]
+            turn = self._envs.roots[np.ix_(ids, bodies)][..., 3:]
             world = np.concatenate([P.rotate(turn, twist[..., :3]), P.rotate(turn, twist[..., 3:])], axis=-1)
             super()._write_bodies(ids, bodies, None, world)
 
@@ -151,7 +151,7 @@ class SnapshotsAlias(Right):
     def _restore(self, ids, data, level):
         super()._restore(ids, data, level)
         if len(ids) == self.num_envs:
-            self._roots = data["roots"]
+            self._envs.roots = data["roots"]
 
 
 class ReadingDisturbs(Right):
@@ -160,7 +160,7 @@ class ReadingDisturbs(Right):
     caught_by = ("test_stepping.py::test_reading_changes_nothing",)
 
     def _read(self, name):
-        self._position += 1e-12
+        self._envs.position += 1e-12
         return super()._read(name)
 
 
@@ -171,7 +171,7 @@ class MimicsStayBehind(Right):
 
     def _build(self, world, num_envs):
         super()._build(world, num_envs)
-        self._followers = []
+        self._envs.followers = []
 
 
 class BlindRays(Right):
@@ -233,7 +233,7 @@ class ClaimsDynamics(Right):
 
 
 class PresenceOfAll(Right):
-    """A change of who is there resets the other envs as well."""
+    """A change of what is present resets the other envs as well."""
 
     caught_by = ("test_varying.py::test_other_envs_do_not_notice",)
 

@@ -7,8 +7,18 @@ from pathlib import Path
 import pytest
 
 DOCS = Path(__file__).parents[2] / "docs"
-ROWS = re.findall(r"^\| (.+\?) \| (.+) \| `(\w+)` \|$", (DOCS / "architecture.md").read_text(), re.MULTILINE)
+CORE = DOCS.parent / "core" / "anysim"
+PAGE = (DOCS / "architecture.md").read_text()
+ROWS = re.findall(r"^\| (.+\?) \| (.+) \| `(\w+)` \|$", PAGE, re.MULTILINE)
+ORDER = re.findall(r"^\| (`\w+`(?:, `\w+`)*) \| [^|]+ \|$", PAGE, re.MULTILINE)
 TERMS = re.findall(r"^\| ([\w ]+) \| .+ \| (`.+`) \|$", (DOCS / "glossary.md").read_text(), re.MULTILINE)
+
+
+def test_the_order_of_imports_names_what_stands_in_core_and_nothing_else() -> None:
+    named = [name for names in ORDER for name in re.findall(r"`(\w+)`", names)]
+    modules = {path.stem for path in CORE.glob("*.py")} - {"__init__"}
+    packages = {path.parent.name for path in CORE.glob("*/__init__.py")}
+    assert sorted(named) == sorted(modules | packages)
 
 
 def test_at_least_twenty_questions_are_answered() -> None:

@@ -14,7 +14,7 @@ ENGINES = ("mujoco", "pybullet", "sapien")
 
 
 def start(world: Path, engine: str, num_envs: int = 2) -> dict[str, np.ndarray]:
-    """Who is there in the first episodes, where, and where it is two control steps later."""
+    """What is present in the first episodes, where, and where it is two control steps later."""
     cameras = anysim.load(world).spec.world.cameras
     blind = [f"world.cameras.{name}.channels=[]" for name in cameras] if engine == "null" else []
     with anysim.make(world, engine=engine, num_envs=num_envs, overrides=blind) as env:

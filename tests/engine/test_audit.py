@@ -86,9 +86,9 @@ class Crooked(NullEngine):
     def _read(self, name: str):
         if name != "body_pose":
             return super()._read(name)
-        swapped = self._position.copy()
+        swapped = self._envs.position.copy()
         swapped[:, [1, 2]] = swapped[:, [2, 1]]
-        return forward_kinematics(self._crooked, self._roots, swapped)
+        return forward_kinematics(self._crooked, self._envs.roots, swapped)
 
 
 def test_a_wrong_axis_and_a_wrong_order_are_found_out(world: World) -> None:

@@ -72,7 +72,7 @@ def test_names_of_its_own_and_primitives_are_free():
     class Fine(NullEngine):
         def _build(self, world, num_envs):
             super()._build(world, num_envs)
-            self._table, self._statement = self._table, 1
+            self._envs, self._statement = self._envs, 1
             other = type("Other", (), {})()
             other._state = 1
 

@@ -12,7 +12,7 @@ Surface = tuple[Array, Array]
 
 
 def ball(radius: float = 0.1) -> Surface:
-    """Whose 20,480 triangles are within 0.05 % of the radius."""
+    """A sphere whose 20,480 triangles are within 0.05 % of the radius."""
     mesh = trimesh.creation.icosphere(5, radius)
     return mesh.vertices, mesh.faces
 

@@ -17,7 +17,7 @@ STATE = ("body_pose", "body_twist", "joint_pos", "joint_vel")
 
 
 def action(seed: int, step: int, size: int) -> np.ndarray:
-    """The action (A,) that is taken in a step of an episode, whoever steps it."""
+    """The action (A,) that is taken in a step of an episode, on whatever engine."""
     return np.sin(1.7 * np.arange(1, size + 1) * step + (seed % 1000))
 
 

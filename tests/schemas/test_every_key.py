@@ -163,7 +163,7 @@ def engine_of(spec: Any, _out: Path) -> Any:
 
 
 def expert_of(spec: Any, out: Path) -> Any:
-    """Who solves the task, and what it says it does in a few control steps."""
+    """The solution of the task, and what it says it does in a few control steps."""
     del out
     with anysim.make(spec) as env:
         policy, said = SkillPolicy(env), []

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import check_style
 import pytest
-from checks import constraints, junk, length, links, packages, words, yaml_header
+from checks import constraints, house, junk, length, links, packages, words, yaml_header
 from checks.tree import Tree
 
 ROOT_SETTINGS = """
@@ -72,6 +72,132 @@ def test_length_warns_then_fails(make_tree: MakeTree, lines: int, expected: list
     assert [fault.fatal for fault in length.check(make_tree({"core/anysim/long.py": "x = 1\n" * lines}))] == expected
 
 
+A = "core/anysim/a.py"
+LONG = '"""A module."""\n' + "x = 1\n" * 9
+SKIP = "# fmt: " + "skip"
+
+
+def told(tree: Tree) -> list[str]:
+    return [str(fault) for fault in house.check(tree)]
+
+
+@pytest.mark.parametrize(
+    ("limit", "value", "inside", "outside", "message"),
+    [
+        ("CORE_LINES", 14, A, "core/anysim/testing/a.py", "core/anysim: 15 lines without testing/, 14 at most"),
+        ("CORE_FILES", 1, A, "core/anysim/testing/a.py", "core/anysim: 2 files without testing/, 1 at most"),
+        ("PACKAGE_LINES", 14, A, "plugins/x/anysim_x/a.py", "core/anysim: 15 lines, 14 at most"),
+        ("PACKAGE_MODULES", 0, A, "plugins/x/anysim_x/a.py", "core/anysim: 1 modules, 0 at most"),
+        ("PLUGIN_LINES", 10, "plugins/x/anysim_x/a.py", A, "plugins/x/anysim_x: 11 lines, 10 at most"),
+    ],
+)
+def test_what_is_too_large_is_found_where_it_counts(
+    make_tree: MakeTree,
+    monkeypatch: pytest.MonkeyPatch,
+    limit: str,
+    value: int,
+    inside: str,
+    outside: str,
+    message: str,
+) -> None:
+    monkeypatch.setattr(house, limit, value)
+    (fault,) = told(make_tree({inside: LONG}))
+    assert fault.startswith(message)
+    assert told(make_tree({outside: LONG})) == []
+
+
+def test_a_plugin_that_may_be_large_has_folders_that_are_not(
+    make_tree: MakeTree, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(house, "PLUGIN_LINES", 21)
+    monkeypatch.setattr(house, "LARGE_PLUGINS", {"x": 50})
+    pieces = {f"plugins/x/anysim_x/{name}.py": LONG for name in ("a/one", "a/two", "b/one", "c")}
+    assert told(make_tree(pieces)) == []
+    (fault,) = told(make_tree({**pieces, "plugins/x/anysim_x/a/deeper/three.py": LONG}))[1:]
+    assert fault.startswith("plugins/x/anysim_x/a: 30 lines, 21 at most: split the group")
+
+
+def test_a_backend_that_is_too_large_is_found(make_tree: MakeTree, monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = ROOT_SETTINGS.replace('"plugins/*"', '"plugins/*", "backends/*"')
+    member = MEMBER.format(name="anysim-y", dependencies=["anysim"])
+    backend = {"pyproject.toml": settings, "backends/y/pyproject.toml": member}
+    monkeypatch.setattr(house, "BACKEND_LINES", {"y": 10})
+    assert told(make_tree({**backend, "backends/y/anysim_y/a.py": LONG})) == []
+    (fault,) = told(make_tree({**backend, "backends/y/anysim_y/a.py": LONG + "\n"}))
+    assert fault.startswith("backends/y/anysim_y: 11 lines, 10 at most")
+
+
+def test_a_module_of_core_without_an_importer_is_found(make_tree: MakeTree) -> None:
+    lonely = {"core/anysim/lonely.py": '"""L."""\n'}
+    (fault,) = told(make_tree(lonely))
+    assert fault.startswith("core/anysim/lonely.py: nothing in core imports it and no entry point names it")
+    uses = '"""U."""\n\nfrom anysim import lonely\n'
+    entry = CLEAN["core/pyproject.toml"] + '[project.entry-points."anysim.terms"]\nx = "anysim.lonely:X"\n'
+    assert len(told(make_tree({**lonely, "plugins/x/anysim_x/a.py": uses}))) == 1, "one distribution is not enough"
+    assert told(make_tree({**lonely, "plugins/x/anysim_x/a.py": uses, "tasks/anysim_tasks/a.py": uses})) == []
+    assert told(make_tree({**lonely, A: uses})) == []
+    assert told(make_tree({**lonely, "core/pyproject.toml": entry})) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {A: '"""A."""\n\n\nclass Pool:\n    pass\n', "core/anysim/b/a.py": '"""B."""\n\n\nclass Pool:\n    pass\n'},
+            "core/anysim/b/a.py:4: the class Pool is in core/anysim/a.py too",
+        ),
+        (
+            {f"core/anysim/{folder}a.py": '"""A."""\n' for folder in ("", "b/", "c/")},
+            "core/anysim/c/a.py: 3 files are called a (core/anysim/a.py, core/anysim/b/a.py)",
+        ),
+        ({A: '"""A."""\n\nx.y._z  # noqa: SLF001\n'}, "core/anysim/a.py:3: uses what is private"),
+        ({"tests/a.py": '"""What it is."""\n'}, "tests/a.py:1: the docstring begins with 'What'"),
+    ],
+    ids=["classes", "files", "private", "docstring"],
+)
+def test_names_that_confuse_are_found(make_tree: MakeTree, changes: dict[str, str], message: str) -> None:
+    named = {"core/anysim/__init__.py": '"""The core."""\n\nfrom anysim import a, b, c\nfrom anysim.b import a as d\n'}
+    named["core/anysim/__init__.py"] += 'from anysim.c import a as e\n\n__version__ = "0.1.0"\n'
+    (fault,) = told(make_tree({**named, **changes}))
+    assert fault.startswith(message)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '"""A."""\n\n\nclass _Pool:\n    pass\n\n\nclass _Pool:\n    pass\n',
+        '"""Whatever has a noun: what comes later is free."""\n',
+        "x = 1\n",
+    ],
+    ids=["private classes", "another word", "no docstring"],
+)
+def test_names_that_do_not_confuse_are_free(make_tree: MakeTree, text: str) -> None:
+    assert told(make_tree({A: text})) == []
+
+
+@pytest.mark.parametrize(
+    ("limit", "fits", "too_many", "message"),
+    [
+        ("FMT_SKIPS", f"x = 1  {SKIP}\n", f"y = 2  {SKIP}\n", "2 lines are kept from the formatter, 1 at most"),
+        ("ANY_IN_SIGNATURES", "def f(a: Any) -> int: ...\n", "def g() -> Any: ...\n", "`Any` is in 2 hints"),
+        ("ANY_IN_SIGNATURES", "def f(a: Any): ...\n", "def g(*, b: dict[str, Any]): ...\n", "`Any` is in 2 hints"),
+        (
+            "ANY_IN_SIGNATURES",
+            "def f(a: Any, b): ...\ndef _g(a: Any): ...\n",
+            "def h(a: Any, /): ...\n",
+            "`Any` is in 2",
+        ),
+    ],
+)
+def test_counts_that_only_fall(
+    make_tree: MakeTree, monkeypatch: pytest.MonkeyPatch, limit: str, fits: str, too_many: str, message: str
+) -> None:
+    monkeypatch.setattr(house, limit, 1)
+    assert told(make_tree({A: fits})) == []
+    (fault,) = told(make_tree({A: fits + too_many}))
+    assert message in fault
+
+
 @pytest.mark.parametrize(
     "text",
     [
@@ -89,7 +215,15 @@ def test_words_of_one_machine_are_found(make_tree: MakeTree, text: str) -> None:
     assert [(fault.path.as_posix(), fault.line) for fault in faults] == [("docs/page.md", 2)]
 
 
-@pytest.mark.parametrize("text", ["~/data", "$HOME/data", "the root/ folder", "https://x.com/home/ada", "a/work/b"])
+@pytest.mark.parametrize("text", ["for whoeve" + "r reads it", "Who is ther" + "e now", "nobody'" + "s wish"])
+def test_persons_for_things_are_found(make_tree: MakeTree, text: str) -> None:
+    (fault,) = words.check(make_tree({"docs/page.md": f"first\n{text}\n"}))
+    assert (fault.line, "not plain English" in fault.message) == (2, True)
+
+
+@pytest.mark.parametrize(
+    "text", ["~/data", "$HOME/data", "the root/ folder", "https://x.com/home/ada", "a/work/b", "it is there"]
+)
 def test_other_paths_are_allowed(make_tree: MakeTree, text: str) -> None:
     assert list(words.check(make_tree({"docs/page.md": text}))) == []
 

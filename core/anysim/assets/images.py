@@ -12,7 +12,7 @@ from anysim.errors import AssetError
 from anysim_schemas.limits import IMAGE_BYTES, IMAGE_PIXELS, Limit
 
 _FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "PPM", "GIF", "WEBP", "TGA")
-"""Others run programs (EPS) or have parsers that nobody tends."""
+"""Others run programs (EPS) or have parsers without maintainers."""
 
 
 @contextmanager

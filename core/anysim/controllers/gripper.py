@@ -54,7 +54,7 @@ class GripperContinuous(Controller):
             1.0,
         ),
         speed: Annotated[
-            float | None, Field(gt=0, description="[1/s] of the whole way; the drives' own where not given")
+            float | None, Field(gt=0, description="[1/s] of the whole stroke; the drives' own where not given")
         ] = None,
     ) -> None:
         super().__init__(channel, num_envs)
@@ -66,9 +66,9 @@ class GripperContinuous(Controller):
         self.dim = 1
         self.low, self.high = np.array([range[0]], dtype=float), np.array([range[1]], dtype=float)
         self._shut = np.minimum(np.maximum(self._closed, channel.lower), channel.upper)
-        self._way = self._opened - self._shut
-        way = np.abs(self._way)
-        self._step = None if speed is None else np.where(way > 0, speed * channel.robot.control_dt * way, np.inf)
+        self._stroke = self._opened - self._shut
+        stroke = np.abs(self._stroke)
+        self._step = None if speed is None else np.where(stroke > 0, speed * channel.robot.control_dt * stroke, np.inf)
         with np.errstate(divide="ignore"):
             self._lead = np.where(channel.kp > 0, channel.effort_limit / channel.kp, np.inf)
         self._target = np.zeros((num_envs, len(channel)))
@@ -79,7 +79,7 @@ class GripperContinuous(Controller):
     def apply(self, action: Array, env_ids: Array | None) -> Command:
         rows = slice(None) if env_ids is None else env_ids
         share = (action - self.low) / (self.high - self.low)
-        goal = np.where(share > 0, self._shut + share * self._way, self._closed)
+        goal = np.where(share > 0, self._shut + share * self._stroke, self._closed)
         if self._step is not None:
             here, was = self.channel.joint_pos(env_ids), self._target[rows]
             goal = was + np.minimum(np.maximum(goal - was, -self._step), self._step)
@@ -88,8 +88,8 @@ class GripperContinuous(Controller):
         return Command(position=goal)
 
     def action_for(self, targets: Array, env_ids: Array) -> Array:
-        moves = self._way != 0
-        share = ((targets - self._shut)[:, moves] / self._way[moves]).sum(axis=1) / max(int(moves.sum()), 1)
+        moves = self._stroke != 0
+        share = ((targets - self._shut)[:, moves] / self._stroke[moves]).sum(axis=1) / max(int(moves.sum()), 1)
         return (self.low + np.minimum(np.maximum(share, 0.0), 1.0) * (self.high - self.low))[:, None]
 
     def snapshot(self, env_ids: Array) -> dict[str, Array]:

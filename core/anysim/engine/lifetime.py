@@ -1,4 +1,4 @@
-"""Ends of engines that nobody ends: one that is dropped frees its world, a copy in a forked process says what it is.
+"""Ends of engines without `destroy`: one that is dropped frees its world, a copy in a forked process says what it is.
 
 A fork copies the memory of engines, but not the threads, sockets and devices that they use: a step would wait for ever
 for threads that do not exist, or speak to the workers of the parent.

@@ -18,7 +18,7 @@ _STORE = bytes([dis.opmap["STORE_ATTR"]])
 
 
 def check_class(engine: type) -> None:
-    """Refuse a class of somebody else's that has a private name of the base classes, or assigns an attribute of theirs.
+    """Refuse a class of another package that has a private name of the base classes, or assigns an attribute of theirs.
 
     Raises:
         EngineError: it does; the message names it, the class and the base that owns it.

@@ -1,4 +1,4 @@
-"""Solids as Coal, the collision library, has them: for whoever measures distances between shapes."""
+"""Solids as Coal, the collision library, has them, for distances between shapes."""
 
 from typing import Any
 

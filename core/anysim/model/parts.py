@@ -45,7 +45,7 @@ class ControlMode(StrEnum):
 
 
 class Actuation(StrEnum):
-    """Who computes the drive law, and how it takes its damping."""
+    """The computation of the drive law: by anysim or by the engine, and how it takes its damping."""
 
     IMPLICIT_PD = "implicit_pd"  # the law, its damping at the end of the step; the same on every engine
     EXPLICIT_PD = "explicit_pd"  # the law of the state at the beginning of the step; the same on every engine

@@ -26,7 +26,7 @@ from anysim.geometry.convex_parts import (
 from anysim.placement.context import Impossible, PlacementContext
 from anysim.placement.relations import spot_of
 from anysim.placement.sampler import PlacementSampler
-from anysim.placement.standing_areas import Footing, below_area, height_under, region_of, standing_places
+from anysim.placement.standing_areas import StandingArea, below_area, height_under, region_of, standing_places
 from anysim_schemas.layout import PlaceFields
 
 
@@ -54,9 +54,9 @@ def candidate(
         x, y, z = (float(v) for v in sampler.value("position", place.position))
         o = context.origin
         return _finished(solid, place, base, turn, (x + o[0], y + o[1]), z + o[2], None, None, "position", context)
-    footings = standing_places(place, context)
-    if isinstance(footings, Impossible):
-        return footings
+    areas = standing_places(place, context)
+    if isinstance(areas, Impossible):
+        return areas
     rotation = matrix_of(quaternion)
 
     round_reach = _round_reach(solid, rotation) if place.facing is not None else None
@@ -68,7 +68,7 @@ def candidate(
     region = region_of(place, context)
     under = below_area(place, context, reach)
     spot, drawn_from = spot_of(solid, rotation, place, sampler, context)
-    if footings is None:  # on the ground
+    if areas is None:  # on the ground
         area = region if under is None else under if region is None else G.common(region, under)
         if area is not None and not area:
             return Impossible(f"nothing of its region lies under '{place.under}'", hopeless=True)
@@ -78,32 +78,32 @@ def candidate(
             else:
                 spot, drawn_from = G.point_in(area, *sampler.uniform("place", 3)), "area"
         return _finished(solid, place, base, turn, spot, None, None, area, drawn_from, context)
-    if spot is None and not any(f.area for f in footings) and region is None and under is None:
-        spot, drawn_from = footings[0].owner.pose.position[:2], "point"  # nothing level: over its origin
+    if spot is None and not any(f.area for f in areas) and region is None and under is None:
+        spot, drawn_from = areas[0].owner.pose.position[:2], "point"  # nothing level: over its origin
     if drawn_from == "point":  # x and y are taken as they are, also over an edge
         assert spot is not None
         return _finished(
-            solid, place, base, turn, spot, height_under(footings, spot), footings[0].owner, region, drawn_from, context
+            solid, place, base, turn, spot, height_under(areas, spot), areas[0].owner, region, drawn_from, context
         )
-    fitting = [(f, tuple(p for p in (G.eroded(q, reach) for q in f.area) if p)) for f in footings]
+    fitting = [(f, tuple(p for p in (G.eroded(q, reach) for q in f.area) if p)) for f in areas]
     if region is not None:
         fitting = [(f, G.common(area, region)) for f, area in fitting]
     if under is not None:
         fitting = [(f, G.common(area, under)) for f, area in fitting]
     fitting = [(f, area) for f, area in fitting if area]
     if not fitting:
-        return _no_room(place, footings, region)
+        return _no_room(place, areas, region)
     u, v, w = sampler.uniform("place", 3)
     sizes = [G.total(area) for _, area in fitting]
     wanted, chosen = u * sum(sizes), 0
     while chosen < len(sizes) - 1 and wanted > sizes[chosen]:
         wanted -= sizes[chosen]
         chosen += 1
-    footing, area = fitting[chosen]
+    standing, area = fitting[chosen]
     if spot is None:
         share = wanted / sizes[chosen] if sizes[chosen] > 0 else 0.0
         spot, drawn_from = G.point_in(area, share, v, w), "area"
-    return _finished(solid, place, base, turn, spot, footing.height, footing.owner, area, drawn_from, context)
+    return _finished(solid, place, base, turn, spot, standing.height, standing.owner, area, drawn_from, context)
 
 
 def _round_reach(solid: Solid, rotation: Matrix) -> float:
@@ -204,13 +204,13 @@ def _faced(place: PlaceFields, context: PlacementContext) -> G.Point | None:
     return None if other is None else (other.center[0], other.center[1])
 
 
-def _no_room(place: PlaceFields, footings: Sequence[Footing], region: G.Area | None) -> Impossible:
-    owner = footings[0].owner.name
-    if not any(f.area for f in footings):
+def _no_room(place: PlaceFields, areas: Sequence[StandingArea], region: G.Area | None) -> Impossible:
+    owner = areas[0].owner.name
+    if not any(f.area for f in areas):
         return Impossible(
             f"'{owner}' has no level surface on top to go on; give `x` and `y`, or say `in`", hopeless=True
         )
-    (low, high) = G.bounds(tuple(p for f in footings for p in f.area))
+    (low, high) = G.bounds(tuple(p for f in areas for p in f.area))
     what = f"the surface of '{owner}', {high[0] - low[0]:.3g} by {high[1] - low[1]:.3g} m,"
     if region is not None:
         return Impossible(f"{what} and its region have no place in common where all of it stays on")

@@ -9,7 +9,7 @@ from anysim.placement.candidate import Candidate
 from anysim.placement.constraints import PlacementTask
 from anysim.placement.context import Impossible, PlacementContext
 from anysim.placement.packing import shifted
-from anysim.placement.standing_areas import footings_of, region_of
+from anysim.placement.standing_areas import region_of, standing_areas_of
 from anysim_schemas.layout import RepairSpec
 from anysim_schemas.proposals import ProposedPose
 
@@ -33,7 +33,7 @@ def start(
         low, high = found.placed.low, found.placed.high
         height, owner = context.ground(low[:2], high[:2]), None
     else:
-        surfaces = footings_of(reference, inside, context)
+        surfaces = standing_areas_of(reference, inside, context)
         if isinstance(surfaces, Impossible):
             return f"cannot be placed: {surfaces.reason}"
         under = [f for f in surfaces if not f.area or G.holds(f.area, x, y)]

@@ -16,7 +16,7 @@ from anysim.placement.context import Impossible, PlacementContext, Settled
 from anysim.placement.order import meant
 from anysim.placement.packing import GAP, packed
 from anysim.placement.sampler import PlacementSampler
-from anysim.placement.standing_areas import footings_of, free_area
+from anysim.placement.standing_areas import free_area, standing_areas_of
 from anysim_schemas.layout import PlaceFields, RepairSpec
 from anysim_schemas.proposals import ProposedPose
 from anysim_schemas.values import Drawn
@@ -269,10 +269,10 @@ class Search:
         if reference is None or reference == "terrain":
             return ""
         self.context.by = task.item
-        footings = footings_of(reference, task.place.in_ is not None, self.context)
-        if isinstance(footings, Impossible) or not any(f.area for f in footings):
+        areas = standing_areas_of(reference, task.place.in_ is not None, self.context)
+        if isinstance(areas, Impossible) or not any(f.area for f in areas):
             return ""
-        whole, free = free_area(footings, self.context.settled.values())
+        whole, free = free_area(areas, self.context.settled.values())
         return f" (of the {whole:.3g} m^2 of '{reference}' {free:.3g} m^2 are free)"
 
 

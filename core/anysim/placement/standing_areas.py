@@ -15,7 +15,7 @@ from anysim_schemas.regions import RegionSpec
 from anysim_schemas.relations import SIDES
 
 
-class Footing(NamedTuple):
+class StandingArea(NamedTuple):
     """A level surface in the world on which something may go: its height, outline, and owner."""
 
     height: float
@@ -24,7 +24,7 @@ class Footing(NamedTuple):
     surface: SupportSurface
 
 
-def footings_of(reference: str, inside: bool, context: PlacementContext) -> list[Footing] | Impossible:
+def standing_areas_of(reference: str, inside: bool, context: PlacementContext) -> list[StandingArea] | Impossible:
     """The level surfaces that a reference to a support means, in the world."""
     name, _, part = reference.partition(".")
     owner = context.find(name)
@@ -42,8 +42,8 @@ def footings_of(reference: str, inside: bool, context: PlacementContext) -> list
         return Impossible(f"'{name}' has {what} (surfaces: {names})", hopeless=True)
     yaw = heading(owner.pose.rotation) if _upright(owner) else 0.0
     x, y, z = owner.pose.position
-    return [Footing(s.height + z, G.moved((s.polygon,), x, y, yaw), owner, s) for s in kept] or [
-        Footing(owner.high[2], (), owner, SupportSurface("", -1, "", owner.high[2] - z, (), inf, False))
+    return [StandingArea(s.height + z, G.moved((s.polygon,), x, y, yaw), owner, s) for s in kept] or [
+        StandingArea(owner.high[2], (), owner, SupportSurface("", -1, "", owner.high[2] - z, (), inf, False))
     ]
 
 
@@ -51,7 +51,7 @@ def _upright(placed: Placed) -> bool:
     return placed.pose.rotation[2][2] > 1.0 - 1e-9
 
 
-def standing_places(place: PlaceFields, context: PlacementContext) -> list[Footing] | Impossible | None:
+def standing_places(place: PlaceFields, context: PlacementContext) -> list[StandingArea] | Impossible | None:
     """Where it may stand; None for the ground."""
     reference, inside = place.on, False
     if place.in_ is not None:
@@ -71,13 +71,13 @@ def standing_places(place: PlaceFields, context: PlacementContext) -> list[Footi
             break
     if reference is None or reference == GROUND or context.find(reference.partition(".")[0]) is None:
         return None  # what it would rest on is not there in this env
-    return footings_of(reference, inside, context)
+    return standing_areas_of(reference, inside, context)
 
 
-def height_under(footings: Sequence[Footing], spot: G.Point) -> float:
+def height_under(areas: Sequence[StandingArea], spot: G.Point) -> float:
     """The height under a point: of the surface there, else of the owner's highest point."""
-    heights = [f.height for f in footings if f.area and G.holds(f.area, *spot)]
-    return max(heights) if heights else footings[0].owner.high[2]
+    heights = [f.height for f in areas if f.area and G.holds(f.area, *spot)]
+    return max(heights) if heights else areas[0].owner.high[2]
 
 
 def region_area(spec: RegionSpec, context: PlacementContext) -> G.Area:
@@ -117,21 +117,21 @@ def below_area(place: PlaceFields, context: PlacementContext, reach: Callable[[f
     return (inner or outline,)
 
 
-def free_area(footings: Sequence[Footing], settled: Iterable[Settled]) -> tuple[float, float]:
+def free_area(areas: Sequence[StandingArea], settled: Iterable[Settled]) -> tuple[float, float]:
     """[m^2] of surfaces, and of what has no box of anything else over it, counted on a grid of 32 by 32 points."""
     placed = [one.placed for one in settled]
     whole = free = 0.0
-    for footing in footings:
-        own, level = footing.owner.name, footing.height
+    for standing in areas:
+        own, level = standing.owner.name, standing.height
         boxes = [p for p in placed if p.name != own and p.low[2] < level + 0.02 and p.high[2] > level]
-        (x0, y0), (x1, y1) = G.bounds(footing.area)
+        (x0, y0), (x1, y1) = G.bounds(standing.area)
         points = [
             (x0 + (i + 0.5) / 32 * (x1 - x0), y0 + (j + 0.5) / 32 * (y1 - y0)) for i in range(32) for j in range(32)
         ]
-        inside = [p for p in points if G.holds(footing.area, *p)]
+        inside = [p for p in points if G.holds(standing.area, *p)]
         bare = [
             p for p in inside if not any(b.low[0] <= p[0] <= b.high[0] and b.low[1] <= p[1] <= b.high[1] for b in boxes)
         ]
-        size = G.total(footing.area)
+        size = G.total(standing.area)
         whole, free = whole + size, free + size * len(bare) / max(1, len(inside))
     return whole, free

@@ -52,7 +52,7 @@ _HELD: set[int] = set()
 _FORK_IS_WATCHED = threading.Event()
 
 
-class Lifeline:
+class ParentWatch:
     """The parent's end; `worker_end` is for the worker, and closed here once the worker has it."""
 
     def __init__(self) -> None:
@@ -66,7 +66,7 @@ class Lifeline:
         """Close the worker's end in this process."""
         os.close(self.worker_end)
 
-    def cut(self) -> None:
+    def release(self) -> None:
         """Let a worker that is still there be killed."""
         if self._own in _HELD:
             _HELD.discard(self._own)
@@ -80,7 +80,7 @@ def _let_go() -> None:
     _HELD.clear()
 
 
-def hang_on(end: int) -> None:
+def end_with_parent(end: int) -> None:
     """Called in the worker with its end: from now on it does not outlive its parent."""
     if sys.platform == "linux":
         import fcntl
@@ -98,4 +98,4 @@ def hang_on(end: int) -> None:
             os.read(end, 1)
             os._exit(1)
 
-        threading.Thread(target=watch, name="anysim-lifeline", daemon=True).start()
+        threading.Thread(target=watch, name="anysim-parent-watch", daemon=True).start()

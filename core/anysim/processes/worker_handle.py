@@ -19,7 +19,7 @@ from typing import Any
 
 from anysim import errors
 from anysim.errors import AnysimError, EngineError
-from anysim.processes.own_process import Lifeline, how_it_ended
+from anysim.processes.own_process import ParentWatch, how_it_ended
 
 _PROGRAM = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
@@ -40,14 +40,14 @@ class WorkerLost(Exception):
 class Worker:
     """One worker process. Every message has a number and is answered; an answer to an earlier one is dropped.
 
-    `module` has `main(connection, lifeline)`, which gets two file descriptors.
+    `module` has `main(connection, parent_watch)`, which gets two file descriptors.
     """
 
     def __init__(self, environment: dict[str, str], timeout_s: float, module: str) -> None:
         self._timeout = timeout_s
         self._sent = 0
         own, theirs = socket.socketpair()
-        lifeline = Lifeline()
+        parent_watch = ParentWatch()
         try:
             self._process = subprocess.Popen(
                 [
@@ -57,20 +57,20 @@ class Worker:
                     _PROGRAM.format(module),
                     json.dumps(sys.path),
                     str(theirs.fileno()),
-                    str(lifeline.worker_end),
+                    str(parent_watch.worker_end),
                 ],
-                pass_fds=(theirs.fileno(), lifeline.worker_end),
+                pass_fds=(theirs.fileno(), parent_watch.worker_end),
                 stdin=subprocess.DEVNULL,
                 env=environment,
             )
         except BaseException:
             own.close()
-            lifeline.cut()
+            parent_watch.release()
             raise
         finally:
             theirs.close()
-            lifeline.handed_over()
-        self._lifeline, self._socket = lifeline, own
+            parent_watch.handed_over()
+        self._parent_watch, self._socket = parent_watch, own
         # a message larger than the socket's buffer must not wait for ever for a worker that stopped reading it
         limit = struct.pack("ll", int(timeout_s), int(timeout_s % 1 * 1e6))
         own.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, limit)
@@ -164,7 +164,7 @@ class Worker:
         if self._process.poll() is None:
             self._process.kill()
             self._process.wait()
-        self._lifeline.cut()
+        self._parent_watch.release()
         self._connection.close()
         self._socket.close()
 

@@ -60,7 +60,7 @@ class LivingBank:
         self._new[candidate, 0 if success else 1] += 1
 
     def save(self) -> None:
-        """Add this run's outcomes to the file, whoever else has added to it meanwhile. Pinned counts are left alone."""
+        """Add this run's outcomes to the file, to which other runs may have added. Pinned counts are left alone."""
         if self._fixed or not self._new.any():
             return
         self.path.parent.mkdir(parents=True, exist_ok=True)

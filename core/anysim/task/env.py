@@ -365,7 +365,7 @@ class TaskEnv:
         return {g: r.copy() for g, r in rows.items()}
 
     def _refuse(self, snapshot: EnvSnapshot, ids: Array) -> None:
-        """Refuse what cannot be put into these envs; a snapshot may come from a file that anybody wrote."""
+        """Refuse what cannot be put into these envs; a snapshot may come from a file of any origin."""
         self.engine.refuse_snapshot(snapshot.engine, ids)
         managed = self._managed(np.array([0]))
         refuse_foreign(snapshot, self.name, spec_hash(self.spec), managed, len(ids))

@@ -88,7 +88,7 @@ def swing(build: Build) -> float:
 
 
 def late(build: Build) -> float:
-    """Beyond a joint's limit, of a mass that meets it at 5 m/s, in ways of one step."""
+    """Beyond a joint's limit, of a mass that meets it at 5 m/s, in distances of one step."""
     engine = build(worlds.slider(mass=1.0, lower=-1.0, upper=0.1, drive=False))
     engine.set_joint_state(position=[[0.0]], velocity=[[5.0]])
     furthest = 0.0

@@ -96,7 +96,7 @@ def creep(build: Build) -> float:
 
 
 def rolling(build: Build) -> float:
-    """Relative, on the way of a solid cylinder that rolls down 15 degrees for 0.6 s: 2/3 g sin a."""
+    """Relative, on the distance of a solid cylinder that rolls down 15 degrees for 0.6 s: 2/3 g sin a."""
     angle, radius = radians(15), 0.1
     s = Sketch("roll", 0.001)
     s.fixed("slab", Box((3.0, 1.0, 0.1)), (0.0, 0.0, 0.0), quaternion=worlds.turn(worlds.Y, angle))

@@ -28,6 +28,24 @@ from anysim.model.world import BodyKind, JointType, World
 _IGNORED = "ignored: kinematic engine"
 
 
+class KinematicEnvs:
+    """All that a build makes: the state of N envs with B bodies and J joints, and what their world says of joints."""
+
+    def __init__(self, world: World, num_envs: int) -> None:
+        n, bodies, joints = num_envs, len(world.bodies), len(world.joints)
+        self.roots = np.zeros((n, bodies, 7))
+        self.twists = np.zeros((n, bodies, 6))
+        self.position = np.zeros((n, joints))
+        self.velocity = np.zeros((n, joints))
+        self.lower = np.array([j.lower for j in world.joints])
+        self.upper = np.array([j.upper for j in world.joints])
+        self.speed_limit = np.array([j.velocity_limit for j in world.joints])
+        self.driven = np.array([a.joint for a in world.actuators], dtype=int)
+        self.followers = [(i, j.mimic) for i, j in enumerate(world.joints) if j.mimic is not None]
+        self.control: Control | None = None
+        self.table = ParameterTable(world, n)
+
+
 class NullEngine(SimEngine):
     """See the module's docstring."""
 
@@ -81,27 +99,16 @@ class NullEngine(SimEngine):
     # ------------------------------------------------------------------ lifecycle
 
     def _build(self, world: World, num_envs: int) -> None:
-        n, bodies, joints = num_envs, len(world.bodies), len(world.joints)
-        self._roots = np.zeros((n, bodies, 7))
-        self._twists = np.zeros((n, bodies, 6))
-        self._position = np.zeros((n, joints))
-        self._velocity = np.zeros((n, joints))
-        self._lower = np.array([j.lower for j in world.joints])
-        self._upper = np.array([j.upper for j in world.joints])
-        self._speed_limit = np.array([j.velocity_limit for j in world.joints])
-        self._driven = np.array([a.joint for a in world.actuators], dtype=int)
-        self._followers = [(i, j.mimic) for i, j in enumerate(world.joints) if j.mimic is not None]
-        self._control: Control | None = None
-        self._table = ParameterTable(world, n)
+        self._envs = KinematicEnvs(world, num_envs)
 
     def _free(self) -> None:
-        del self._roots, self._twists, self._position, self._velocity, self._table, self._control
+        del self._envs
 
     def _reset(self, ids: Array) -> None:
-        self._roots[ids] = self.world.initial_body_pose
-        self._twists[ids] = 0.0
-        self._position[ids] = [j.initial for j in self.world.joints]
-        self._velocity[ids] = 0.0
+        self._envs.roots[ids] = self.world.initial_body_pose
+        self._envs.twists[ids] = 0.0
+        self._envs.position[ids] = [j.initial for j in self.world.joints]
+        self._envs.velocity[ids] = 0.0
 
     def _populate(self, ids: Array) -> None:
         """Nothing touches or sees anything here, so nothing has to leave: what is absent moves unseen."""
@@ -116,69 +123,66 @@ class NullEngine(SimEngine):
             self._move_joints(rows, dt)
 
     def _move_bodies(self, rows: Array, dt: float) -> None:
-        twist = self._twists[rows]
-        pose = self._roots[rows]
+        twist = self._envs.twists[rows]
+        pose = self._envs.roots[rows]
         moving = (twist != 0.0).any(axis=-1)  # a body at rest keeps its bits
         rate = P.norm(twist[..., 3:])
         axis = twist[..., 3:] / np.where(rate == 0.0, 1.0, rate)[..., None]
         turned = P.normalize(P.multiply(P.from_axis_angle(axis, rate * dt), pose[..., 3:]))
         moved = np.concatenate([pose[..., :3] + twist[..., :3] * dt, turned], axis=-1)
-        self._roots[rows] = np.where(moving[..., None], moved, pose)
+        self._envs.roots[rows] = np.where(moving[..., None], moved, pose)
 
     def _move_joints(self, rows: Array, dt: float) -> None:
-        position, velocity = self._position[rows], self._velocity[rows]
+        envs = self._envs
+        position, velocity = envs.position[rows], envs.velocity[rows]
         goal = position + velocity * dt
-        if len(self._driven):
-            assert self._control is not None
-            mode, target, reach = (
-                self._control.mode[rows],
-                self._control.position[rows],
-                self._speed_limit[self._driven],
-            )
-            here = position[:, self._driven]
-            way = (target - here) / dt
-            rate = np.where(mode == VELOCITY, self._control.velocity[rows], velocity[:, self._driven])
-            rate = np.where(mode == POSITION, way, rate)
-            velocity[:, self._driven] = np.clip(rate, -reach, reach)
+        if len(envs.driven):
+            assert envs.control is not None
+            mode, target, reach = envs.control.mode[rows], envs.control.position[rows], envs.speed_limit[envs.driven]
+            here = position[:, envs.driven]
+            direct = (target - here) / dt
+            rate = np.where(mode == VELOCITY, envs.control.velocity[rows], velocity[:, envs.driven])
+            rate = np.where(mode == POSITION, direct, rate)
+            velocity[:, envs.driven] = np.clip(rate, -reach, reach)
             # a joint that arrives gets the target's own bits, which a sum would round
-            arrives = (mode == POSITION) & (np.abs(way) <= reach)
-            goal[:, self._driven] = np.where(arrives, target, here + velocity[:, self._driven] * dt)
-        velocity[(goal < self._lower) | (goal > self._upper)] = 0.0
-        goal = np.clip(goal, self._lower, self._upper)
-        for joint, mimic in self._followers:
+            arrives = (mode == POSITION) & (np.abs(direct) <= reach)
+            goal[:, envs.driven] = np.where(arrives, target, here + velocity[:, envs.driven] * dt)
+        velocity[(goal < envs.lower) | (goal > envs.upper)] = 0.0
+        goal = np.clip(goal, envs.lower, envs.upper)
+        for joint, mimic in envs.followers:
             goal[:, joint] = mimic.multiplier * goal[:, mimic.joint] + mimic.offset
             velocity[:, joint] = mimic.multiplier * velocity[:, mimic.joint]
-        self._position[rows], self._velocity[rows] = goal, velocity
+        envs.position[rows], envs.velocity[rows] = goal, velocity
 
     # ------------------------------------------------------------------ reading and writing
 
     def _read(self, name: str) -> Array:
         n = self.num_envs
         if name == "body_pose":
-            return forward_kinematics(self.world, self._roots, self._position)
+            return forward_kinematics(self.world, self._envs.roots, self._envs.position)
         if name == "body_twist":
             return self._forward_twists()
         if name == "joint_pos":
-            return self._position.copy()
+            return self._envs.position.copy()
         if name == "joint_vel":
-            return self._velocity.copy()
+            return self._envs.velocity.copy()
         if name == "joint_effort":
-            return np.zeros_like(self._position)
+            return np.zeros_like(self._envs.position)
         if name == "contact_force":
             return np.zeros((n, len(self.world.contact_sensors), 3))
-        state = (self._roots, self._twists, self._position, self._velocity)
+        state = (self._envs.roots, self._envs.twists, self._envs.position, self._envs.velocity)
         return np.array([not all(np.isfinite(part[i]).all() for part in state) for i in range(n)], dtype=bool)
 
     def _forward_twists(self) -> Array:
         """World twists (N, B, 6): a link's is its parent's, carried to its origin, plus what its joint adds."""
         world = self.world
-        poses = forward_kinematics(world, self._roots, self._position)
-        twists = self._twists.copy()
+        poses = forward_kinematics(world, self._envs.roots, self._envs.position)
+        twists = self._envs.twists.copy()
         for i, body in enumerate(world.bodies):
             if body.kind is not BodyKind.LINK:
                 continue
             joint = world.joints[world.body_joint[i]]
-            parent, rate = twists[:, body.parent], self._velocity[:, world.body_joint[i], None]
+            parent, rate = twists[:, body.parent], self._envs.velocity[:, world.body_joint[i], None]
             linear = parent[:, :3] + P.cross(parent[:, 3:], poses[:, i, :3] - poses[:, body.parent, :3])
             axis = P.rotate(poses[:, i, 3:], np.broadcast_to(joint.axis, (len(poses), 3)))
             if joint.type is JointType.PRISMATIC:
@@ -191,38 +195,38 @@ class NullEngine(SimEngine):
 
     def _write_joints(self, ids: Array, joints: Array, position: Array | None, velocity: Array | None) -> None:
         if position is not None:
-            self._position[np.ix_(ids, joints)] = position
+            self._envs.position[np.ix_(ids, joints)] = position
         if velocity is not None:
-            self._velocity[np.ix_(ids, joints)] = velocity
+            self._envs.velocity[np.ix_(ids, joints)] = velocity
 
     def _write_bodies(self, ids: Array, bodies: Array, pose: Array | None, twist: Array | None) -> None:
         if pose is not None:
-            self._roots[np.ix_(ids, bodies)] = pose
+            self._envs.roots[np.ix_(ids, bodies)] = pose
         if twist is not None:
-            self._twists[np.ix_(ids, bodies)] = twist
+            self._envs.twists[np.ix_(ids, bodies)] = twist
 
     def _apply_control(self, control: Control) -> None:
-        self._control = Control(*(part.copy() for part in control))
+        self._envs.control = Control(*(part.copy() for part in control))
 
     # ------------------------------------------------------------------ parameters and snapshots
 
     def _get_parameter(self, name: str) -> Array:
-        return self._table.get(name)
+        return self._envs.table.get(name)
 
     def _set_parameter(self, name: str, values: Array, ids: Array, indices: Array) -> None:
-        self._table.set(name, values, ids, indices)
+        self._envs.table.set(name, values, ids, indices)
 
     def _default_parameter(self, name: str) -> Array:
-        return self._table.default(name)
+        return self._envs.table.default(name)
 
     def _snapshot(self, ids: Array, level: SnapshotLevel) -> dict[str, Array]:
         return {
-            "roots": self._roots[ids],
-            "twists": self._twists[ids],
-            "position": self._position[ids],
-            "velocity": self._velocity[ids],
+            "roots": self._envs.roots[ids],
+            "twists": self._envs.twists[ids],
+            "position": self._envs.position[ids],
+            "velocity": self._envs.velocity[ids],
         }
 
     def _restore(self, ids: Array, data: Mapping[str, Array], level: SnapshotLevel) -> None:
-        self._roots[ids], self._twists[ids] = data["roots"], data["twists"]
-        self._position[ids], self._velocity[ids] = data["position"], data["velocity"]
+        self._envs.roots[ids], self._envs.twists[ids] = data["roots"], data["twists"]
+        self._envs.position[ids], self._envs.velocity[ids] = data["position"], data["velocity"]

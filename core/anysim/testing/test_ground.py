@@ -40,7 +40,7 @@ def test_a_ball_rolls_down_a_ramp(build, as_mesh):
     engine.step(800)
     pose = engine.get_state().body_pose[0]
     went = float(np.linalg.norm(pose[ball, :3] - start))
-    assert_close(went, 0.5 * 5 / 7 * 9.81 * sin(angle) * 0.8**2, tolerances.ROLLING * went, "way of the ball")
+    assert_close(went, 0.5 * 5 / 7 * 9.81 * sin(angle) * 0.8**2, tolerances.ROLLING * went, "distance of the ball")
     normal = np.array([sin(angle), 0.0, cos(angle)])
     assert_close(float(pose[ball, :3] @ normal), ground.RADIUS, tolerances.GROUND, "ball above the ramp")
     assert_close(float(pose[box, :3] @ normal), 0.05, tolerances.GROUND, "box above the ramp")

@@ -28,7 +28,7 @@ def test_free_fall(build):
     engine.step(500)
     state = engine.get_state()
     assert_ratio(state.body_twist[0, 0, 2], -G, tolerances.FALL_SPEED, "speed after 1 s")
-    assert_ratio(20.0 - state.body_pose[0, 0, 2], G / 2, tolerances.MOTION, "way after 1 s")
+    assert_ratio(20.0 - state.body_pose[0, 0, 2], G / 2, tolerances.MOTION, "distance after 1 s")
 
 
 def test_a_throw_is_a_parabola(build):
@@ -157,7 +157,7 @@ def test_nothing_slows_a_free_joint(build, drive):
     engine.set_joint_state(velocity=3.0)
     engine.step(500)
     assert_ratio(engine.get_state().joint_vel[0, 0], 3.0, tolerances.COASTING, "speed after 1 s")
-    assert_ratio(engine.get_state().joint_pos[0, 0], 3.0, tolerances.COASTING, "way after 1 s")
+    assert_ratio(engine.get_state().joint_pos[0, 0], 3.0, tolerances.COASTING, "distance after 1 s")
 
 
 def test_a_drive_carries_its_load(build):

@@ -40,7 +40,7 @@ def test_a_step_moves_what_moves(build):
     start = engine.get_state().body_pose[0, 0, :3]
     engine.step(100)
     moved = engine.get_state().body_pose[0, 0, :3] - start
-    assert_close(moved, np.array([0.2, 0.0, -0.1]), tolerances.MOTION, "the way of a drifting body")
+    assert_close(moved, np.array([0.2, 0.0, -0.1]), tolerances.MOTION, "the distance of a drifting body")
 
 
 @needs(C.DYNAMICS)

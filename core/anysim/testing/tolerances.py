@@ -60,7 +60,7 @@ GROUND = 1e-3
 """[m]: where rays meet uneven ground, and how high a ball of 1 kg rests or rolls above it."""
 
 ROLLING = 3e-2
-"""Relative, on the way of a ball that rolls down a ramp of triangles for 0.8 s: it crosses an edge every few
+"""Relative, on the distance of a ball that rolls down a ramp of triangles for 0.8 s: it crosses an edge every few
 centimetres, and begins with a settling contact. Measured: 2.0 % slow on soft contacts, else below 1 %."""
 
 WEIGHT = 2e-2
@@ -76,10 +76,10 @@ LIMIT = 2e-2
 """[rad or m]: overshoot of a joint pressed against its limit; limits are soft constraints in most engines."""
 
 LATE = 0.5
-"""In ways of one step: a joint that meets its limit within a step is stopped there by engines that look ahead."""
+"""In distances of one step: a joint that meets its limit within a step is stopped there by engines that look ahead."""
 
 DENT = 2e-3
-"""[m for each m/s]: the way of one step of 2 ms, by which discrete time may catch an impact late."""
+"""[m for each m/s]: the distance of one step of 2 ms, by which discrete time may catch an impact late."""
 
 FOLLOWER = 2e-3
 """[m or rad]: lag of a mimic joint during motion, where it is a soft constraint."""

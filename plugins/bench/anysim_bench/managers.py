@@ -101,14 +101,14 @@ def task_env(engine: str, num_envs: int, task: str) -> TaskEnv:
 
 
 def step_costs(env: TaskEnv, rounds: int = 200) -> list[Cost]:
-    """Who takes how long in a control step of all envs [ms]; the last row is the sum."""
+    """Times of each part of a control step of all envs [ms]; the last row is the sum."""
     env.reset(seed=0)
     action = np.zeros((env.num_envs, env.action_dim))
     return _costs(env, lambda: env.step(action), rounds, 1.0)
 
 
 def reset_costs(env: TaskEnv, rounds: int = 30) -> list[Cost]:
-    """Who takes how long in a full reset, for each env [ms]; the last row is the sum."""
+    """Times of each part of a full reset, for each env [ms]; the last row is the sum."""
     env.reset(seed=0)
     return _costs(env, env.reset, rounds, 1.0 / env.num_envs)
 

@@ -11,7 +11,7 @@ from anysim.cli.output import interactive
 class Rows:
     """A table whose rows appear at once: in columns for a person, separated by tabs in a pipe, nowhere if `quiet`.
 
-    A column is as wide as its head and `widths` gives it, so that rows that nobody knows yet stand below each other.
+    A column is as wide as its head and `widths` gives it, so that rows that are not known yet stand below each other.
     """
 
     def __init__(self, title: str, heads: Sequence[str], widths: Sequence[int] = (), quiet: bool = False) -> None:

@@ -79,7 +79,7 @@ class Limits:
     Attributes:
         hours: [h] of wall time from now.
         max_bytes: of trajectories that are kept.
-        kept: bytes so far; whoever keeps a trajectory adds to it.
+        kept: bytes so far; the recorder of a kept trajectory adds to it.
     """
 
     hours: float | None = None

@@ -13,7 +13,7 @@ def verify(directory: str | Path) -> list[str]:
     """The faults of a trajectory, as sentences; empty if it is whole. Reads every byte.
 
     Finds a manifest that is damaged, missing and additional files, changed bytes, content that contradicts the
-    manifest, videos that do not decode, and numbers that no recorder writes, also where somebody made the hashes right.
+    manifest, videos that do not decode, and numbers that no recorder writes, also where the hashes were made right.
     The manifest itself carries no signature: who can change everything can change everything.
 
     Raises:

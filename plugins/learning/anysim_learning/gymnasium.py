@@ -14,7 +14,7 @@ from anysim.task.contract import Obs, Status
 from anysim.task.env import TaskEnv
 
 PRIVILEGED = "privileged"
-"""The group of observations that only a simulator knows; a view shows it to whoever asks for it."""
+"""The group of observations that only a simulator knows; a view shows it on request."""
 
 
 def observation_space(env: TaskEnv, privileged: bool = False) -> gym.spaces.Dict:

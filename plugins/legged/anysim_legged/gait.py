@@ -39,7 +39,7 @@ class Motion(NamedTuple):
     pitch: Array
 
 
-class Footing(NamedTuple):
+class FootTargets(NamedTuple):
     """What the gait asks for: places (E, L, 3) [m] and velocities (E, L, 3) [m/s] of feet, and which stand (E, L)."""
 
     feet: Array
@@ -85,7 +85,7 @@ class Trot:
         self._foot[rows] = self._lifted[rows] = self._landed[rows] = feet
         self._stance[rows] = True
 
-    def tick(self, rows: slice | Array, command: Array, motion: Motion, dt: float) -> Footing:
+    def tick(self, rows: slice | Array, command: Array, motion: Motion, dt: float) -> FootTargets:
         """Advance by `dt` towards commands (E, 3)."""
         p = self._p
         velocity = self.velocity[rows]
@@ -119,11 +119,11 @@ class Trot:
         rate = p.frequency / (1.0 - p.duty)
         speed = np.where(stance[..., None], sliding, (landing - lifted) * (rate * (1.0 - turn))[..., None])
         speed[..., 2] = np.where(stance, 0.0, rate * np.pi * p.clearance * np.sin(2.0 * np.pi * swung))
-        footing = Footing(foot, speed, stance)
+        targets = FootTargets(foot, speed, stance)
         self.velocity[rows], self.slip[rows] = velocity, slip
         self._phase[rows], self._stance[rows] = phase, stance
         self._lifted[rows], self._landed[rows], self._foot[rows] = lifted, landing, foot
-        return footing
+        return targets
 
     def _advance(self, rows: slice | Array, command: Array, velocity: Array, dt: float) -> tuple[Array, Array]:
         """The phase (E,) of the stride, and who walks: until a whole stride was made without a command to move."""

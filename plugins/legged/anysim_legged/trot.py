@@ -10,7 +10,7 @@ from anysim.controllers.base import ChannelView, Command, Controller
 from anysim.conventions import Array
 from anysim.errors import TaskError, listing
 from anysim.math import pose as P
-from anysim_legged.gait import Footing, GaitParameters, Motion, Trot
+from anysim_legged.gait import FootTargets, GaitParameters, Motion, Trot
 from anysim_legged.legs import Legs, solve
 from anysim_legged.weight import Balance, shares
 
@@ -108,19 +108,19 @@ class TrotController(Controller):
     def update(self, env_ids: Array | None) -> Command:
         rows = _rows(env_ids)
         pose, twist = self.robot.base_pose(env_ids), self.robot.base_twist(env_ids)
-        footing = self.gait.tick(rows, self._command[rows], _motion(pose, twist), self._dt)
-        return self._drive(pose, self._balance.com(env_ids, len(pose)), footing)
+        targets = self.gait.tick(rows, self._command[rows], _motion(pose, twist), self._dt)
+        return self._drive(pose, self._balance.com(env_ids, len(pose)), targets)
 
-    def _drive(self, pose: Array, com: Array, footing: Footing) -> Command:
+    def _drive(self, pose: Array, com: Array, targets: FootTargets) -> Command:
         """Positions of the legs' drives, and the torques that carry the weight."""
-        postures = self.legs.inverse(footing.feet)
+        postures = self.legs.inverse(targets.feet)
         joints = np.minimum(np.maximum(postures.joints, self.legs.lower), self.legs.upper)
         up = P.rotate_inverse(pose[:, 3:], np.broadcast_to(self._weight, (len(pose), 3)))
-        share = shares(footing.stance, footing.feet, com)
+        share = shares(targets.stance, targets.feet, com)
         force = up[:, None] * share[..., None]  # of the ground on each foot
         jacobian = postures.jacobian
         effort = -np.stack([P.dot(jacobian[..., k], force) for k in range(3)], axis=-1)
-        rates = solve(jacobian, footing.velocity)
+        rates = solve(jacobian, targets.velocity)
         rates = np.minimum(np.maximum(rates, -self._fastest), self._fastest)
         joints = joints - 0.5 * self._dt * rates  # held for a whole tick: where they shall be in its middle
         command = [np.empty((len(pose), self._order.size)) for _ in range(3)]

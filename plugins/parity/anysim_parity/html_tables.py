@@ -14,7 +14,7 @@ def number(value: float) -> str:
 
 
 def badge(found: Sequence[Finding]) -> str:
-    """How many comparisons agree; how many differ as declared (amber), and how many as nobody declares (red)."""
+    """How many comparisons agree; how many differ as declared (amber), and how many as no engine declares (red)."""
     if not found:
         return ""
     off = [f for f in found if not f.agree]
@@ -64,7 +64,7 @@ def _measure_row(measure: Measure, engines: Sequence[str], notes: Sequence[str])
 
 
 def _classes(off: bool, explanation: str, *engines: str) -> str:
-    """Of a cell with a number: beyond its tolerance as one of the engines declares, or as nobody does."""
+    """Of a cell with a number: beyond its tolerance as one of the engines declares, or as none does."""
     return "n" if not off else "n known" if declares(explanation, *engines) else "n off"
 
 

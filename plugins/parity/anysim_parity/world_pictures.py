@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anysim.api import load, make, watched
-from anysim.cli.montage import montage
 from anysim.conventions import Array
 from anysim.engine.capability import Capability
 from anysim.engine.factory import engine_class
@@ -125,3 +124,15 @@ def sheet(found: Pictures, columns: int | None = None) -> Any:
         axis.set_title(name, fontsize=9, loc="left")
         axis.set_axis_off()
     return figure
+
+
+def montage(images: Array, columns: int | None = None, gap: int = 4) -> Array:
+    """One image (H', W', 3) uint8 of many (N, H, W, 3), row by row, about as wide as high, white between them."""
+    count, height, width, _ = images.shape
+    across = columns or int(np.ceil(np.sqrt(count)))
+    down = -(-count // across)
+    sheet = np.full((down * (height + gap) - gap, across * (width + gap) - gap, 3), 255, dtype=np.uint8)
+    for number, image in enumerate(images):
+        top, left = (number // across) * (height + gap), (number % across) * (width + gap)
+        sheet[top : top + height, left : left + width] = image
+    return sheet

@@ -11,7 +11,7 @@ from multiprocessing.connection import Connection
 from operator import attrgetter
 
 from anysim.planning.motion import Budget, MotionPlanner, PlanStatus
-from anysim.processes.own_process import hang_on
+from anysim.processes.own_process import end_with_parent
 from anysim.processes.shared_memory import Layout, SharedArrays
 from anysim_planning.answering import Job, PlannerHost, planner_maker
 from anysim_planning.queued import BATCH
@@ -22,10 +22,10 @@ NOTES: Layout = {"given_up": ((BATCH,), "|b1"), "end": ((BATCH,), "<f8")}
 """What a process and its parent share, by place in the batch: the wish to stop, and when the time will be over."""
 
 
-def main(connection: int, lifeline: int) -> None:
+def main(connection: int, parent_watch: int) -> None:
     """Serve until the parent says stop, or ends. Ctrl-C reaches the parent, which decides what becomes of this."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    hang_on(lifeline)
+    end_with_parent(parent_watch)
     faulthandler.enable()  # a crash in a planner's library says where
     os.nice(NICENESS)
     with socket.socket(fileno=connection) as channel, Connection(os.dup(connection)) as pipe:

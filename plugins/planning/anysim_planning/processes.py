@@ -72,7 +72,7 @@ class ProcessService(QueuedService):
             self._drop(seat)
 
     def _plan(self, seat: Seat) -> None:
-        """Answer the requests of a seat; where nobody knows which one its process was lost with, each goes alone."""
+        """Answer the requests of a seat; where it is not known which one its process was lost with, each goes alone."""
         alone = False
         while seat.jobs:
             batch = list[PlanFuture]()

@@ -146,7 +146,7 @@ class QueuedService(PlannerService):
         """Under the lock: a request that a worker has was given up, as its budget says."""
 
     def _replace_the_hung(self) -> None:
-        """Under the lock, with every flush and while somebody waits."""
+        """Under the lock, with every flush and while a call waits."""
 
     def _started(self) -> Seat:
         seat = Seat()

@@ -34,7 +34,7 @@ class Retargeted(NamedTuple):
         reached: (T,) bool, both errors are within the tolerances and no joint has jumped.
         position_error: (T,) [m]
         rotation_error: (T,) [rad]
-        free: (T,) bool, the robot touches neither itself nor what stands around it; all True where nobody looked.
+        free: (T,) bool, the robot touches neither itself nor what stands around it; all True where it was not checked.
     """
 
     times: Array

@@ -36,7 +36,7 @@ def check_torch(path: Path) -> None:
     if not any(path.resolve().is_relative_to(root) for root in roots):
         raise TaskError(
             f"the policy {path} is TorchScript, which can run code of its own, and lies in no trusted folder: export "
-            f"it to ONNX, or name its folder in {TRUSTED} if you trust whoever made it"
+            f"it to ONNX, or name its folder in {TRUSTED} if you trust its author"
         )
 
 

@@ -27,7 +27,7 @@ from anysim.processes.shared_memory import SharedArrays
 from anysim.processes.worker_handle import WorkerLost
 from anysim_sharded.blocks import Blocks, joined, joined_by_name, joined_contacts, rows_of, state_layout
 from anysim_sharded.hosted import News
-from anysim_sharded.pool import START_S, Crew, dismiss, hire, importable_path
+from anysim_sharded.pool import START_S, WorkerPool, importable_path, release_pool, take_pool
 
 TIMEOUT_S = 300.0
 """The longest that a worker may take for a control step or another command, but to build or draw, if not set [s]."""
@@ -50,7 +50,7 @@ class ShardedEngine(SimEngine):
         super().__init__(**options)
         self._given = dict(options)
         self._front = self.inner(**options)  # never gets a world; knows what depends on options
-        self._crew: Crew | None = None
+        self._pool: WorkerPool | None = None
         self._memory: SharedArrays | None = None
         self._lost = np.zeros(0, dtype=bool)
 
@@ -77,7 +77,7 @@ class ShardedEngine(SimEngine):
     @property
     def workers(self) -> tuple[int, ...]:
         """The process ids of the workers, in the order of their blocks of envs; empty without a world."""
-        return () if self._crew is None else self._crew.pids
+        return () if self._pool is None else self._pool.pids
 
     @property
     def lost(self) -> Array:
@@ -93,14 +93,14 @@ class ShardedEngine(SimEngine):
     # ------------------------------------------------------------------ lifecycle
 
     def _build(self, world: World, num_envs: int) -> None:
-        fresh = self._crew is None
-        if self._crew is None:
+        fresh = self._pool is None
+        if self._pool is None:
             count = min(self.shards, num_envs)
             threads = max(1, usable_cores() // count)
             options = self.inner.share_of_threads(self._given, threads)
-            crew = hire(importable_path(self.inner), options, count, threads, self.timeout_s)
-            self._crew = crew
-            self._finalizer = weakref.finalize(self, Crew.close, crew)
+            pool = take_pool(importable_path(self.inner), options, count, threads, self.timeout_s)
+            self._pool = pool
+            self._finalizer = weakref.finalize(self, WorkerPool.close, pool)
             self._blocks = Blocks(num_envs, count)
         count = len(self._blocks.bounds)
         self._lost = np.zeros(num_envs, dtype=bool)
@@ -112,7 +112,7 @@ class ShardedEngine(SimEngine):
         self._pushed = False
         self._memory = SharedArrays(state_layout(world, num_envs))
         try:
-            self._crew.build(world, self._blocks, self._memory)
+            self._pool.build(world, self._blocks, self._memory)
         except BaseException:
             self._let_go(fresh)
             raise
@@ -121,10 +121,10 @@ class ShardedEngine(SimEngine):
         if self._memory is not None:
             self._memory.close()
             self._memory = None
-        if workers_too and self._crew is not None:
+        if workers_too and self._pool is not None:
             self._finalizer.detach()
-            dismiss(self._crew)
-            self._crew = None
+            release_pool(self._pool)
+            self._pool = None
 
     def _free(self) -> None:
         self._let_go(workers_too=False)  # the workers free theirs when they build anew, or end
@@ -145,17 +145,17 @@ class ShardedEngine(SimEngine):
         Raises:
             AnysimError: what the first worker with an error raised, or a worker that could not be replaced.
         """
-        assert self._crew is not None
+        assert self._pool is not None
         if self._commands.control_changed:  # stays so: a later write before the next step must not be missed
             self._apply_control(self._commands.control)
         messages = {k: (name, self._news[k], *arguments) for k, arguments in parts.items()}
         for k in parts:
             self._news[k] = News()
-        answers, raised, lost = self._crew.ask(messages, limit)
+        answers, raised, lost = self._pool.ask(messages, limit)
         for k, how in lost.items():
             self._replace(k, how)
             if again:
-                more, errors, gone = self._crew.ask({k: (name, self._spent_news(k), *parts[k])}, limit)
+                more, errors, gone = self._pool.ask({k: (name, self._spent_news(k), *parts[k])}, limit)
                 answers |= more
                 raised |= errors
                 if gone:
@@ -175,7 +175,7 @@ class ShardedEngine(SimEngine):
 
     def _replace(self, k: int, how: WorkerLost) -> None:
         """A new worker in the place of a lost one: its envs in their initial state, their parameters as they were."""
-        assert self._crew is not None
+        assert self._pool is not None
         assert self._memory is not None
         first, stop = self._blocks.bounds[k]
         rows = np.arange(first, stop)
@@ -185,19 +185,19 @@ class ShardedEngine(SimEngine):
         self._memory["wrench"][rows] = 0.0
         self._news[k] = News()
         try:
-            self._crew.replace(k, self.world, self._blocks, self._memory)
+            self._pool.replace(k, self.world, self._blocks, self._memory)
             for name, arguments in (
                 ("populate", (rows - first, self._presence.entities[rows])),
                 ("reset", (rows - first,)),
                 ("set_parameters", ({name: values[rows] for name, values in self._values.items()},)),
             ):
-                _, raised, lost = self._crew.ask({k: (name, News(), *arguments)}, None)
+                _, raised, lost = self._pool.ask({k: (name, News(), *arguments)}, None)
                 if raised:
                     raise raised[k]
                 if lost:
                     raise lost[k]
         except Exception as error:
-            self._crew.discard(k)
+            self._pool.discard(k)
             raise EngineFailure(f"{self._who(k)} {how}, and could not be replaced: {error}") from error
         warnings.warn(
             f"{self._who(k)} {how}; a new worker holds these envs in their initial state, faulted until reset(); "
@@ -339,7 +339,7 @@ class ShardedEngine(SimEngine):
     def renderer_name(self) -> str:
         """What draws the images."""
         with self._lock:
-            return self._front.renderer_name() if self._crew is None else self._ask("renderer_name", {0: ()})[0]
+            return self._front.renderer_name() if self._pool is None else self._ask("renderer_name", {0: ()})[0]
 
     def _render(self, view: CameraView, ids: Array, channels: tuple[str, ...]) -> dict[str, Array]:
         parts = self._blocks.split_query(ids)

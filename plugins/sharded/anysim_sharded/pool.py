@@ -39,7 +39,7 @@ def importable_path(engine_class: type[SimEngine]) -> str:
     return f"{module}:{name}"
 
 
-class Crew:
+class WorkerPool:
     """`count` workers with an engine each. A place whose worker was lost is empty until it is replaced."""
 
     def __init__(self, path: str, options: Mapping[str, Any], count: int, threads: int, timeout_s: float) -> None:
@@ -62,7 +62,7 @@ class Crew:
 
     @staticmethod
     def kind_of(path: str, options: Mapping[str, Any], count: int, threads: int, timeout_s: float) -> str:
-        """What two crews have in common that can stand in for each other."""
+        """What two pools have in common that can stand in for each other."""
         return repr((path, sorted(options.items()), count, threads, timeout_s))
 
     def rest(self) -> bool:
@@ -179,8 +179,8 @@ class Crew:
             shutil.rmtree(self._folder, ignore_errors=True)
 
 
-_kept: dict[str, Crew] | None = None
-"""Idle crews by kind; None where none are kept."""
+_kept: dict[str, WorkerPool] | None = None
+"""Idle pools by kind; None where none are kept."""
 
 
 @contextmanager
@@ -193,20 +193,20 @@ def keeping_workers() -> Iterator[None]:
         yield
     finally:
         idle, _kept = _kept, outer
-        for crew in idle.values():
-            crew.close()
+        for pool in idle.values():
+            pool.close()
 
 
-def hire(path: str, options: Mapping[str, Any], count: int, threads: int, timeout_s: float) -> Crew:
+def take_pool(path: str, options: Mapping[str, Any], count: int, threads: int, timeout_s: float) -> WorkerPool:
     """Idle workers of this kind, or new ones."""
-    kind = Crew.kind_of(path, options, count, threads, timeout_s)
+    kind = WorkerPool.kind_of(path, options, count, threads, timeout_s)
     idle = None if _kept is None else _kept.pop(kind, None)
-    return Crew(path, options, count, threads, timeout_s) if idle is None else idle
+    return WorkerPool(path, options, count, threads, timeout_s) if idle is None else idle
 
 
-def dismiss(crew: Crew) -> None:
-    """Keep a crew where crews are kept and nothing is wrong with it; else end it."""
-    if _kept is not None and crew.kind not in _kept and crew.rest():
-        _kept[crew.kind] = crew
+def release_pool(pool: WorkerPool) -> None:
+    """Keep a pool where pools are kept and nothing is wrong with it; else end it."""
+    if _kept is not None and pool.kind not in _kept and pool.rest():
+        _kept[pool.kind] = pool
     else:
-        crew.close()
+        pool.close()

@@ -13,7 +13,7 @@ from typing import Any
 
 from anysim.errors import AnysimError
 from anysim.model.world import World
-from anysim.processes.own_process import hang_on
+from anysim.processes.own_process import end_with_parent
 from anysim.processes.shared_memory import Layout
 from anysim_sharded.hosted import HostedEngine, hosted_class
 
@@ -22,10 +22,10 @@ LINGER_S = 3e-4
 starts milliseconds late: two shards on two cores gained 1.5 to 1.6 times without this, 1.85 with it."""
 
 
-def main(connection: int, lifeline: int) -> None:
+def main(connection: int, parent_watch: int) -> None:
     """Serve until the parent says stop, or ends. Ctrl-C reaches the parent, which decides what becomes of this."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    hang_on(lifeline)
+    end_with_parent(parent_watch)
     faulthandler.enable()  # a crash in an engine's library says where
     with socket.socket(fileno=connection) as channel, Connection(channel.detach()) as pipe:
         Host(pipe).serve()

@@ -194,7 +194,7 @@ class PlannedMoves:
     def move(self, ids: Array) -> Array:
         """Tell the joints where to be in this control step; (n,) bool: in which envs that was told."""
         if self.latency == REALTIME and self._questions:
-            self.planner.service.flush()  # nobody waits for a worker that hangs; this is where one is replaced
+            self.planner.service.flush()  # without waiting for a worker that hangs; this is where one is replaced
         for i in ids[self.stage[ids] == Stage.PLANNING].tolist():
             question = self._questions[i]
             if question.future.done if question.due is None else self._env.scene.elapsed[i] >= question.due:

@@ -1,4 +1,4 @@
-"""The server of the browser's page: on loopback alone, for whoever has the token, and for no other site.
+"""The server of the browser's page: on loopback alone, for those who have the token, and for no other site.
 
 The page itself holds no secret. Its address carries the token behind `#`, which browsers do not send; what the page
 then asks for needs it in a header. A foreign site that is open in the same browser is refused by its Origin, and one

@@ -232,7 +232,7 @@ class Session:
     # ------------------------------------------------------------------ what is recorded and shown
 
     def _source(self) -> dict[str, Any]:
-        """Who drives what, for the record."""
+        """The devices and what each drives, for the record."""
         setup, arm = self.setup, self.drives.active
         return {
             "source": "teleop",
@@ -286,7 +286,7 @@ class Session:
         )
 
     def _judged(self) -> Mapping[str, bool]:
-        """What each term of success says; nothing where nobody looks."""
+        """What each term of success says; nothing where no page looks."""
         if not self.device.live:
             return MappingProxyType({})
         return {name: bool(term()[0]) for name, term in self._success.items()}

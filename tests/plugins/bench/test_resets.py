@@ -1,4 +1,4 @@
-"""Nothing accumulates in resets that change who is there; and the benchmark would see it if it did."""
+"""Nothing accumulates in resets that change what is present; and the benchmark would see it if it did."""
 
 import pytest
 from typer.testing import CliRunner

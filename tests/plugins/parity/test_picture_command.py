@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from anysim.api import WATCHING as WATCHED, load, make as anysim_make
-from anysim.cli.montage import montage
 from anysim.errors import NameLookupError
 from anysim.testing.engines import require_drawing
-from anysim_parity.world_pictures import pictures
+from anysim_parity.world_pictures import montage, pictures
 from tests.cli.test_cli import anysim
 
 WORLD = """

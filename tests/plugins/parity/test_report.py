@@ -107,7 +107,7 @@ def test_what_no_engine_declares_is_red_and_what_one_declares_amber() -> None:
     assert declares("b declares of contacts: soft", "a", "b")
     assert not declares("ab declares of contacts: soft", "a", "b"), "the name of another engine ends alike"
     bounce, drop = contact.measures
-    quiet = bounce._replace(explanation="A remark that accuses nobody.")
+    quiet = bounce._replace(explanation="A remark that accuses no engine.")
     for measure, kind, other in ((bounce, "known", "off"), (quiet, "off", "known")):
         text = page(whole._replace(layers=(contact._replace(measures=(measure, drop)), *whole.layers[1:])))
         assert [cell.text for cell in parsed(text).xpath(f"//td[@class='n {kind}']")] == ["0.31"]

@@ -48,7 +48,7 @@ class Shifted(NullEngine):
         bodies[spot] = replace(bodies[spot], position=(x + self.SHIFT, y, z))
         wrong = replace(world, bodies=tuple(bodies))
         if name == "body_pose":
-            return forward_kinematics(wrong, self._roots, self._position)
+            return forward_kinematics(wrong, self._envs.roots, self._envs.position)
         return super()._read(name)
 
 

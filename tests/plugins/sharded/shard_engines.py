@@ -12,8 +12,8 @@ class Moody(NullEngine):
     """Does what the position target of env 0 of its block says in the next step."""
 
     def _step(self, n_steps, ids):
-        assert self._control is not None
-        wish = int(self._control.position[0, 0])
+        assert self._envs.control is not None
+        wish = int(self._envs.control.position[0, 0])
         if wish == 1:
             os.kill(os.getpid(), signal.SIGSEGV)
         elif wish == 2:

@@ -221,7 +221,7 @@ def test_workers_are_kept_for_the_next_engine_where_that_is_asked_for():
         with kind() as engine:
             seen.append(engine.create_world(world, 2).workers)
         assert seen[0] == seen[1]
-        assert not set(seen[0]) & set(seen[2]), "a crew with a lost worker is not kept"
+        assert not set(seen[0]) & set(seen[2]), "a pool with a lost worker is not kept"
         assert children() - before == set(seen[2])
     assert children() == before
 

@@ -146,7 +146,7 @@ def read(path: str | Path) -> Content:
         raise SnapshotError(f"{path} cannot be read: {error.strerror or error}") from error
     except SnapshotError:
         raise
-    except Exception as error:  # of any library that reads what anybody may have written
+    except Exception as error:  # of any library that reads a file of any origin
         raise SnapshotError(
             f"{path} is no snapshot, or a damaged or truncated one: {error}; copy it anew, or save it anew"
         ) from error

@@ -1,4 +1,4 @@
-"""Checks of the rows of a snapshot, which may come from a file that anybody wrote."""
+"""Checks of the rows of a snapshot, which may come from a file of any origin."""
 
 from collections.abc import Collection, Generator, Mapping
 from contextlib import contextmanager

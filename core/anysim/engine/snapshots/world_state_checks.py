@@ -1,4 +1,4 @@
-"""Checks of a world state, which may come from a file or a program that anybody wrote."""
+"""Checks of a world state, which may come from a file or a program of any origin."""
 
 from typing import TYPE_CHECKING, Any
 

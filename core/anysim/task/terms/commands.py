@@ -91,5 +91,5 @@ def goal_beside(
 ) -> Array:
     """A point at the height of a frame and `distance` [m] from it, where it is when the episode begins."""
     far, angle = draw("distance", distance), draw("direction", direction)
-    way = np.stack([np.cos(angle), np.sin(angle), np.zeros(len(angle))], axis=1)
-    return _upright(frame.position + far[:, None] * way)
+    along = np.stack([np.cos(angle), np.sin(angle), np.zeros(len(angle))], axis=1)
+    return _upright(frame.position + far[:, None] * along)

@@ -18,7 +18,7 @@ class Quantity(NamedTuple):
     """A number of a state that the success depends on, such as a distance [m] or a speed [m/s].
 
     Attributes:
-        well: a range in which it stands in nobody's way.
+        well: a range in which it obstructs nothing.
         around: a range about the threshold, or about both where the two rules have thresholds of their own.
     """
 

@@ -12,8 +12,8 @@ from anysim_parity.probes import tolerances as T
 from anysim_parity.probes.probe import CURVE_POINTS, Found, G, Probe, Quantity, crossing, cube, lane, record, series
 from anysim_parity.result import Plot
 
-GAP, WAY = 0.5, 0.4
-"""[m]: clearance of the falling ball, and the way it is timed over."""
+GAP, DISTANCE = 0.5, 0.4
+"""[m]: clearance of the falling ball, and the distance that it is timed over."""
 
 RADIUS, HALF = 0.05, 0.05
 MASSES = (0.1, 1.0, 20.0)
@@ -28,7 +28,7 @@ SINKS = "A soft contact carries a weight by sinking; a rigid one may keep a gap 
 
 def drop(dt: float) -> Probe:
     """A ball falls; boxes of several masses are put down gently and lie."""
-    quantities = [Quantity(FALL, "s", sqrt(2 * WAY / G), dt, (Capability.RIGID_BODIES,))]
+    quantities = [Quantity(FALL, "s", sqrt(2 * DISTANCE / G), dt, (Capability.RIGID_BODIES,))]
     for mass in MASSES:
         quantities.append(Quantity(HEIGHT.format(mass), "m", HALF, T.REST_HEIGHT, remark=SINKS))
     for mass in MASSES:
@@ -55,9 +55,9 @@ def _drop_world(dt: float) -> World:
 
 def _drop(engine: SimEngine) -> Found:
     ball = engine.index.body("ball")
-    way = record(engine, 0.6)
-    fallen = RADIUS + GAP - way.pose[:, ball, 2]
-    values = {FALL: crossing(way.time, fallen, WAY)}
+    motion = record(engine, 0.6)
+    fallen = RADIUS + GAP - motion.pose[:, ball, 2]
+    values = {FALL: crossing(motion.time, fallen, DISTANCE)}
     engine.step(round(0.6 / engine.world.physics.dt))
     rest = record(engine, 0.2, forces=bool(engine.world.contact_sensors))
     for i, mass in enumerate(MASSES):
@@ -65,7 +65,7 @@ def _drop(engine: SimEngine) -> Found:
         if len(rest.force):
             values[WEIGHT.format(mass)] = float(rest.force[:, i, 2].mean())
     values[STILL] = float(np.abs(rest.twist[:, : len(MASSES), :3]).max())
-    return Found(values, {PLOT: (way.time, way.pose[:, ball, 2])})
+    return Found(values, {PLOT: (motion.time, motion.pose[:, ball, 2])})
 
 
 # ---------------------------------------------------------------------- bounce
@@ -121,10 +121,10 @@ def _bounce_world(dt: float) -> World:
 
 
 def _bounce(engine: SimEngine) -> Found:
-    way = record(engine, 1.4)
-    height = way.pose[:, :, 2] - RADIUS
-    first = int(np.searchsorted(way.time, sqrt(2 * GAP / G) - AROUND))
-    last = int(np.searchsorted(way.time, sqrt(2 * GAP / G) + AROUND))
+    motion = record(engine, 1.4)
+    height = motion.pose[:, :, 2] - RADIUS
+    first = int(np.searchsorted(motion.time, sqrt(2 * GAP / G) - AROUND))
+    last = int(np.searchsorted(motion.time, sqrt(2 * GAP / G) + AROUND))
     lowest = first + np.argmin(height[first:last], axis=0)
     values: dict[str, float] = {}
     curves: dict[str, tuple[np.ndarray, np.ndarray]] = {}
@@ -132,5 +132,5 @@ def _bounce(engine: SimEngine) -> Found:
         values[APEX.format(e)] = float(height[lowest[i] :, i].max())
         values[SUNK.format(e)] = float(max(0.0, -height[:, i].min()))
         if e in BOUNCES[2:]:
-            curves[_bounce_plot(e)] = (way.time, height[:, i])
+            curves[_bounce_plot(e)] = (motion.time, height[:, i])
     return Found(values, curves)

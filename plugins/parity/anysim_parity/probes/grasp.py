@@ -121,7 +121,7 @@ def lift(dt: float) -> Probe:
         Quantity(HELD, "m", 0.0, T.SLIP, position, "Regularised friction creeps under any load."),
     )
     still = Series("analytic", (0.0, RISE + HOLD_TIME), (0.0, 0.0))
-    plot = Plot(PLOT, "time [s]", "way in the grip [m]", (), still)
+    plot = Plot(PLOT, "time [s]", "displacement in the grip [m]", (), still)
     return Probe("lift", _lift_world(dt), quantities, _lift, (plot,))
 
 
@@ -159,11 +159,11 @@ def _lift(engine: SimEngine) -> Found:
         speed[0, 0] = UP / RISE * 30 * (share * (1 - share)) ** 2
         engine.set_control(position=target, velocity=speed)
 
-    way = record(engine, RISE + HOLD_TIME, push=command)
-    inside = way.pose[:, thing, 2] - way.pose[:, palm, 2]
+    motion = record(engine, RISE + HOLD_TIME, push=command)
+    inside = motion.pose[:, thing, 2] - motion.pose[:, palm, 2]
     inside = inside - inside[0]
-    top = int(np.searchsorted(way.time - began, RISE))
+    top = int(np.searchsorted(motion.time - began, RISE))
     values |= {LIFTED: float(-inside[top]), HELD: float(inside[top] - inside[-1])}
     if squeeze is not None:
         values[SQUEEZE] = float(squeeze)
-    return Found(values, {PLOT: (way.time - began, inside)})
+    return Found(values, {PLOT: (motion.time - began, inside)})

@@ -43,8 +43,8 @@ def _pairs(engine: SimEngine) -> Found:
     blocks = [engine.index.body(f"block{i}") for i in range(len(PAIRS) + 1)]
     engine.step(round(0.2 / engine.world.physics.dt))
     engine.set_body_state(twist=np.tile([SPEED, 0.0, 0.0, 0.0, 0.0, 0.0], (1, len(blocks), 1)), bodies=blocks)
-    way = record(engine, 0.2)
-    late = way.time - way.time[0] > 0.05
-    slowed = [-slope_of(way.time[late], way.twist[late, body, 0]) / G for body in blocks]
+    motion = record(engine, 0.2)
+    late = motion.time - motion.time[0] > 0.05
+    slowed = [-slope_of(motion.time[late], motion.twist[late, body, 0]) / G for body in blocks]
     names = [*(FIXED.format(*pair) for pair in PAIRS), LOOSE.format(SMOOTH, SMOOTH)]
     return Found(dict(zip(names, slowed, strict=True)))

@@ -20,7 +20,7 @@ LYING: Quat = (sqrt(0.5), 0.0, 0.0, sqrt(0.5))
 BODIES = {"sphere": 0.4, "cylinder": 0.5}
 """I / (m r^2) of a solid body about its axis."""
 
-GAIN, SPIN = "roll: acceleration of a {} down 15 degrees", "roll: slip of a {} that rolls, per way"
+GAIN, SPIN = "roll: acceleration of a {} down 15 degrees", "roll: slip of a {} that rolls, per distance"
 FINAL, WHEN = "roll: final speed of a sphere launched at 2 m/s without spin", "roll: time until it rolls"
 PLOT = "A sphere that begins to roll"
 
@@ -58,18 +58,18 @@ def _world(dt: float) -> World:
 def _roll(engine: SimEngine) -> Found:
     launched = engine.index.body("launched")
     engine.set_body_state(twist=[SPEED, 0.0, 0.0, 0.0, 0.0, 0.0], bodies=[launched])
-    way = record(engine, 0.5)
+    motion = record(engine, 0.5)
     downhill = np.array([cos(SLOPE), 0.0, -sin(SLOPE)])
-    late, values = way.time > 0.15, dict[str, float]()
+    late, values = motion.time > 0.15, dict[str, float]()
     for name in BODIES:
         body = engine.index.body(name)
-        speed, turning = way.twist[:, body, :3] @ downhill, RADIUS * way.twist[:, body, 4]
-        values[GAIN.format(name)] = slope_of(way.time[late], speed[late])
+        speed, turning = motion.twist[:, body, :3] @ downhill, RADIUS * motion.twist[:, body, 4]
+        values[GAIN.format(name)] = slope_of(motion.time[late], speed[late])
         values[SPIN.format(name)] = float((speed[-1] - turning[-1]) / max(abs(speed[-1]), 1e-6))
-    speed, turning = way.twist[:, launched, 0], RADIUS * way.twist[:, launched, 4]
+    speed, turning = motion.twist[:, launched, 0], RADIUS * motion.twist[:, launched, 4]
     values[FINAL] = float(speed[-1])
-    values[WHEN] = _until(way.time, speed - turning)
-    return Found(values, {PLOT: (way.time, speed)})
+    values[WHEN] = _until(motion.time, speed - turning)
+    return Found(values, {PLOT: (motion.time, speed)})
 
 
 def _until(time: Array, slip: Array) -> float:

@@ -26,11 +26,11 @@ PLOT = "A block that slides to a stop"
 
 def slide(dt: float) -> Probe:
     """One block is given a speed, two are pushed, on the flat ground."""
-    way, gained = SPEED**2 / (2 * FRICTION * G), PUSHES[1] - FRICTION * G
+    distance, gained = SPEED**2 / (2 * FRICTION * G), PUSHES[1] - FRICTION * G
     t = np.linspace(0.0, SPEED / (FRICTION * G), CURVE_POINTS)
     plot = Plot(PLOT, "time [s]", "distance [m]", (), series("analytic", t, SPEED * t - FRICTION * G / 2 * t**2))
     quantities = (
-        Quantity(STOP, "m", way, T.SLIDING * way),
+        Quantity(STOP, "m", distance, T.SLIDING * distance),
         Quantity(STUCK, "m/s", 0.0, T.CREEP, remark="Regularised friction creeps under any load."),
         Quantity(DRIVEN, "m/s^2", gained, T.SLIDING * gained),
     )
@@ -49,13 +49,13 @@ def _slide(engine: SimEngine) -> Found:
     engine.step(round(0.2 / engine.world.physics.dt))
     engine.set_body_state(twist=[SPEED, 0.0, 0.0, 0.0, 0.0, 0.0], bodies=[0])
     wrench = [[[force, 0.0, 0.0, 0.0, 0.0, 0.0] for force in PUSHES]]
-    way = record(engine, 1.0, push=lambda: engine.apply_wrench(wrench, [1, 2]))
-    time, x = way.time - way.time[0], way.pose[:, :, 0]
+    motion = record(engine, 1.0, push=lambda: engine.apply_wrench(wrench, [1, 2]))
+    time, x = motion.time - motion.time[0], motion.pose[:, :, 0]
     late = time > 0.4
     values = {
         STOP: float(x[-1, 0] - x[0, 0]),
         STUCK: slope_of(time[late], x[late, 1]),
-        DRIVEN: slope_of(time[late], way.twist[late, 2, 0]),
+        DRIVEN: slope_of(time[late], motion.twist[late, 2, 0]),
     }
     return Found(values, {PLOT: (time, x[:, 0] - x[0, 0])})
 
@@ -106,11 +106,11 @@ def _inclines(dt: float) -> World:
 
 
 def _incline(engine: SimEngine) -> Found:
-    way = record(engine, 0.8)
+    motion = record(engine, 0.8)
     held, slid = (engine.index.body(f"block{i}") for i in range(2))
     downhill = np.array([[cos(a), 0.0, -sin(a)] for a in np.radians(ANGLES)])
-    along = ((way.pose[:, [held, slid], :3] - way.pose[0, [held, slid], :3]) * downhill).sum(axis=-1)
-    speed = way.twist[:, slid, :3] @ downhill[1]
-    late = way.time > 0.3
-    values = {CREEP: slope_of(way.time[late], along[late, 0]), GAIN: slope_of(way.time[late], speed[late])}
-    return Found(values, {INCLINE: (way.time, along[:, 1])})
+    along = ((motion.pose[:, [held, slid], :3] - motion.pose[0, [held, slid], :3]) * downhill).sum(axis=-1)
+    speed = motion.twist[:, slid, :3] @ downhill[1]
+    late = motion.time > 0.3
+    values = {CREEP: slope_of(motion.time[late], along[late, 0]), GAIN: slope_of(motion.time[late], speed[late])}
+    return Found(values, {INCLINE: (motion.time, along[:, 1])})

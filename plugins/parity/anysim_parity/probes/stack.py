@@ -35,7 +35,7 @@ def stack(dt: float) -> Probe:
     quantities.append(Quantity(LOADED, "m", 3 * HALF, T.STACK_HEIGHT))
     quantities.append(Quantity(BORNE, "N", HEAVY * G, T.WEIGHT * HEAVY * G, sensors))
     still = Series("analytic", (0.0, 2.5), (0.0, 0.0))
-    plot = Plot(PLOT, "time [s]", "horizontal way [m]", (), still)
+    plot = Plot(PLOT, "time [s]", "horizontal displacement [m]", (), still)
     return Probe("stack", _world(dt), tuple(quantities), _stack, (plot,))
 
 
@@ -49,17 +49,17 @@ def _world(dt: float) -> World:
 
 
 def _stack(engine: SimEngine) -> Found:
-    way = record(engine, 2.5, every=5, forces=bool(engine.world.contact_sensors))
-    top, late = COUNT - 1, way.time >= 0.5
-    aside = np.hypot(*(way.pose[:, top, :2] - way.pose[0, top, :2]).T)
+    motion = record(engine, 2.5, every=5, forces=bool(engine.world.contact_sensors))
+    top, late = COUNT - 1, motion.time >= 0.5
+    aside = np.hypot(*(motion.pose[:, top, :2] - motion.pose[0, top, :2]).T)
     began = int(np.argmax(late))
     values = {
-        TOP: float(way.pose[-1, top, 2]),
-        DRIFT: float(np.hypot(*(way.pose[-1, top, :2] - way.pose[began, top, :2]))),
-        LOADED: float(way.pose[-1, COUNT + 1, 2]),
+        TOP: float(motion.pose[-1, top, 2]),
+        DRIFT: float(np.hypot(*(motion.pose[-1, top, :2] - motion.pose[began, top, :2]))),
+        LOADED: float(motion.pose[-1, COUNT + 1, 2]),
     }
-    if len(way.force):
-        down = -way.force[way.time >= 1.5, :, 2].mean(axis=0)
+    if len(motion.force):
+        down = -motion.force[motion.time >= 1.5, :, 2].mean(axis=0)
         values |= {FORCE.format(i + 1): float(down[i]) for i in range(COUNT - 1)}
         values[BORNE] = float(down[COUNT - 1])
-    return Found(values, {PLOT: (way.time, aside)})
+    return Found(values, {PLOT: (motion.time, aside)})

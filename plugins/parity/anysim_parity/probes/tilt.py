@@ -72,13 +72,13 @@ def _boxes(engine: SimEngine) -> list[int]:
 
 def _slip(engine: SimEngine, middle: float) -> float:
     boxes, angles = _boxes(engine), _angles(middle)
-    way = record(engine, SECONDS, every=25)
-    moved = np.linalg.norm(way.pose[-1, boxes, :3] - way.pose[0, boxes, :3], axis=-1)
+    motion = record(engine, SECONDS, every=25)
+    moved = np.linalg.norm(motion.pose[-1, boxes, :3] - motion.pose[0, boxes, :3], axis=-1)
     return threshold(angles, moved > SLIPPED)
 
 
 def _topple(engine: SimEngine, middle: float) -> float:
     boxes, angles = _boxes(engine), _angles(middle)
-    way = record(engine, SECONDS, every=25)
-    leant = P.angle_between(way.pose[0, boxes, 3:], way.pose[-1, boxes, 3:])
+    motion = record(engine, SECONDS, every=25)
+    leant = P.angle_between(motion.pose[0, boxes, 3:], motion.pose[-1, boxes, 3:])
     return threshold(angles, leant > LEANT)

@@ -33,7 +33,6 @@ def draw(entry: "CatalogueEntry", engines: Sequence[str], target: Path) -> str:
     """A PNG of the robot as each engine draws it, side by side; engines that cannot are named on stderr."""
     from PIL import Image
 
-    from anysim.cli.montage import montage
     from anysim.cli.output import working_on
     from anysim.errors import AnysimError
     from anysim_robots.qualify.portrait import portrait
@@ -52,7 +51,7 @@ def draw(entry: "CatalogueEntry", engines: Sequence[str], target: Path) -> str:
     import numpy as np
 
     target.parent.mkdir(parents=True, exist_ok=True)
-    Image.fromarray(montage(np.stack(images), columns=len(images))).save(target)
+    Image.fromarray(np.hstack(images)).save(target)
     return str(target)
 
 

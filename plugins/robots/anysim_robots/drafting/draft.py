@@ -189,7 +189,7 @@ def draft(file: Path, name: str | None = None, packages: Mapping[str, Path] = Ma
 def _open(model: ImportedModel, found: Guess) -> list[str]:
     """What could not be inferred."""
     asked = [
-        "license: the SPDX expression of the files, and where it is stated; a robot without one is nobody's to use",
+        "license: the SPDX expression of the files, and where it is stated; a robot without one may not be used",
         "gains and armature: those that are not said to be the file's are guessed from inertia; take the maker's",
     ]
     followers = [joint.name for joint in model.joints if joint.mimic is not None]

@@ -36,7 +36,7 @@ class Follower(NamedTuple):
 
 
 class Oracle(Protocol):
-    """Somebody else's reading of a source.
+    """An independent reading of a source.
 
     Attributes:
         name: who reads.

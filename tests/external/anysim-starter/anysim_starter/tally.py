@@ -25,5 +25,5 @@ def after_episode(env: TaskEnv, env_ids: Array) -> None:
 
 @hookimpl
 def on_close(env: TaskEnv) -> None:
-    """Say it once, to whoever listens to the log."""
+    """Say it once, to the listeners of the log."""
     _log.info("%s: %s", env.name, ", ".join(f"{count} {word}" for word, count in sorted(tally(env).items())))
