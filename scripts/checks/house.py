@@ -14,7 +14,7 @@ TESTING = CORE / "testing"
 CORE_LINES, CORE_FILES = 30_000, 222
 """What there is, and 2 % for contracts to come. What looks on, and what reads one format of files, is a plugin."""
 PACKAGE_LINES, PACKAGE_MODULES = 4_000, 26
-BACKEND_LINES = {"mujoco": 2_310, "pybullet": 3_300, "sapien": 3_700}
+BACKEND_LINES = {"mujoco": 2_310, "sapien": 3_700}
 """To come down to 2,500 each, by what engines with one scene per env share."""
 
 FMT_SKIPS = 77
