@@ -271,7 +271,7 @@ def test_the_journal_of_sapien_has_a_format(get) -> None:
     env = running(get("sapien", 3))
     snapshot = env.engine.snapshot()
     for change, says in (
-        ({"engine.journal_format": np.full(3, 9)}, "journal has format 9, this anysim-sapien reads 1"),
+        ({"engine.journal_format": np.full(3, 9)}, "journal has format 9, this anysim-mechanics reads 1"),
         ({"engine.length": np.full(3, 10**9)}, "damaged"),
         ({"engine.journal": np.full_like(snapshot.data["engine.journal"], 77.0)}, "no entry of a journal"),
     ):

@@ -121,7 +121,7 @@ def test_a_backend_that_is_too_large_is_found(make_tree: MakeTree, monkeypatch: 
     settings = ROOT_SETTINGS.replace('"plugins/*"', '"plugins/*", "backends/*"')
     member = MEMBER.format(name="anysim-y", dependencies=["anysim"])
     backend = {"pyproject.toml": settings, "backends/y/pyproject.toml": member}
-    monkeypatch.setattr(house, "BACKEND_LINES", {"y": 10})
+    monkeypatch.setattr(house, "BACKEND_LINES", 10)
     assert told(make_tree({**backend, "backends/y/anysim_y/a.py": LONG})) == []
     (fault,) = told(make_tree({**backend, "backends/y/anysim_y/a.py": LONG + "\n"}))
     assert fault.startswith("backends/y/anysim_y: 11 lines, 10 at most")

@@ -7,7 +7,7 @@ import numpy as np
 from anysim.conventions import WORLD, Array
 from anysim.engine.presence import bodies_there
 from anysim.model.world import World
-from anysim_pybullet.tree import Tree
+from anysim_mechanics.trees import Tree
 
 
 @dataclass(frozen=True)

@@ -13,12 +13,12 @@ from anysim.conventions import WORLD, Array
 from anysim.errors import EngineError
 from anysim.math import pose as P
 from anysim.model.world import Geom, HeightField, HeightFieldShape, MeshShape, Plane, World
+from anysim_mechanics.pair_factors import PairRules
+from anysim_mechanics.trees import Frames, Tree, frames_of, shifted, trees_of
 from anysim_pybullet.bullet import bullet, connect, disconnect
 from anysim_pybullet.cast import Cast
 from anysim_pybullet.declared import LINKS
 from anysim_pybullet.options import PybulletOptions, sweeps
-from anysim_pybullet.surfaces import PairRules
-from anysim_pybullet.tree import Frames, Tree, frames_of, shifted, trees_of
 from anysim_pybullet.urdf import body_link, joint_name, shape_link, tree_urdf, world_geom_urdf, write_meshes
 
 STATIC_GROUP, MOVING_GROUP = 2, 1

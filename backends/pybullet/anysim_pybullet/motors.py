@@ -16,11 +16,12 @@ from anysim.conventions import Array
 from anysim.engine.control import EFFORT, Control, acting_gains
 from anysim.errors import EngineError
 from anysim.kinematics.dynamics import mass_matrix
-from anysim.math.compiled import compiled
 from anysim.model.world import World
+from anysim_mechanics.drive_gains import DriveGains
+from anysim_mechanics.native_targets import native_targets
+from anysim_mechanics.trees import Tree
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.client import Env
-from anysim_pybullet.tree import Tree
 
 ENDLESS = 1e30
 """Stands for no effort limit: Bullet multiplies it by the time step."""
@@ -71,16 +72,7 @@ class Motors:
         gains = self._gains
         assert gains is not None
         position, velocity = np.empty_like(control.position), np.empty_like(control.position)
-        targets(
-            control.position,
-            control.velocity,
-            control.effort,
-            gains.stiffness,
-            gains.drag,
-            gains.whole,
-            position,
-            velocity,
-        )
+        native_targets(*control[:3], gains.stiffness, gains.drag, gains.whole, position, velocity)
         places, speeds = position.tolist(), velocity.tolist()
         for order in gains.orders:
             place, speed = places[order.env], speeds[order.env]
@@ -89,18 +81,16 @@ class Motors:
             terms = {"targetPositions": place, "targetVelocities": speed, **order.terms}
             yield order.client, order.uid, order.links, terms
 
-    def prepare(
-        self, mode: Array, kp: Array, kd: Array, limit: Array, damping: Array, armature: Array, envs: list[Env]
-    ) -> None:
-        """Keep all that does not depend on targets; gains and limits are (N, A), the others (N, J)."""
+    def prepare(self, mode: Array, own: DriveGains, damping: Array, armature: Array, envs: list[Env]) -> None:
+        """Keep all that does not depend on targets; the mode is (N, A), the joints' damping and armature are (N, J)."""
         dt = self._dt
-        stiffness, drag = acting_gains(mode, kp, kd)
+        stiffness, drag = acting_gains(mode, own.kp, own.kd)
         motor = (stiffness > 0) | (drag > 0)
         whole = drag + damping[:, self._driven]
         inertia = self._inertia + armature[:, self._driven] + dt * whole
         self.running[:, self._driven] = motor
         told = {
-            "forces": np.where(motor, np.minimum(limit, ENDLESS), 0.0),
+            "forces": np.where(motor, np.minimum(own.limit, ENDLESS), 0.0),
             "positionGains": dt * dt * stiffness / inertia,
             "velocityGains": dt * whole / inertia,
         }
@@ -133,33 +123,6 @@ class _Gains(NamedTuple):
     drag: Array
     whole: Array
     orders: list[_Order]
-
-
-@compiled
-def targets(
-    position: Array,
-    velocity: Array,
-    effort: Array,
-    stiffness: Array,
-    drag: Array,
-    whole: Array,
-    place: Array,
-    speed: Array,
-) -> None:
-    """What Bullet's motors are told for commands; all are (N, A).
-
-    Args:
-        position, velocity, effort: the commands.
-        stiffness, drag: of the drives in their modes.
-        whole: drag and the joints' own damping.
-        place, speed: the motors' targets, written.
-    """
-    for env in range(position.shape[0]):
-        for a in range(position.shape[1]):
-            stiff = stiffness[env, a] > 0.0
-            place[env, a] = position[env, a] + (effort[env, a] / stiffness[env, a] if stiff else 0.0)
-            push = drag[env, a] * velocity[env, a] + (0.0 if stiff else effort[env, a])
-            speed[env, a] = push / whole[env, a] if whole[env, a] > 0.0 else 0.0
 
 
 def refuse_dry_friction(world: World, joint: int, friction: float) -> None:

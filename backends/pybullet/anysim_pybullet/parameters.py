@@ -10,7 +10,7 @@ from anysim.errors import EngineError
 from anysim.kinematics.inertia import tensor
 from anysim.math import matrix as M
 from anysim.model.world import Inertial, World
-from anysim_pybullet import kernels as K
+from anysim_mechanics import articulation as K
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.client import Env
 from anysim_pybullet.law import Laws
@@ -36,9 +36,9 @@ class Parameters(ParameterTable):
             "joint.damping": laws.drives[:, :, K.DAMPING],
             "joint.armature": laws.drives[:, :, K.ARMATURE],
             "joint.friction": laws.drives[:, :, K.DRY],
-            "actuator.kp": laws.kp,
-            "actuator.kd": laws.kd,
-            "actuator.effort_limit": laws.limit,
+            "actuator.kp": laws.gains.kp,
+            "actuator.kd": laws.gains.kd,
+            "actuator.effort_limit": laws.gains.limit,
             "world.gravity": laws.gravity[:, None],
         }
         super().__init__(world, len(envs), own_scenery(options), kept)

@@ -15,7 +15,7 @@ from anysim.conventions import Array
 from anysim.errors import EngineError
 from anysim.math import pose as P
 from anysim.model.world import Box, Capsule, Cylinder, Geom, JointType, Mesh, MeshShape, Sphere, World
-from anysim_pybullet.tree import Frames, Tree, link_pose
+from anysim_mechanics.trees import Frames, Tree, link_pose
 
 UNLIMITED = 1e10
 """Stands for infinity where Bullet wants a number: the open side of a limit."""

@@ -1,57 +1,20 @@
 """Contacts of a substep: PhysX' points with the force along their normal, and the friction that goes with them.
 
-PhysX 5.3 reports no friction. It follows from momentum: each touching body's net contact force is known (`Momentum`),
-and what its normal forces leave of it is the friction of its pairs. Where a body touches one thing more than there are
-such equations (a box on two tables), they say no more than the sum; it is shared among the pairs as the most likely
-one, with each pair's friction spread up to its coefficient times its normal force.
+PhysX 5.3 reports no friction: it follows from momentum, see `anysim_mechanics.contact_friction`.
 """
-
-from typing import NamedTuple
 
 import numpy as np
 
-from anysim.conventions import WORLD, Array
-from anysim.model.pairs import counted
 from anysim.model.world import World
-from anysim_sapien.momentum import Balance, Momentum
+from anysim_mechanics.contact_friction import Pair, with_friction
+from anysim_sapien.momentum import Momentum
 from anysim_sapien.scene import EnvScene
-
-_NOISE = 1e-3
-"""Relative, of a momentum equation: single precision, and the terms of a link's that are first-order in the step."""
-
-
-class Pair(NamedTuple):
-    """Two shapes that touch: forces are on the first body [N]."""
-
-    first: int
-    second: int
-    normals: Array
-    """(P, 3) unit, from the second to the first."""
-    pressure: Array
-    """(P,) [N] along the normals."""
-    position: Array
-    """(P, 3) [m]."""
-    separation: Array
-    """(P,) [m]."""
-    friction: Array
-    """(3,) [N]."""
-
-    @property
-    def force(self) -> Array:
-        """(3,) [N] on the first body."""
-        return self.pressure @ self.normals + self.friction
-
-    def shared(self) -> Array:
-        """(P, 3) [N] on the first body, friction shared as the pressure is."""
-        total = self.pressure.sum()
-        share = self.pressure / total if total > 0 else self.pressure
-        return self.pressure[:, None] * self.normals + share[:, None] * self.friction
 
 
 def pairs_of(world: World, scene: EnvScene, momentum: Momentum, env: int) -> list[Pair]:
     """What touched or pressed in the last substep of an env, with friction."""
     found: list[Pair] = []
-    spread: list[Array] = []
+    coefficients: list[float] = []
     for contact in scene.contacts():
         points = contact.points
         impulse = np.array([p.impulse for p in points], dtype=float).reshape(-1, 3)
@@ -63,63 +26,6 @@ def pairs_of(world: World, scene: EnvScene, momentum: Momentum, env: int) -> lis
         first, second = (scene.body_of[body] for body in contact.bodies)
         position = np.array([p.position for p in points], dtype=float).reshape(-1, 3)
         found.append(Pair(first, second, normals, pressure, position, separation, np.zeros(3)))
-        # shapes of a pair have one coefficient, see surfaces.py
-        coefficient = float(contact.shapes[0].physical_material.static_friction)
-        across = np.eye(3) * pressure.sum() - np.einsum("p,pi,pj->ij", pressure, normals, normals)
-        spread.append(coefficient**2 * pressure.sum() * across)
-    friction = _friction(found, spread, momentum.balance(env))
-    return [pair._replace(friction=f) for pair, f in zip(found, friction, strict=True)]
-
-
-def _friction(pairs: list[Pair], spread: list[Array], balance: Balance) -> Array:
-    """(C, 3) [N] on the first bodies: the likeliest with which the momentum of the bodies comes out.
-
-    Args:
-        pairs: with their normal forces.
-        spread: (3, 3) of each, the covariance of a friction that may be anything its pair could exert.
-        balance: net contact forces, and by how much they may be off.
-    """
-    touched = {body for pair in pairs if pair.pressure.any() for body in (pair.first, pair.second)}
-    rows = {
-        body: i for i, body in enumerate(sorted(b for b in touched if b != WORLD and np.isfinite(balance.doubt[b])))
-    }
-    if not rows:
-        return np.zeros((len(pairs), 3))
-    left = balance.force[list(rows)]
-    enters = np.zeros((len(rows), len(pairs)))
-    for column, pair in enumerate(pairs):
-        for body, sign in ((pair.first, 1.0), (pair.second, -1.0)):
-            if body in rows:
-                enters[rows[body], column] += sign
-                left[rows[body]] -= sign * (pair.pressure @ pair.normals)
-    free = np.array(spread)
-    matrix = np.einsum("ac,cij,bc->aibj", enters, free, enters).reshape(3 * len(rows), -1)
-    diagonal = np.einsum("ac,cii->a", np.abs(enters), free).repeat(3)
-    matrix[np.diag_indices(len(matrix))] += _NOISE**2 * diagonal + (balance.doubt[list(rows)] ** 2).repeat(3) + 1e-18
-    weight = np.linalg.solve(matrix, left.ravel()).reshape(-1, 3)
-    return np.einsum("cij,ac,aj->ci", free, enters, weight)
-
-
-def sensor_forces(world: World, scene: EnvScene, momentum: Momentum, env: int) -> Array:
-    """(S, 3) [N]: the net contact force of the last substep on each contact sensor's bodies."""
-    total = np.zeros((len(world.contact_sensors), 3))
-    pairs = [pair for pair in pairs_of(world, scene, momentum, env) if pair.pressure.any()] if len(total) else []
-    first, second = np.array([(pair.first, pair.second) for pair in pairs], dtype=int).reshape(-1, 2).T
-    for row, sensor in zip(total, world.contact_sensors, strict=True):
-        for pair, on_first, on_second in zip(pairs, *counted(sensor, first, second), strict=True):
-            if on_first:
-                row += pair.force
-            if on_second:
-                row -= pair.force
-    return total
-
-
-def contact_points(world: World, scene: EnvScene, momentum: Momentum, env: int) -> list[tuple[Array, ...]]:
-    """All points that touch or exert force, as columns of `ContactPoints` for each pair."""
-    parts: list[tuple[Array, ...]] = []
-    for pair in pairs_of(world, scene, momentum, env):
-        counts = (pair.separation <= 0) | (pair.pressure != 0)
-        bodies = np.full(counts.sum(), pair.first), np.full(counts.sum(), pair.second)
-        rows = pair.position, -pair.normals, -pair.shared(), -pair.separation
-        parts.append((*bodies, *(row[counts] for row in rows)))
-    return parts
+        # shapes of a pair have one coefficient, see `anysim_mechanics.collision_groups`
+        coefficients.append(float(contact.shapes[0].physical_material.static_friction))
+    return with_friction(found, coefficients, momentum.balance(env))

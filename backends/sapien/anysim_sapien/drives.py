@@ -1,173 +1,103 @@
-"""The drives: u = kp (q* - q) + kd (qd* - qd) + ff, clipped, with its damping taken implicitly.
+"""The drives, as PhysX is given them; see `anysim_mechanics.damped_drives` for the law.
 
-Each substep kp (q* - q) + kd qd* + ff goes into PhysX as a force, and the damping as PhysX' own drive, a constraint
-that the solver meets together with contacts and limits. So a free joint moves as MuJoCo's `implicitfast` moves it, and
-a blocked one exerts all of its command; a law computed outside from mass matrix and bias alone would lose most of it.
-Where the law exceeds the effort limit at the present speed, PhysX clips it instead, at the speed that it ends with: the
-drive gets the law as damping towards a velocity, and the limit. A clipped force given from outside would set stiff
-joints swinging. With `actuation: explicit_pd` the force is the law of the state at the beginning of the substep. This
-holds for the PGS solver: TGS applies forces at once and damping bit by bit, and damped joints get much too slow.
-
-See `anysim_sapien.kernels.substep` for the law.
+It holds for the PGS solver: TGS applies forces at once and damping bit by bit, and damped joints get much too slow.
 """
-
-from typing import NamedTuple
 
 import numpy as np
 
-from anysim.conventions import Array
-from anysim.engine.control import EFFORT, POSITION, Control
-from anysim.errors import EngineError
 from anysim.model.world import Actuation, World
-from anysim_sapien.journal import Journal, Op
-from anysim_sapien.packing import Packing
+from anysim_mechanics import damped_drives as D
+from anysim_mechanics.native_targets import native_targets
 from anysim_sapien.scene import UNBOUNDED, EnvScene
 
 
-class _Ended(NamedTuple):
-    """What an env's efforts are worked out from: the law of its last substep, and the state that it left."""
-
-    law: Array
-    packed: bytes
-    packing: Packing
-
-
-class Drives:
-    """Gains, limits (N, A), passive damping (N, J), and the law of each joint (N, 8, J)."""
-
-    each_substep = True
-    """Whether `substep` must be called before each substep, and not only `begin` before the first."""
+class LawDrives(D.DampedDrives):
+    """The law as a force in each substep, its damping as PhysX' own drives: `told` is theirs (N, 3, J)."""
 
     def __init__(self, world: World, num_envs: int) -> None:
-        from anysim_sapien import kernels  # numba, where a world is built
-
-        actuators, joints, n = world.actuators, world.joints, num_envs
-        driven = [a.joint for a in actuators]
-        for actuator in actuators:
-            if driven.count(actuator.joint) > 1:
-                raise EngineError(f"joint '{joints[actuator.joint].name}' has two drives; sapien takes one per joint")
-        self._kernels = kernels
-        self._actuator = np.array([driven.index(j) if j in driven else -1 for j in range(len(joints))], dtype=int)
-        self.kp = np.tile(np.array([a.kp for a in actuators], dtype=float), (n, 1))
-        self.kd = np.tile(np.array([a.kd for a in actuators], dtype=float), (n, 1))
-        self.limit = np.tile(np.array([a.effort_limit for a in actuators], dtype=float), (n, 1))
-        self.passive = np.tile(np.array([j.damping for j in joints], dtype=float), (n, 1))
-        self._control = np.zeros((n, 0))  # the commands, a row per env
-        self._commanded, self._tuned = 0, 0  # how often commands, and gains, were written
-        self._kind = {Actuation.EXPLICIT_PD: kernels.EXPLICIT, Actuation.NATIVE: kernels.NATIVE}.get(
-            world.physics.actuation, kernels.LAW
-        )
-        limits = [j.velocity_limit if world.physics.velocity_limits else np.inf for j in joints]
-        self._speeds = np.array(limits, dtype=float)
-        # damping, force limit and velocity target of PhysX' drives, as PhysX has them
-        self._told = np.full((n, 3, len(joints)), np.nan)
-        self._news = np.zeros((len(joints), 2), dtype=int)
-        self._ended: list[_Ended | None] = [None] * n
-        self._update()
-
-    def apply(self, control: Control) -> None:
-        """Take over the commands of all envs."""
-        self._control = np.concatenate(control, axis=1)
-        self._commanded += 1
-        self._update()
-
-    def refresh(self) -> None:
-        """Take over gains, limits or passive damping that were written."""
-        self._tuned += 1
-        self._update()
-
-    def _update(self) -> None:
-        """Make the law: a new array, since efforts of the last substep may yet be asked for."""
-        self._law = np.empty((len(self._control), 8, len(self._actuator)))
-        self._kernels.orders(
-            self._control,
-            self._actuator,
-            self.kp,
-            self.kd,
-            self.limit,
-            self.passive,
-            self._speeds,
-            POSITION,
-            EFFORT,
-            self._law,
-        )
-
-    def set_gains(self, env: int, values: Array) -> None:
-        """Write an env's kp, kd, limits (A,) and passive damping (J,), one after the other."""
-        a = self.kp.shape[1]
-        self.kp[env], self.kd[env], self.limit[env] = values[: 3 * a].reshape(3, a)
-        self.passive[env] = values[3 * a :]
-        self.refresh()
-
-    def record(self, env: int, journal: Journal) -> None:
-        """Have a journal know what moves the env from here on."""
-        if journal.commanded != self._commanded:
-            journal.commanded = self._commanded
-            control = self._control[env].tobytes()
-            if control != journal.control:
-                journal.control = control
-                journal.record(Op.CONTROL, control)
-        if journal.tuned != self._tuned:
-            journal.tuned = self._tuned
-            gains = b"".join(part[env].tobytes() for part in (self.kp, self.kd, self.limit, self.passive))
-            if gains != journal.gains:
-                journal.gains = gains
-                journal.record(Op.GAINS, gains)
-
-    def forget(self, env: int) -> None:
-        """The env's scene is new: PhysX has none of these numbers."""
-        self._told[env] = np.nan
+        super().__init__(world, num_envs, np.full((num_envs, 3, len(world.joints)), np.nan))
 
     def begin(self, env: int, scene: EnvScene) -> None:
         """Before the first substep of a call: nothing, the law is given anew in each."""
 
-    def given(self, env: int) -> Array:
-        """What PhysX has been told of an env's drives; not a number where it has been told nothing yet."""
-        return self._told[env].copy()
-
-    def adopt(self, env: int, told: Array) -> None:
-        """The env's scene is another one, which was told this."""
-        self._told[env] = told
-
     def substep(self, env: int, scene: EnvScene) -> None:
         """Give PhysX the law's terms at the present state."""
-        count, kernel = 0, self._kernels.substep
+        count, news = 0, self.news
         for handle, _, joints, force in scene.trees:
-            count = kernel(
-                self._law,
-                env,
-                joints,
-                handle.get_qpos(),
-                handle.get_qvel(),
-                self._kind,
-                UNBOUNDED,
-                self._told,
-                force,
-                self._news,
-                count,
+            position, velocity = handle.get_qpos(), handle.get_qvel()
+            count = D.substep(
+                self.law, env, joints, position, velocity, self.kind, UNBOUNDED, self.told, force, news, count
             )
             handle.set_qf(force)
         if count:
             self._tell(env, scene, count)
 
     def _tell(self, env: int, scene: EnvScene, count: int) -> None:
-        damping, limit, target = self._told[env].tolist()
-        for j, what in self._news[:count].tolist():
-            if what & self._kernels.GAINS:
+        damping, limit, target = self.told[env].tolist()
+        for j, what in self.news[:count].tolist():
+            if what & D.GAINS:
                 scene.joints[j].set_drive_properties(0.0, damping[j], limit[j], "force")
-            if what & self._kernels.SPEED:
+            if what & D.SPEED:
                 scene.joints[j].set_drive_velocity_target(target[j])
 
-    # ------------------------------------------------------------------ what was exerted
 
-    def note(self, env: int, scene: EnvScene) -> None:
-        """After the last substep: the drives' damping acted on the speed at its end. Most steps are never asked for."""
-        self._ended[env] = _Ended(self._law, scene.packed(), scene.packing)
+class NativeDrives(D.DampedDrives):
+    """PhysX' own drives, for `actuation: native`: stiffness and damping that the solver takes implicitly, both of them.
 
-    def exerted(self, env: int, effort: Array) -> None:
-        """Write what the env's drives exerted in the last substep into its row of (N, J)."""
-        ended = self._ended[env]
-        if ended is not None:
-            law, packed, packing = ended
-            state = np.frombuffer(packed, dtype=np.float32)
-            self._kernels.exerted(law, env, state, packing.joint_pos, packing.joint_vel, self._kind, effort)
+    Gains, targets and limits are given once, not in each substep. Feed-forward moves the target, so that the effort
+    limit bounds it as well; a joint's own damping is part of its drive, with a target that leaves the law as it is.
+    `told` is what PhysX has of `wanted` (N, J, 6): targets, stiffness, damping, limit, and force.
+    """
+
+    def __init__(self, world: World, num_envs: int) -> None:
+        self.wanted = np.zeros((num_envs, len(world.joints), 6))
+        super().__init__(world, num_envs, np.full_like(self.wanted, np.nan))
+
+    def _update(self) -> None:
+        """Make PhysX' terms from those of the law."""
+        super()._update()
+        self.wanted[...] = 0.0
+        self.wanted[:, :, 3], self.wanted[:, :, 4] = self.passive, UNBOUNDED
+        if self.control is None or self.terms is None:
+            return
+        (stiffness, damping, *_), joint, limit = self.terms, self.gains.joint, self.gains.limit
+        position, velocity, feed, _ = self.control
+        # a drive in effort mode exerts a force, and its joint's damping has no limit
+        stiff, driven = stiffness > 0, (stiffness > 0) | (damping > 0)
+        whole = damping + self.passive[:, joint]
+        place, speed = np.empty_like(feed), np.empty_like(feed)
+        native_targets(position, velocity, np.where(driven, feed, 0.0), stiffness, damping, whole, place, speed)
+        limits = np.where(driven, np.minimum(limit, UNBOUNDED), UNBOUNDED)
+        force = np.where(driven, 0.0, np.clip(feed, -limit, limit))
+        terms = np.where(stiff, place, 0.0), speed, stiffness, whole, limits, force
+        self.wanted[:, joint] = np.stack(terms, axis=-1)
+
+    def begin(self, env: int, scene: EnvScene) -> None:
+        """Tell PhysX what changed."""
+        count = D.changes(self.wanted, self.told, env, scene.layout.joint_there, self.news)
+        if not count:
+            return
+        joints, rows, forced = scene.joints, self.wanted[env].tolist(), False
+        for j, what in self.news[:count].tolist():
+            position, velocity, stiffness, damping, limit, _ = rows[j]
+            if what & D.GAINS:
+                joints[j].set_drive_properties(stiffness, damping, limit, "force")
+            if what & D.TARGET:
+                joints[j].set_drive_target(position)
+            if what & D.SPEED:
+                joints[j].set_drive_velocity_target(velocity)
+            forced |= bool(what & D.FORCE)
+        if forced:
+            for tree in scene.trees:
+                tree.handle.set_qf(self.wanted[env, tree.joints, 5].astype(np.float32))
+
+    def substep(self, env: int, scene: EnvScene) -> None:
+        """Before a substep: nothing, PhysX has all of the law."""
+
+
+Drives = LawDrives | NativeDrives
+
+
+def drives_of(world: World, num_envs: int) -> Drives:
+    """The drives that the World's actuation asks for."""
+    return (NativeDrives if world.physics.actuation is Actuation.NATIVE else LawDrives)(world, num_envs)

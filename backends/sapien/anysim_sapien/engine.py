@@ -1,7 +1,7 @@
 """SAPIEN as a SimEngine: one scene per env, stepped one after the other on the CPU."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from anysim.conventions import Array
 from anysim.engine.availability import Finding
@@ -11,11 +11,13 @@ from anysim.engine.presence import Lifecycle
 from anysim.engine.requirements import crowded
 from anysim.engine.state import SnapshotLevel
 from anysim.model.world import World
+from anysim_mechanics.journal_checks import refuse_pasts
+from anysim_mechanics.meeting import refusals
 from anysim_sapien import declared
-from anysim_sapien.envs import Envs
-from anysim_sapien.journal_checks import refuse_pasts
-from anysim_sapien.meeting import refusals
 from anysim_sapien.options import SapienOptions
+
+if TYPE_CHECKING:
+    from anysim_sapien.envs import Envs
 
 
 class SapienEngine(OneWorldPerEnv):
@@ -30,7 +32,7 @@ class SapienEngine(OneWorldPerEnv):
     library = declared.LIBRARY
     options_type = SapienOptions
     options: SapienOptions
-    _envs: Envs
+    _envs: "Envs"
 
     @classmethod
     def findings(cls) -> tuple[Finding, ...]:
@@ -57,5 +59,7 @@ class SapienEngine(OneWorldPerEnv):
         device = open_device(self.options.vulkan_icd)
         return f"{device.name}, {'in software' if device.is_cpu else 'on the GPU'}"
 
-    def _make(self, world: World, present: Array) -> Envs:
+    def _make(self, world: World, present: Array) -> "Envs":
+        from anysim_sapien.envs import Envs  # SAPIEN and numba, where a world is built
+
         return Envs(world, present, self.options)

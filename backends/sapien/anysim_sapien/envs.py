@@ -15,11 +15,12 @@ from anysim.engine.one_world.base import EnvWorlds, Painter
 from anysim.engine.one_world.last_substep import LastSubstep
 from anysim.engine.state import SnapshotLevel
 from anysim.model.world import World
+from anysim_mechanics.contact_friction import contact_points, sensor_forces
 from anysim_sapien.audit import geom_volumes, joint_limits
-from anysim_sapien.contacts import contact_points, sensor_forces
+from anysim_sapien.contacts import pairs_of
+from anysim_sapien.drives import drives_of
 from anysim_sapien.momentum import Momentum
 from anysim_sapien.motion import Motion, motion_of, put_motion, put_twist, twists_of
-from anysim_sapien.native import drives_of
 from anysim_sapien.options import SapienOptions
 from anysim_sapien.parameters import Parameters
 from anysim_sapien.raw import raw_loop
@@ -60,7 +61,8 @@ class Envs(EnvWorlds):
         self.drives.exerted(env, self.last.effort)
 
     def _touched(self, env: int) -> Array:
-        return sensor_forces(self.world, self.scenes[env], self._momentum, env)
+        sensors = self.world.contact_sensors
+        return sensor_forces(self.world, pairs_of(self.world, self.scenes[env], self._momentum, env) if sensors else ())
 
     # ------------------------------------------------------------------ new scenes
 
@@ -155,7 +157,7 @@ class Envs(EnvWorlds):
         self.parameters.put_rows(env, rows)
         if level is SnapshotLevel.TRAJECTORY:
             self.scenes[env], drives, momentum = relive(self._recipes[env], rows)
-            self.drives.adopt(env, drives.given(0))
+            self.drives.adopt(env, drives)
             self._momentum.adopt(env, momentum.noted(0))
         else:
             self._place(env, Motion(*(rows[name] for name in Motion._fields)))
@@ -163,7 +165,7 @@ class Envs(EnvWorlds):
     # ------------------------------------------------------------------ sensing and checks
 
     def contacts(self, env: int) -> list[tuple[Array, ...]]:
-        return contact_points(self.world, self.scenes[env], self._momentum, env)
+        return contact_points(pairs_of(self.world, self.scenes[env], self._momentum, env))
 
     def raycast(self, env: int, origins: Array, directions: Array) -> tuple[Array, Array]:
         distance, body, scene = np.full(len(origins), np.inf), np.full(len(origins), WORLD), self.scenes[env]

@@ -12,7 +12,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.errors import EngineError
 from anysim.model.world import BodyKind, World
-from anysim_sapien.layout import Layout
+from anysim_mechanics.layout import Layout
 
 _CONSTANTS = np.array([0.0, 1.0], dtype=np.float32).tobytes()
 """In front of what is packed: what is not there has these for its numbers."""

@@ -10,13 +10,14 @@ from anysim.engine.parameter_table import ParameterTable
 from anysim.errors import EngineError
 from anysim.kinematics.dynamics import gain
 from anysim.kinematics.inertia import check_physical, from_principal, principal
+from anysim_mechanics.collision_groups import Copy
 from anysim_sapien.drives import Drives
 from anysim_sapien.options import OWN_SCENERY
 from anysim_sapien.recipe import Recipes, Values
 from anysim_sapien.scene import EnvScene
-from anysim_sapien.surfaces import Copy
 
-_DRIVES = {"joint.damping": "passive", "actuator.kp": "kp", "actuator.kd": "kd", "actuator.effort_limit": "limit"}
+_GAINS = {"actuator.kp": "kp", "actuator.kd": "kd", "actuator.effort_limit": "limit"}
+_DRIVES = ("joint.damping", *_GAINS)
 _BODIES = ("body.mass", "body.com", "body.inertia")
 _DAMPING = ("body.linear_damping", "body.angular_damping")
 _SURFACES = ("geom.friction", "geom.restitution")
@@ -41,8 +42,9 @@ class Parameters(ParameterTable):
         """`rebuild` makes an env's scene anew in its state, `written` is told of envs that were written to."""
         self._layout, self._options = recipes.layout, recipes.options
         self._drives, self._scenes, self._rebuild, self._written = drives, scenes, rebuild, written
-        kept = {name: getattr(drives, kind) for name, kind in _DRIVES.items()}
-        super().__init__(recipes.world, len(drives.kp), OWN_SCENERY, kept)
+        kept = {"joint.damping": drives.passive}
+        kept |= {name: getattr(drives.gains, kind) for name, kind in _GAINS.items()}
+        super().__init__(recipes.world, len(drives.passive), OWN_SCENERY, kept)
 
     def of(self, env: int) -> Values:
         """What the scene of an env is built with."""

@@ -7,7 +7,7 @@ import numpy as np
 from anysim.conventions import Array, wxyz_from_xyzw
 from anysim.kinematics.dynamics import gain
 from anysim.model.world import JointType
-from anysim_sapien.journal import Journal, Op
+from anysim_mechanics.journal import Journal, Op
 from anysim_sapien.library import physx, sapien
 from anysim_sapien.recipe import Recipe
 from anysim_sapien.shapes import to_pose

@@ -9,8 +9,8 @@ import numpy as np
 
 from anysim.engine.control import Control, alternating
 from anysim.model.world import Actuation
+from anysim_sapien.drives import NativeDrives
 from anysim_sapien.motion import motion_of, put_motion
-from anysim_sapien.native import NativeDrives
 from anysim_sapien.recipe import Recipes
 from anysim_sapien.scene import EnvScene
 
@@ -30,7 +30,9 @@ def raw_loop(envs: "Envs", control: Control) -> Callable[[int], None]:
     recipes = Recipes(native, envs.options)
     scenes = [EnvScene(recipes.of(o.recipe.present), envs.parameters.of(env)) for env, o in enumerate(originals)]
     own = NativeDrives(native, len(scenes))
-    own.kp[...], own.kd[...], own.limit[...], own.passive[...] = drives.kp, drives.kd, drives.limit, drives.passive
+    for name in ("kp", "kd", "limit"):
+        getattr(own.gains, name)[...] = getattr(drives.gains, name)
+    own.passive[...] = drives.passive
     own.apply(control)
     for env, (scene, original) in enumerate(zip(scenes, originals, strict=True)):
         put_motion(scene, motion_of(original))
@@ -41,7 +43,7 @@ def raw_loop(envs: "Envs", control: Control) -> Callable[[int], None]:
         own.apply(commands)
         written.append(
             [
-                [(scene.joints[j], *own.target(env, j)) for j in driven if scene.layout.joint_there[j]]
+                [(scene.joints[j], *own.wanted[env, j, :2].tolist()) for j in driven if scene.layout.joint_there[j]]
                 for env, scene in enumerate(scenes)
             ]
         )

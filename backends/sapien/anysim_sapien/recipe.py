@@ -12,12 +12,12 @@ from anysim.kinematics.inertia import Principal, check_physical, principal
 from anysim.math import pose as P
 from anysim.model.shapes import is_ground
 from anysim.model.world import BodyKind, Joint, World
-from anysim_sapien.layout import Layout
-from anysim_sapien.meeting import Meeting
+from anysim_mechanics.collision_groups import Copy
+from anysim_mechanics.layout import Layout
+from anysim_mechanics.meeting import Meeting
 from anysim_sapien.options import SapienOptions
 from anysim_sapien.packing import Packing
 from anysim_sapien.shapes import to_pose
-from anysim_sapien.surfaces import Copy
 
 _KEPT = 64
 """Of what follows from values that may be drawn in each reset, this is kept beside what the envs have now."""

@@ -15,7 +15,7 @@ from anysim.geometry.tessellate import triangles
 from anysim.math import pose as P
 from anysim.model.appearance import lying, wrapped
 from anysim.model.world import Box, Capsule, Cylinder, Geom, HeightFieldShape, MeshShape, Plane, Shape, Sphere, World
-from anysim_sapien.layout import Layout
+from anysim_mechanics.layout import Layout
 from anysim_sapien.library import sapien
 from anysim_sapien.options import SapienOptions
 from anysim_sapien.shapes import X_TO_Z, relief, to_pose

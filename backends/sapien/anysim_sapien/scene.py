@@ -12,8 +12,8 @@ import numpy as np
 
 from anysim.conventions import WORLD, Array
 from anysim.model.world import Body, BodyKind, JointType, Solver
-from anysim_sapien.exclusions import Group
-from anysim_sapien.journal import Op
+from anysim_mechanics.exclusion_groups import Group
+from anysim_mechanics.journal import Op
 from anysim_sapien.library import physx, sapien
 from anysim_sapien.packing import Packing, pack
 from anysim_sapien.parts import SceneParts, Tree

@@ -20,11 +20,11 @@ from anysim.model.world import (
     Sphere,
     World,
 )
-from anysim_sapien.exclusions import Group
+from anysim_mechanics.collision_groups import Copy
+from anysim_mechanics.exclusion_groups import Group
 from anysim_sapien.hulls import UNIT_SCALE, convex
 from anysim_sapien.library import physx, sapien
 from anysim_sapien.options import SapienOptions
-from anysim_sapien.surfaces import Copy
 
 X_TO_Z = np.array([0.0, -sqrt(0.5), 0.0, sqrt(0.5)])
 """PhysX has the normal of a plane and the axis of a capsule or cylinder along x; the World has them along z."""

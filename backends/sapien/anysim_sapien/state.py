@@ -6,16 +6,16 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.model.world import World
+from anysim_mechanics.link_twists import LinkTwists
 from anysim_sapien.packing import Batch
 from anysim_sapien.scene import EnvScene
-from anysim_sapien.velocities import Twists
 
 
 class StateReader:
     """Fields of all envs at once, from what their scenes pack."""
 
     def __init__(self, world: World, scenes: list[EnvScene]) -> None:
-        self._scenes, self._twists = scenes, Twists(world)
+        self._scenes, self._twists = scenes, LinkTwists(world)
         self._blobs: list[bytes] = []
         self._packed, self._batch = np.zeros(0), Batch([scene.packing for scene in scenes])
         self._coms: list[Array] = []
@@ -43,7 +43,9 @@ class StateReader:
         coms = [scene.com for scene in self._scenes]
         if len(coms) != len(self._coms) or any(a is not b for a, b in zip(coms, self._coms, strict=True)):
             self._coms, self._com = coms, np.array(coms)
-        return self._twists.of(*self._read(), self._com)
+        packed, batch = self._read()
+        velocity, joint_vel = packed.take(batch.velocity), packed.take(batch.joint_vel)
+        return self._twists.of(packed.take(batch.pose), velocity, joint_vel, self._com)
 
     def joint_pos(self) -> Array:
         packed, batch = self._read()

@@ -8,10 +8,9 @@ from numpy.typing import ArrayLike
 
 from anysim.conventions import Array
 from anysim.engine.control import Control
-from anysim_sapien.drives import Drives
-from anysim_sapien.journal import FORMAT, Op, entries
+from anysim_mechanics.journal import FORMAT, Op, entries
+from anysim_sapien.drives import Drives, drives_of
 from anysim_sapien.momentum import Momentum
-from anysim_sapien.native import drives_of
 from anysim_sapien.recipe import Recipe, Values
 from anysim_sapien.scene import EnvScene
 
@@ -25,13 +24,12 @@ def advance(scene: EnvScene, drives: Drives, momentum: Momentum, row: int, pushe
     if driven:
         drives.record(row, journal)
         drives.begin(row, scene)
-    by_law = driven and drives.each_substep
     pushed: list[tuple[Any, Array, Array]] = []
     if pushes is not None and len(pushes):
         journal.record(Op.WRENCH, pushes.tobytes())
         pushed = [(scene.bodies[int(push[0])], push[1:4], push[4:]) for push in pushes]
     for number in range(n_steps):
-        if by_law:
+        if driven:
             drives.substep(row, scene)
         if number == n_steps - 1:
             momentum.before(scene)
@@ -41,7 +39,7 @@ def advance(scene: EnvScene, drives: Drives, momentum: Momentum, row: int, pushe
     scene.stepped(n_steps)
     momentum.after(row, scene, pushes)
     if driven:
-        drives.note(row, scene)
+        drives.note(row, scene.joint_positions(), scene.joint_velocities())
     if pushed:
         journal.flush()
 

@@ -10,7 +10,7 @@ from anysim.math import pose as P
 from anysim.model.world import Box, ControlMode, JointType
 from anysim.testing import tolerances
 from anysim.testing.sketch import Sketch, inertial
-from anysim_pybullet import kernels as K
+from anysim_mechanics import articulation as K
 from anysim_pybullet.bullet import bullet
 
 Z, EFFORT, REVOLUTE = (0.0, 0.0, 1.0), ControlMode.EFFORT, JointType.REVOLUTE

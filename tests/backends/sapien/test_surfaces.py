@@ -9,11 +9,11 @@ from anysim.errors import CapabilityError, EngineError
 from anysim.model.world import Body, BodyKind, Box, JointType, Sphere, Surface, World
 from anysim.testing.sketch import Sketch, inertial
 from anysim.testing.varying import having, with_slots
+from anysim_mechanics.collision_groups import copies_of
+from anysim_mechanics.exclusion_groups import Group, apart_of
+from anysim_mechanics.layout import Layout
+from anysim_mechanics.meeting import Meeting
 from anysim_sapien.engine import SapienEngine
-from anysim_sapien.exclusions import Group, apart_of
-from anysim_sapien.layout import Layout
-from anysim_sapien.meeting import Meeting
-from anysim_sapien.surfaces import copies_of
 from anysim_sharded.engine import sharded
 
 

@@ -10,7 +10,7 @@ from anysim.engine.parameters import PARAMETERS
 from anysim.engine.snapshots.row_checks import damaged, refuse_parameters, refuse_range, refuse_rotations
 from anysim.errors import SnapshotError
 from anysim.model.world import BodyKind, World
-from anysim_sapien.journal import FORMAT, Op, entries
+from anysim_mechanics.journal import FORMAT, Op, entries
 
 _BASE = {
     "mass": "body.mass",
@@ -27,7 +27,7 @@ _JOINT = {Op.DRY, Op.ARMATURE}
 
 
 def refuse_pasts(data: Mapping[str, Array], world: World, steps: int) -> None:
-    """Refuse rows that `relive` could not read, or that would have it do what no run does.
+    """Refuse rows from which a scene could not be built and played, or that would have it do what no run does.
 
     `steps` is how many physics steps a journal has at most.
 
@@ -36,7 +36,7 @@ def refuse_pasts(data: Mapping[str, Array], world: World, steps: int) -> None:
     """
     if (other := data["journal_format"][data["journal_format"] != FORMAT]).size:
         raise SnapshotError(
-            f"the snapshot's journal has format {other[0]}, this anysim-sapien reads {FORMAT}; nothing was changed. "
+            f"the snapshot's journal has format {other[0]}, this anysim-mechanics reads {FORMAT}; nothing was changed. "
             f"Take a new one, replay its episode here from seed and actions, or carry a WorldState over"
         )
     envs = len(data["length"])

@@ -1,9 +1,9 @@
-"""The pair rule of `anysim.conventions` on an engine that averages.
+"""The pair rule of `anysim.conventions`, for a library that averages.
 
-PhysX gives a pair of shapes the mean of their coefficients. The rule wants the larger one, or that of the higher
-priority, and no single coefficient per shape gives that for all pairs. So a geom becomes one shape for each value that
-its pairs can have: shapes of a value carry it on both sides, where the mean is the value itself, and collision groups
-let shapes meet only in the value of their pair.
+Such a library (PhysX) gives a pair of shapes the mean of their coefficients. The rule wants the larger one, or that of
+the higher priority, and no single coefficient per shape gives that for all pairs. So a geom becomes one shape for each
+value that its pairs can have: shapes of a value carry it on both sides, where the mean is the value itself, and
+collision groups let shapes meet only in the value of their pair.
 
 Two shapes meet where the `kind` bits of one and the `meets` bits of the other have a bit in common.
 """
@@ -20,7 +20,7 @@ from anysim.model.pairs import pair_friction, pair_restitution
 from anysim.model.world import Surface
 
 BITS = 32
-"""Collision groups of PhysX shapes, as SAPIEN lays them out."""
+"""Collision groups of a shape."""
 
 
 class Touch(NamedTuple):
@@ -31,7 +31,7 @@ class Touch(NamedTuple):
 
 
 class Copy(NamedTuple):
-    """One PhysX shape of a geom: its surface, and the bits that say which others it meets."""
+    """One shape of a geom: its surface, and the bits that say which others it meets."""
 
     touch: Touch
     kind: int
@@ -74,7 +74,7 @@ def copies_of(
         frictions: (G,) those in force, which may differ from the surfaces' own.
         fixed: (G,) bool, geoms that nothing moves; two of them never meet.
         may_meet: (G, G) bool; a geom gets no shape for a value that none of its pairs can have.
-        labels: (G,) of the geoms' bodies, as in `exclusions.Apart`; none where it is empty.
+        labels: (G,) of the geoms' bodies, as in `exclusion_groups.Apart`; none where it is empty.
         between: pairs of labels, both ways, that never meet.
 
     Raises:
@@ -104,7 +104,7 @@ def copies_of(
         if number is None:
             raise EngineError(
                 f"the {len(classes)} different surfaces of this world meet in more ways than the {BITS} collision "
-                f"groups of PhysX can keep apart; give more geoms the same friction, restitution and priority"
+                f"groups can keep apart; give more geoms the same friction, restitution and priority"
                 + (", or exclude fewer pairs" if between else "")
             )
         return 1 << number

@@ -1,4 +1,4 @@
-"""Pairs of bodies that never collide, as PhysX filter words.
+"""Pairs of bodies that never collide, as filter words such as those of PhysX in SAPIEN.
 
 Two shapes are kept apart where their groups have the same number and a bit in common. Bodies that hang together by
 exclusions get one number; within it each bit stands for a set of bodies of which no two collide. -1 is the world.
@@ -17,7 +17,7 @@ BITS, NUMBERS = 32, 1 << 16
 
 
 class Group(NamedTuple):
-    """The third and fourth filter word of a body's shapes."""
+    """The filter words of a body's shapes."""
 
     bits: int = 0
     number: int = 0
@@ -28,7 +28,7 @@ class Apart(NamedTuple):
 
     Attributes:
         groups: filter words of the bodies that need some.
-        labels: bodies that `surfaces` keeps apart, where filter words do not suffice; equal labels are treated alike.
+        labels: bodies that `collision_groups` keeps apart, where filter words do not suffice; equal ones are alike.
         between: pairs of labels (both ways) whose bodies never collide.
     """
 
@@ -38,7 +38,7 @@ class Apart(NamedTuple):
 
 
 def apart_of(world: World, there: Array | None = None) -> Apart:
-    """How PhysX is told of the World's exclusions, or of those between bodies (B,) that are there.
+    """The World's exclusions, or those between bodies (B,) that are there.
 
     Bodies that many others pass through need many sets, a tool with 20 links against two parts 40 of them. There the
     pairs across entities are left to the collision groups that surfaces have: these take a bit for each kind of body.
@@ -66,8 +66,8 @@ def groups_of(world: World, wanted: set[frozenset[int]]) -> dict[int, Group]:
         if len(sets) > BITS or number >= NUMBERS:
             names = ", ".join(world.bodies[i].name for i in sorted(members) if i != WORLD)
             raise EngineError(
-                f"PhysX cannot keep apart the excluded pairs around {names[:80]}: they form {len(sets)} sets and there "
-                f"are {BITS} bits; exclude all pairs of this robot, or fewer"
+                f"the excluded pairs around {names[:80]} form {len(sets)} sets, more than the {BITS} bits of collision "
+                f"groups keep apart; exclude all pairs of this robot, or fewer"
             )
         for body in members:
             groups[body] = Group(sum(1 << i for i, part in enumerate(sets) if body in part), number)

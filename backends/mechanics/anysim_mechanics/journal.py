@@ -1,7 +1,7 @@
-"""Journal of a scene: everything done to it since it was built.
+"""Journal of a scene: everything done to it since it was built, for exact snapshots by playing it again.
 
-PhysX keeps contact memory that nothing reads out, but the same scene built again and treated alike comes to the same
-bits, in any process.
+A library may keep memory that nothing reads out (PhysX that of contacts). Where the same scene built again and treated
+alike comes to the same bits, in any process, its past is its state.
 
 A journal is a sequence of entries of 64-bit floats: what was done, how many numbers follow, and these numbers.
 """

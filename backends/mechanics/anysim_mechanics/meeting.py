@@ -1,4 +1,4 @@
-"""Which geoms of a World can meet, and the PhysX shapes that make them meet by the rules. Knows no SAPIEN."""
+"""The geoms of a World that can meet, and the shapes that make them meet by the rules."""
 
 from dataclasses import replace
 from itertools import product
@@ -10,9 +10,9 @@ from anysim.conventions import Array
 from anysim.errors import EngineError
 from anysim.model.pairs import may_meet
 from anysim.model.world import World
-from anysim_sapien.exclusions import Apart, apart_of
-from anysim_sapien.layout import Layout
-from anysim_sapien.surfaces import Copy, copies_of
+from anysim_mechanics.collision_groups import Copy, copies_of
+from anysim_mechanics.exclusion_groups import Apart, apart_of
+from anysim_mechanics.layout import Layout
 
 MOST = 64
 """Ways to fill the slots of a World that are tried before it is refused."""
@@ -39,7 +39,7 @@ class Meeting:
         """The shapes of each geom that collides, for the coefficients in force (G,); restitutions as built for None.
 
         Raises:
-            EngineError: more different pairs than PhysX has collision groups.
+            EngineError: more different pairs than there are collision groups.
         """
         surfaces = self._surfaces
         if restitution is not None:
@@ -50,7 +50,7 @@ class Meeting:
 
 
 def refusals(world: World) -> list[str]:
-    """Why PhysX' filters cannot tell this World's pairs apart, if so."""
+    """Why collision groups cannot tell this World's pairs apart, if so."""
     friction = np.array([geom.surface.friction for geom in world.geoms], dtype=float)
     together = _trouble(world, friction, np.ones(len(world.entities), dtype=bool))
     if not together or not world.slots:

@@ -1,4 +1,4 @@
-"""Places of a World's parts in SAPIEN: articulations, single bodies, and indices made once at build."""
+"""Articulations and single bodies of a World, or of what is there of it: indices made once at build."""
 
 from dataclasses import dataclass
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from anysim.conventions import WORLD, Array
 from anysim.model.world import BodyKind, World
+from anysim_mechanics.trees import members
 
 
 @dataclass(frozen=True)
@@ -41,20 +42,16 @@ class Layout:
         """Sort the World's bodies, or those of them (B,) that are there."""
         if there is None:
             there = np.ones(len(world.bodies), dtype=bool)
-        root = list(range(len(world.bodies)))
-        for i, body in enumerate(world.bodies):
-            if body.kind is BodyKind.LINK:
-                root[i] = root[body.parent]
-        trees = {r: tuple(i for i, other in enumerate(root) if other == r) for r in dict.fromkeys(root) if there[r]}
-        articulated = [members for members in trees.values() if len(members) > 1]
+        trees = {root: tuple(bodies) for root, bodies in members(world).items() if there[root]}
+        articulated = [bodies for bodies in trees.values() if len(bodies) > 1]
         tree_of = np.full(len(world.bodies), -1)
-        for number, members in enumerate(articulated):
-            tree_of[list(members)] = number
+        for number, bodies in enumerate(articulated):
+            tree_of[list(bodies)] = number
         fixed = np.array([b.kind is BodyKind.STATIC for b in world.bodies], dtype=bool)
         entity = np.array([*world.body_entity, -1]) + 1
         return cls(
             trees=tuple(articulated),
-            actors=tuple(r for r, members in trees.items() if len(members) == 1),
+            actors=tuple(root for root, bodies in trees.items() if len(bodies) == 1),
             tree_of=tree_of,
             there=there,
             joint_there=there[np.array([joint.body for joint in world.joints], dtype=int)],

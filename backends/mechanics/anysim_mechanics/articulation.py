@@ -1,4 +1,4 @@
-"""The compiled arithmetic of the drive law over one articulation.
+"""The compiled mechanics of one articulation: mass matrix and bias forces, the drive law, and weights.
 
 Kernels that call each other share one file because numba's cache notices a change of a kernel's own file only. None
 adds in an order that depends on the number of envs, and none is compiled with fast-math: an env's bits are its own.
@@ -271,10 +271,10 @@ def drive_law(
     else at the beginning, as if kd were 0 in what follows. The torque is clip(u - dt kd qdd) with
     (M + A + dt (Kd + D)) qdd = u + f - D qd - c + known + outer. D is the joints' own damping, A their armature, M, c
     and known are those of `dynamics`. f is dry friction: it stops the joint by the end of the step where that takes no
-    more than its coefficient. Bullet's own would hold the bare link, and let go of one with much armature only after
-    the torque has built up over many steps. `outer` is what else acted in the last step (contacts, limits): the
-    momentum M dv/dt + c that the applied forces do not explain. Joints that follow another are coupled in the equation,
-    and the forces of the coupling drop out of it.
+    more than its coefficient. A library that knows no armature would hold the bare link, and let go of one with much
+    armature only after the torque has built up over many steps. `outer` is what else acted in the last step (contacts,
+    limits): the momentum M dv/dt + c that the applied forces do not explain. Joints that follow another are coupled in
+    the equation, and the forces of the coupling drop out of it.
 
     Args:
         drives: (n, 10): damping, armature, the stiffness and damping of the drive in its mode, its limit,

@@ -1,10 +1,10 @@
-"""The pair rules of the conventions, in an engine that multiplies.
+"""The pair rules of the conventions, for a library that multiplies.
 
-A pair's friction is the larger of the two coefficients, or that of the surface of higher priority; Bullet multiplies
-the numbers of the two shapes. So each shape gets a number such that the products come out as the rule says. Where no
-such numbers exist (0.2 and 0.2 on a ground of 0.8), a geom becomes one shape for each value that its pairs can have;
-shapes meet only in the value of their pair, and each has its root. Coefficients that are changed later may ask for
-values that no shape is there for: then the products come as near as least squares bring them.
+A pair's friction is the larger of the two coefficients, or that of the surface of higher priority; such a library
+(Bullet) multiplies the numbers of the two shapes. So each shape gets a number such that the products come out as the
+rule says. Where no such numbers exist (0.2 and 0.2 on a ground of 0.8), a geom becomes one shape for each value that
+its pairs can have; shapes meet only in the value of their pair, and each has its root. Coefficients that are changed
+later may ask for values that no shape is there for: then the products come as near as least squares bring them.
 """
 
 import math
@@ -18,7 +18,7 @@ from anysim.math import pose as P
 from anysim.math.compiled import compiled
 from anysim.model.pairs import may_meet, pair_friction, pair_restitution
 from anysim.model.world import Geom, World
-from anysim_pybullet.tree import Tree
+from anysim_mechanics.trees import Tree
 
 _SWEEPS = 100
 EXACT = 0.02
@@ -29,7 +29,7 @@ _APART, _LOOSE, _WITHIN = 1.0, 0.01, 0.001
 
 
 class Surfaces(NamedTuple):
-    """What Bullet gets for each shape (K,)."""
+    """What the library is given for each shape (K,)."""
 
     friction: Array
     spinning: Array
@@ -37,7 +37,7 @@ class Surfaces(NamedTuple):
 
 
 class PairRules:
-    """The pairs of shapes of a World; gives Bullet's numbers for any coefficients.
+    """The pairs of shapes of a World; gives the library's numbers for any coefficients.
 
     Attributes:
         geoms: (K,) the World's geom of each shape, in order; more than once where a geom has several shapes.
@@ -45,6 +45,7 @@ class PairRules:
     """
 
     def __init__(self, world: World, trees: list[Tree], contact_erp: float) -> None:
+        """`contact_erp` is the share of a penetration that the library takes back in a step."""
         self._world, self._erp = world, contact_erp
         solid = np.array([i for i, g in enumerate(world.geoms) if g.collides], dtype=int)
         tree_of = {WORLD: -1} | {int(b): t.number for t in trees for b in t.bodies}
@@ -100,7 +101,7 @@ class PairRules:
         return np.maximum(pair_restitution(restitution) - 0.5 * self._erp, 0.0)
 
     def numbers(self, friction: Array, restitution: Array, shapes: Array | None = None) -> Surfaces:
-        """What Bullet gets, for coefficients (K,) of all shapes' geoms, for those shapes that are there (None: all)."""
+        """The numbers for coefficients (K,) of all shapes' geoms, for those shapes that are there (None: all)."""
         chosen = np.arange(len(friction)) if shapes is None else shapes
         return self._numbers(friction.tobytes(), restitution.tobytes(), chosen.tobytes())
 
@@ -120,7 +121,7 @@ class PairRules:
 
     @staticmethod
     def _spinning(values: Array, weights: Array, spin: Array) -> Array:
-        """Bullet's torsional coefficient of a pair is s1 f2 + s2 f1; that of the rule is the larger of the two."""
+        """A torsional coefficient of a pair is s1 f2 + s2 f1 in Bullet; that of the rule is the larger of the two."""
         turning = np.flatnonzero(spin)
         wanted = np.maximum.outer(spin, spin)
         spinning = np.zeros_like(values)

@@ -1,4 +1,4 @@
-"""The World as trees: each root body with its links is one Bullet multibody. Index arrays, made once at build.
+"""The World as trees, each a root body with its links: index arrays for kernels, made once at build.
 
 A link's frame here has the axes of its body and lies on its joint: at the anchor of a revolute joint, else at the
 body's origin. That is where a URDF wants it.
@@ -13,7 +13,15 @@ from anysim.kinematics import inertia
 from anysim.math import pose as P
 from anysim.model.world import BodyKind, JointType, World
 
-Inertia6 = tuple[float, float, float, float, float, float]
+
+def members(world: World) -> dict[int, list[int]]:
+    """By root body, the bodies of its tree: the root first, parents before children."""
+    root: list[int] = []
+    trees: dict[int, list[int]] = {}
+    for i, body in enumerate(world.bodies):
+        root.append(i if body.kind is not BodyKind.LINK else root[body.parent])
+        trees.setdefault(root[i], []).append(i)
+    return trees
 
 
 @dataclass(frozen=True)
@@ -66,13 +74,7 @@ def shifted(frames: Frames, com: Array) -> Frames:
 
 def trees_of(world: World, frames: Frames) -> list[Tree]:
     """One tree for each root body, in the World's order."""
-    root = []
-    for i, body in enumerate(world.bodies):
-        root.append(i if body.kind is not BodyKind.LINK else root[body.parent])
-    members: dict[int, list[int]] = {}
-    for i, r in enumerate(root):
-        members.setdefault(r, []).append(i)
-    return [_tree(world, frames, number, bodies) for number, bodies in enumerate(members.values())]
+    return [_tree(world, frames, number, bodies) for number, bodies in enumerate(members(world).values())]
 
 
 def _tree(world: World, frames: Frames, number: int, bodies: list[int]) -> Tree:
