@@ -43,7 +43,7 @@ WORDS = {
     "robots": "the robot catalogue with its files, `anysim robot`, `anysim gallery`",
     "sapien": "the engine SAPIEN",
     "skills": "scripted solutions: grasp, place, push, press, open, close, insert, hand over",
-    "tasks": "twenty tasks on a table, with their experts",
+    "tasks": "tasks on tables, with tight fits, hands, mobile bases and legs, with their experts",
     "teleop": "`anysim teleop`: demonstrations, driven by an input device",
     "urdf": "URDF files",
 }
