@@ -2,7 +2,6 @@
 
 import json
 import sys
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ from checks.constraints import FILE as CONSTRAINTS
 from lock import find_uv
 
 from anysim.testing.engines import require_engine
+from tests.external_packages import FOUND, offered
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("wheels")]  # built once, by one worker
 
@@ -42,13 +42,6 @@ task:
   success: {near: {term: near, a: block, b: goal, tolerance: 0.025}, rest: {term: at_rest, robot: arm, speed: 0.2}}
   expert: {skill: pick, robot: arm, object: block, goal: goal}
 record: {writer: mcap}
-"""
-OFFERS = """
-import json
-from anysim.registry import KINDS, distribution, load, names
-own = {kind: [name for name in names(kind) if distribution(kind, name) == "anysim-starter"] for kind in KINDS}
-assert all(load(kind, name) is not None for kind, found in own.items() for name in found)
-print(json.dumps({kind: found for kind, found in own.items() if found}))
 """
 ORIGIN = "import anysim, anysim_tasks; print(anysim.__file__); print(anysim_tasks.__file__)"
 
@@ -89,10 +82,8 @@ def test_nothing_of_the_checkout_is_on_the_path(python: Path, program: Any, fold
 
 
 def test_all_that_the_package_of_the_guides_offers_is_found_and_loads(python: Path, program: Any, folder: Path) -> None:
-    page = ROOT / "tests" / "external" / "anysim-starter" / "pyproject.toml"
-    offered = tomllib.loads(page.read_text())["project"]["entry-points"]
-    kinds = {group.removeprefix("anysim."): sorted(names) for group, names in offered.items() if group != "anysim"}
-    assert json.loads(program(python, "-c", OFFERS, cwd=folder).stdout) == kinds
+    found = program(python, "-c", FOUND, "anysim-starter", cwd=folder).stdout
+    assert json.loads(found) == offered("anysim-starter")
 
 
 @pytest.mark.parametrize("engine", ENGINES)
