@@ -50,8 +50,10 @@ test-slow: $(TEST)  ## run the tests that are marked slow
 test-full: $(TEST) test-learning  ## run every test, those that are marked full too (hours): before a release
 	$(PYTEST) $(ARGS)
 
-test-learning: $(TORCH)  ## run the tests of the learners, in an environment with torch (gigabytes where CUDA is)
-	OMP_NUM_THREADS=1 .venv-torch/bin/python -m pytest -n 0 tests/plugins/learning/test_learners.py tests/plugins/policy $(ARGS)
+test-learning: $(TORCH)  ## run the tests of the learners and their example, in an environment with torch (gigabytes where CUDA is)
+	OMP_NUM_THREADS=1 .venv-torch/bin/python -m pytest -n 0 tests/plugins/learning/test_learners.py tests/plugins/policy \
+	  tests/docs/test_docs.py::test_the_example_with_stable_baselines_trains \
+	  tests/docs/test_starter.py::test_its_learner_trains_stops_and_goes_on $(ARGS)
 
 # The packages of .venv, and what the learners need beside them.
 $(TORCH): $(TEST) plugins/learning/pyproject.toml

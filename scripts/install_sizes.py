@@ -44,7 +44,7 @@ WORDS = {
     "sapien": "the engine SAPIEN",
     "sharded": "worker processes: `engine: {name: pybullet, shards: 2}`",
     "skills": "scripted solutions: grasp, place, push, press, open, close, insert, hand over",
-    "tasks": "twenty tasks on a table, with their experts",
+    "tasks": "tasks on tables, with tight fits, hands, mobile bases and legs, with their experts",
     "teleop": "`anysim teleop`: demonstrations, driven by an input device",
     "urdf": "URDF files",
 }

@@ -8,6 +8,20 @@ import tomllib
 from pathlib import Path
 
 EXTERNAL = Path(__file__).parent / "external"
+FOUND = """
+import json, sys
+from anysim.registry import KINDS, distribution, load, names
+own = {kind: [name for name in names(kind) if distribution(kind, name) == sys.argv[1]] for kind in KINDS}
+assert all(load(kind, name) is not None for kind, found in own.items() for name in found)
+print(json.dumps({kind: found for kind, found in own.items() if found}))
+"""
+"""A program that loads all that a distribution offers to anysim, and prints its names by kind."""
+
+
+def offered(name: str) -> dict[str, list[str]]:
+    """The names that the distribution `tests/external/NAME` declares, by kind."""
+    declared = tomllib.loads((EXTERNAL / name / "pyproject.toml").read_text())["project"]["entry-points"]
+    return {group.removeprefix("anysim."): sorted(rows) for group, rows in declared.items() if group != "anysim"}
 
 
 def install(name: str, folder: Path) -> Path:

@@ -4,7 +4,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from anysim_schemas.base import Color, Fraction, Integer, NonNegative, Spec
+from anysim_schemas.base import Color, Fraction, Integer, Name, NonNegative, Spec
 from anysim_schemas.values import ChoiceOf, NonNegativeValue
 
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tga")
@@ -18,8 +18,8 @@ class TextureSpec(Spec):
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("pattern", "colors", "seed", "resolution"), ("image",))
 
-    pattern: Literal["checker", "stripes", "dots", "gradient", "noise", "brick", "wood"] | None = Field(
-        default=None, description="a pattern by name"
+    pattern: Name | None = Field(
+        default=None, description="a pattern by name, as `checker`; `anysim list textures` has them"
     )
     image: str | None = Field(default=None, description="URI of an image file (PNG, JPEG, BMP, TGA)")
     colors: tuple[Color, Color] | None = Field(

@@ -12,6 +12,7 @@ from anysim_schemas.values import TAG_PREFIX, Choice, Range
 SHAPES = ("box", "sphere", "cylinder", "capsule", "mesh", "asset", "procedural")
 PROCEDURAL = "procedural:"
 """What the URI of a procedural asset begins with."""
+ASSET = "URI of a URDF or MJCF file, FILE.xml#BODY for one of several; or of another format that an importer reads"
 PACKAGES = "folders, as URIs, of packages that a URDF refers to as `package://NAME/…`, by NAME"
 MESH_ENDINGS = (".stl", ".obj", ".dae", ".glb", ".ply")
 
@@ -35,7 +36,7 @@ class SourceSpec(Spec):
         default=None, description="radius, length of the straight part along z [m]"
     )
     mesh: str | None = Field(default=None, description="URI of a mesh file; collides as its convex hull")
-    asset: str | None = Field(default=None, description="URI of a URDF or MJCF file; FILE.xml#BODY for one of several")
+    asset: str | None = Field(default=None, description=ASSET)
     packages: dict[str, str] = Field(default_factory=dict, description=PACKAGES)
     procedural: str | None = Field(
         default=None, description="a builder of articulated assets, as in `anysim list assets`"

@@ -87,7 +87,7 @@ def test_an_example_of_a_world_checks(path: Path) -> None:
 
 @pytest.mark.full
 @pytest.mark.skipif(
-    find_spec("stable_baselines3") is None, reason="stable-baselines3 brings torch, which no group of ours installs"
+    find_spec("stable_baselines3") is None, reason="the example needs stable-baselines3: make test-learning"
 )
 def test_the_example_with_stable_baselines_trains(tmp_path: Path) -> None:
     run([str(ROOT / "docs" / "examples" / "train_with_sb3.py")], tmp_path)

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from importlib import metadata
+from pathlib import Path
 
 import pytest
 
@@ -103,3 +104,17 @@ def test_commands_of_every_observer_join(monkeypatch: pytest.MonkeyPatch) -> Non
         + registry.remedy("anysim-faulty")
     ]
     assert {"compare", "picture", "gallery"} <= {command.name for command in app.registered_commands}
+
+
+def test_the_program_that_measures_starts_measures_both() -> None:
+    program = Path(__file__).parents[2] / "benchmarks" / "startup.py"
+    command = [sys.executable, str(program), "--rounds", "1"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode in (0, 1), done.stderr  # 1: a limit is missed, beside other work
+    head, *rows = done.stdout.splitlines()
+    assert head.split() == ["cpu", "s", "wall", "s", "limit", "s"]
+    assert [row.split("  ")[0] for row in rows] == ["anysim --help", "anysim run pick_cube, first step"]
+    assert (done.returncode == 1) == ("missed" in done.stdout)
+    done = subprocess.run([*command, "--task", "no_task"], capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 1
+    assert "no task named 'no_task'" in done.stderr

@@ -1,4 +1,4 @@
-"""anysim without its repository: wheels and extras in a fresh environment, where tasks run on three engines."""
+"""anysim without its repository: wheels, extras and the guides' package in a fresh environment, on three engines."""
 
 import json
 import sys
@@ -10,6 +10,7 @@ from checks.constraints import FILE as CONSTRAINTS
 from lock import find_uv
 
 from anysim.testing.engines import require_engine
+from tests.external_packages import FOUND, offered
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("wheels")]  # built once, by one worker
 
@@ -54,15 +55,17 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def python(wheels: list[Path], program: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An environment with the extras, installed as docs/install.md says."""
+def python(
+    wheels: list[Path], external_wheels: dict[str, Path], program: Any, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    """An environment with the extras, installed as docs/install.md says, and the package that the guides write."""
     program(ROOT / "scripts" / "wheel_list.sh", wheels[0].parent)
     uv, venv = find_uv(ROOT), tmp_path_factory.mktemp("user") / "venv"
     program(uv, "venv", "--quiet", "--python", sys.executable, venv)
     own = ("--constraint", wheels[0].parent / "anysim.txt", "--constraint", ROOT / CONSTRAINTS)
     interpreter = venv / "bin" / "python"
-    wanted = f"anysim[{','.join(EXTRAS)}]"
-    program(uv, "pip", "install", "--quiet", "--python", interpreter, "--compile-bytecode", *own, wanted, cwd=venv)
+    wanted = f"anysim[{','.join(EXTRAS)}]", external_wheels["anysim-starter"]
+    program(uv, "pip", "install", "--quiet", "--python", interpreter, "--compile-bytecode", *own, *wanted, cwd=venv)
     program(uv, "pip", "check", "--python", interpreter)
     return interpreter
 
@@ -78,8 +81,13 @@ def test_nothing_of_the_checkout_is_on_the_path(python: Path, program: Any, fold
     assert installed == {"null", *ENGINES}
 
 
+def test_all_that_the_package_of_the_guides_offers_is_found_and_loads(python: Path, program: Any, folder: Path) -> None:
+    found = program(python, "-c", FOUND, "anysim-starter", cwd=folder).stdout
+    assert json.loads(found) == offered("anysim-starter")
+
+
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("task", ["pick_cube", "own.yaml"])
+@pytest.mark.parametrize("task", ["pick_cube", "own.yaml", "touch_shelf"])
 def test_a_task_runs_and_is_recorded(task: str, engine: str, python: Path, program: Any, folder: Path) -> None:
     require_engine(engine)
     out = folder / f"{Path(task).stem}-{engine}"
@@ -104,3 +112,13 @@ def test_a_task_runs_and_is_recorded(task: str, engine: str, python: Path, progr
     assert summary["attempts"] == summary["successes"] == 2
     for episode in summary["episodes"]:
         assert (Path(episode["path"]) / "trajectory.mcap").stat().st_size > 10_000
+
+
+def test_its_commands_are_planned_and_replay(python: Path, program: Any, folder: Path) -> None:
+    """Skills as commands, and a planner, of the package of the guides."""
+    words = ("-n", "4", "-k", "8", "--seed", "5", "-o", "record.cameras=[]", "--out", "touch_twice", "--json")
+    found = json.loads(program(python.with_name("anysim"), "run", "touch_twice", *words, cwd=folder).stdout)
+    assert found["successes"] == found["attempts"] == 8
+    assert {episode["outcome"]["phase"] for episode in found["episodes"]} == {"2 starter_plan_to: follow"}
+    again = json.loads(program(python.with_name("anysim"), "replay", "touch_twice", "--json", cwd=folder).stdout)
+    assert again["identical"] == again["replayed"] == 8

@@ -4,13 +4,14 @@
 |---|---|
 | `…/arm.urdf`, `…/arm.xml` | the one robot or object that the file holds |
 | `…/scene.xml#left_arm` | of an MJCF file with several, the one whose first body is `left_arm` |
+| `…/shelf.boards` | whatever the installed importer `boards` reads |
 """
 
 import re
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from anysim import registry
 from anysim.assets.mesh_budget import bounded
@@ -22,7 +23,7 @@ from anysim.errors import AssetError
 from anysim_schemas.limits import MODEL_BYTES
 from anysim_schemas.object_source import PROCEDURAL
 
-_FORMATS: dict[str, Literal["urdf", "mjcf"]] = {".urdf": "urdf", ".xml": "mjcf", ".mjcf": "mjcf"}
+_FORMATS = {".urdf": "urdf", ".xml": "mjcf", ".mjcf": "mjcf"}  # other endings are importers' names
 _WITH_BODY = re.compile(r"(robot_descriptions:\w+|.*\.(?:urdf|xml|mjcf))#(.+)", re.IGNORECASE | re.DOTALL)
 """A `#` inside of a path is none that names a body."""
 
@@ -30,12 +31,12 @@ _WITH_BODY = re.compile(r"(robot_descriptions:\w+|.*\.(?:urdf|xml|mjcf))#(.+)", 
 class ModelFile(NamedTuple):
     """A file that holds a model, the folder that no reference in it may leave, its format, and the body that is meant.
 
-    `body` is empty where the whole file is meant, and always is for a URDF.
+    `kind` is the name of its importer. `body` is empty where the whole file is meant, as it is of all but MJCF files.
     """
 
     path: Path
     root: Path
-    kind: Literal["urdf", "mjcf"]
+    kind: str
     body: str
 
 
@@ -47,7 +48,7 @@ def import_asset(
     packages: Mapping[str, str] = MappingProxyType({}),
     visual_error: float = VISUAL_ERROR,
 ) -> ImportedModel:
-    """The model behind a URI: `.urdf` is read by the installed importer `urdf`, `.xml` and `.mjcf` by `mjcf`.
+    """The model behind a URI: `.xml` is read by the installed importer `mjcf`, others by that of their ending's name.
 
     `procedural:NAME` is built by the installed builder, with its default parameters. `packages` are the folders, as
     URIs, of packages that a URDF refers to as `package://NAME/…`. `visual_error` [m] is how far its looks may be off.
@@ -66,7 +67,7 @@ def _read(uri: str, base: Path | None, scale: float, packages: Mapping[str, str]
     if uri.startswith(PROCEDURAL):
         return from_uri(uri, scale=scale)
     file = model_file(uri, base=base)
-    own: dict[str, object] = {"body": file.body}
+    own: dict[str, object] = {"body": file.body} if file.kind == "mjcf" else {}
     if file.kind == "urdf":
         own = {"packages": {name: locate_folder(folder, base=base).path for name, folder in packages.items()}}
     importer = registry.load("importers", file.kind)
@@ -88,11 +89,11 @@ def model_file(uri: str, *, base: Path | None = None) -> ModelFile:
     """
     whole, body = split_body(uri)
     file = locate(whole, base=base)
-    kind = _FORMATS.get(file.path.suffix.lower())
-    if kind is None:
-        raise AssetError(
-            f"asset '{uri}': '{file.path.suffix}' is no format of robots and assets ({', '.join(_FORMATS)})"
-        )
+    ending = file.path.suffix.lower()
+    endings = dict.fromkeys([*_FORMATS, *(f".{name}" for name in registry.names("importers"))])
+    if ending not in endings:
+        raise AssetError(f"asset '{uri}': '{ending}' is no format of robots and assets ({', '.join(endings)})")
+    kind = _FORMATS.get(ending, ending[1:])
     if kind == "mjcf" and bounded(file.path, MODEL_BYTES)[:4096].find(b"<robot") >= 0:
         kind = "urdf"  # a URDF that is called .xml
     if body and kind == "urdf":

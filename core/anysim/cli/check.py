@@ -45,6 +45,10 @@ def check(
 
     Nothing is built. Exit code 1 if a file has faults. A file's own engine is checked unless --engine or --all-engines
     says otherwise. With --all-engines a file is at fault only if no engine can run it; which can is said of each.
+
+    Examples:
+      anysim check my_world.yaml
+      anysim check pick_cube --all-engines --verbose
     """
     from anysim.cli.output import print_json
 

@@ -15,7 +15,7 @@ def list_(
     kind: Annotated[
         str,
         typer.Argument(
-            metavar="KIND", help="engines, tasks, robots, controllers, terms, skills, planners, devices, writers…"
+            metavar="KIND", help="engines, tasks, robots, terms, skills, planners…; an unknown word names all kinds."
         ),
     ],
     engines: Annotated[
@@ -23,14 +23,18 @@ def list_(
     ] = False,
     json: AsJson = False,
 ) -> None:
-    """List what is installed of a kind, and where it comes from."""
+    """List what is installed of a kind, and where it comes from.
+
+    Examples:
+      anysim list tasks --engines
+    """
     from anysim import registry
     from anysim.cli.output import print_json, print_table
     from anysim.errors import PluginError, listing, suggest
 
     if kind not in registry.KINDS:
         raise PluginError(
-            f"there is no kind '{kind}'{suggest(kind, list(registry.KINDS))} (kinds: {listing(registry.KINDS, 20)})"
+            f"there is no kind '{kind}'{suggest(kind, list(registry.KINDS))} (kinds: {listing(registry.KINDS, 30)})"
         )
     if kind == "robots":
         _robots(json)

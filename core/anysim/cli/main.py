@@ -18,7 +18,8 @@ or anysim itself; 130 interrupted."""
 app = typer.Typer(
     name="anysim",
     cls=Commands,
-    help="One YAML world and one MDP on any physics engine.",
+    help="One YAML world and one MDP on any physics engine.\n\n"
+    "Begin with `anysim list tasks` and `anysim run pick_cube`; `anysim COMMAND --help` has examples.",
     epilog=EXIT_CODES,
     no_args_is_help=True,
     add_completion=False,

@@ -11,13 +11,18 @@ from anysim.errors import PluginError
 from anysim.registry import INSTALL_HINTS
 
 Task = Annotated[str, typer.Argument(metavar="TASK", help="An installed task (`anysim list tasks`) or a YAML file.")]
-Engine = Annotated[str | None, typer.Option("--engine", "-e", help="An installed engine; wins over the file.")]
+Engine = Annotated[
+    str | None,
+    typer.Option("--engine", "-e", help="An installed engine. Default: the file's, else ANYSIM_ENGINE, else mujoco."),
+]
 NumEnvs = Annotated[
-    int | None, typer.Option("--num-envs", "-n", min=1, help="Parallel environments; wins over the file.")
+    int | None, typer.Option("--num-envs", "-n", min=1, help="Parallel environments. Default: the file's, else 1.")
 ]
 Seed = Annotated[
     int | None,
-    typer.Option("--seed", "-s", min=0, help="The seed that everything random follows from; wins over the file's."),
+    typer.Option(
+        "--seed", "-s", min=0, help="The seed that everything random follows from. Default: the file's, else 0."
+    ),
 ]
 Overrides = Annotated[
     list[str] | None,

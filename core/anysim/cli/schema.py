@@ -16,7 +16,11 @@ class Root(StrEnum):
 def schema(
     root: Annotated[Root, typer.Argument(help="run: worlds and tasks; robot: catalogue entries.")] = Root.RUN,
 ) -> None:
-    """Print the JSON Schema of a kind of file, for completion and checks in an editor."""
+    """Print the JSON Schema of a kind of file, for completion and checks in an editor.
+
+    Examples:
+      anysim schema run > run.schema.json
+    """
     from anysim.cli.output import print_json
     from anysim_schemas.jsonschema import json_schema
     from anysim_schemas.robot_model import RobotModelSpec

@@ -6,6 +6,8 @@ import typer
 
 from anysim.cli.options import AsJson
 
+BY_DEFAULT = "default: ANYSIM_ENGINE, else mujoco."
+
 app = typer.Typer(help="Measure what anysim costs, as ratios in one run.", no_args_is_help=True)
 
 
@@ -39,6 +41,10 @@ def step(
     engine's own. Then the task, with observations, rewards and status. All loops write two commands in turn.
 
     A budget is the least ratio that is good enough; a missed one is marked and changes nothing else.
+
+    Examples:
+      anysim bench step
+      anysim bench step --engine pybullet --num-envs 16 --task ''
     """
     from collections.abc import Iterator
 
@@ -105,6 +111,9 @@ def tasks(
 
     Beside them is the engine's own loop over as many physics steps of the same world, in the same run, and the ratio of
     the two. A control step of one env counts as one.
+
+    Examples:
+      anysim bench tasks --tasks reach,pick_cube --engine mujoco
     """
     from anysim.api import load
     from anysim.cli.output import print_json
@@ -130,13 +139,17 @@ def tasks(
 
 @app.command("shards")
 def shards(
-    engine: Annotated[str | None, typer.Option("--engine", "-e", help="An installed engine.")] = None,
+    engine: Annotated[str | None, typer.Option("--engine", "-e", help=f"An installed engine; {BY_DEFAULT}")] = None,
     num_envs: Annotated[int, typer.Option("--num-envs", "-n", min=1, help="Envs of all shards together.")] = 16,
     counts: Annotated[str, typer.Option("--shards", help="Numbers of shards, separated by commas.")] = "1,2",
     rounds: Annotated[int, typer.Option(min=1, help="Interleaved rounds; the best of each side counts.")] = 7,
     json: AsJson = False,
 ) -> None:
-    """Step a Panda with five boxes in one process and in several, and compare with the first number of shards."""
+    """Step a Panda with five boxes in one process and in several, and compare with the first number of shards.
+
+    Examples:
+      anysim bench shards --engine pybullet
+    """
     from anysim.cli.output import print_json, print_table
     from anysim.engine.factory import default_engine
     from anysim.errors import EngineError
@@ -172,6 +185,9 @@ def managers(
 
     Each part's own time is told from that of the engine at its calls. The budget of a reset is without the engine: what
     it takes to write a friction, or to build a scene anew, is its own.
+
+    Examples:
+      anysim bench managers --engine mujoco
     """
     from anysim.cli.output import print_json, print_table
     from anysim_bench.managers import RESET_BUDGET_MS, STEP_BUDGET, reset_costs, step_costs, task_env
@@ -201,7 +217,9 @@ def managers(
 
 @app.command("collect")
 def collect(
-    engine: Annotated[str | None, typer.Option("--engine", "-e", help="Engines, separated by commas.")] = None,
+    engine: Annotated[
+        str | None, typer.Option("--engine", "-e", help=f"Engines, separated by commas; {BY_DEFAULT}")
+    ] = None,
     num_envs: Annotated[int, typer.Option("--num-envs", "-n", min=1, help="Envs.")] = 16,
     episodes: Annotated[int, typer.Option("--episodes", "-k", min=1, help="Episodes, over all envs.")] = 64,
     present: Annotated[
@@ -215,6 +233,9 @@ def collect(
     """Collect episodes with the task's expert, and see which share of the processor time is the engine's.
 
     All threads count. Building and a first collection, in which everything is compiled and loaded, do not.
+
+    Examples:
+      anysim bench collect --present 0,10000
     """
     from anysim.cli.output import print_json
     from anysim.engine.factory import default_engine
@@ -258,7 +279,9 @@ def plan(
     requests: Annotated[int, typer.Option("--requests", "-r", min=2, help="Requests, planned together.")] = 50,
     goals: Annotated[int, typer.Option("--goals", "-g", min=1, help="Candidates of each goal set.")] = 16,
     task: Annotated[str, typer.Option(help="The task, whose first robot is an arm.")] = "pick_cube",
-    engine: Annotated[str | None, typer.Option("--engine", "-e", help="The engine that steps meanwhile.")] = None,
+    engine: Annotated[
+        str | None, typer.Option("--engine", "-e", help=f"The engine that steps meanwhile; {BY_DEFAULT}")
+    ] = None,
     pairs: Annotated[int, typer.Option(min=0, help="Plans of two arms together; 0 leaves them out.")] = 0,
     dual: Annotated[str, typer.Option(help="The robot of the catalogue that has these two arms.")] = "baxter",
     json: AsJson = False,
@@ -270,6 +293,9 @@ def plan(
 
     The exit code is 1 where shapes touch on a path, looked at by other means than the planner's, or where a service
     gives other answers than its planner alone.
+
+    Examples:
+      anysim bench plan --planner rrt --pairs 20
     """
     from anysim.cli.output import print_json
     from anysim_bench.plan import IK_GOAL, RATIO_GOAL, STALL_GOAL_MS, plan_cost
@@ -331,6 +357,9 @@ def resets(
     A Panda, a table and ten things, each a box, a ball, a can or nothing. Memory, open files, threads and what the
     engine holds of its library are printed on the way; the exit code is 1 where something grew. More resets find
     smaller leaks.
+
+    Examples:
+      anysim bench resets --engine sapien --resets 10000
     """
     from anysim.cli.output import print_json
     from anysim.engine.capability import Capability

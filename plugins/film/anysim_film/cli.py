@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from anysim.cli.options import AsJson, Engine, Overrides
+from anysim.cli.options import AsJson, Overrides
 
 if TYPE_CHECKING:
     from anysim_film.filmer import Filmed
@@ -15,11 +15,17 @@ def render(
     directories: Annotated[list[Path], typer.Argument(metavar="DIR…", help="Trajectories, or runs with many of them.")],
     camera: Annotated[
         list[str] | None,
-        typer.Option("--camera", "-c", help="One of the recorded world's; may be repeated. Default: those of the run."),
+        typer.Option(
+            "--camera",
+            "-c",
+            help="A camera of the recorded world, or one that -o adds; may be repeated. Default: those of the run.",
+        ),
     ] = None,
     size: Annotated[tuple[int, int] | None, typer.Option(help="Width and height of the images [px].")] = None,
     fps: Annotated[float | None, typer.Option(min=0.01, help="Images per second of simulated time.")] = None,
-    engine: Engine = None,
+    engine: Annotated[
+        str | None, typer.Option("--engine", "-e", help="Another installed engine than that of the recording.")
+    ] = None,
     override: Overrides = None,
     out: Annotated[
         Path | None, typer.Option(help="Directory of the videos; default: each trajectory's own, whose cameras lack.")

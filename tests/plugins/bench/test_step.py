@@ -1,6 +1,7 @@
 """The benchmark of steps: its budgets, and that its loops write commands that change."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,6 +29,21 @@ from anysim_bench import cli, step
 )
 def test_budgets(engine, what, actuation, num_envs, least):
     assert step.budget(engine, what, actuation, num_envs) == least
+
+
+def test_the_page_of_the_benchmarks_has_these_budgets():
+    page = (Path(__file__).parents[3] / "benchmarks" / "README.md").read_text()
+    head, _, *rows = (
+        [cell.strip().replace("`", "") for cell in line.strip("|").split("|")]
+        for line in page.partition("## A step")[2].partition("\n## ")[0].splitlines()
+        if line.startswith("|")
+    )
+    sizes = [int(name.split()[0]) for name in head[3:]]
+    assert {row[0] for row in rows} == {"mujoco", "pybullet", "sapien"}
+    for engine, what, drives, *cells in rows:
+        for actuation in drives.split(", "):
+            found = [step.budget(engine, what, actuation, size) for size in sizes]
+            assert cells == ["" if least is None else f"{least:.2f}" for least in found]
 
 
 def test_a_ratio_below_its_budget_is_missed():

@@ -24,6 +24,7 @@ from anysim_film.filmer import Filmer, FilmOrder, film_targets
 from anysim_film.jobs import film_all
 from anysim_film.sheet import FILM_FILE, read_sheet
 from anysim_inspect.verify import verify
+from anysim_mcap.video import images
 from tests.record.test_film import SEEN, filmed_env, recorded as played
 
 SHORT = (*SEEN, "task.horizon=6", "record.keep=all", "record.fps=25")
@@ -176,30 +177,40 @@ def test_cameras_that_cannot_be_filmed(blind: list[Path]) -> None:
 
 
 def test_films_beside_a_trajectory(blind: list[Path], tmp_path: Path) -> None:
-    """Other looks and sizes, with a sheet that says of what; the same order goes on, another one is refused."""
+    """Other looks, sizes, cameras and lights, with a sheet of what; the same order goes on, another one is refused."""
     path, out = blind[0], tmp_path / "films" / "a"
     changes = (
         "world.objects.cube.color=magenta",
         "world.objects.rod={source: {box: [0.1, 0.1, 0.1]}, fixed: true}",
         "world.layout.rod={position: [0.2, 0.4, 0.6]}",
+        "world.cameras.above={from: [0.3, 0.0, 2.0], look_at: table}",
     )
-    with Filmer(FilmOrder(("front",), "pybullet", changes, (64, 48), 50.0)) as filmer:
+    with Filmer(FilmOrder(("front", "above"), "pybullet", changes, (64, 48), 50.0)) as filmer:
         film = filmer.film(path, out)
-    assert (film.cameras, film.frames, film.still, film.directory) == (("front",), 7, ("rod",), out)
+    assert (film.cameras, film.frames, film.still, film.directory) == (("front", "above"), 14, ("rod",), out)
     sheet, manifest = read_sheet(out), read_manifest(path)
     assert sheet is not None
     assert (sheet.engine, sheet.still, sheet.final_digest) == ("pybullet", ("rod",), manifest.final_digest)
     assert (sheet.cameras["front"].width, sheet.cameras["front"].every) == (64, 1)
-    assert set(sheet.files) == {"front.mp4"} == {p.name for p in out.iterdir()} - {FILM_FILE}
+    assert set(sheet.files) == {"above.mp4", "front.mp4"} == {p.name for p in out.iterdir()} - {FILM_FILE}
     assert manifest.cameras == {}
-    with Filmer(FilmOrder(("front",), "pybullet", changes, (64, 48), 50.0)) as filmer:
-        assert filmer.film(path, out).present == ("front",)
+    with Filmer(FilmOrder(("front", "above"), "pybullet", changes, (64, 48), 50.0)) as filmer:
+        assert filmer.film(path, out).present == ("front", "above")
     for other, source in ((changes[1:], path), (changes, blind[1])):
         with (
             Filmer(FilmOrder(("front",), "pybullet", other, (64, 48), 50.0)) as filmer,
             pytest.raises(RecordError, match="holds videos of something else"),
         ):
             filmer.film(source, out)
+    dark = ("world.lights.key.intensity=0.0", "world.scenery.ambient=[0.0, 0.0, 0.0]")
+    with Filmer(FilmOrder(("above",), "pybullet", (*changes, *dark), (64, 48), 50.0)) as filmer:
+        filmer.film(path, tmp_path / "dark")
+    lit, unlit = (
+        np.stack([*images(folder / "above.mp4", 64, 48)]).astype(float) for folder in (out, tmp_path / "dark")
+    )
+    red, green, blue = np.moveaxis(lit, -1, 0)
+    assert ((red > green + 60) & (blue > green + 60)).any(axis=(1, 2)).all(), "the cube is not seen from above"
+    assert unlit.mean() < 0.05 * lit.mean()
 
 
 def test_each_trajectory_has_a_place_of_its_own(tmp_path: Path) -> None:

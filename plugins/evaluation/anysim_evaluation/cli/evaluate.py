@@ -50,7 +50,10 @@ def evaluate(
     first: Annotated[int, typer.Option("--seed", "-s", min=0, help="The place in the split to begin at.")] = 0,
     level: Annotated[str | None, typer.Option(help="A level of difficulty that the task has.")] = None,
     num_envs: Annotated[
-        int | None, typer.Option("--num-envs", "-n", min=1, help="Parallel environments; results do not depend on it.")
+        int | None,
+        typer.Option(
+            "--num-envs", "-n", min=1, help="Parallel environments, by default 16; results do not depend on it."
+        ),
     ] = None,
     privileged: Annotated[
         bool, typer.Option("--privileged", help="Show the policy the observations that only a simulator knows, too.")

@@ -25,6 +25,9 @@ def doctor(json: AsJson = False) -> None:
 
     Each fault comes with its remedy. Engines and plugins are tried in processes of their own: one that is missing,
     crashes or hangs costs nothing but its own rows. Exit code 1 if no engine with dynamics works.
+
+    Examples:
+      anysim doctor
     """
     from anysim import registry
     from anysim.cli.output import print_json, print_table, working_on

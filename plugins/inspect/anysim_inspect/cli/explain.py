@@ -19,6 +19,10 @@ def explain(
     """Say what was drawn in an episode: each value, the stream it comes from, and the line of YAML that asks for it.
 
     The same on every engine, and whatever the number of envs. `anysim run TASK --seed S` has this episode in env I.
+
+    Examples:
+      anysim explain pick_cube --seed 1
+      anysim explain my_world.yaml --seed 1 --episode 2 --env 3
     """
     from anysim.cli.output import print_json, print_table
     from anysim_inspect.draws import explain as explain_one

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from anysim.cli.options import AsJson, Engine
+from anysim.cli.options import AsJson
 
 if TYPE_CHECKING:
     from anysim.record.replay import FieldSummary, ReplayResult
@@ -13,7 +13,9 @@ if TYPE_CHECKING:
 
 def replay(
     directories: Annotated[list[Path], typer.Argument(metavar="DIR…", help="Trajectories, or runs with many of them.")],
-    engine: Engine = None,
+    engine: Annotated[
+        str | None, typer.Option("--engine", "-e", help="Another installed engine than that of the recording.")
+    ] = None,
     base: Annotated[
         Path | None, typer.Option(help="Folder of the recorded file, where its world has assets with relative paths.")
     ] = None,
@@ -24,6 +26,10 @@ def replay(
     On the engine that recorded them they must be equal to the bit; exit code 1 if not, or if one is damaged. On another
     engine the same actions lead elsewhere: the drift of every state array is reported, and whether the episodes end
     alike.
+
+    Examples:
+      anysim replay runs/a
+      anysim replay runs/a/episodes/env_0000_episode_0000 --engine pybullet
     """
     from anysim.cli.output import counting, print_json
     from anysim.record.names import find_trajectories

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from anysim.cli.options import AsJson, Engine
+from anysim.cli.options import AsJson
 
 app = typer.Typer(help="Files of envs at one moment: look at them, or take one from a recording.", no_args_is_help=True)
 
@@ -17,10 +17,16 @@ def _group() -> None:
 
 @app.command("show")
 def show(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="What `save` of a snapshot or a world state wrote.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="What `anysim snapshot take`, or `save` in Python, wrote.")
+    ],
     json: AsJson = False,
 ) -> None:
-    """Check a file against its hashes, and print what it belongs to and what it holds."""
+    """Check a file against its hashes, and print what it belongs to and what it holds.
+
+    Examples:
+      anysim snapshot show moment.snapshot
+    """
     from anysim.cli.output import print_json, print_table
     from anysim.engine.snapshots.file import made_with, read
 
@@ -59,7 +65,9 @@ def take(
     name: Annotated[
         str | None, typer.Option("--trajectory", help="Which one of a run, by its folder; default the first.")
     ] = None,
-    engine: Engine = None,
+    engine: Annotated[
+        str | None, typer.Option("--engine", "-e", help="Another installed engine than that of the recording.")
+    ] = None,
 ) -> None:
     """Replay a trajectory up to a step and write a snapshot, from which any number of runs can go on.
 

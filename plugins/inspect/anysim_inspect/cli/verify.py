@@ -15,6 +15,9 @@ def verify(
     """Read every byte of trajectories and name what is not as it was committed; nothing is simulated.
 
     Exit code 1 if one is damaged.
+
+    Examples:
+      anysim verify runs/a
     """
     from anysim.cli.output import print_json
     from anysim.record.names import find_trajectories
