@@ -7,13 +7,14 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from checks import constraints, house, junk, length, links, packages, words, yaml_header
+from checks import constraints, house, junk, length, links, packages, participles, words, yaml_header
 from checks.tree import Fault, Tree
 
 CHECKS: Sequence[Callable[[Tree], Iterator[Fault]]] = (
     house.check,
     length.check,
     words.check,
+    participles.check,
     junk.check,
     packages.check,
     constraints.check,

@@ -21,7 +21,7 @@ from anysim.engine.factory import ENGINE_VARIABLE, create_simulation, engine_cla
 from anysim.errors import AnysimError, AssetError, PluginError, SpecError, SpecIssue, TaskError, listing
 from anysim.math.arrays import shown, whole
 from anysim.plugin_parameters import options_model
-from anysim_schemas.load import Loaded, LoadedRun, load_run
+from anysim_schemas.load import LoadedRun, LoadedSpec, load_run
 from anysim_schemas.object_source import Source, SourceChoice, SourceFolder, most
 from anysim_schemas.plugin import UnknownPlugin
 
@@ -114,7 +114,7 @@ def compile_world(
 
     if isinstance(source, RunSpec):
         return compile_spec(source, base=base)
-    loaded = source if isinstance(source, Loaded) else load(source, overrides=overrides)
+    loaded = source if isinstance(source, LoadedSpec) else load(source, overrides=overrides)
     try:
         return compile_spec(loaded.spec, base=base or _asset_folders(loaded))
     except (SpecError, AssetError) as error:
@@ -276,7 +276,7 @@ def simulation(spec: "RunSpec") -> "SimEngine":
 
 
 def _loaded(source: str | Path | LoadedRun | Mapping[str, Any], overrides: Sequence[str]) -> LoadedRun:
-    if not isinstance(source, Loaded):
+    if not isinstance(source, LoadedSpec):
         return load(source, overrides=overrides)
     return replace(load(source.data, overrides=overrides), files=source.files) if overrides else source
 

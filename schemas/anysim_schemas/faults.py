@@ -12,7 +12,7 @@ from anysim_schemas.errors import KeyFault
 from anysim_schemas.messages import MISSING, TYPE_ERRORS, count, sentence, suggest, unknown_key
 from anysim_schemas.nodes import Fault, Mark, Node
 from anysim_schemas.shapes import Shape, Shapes, expectation, field_at, inside, keys, tagged
-from anysim_schemas.values import KINDS, TAG_PREFIX, Drawn
+from anysim_schemas.values import KINDS, TAG_PREFIX, Distribution
 
 UNKNOWN_KEY = "extra_forbidden"
 MAX_FAULTS = 1_000
@@ -25,7 +25,7 @@ CONSTANT = TAG_PREFIX + "constant"
 
 
 @dataclass(frozen=True)
-class _Located:
+class _LocatedError:
     """An error whose location has been followed through the data and the annotations."""
 
     error: ErrorDetails
@@ -70,7 +70,7 @@ def locate(
     return faults
 
 
-def _follow(error: ErrorDetails, model: type[BaseModel], root: Node) -> _Located:
+def _follow(error: ErrorDetails, model: type[BaseModel], root: Node) -> _LocatedError:
     node, shapes = root, (Shape(model),)
     field: FieldInfo | None = None
     path: list[str | int] = []
@@ -90,7 +90,7 @@ def _follow(error: ErrorDetails, model: type[BaseModel], root: Node) -> _Located
             path.append(element)
         elif position == last and error["type"] in ("missing", UNKNOWN_KEY):
             depth = len(path)
-            return _Located(error, (*path, element), depth, node, shapes, union, branch, field)
+            return _LocatedError(error, (*path, element), depth, node, shapes, union, branch, field)
         elif inside(shapes, element):  # the field that a bare string stands for
             field, shapes = field_at(shapes, element), inside(shapes, element)
         elif union is None:
@@ -102,12 +102,12 @@ def _follow(error: ErrorDetails, model: type[BaseModel], root: Node) -> _Located
             break
         node = child
         path.append(element)
-    return _Located(error, tuple(path), len(path), node, shapes, union, branch, field)
+    return _LocatedError(error, tuple(path), len(path), node, shapes, union, branch, field)
 
 
-def _decide_unions(found: Sequence[_Located]) -> Iterator[_Located]:
+def _decide_unions(found: Sequence[_LocatedError]) -> Iterator[_LocatedError]:
     """Of the errors of a union only those of the branch that was meant: of the right type, the keys that fit best."""
-    unions: dict[tuple[str | int, ...], list[_Located]] = {}
+    unions: dict[tuple[str | int, ...], list[_LocatedError]] = {}
     for located in found:
         if located.union is not None:
             unions.setdefault(located.union, []).append(located)
@@ -118,8 +118,8 @@ def _decide_unions(found: Sequence[_Located]) -> Iterator[_Located]:
             yield from _decide(unions.pop(located.union))
 
 
-def _decide(errors: Sequence[_Located]) -> Iterator[_Located]:
-    branches: dict[str | int, list[_Located]] = {}
+def _decide(errors: Sequence[_LocatedError]) -> Iterator[_LocatedError]:
+    branches: dict[str | int, list[_LocatedError]] = {}
     for located in errors:
         branches.setdefault(located.branch, []).append(located)
     fitting = [group for group in branches.values() if any(_fits_type(e) for e in group)]
@@ -129,12 +129,12 @@ def _decide(errors: Sequence[_Located]) -> Iterator[_Located]:
         yield next((e for e in errors if e.error["type"] in TYPE_ERRORS), errors[0])
 
 
-def _fits_type(located: _Located) -> bool:
+def _fits_type(located: _LocatedError) -> bool:
     """Whether the error lies below its union, or is no complaint about the type of the value."""
     return len(located.path) > len(located.union or ()) or located.error["type"] not in MISMATCHES
 
 
-def _join_lengths(found: Iterator[_Located]) -> Iterator[_Located]:
+def _join_lengths(found: Iterator[_LocatedError]) -> Iterator[_LocatedError]:
     """One error for a list that is too short, where pydantic reports each missing item."""
     seen: set[tuple[str | int, ...]] = set()
     for located in found:
@@ -150,12 +150,12 @@ def _join_lengths(found: Iterator[_Located]) -> Iterator[_Located]:
         yield located
 
 
-def _is_short_list(located: _Located) -> bool:
+def _is_short_list(located: _LocatedError) -> bool:
     """Whether an item of a list of fixed length is missing."""
     return located.error["type"] == "missing" and bool(located.path) and isinstance(located.path[-1], int)
 
 
-def _mark(located: _Located) -> Mark:
+def _mark(located: _LocatedError) -> Mark:
     kind, node = located.error["type"], located.node
     if kind == UNKNOWN_KEY:
         child = node.child(located.path[-1])
@@ -163,7 +163,7 @@ def _mark(located: _Located) -> Mark:
     return node.key if "[key]" in located.error["loc"] and node.key is not None else node.place
 
 
-def _message(located: _Located, more_keys: Sequence[str]) -> str:
+def _message(located: _LocatedError, more_keys: Sequence[str]) -> str:
     error, shapes = located.error, located.shapes
     kind, given = error["type"], cast("object", error["input"])
     context = cast("Mapping[str, Any]", error.get("ctx", {}))
@@ -189,7 +189,7 @@ def _message(located: _Located, more_keys: Sequence[str]) -> str:
     return text + _purpose(located) if kind in LIMITS else text
 
 
-def _purpose(located: _Located) -> str:
+def _purpose(located: _LocatedError) -> str:
     """What the key is for, in parentheses, where its field says so."""
     field = located.field
     return f" ({field.description})" if field is not None and field.description else ""
@@ -201,6 +201,6 @@ def _further_down(shapes: Shapes) -> dict[str, str]:
         key: f"{parent}.{key}"
         for parent in reversed(keys(shapes))
         for key in keys(
-            tuple(s for s in inside(shapes, parent) if s.spec is not None and not issubclass(s.spec, Drawn))
+            tuple(s for s in inside(shapes, parent) if s.spec is not None and not issubclass(s.spec, Distribution))
         )
     }

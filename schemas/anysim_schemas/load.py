@@ -28,7 +28,7 @@ ROUNDS = 3
 
 
 @dataclass(frozen=True)
-class Loaded(Generic[M]):
+class LoadedSpec(Generic[M]):
     """A spec and where it came from.
 
     Attributes:
@@ -71,7 +71,7 @@ def _children(value: object) -> dict[str, object]:
     )
 
 
-LoadedRun = Loaded[RunSpec]
+LoadedRun = LoadedSpec[RunSpec]
 
 
 def load_run(
@@ -98,7 +98,7 @@ def load(
     extends: ExtendsResolver | None = None,
     base_data: Mapping[str, Any] | None = None,
     past: list[SpecIssue] | None = None,
-) -> Loaded[M]:
+) -> LoadedSpec[M]:
     """Read, merge and validate a spec.
 
     Args:
@@ -137,7 +137,7 @@ def load(
         root, spec = rest
     data = root.plain()
     provenance = {path: str(mark) or "data" for path, mark in places(root, shapes)}
-    return Loaded(spec, provenance, tuple(reader.files), data)
+    return LoadedSpec(spec, provenance, tuple(reader.files), data)
 
 
 def _validated(model: type[M], root: Node, resolver: OptionsResolver | None) -> tuple[M | None, list[Fault]]:

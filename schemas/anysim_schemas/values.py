@@ -77,7 +77,7 @@ class Variant(Spec):
         return f"{cls.__name__}_{labels[0]}" if labels else super().model_parametrized_name(params)
 
 
-class Drawn(Variant, Generic[T]):
+class Distribution(Variant, Generic[T]):
     """What the values that are drawn have in common: the key that says how, whether at all, and with whom."""
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
@@ -97,13 +97,13 @@ class Drawn(Variant, Generic[T]):
     )
 
     @model_validator(mode="after")
-    def _gated(self) -> "Drawn[T]":
+    def _gated(self) -> "Distribution[T]":
         if self.otherwise is not None and self.ratio == 1.0:
             raise KeyFault("`otherwise` is for the episodes that a `ratio` below 1 leaves out", "otherwise")
         return self
 
 
-class Range(Drawn[T], Generic[T]):
+class Range(Distribution[T], Generic[T]):
     """Uniform between two bounds, component by component; whole numbers include both bounds."""
 
     range: tuple[T, T] = Field(description="lower and upper bound")
@@ -114,7 +114,7 @@ class Range(Drawn[T], Generic[T]):
         return self
 
 
-class LogUniform(Drawn[T], Generic[T]):
+class LogUniform(Distribution[T], Generic[T]):
     """Uniform in the logarithm between two positive bounds, component by component: each decade is equally likely."""
 
     log_uniform: tuple[T, T] = Field(description="lower and upper bound, above 0")
@@ -127,7 +127,7 @@ class LogUniform(Drawn[T], Generic[T]):
         return self
 
 
-class Choice(Drawn[T], Generic[T]):
+class Choice(Distribution[T], Generic[T]):
     """One of the listed values, each equally likely unless `weights` says otherwise."""
 
     choice: tuple[T, ...] = Field(min_length=1, description="the values to draw from")
@@ -164,7 +164,7 @@ class NormalParameters(Variant, Generic[T]):
         return self
 
 
-class Normal(Drawn[T], Generic[T]):
+class Normal(Distribution[T], Generic[T]):
     """Normally distributed."""
 
     normal: NormalParameters[T] = Field(description="mean, standard deviation and limits")
@@ -174,7 +174,7 @@ def kind_of(value: object) -> str:
     """The tag of the branch that a value is of."""
     mapping = cast("dict[object, object]", value) if isinstance(value, dict) else {}
     for kind in KINDS:
-        if kind in mapping or (isinstance(value, Drawn) and hasattr(cast("object", value), kind)):
+        if kind in mapping or (isinstance(value, Distribution) and hasattr(cast("object", value), kind)):
             return TAG_PREFIX + kind
     return TAG_PREFIX + "constant"
 
@@ -238,6 +238,6 @@ else:
 
 def unshared(noise: Any) -> Any:
     """Refuse to share the draws of a value that is drawn anew at each step, or for several numbers at once."""
-    if isinstance(noise, Drawn) and cast("Drawn[float]", noise).shared is not None:
+    if isinstance(noise, Distribution) and cast("Distribution[float]", noise).shared is not None:
         raise KeyFault("noise is drawn for itself, number by number; leave `shared` out", "shared")
     return cast("Any", noise)

@@ -116,7 +116,7 @@ def parse(text: str, source: str, faults: list[Fault]) -> Node | None:
     return None
 
 
-class _Built(NamedTuple):
+class _BuiltNode(NamedTuple):
     """Data, how many values it holds with all aliases expanded, and how deep it goes."""
 
     node: Node
@@ -130,7 +130,7 @@ class _Builder:
     def __init__(self, source: str, faults: list[Fault]) -> None:
         self._source = source
         self._faults = faults
-        self._done: dict[int, _Built] = {}
+        self._done: dict[int, _BuiltNode] = {}
         self._open: set[int] = set()
         self._aliased = 0
 
@@ -144,7 +144,7 @@ class _Builder:
     def _fault(self, node: yaml.Node, message: str) -> None:
         self._faults.append(Fault(self._mark(node), "", message))
 
-    def _build(self, node: yaml.Node) -> _Built:
+    def _build(self, node: yaml.Node) -> _BuiltNode:
         identity = id(node)
         if identity in self._open:
             raise _Fatal(Fault(self._mark(node), "", "the value of this anchor contains itself"))
@@ -156,7 +156,7 @@ class _Builder:
         elif isinstance(node, yaml.SequenceNode):
             built = self._sequence(node)
         else:
-            built = _Built(Node(self._scalar(cast("yaml.ScalarNode", node)), self._mark(node)), 1, 0)
+            built = _BuiltNode(Node(self._scalar(cast("yaml.ScalarNode", node)), self._mark(node)), 1, 0)
         if max(built.depth, len(self._open)) > YAML_DEPTH.value:
             raise RecursionError
         self._check_tag(node)
@@ -164,21 +164,21 @@ class _Builder:
         self._done[identity] = built
         return built
 
-    def _alias(self, node: yaml.Node, built: _Built) -> _Built:
+    def _alias(self, node: yaml.Node, built: _BuiltNode) -> _BuiltNode:
         self._aliased += built.size
         if YAML_ALIASED.exceeded(self._aliased):
             raise _Fatal(Fault(self._mark(node), "", f"the file {YAML_ALIASED.sentence()}"))
         return built
 
-    def _sequence(self, node: yaml.SequenceNode) -> _Built:
+    def _sequence(self, node: yaml.SequenceNode) -> _BuiltNode:
         items = [self._build(item) for item in cast("list[yaml.Node]", node.value)]
         size, depth = sum(item.size for item in items), max((item.depth for item in items), default=0)
-        return _Built(Node([item.node for item in items], self._mark(node)), 1 + size, 1 + depth)
+        return _BuiltNode(Node([item.node for item in items], self._mark(node)), 1 + size, 1 + depth)
 
-    def _mapping(self, node: yaml.MappingNode) -> _Built:
+    def _mapping(self, node: yaml.MappingNode) -> _BuiltNode:
         entries: dict[str, Node] = {}
         merged: dict[str, Node] = {}
-        parts: list[_Built] = []
+        parts: list[_BuiltNode] = []
         for key, value in cast("list[tuple[yaml.Node, yaml.Node]]", node.value):
             if key.tag == TAG + "merge":
                 parts += self._merge(value, merged)
@@ -196,9 +196,9 @@ class _Builder:
             entries[name] = Node(parts[-1].node.value, place, place) if empty else parts[-1].node.under(place)
         both = {**{name: child for name, child in merged.items() if name not in entries}, **entries}
         size, depth = sum(part.size for part in parts), max((part.depth for part in parts), default=0)
-        return _Built(Node(both, self._mark(node)), 1 + size, 1 + depth)
+        return _BuiltNode(Node(both, self._mark(node)), 1 + size, 1 + depth)
 
-    def _merge(self, value: yaml.Node, into: dict[str, Node]) -> list[_Built]:
+    def _merge(self, value: yaml.Node, into: dict[str, Node]) -> list[_BuiltNode]:
         """The mappings that `<<` brings in; their entries go `into`, of several the first wins."""
         sources = cast("list[yaml.Node]", value.value) if isinstance(value, yaml.SequenceNode) else [value]
         parts = [self._build(source) for source in sources]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from anysim.processes.own_process import Ended, how_it_ended, run_module
+from anysim.processes.own_process import ProcessEnd, how_it_ended, run_module
 
 
 @pytest.fixture(autouse=True)
@@ -20,13 +20,13 @@ def modules(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_module_gets_its_arguments_and_ends_well() -> None:
-    assert run_module("good", "a", "b c", limit=60.0) == Ended("['a', 'b c']\n", "", "")
+    assert run_module("good", "a", "b c", limit=60.0) == ProcessEnd("['a', 'b c']\n", "", "")
 
 
 def test_a_crash_an_exit_code_and_a_hang_are_words() -> None:
     died = run_module("dies", limit=60.0)
     assert (died.out, died.trouble) == ("on its way\n", "was ended by signal 11 (SIGSEGV)")
-    assert run_module("wrong", limit=60.0) == Ended("", "no\n", "ended with exit code 1")
+    assert run_module("wrong", limit=60.0) == ProcessEnd("", "no\n", "ended with exit code 1")
     hung = run_module("slow", limit=5.0)
     assert (hung.out, hung.trouble) == ("begun\n", "took longer than 5 s and was stopped")
 

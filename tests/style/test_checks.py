@@ -6,7 +6,7 @@ from pathlib import Path
 
 import check_style
 import pytest
-from checks import constraints, house, junk, length, links, packages, words, yaml_header
+from checks import constraints, house, junk, length, links, packages, participles, words, yaml_header
 from checks.tree import Tree
 
 ROOT_SETTINGS = """
@@ -196,6 +196,27 @@ def test_counts_that_only_fall(
     assert told(make_tree({A: fits})) == []
     (fault,) = told(make_tree({A: fits + too_many}))
     assert message in fault
+
+
+KEPT = '"""K."""\n\n\nclass {}:\n    pass\n\n\ndef {}(rows): ...\n\n\n{} = 1\n'
+
+
+@pytest.mark.parametrize(
+    "names", [("Kept", "kept", "kept"), ("_Kept", "_kept", "kept"), ("Placed", "placed", "_placed")]
+)
+def test_a_participle_of_three_kinds_is_found(make_tree: MakeTree, names: tuple[str, str, str]) -> None:
+    (fault,) = participles.check(make_tree({A: KEPT.format(*names)}))
+    assert str(fault).startswith(f"core/anysim/a.py:4: {names[0]} is a function and a variable too")
+    alone = KEPT.format(names[0], "f", names[2])
+    assert list(participles.check(make_tree({A: alone}))) == [], "no function"
+    assert list(participles.check(make_tree({"backends/y/a.py": KEPT.format(*names)}))) == []
+
+
+@pytest.mark.parametrize(
+    "names", [("Placement", "placed", "placed"), ("Speed", "speed", "speed"), ("PlacedPart", "placed", "placed_part")]
+)
+def test_nouns_are_names_of_all_kinds(make_tree: MakeTree, names: tuple[str, str, str]) -> None:
+    assert list(participles.check(make_tree({A: KEPT.format(*names)}))) == []
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from anysim.model.hash import split
 from anysim.model.world import Body, Geom, HeightFieldShape, Joint, MeshShape, Site
 
 _IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-_Placed = TypeVar("_Placed", Geom, Site)
+_GeomOrSite = TypeVar("_GeomOrSite", Geom, Site)
 
 
 def attach(model: ImportedModel, part: ImportedModel, link: str, pose: Array, prefix: str = "") -> ImportedModel:
@@ -169,7 +169,7 @@ class _Attachment:
             geoms.append(replace(self._placed(geom), shape=shape))
         return geoms, [*self.model.geom_links, *(self._named(name) for name in self.part.geom_links)]
 
-    def _placed(self, thing: _Placed) -> _Placed:
+    def _placed(self, thing: _GeomOrSite) -> _GeomOrSite:
         """A geom or site of the part; what is on its root moves along with that."""
         pose = P.pose(thing.position, thing.quaternion)
         on_root = thing.body <= 0  # also what the part fixes to the world: the carrier is its world

@@ -9,14 +9,14 @@ from anysim.assets.mesh_budget import plain_xml
 from anysim.errors import AssetError
 
 
-class Declared(NamedTuple):
+class ColladaHead(NamedTuple):
     """The head of a file: metres in its unit, and the axis that points up, `X`, `Y` or `Z`."""
 
     metres: float = 1.0
     up: str = "Y"
 
 
-def declared(path: Path, data: bytes) -> Declared:
+def declared(path: Path, data: bytes) -> ColladaHead:
     """What `<asset>` says of the whole file; COLLADA's defaults, metres and y, where it says nothing.
 
     Read as XML and not by a pattern: quotes of either kind, blanks around `=` and comments are all in use.
@@ -36,7 +36,7 @@ def declared(path: Path, data: bytes) -> Declared:
     except (ValueError, etree.XMLSyntaxError) as error:
         raise AssetError(f"{path}: cannot be read as a mesh: {error}") from error
     if asset is None:
-        return Declared()
+        return ColladaHead()
     unit, up = asset.find("{*}unit"), asset.findtext("{*}up_axis", "").strip()
     said = "1" if unit is None else unit.get("meter", "1")
     try:
@@ -45,4 +45,4 @@ def declared(path: Path, data: bytes) -> Declared:
         metres = nan
     if not 0.0 < metres < inf:
         raise AssetError(f"{path}: <unit meter='{said[:30]}'> is not the number of metres of its unit, such as 0.001")
-    return Declared(metres, up[0] if up in ("X_UP", "Y_UP", "Z_UP") else "Y")
+    return ColladaHead(metres, up[0] if up in ("X_UP", "Y_UP", "Z_UP") else "Y")

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anysim import cache
-from anysim.assets.collada import Declared, declared
+from anysim.assets.collada import ColladaHead, declared
 from anysim.assets.mesh_budget import bounded, check, mesh_bytes
 from anysim.conventions import Array
 from anysim.errors import AssetError
@@ -153,8 +153,8 @@ def _key(path: Path, *parameters: object) -> str:
     return cache.digest(_VERSION, path.suffix.lower(), data, materials, *(repr(p) for p in parameters))
 
 
-def _declared(path: Path, data: bytes) -> Declared:
-    return declared(path, data) if path.suffix.lower() == ".dae" else Declared()
+def _declared(path: Path, data: bytes) -> ColladaHead:
+    return declared(path, data) if path.suffix.lower() == ".dae" else ColladaHead()
 
 
 def _material_files(path: Path, data: bytes) -> list[Path]:

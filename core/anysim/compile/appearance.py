@@ -22,7 +22,7 @@ from anysim.model.world import Light, Scenery
 from anysim.randomization.distributions import nominal
 from anysim_schemas.lights import LightSpec, ScenerySpec
 from anysim_schemas.matter import MaterialSpec, TextureSpec
-from anysim_schemas.values import Choice, Drawn
+from anysim_schemas.values import Choice, Distribution
 
 MAX_IMAGE_SIDE = 1024
 """Larger images are made smaller: an engine holds a texture six times, once for each side."""
@@ -167,7 +167,7 @@ def compile_lights(specs: Mapping[str, LightSpec], issues: Issues) -> tuple[Ligh
         direction = nominal(spec.direction)
         length = float(np.linalg.norm(direction))
         if length < 1e-9:
-            text = "; choose bounds whose middle is not zero" if isinstance(spec.direction, Drawn) else ""
+            text = "; choose bounds whose middle is not zero" if isinstance(spec.direction, Distribution) else ""
             issues.add(f"{name}.direction", f"a light needs a direction that is not zero{text}")
             continue
         x, y, z = (component / length for component in direction)

@@ -15,23 +15,23 @@ from anysim_schemas.joints import ObjectJointSpec
 _FIELDS = ("initial", "opened", "friction", "damping", "limits")
 
 
-class Asked(NamedTuple):
+class JointValue(NamedTuple):
     """A value that a spec gives a joint, and the key of `joints` that it stands under."""
 
     value: Any
     key: str
 
 
-def asked_of(joints: Mapping[str, ObjectJointSpec], name: str) -> dict[str, Asked]:
+def asked_of(joints: Mapping[str, ObjectJointSpec], name: str) -> dict[str, JointValue]:
     """By field what a spec asks of the joint `name`: later patterns win over earlier ones, its own name over all."""
-    found: dict[str, Asked] = {}
+    found: dict[str, JointValue] = {}
     for key, spec in sorted(joints.items(), key=lambda item: item[0] == name):  # stable: else in the order written
         if fnmatchcase(name, key):
             given = {field: getattr(spec, field) for field in _FIELDS if getattr(spec, field) is not None}
             if "initial" in given or "opened" in given:
                 found.pop("initial", None)
                 found.pop("opened", None)
-            found |= {field: Asked(value, key) for field, value in given.items()}
+            found |= {field: JointValue(value, key) for field, value in given.items()}
     return found
 
 
@@ -57,7 +57,7 @@ def with_joints(model: ImportedModel, joints: Mapping[str, ObjectJointSpec], iss
     return replace(model, joints=tuple(made))
 
 
-def _joint(model: ImportedModel, joint: Joint, asked: Mapping[str, Asked], issues: Issues) -> Joint:
+def _joint(model: ImportedModel, joint: Joint, asked: Mapping[str, JointValue], issues: Issues) -> Joint:
     if "limits" in asked:
         lower, upper = asked["limits"].value
         joint = replace(joint, lower=lower, upper=upper, initial=min(max(joint.initial, lower), upper))

@@ -39,7 +39,7 @@ from anysim.model.world import (
 from anysim.randomization.distributions import nominal
 from anysim_schemas.object_source import PROCEDURAL, SourceSpec
 from anysim_schemas.objects import ContactSpec, ObjectSpec
-from anysim_schemas.values import Drawn
+from anysim_schemas.values import Distribution
 
 DEFAULT_DENSITY = 1000.0  # [kg/m^3], water
 DEFAULT_FRICTION = 0.8
@@ -57,7 +57,7 @@ def add_object(
     quaternion: Quat = IDENTITY_QUATERNION,
 ) -> list[ImportNote]:
     """Add an object of one source; what is wrong goes to `issues`, at the path of the object. Returns import notes."""
-    if not isinstance(spec.source, SourceSpec) or isinstance(spec.scale, Drawn) or spec.count is not None:
+    if not isinstance(spec.source, SourceSpec) or isinstance(spec.scale, Distribution) or spec.count is not None:
         issues.add("", "an object that is added to a world has one source, one scale and no count; add each by its own")
         return []
     model = object_model(name, spec, KeyedSource(spec.source, "source"), spec.scale, issues, base, builder.visual_error)

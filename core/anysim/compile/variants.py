@@ -12,7 +12,7 @@ from anysim.errors import AssetError, listing
 from anysim.randomization.distributions import quantile
 from anysim_schemas.object_source import PROCEDURAL, SHAPES, Count, SourceChoice, SourceFolder, SourceSpec, most
 from anysim_schemas.objects import ObjectSpec
-from anysim_schemas.values import Choice, Drawn
+from anysim_schemas.values import Choice, Distribution
 
 INSTANCER = "rigid_instancer"
 
@@ -58,7 +58,7 @@ def options(values: Sequence[Any], middle: int = 0, like: Any = None) -> Options
 def sizes(spec: ObjectSpec) -> Options:
     """The scales that an object is made in: of a distribution the middles of `sizes` equally likely parts."""
     value = spec.scale
-    if not isinstance(value, Drawn):
+    if not isinstance(value, Distribution):
         return Options((value,))
     if isinstance(value, Choice):
         return options(value.choice, like=value)

@@ -33,7 +33,7 @@ from anysim_schemas.rooms import furniture_names
 from anysim_schemas.run import RunSpec, WorldSpec
 
 
-class Compiled(NamedTuple):
+class CompiledWorld(NamedTuple):
     """A World, and for each entity what its importer repaired or left out."""
 
     world: World
@@ -61,7 +61,7 @@ def compile_world(spec: RunSpec | WorldSpec, *, physics: PhysicsSpec | None = No
 
 def compile_with_report(
     spec: RunSpec | WorldSpec, *, physics: PhysicsSpec | None = None, base: Base = None
-) -> Compiled:
+) -> CompiledWorld:
     """As `compile_world`, with the notes of the importers."""
     if isinstance(spec, RunSpec):
         issues, content, steps = Issues("world"), spec.world, physics or spec.physics
@@ -102,7 +102,7 @@ def compile_with_report(
     world = with_exclusions(world, content.collisions, issues.at("collisions"))
     world = with_sensors(world, content.cameras, content.contact_sensors, issues)
     issues.raise_if_any()
-    return Compiled(world, notes)
+    return CompiledWorld(world, notes)
 
 
 def _base(base: Base, name: str) -> Path | None:

@@ -24,9 +24,9 @@ from anysim.engine.records import below
 from anysim.engine.sensing import EngineSensing
 from anysim.engine.snapshots.row_checks import damaged, mapping_of_arrays, refuse_other_forms, refuse_parameters
 from anysim.engine.snapshots.world_state import (
-    Carried,
     Missing,
     WorldState,
+    WorldStateGaps,
     read_world_state,
     refuse_world_state,
     write_world_state,
@@ -273,7 +273,7 @@ class SimEngine(EngineSensing):
             self._require_world()
             return read_world_state(self, self._records, self._ids(env_ids))
 
-    def set_world_state(self, state: WorldState, env_ids: EnvIds = None, missing: Missing = "refuse") -> Carried:
+    def set_world_state(self, state: WorldState, env_ids: EnvIds = None, missing: Missing = "refuse") -> WorldStateGaps:
         """Put envs into a state, from whatever engine and world, as if they had just been reset into it.
 
         Where names differ: `refuse`, or carry over what both have and `keep` the rest. Returns what differs.

@@ -19,7 +19,7 @@ from anysim.engine.lifetime import EngineLifetime
 from anysim.engine.options import EngineOptions
 from anysim.engine.presence import Lifecycle, Presence, write_present
 from anysim.engine.primitives import Primitives
-from anysim.engine.records import EnvRecords, Kept
+from anysim.engine.records import EnvRecords, RebuildState
 from anysim.engine.requirements import check_drives, check_masses, needs_of
 from anysim.engine.reserved_names import check_class, check_instance
 from anysim.engine.state import Availability, State
@@ -203,7 +203,7 @@ class EngineLifecycle(EngineLifetime, Primitives):
         """Replace the world, carrying by name all that both worlds have. On failure the old one is built again."""
         needs, state = self._check(world), self.get_state()
         changed = {name: np.array(self._get_parameter(name)) for name in self._records.changed}
-        kept = Kept.of(self.world, state, self._records, changed, self._carry_rows())
+        kept = RebuildState.of(self.world, state, self._records, changed, self._carry_rows())
         try:
             self._build_from(world, kept)
         except BaseException:
@@ -211,7 +211,7 @@ class EngineLifecycle(EngineLifetime, Primitives):
             raise
         self.approximations = needs
 
-    def _build_from(self, world: World, kept: Kept) -> None:
+    def _build_from(self, world: World, kept: RebuildState) -> None:
         self._retire_state()
         self._release()
         self._install(world, self.num_envs)

@@ -97,7 +97,7 @@ class EnvRecords:
         self.world, self.rig = world, rig
 
 
-class Kept(NamedTuple):
+class RebuildState(NamedTuple):
     """Copies of what an engine had before a rebuild, in the order of its old World.
 
     Attributes:

@@ -115,7 +115,7 @@ class PlacedPart(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedSolid:
     """A solid at its place in the world, with the box around it."""
 
     name: str
@@ -145,7 +145,7 @@ class Solid:
         self.parts = tuple(_part(placed.shape, placed.pose, body, meshes) for placed, body in shape.owned)
         self.collides = shape.collides
 
-    def at(self, pose: Pose) -> Placed:
+    def at(self, pose: Pose) -> PlacedSolid:
         """With its root somewhere."""
         placed: list[PlacedPart] = []
         for part in self.parts:
@@ -154,10 +154,10 @@ class Solid:
             rotation = product(pose.rotation, part.pose.rotation) if part.pose.rotation != IDENTITY else pose.rotation
             placed.append(boxed(part, Pose(here, rotation)))
         if not placed:
-            return Placed(self.name, pose, (), pose.position, pose.position)
+            return PlacedSolid(self.name, pose, (), pose.position, pose.position)
         low = tuple(min(p.low[k] for p in placed) for k in range(3))
         high = tuple(max(p.high[k] for p in placed) for k in range(3))
-        return Placed(self.name, pose, tuple(placed), low, high)  # type: ignore[arg-type]
+        return PlacedSolid(self.name, pose, tuple(placed), low, high)  # type: ignore[arg-type]
 
     def reach(self, rotation: Matrix, n: Vec) -> float:
         """How far it goes from its root's origin in a unit direction of the world, the root turned by `rotation`."""

@@ -17,11 +17,11 @@ from anysim.model.world import BodyKind, Slot, World
 from anysim.placement.candidate import Candidate
 from anysim.placement.clearance import ClearanceQuery
 from anysim.placement.constraints import PlacementTask
-from anysim.placement.context import PlacementContext, Settled
+from anysim.placement.context import PlacementContext, SettledObject
 from anysim.placement.nominal import nominal_place, roots_at
 from anysim.placement.order import entry_of, placement_order
 from anysim.placement.sampler import EpisodeSampler, NominalSampler, PlacementSampler
-from anysim.placement.search import NoPlace, Refused, Search, is_constant
+from anysim.placement.search import NoPlace, RefusedProposal, Search, is_constant
 from anysim_schemas.layout import PlaceFields, RepairSpec
 
 IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -54,7 +54,7 @@ class LayoutManager(Manager):
         self._others = [item for item in self._context.items if item.name not in order]
         self._entries = {name: entry_of(content.layout, items[name]) or "" for name in order}
         self._still = {
-            entity: Settled(
+            entity: SettledObject(
                 self._context.initial(self._world.entities[entity].name),
                 self._solid(entity).fixed,
                 True,
@@ -141,7 +141,7 @@ class LayoutManager(Manager):
             entity = there[item.name]
             if entity is not None:
                 tasks.append(self._task(env, item, self._solid(entity), middles))
-        settled: dict[str, Settled] = {}
+        settled: dict[str, SettledObject] = {}
         for item in self._others:
             entity = there[item.name]
             if entity is not None:
@@ -160,13 +160,13 @@ class LayoutManager(Manager):
         try:
             self._source.propose(env, self.streams, self._context, tasks, settled)
             return search().solve(tasks)
-        except Refused as error:
+        except RefusedProposal as error:
             if not self._source.falls_back:
                 raise NoPlace(f"the proposal is refused: {error}; see {self._source.path}") from None
             self._source.dismiss(env, self.streams, str(error), tasks)
             return search().solve(tasks)
 
-    def _shifted(self, entity: int, origin: Sequence[float]) -> Settled:
+    def _shifted(self, entity: int, origin: Sequence[float]) -> SettledObject:
         still = self._still[entity]
         if not any(origin):
             return still

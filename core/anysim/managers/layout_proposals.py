@@ -13,9 +13,9 @@ import numpy as np
 from anysim import registry
 from anysim.geometry.convex_parts import IDENTITY, Pose
 from anysim.placement.constraints import PlacementTask
-from anysim.placement.context import PlacementContext, Settled
+from anysim.placement.context import PlacementContext, SettledObject
 from anysim.placement.proposals import LevelSurface, Proposer, Request, Thing, faults, parsed, read_file
-from anysim.placement.search import Refused
+from anysim.placement.search import RefusedProposal
 from anysim.placement.support_surfaces import HEADROOM
 from anysim.randomization.streams import Origin, Streams
 from anysim_schemas.files import exists
@@ -58,12 +58,12 @@ class ProposalSource:
         streams: Streams,
         context: PlacementContext,
         tasks: Sequence[PlacementTask],
-        settled: Mapping[str, Settled],
+        settled: Mapping[str, SettledObject],
     ) -> None:
         """Give the tasks the poses that are proposed for them.
 
         Raises:
-            Refused: names that do not exist, or numbers that are no pose; a sentence for each.
+            RefusedProposal: names that do not exist, or numbers that are no pose; a sentence for each.
         """
         if env in self._recalled:
             chosen = parsed(self._recalled.pop(env), "the record", self.path)[0]
@@ -75,7 +75,7 @@ class ProposalSource:
         streams.note(env, STREAM, data, Origin(STREAM, self.path))
         wrong = faults(chosen, [task.item.name for task in tasks])
         if wrong:
-            raise Refused("; ".join(wrong.values()))
+            raise RefusedProposal("; ".join(wrong.values()))
         for task in tasks:
             task.proposed = chosen.poses.get(task.item.name)
 
@@ -112,7 +112,7 @@ def _name(proposer: Proposer) -> str:
 
 
 def _request(
-    context: PlacementContext, tasks: Sequence[PlacementTask], settled: Mapping[str, Settled], seed: int
+    context: PlacementContext, tasks: Sequence[PlacementTask], settled: Mapping[str, SettledObject], seed: int
 ) -> Request:
     """What a proposer is told: sizes, nominal supports and what the layout says. Plain data."""
     world = context.world

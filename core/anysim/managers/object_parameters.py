@@ -19,7 +19,7 @@ from anysim.randomization.distributions import nominal
 from anysim.randomization.draw import draw, is_random
 from anysim_schemas.objects import ObjectSpec
 
-Drawn = Mapping[str, Sequence[Any]]
+DrawnValues = Mapping[str, Sequence[Any]]
 """For each field what it is in each of E envs; None where the spec does not give it."""
 
 
@@ -72,7 +72,7 @@ class Rule(NamedTuple):
 
     parameter: str
     fields: tuple[str, ...]
-    rows: Callable[[EntityIndices, ObjectSpec, Drawn], Rows]
+    rows: Callable[[EntityIndices, ObjectSpec, DrawnValues], Rows]
     reads: tuple[str, ...] = ()
 
 
@@ -93,11 +93,11 @@ def field_of(spec: ObjectSpec, field: str) -> Any:
     return value
 
 
-def _column(drawn: Drawn, field: str) -> Array:
+def _column(drawn: DrawnValues, field: str) -> Array:
     return np.array(drawn[field], dtype=float)
 
 
-def _heavier(part: EntityIndices, spec: ObjectSpec, drawn: Drawn) -> Array | None:
+def _heavier(part: EntityIndices, spec: ObjectSpec, drawn: DrawnValues) -> Array | None:
     """(E,) by what factor all masses change, so that the object's shape stays what it was."""
     total = part.mass
     if part.world.bodies[part.bodies[0]].kind is BodyKind.STATIC and not total:
@@ -107,12 +107,12 @@ def _heavier(part: EntityIndices, spec: ObjectSpec, drawn: Drawn) -> Array | Non
     return np.array([1.0 if mass is None else mass / total for mass in drawn["mass"]])
 
 
-def _mass(part: EntityIndices, spec: ObjectSpec, drawn: Drawn) -> Rows:
+def _mass(part: EntityIndices, spec: ObjectSpec, drawn: DrawnValues) -> Rows:
     ratio = _heavier(part, spec, drawn)
     return None if ratio is None else ratio[:, None] * part.masses
 
 
-def _inertia(part: EntityIndices, spec: ObjectSpec, drawn: Drawn) -> Rows:
+def _inertia(part: EntityIndices, spec: ObjectSpec, drawn: DrawnValues) -> Rows:
     ratio = _heavier(part, spec, drawn)
     if ratio is None:
         return None
@@ -121,30 +121,30 @@ def _inertia(part: EntityIndices, spec: ObjectSpec, drawn: Drawn) -> Rows:
     return ratio[:, None, None] * np.array([part.world.bodies[b].inertial.inertia for b in part.bodies])
 
 
-def _com(part: EntityIndices, spec: ObjectSpec, drawn: Drawn) -> Rows:
+def _com(part: EntityIndices, spec: ObjectSpec, drawn: DrawnValues) -> Rows:
     built = np.array([part.world.bodies[b].inertial.com for b in part.roots]) - np.array(
         nominal(spec.com_offset or 0.0)
     )
     return built + _column(drawn, "com_offset")[:, None]
 
 
-def _root(field: str) -> Callable[[EntityIndices, ObjectSpec, Drawn], Rows]:
+def _root(field: str) -> Callable[[EntityIndices, ObjectSpec, DrawnValues], Rows]:
     return lambda part, spec, drawn: np.repeat(_column(drawn, field)[:, None], len(part.roots), axis=1)
 
 
-def _surface(field: str) -> Callable[[EntityIndices, ObjectSpec, Drawn], Rows]:
+def _surface(field: str) -> Callable[[EntityIndices, ObjectSpec, DrawnValues], Rows]:
     return lambda part, spec, drawn: np.repeat(_column(drawn, field)[:, None], len(part.geoms), axis=1)
 
 
-def _look(field: str, things: str) -> Callable[[EntityIndices, ObjectSpec, Drawn], Rows]:
-    def rows(part: EntityIndices, spec: ObjectSpec, drawn: Drawn) -> Rows:
+def _look(field: str, things: str) -> Callable[[EntityIndices, ObjectSpec, DrawnValues], Rows]:
+    def rows(part: EntityIndices, spec: ObjectSpec, drawn: DrawnValues) -> Rows:
         table = {thing.name: i for i, thing in enumerate(getattr(part.world, things))}
         return np.repeat(np.array([[float(table[name])] for name in drawn[field]]), len(part.shown), axis=1)
 
     return rows
 
 
-def _color(part: EntityIndices, spec: ObjectSpec, drawn: Drawn) -> Rows:
+def _color(part: EntityIndices, spec: ObjectSpec, drawn: DrawnValues) -> Rows:
     """The colour over the texture's white over the material's; opacity is the material's."""
     materials = {material.name: material for material in part.world.materials}
     built = np.array([part.world.geoms[g].color for g in part.shown]).reshape(-1, 4)

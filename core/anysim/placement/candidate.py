@@ -11,7 +11,7 @@ from typing import NamedTuple
 from anysim.geometry import polygon as G
 from anysim.geometry.convex_parts import (
     Matrix,
-    Placed,
+    PlacedSolid,
     Pose,
     Quaternion,
     Solid,
@@ -38,8 +38,8 @@ class Candidate(NamedTuple):
 
     pose: Pose
     quaternion: Quaternion
-    placed: Placed
-    support: Placed | None
+    placed: PlacedSolid
+    support: PlacedSolid | None
     area: G.Area | None
     drawn_from: str
 
@@ -149,7 +149,7 @@ def _finished(
     turn: float,
     spot: G.Point,
     height: float | None,
-    support: Placed | None,
+    support: PlacedSolid | None,
     area: G.Area | None,
     drawn_from: str,
     context: PlacementContext,

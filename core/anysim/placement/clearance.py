@@ -12,7 +12,7 @@ import numpy as np
 from anysim.conventions import WORLD
 from anysim.geometry.bounds import ground_top
 from anysim.geometry.coal_solids import coal_hull, coal_solid
-from anysim.geometry.convex_parts import IDENTITY, Part, Placed, PlacedPart, Pose, Vec, boxed, pose_of, turned
+from anysim.geometry.convex_parts import IDENTITY, Part, PlacedPart, PlacedSolid, Pose, Vec, boxed, pose_of, turned
 from anysim.model.world import Box, Capsule, Cylinder, HeightFieldShape, MeshShape, Plane, Shape, Sphere, World
 
 TOUCH = 1e-4
@@ -45,7 +45,7 @@ class ClearanceQuery:
         self.walls = _placed("terrain", parts)
         """What stands on the ground and is part of it; None where there is nothing."""
 
-    def gap(self, a: Placed, b: Placed, limit: float) -> float:
+    def gap(self, a: PlacedSolid, b: PlacedSolid, limit: float) -> float:
         """The least distance [m] between two things; negative where they are in each other, inf beyond `limit`."""
         if _apart(a.low, a.high, b.low, b.high, limit):
             return inf
@@ -62,7 +62,7 @@ class ClearanceQuery:
                 least = min(least, self._distance(one, other))
         return least
 
-    def above_ground(self, a: Placed) -> bool:
+    def above_ground(self, a: PlacedSolid) -> bool:
         """Whether no part of a thing is below the ground."""
         if self._planes is not None and a.parts and a.low[2] < self._planes - TOUCH:
             return not any(p.low[2] < self._planes - TOUCH and not self._free_of_ground(p) for p in a.parts)
@@ -104,13 +104,13 @@ def _concave(shape: Shape) -> bool:
     return bool(getattr(shape, "concave", False))
 
 
-def _placed(name: str, parts: list[Part]) -> Placed | None:
+def _placed(name: str, parts: list[Part]) -> PlacedSolid | None:
     if not parts:
         return None
     found = tuple(boxed(part, part.pose) for part in parts)
     low = tuple(min(p.low[k] for p in found) for k in range(3))
     high = tuple(max(p.high[k] for p in found) for k in range(3))
-    return Placed(name, Pose((0.0, 0.0, 0.0), IDENTITY), found, low, high)  # type: ignore[arg-type]
+    return PlacedSolid(name, Pose((0.0, 0.0, 0.0), IDENTITY), found, low, high)  # type: ignore[arg-type]
 
 
 def _apart(low: Vec, high: Vec, other_low: Vec, other_high: Vec, limit: float) -> bool:

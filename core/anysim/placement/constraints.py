@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from anysim.geometry import polygon as G
-from anysim.geometry.convex_parts import Placed, Solid
+from anysim.geometry.convex_parts import PlacedSolid, Solid
 from anysim.model.world import Slot
 from anysim.placement.candidate import Candidate
 from anysim.placement.clearance import TOUCH, ClearanceQuery
@@ -143,7 +143,7 @@ def _below(place: PlaceFields, context: PlacementContext) -> set[str]:
     return found
 
 
-def _beside(side: str, relation: SideSpec, placed: Placed, context: PlacementContext) -> Objection | None:
+def _beside(side: str, relation: SideSpec, placed: PlacedSolid, context: PlacementContext) -> Objection | None:
     other = context.find(relation.of)
     if other is None:
         return None

@@ -9,7 +9,7 @@ import numpy as np
 from anysim.conventions import GROUND, WORLD
 from anysim.geometry import polygon as G
 from anysim.geometry.bounds import ground_top
-from anysim.geometry.convex_parts import IDENTITY, Placed, Solid, Vec, pose_of
+from anysim.geometry.convex_parts import IDENTITY, PlacedSolid, Solid, Vec, pose_of
 from anysim.model.world import Plane, Slot, World
 from anysim.placement.order import items_of, meant
 from anysim.placement.resting_poses import RestingPose, resting_poses
@@ -18,13 +18,13 @@ from anysim_schemas.layout import PlaceFields
 from anysim_schemas.regions import RegionSpec
 
 
-class Settled(NamedTuple):
+class SettledObject(NamedTuple):
     """Something that has its place: its shape there, whether it is welded to the world, and whether nothing was drawn.
 
     `listed` says that the layout has put it there: clearances are kept to such things.
     """
 
-    placed: Placed
+    placed: PlacedSolid
     fixed: bool = False
     constant: bool = True
     collides: bool = True
@@ -56,7 +56,7 @@ class PlacementContext:
         self.world, self._regions = world, regions or {}
         self.items = items_of(world)
         self.origin: Vec = (0.0, 0.0, 0.0)
-        self.settled: dict[str, Settled] = {}
+        self.settled: dict[str, SettledObject] = {}
         self.places: dict[str, PlaceFields] = {}
         self.by: Slot | None = None
         self.present: Callable[[Slot], bool] = lambda item: True
@@ -68,7 +68,7 @@ class PlacementContext:
         level = all(isinstance(g.shape, Plane) for g in own)
         self._level = max((g.position[2] for g in own), default=0.0) if level else None
 
-    def in_env(self, origin: Vec, present: Callable[[Slot], bool], settled: Mapping[str, Settled]) -> Self:
+    def in_env(self, origin: Vec, present: Callable[[Slot], bool], settled: Mapping[str, SettledObject]) -> Self:
         """The context of an env: where it is, which items are there, and what has its place and keeps it."""
         own = copy(self)
         own.origin, own.present, own.settled, own.places, own.by = origin, present, dict(settled), {}, None
@@ -82,12 +82,12 @@ class PlacementContext:
             self._solids[name] = Solid(self.world, self._by_name[name])
         return self._solids[name]
 
-    def initial(self, name: str) -> Placed:
+    def initial(self, name: str) -> PlacedSolid:
         """An entity at its initial pose."""
         body = self.world.bodies[self._by_name[name].root]
         return self.solid(name).at(pose_of((*body.position, *body.quaternion)))
 
-    def surfaces_of(self, placed: Placed) -> Sequence[SupportSurface]:
+    def surfaces_of(self, placed: PlacedSolid) -> Sequence[SupportSurface]:
         """The surfaces of a placed thing, in its root's frame less its heading where it stands upright."""
         rotation = placed.pose.rotation
         if rotation[2][2] > 1.0 - 1e-9:
@@ -118,7 +118,7 @@ class PlacementContext:
         """The item that a name means here; None where there is none in this env."""
         return next((item for item in meant(name, self.items, self.by) if self.present(item)), None)
 
-    def find(self, name: str) -> Placed | None:
+    def find(self, name: str) -> PlacedSolid | None:
         """A placed thing by name; None where it is not there."""
         item = self.item(name)
         found = None if item is None else self.settled.get(item.name)

@@ -13,7 +13,7 @@ from anysim.model.hash import split
 from anysim.model.slots import is_robot
 from anysim.model.world import BodyKind, Slot, World
 from anysim.placement.candidate import candidate
-from anysim.placement.context import Impossible, PlacementContext, Settled
+from anysim.placement.context import Impossible, PlacementContext, SettledObject
 from anysim.placement.order import entry_of, placement_order
 from anysim.placement.sampler import NominalSampler
 from anysim_schemas.layout import PlaceFields, PlacementSpec
@@ -45,7 +45,7 @@ def place_nominally(
     names, _ = placement_order(layout, tuple(items.values()))
     entries = {name: entry_of(layout, items[name]) for name in items}
     for item in items.values():
-        context.settled[item.name] = Settled(context.initial(world.entities[item.entities[0]].name))
+        context.settled[item.name] = SettledObject(context.initial(world.entities[item.entities[0]].name))
     loose = [
         item.name
         for item in items.values()
@@ -65,7 +65,7 @@ def place_nominally(
             solid = context.solid(world.entities[entity].name)
             found = candidate(solid, place, NominalSampler(number), context)
             if not isinstance(found, Impossible):
-                context.settled[name] = Settled(found.placed)
+                context.settled[name] = SettledObject(found.placed)
                 rows[entity] = row_of(found.pose, found.quaternion)
             elif found.hopeless and issues is not None and number == 0:
                 issues.add(str(entry), f"'{name}' cannot be placed: {found.reason}")

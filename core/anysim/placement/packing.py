@@ -7,7 +7,7 @@ points of bottom-left packing). They are tried from the lowest y on, then the lo
 from collections.abc import Callable, Sequence
 
 from anysim.geometry import polygon as G
-from anysim.geometry.convex_parts import Placed, PlacedPart, Pose
+from anysim.geometry.convex_parts import PlacedPart, PlacedSolid, Pose
 from anysim.placement.candidate import Candidate
 from anysim.placement.sampler import PlacementSampler
 
@@ -21,7 +21,7 @@ MOST = 4000
 def packed(
     turns: Sequence[tuple[Candidate, PlacementSampler]],
     objected: Callable[[Candidate], bool],
-    standing: Sequence[Placed],
+    standing: Sequence[PlacedSolid],
     gap: float = GAP,
 ) -> Candidate | None:
     """The first corner at which one of `turns` can stand; None where there is none.
@@ -40,7 +40,7 @@ def packed(
     return None
 
 
-def _corners(start: Candidate, area: G.Area, standing: Sequence[Placed], gap: float) -> list[G.Point]:
+def _corners(start: Candidate, area: G.Area, standing: Sequence[PlacedSolid], gap: float) -> list[G.Point]:
     """Origins of the thing for which its box begins where the area does, or where another's box ends."""
     low, high = start.placed.low, start.placed.high
     left, front = start.pose.position[0] - low[0], start.pose.position[1] - low[1]
@@ -67,5 +67,5 @@ def shifted(found: Candidate, dx: float, dy: float, dz: float = 0.0) -> Candidat
         PlacedPart(p.part, Pose(there(p.pose.position), p.pose.rotation), there(p.low), there(p.high))
         for p in found.placed.parts
     )
-    placed = Placed(found.placed.name, pose, parts, there(found.placed.low), there(found.placed.high))
+    placed = PlacedSolid(found.placed.name, pose, parts, there(found.placed.low), there(found.placed.high))
     return found._replace(pose=pose, placed=placed)

@@ -3,7 +3,7 @@
 from math import cos, pi, sin
 
 from anysim.geometry import polygon as G
-from anysim.geometry.convex_parts import Matrix, Placed, Solid, Vec, heading
+from anysim.geometry.convex_parts import Matrix, PlacedSolid, Solid, Vec, heading
 from anysim.placement.context import PlacementContext
 from anysim.placement.sampler import PlacementSampler
 from anysim_schemas.layout import PlaceFields
@@ -13,7 +13,7 @@ SIDE_ANGLE = {"in_front_of": 0.0, "left_of": 0.5 * pi, "behind": pi, "right_of":
 """The direction of each side against the x axis [rad]."""
 
 
-def extent(placed: Placed, n: Vec) -> float:
+def extent(placed: PlacedSolid, n: Vec) -> float:
     """How far a placed thing goes along a unit direction, from the world's origin."""
     values = [
         p.pose.position[0] * n[0]
@@ -25,13 +25,13 @@ def extent(placed: Placed, n: Vec) -> float:
     return max(values) if values else sum(a * b for a, b in zip(placed.pose.position, n, strict=True))
 
 
-def side_direction(side: str, relation: SideSpec, other: Placed) -> Vec:
+def side_direction(side: str, relation: SideSpec, other: PlacedSolid) -> Vec:
     """The unit direction of a side of another thing."""
     angle = SIDE_ANGLE[side] + (heading(other.pose.rotation) if relation.axes == "own" else 0.0)
     return (cos(angle), sin(angle), 0.0)
 
 
-def sideways(relation: SideSpec, other: Placed, n: Vec) -> tuple[float, float]:
+def sideways(relation: SideSpec, other: PlacedSolid, n: Vec) -> tuple[float, float]:
     """The middle of another thing across a direction, and how far from it one may be."""
     across = (-n[1], n[0], 0.0)
     left, right = extent(other, across), -extent(other, (n[1], -n[0], 0.0))

@@ -12,14 +12,14 @@ from anysim.placement import repair
 from anysim.placement.candidate import Candidate, candidate
 from anysim.placement.clearance import ClearanceQuery
 from anysim.placement.constraints import Constraints, Objection, PlacementTask
-from anysim.placement.context import Impossible, PlacementContext, Settled
+from anysim.placement.context import Impossible, PlacementContext, SettledObject
 from anysim.placement.order import meant
 from anysim.placement.packing import GAP, packed
 from anysim.placement.sampler import PlacementSampler
 from anysim.placement.standing_areas import free_area, standing_areas_of
 from anysim_schemas.layout import PlaceFields, RepairSpec
 from anysim_schemas.proposals import ProposedPose
-from anysim_schemas.values import Drawn
+from anysim_schemas.values import Distribution
 
 ATTEMPTS = 100
 """Draws of one object's place in a row."""
@@ -32,7 +32,7 @@ class NoPlace(Exception):
     """Something does not fit; the message is a sentence."""
 
 
-class Refused(NoPlace):
+class RefusedProposal(NoPlace):
     """A proposal cannot be kept; the message has a sentence for each object."""
 
 
@@ -53,7 +53,7 @@ class Search:
 
         Raises:
             NoPlace: one of them has none.
-            Refused: proposed poses cannot be kept; a sentence for each.
+            RefusedProposal: proposed poses cannot be kept; a sentence for each.
         """
         self._constraints = Constraints(self.context, self.clearance)
         found: dict[str, Candidate] = {}
@@ -96,7 +96,7 @@ class Search:
             self._settle(task, result, found)
             done += 1
         if refused:
-            raise Refused("; ".join(refused))
+            raise RefusedProposal("; ".join(refused))
         return found
 
     # ------------------------------------------------------------------ one thing
@@ -142,7 +142,9 @@ class Search:
     def _settle(self, task: PlacementTask, chosen: Candidate, found: dict[str, Candidate]) -> None:
         name = task.item.name
         found[name] = chosen
-        self.context.settled[name] = Settled(chosen.placed, task.solid.fixed, task.constant, task.solid.collides, True)
+        self.context.settled[name] = SettledObject(
+            chosen.placed, task.solid.fixed, task.constant, task.solid.collides, True
+        )
 
     def _remove(self, task: PlacementTask, found: dict[str, Candidate]) -> None:
         found.pop(task.item.name, None)
@@ -295,6 +297,6 @@ def _scattered(task: PlacementTask) -> bool:
 
 def is_constant(place: PlaceFields) -> bool:
     """Whether nothing is drawn for a place."""
-    if any(isinstance(getattr(place, name), Drawn) for name in ("position", "x", "y", "roll", "pitch", "yaw")):
+    if any(isinstance(getattr(place, name), Distribution) for name in ("position", "x", "y", "roll", "pitch", "yaw")):
         return False
     return place.rest == "given" and (place.position is not None or place.x is not None or place.y is not None)

@@ -7,8 +7,8 @@ from typing import NamedTuple
 from anysim.conventions import GROUND
 from anysim.errors import listing
 from anysim.geometry import polygon as G
-from anysim.geometry.convex_parts import Placed, heading
-from anysim.placement.context import Impossible, PlacementContext, Settled
+from anysim.geometry.convex_parts import PlacedSolid, heading
+from anysim.placement.context import Impossible, PlacementContext, SettledObject
 from anysim.placement.support_surfaces import SupportSurface, choose
 from anysim_schemas.layout import PlaceFields
 from anysim_schemas.regions import RegionSpec
@@ -20,7 +20,7 @@ class StandingArea(NamedTuple):
 
     height: float
     area: G.Area
-    owner: Placed
+    owner: PlacedSolid
     surface: SupportSurface
 
 
@@ -47,7 +47,7 @@ def standing_areas_of(reference: str, inside: bool, context: PlacementContext) -
     ]
 
 
-def _upright(placed: Placed) -> bool:
+def _upright(placed: PlacedSolid) -> bool:
     return placed.pose.rotation[2][2] > 1.0 - 1e-9
 
 
@@ -117,7 +117,7 @@ def below_area(place: PlaceFields, context: PlacementContext, reach: Callable[[f
     return (inner or outline,)
 
 
-def free_area(areas: Sequence[StandingArea], settled: Iterable[Settled]) -> tuple[float, float]:
+def free_area(areas: Sequence[StandingArea], settled: Iterable[SettledObject]) -> tuple[float, float]:
     """[m^2] of surfaces, and of what has no box of anything else over it, counted on a grid of 32 by 32 points."""
     placed = [one.placed for one in settled]
     whole = free = 0.0

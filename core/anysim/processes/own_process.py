@@ -14,7 +14,7 @@ import threading
 from typing import NamedTuple
 
 
-class Ended(NamedTuple):
+class ProcessEnd(NamedTuple):
     """What a process printed, and `trouble`: how it ended, in words, or empty where it ended well."""
 
     out: str
@@ -22,7 +22,7 @@ class Ended(NamedTuple):
     trouble: str
 
 
-def run_module(module: str, *arguments: str, limit: float) -> Ended:
+def run_module(module: str, *arguments: str, limit: float) -> ProcessEnd:
     """Run `python -m module arguments` for at most `limit` seconds; what it printed until then comes back."""
     command = (sys.executable, "-m", module, *arguments)
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
@@ -31,11 +31,11 @@ def run_module(module: str, *arguments: str, limit: float) -> Ended:
         except subprocess.TimeoutExpired:
             process.kill()
             out, err = process.communicate()
-            return Ended(out, err, f"took longer than {limit:g} s and was stopped")
+            return ProcessEnd(out, err, f"took longer than {limit:g} s and was stopped")
         except BaseException:
             process.kill()
             raise
-    return Ended(out, err, how_it_ended(process.returncode))
+    return ProcessEnd(out, err, how_it_ended(process.returncode))
 
 
 def how_it_ended(code: int) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
-from anysim_schemas.values import Choice, Drawn, LogUniform, Normal, Range
+from anysim_schemas.values import Choice, Distribution, LogUniform, Normal, Range
 
 _STANDARD = NormalDist()
 _LOWEST = 2.0**-54
@@ -27,7 +27,7 @@ def nominal(value: Any) -> Any:
 
     A constant is itself; where a `ratio` gates a value it is what the other episodes have, if that is given.
     """
-    if isinstance(value, Drawn) and value.otherwise is not None:
+    if isinstance(value, Distribution) and value.otherwise is not None:
         return value.otherwise
     if isinstance(value, Choice):
         return value.choice[0]
@@ -93,7 +93,7 @@ def written(value: Any) -> tuple[Any, ...]:
         found = tuple(value.log_uniform)
     else:
         found = () if isinstance(value, Normal) else (value,)
-    return found if not isinstance(value, Drawn) or value.otherwise is None else (*found, value.otherwise)
+    return found if not isinstance(value, Distribution) or value.otherwise is None else (*found, value.otherwise)
 
 
 def extremes(value: Any) -> tuple[float, float]:

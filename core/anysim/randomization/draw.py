@@ -14,12 +14,12 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.randomization.distributions import draw_one, extremes, nominal
 from anysim.randomization.streams import OVERRIDDEN, Origin, Streams
-from anysim_schemas.values import Choice, Drawn
+from anysim_schemas.values import Choice, Distribution
 
 
 def is_random(value: Any) -> bool:
     """Whether a value differs between episodes."""
-    return isinstance(value, Drawn)
+    return isinstance(value, Distribution)
 
 
 def draw(value: Any, name: str, streams: Streams, env: int, tick: int = 0, *, source: str = "") -> Any:

@@ -12,7 +12,7 @@ from anysim.task.scene import SceneView
 from anysim_schemas.task import ObservationTermSpec
 
 
-class Sensed:
+class ObservedTerm:
     """One observed term. What is truth in it, and what is not, is drawn by streams of its own."""
 
     def __init__(

@@ -17,7 +17,7 @@ from anysim.randomization.draw import draw_rows, is_random
 from anysim.randomization.streams import Streams
 from anysim.task.bindings import Bindings, bind_term
 from anysim.task.contract import Obs
-from anysim.task.observation_noise import Sensed
+from anysim.task.observation_noise import ObservedTerm
 from anysim.task.scene import SceneView
 from anysim.task.term_registry import find
 from anysim_schemas.task import EventTermSpec, TaskSpec
@@ -109,15 +109,15 @@ class Mdp:
         """The term with what its spec says of noise, bias and delay; the term itself where that is nothing."""
         entries = self.spec.observations[group]
         spec = entries[place]
-        if not Sensed.alters(spec):
+        if not ObservedTerm.alters(spec):
             return term.call
         before = sum(entry.term == spec.term for entry in entries[:place])  # terms of one name are told apart by order
         name = f"task/observations.{group}/{spec.term}{f'~{before}' if before else ''}"
-        return Sensed(term.call, spec, name, f"task.observations.{group}.{place}", self.scene, self.streams)
+        return ObservedTerm(term.call, spec, name, f"task.observations.{group}.{place}", self.scene, self.streams)
 
     @property
-    def _altered(self) -> list[Sensed]:
-        return [call for terms in self._groups.values() for call, _ in terms if isinstance(call, Sensed)]
+    def _altered(self) -> list[ObservedTerm]:
+        return [call for terms in self._groups.values() for call, _ in terms if isinstance(call, ObservedTerm)]
 
     def reset(self, env_ids: Array) -> None:
         """New bindings, reset events, then new goals; the scene must be looking at these rows."""

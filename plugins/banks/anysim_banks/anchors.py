@@ -14,7 +14,7 @@ from anysim.model.affordances import Affordance, AffordanceKind
 from anysim.model.world import World
 from anysim_banks.subject import Subject, subject_of
 from anysim_schemas.base import Name, Number, Positive, Spec
-from anysim_schemas.load import Loaded, load
+from anysim_schemas.load import LoadedSpec, load
 
 Vector = tuple[Number, Number, Number]
 
@@ -41,7 +41,7 @@ class Anchors(Spec):
     anchors: tuple[Anchor, ...] = Field(description="the regions")
 
 
-def read_anchors(path: Path) -> Loaded[Anchors]:
+def read_anchors(path: Path) -> LoadedSpec[Anchors]:
     """A document of anchors, with the places of its keys.
 
     Raises:
@@ -53,7 +53,7 @@ def read_anchors(path: Path) -> Loaded[Anchors]:
     return load(Anchors, path)
 
 
-def anchored(world: World, entity: str, loaded: Loaded[Anchors]) -> list[tuple[Subject, Anchor]]:
+def anchored(world: World, entity: str, loaded: LoadedSpec[Anchors]) -> list[tuple[Subject, Anchor]]:
     """What banks are made of by anchors on an entity.
 
     Raises:

@@ -58,7 +58,7 @@ def parse_bases(words: Sequence[str], robot: str) -> tuple[Base, ...]:
     return tuple(found)
 
 
-class Reached(NamedTuple):
+class ReachableGrasps(NamedTuple):
     """What a robot reaches.
 
     Attributes:
@@ -87,7 +87,7 @@ class Reach:
         self._carriers = _carriers(self._world, self._chain)
         self._length = float(P.norm(self._chain.rest[1:, :3]).sum() + P.norm(self._chain.tool_offset[:3]))
 
-    def of(self, subject: Subject, pose: Array, rng: np.random.Generator) -> Reached:
+    def of(self, subject: Subject, pose: Array, rng: np.random.Generator) -> ReachableGrasps:
         """Which grasps (G, 7), tool poses in the body's frame, are reached from the stated or from good base poses.
 
         Raises:
@@ -101,7 +101,7 @@ class Reach:
                 f"--base {' and '.join(','.join(f'{x:g}' for x in base) for base in bases)} in the frame of the asset; "
                 "state another one, or none to have them sampled"
             )
-        return Reached(bases, grasps)
+        return ReachableGrasps(bases, grasps)
 
     def _from(self, base: Base, subject: Subject, pose: Array) -> Array:
         """(G,) bool."""

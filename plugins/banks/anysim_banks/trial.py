@@ -59,7 +59,7 @@ class Verdicts(NamedTuple):
     missed: Array
 
 
-class _Closed(NamedTuple):
+class _ClosedGrip(NamedTuple):
     """Things in closed fingers: poses (n, 7), which have got away, which were missed, and where loads begin."""
 
     held: Array
@@ -130,7 +130,7 @@ class Trial:
             margin[alive] = np.minimum(margin[alive], self._loaded(alive, closed.held[alive], load, _HOLD, ramp))
         return margin, closed.missed
 
-    def _close(self, pose: Array, width: Array) -> _Closed:
+    def _close(self, pose: Array, width: Array) -> _ClosedGrip:
         """Close the fingers on things at these grasps, one in each env."""
         sim, ids = self._sim, np.arange(len(width))
         sim.reset(ids)
@@ -149,7 +149,7 @@ class Trial:
         missed = (grip < MISSED * width) | (state.fault[ids] != 0)
         moved = P.norm(held[:, :3] - at[:, :3]) > DISPLACED[0]
         gone = missed | moved | (P.angle_between(held[:, 3:], at[:, 3:]) > DISPLACED[1])
-        return _Closed(held, gone, missed, sim.snapshot(ids))
+        return _ClosedGrip(held, gone, missed, sim.snapshot(ids))
 
     def _loaded(
         self, ids: Array, held: Array, load: Array, hold: int, ramp: int, limits: tuple[float, float] = (SHIFT, TURN)

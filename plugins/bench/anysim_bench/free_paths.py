@@ -29,7 +29,7 @@ def dense(path: Array, step: float = STEP) -> Array:
     return np.concatenate(rows)
 
 
-class _Placed(NamedTuple):
+class _PlacedGeom(NamedTuple):
     """A geom in n poses: the corners (n, 3) of the box around it, its positions (n, 3) and turns (n, 3, 3)."""
 
     low: Array
@@ -67,18 +67,18 @@ class Touching:
                 return True
         return False
 
-    def _placed(self, body_pose: Array) -> list[_Placed]:
+    def _placed(self, body_pose: Array) -> list[_PlacedGeom]:
         still = np.tile(P.pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)), (len(body_pose), 1))
-        found = list[_Placed]()
+        found = list[_PlacedGeom]()
         for geom, local, (middle, half) in zip(self._geoms, self._local, self._boxes, strict=True):
             pose = P.compose(still if geom.body < 0 else body_pose[:, geom.body], np.broadcast_to(local, still.shape))
             centre = pose[:, :3] + P.rotate(pose[:, 3:], np.broadcast_to(middle, (len(pose), 3)))
             turn = P.to_matrix(pose[:, 3:])
             reach = np.full_like(centre, np.inf) if half is None else np.abs(turn) @ half
-            found.append(_Placed(centre - reach, centre + reach, pose[:, :3], turn))
+            found.append(_PlacedGeom(centre - reach, centre + reach, pose[:, :3], turn))
         return found
 
-    def _touch(self, a: int, b: int, placed: list[_Placed], row: int) -> bool:
+    def _touch(self, a: int, b: int, placed: list[_PlacedGeom], row: int) -> bool:
         import coal  # pyright: ignore[reportMissingImports]  (found by its .pth file)
 
         at = [coal.Transform3s(placed[g].turn[row], placed[g].position[row]) for g in (a, b)]

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from anysim.api import blind_env, compile_world, load, place_of, watched
 from anysim.randomization.streams import episode_seed
-from anysim_schemas.load import Loaded, LoadedRun
+from anysim_schemas.load import LoadedRun, LoadedSpec
 
 
 class Draw(NamedTuple):
@@ -52,7 +52,7 @@ def explain(
     Draws depend on the seed, the env and the names of streams alone, so no engine is needed: the reset runs on the
     kinematic one, with a single env.
     """
-    loaded = watched(source if isinstance(source, Loaded) else load(source, overrides=overrides))
+    loaded = watched(source if isinstance(source, LoadedSpec) else load(source, overrides=overrides))
     seed = loaded.spec.seed if seed is None else seed
     chosen = episode_seed(seed, env, episode)
     with blind_env(loaded, compile_world(loaded), "explain") as one:

@@ -19,7 +19,7 @@ RECENT = 100
 """Episodes over which success, reward and steps are averaged."""
 
 
-class Ended(NamedTuple):
+class EpisodeEnd(NamedTuple):
     """An episode that has ended in a step.
 
     Attributes:
@@ -52,7 +52,7 @@ class Moment(NamedTuple):
     reward: Array
     done: Array
     truncated: Array
-    ended: tuple[Ended, ...]
+    ended: tuple[EpisodeEnd, ...]
 
 
 def action_range(env: TaskEnv) -> tuple[Array, Array]:
@@ -92,7 +92,7 @@ class Batch:
         self.env, self.groups = env, tuple(groups)
         self.sizes = {group: env.observation_sizes[group] for group in groups}
         self.middle, self.half = action_range(env)
-        self.recent: deque[Ended] = deque(maxlen=RECENT)
+        self.recent: deque[EpisodeEnd] = deque(maxlen=RECENT)
         self._total = np.zeros(env.num_envs)
 
     def averages(self) -> dict[str, float]:
@@ -121,11 +121,11 @@ class Batch:
         self._total += reward
         done = result.status != Status.RUNNING
         truncated = done & ((result.status == Status.TRUNCATED) | fault)
-        ended: tuple[Ended, ...] = ()
+        ended: tuple[EpisodeEnd, ...] = ()
         if done.any():
             last = self._obs()
             ended = tuple(
-                Ended(
+                EpisodeEnd(
                     i,
                     "fault" if fault[i] else str(result.status[i]),
                     {group: rows[i] for group, rows in last.items()},

@@ -14,11 +14,11 @@ from anysim_learning.learner import Learner, Lesson
 
 POLICY, CHECKPOINT, ABOUT, CURVE = "policy.onnx", "checkpoint.npz", "train.json", "curve.jsonl"
 
-Told = Callable[[Mapping[str, float]], None]
+Tell = Callable[[Mapping[str, float]], None]
 
 
 def train(
-    learner: Learner, lesson: Lesson, examined: TaskEnv, steps: int, exams: int, out: Path, tell: Told
+    learner: Learner, lesson: Lesson, examined: TaskEnv, steps: int, exams: int, out: Path, tell: Tell
 ) -> Mapping[str, float]:
     """Learn until `steps` are done, from the checkpoint in `out` on where there is one; returns the last numbers.
 

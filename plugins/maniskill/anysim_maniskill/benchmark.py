@@ -13,7 +13,7 @@ STATE = "state"
 """What the one observation is called: ManiSkill's flat state."""
 
 
-class Stepped(NamedTuple):
+class ExternalStep(NamedTuple):
     """What a step gave: the observation by name, the reward, and whether the environment has ended the episode."""
 
     obs: dict[str, Array]
@@ -84,10 +84,10 @@ class ManiSkillEnv:
         """Begin the episode of a seed."""
         return _named(self._env.reset(seed=seed)[0])
 
-    def step(self, action: Array) -> Stepped:
+    def step(self, action: Array) -> ExternalStep:
         """One step. ManiSkill ends an episode with success or failure; which, the verdict says."""
         obs, reward, terminated, *_ = self._env.step(action.astype(np.float32))
-        return Stepped(_named(obs), float(reward), bool(terminated))
+        return ExternalStep(_named(obs), float(reward), bool(terminated))
 
     def verdict(self) -> bool:
         """Success by the environment's own `evaluate`.

@@ -12,7 +12,7 @@ from anysim_parity.judge import largest_gap
 from anysim_parity.probes.drop import bounce, drop
 from anysim_parity.probes.grasp import grasp, lift
 from anysim_parity.probes.pairs import pairs
-from anysim_parity.probes.probe import Found, Probe, Quantity, series
+from anysim_parity.probes.probe import Probe, Quantity, Reading, series
 from anysim_parity.probes.roll import roll
 from anysim_parity.probes.slide import incline, slide
 from anysim_parity.probes.stack import stack
@@ -54,7 +54,7 @@ def contact_layer(
         if probes is not None and name not in probes:
             continue
         probe = PROBES[name](dt)
-        found: dict[str, Found] = {}
+        found: dict[str, Reading] = {}
         declared: dict[str, Capabilities] = {}
         for engine, make in engines.items():
             try:
@@ -70,7 +70,7 @@ def contact_layer(
     return Layer("contact", QUESTION, tuple(measures), tuple(plots), refused=words)
 
 
-def _run(probe: Probe, make: Callable[[], SimEngine]) -> tuple[Capabilities, Found]:
+def _run(probe: Probe, make: Callable[[], SimEngine]) -> tuple[Capabilities, Reading]:
     with make() as engine:
         declared, world = engine.capabilities, probe.world
         if Capability.CONTACT_SENSORS not in declared:
@@ -86,7 +86,7 @@ def _run(probe: Probe, make: Callable[[], SimEngine]) -> tuple[Capabilities, Fou
         return declared, found
 
 
-def _missing(probe: Probe, found: Found, declared: Capabilities) -> str:
+def _missing(probe: Probe, found: Reading, declared: Capabilities) -> str:
     """What an engine that ran the probe gives no number for, and why."""
     absent = [q.subject for q in probe.quantities if not math.isfinite(found.values.get(q.subject, math.nan))]
     if not absent:
@@ -100,7 +100,7 @@ def _words(error: Exception) -> str:
     return str(error) if isinstance(error, EngineError) else f"{type(error).__name__}: {error}"
 
 
-def _measure(quantity: Quantity, found: Mapping[str, Found], declared: Mapping[str, Capabilities]) -> Measure:
+def _measure(quantity: Quantity, found: Mapping[str, Reading], declared: Mapping[str, Capabilities]) -> Measure:
     values = {
         engine: one.values[quantity.subject]
         for engine, one in found.items()
@@ -125,6 +125,6 @@ def explanation(measure: Measure, quantity: Quantity, declared: Mapping[str, Cap
     return " ".join([*words, quantity.remark] if quantity.remark else words)
 
 
-def _plot(plot: Plot, found: Mapping[str, Found]) -> Plot:
+def _plot(plot: Plot, found: Mapping[str, Reading]) -> Plot:
     drawn = [series(engine, *one.curves[plot.title]) for engine, one in found.items() if plot.title in one.curves]
     return plot._replace(series=tuple(drawn))

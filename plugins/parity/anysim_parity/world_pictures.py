@@ -12,7 +12,7 @@ from anysim.conventions import Array
 from anysim.engine.capability import Capability
 from anysim.engine.factory import engine_class
 from anysim.errors import AnysimError, NameLookupError, listing, suggest
-from anysim_schemas.load import Loaded, LoadedRun
+from anysim_schemas.load import LoadedRun, LoadedSpec
 
 
 class Pictures(NamedTuple):
@@ -53,7 +53,7 @@ def pictures(
         SpecError: the file, with line and column.
         NameLookupError: the world has no such camera.
     """
-    loaded = source if isinstance(source, Loaded) else load(source, overrides=overrides)
+    loaded = source if isinstance(source, LoadedSpec) else load(source, overrides=overrides)
     cameras = list(loaded.spec.world.cameras)
     if camera is not None and camera not in [*cameras, "default"]:
         raise NameLookupError(

@@ -14,7 +14,7 @@ from anysim_parity.report import Comparison, as_data
 JSON_FILE, HTML_FILE = "compare.json", "compare.html"
 
 
-class Written(NamedTuple):
+class ReportFiles(NamedTuple):
     """Where it is. `html` is None where the page could not be drawn; `trouble` says why."""
 
     json: Path
@@ -32,7 +32,7 @@ def check_out(out: Path) -> None:
         raise AnysimError(f"{out} is there already and is no comparison; name another directory with --out")
 
 
-def write(comparison: Comparison, out: Path) -> Written:
+def write(comparison: Comparison, out: Path) -> ReportFiles:
     """Write both files aside and show them by one rename; an earlier comparison gives way.
 
     Raises:
@@ -55,4 +55,4 @@ def write(comparison: Comparison, out: Path) -> Written:
             out.rename(Path(folder) / "before")
         made.rename(out)
         shutil.rmtree(Path(folder) / "before", ignore_errors=True)
-    return Written(out / JSON_FILE, None if trouble else out / HTML_FILE, trouble)
+    return ReportFiles(out / JSON_FILE, None if trouble else out / HTML_FILE, trouble)

@@ -16,7 +16,7 @@ PREPROCESSOR, POSTPROCESSOR = "policy_preprocessor.json", "policy_postprocessor.
 _BLOCK = 1 << 20
 
 
-class Loaded(NamedTuple):
+class LoadedPolicy(NamedTuple):
     """A policy of LeRobot, ready to run.
 
     Attributes:
@@ -34,7 +34,7 @@ class Loaded(NamedTuple):
     version: str
 
 
-def load_directory(folder: Path, device: str) -> Loaded:
+def load_directory(folder: Path, device: str) -> LoadedPolicy:
     """The policy of a directory.
 
     Raises:
@@ -72,15 +72,15 @@ def load_directory(folder: Path, device: str) -> Loaded:
     except Exception as error:
         words = str(error).strip().splitlines()
         raise TaskError(f"the policy {folder} cannot be loaded by lerobot: {words[0] if words else error!r}") from error
-    return Loaded(policy, before, after, config, version)
+    return LoadedPolicy(policy, before, after, config, version)
 
 
-class _Said(NamedTuple):
+class _StepFiles(NamedTuple):
     before: tuple[str, ...]
     states: tuple[str, ...]
 
 
-def _said(folder: Path) -> _Said:
+def _said(folder: Path) -> _StepFiles:
     """The steps before the policy, and the files with the numbers of all steps."""
     if not folder.is_dir():
         raise TaskError(f"the policy {folder} is no directory; expected one that LeRobot's save_pretrained wrote")
@@ -114,7 +114,7 @@ def _said(folder: Path) -> _Said:
                 states.append(state)
             if name == PREPROCESSOR:
                 before.append(known)
-    return _Said(tuple(before), tuple(states))
+    return _StepFiles(tuple(before), tuple(states))
 
 
 def _json(folder: Path, name: str) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from anysim import registry
 from anysim.errors import PluginError, TaskError
 from anysim_evaluation.cli import evaluate as cli
 from anysim_evaluation.driver import Episode, episode_seeds
-from anysim_evaluation.external.benchmark import Stepped, is_external, open_task
+from anysim_evaluation.external.benchmark import ExternalStep, is_external, open_task
 from anysim_evaluation.external.driving import drive_external, external_policy
 from anysim_sapien import vulkan
 
@@ -40,10 +40,10 @@ class Walk:
         self.place = 0.1 * (seed % 5)
         return {"place": np.array([self.place])}
 
-    def step(self, action: Any) -> Stepped:
+    def step(self, action: Any) -> ExternalStep:
         self.actions.append(float(action[0]))
         self.place += float(action[0])
-        return Stepped({"place": np.array([self.place])}, -abs(self.place), self.place < -1)
+        return ExternalStep({"place": np.array([self.place])}, -abs(self.place), self.place < -1)
 
     def verdict(self) -> bool:
         return self.place > 1

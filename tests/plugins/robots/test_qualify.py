@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from anysim.assets.catalogue import load_robot, missing_source
-from anysim.processes.own_process import Ended
+from anysim.processes.own_process import ProcessEnd
 from anysim_robots.gallery.page import contact_sheets, page
 from anysim_robots.gallery.store import due, estimate, fingerprint, measure, read
 from anysim_robots.qualify import apart, motion, oracle, run
@@ -201,7 +201,7 @@ def test_what_needs_a_missing_reader_is_not_asked_and_says_how_to_get_it(monkeyp
 
 def test_a_process_that_dies_is_a_failed_check(monkeypatch: pytest.MonkeyPatch) -> None:
     """The check that it had announced last failed, with the last line of what it said."""
-    ended = Ended("build\nhold\n", "words\nlast words\n", "was ended by signal 11 (SIGSEGV)")
+    ended = ProcessEnd("build\nhold\n", "words\nlast words\n", "was ended by signal 11 (SIGSEGV)")
     monkeypatch.setattr(apart, "run_module", lambda module, job, limit: ended)
     found = qualify_apart(str(ARM / "third_arm.yaml"), "mujoco", SHORT).found
     assert found.status == "failed"

@@ -24,9 +24,9 @@ ABOVE = "world.objects.roof={source: {box: [0.6, 0.6, 0.02]}, fixed: true}", "wo
 CONE = "world.objects.cone={source: {sphere: 0.05}}", "world.layout.cone={position: [0.4, -0.4, 0.45]}"
 
 ROWS: dict[str, Row] = {
-    "Drawn.ratio": mass("ratio=0.4"),
-    "Drawn.otherwise": mass("otherwise=7.0", "range: [0.1, 0.4], ratio: 0.4"),
-    "Drawn.shared": mass("shared=weights"),
+    "Distribution.ratio": mass("ratio=0.4"),
+    "Distribution.otherwise": mass("otherwise=7.0", "range: [0.1, 0.4], ratio: 0.4"),
+    "Distribution.shared": mass("shared=weights"),
     "Range.range": mass("range=[0.1, 0.5]"),
     "LogUniform.log_uniform": mass("log_uniform=[0.1, 0.5]", "log_uniform: [0.1, 0.4]"),
     "Choice.choice": mass("choice=[0.3, 0.4]", "choice: [0.1, 0.2]"),

@@ -40,7 +40,7 @@ class NamedRows(NamedTuple):
     values: Array
 
 
-class Carried(NamedTuple):
+class WorldStateGaps(NamedTuple):
     """What one side has and the other has not, as `body panda_hand`, where a state was carried into a world.
 
     Attributes:
@@ -200,7 +200,7 @@ def read_world_state(engine: "SimEngine", records: EnvRecords, ids: Array) -> Wo
 
 def refuse_world_state(
     engine: "SimEngine", records: EnvRecords, state: WorldState, ids: Array, missing: Missing
-) -> Carried:
+) -> WorldStateGaps:
     """Refuse a state that cannot be written into these envs; returns what differs.
 
     Raises:
@@ -249,7 +249,7 @@ def write_world_state(engine: "SimEngine", records: EnvRecords, state: WorldStat
     records.ticks[ids] = np.rint(state.time / world.physics.dt)
 
 
-def _compared(engine: "SimEngine", state: WorldState) -> Carried:
+def _compared(engine: "SimEngine", state: WorldState) -> WorldStateGaps:
     dropped: list[str] = []
     kept: list[str] = []
     world = engine.world
@@ -261,7 +261,7 @@ def _compared(engine: "SimEngine", state: WorldState) -> Carried:
     fixed = {e.name for i, e in enumerate(world.entities) if not any(i in slot.entities for slot in world.slots)}
     gone = [name for name, there in zip(state.entities, state.present.T, strict=True) if not there.all()]
     dropped += [f"absence of {name}" for name in gone if name in fixed]
-    return Carried(tuple(dropped), tuple(kept))
+    return WorldStateGaps(tuple(dropped), tuple(kept))
 
 
 def _parameters(engine: "SimEngine", records: EnvRecords, state: WorldState, ids: Array) -> dict[str, Array]:

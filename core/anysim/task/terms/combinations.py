@@ -79,7 +79,7 @@ class After:
         return (was[:, 0] > 0) & self._of.all()
 
 
-class Turned:
+class FrameTurn:
     """A frame has turned about one of its axes by at least an angle since the episode's first step, turns counted.
 
     The axis should stay where it is in the world, and the frame turn by less than half a turn in a control step.
@@ -143,5 +143,5 @@ PREDICATES = {
     "hold": Lasting,
     "k_of": k_of,
     "not": none,
-    "turned": Turned,
+    "turned": FrameTurn,
 }

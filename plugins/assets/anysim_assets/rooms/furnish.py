@@ -40,7 +40,7 @@ class NoPlace(Exception):
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedPiece:
     """A piece of furniture in the room, by its middle (2,) [m] and yaw [rad]."""
 
     name: str
@@ -60,7 +60,7 @@ class Placed:
         return G.oriented_rectangle(self.middle + ahead, (self.piece.half[0], depth / 2), self.yaw)
 
 
-def furnish(plan: RoomPlan, pieces: Mapping[str, int], walkway: float, seed: int) -> list[Placed]:
+def furnish(plan: RoomPlan, pieces: Mapping[str, int], walkway: float, seed: int) -> list[PlacedPiece]:
     """All pieces in their places.
 
     Raises:
@@ -79,8 +79,8 @@ def furnish(plan: RoomPlan, pieces: Mapping[str, int], walkway: float, seed: int
     )
 
 
-def _arrange(plan: RoomPlan, pieces: Mapping[str, int], walkway: float, seed: int, attempt: int) -> list[Placed]:
-    placed: list[Placed] = []
+def _arrange(plan: RoomPlan, pieces: Mapping[str, int], walkway: float, seed: int, attempt: int) -> list[PlacedPiece]:
+    placed: list[PlacedPiece] = []
     doors = [plan.approach(o) for o in plan.openings if o.is_door]
     for name, kind in names_of(pieces):
         number = list(MAKERS).index(kind)
@@ -89,7 +89,7 @@ def _arrange(plan: RoomPlan, pieces: Mapping[str, int], walkway: float, seed: in
         rng = _generator(seed, number, index, attempt + 1)
         for _ in range(CANDIDATES):
             spot = _candidate(plan, kind, made, placed, rng)
-            one = Placed(name, kind, made, spot[0], spot[1])
+            one = PlacedPiece(name, kind, made, spot[0], spot[1])
             if _fits(plan, one, placed, doors):
                 placed.append(one)
                 break
@@ -105,7 +105,7 @@ def _generator(*seed: int) -> np.random.Generator:
     return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed)))
 
 
-def passable(plan: RoomPlan, placed: list[Placed], walkway: float) -> bool:
+def passable(plan: RoomPlan, placed: list[PlacedPiece], walkway: float) -> bool:
     """Whether a disc of the passage's width gets from each door to the others, and to the largest part of the room."""
     solid = [one.footprint for one in placed]
     grid = Occupancy.of_footprints(solid, plan.outline, 0.05)
@@ -117,7 +117,7 @@ def passable(plan: RoomPlan, placed: list[Placed], walkway: float) -> bool:
 
 
 def _candidate(
-    plan: RoomPlan, kind: str, made: Piece, placed: list[Placed], rng: np.random.Generator
+    plan: RoomPlan, kind: str, made: Piece, placed: list[PlacedPiece], rng: np.random.Generator
 ) -> tuple[Array, float]:
     """A place to look at: (middle (2,), yaw)."""
     hosts = [other for other in placed if other.kind in HOSTS.get(kind, ())]
@@ -144,10 +144,12 @@ def _at_wall(plan: RoomPlan, made: Piece, rng: np.random.Generator, corner: floa
     return wall.at(wall.length / 2 + along, made.half[1] + GAP), wall.yaw
 
 
-def _seat(made: Piece, hosts: list[Placed], placed: list[Placed], rng: np.random.Generator) -> tuple[Array, float]:
+def _seat(
+    made: Piece, hosts: list[PlacedPiece], placed: list[PlacedPiece], rng: np.random.Generator
+) -> tuple[Array, float]:
     """At a side of a table, or before a desk, facing it; at the one that has fewest."""
 
-    def taken(host: Placed) -> int:
+    def taken(host: PlacedPiece) -> int:
         reach = float(np.hypot(*host.piece.half)) + 0.5
         return sum(o.kind == "chair" and bool(np.linalg.norm(o.middle - host.middle) < reach) for o in placed)
 
@@ -170,7 +172,7 @@ def _seat(made: Piece, hosts: list[Placed], placed: list[Placed], rng: np.random
     return host.middle + G.turned(local, host.yaw), host.yaw + direction + pi
 
 
-def _beside(made: Piece, bed: Placed, rng: np.random.Generator) -> tuple[Array, float]:
+def _beside(made: Piece, bed: PlacedPiece, rng: np.random.Generator) -> tuple[Array, float]:
     side = -1 if rng.random() < 0.5 else 1
     local = np.array([side * (bed.piece.half[0] + made.half[0] + GAP + 0.02), -bed.piece.half[1] + made.half[1]])
     return bed.middle + G.turned(local, bed.yaw), bed.yaw
@@ -179,7 +181,7 @@ def _beside(made: Piece, bed: Placed, rng: np.random.Generator) -> tuple[Array, 
 # ---------------------------------------------------------------------- rules
 
 
-def _fits(plan: RoomPlan, one: Placed, placed: list[Placed], doors: list[Array]) -> bool:
+def _fits(plan: RoomPlan, one: PlacedPiece, placed: list[PlacedPiece], doors: list[Array]) -> bool:
     own = one.footprint
     if not G.encloses(plan.outline, own):
         return False
@@ -209,5 +211,5 @@ def _fits(plan: RoomPlan, one: Placed, placed: list[Placed], doors: list[Array])
     return not depth or G.encloses(plan.outline, one.zone(depth))
 
 
-def _grown(one: Placed, by: float) -> tuple[float, float]:
+def _grown(one: PlacedPiece, by: float) -> tuple[float, float]:
     return one.piece.half[0] + by, one.piece.half[1] + by

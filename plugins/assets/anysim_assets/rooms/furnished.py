@@ -13,7 +13,7 @@ from anysim.errors import Issues
 from anysim.model.appearance import Rgb, nominal_rgb
 from anysim.model.world import ORIGIN, Body, BodyKind, Box, Geom, Mesh, MeshShape, Quat, Surface
 from anysim_assets.rooms import outlines as G
-from anysim_assets.rooms.furnish import NoPlace, Placed, furnish
+from anysim_assets.rooms.furnish import NoPlace, PlacedPiece, furnish
 from anysim_assets.rooms.plan import RoomPlan, plan_of, wall_boxes
 from anysim_schemas.rooms import RoomSpec
 
@@ -27,7 +27,7 @@ class Furnished(NamedTuple):
     """A room with what stands in it."""
 
     plan: RoomPlan
-    pieces: tuple[Placed, ...]
+    pieces: tuple[PlacedPiece, ...]
 
 
 def room_of(spec: RoomSpec, issues: Issues) -> Furnished | None:
@@ -101,7 +101,7 @@ def _floor_mesh(plan: RoomPlan) -> Mesh:
     return Mesh("floor", points, triangles, digest)
 
 
-def _piece(spec: RoomSpec, one: Placed, color: Rgb | None) -> ImportedModel:
+def _piece(spec: RoomSpec, one: PlacedPiece, color: Rgb | None) -> ImportedModel:
     touch = Surface(friction=spec.friction)
     geoms: list[Geom] = []
     for k, part in enumerate(one.piece.parts):

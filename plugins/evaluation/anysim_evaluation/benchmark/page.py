@@ -9,10 +9,10 @@ from anysim_evaluation.page import drawn, table, whole
 SIDE = 220
 """[px] of a scatter plot."""
 
-Told = Mapping[str, Any]
+Summary = Mapping[str, Any]
 
 
-def page(told: Told) -> str:
+def page(told: Summary) -> str:
     """HTML that is also well-formed XML; the same bytes for the same results."""
     title = escape(f"Benchmark {told['protocol']}")
     return whole(title, _body(told, title))
@@ -23,7 +23,7 @@ def figure(value: float | None, form: str = ".2f") -> str:
     return "" if value is None else format(value, form)
 
 
-def _body(told: Told, title: str) -> Iterator[str]:
+def _body(told: Summary, title: str) -> Iterator[str]:
     yield f"<h1>{title}</h1><p>{escape(told['description'])}</p>"
     yield f"<p>{told['episodes']} episodes of each task, policy and engine; seeds {escape(told['parts']['seeds'])}.</p>"
     yield f"<p>Frozen as <code>{told['frozen'][:16]}</code>. Intervals are at 95 %.</p>"
@@ -44,21 +44,21 @@ def _body(told: Told, title: str) -> Iterator[str]:
     yield from table("Not run", ("task", "engine", "policy", "why"), absent)
 
 
-def _means(means: Sequence[Told], engines: Sequence[str]) -> Iterator[str]:
+def _means(means: Sequence[Summary], engines: Sequence[str]) -> Iterator[str]:
     by_cell = {(one["policy"], one["engine"]): one for one in means}
     policies = list(dict.fromkeys(one["policy"] for one in means))
     rows = [[escape(policy), *(_bar(by_cell.get((policy, engine))) for engine in engines)] for policy in policies]
     yield from table("Mean success over the tasks", ("policy", *map(escape, engines)), rows)
 
 
-def _bar(one: Told | None) -> str:
+def _bar(one: Summary | None) -> str:
     if one is None:
         return ""
     low, high = one["interval"]
     return f"{drawn(one['success'], one['interval'])} {one['success']:.0%} <small>({low:.0%} to {high:.0%})</small>"
 
 
-def _tasks(rows: Sequence[Told], engines: Sequence[str]) -> Iterator[str]:
+def _tasks(rows: Sequence[Summary], engines: Sequence[str]) -> Iterator[str]:
     """Success by task and policy, the engines beside each other in a cell; the higher, the darker the ground."""
     by_cell = {(one["task"], one["policy"], one["engine"]): one for one in rows}
     policies = list(dict.fromkeys(one["policy"] for one in rows))
@@ -70,7 +70,7 @@ def _tasks(rows: Sequence[Told], engines: Sequence[str]) -> Iterator[str]:
     yield from table(title, ("task", *(p.replace("_", " ") for p in policies)), lines)
 
 
-def _shade(one: Told | None) -> str:
+def _shade(one: Summary | None) -> str:
     if one is None or one["success"] is None:
         return '<span class="cell">?</span>'
     share = one["success"]
@@ -79,7 +79,7 @@ def _shade(one: Told | None) -> str:
     return f'<span class="cell" style="background: {ground}; color: {ink}">{100 * share:.0f}</span>'
 
 
-def _scatters(rows: Sequence[Told], engines: Sequence[str]) -> Iterator[str]:
+def _scatters(rows: Sequence[Summary], engines: Sequence[str]) -> Iterator[str]:
     if len(engines) < 2:
         return
     found = {(one["task"], one["policy"], one["engine"]): one["success"] for one in rows}
@@ -112,7 +112,7 @@ def _scatter(x: str, y: str, points: Sequence[tuple[float, float]]) -> str:
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 
 
-def ranks(told: Told) -> Table:
+def ranks(told: Summary) -> Table:
     """How far the engines order the policies as the reference does: columns and rows."""
     columns = (
         "engine",
@@ -140,7 +140,7 @@ def ranks(told: Told) -> Table:
     ]
 
 
-def agreement(told: Told) -> Table:
+def agreement(told: Summary) -> Table:
     """How far two engines have the same outcomes on the same seeds: columns and rows."""
     columns = ("engines", "policy", "episodes", "same outcome", "kappa", "one alone", "p")
     order = sorted(told["engines"], key=lambda one: one["policy"] is not None)
@@ -150,7 +150,7 @@ def agreement(told: Told) -> Table:
     ]
 
 
-def paired(told: Told) -> Table:
+def paired(told: Summary) -> Table:
     """Each policy against the reference: columns and rows."""
     columns = ("engine", "policies", "episodes", "same outcome", "kappa", "one alone", "p")
     return columns, [
@@ -159,12 +159,12 @@ def paired(told: Told) -> Table:
     ]
 
 
-def _pair(one: Told) -> list[str]:
+def _pair(one: Summary) -> list[str]:
     alone = f"{one['only_first']} and {one['only_second']}"
     return [str(one["seeds"]), f"{one['agree']:.1%}", figure(one["kappa"]), alone, figure(one["p"], ".3g")]
 
 
-def matrix(told: Told) -> Table:
+def matrix(told: Summary) -> Table:
     """Mean success by the engine that policies were trained on and the one they are evaluated on: columns and rows."""
     engines = list(dict.fromkeys(one["engine"] for one in told["matrix"]))
     found = {(one["trained_on"], one["engine"]): one["success"] for one in told["matrix"]}
@@ -173,7 +173,7 @@ def matrix(told: Told) -> Table:
     return ("trained on", *map(escape, engines)), rows
 
 
-def _all(rows: Sequence[Told]) -> Table:
+def _all(rows: Sequence[Summary]) -> Table:
     columns = ("task", "engine", "policy", "episodes", "success", "95 %", "failed", "out of time", "length", "failures")
     return (*columns, "faults"), [
         [

@@ -9,7 +9,7 @@ from anysim.api import resolve_options
 from anysim.errors import SpecError, SpecIssue, TaskError, listing
 from anysim_evaluation.driver import episode_seeds
 from anysim_schemas.benchmark import BenchmarkSpec, BenchmarkTaskSpec
-from anysim_schemas.load import Loaded, load
+from anysim_schemas.load import LoadedSpec, load
 
 
 class Protocol(NamedTuple):
@@ -20,7 +20,7 @@ class Protocol(NamedTuple):
         added: policies of the command line, which are not in the file.
     """
 
-    loaded: Loaded[BenchmarkSpec]
+    loaded: LoadedSpec[BenchmarkSpec]
     added: Sequence[str] = ()
 
     @property

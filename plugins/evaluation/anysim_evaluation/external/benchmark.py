@@ -16,7 +16,7 @@ SEPARATOR = ":"
 """Between the name of a benchmark and that of its task, as in `maniskill:PickCube-v1`."""
 
 
-class Stepped(NamedTuple):
+class ExternalStep(NamedTuple):
     """What one step gave.
 
     Attributes:
@@ -46,7 +46,7 @@ class ExternalEnv(Protocol):
         """Begin the episode of a seed; arrays by name, without an axis of envs."""
         ...
 
-    def step(self, action: Array) -> Stepped:
+    def step(self, action: Array) -> ExternalStep:
         """One step with an action (A,) within the bounds."""
         ...
 

@@ -11,7 +11,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.errors import PluginError
 from anysim.task.contract import Obs
-from anysim_evaluation.external.benchmark import Stepped
+from anysim_evaluation.external.benchmark import ExternalStep
 
 PACKAGE = "gymnasium_robotics"
 JUDGED = frozenset({"fetch", "shadow_dexterous_hand", "adroit_hand", "maze"})
@@ -81,10 +81,10 @@ class GymnasiumEnv:
         obs, self._info = self._env.reset(seed=seed)
         return _named(obs)
 
-    def step(self, action: Array) -> Stepped:
+    def step(self, action: Array) -> ExternalStep:
         """One step."""
         obs, reward, terminated, _, self._info = self._env.step(action.astype(self._env.action_space.dtype))
-        return Stepped(_named(obs), float(reward), bool(terminated))
+        return ExternalStep(_named(obs), float(reward), bool(terminated))
 
     def verdict(self) -> bool:
         """What `info` says."""

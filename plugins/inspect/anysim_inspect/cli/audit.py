@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from anysim.testing.audit import AuditLine
 
 
-class _Audited(NamedTuple):
+class _EngineAudit(NamedTuple):
     engine: str
     version: str
     lines: "list[AuditLine]"
@@ -60,12 +60,12 @@ def audit(
 
     loaded = load(task, overrides=override or [])
     world = unseen(compile_world(loaded))
-    audited: list[_Audited] = []
+    audited: list[_EngineAudit] = []
     for name in _engines(engine, loaded.spec.engine.name):
         options = loaded.spec.engine.options if name == loaded.spec.engine.name else {}
         with create_simulation(name, **options) as simulation:
             simulation.create_world(world)
-            audited.append(_Audited(name, simulation.version, run_audit(simulation)))
+            audited.append(_EngineAudit(name, simulation.version, run_audit(simulation)))
     if json:
         documents = [_document(one, every) for one in audited]
         print_json(documents[0] if len(documents) == 1 else documents)
@@ -86,7 +86,7 @@ def _engines(text: str | None, default: str) -> list[str]:
     return [part.strip() for part in text.split(",") if part.strip()]
 
 
-def _document(one: _Audited, every: bool) -> dict[str, Any]:
+def _document(one: _EngineAudit, every: bool) -> dict[str, Any]:
     return {
         "engine": one.engine,
         "version": one.version,
@@ -98,7 +98,7 @@ def _document(one: _Audited, every: bool) -> dict[str, Any]:
     }
 
 
-def _tell(one: _Audited, every: bool) -> None:
+def _tell(one: _EngineAudit, every: bool) -> None:
     from anysim.cli.output import print_table
 
     title = f"{one.engine} {one.version}"

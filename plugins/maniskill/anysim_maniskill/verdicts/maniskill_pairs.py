@@ -10,7 +10,7 @@ from anysim_maniskill.verdicts import maniskill
 from anysim_maniskill.verdicts.pair import Difference, Pair, Quantity, direction, signs, turned, yawed
 from anysim_maniskill.verdicts.sketch import Sketch
 
-Drawn = Mapping[str, Array]
+Draws = Mapping[str, Array]
 
 SPEED = Quantity((0.0, 0.008), (0.005, 0.015))
 RATE = Quantity((0.0, 0.4), (0.3, 0.7))
@@ -45,7 +45,7 @@ def moving(rng: np.random.Generator, speed: Array, rate: Array) -> Array:
     return np.concatenate([speed[:, None] * direction(rng, n), rate[:, None] * direction(rng, n)], axis=1)
 
 
-def hand(sketch: Sketch, rng: np.random.Generator, frame: str, drawn: Drawn) -> None:
+def hand(sketch: Sketch, rng: np.random.Generator, frame: str, drawn: Draws) -> None:
     """Put the tool at a distance from a frame: about the thing, where the fingers press on it."""
     press = drawn.get("press", np.zeros(sketch.num_states))
     distance = np.where(press > 0, 0.01, drawn["hand"])
@@ -57,7 +57,7 @@ def hand(sketch: Sketch, rng: np.random.Generator, frame: str, drawn: Drawn) -> 
     )
 
 
-def _pick_cube(sketch: Sketch, drawn: Drawn, rng: np.random.Generator) -> None:
+def _pick_cube(sketch: Sketch, drawn: Draws, rng: np.random.Generator) -> None:
     n = sketch.num_states
     goal = sketch.pose("goal")
     sketch.place(
@@ -71,27 +71,27 @@ def _pick_cube(sketch: Sketch, drawn: Drawn, rng: np.random.Generator) -> None:
     sketch.move_joints(arm.tolist(), None, drawn["speed"][:, None] * shares)
 
 
-def _push_cube(sketch: Sketch, drawn: Drawn, rng: np.random.Generator) -> None:
+def _push_cube(sketch: Sketch, drawn: Draws, rng: np.random.Generator) -> None:
     offset = level(rng, drawn["sideways"], drawn["height"])
     twist = moving(rng, drawn["speed"], drawn["rate"])
     sketch.place("cube", at(sketch.pose("goal"), offset, yawed(rng, sketch.num_states)), twist)
 
 
-def _stack_cube(sketch: Sketch, drawn: Drawn, rng: np.random.Generator) -> None:
+def _stack_cube(sketch: Sketch, drawn: Draws, rng: np.random.Generator) -> None:
     offset = level(rng, drawn["sideways"], 0.04 + drawn["height"])
     twist = moving(rng, drawn["speed"], drawn["rate"])
     sketch.place("cube", at(sketch.pose("base"), offset, yawed(rng, sketch.num_states)), twist)
     hand(sketch, rng, "cube", drawn)
 
 
-def _place_sphere(sketch: Sketch, drawn: Drawn, rng: np.random.Generator) -> None:
+def _place_sphere(sketch: Sketch, drawn: Draws, rng: np.random.Generator) -> None:
     offset = level(rng, drawn["sideways"], 0.02 + drawn["height"])
     twist = moving(rng, drawn["speed"], drawn["rate"])
     sketch.place("ball", at(sketch.pose("bin.inside"), offset), twist)
     hand(sketch, rng, "ball", drawn)
 
 
-def _stack_pyramid(sketch: Sketch, drawn: Drawn, rng: np.random.Generator) -> None:
+def _stack_pyramid(sketch: Sketch, drawn: Draws, rng: np.random.Generator) -> None:
     n = sketch.num_states
     base, along = sketch.pose("base"), direction(rng, n, level=True)
     across = np.stack([-along[:, 1], along[:, 0], np.zeros(n)], axis=1)
@@ -104,7 +104,7 @@ def _stack_pyramid(sketch: Sketch, drawn: Drawn, rng: np.random.Generator) -> No
     hand(sketch, rng, "top", drawn)
 
 
-def write_peg(sketch: Sketch, drawn: Drawn, rng: np.random.Generator) -> None:
+def write_peg(sketch: Sketch, drawn: Draws, rng: np.random.Generator) -> None:
     """A peg in a hole: its tip in the frame of the hole, its tilt, and the hand at its head."""
     n, hole = sketch.num_states, sketch.pose("block.hole")
     place = np.stack([drawn["x"], drawn["y"], drawn["height"]], axis=1)
@@ -114,18 +114,18 @@ def write_peg(sketch: Sketch, drawn: Drawn, rng: np.random.Generator) -> None:
     hand(sketch, rng, "peg.head", drawn)
 
 
-def _plug_charger(sketch: Sketch, drawn: Drawn, rng: np.random.Generator) -> None:
+def _plug_charger(sketch: Sketch, drawn: Draws, rng: np.random.Generator) -> None:
     n, hole = sketch.num_states, sketch.pose("socket.hole")
     rolled = P.from_axis_angle(np.tile([0.0, 0.0, 1.0], (n, 1)), drawn["roll"])
     rotation = P.multiply(P.multiply(hole[:, 3:], rolled), turned(rng, drawn["angle"]))
     sketch.place("charger.tip", at(hole, drawn["distance"][:, None] * direction(rng, n), rotation))
 
 
-def _turn_faucet(sketch: Sketch, drawn: Drawn, rng: np.random.Generator) -> None:
+def _turn_faucet(sketch: Sketch, drawn: Draws, rng: np.random.Generator) -> None:
     sketch.open_joint("faucet.lever", drawn["share"], drawn["speed"] * signs(rng, sketch.num_states))
 
 
-def _open_drawer(sketch: Sketch, drawn: Drawn, rng: np.random.Generator) -> None:
+def _open_drawer(sketch: Sketch, drawn: Draws, rng: np.random.Generator) -> None:
     sketch.open_joint("cabinet.drawer_1", drawn["share"], drawn["speed"] * signs(rng, sketch.num_states))
     hand(sketch, rng, "cabinet.drawer_1.handle", drawn)
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from anysim_maniskill.verdicts import robosuite
 from anysim_maniskill.verdicts.maniskill import PRESS as FORCE
-from anysim_maniskill.verdicts.maniskill_pairs import HAND, PRESS, RATE, SPEED, Drawn, at, hand, moving, write_peg
+from anysim_maniskill.verdicts.maniskill_pairs import HAND, PRESS, RATE, SPEED, Draws, at, hand, moving, write_peg
 from anysim_maniskill.verdicts.pair import Difference, Pair, Quantity, direction, signs, yawed
 from anysim_maniskill.verdicts.sketch import Sketch
 
@@ -14,13 +14,13 @@ RELEASE = float(np.arctanh(0.4) / 10)
 STILL = Difference("robosuite does not ask that the thing is at rest", ("task.success.still=null",))
 
 
-def _lift(sketch: Sketch, drawn: Drawn, rng: np.random.Generator) -> None:
+def _lift(sketch: Sketch, drawn: Draws, rng: np.random.Generator) -> None:
     cube = sketch.pose("cube")
     cube[:, 2] = sketch.pose("table")[:, 2] + 0.2 + drawn["height"]
     sketch.place("cube", at(cube, np.zeros(3), yawed(rng, sketch.num_states)))
 
 
-def _stack(sketch: Sketch, drawn: Drawn, rng: np.random.Generator) -> None:
+def _stack(sketch: Sketch, drawn: Draws, rng: np.random.Generator) -> None:
     """Cubes with parallel edges, one shifted along them."""
     n, base = sketch.num_states, sketch.pose("base")
     base[:, 3:] = [0.0, 0.0, 0.0, 1.0]
@@ -30,12 +30,12 @@ def _stack(sketch: Sketch, drawn: Drawn, rng: np.random.Generator) -> None:
     hand(sketch, rng, "cube", drawn)
 
 
-def _door(sketch: Sketch, drawn: Drawn, rng: np.random.Generator) -> None:
+def _door(sketch: Sketch, drawn: Draws, rng: np.random.Generator) -> None:
     sketch.open_joint("cabinet.door_1", drawn["share"], drawn["speed"] * signs(rng, sketch.num_states))
     hand(sketch, rng, "cabinet.door_1.handle", drawn)
 
 
-def _tidy(sketch: Sketch, drawn: Drawn, rng: np.random.Generator) -> None:
+def _tidy(sketch: Sketch, drawn: Draws, rng: np.random.Generator) -> None:
     """Each thing somewhere in the bin, and one of them at the drawn place."""
     n = sketch.num_states
     inside = at(sketch.pose("bin.inside"), np.zeros(3), np.tile([0.0, 0.0, 0.0, 1.0], (n, 1)))

@@ -9,7 +9,7 @@ from anysim.engine.capability import Capability
 from anysim.model.world import ContactSensor, Sphere, Surface, World
 from anysim.testing.sketch import Sketch
 from anysim_parity.probes import tolerances as T
-from anysim_parity.probes.probe import CURVE_POINTS, Found, G, Probe, Quantity, crossing, cube, lane, record, series
+from anysim_parity.probes.probe import CURVE_POINTS, G, Probe, Quantity, Reading, crossing, cube, lane, record, series
 from anysim_parity.result import Plot
 
 GAP, DISTANCE = 0.5, 0.4
@@ -53,7 +53,7 @@ def _drop_world(dt: float) -> World:
     return s.world()
 
 
-def _drop(engine: SimEngine) -> Found:
+def _drop(engine: SimEngine) -> Reading:
     ball = engine.index.body("ball")
     motion = record(engine, 0.6)
     fallen = RADIUS + GAP - motion.pose[:, ball, 2]
@@ -65,7 +65,7 @@ def _drop(engine: SimEngine) -> Found:
         if len(rest.force):
             values[WEIGHT.format(mass)] = float(rest.force[:, i, 2].mean())
     values[STILL] = float(np.abs(rest.twist[:, : len(MASSES), :3]).max())
-    return Found(values, {PLOT: (motion.time, motion.pose[:, ball, 2])})
+    return Reading(values, {PLOT: (motion.time, motion.pose[:, ball, 2])})
 
 
 # ---------------------------------------------------------------------- bounce
@@ -120,7 +120,7 @@ def _bounce_world(dt: float) -> World:
     return s.world()
 
 
-def _bounce(engine: SimEngine) -> Found:
+def _bounce(engine: SimEngine) -> Reading:
     motion = record(engine, 1.4)
     height = motion.pose[:, :, 2] - RADIUS
     first = int(np.searchsorted(motion.time, sqrt(2 * GAP / G) - AROUND))
@@ -133,4 +133,4 @@ def _bounce(engine: SimEngine) -> Found:
         values[SUNK.format(e)] = float(max(0.0, -height[:, i].min()))
         if e in BOUNCES[2:]:
             curves[_bounce_plot(e)] = (motion.time, height[:, i])
-    return Found(values, curves)
+    return Reading(values, curves)

@@ -8,7 +8,7 @@ from anysim.engine.capability import Capability
 from anysim.model.world import Box, ContactSensor, ControlMode, JointType, Surface, World
 from anysim.testing.sketch import Sketch, inertial
 from anysim_parity.probes import tolerances as T
-from anysim_parity.probes.probe import Found, G, Probe, Quantity, Z, cube, lane, record, threshold
+from anysim_parity.probes.probe import G, Probe, Quantity, Reading, Z, cube, lane, record, threshold
 from anysim_parity.result import Plot, Series
 
 HALF, MASS, FRICTION = 0.02, 0.1, 0.5
@@ -83,7 +83,7 @@ def _finger(
     s.drive(link, mode, kp, kd)
 
 
-def _grasp(engine: SimEngine) -> Found:
+def _grasp(engine: SimEngine) -> Reading:
     ratios, dt = _ratios(), engine.world.physics.dt
     engine.set_control(effort=np.repeat(ratios * LEAST, 2)[None])
     engine.step(round(0.5 / dt))
@@ -93,7 +93,7 @@ def _grasp(engine: SimEngine) -> Found:
     held = engine.get_state().body_pose[0, cubes, 2].copy()
     engine.step(round(0.5 / dt))
     fallen = held - engine.get_state().body_pose[0, cubes, 2]
-    return Found({HOLDS: threshold(ratios[::-1], fallen[::-1] > DROPPED)})
+    return Reading({HOLDS: threshold(ratios[::-1], fallen[::-1] > DROPPED)})
 
 
 # ---------------------------------------------------------------------- lift
@@ -140,7 +140,7 @@ def _lift_world(dt: float) -> World:
     return s.world()
 
 
-def _lift(engine: SimEngine) -> Found:
+def _lift(engine: SimEngine) -> Reading:
     dt, state = engine.world.physics.dt, engine.get_state()
     palm, thing = engine.index.body("gripper.palm"), engine.index.body("cube")
     # a finger that is stopped by the cube 1 mm ahead exerts kp times what is left
@@ -166,4 +166,4 @@ def _lift(engine: SimEngine) -> Found:
     values |= {LIFTED: float(-inside[top]), HELD: float(inside[top] - inside[-1])}
     if squeeze is not None:
         values[SQUEEZE] = float(squeeze)
-    return Found(values, {PLOT: (motion.time - began, inside)})
+    return Reading(values, {PLOT: (motion.time - began, inside)})

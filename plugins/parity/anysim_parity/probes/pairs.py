@@ -6,7 +6,7 @@ from anysim.engine.base import SimEngine
 from anysim.model.world import Box, Surface, World
 from anysim.testing.sketch import Sketch
 from anysim_parity.probes import tolerances as T
-from anysim_parity.probes.probe import Found, G, Probe, Quantity, lane, record, slope_of
+from anysim_parity.probes.probe import G, Probe, Quantity, Reading, lane, record, slope_of
 from anysim_parity.probes.slide import HALF
 
 SMOOTH, ROUGH, GROUND = 0.2, 0.6, 0.4
@@ -39,7 +39,7 @@ def _world(dt: float) -> World:
     return s.world()
 
 
-def _pairs(engine: SimEngine) -> Found:
+def _pairs(engine: SimEngine) -> Reading:
     blocks = [engine.index.body(f"block{i}") for i in range(len(PAIRS) + 1)]
     engine.step(round(0.2 / engine.world.physics.dt))
     engine.set_body_state(twist=np.tile([SPEED, 0.0, 0.0, 0.0, 0.0, 0.0], (1, len(blocks), 1)), bodies=blocks)
@@ -47,4 +47,4 @@ def _pairs(engine: SimEngine) -> Found:
     late = motion.time - motion.time[0] > 0.05
     slowed = [-slope_of(motion.time[late], motion.twist[late, body, 0]) / G for body in blocks]
     names = [*(FIXED.format(*pair) for pair in PAIRS), LOOSE.format(SMOOTH, SMOOTH)]
-    return Found(dict(zip(names, slowed, strict=True)))
+    return Reading(dict(zip(names, slowed, strict=True)))

@@ -37,7 +37,7 @@ class Quantity(NamedTuple):
     remark: str = ""
 
 
-class Found(NamedTuple):
+class Reading(NamedTuple):
     """What a probe found on one engine: numbers by subject of the quantity, curves by title of the plot."""
 
     values: Mapping[str, float]
@@ -59,7 +59,7 @@ class Probe(NamedTuple):
     name: str
     world: World
     quantities: tuple[Quantity, ...]
-    run: Callable[[SimEngine], Found]
+    run: Callable[[SimEngine], Reading]
     plots: tuple[Plot, ...] = ()
     needs: tuple[Capability, ...] = (Capability.DYNAMICS,)
 

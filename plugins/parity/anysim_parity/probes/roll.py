@@ -9,7 +9,7 @@ from anysim.engine.base import SimEngine
 from anysim.model.world import Cylinder, Quat, Sphere, Surface, World
 from anysim.testing.sketch import Sketch
 from anysim_parity.probes import tolerances as T
-from anysim_parity.probes.probe import CURVE_POINTS, Found, G, Probe, Quantity, lane, record, series, slope_of
+from anysim_parity.probes.probe import CURVE_POINTS, G, Probe, Quantity, Reading, lane, record, series, slope_of
 from anysim_parity.probes.slide import on_slab, slab
 from anysim_parity.result import Plot
 
@@ -55,7 +55,7 @@ def _world(dt: float) -> World:
     return s.world()
 
 
-def _roll(engine: SimEngine) -> Found:
+def _roll(engine: SimEngine) -> Reading:
     launched = engine.index.body("launched")
     engine.set_body_state(twist=[SPEED, 0.0, 0.0, 0.0, 0.0, 0.0], bodies=[launched])
     motion = record(engine, 0.5)
@@ -69,7 +69,7 @@ def _roll(engine: SimEngine) -> Found:
     speed, turning = motion.twist[:, launched, 0], RADIUS * motion.twist[:, launched, 4]
     values[FINAL] = float(speed[-1])
     values[WHEN] = _until(motion.time, speed - turning)
-    return Found(values, {PLOT: (motion.time, speed)})
+    return Reading(values, {PLOT: (motion.time, speed)})
 
 
 def _until(time: Array, slip: Array) -> float:

@@ -9,7 +9,18 @@ from anysim.engine.capability import Capability
 from anysim.model.world import Box, Surface, Vec3, World
 from anysim.testing.sketch import Sketch
 from anysim_parity.probes import tolerances as T
-from anysim_parity.probes.probe import CURVE_POINTS, Found, G, Probe, Quantity, about_y, lane, record, series, slope_of
+from anysim_parity.probes.probe import (
+    CURVE_POINTS,
+    G,
+    Probe,
+    Quantity,
+    Reading,
+    about_y,
+    lane,
+    record,
+    series,
+    slope_of,
+)
 from anysim_parity.result import Plot
 
 HALF: Vec3 = (0.1, 0.1, 0.05)
@@ -45,7 +56,7 @@ def _flat(dt: float) -> World:
     return s.world()
 
 
-def _slide(engine: SimEngine) -> Found:
+def _slide(engine: SimEngine) -> Reading:
     engine.step(round(0.2 / engine.world.physics.dt))
     engine.set_body_state(twist=[SPEED, 0.0, 0.0, 0.0, 0.0, 0.0], bodies=[0])
     wrench = [[[force, 0.0, 0.0, 0.0, 0.0, 0.0] for force in PUSHES]]
@@ -57,7 +68,7 @@ def _slide(engine: SimEngine) -> Found:
         STUCK: slope_of(time[late], x[late, 1]),
         DRIVEN: slope_of(time[late], motion.twist[late, 2, 0]),
     }
-    return Found(values, {PLOT: (time, x[:, 0] - x[0, 0])})
+    return Reading(values, {PLOT: (time, x[:, 0] - x[0, 0])})
 
 
 # ---------------------------------------------------------------------- incline
@@ -105,7 +116,7 @@ def _inclines(dt: float) -> World:
     return s.world()
 
 
-def _incline(engine: SimEngine) -> Found:
+def _incline(engine: SimEngine) -> Reading:
     motion = record(engine, 0.8)
     held, slid = (engine.index.body(f"block{i}") for i in range(2))
     downhill = np.array([[cos(a), 0.0, -sin(a)] for a in np.radians(ANGLES)])
@@ -113,4 +124,4 @@ def _incline(engine: SimEngine) -> Found:
     speed = motion.twist[:, slid, :3] @ downhill[1]
     late = motion.time > 0.3
     values = {CREEP: slope_of(motion.time[late], along[late, 0]), GAIN: slope_of(motion.time[late], speed[late])}
-    return Found(values, {INCLINE: (motion.time, along[:, 1])})
+    return Reading(values, {INCLINE: (motion.time, along[:, 1])})

@@ -9,7 +9,7 @@ from anysim.engine.capability import Capability
 from anysim.model.world import ContactSensor, World
 from anysim.testing.sketch import Sketch
 from anysim_parity.probes import tolerances as T
-from anysim_parity.probes.probe import Found, G, Probe, Quantity, cube, record
+from anysim_parity.probes.probe import G, Probe, Quantity, Reading, cube, record
 from anysim_parity.result import Plot, Series
 
 COUNT, HALF, MASS = 5, 0.05, 1.0
@@ -48,7 +48,7 @@ def _world(dt: float) -> World:
     return s.world()
 
 
-def _stack(engine: SimEngine) -> Found:
+def _stack(engine: SimEngine) -> Reading:
     motion = record(engine, 2.5, every=5, forces=bool(engine.world.contact_sensors))
     top, late = COUNT - 1, motion.time >= 0.5
     aside = np.hypot(*(motion.pose[:, top, :2] - motion.pose[0, top, :2]).T)
@@ -62,4 +62,4 @@ def _stack(engine: SimEngine) -> Found:
         down = -motion.force[motion.time >= 1.5, :, 2].mean(axis=0)
         values |= {FORCE.format(i + 1): float(down[i]) for i in range(COUNT - 1)}
         values[BORNE] = float(down[COUNT - 1])
-    return Found(values, {PLOT: (motion.time, aside)})
+    return Reading(values, {PLOT: (motion.time, aside)})

@@ -10,7 +10,7 @@ from anysim.math import pose as P
 from anysim.model.world import Box, Surface, Vec3, World
 from anysim.testing.sketch import Sketch
 from anysim_parity.probes import tolerances as T
-from anysim_parity.probes.probe import Found, Probe, Quantity, about_y, lane, record, threshold
+from anysim_parity.probes.probe import Probe, Quantity, Reading, about_y, lane, record, threshold
 from anysim_parity.probes.slide import HALF, on_slab, slab
 
 FRICTION = 0.5
@@ -38,7 +38,7 @@ def slip(dt: float) -> Probe:
     """A flat box on slopes around the friction angle."""
     angle = degrees(atan(FRICTION))
     world = _slopes("slip", dt, angle, HALF, FRICTION)
-    return Probe("slip", world, (Quantity(SLIP, "deg", angle, T.ANGLE),), lambda e: Found({SLIP: _slip(e, angle)}))
+    return Probe("slip", world, (Quantity(SLIP, "deg", angle, T.ANGLE),), lambda e: Reading({SLIP: _slip(e, angle)}))
 
 
 def topple(dt: float) -> Probe:
@@ -46,7 +46,7 @@ def topple(dt: float) -> Probe:
     angle = degrees(atan2(TALL[0], TALL[2]))
     world = _slopes("topple", dt, angle, TALL, STICKY)
     return Probe(
-        "topple", world, (Quantity(TOPPLE, "deg", angle, T.ANGLE),), lambda e: Found({TOPPLE: _topple(e, angle)})
+        "topple", world, (Quantity(TOPPLE, "deg", angle, T.ANGLE),), lambda e: Reading({TOPPLE: _topple(e, angle)})
     )
 
 

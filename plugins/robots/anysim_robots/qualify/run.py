@@ -8,7 +8,7 @@ from typing import NamedTuple
 from anysim.api import load, make
 from anysim.assets.catalogue import CatalogueEntry, load_robot, missing_source
 from anysim.compile.edit import unseen
-from anysim.compile.world import Compiled, compile_with_report
+from anysim.compile.world import CompiledWorld, compile_with_report
 from anysim.engine.factory import availability, create_simulation
 from anysim.errors import AnysimError, CapabilityError, PluginError
 from anysim_robots.qualify.motion import hold_check, random_checks
@@ -94,7 +94,7 @@ def qualify(
     )
 
 
-def _oracle(entry: CatalogueEntry, compiled: Compiled) -> tuple[Oracle | None, str]:
+def _oracle(entry: CatalogueEntry, compiled: CompiledWorld) -> tuple[Oracle | None, str]:
     """Whom the source is held against; None and how to get it where that is not installed."""
     try:
         return oracle_of(entry, compiled.world), ""
@@ -102,7 +102,7 @@ def _oracle(entry: CatalogueEntry, compiled: Compiled) -> tuple[Oracle | None, s
         return None, str(error)
 
 
-def _static(compiled: Compiled, engine: str, oracle: Oracle | None, tell: Callable[[str], object]) -> list[Check]:
+def _static(compiled: CompiledWorld, engine: str, oracle: Oracle | None, tell: Callable[[str], object]) -> list[Check]:
     found: list[Check] = []
     with create_simulation(engine) as simulation:
         simulation.create_world(unseen(compiled.world))

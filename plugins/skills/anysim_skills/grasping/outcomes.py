@@ -8,11 +8,11 @@ from anysim.hooks import hookimpl, manager
 from anysim.task.env import TaskEnv
 
 
-class Watched(Protocol):
+class EpisodeListener(Protocol):
     """What is told of episodes."""
 
     @property
-    def banks(self) -> "Kept":
+    def banks(self) -> "KeptBanks":
         """What is kept once the env is closed."""
         ...
 
@@ -25,7 +25,7 @@ class Watched(Protocol):
         ...
 
 
-class Kept(Protocol):
+class KeptBanks(Protocol):
     """What is kept once the env is closed."""
 
     def save(self) -> None:
@@ -37,9 +37,9 @@ class _Outcomes:
     """The grasps from banks of each env, which hold for as long as it is open."""
 
     def __init__(self) -> None:
-        self._watched: WeakKeyDictionary[TaskEnv, list[Watched]] = WeakKeyDictionary()
+        self._watched: WeakKeyDictionary[TaskEnv, list[EpisodeListener]] = WeakKeyDictionary()
 
-    def watch(self, env: TaskEnv, grasps: Watched) -> None:
+    def watch(self, env: TaskEnv, grasps: EpisodeListener) -> None:
         """Tell these grasps of the episodes of an env."""
         if not manager().is_registered(self):
             manager().register(self)

@@ -1,0 +1,35 @@
+"""Past participles as names: not of a class, a function and a variable at once, which no reader can tell apart."""
+
+import ast
+import re
+from collections.abc import Iterator
+
+from checks.tree import Fault, Tree
+
+PARTICIPLE = re.compile(
+    r"\w{2,}[^e]ed|built|drawn|found|given|gone|held|hung|kept|known|left|lost|made|said|seen|sent|shown|taken|told|worn"
+    r"|written"
+)
+NOUNS = ("core", "schemas", "plugins", "tasks")
+"""Where classes are called by nouns; those of backends are still to be renamed."""
+
+
+def check(tree: Tree) -> Iterator[Fault]:
+    """Classes whose name is a past participle that functions and variables have as well."""
+    functions: set[str] = set()
+    variables: set[str] = set()
+    classes: list[tuple[str, Fault]] = []
+    for path in tree.under(*NOUNS, "backends", suffixes=(".py",)):
+        for node in ast.walk(ast.parse(tree.text(path) or "")):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                functions.add(node.name.strip("_"))
+            elif isinstance(node, ast.arg):
+                variables.add(node.arg.strip("_"))
+            elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                variables.add(node.id.strip("_"))
+            elif isinstance(node, ast.ClassDef) and path.parts[0] in NOUNS:
+                remedy = f"{node.name} is a function and a variable too; call the class by a noun"
+                classes.append((node.name.strip("_").lower(), Fault(path, node.lineno, remedy)))
+    for name, fault in classes:
+        if PARTICIPLE.fullmatch(name) and name in functions and name in variables:
+            yield fault
