@@ -5,6 +5,8 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from packaging.requirements import Requirement
+
 from checks.tree import Fault, Tree
 
 SHARED = ("version", "requires-python", "license")
@@ -16,6 +18,7 @@ def check(tree: Tree) -> Iterator[Fault]:
     """Differences between the distributions' metadata, unlisted packages, and heavy `__init__` modules."""
     yield from _metadata(tree)
     yield from _known_to_tools(tree)
+    yield from _libraries(tree)
     for path in tree.files:
         if path.name == "__init__.py" and path.parts[0] not in ("tests", "scripts", "docs", "benchmarks"):
             yield from _light(tree, path)
@@ -55,6 +58,23 @@ def _known_to_tools(tree: Tree) -> Iterator[Fault]:
             yield Fault(settings, 0, f"add {package} to root_packages of tool.importlinter, and to its contracts")
         if member.folder.as_posix() not in tools["pyright"]["extraPaths"]:
             yield Fault(settings, 0, f"add {member.folder.as_posix()} to extraPaths of tool.pyright")
+
+
+def _libraries(tree: Tree) -> Iterator[Fault]:
+    """What stands among the backends and is no engine: it offers nothing by itself, and backends alone build on it."""
+    groups = {member.project["name"]: member.project.get("entry-points", {}) for member in tree.members}
+    backends = [member for member in tree.members if member.folder.parts[0] == "backends"]
+    engines = {name for name, own in groups.items() if "anysim.engines" in own}
+    libraries = {member.project["name"] for member in backends} - engines
+    for member in tree.members:
+        name, file = member.project["name"], member.folder / "pyproject.toml"
+        if name in libraries and groups[name]:
+            yield Fault(file, 0, f"has entry points ({', '.join(groups[name])}) and no engine; move them to a plugin")
+        extras = member.project.get("optional-dependencies", {}).values()
+        wanted = [*member.project["dependencies"], *(text for extra in extras for text in extra)]
+        for used in sorted(libraries & {Requirement(text).name for text in wanted}):
+            if member not in backends:
+                yield Fault(file, 0, f"depends on {used}, which is for backends alone; what plugins share is core's")
 
 
 def _light(tree: Tree, path: Path) -> Iterator[Fault]:

@@ -162,8 +162,9 @@ def test_the_fields_of_the_guide_are_those_of_the_state() -> None:
 
 
 def test_the_helpers_of_the_guide_exist() -> None:
-    names = [name for cells in _table("helpers") for name in re.findall(r"`(anysim(?:_mechanics)?\.[\w.]+)`", cells[0])]
-    assert len(names) > 20
+    rows = [*_table("helpers"), *_table("mechanics")]
+    names = [name for cells in rows for name in re.findall(r"`(anysim(?:_mechanics)?\.[\w.]+)`", cells[0])]
+    assert len(names) > 30
     for name in names:
         module, _, attribute = name.rpartition(".")
         assert find_spec(name) if name == "anysim.math.pose" else hasattr(import_module(module), attribute), name

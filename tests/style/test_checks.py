@@ -319,6 +319,35 @@ def test_a_package_unknown_to_the_tools_is_found(make_tree: MakeTree) -> None:
 
 
 @pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({}, ""),
+        (
+            {"backends/m/pyproject.toml": '\n[project.entry-points."anysim.terms"]\nm = "anysim_m"\n'},
+            "has entry points",
+        ),
+        ({"plugins/x/pyproject.toml": '\n[project.optional-dependencies]\nm = ["anysim-m"]\n'}, "for backends alone"),
+    ],
+)
+def test_a_library_of_backends_is_for_backends(make_tree: MakeTree, change: dict[str, str], message: str) -> None:
+    """It has no entry points, and neither core nor plugins nor tasks build on it; a backend may."""
+    settings = ROOT_SETTINGS.replace('"plugins/*"', '"plugins/*", "backends/*"').replace(
+        "anysim-x = ", "anysim-m = { workspace = true }\nanysim-e = { workspace = true }\nanysim-x = "
+    )
+    settings = settings.replace('"anysim_x"', '"anysim_x", "anysim_m", "anysim_e"')
+    settings = settings.replace('"plugins/x"]', '"plugins/x", "backends/m", "backends/e"]')
+    files = {"pyproject.toml": settings, "plugins/x/pyproject.toml": CLEAN["plugins/x/pyproject.toml"]}
+    for letter, needed in (("m", ["anysim"]), ("e", ["anysim-m"])):
+        files[f"backends/{letter}/pyproject.toml"] = MEMBER.format(name=f"anysim-{letter}", dependencies=needed)
+        files[f"backends/{letter}/anysim_{letter}/__init__.py"] = '"""One."""\n'
+        files[f"backends/{letter}/anysim_{letter}/py.typed"] = ""
+    files["backends/e/pyproject.toml"] += '\n[project.entry-points."anysim.engines"]\ne = "anysim_e:E"\n'
+    found = [fault.message for fault in packages.check(make_tree(files | {k: files[k] + v for k, v in change.items()}))]
+    assert len(found) == len(change), found
+    assert all(message in text for text in found)
+
+
+@pytest.mark.parametrize(
     ("text", "message"),
     [
         ("numpy==2.4.6\nmujoco==3.17.0\nruff==0.17.5\n", "mujoco comes after numpy"),

@@ -9,7 +9,6 @@ Two shapes meet where the `kind` bits of one and the `meets` bits of the other h
 """
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -47,16 +46,8 @@ class _Class(NamedTuple):
     label: int
 
 
-@dataclass
-class _Bits:
-    """The shapes of one class, for its movable or its fixed geoms: value to (kind, meets)."""
-
-    copies: dict[Touch, list[int]]
-
-    def add(self, touch: Touch, kind: int = 0, meets: int = 0) -> None:
-        bits = self.copies.setdefault(touch, [0, 0])
-        bits[0] |= kind
-        bits[1] |= meets
+_Bits = dict[Touch, tuple[int, int]]
+"""The shapes of one class, for its movable or its fixed geoms: value to (kind, meets)."""
 
 
 def copies_of(
@@ -95,8 +86,8 @@ def copies_of(
     number = {key: i for i, key in enumerate(classes)}
     movable = {c for c, still in zip(keys, fixed, strict=True) if not still}
     still = {c for c, f in zip(keys, fixed, strict=True) if f}
-    loose: dict[_Class, _Bits] = {c: _Bits({}) for c in classes}
-    stuck: dict[_Class, _Bits] = {c: _Bits({}) for c in classes}
+    loose: dict[_Class, _Bits] = {c: {} for c in classes}
+    stuck: dict[_Class, _Bits] = {c: {} for c in classes}
     next_bit = iter(range(BITS))
 
     def bit() -> int:
@@ -109,20 +100,24 @@ def copies_of(
             )
         return 1 << number
 
+    def add(shapes: _Bits, touch: Touch, kind: int = 0, meets: int = 0) -> None:
+        before = shapes.get(touch, (0, 0))
+        shapes[touch] = (before[0] | kind, before[1] | meets)
+
     def meet(touch: Touch, first: _Class, seconds: Sequence[_Class]) -> None:
         """Movable geoms of `first` meet all of `seconds`, its fixed ones the movable of `seconds`."""
         seconds = [second for second in seconds if (first.label, second.label) not in between]
         if first in movable and seconds:
             mark = bit()
-            loose[first].add(touch, kind=mark)
+            add(loose[first], touch, kind=mark)
             for second in seconds:
-                loose[second].add(touch, meets=mark)
-                stuck[second].add(touch, meets=mark)
+                add(loose[second], touch, meets=mark)
+                add(stuck[second], touch, meets=mark)
         if first in still and any(second in movable for second in seconds):
             mark = bit()
-            stuck[first].add(touch, kind=mark)
+            add(stuck[first], touch, kind=mark)
             for second in seconds:
-                loose[second].add(touch, meets=mark)
+                add(loose[second], touch, meets=mark)
 
     mixed: list[tuple[_Class, _Class]] = []
     for place, first in enumerate(classes):
@@ -137,7 +132,7 @@ def copies_of(
     result: list[list[Copy]] = []
     for key, is_fixed, others in zip(keys, fixed, partners, strict=True):
         wanted = {pair(key, other) for other in others}
-        bits = (stuck if is_fixed else loose)[key].copies
+        bits = (stuck if is_fixed else loose)[key]
         copies = [Copy(touch, *marks) for touch, marks in bits.items() if touch in wanted]
         # a geom that can touch nothing is still there for rays
         result.append(copies or [Copy(Touch(key.friction, key.restitution), 0, 0)])

@@ -86,21 +86,6 @@ class DriveArrays:
         """The memory of one articulation, a view."""
         return self.memory[env, self._starts[tree] : self._starts[tree + 1]]
 
-    def weight(self, env: int, tree: Tree, position: Array, torque: Array) -> bool:
-        """Write what cancels the weight of a tree's compensated bodies into `torque` (J,), as `articulation.weight`."""
-        return K.weight(
-            tree.joint_ints,
-            tree.joint_floats,
-            self.bodies[env],
-            tree.bodies,
-            self.gravity[env],
-            self.roots[env, tree.bodies[0]],
-            position,
-            tree.joints,
-            tree.first,
-            torque,
-        )
-
 
 class TreeDrives:
     """The law of one articulation of an env, over the steps of a call.
@@ -115,29 +100,16 @@ class TreeDrives:
     def __init__(self, arrays: DriveArrays, env: int, tree: Tree, wrench: Array | None, dt: float) -> None:
         """`wrench` (B, 6) [N, N m] is that of the call, at the centres of mass."""
         n = len(tree.joints)
-        self.tree, self._dt, self._implicit = tree, dt, arrays.implicit
-        self._gravity, self._bodies = arrays.gravity[env], arrays.bodies[env, tree.bodies]
-        self._drives, self._memory = arrays.acting[env, tree.joints], arrays.remembered(env, tree.number)
+        self.tree, gravity, bodies = tree, arrays.gravity[env], arrays.bodies[env, tree.bodies]
         self.wrench = np.zeros((n + 1, 6)) if wrench is None else wrench[tree.bodies]
-        self.motion, self.root, self._out = np.zeros((2, n)), np.zeros(13), np.zeros(2 * n + 6)
+        self.motion, self.root, out = np.zeros((2, n)), np.zeros(13), np.zeros(2 * n + 6)
         self.root[:7] = arrays.roots[env, tree.bodies[0]]
-        self.torque, self.effort, self.base = np.split(self._out, [n, 2 * n])
-        self.lift = -self._bodies[0, K.MASS] * self._bodies[0, K.COMPENSATED] * self._gravity
+        self.torque, self.effort, self.base = np.split(out, [n, 2 * n])
+        self.lift = -bodies[0, K.MASS] * bodies[0, K.COMPENSATED] * gravity
+        constants = dt, arrays.implicit, tree.joint_ints, tree.joint_floats, bodies, arrays.acting[env, tree.joints]
+        state = self.wrench, gravity, self.root, self.motion, tree.first, arrays.remembered(env, tree.number)
+        self._terms = *constants, *state, out
 
     def solve(self) -> bool:
         """Work out the next step; False where the state is not finite."""
-        return K.drive_law(
-            self._dt,
-            self._implicit,
-            self.tree.joint_ints,
-            self.tree.joint_floats,
-            self._bodies,
-            self._drives,
-            self.wrench,
-            self._gravity,
-            self.root,
-            self.motion,
-            self.tree.first,
-            self._memory,
-            self._out,
-        )
+        return K.drive_law(*self._terms)

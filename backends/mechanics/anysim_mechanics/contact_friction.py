@@ -21,20 +21,20 @@ _NOISE = 1e-3
 
 
 class Pair(NamedTuple):
-    """Two shapes that touch: forces are on the first body [N]."""
+    """Two shapes that touch at P points: forces are on the first body [N].
+
+    Attributes:
+        normals: (P, 3) unit, from the second to the first. pressure: (P,) [N] along them.
+        position: (P, 3) [m]. separation: (P,) [m]. friction: (3,) [N].
+    """
 
     first: int
     second: int
     normals: Array
-    """(P, 3) unit, from the second to the first."""
     pressure: Array
-    """(P,) [N] along the normals."""
     position: Array
-    """(P, 3) [m]."""
     separation: Array
-    """(P,) [m]."""
     friction: Array
-    """(3,) [N]."""
 
     @property
     def force(self) -> Array:

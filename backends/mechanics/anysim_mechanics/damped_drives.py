@@ -109,17 +109,11 @@ class DampedDrives:
     def record(self, env: int, journal: Journal) -> None:
         """Have a journal know what moves the env from here on."""
         if journal.commanded != self._commanded:
-            journal.commanded = self._commanded
-            control = b"" if self.control is None else np.concatenate([part[env] for part in self.control]).tobytes()
-            if control != journal.control:
-                journal.control = control
-                journal.record(Op.CONTROL, control)
+            journal.commanded, control = self._commanded, self.control
+            journal.renew(Op.CONTROL, b"" if control is None else np.concatenate([c[env] for c in control]).tobytes())
         if journal.tuned != self._tuned:
             journal.tuned, own = self._tuned, self.gains
-            gains = b"".join(part[env].tobytes() for part in (own.kp, own.kd, own.limit, self.passive))
-            if gains != journal.gains:
-                journal.gains = gains
-                journal.record(Op.GAINS, gains)
+            journal.renew(Op.GAINS, b"".join(v[env].tobytes() for v in (own.kp, own.kd, own.limit, self.passive)))
 
     # ------------------------------------------------------------------ what was exerted
 

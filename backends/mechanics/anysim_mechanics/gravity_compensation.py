@@ -8,6 +8,7 @@ make them.
 import numpy as np
 
 from anysim.conventions import Array
+from anysim_mechanics import articulation as K
 from anysim_mechanics.computed_drives import DriveArrays
 from anysim_mechanics.trees import Tree
 
@@ -38,7 +39,10 @@ class GravityCompensation:
 
     def renew(self, env: int, tree: Tree, position: Array) -> bool:
         """Work out the torques of a tree at the env's joint positions (J,); False where they are not finite."""
-        return self._arrays.weight(env, tree, position, self.torque[env])
+        bodies, gravity, root = (part[env] for part in (self._arrays.bodies, self._arrays.gravity, self._arrays.roots))
+        shape = tree.joint_ints, tree.joint_floats, bodies, tree.bodies
+        state = gravity, root[tree.bodies[0]], position
+        return K.weight(*shape, *state, tree.joints, tree.first, self.torque[env])
 
     def spend(self, env: int, steps: int) -> int:
         """How many of some steps the torques are good for; these are counted."""

@@ -57,7 +57,7 @@ _WRITES = frozenset({Op.JOINTS, Op.POSE, Op.VELOCITY, Op.INERTIAL, Op.DRY, Op.AR
 class Journal:
     """What was done to one scene."""
 
-    __slots__ = ("_bytes", "_waiting", "commanded", "control", "gains", "steps", "tuned", "writes")
+    __slots__ = ("_bytes", "_latest", "_waiting", "commanded", "steps", "tuned", "writes")
 
     def __init__(self) -> None:
         self.clear()
@@ -68,8 +68,7 @@ class Journal:
         self._waiting = 0
         self.steps, self.writes = 0, 0
         """Physics steps and writes since the last BASE."""
-        self.control, self.gains = b"", b""
-        """The latest entries CONTROL and GAINS."""
+        self._latest: dict[Op, bytes] = {}
         self.commanded, self.tuned = -1, -1
         """Marks of the drives', by which they know that neither changed since."""
 
@@ -80,6 +79,12 @@ class Journal:
         self._bytes += _HEAD.pack(op, len(numbers) // 8) + numbers
         if op in _WRITES:
             self.writes += 1
+
+    def renew(self, op: Op, numbers: bytes) -> None:
+        """Add an entry where the latest by this method says something else."""
+        if self._latest.get(op, b"") != numbers:
+            self._latest[op] = numbers
+            self.record(op, numbers)
 
     def note(self, op: Op, *numbers: Array | float) -> None:
         """Add an entry of numbers and rows of numbers."""

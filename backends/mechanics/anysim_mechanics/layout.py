@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anysim.conventions import WORLD, Array
+from anysim.conventions import Array
 from anysim.model.world import BodyKind, World
 from anysim_mechanics.trees import members
 
@@ -32,10 +32,6 @@ class Layout:
     """(B,) bool: free bodies that are there."""
     links: Array
     """(L,) links, without roots, that are there."""
-    geom_fixed: Array
-    """(G,) bool: geoms of the world and of static bodies."""
-    geom_entity: Array
-    """(G,) segmentation id."""
 
     @classmethod
     def of(cls, world: World, there: Array | None = None) -> "Layout":
@@ -47,17 +43,13 @@ class Layout:
         tree_of = np.full(len(world.bodies), -1)
         for number, bodies in enumerate(articulated):
             tree_of[list(bodies)] = number
-        fixed = np.array([b.kind is BodyKind.STATIC for b in world.bodies], dtype=bool)
-        entity = np.array([*world.body_entity, -1]) + 1
         return cls(
             trees=tuple(articulated),
             actors=tuple(root for root, bodies in trees.items() if len(bodies) == 1),
             tree_of=tree_of,
             there=there,
             joint_there=there[np.array([joint.body for joint in world.joints], dtype=int)],
-            fixed=fixed & there,
+            fixed=np.array([b.kind is BodyKind.STATIC for b in world.bodies], dtype=bool) & there,
             free=np.array([b.kind is BodyKind.FREE for b in world.bodies], dtype=bool) & there,
             links=np.array([i for i, b in enumerate(world.bodies) if b.kind is BodyKind.LINK and there[i]], dtype=int),
-            geom_fixed=np.array([g.body == WORLD or fixed[g.body] for g in world.geoms], dtype=bool),
-            geom_entity=entity[[g.body for g in world.geoms]] if world.geoms else np.zeros(0, dtype=int),
         )

@@ -15,20 +15,21 @@ class LinkTwists:
     """The constants of a World, made once."""
 
     def __init__(self, world: World) -> None:
-        self._free = np.array([i for i, b in enumerate(world.bodies) if b.kind is BodyKind.FREE], dtype=int)
-        self._links = np.array([i for i, b in enumerate(world.bodies) if b.kind is BodyKind.LINK], dtype=int)
-        self._body = np.array([j.body for j in world.joints], dtype=int)
-        self._axis = np.array([j.axis for j in world.joints], dtype=float).reshape(-1, 3)
-        self._anchor = np.array([j.anchor for j in world.joints], dtype=float).reshape(-1, 3)
-        self._turns = np.array([j.type is JointType.REVOLUTE for j in world.joints], dtype=float)
-        root = {body: root for root, bodies in members(world).items() for body in bodies}
-        self._root = np.array([root[i] for i in self._links.tolist()], dtype=int)
+        body = np.array([j.body for j in world.joints], dtype=int)
+        axis, anchor = (np.array([getattr(j, name) for j in world.joints], dtype=float) for name in ("axis", "anchor"))
+        turns = np.array([j.type is JointType.REVOLUTE for j in world.joints], dtype=float)
+        of = {body: root for root, bodies in members(world).items() for body in bodies}
+        free = np.array([i for i, b in enumerate(world.bodies) if b.kind is BodyKind.FREE], dtype=int)
+        links = np.array([i for i, b in enumerate(world.bodies) if b.kind is BodyKind.LINK], dtype=int)
+        root = np.array([of[i] for i in links.tolist()], dtype=int)
         chains: dict[int, list[int]] = {}
-        for i in self._links.tolist():
+        for i in links.tolist():
             # sums run up the joints' numbers
             chains[i] = sorted([*chains.get(world.bodies[i].parent, ()), world.body_joint[i]])
-        self._first = np.cumsum([0, *(len(chain) for chain in chains.values())])
-        self._chain = np.array([joint for chain in chains.values() for joint in chain], dtype=int)
+        first = np.cumsum([0, *(len(chain) for chain in chains.values())])
+        chain = np.array([joint for chain in chains.values() for joint in chain], dtype=int)
+        joints = body, axis.reshape(-1, 3), anchor.reshape(-1, 3), turns
+        self._constants = free, *joints, links, root, first, chain
 
     def of(self, pose: Array, velocity: Array, joint_vel: Array, com: Array) -> Array:
         """(N, B, 6) velocities of the bodies' frame origins, and their rates; 0 of what stands still.
@@ -40,22 +41,7 @@ class LinkTwists:
             com: (N, B, 3) centres of mass in the bodies' frames.
         """
         twists = np.zeros(velocity.shape)
-        _twists(
-            pose,
-            velocity,
-            joint_vel,
-            com,
-            self._free,
-            self._body,
-            self._axis,
-            self._anchor,
-            self._turns,
-            self._links,
-            self._root,
-            self._first,
-            self._chain,
-            twists,
-        )
+        _twists(pose, velocity, joint_vel, com, *self._constants, twists)
         return twists
 
 

@@ -32,8 +32,9 @@ class Meeting:
         self.solid = np.array([i for i, geom in enumerate(world.geoms) if geom.collides and here[geom.body]], dtype=int)
         self._surfaces = [world.geoms[i].surface for i in self.solid]
         self._labels = [self.apart.labels.get(world.geoms[i].body, 0) for i in self.solid]
-        self._fixed = layout.geom_fixed[self.solid]
-        self._meet = may_meet(world, np.array([world.geoms[i].body for i in self.solid], dtype=int))
+        bodies = np.array([world.geoms[i].body for i in self.solid], dtype=int)
+        self._fixed = np.append(layout.fixed, True)[bodies]
+        self._meet = may_meet(world, bodies)
 
     def copies(self, friction: Array, restitution: Array | None = None) -> dict[int, list[Copy]]:
         """The shapes of each geom that collides, for the coefficients in force (G,); restitutions as built for None.

@@ -30,6 +30,23 @@ class Balance(NamedTuple):
     doubt: Array
 
 
+class Given(NamedTuple):
+    """What an env was under in a substep.
+
+    Attributes:
+        gravity: (3,) [m/s^2], mass: (B,) [kg], friction: (J,) [N m] or [N].
+        slowing: (B, 2) [1/s] damping of velocities, which takes its share of what gravity and pushes have added
+            already, and of rates.
+        pushes: (K, 7) bodies and the wrenches that were on them; None without any.
+    """
+
+    gravity: Array
+    mass: Array
+    friction: Array
+    slowing: Array
+    pushes: Array | None
+
+
 class Substep(NamedTuple):
     """What a substep did to an env.
 
@@ -37,20 +54,12 @@ class Substep(NamedTuple):
         before, after: (B, 3) [m/s] velocities of the centres of mass.
         turn: (B, 4) orientations before.
         joint_force: (B, 3) [N] what each link's joint exerts on it, in the joint's axes before.
-        gravity: (3,) [m/s^2], mass: (B,) [kg], friction: (J,) [N m] or [N].
-        slowing: (B,) [1/s] damping of velocities, which takes its share of what gravity and pushes have added already.
-        pushes: (K, 7) bodies and the wrenches that were on them; None without any.
     """
 
     before: Array
     after: Array
     turn: Array
     joint_force: Array
-    gravity: Array
-    mass: Array
-    friction: Array
-    slowing: Array
-    pushes: Array | None
 
 
 class MomentumBalance:
@@ -72,34 +81,34 @@ class MomentumBalance:
         """Where there was no substep."""
         return Balance(np.zeros((len(self._parent), 3)), np.full(len(self._parent), np.inf))
 
-    def solve(self, substep: Substep) -> Balance:
+    def solve(self, substep: Substep, given: Given) -> Balance:
         """Net contact forces of a substep."""
-        (force, doubt), moving, mass = self.unknown(), self._moving, substep.mass[self._moving]
+        (force, doubt), moving, mass = self.unknown(), self._moving, given.mass[self._moving]
         before = substep.before[moving]
         force[moving] = (substep.after[moving] - before) * (mass[:, None] / self._dt)
-        force[moving] -= np.outer(mass * self._weighs[moving], substep.gravity)
-        if substep.slowing.any():
-            force[moving] += self._dragged(substep, before)
-        if substep.pushes is not None:
-            force[substep.pushes[:, 0].astype(int)] -= substep.pushes[:, 1:4]
+        force[moving] -= np.outer(mass * self._weighs[moving], given.gravity)
+        if given.slowing[:, 0].any():
+            force[moving] += self._dragged(before, given)
+        if given.pushes is not None:
+            force[given.pushes[:, 0].astype(int)] -= given.pushes[:, 1:4]
         if len(self._links):
             exerted, links = np.zeros_like(force), self._links
             exerted[links] = P.rotate(P.multiply(substep.turn[links], self._turn[links]), substep.joint_force[links])
             force -= exerted
             np.add.at(force, self._parent[links], exerted[links])
-        doubt[moving] = (substep.friction @ self._doubts)[moving]
+        doubt[moving] = (given.friction @ self._doubts)[moving]
         return Balance(force, doubt)
 
-    def _dragged(self, substep: Substep, before: Array) -> Array:
+    def _dragged(self, before: Array, given: Given) -> Array:
         """(M, 3) [N] what damping takes of what moves."""
         moving = self._moving
         pushed = np.zeros((len(self._parent), 3))
-        if substep.pushes is not None:
-            pushed[substep.pushes[:, 0].astype(int)] = substep.pushes[:, 1:4]
-        mass = substep.mass[moving, None]
+        if given.pushes is not None:
+            pushed[given.pushes[:, 0].astype(int)] = given.pushes[:, 1:4]
+        mass = given.mass[moving, None]
         pulled = np.divide(pushed[moving], mass, out=np.zeros((len(mass), 3)), where=mass > 0)  # 0 of what is absent
-        gained = np.outer(self._weighs[moving], substep.gravity) + pulled
-        return substep.slowing[moving, None] * mass * (before + self._dt * gained)
+        gained = np.outer(self._weighs[moving], given.gravity) + pulled
+        return given.slowing[moving, :1] * mass * (before + self._dt * gained)
 
 
 def _doubts(world: World) -> Array:

@@ -19,7 +19,7 @@ from anysim_mechanics.trees import Frames, Tree
 from anysim_pybullet import reading
 from anysim_pybullet.client import Env
 from anysim_pybullet.lift import Lifter
-from anysim_pybullet.motors import Motors, feed
+from anysim_pybullet.motors import Motors
 
 _ONLY_COUPLED = np.array([0, 0, 0, 0, 1, 0, 1, 0, 1, 0], dtype=float)
 """Takes everything away from the drive of a joint that a motor moves, but limits and its multiplier."""
@@ -69,7 +69,8 @@ class Laws(DriveArrays):
             return
         if not motors.know(control.mode):
             before = motors.running.copy()
-            motors.prepare(control.mode, gains, *self.damping_and_armature(), self._envs)
+            damping, armature = self.drives[:, :, K.DAMPING], self.drives[:, :, K.ARMATURE]
+            motors.prepare(control.mode, gains, damping, armature, self._envs)
             self.acting = self.drives.copy()
             self.acting[:, gains.joint, K.LIMIT] = gains.limit
             self.acting[motors.running] *= _ONLY_COUPLED
@@ -79,11 +80,7 @@ class Laws(DriveArrays):
                 self._sort_trees()
         motors.apply(control)
         if self._feeds:
-            self.acting[:, gains.joint, K.FEED] = feed(control)
-
-    def damping_and_armature(self) -> tuple[Array, Array]:
-        """Those of the joints (N, J), views."""
-        return self.drives[:, :, K.DAMPING], self.drives[:, :, K.ARMATURE]
+            self.acting[:, gains.joint, K.FEED] = np.where(control.mode == EFFORT, control.effort, 0.0)
 
     def lifter(self, env: Env, index: int) -> Lifter | None:
         """What is left to do in an env where Bullet's motors do everything else; None where the law is needed."""

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.control import EFFORT, Control, acting_gains
+from anysim.engine.control import Control, acting_gains
 from anysim.errors import EngineError
 from anysim.kinematics.dynamics import mass_matrix
 from anysim.model.world import World
@@ -132,8 +132,3 @@ def refuse_dry_friction(world: World, joint: int, friction: float) -> None:
             f"joint '{world.joints[joint].name}' has dry friction and a drive; with physics.actuation: native pybullet "
             f"has one motor for both; use physics.actuation: implicit_pd, or take the friction away"
         )
-
-
-def feed(control: Control) -> Array:
-    """What is left of the commands for the law: the effort of drives in effort mode (N, A)."""
-    return np.where(control.mode == EFFORT, control.effort, 0.0)

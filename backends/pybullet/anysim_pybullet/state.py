@@ -105,20 +105,8 @@ class Mirror:
         if not everything:
             bodies, roots, joints = cast.links, 0, _NONE
         pose, twist, rates = self.pose[index], self.twist[index], self.velocity[index]
-        reading.take(
-            packed,
-            env.local,
-            bodies,
-            roots,
-            joints,
-            self._running[index],
-            pose,
-            twist,
-            self.position[index],
-            rates,
-            self._motor[index],
-            self._laws.effort[index],
-        )
+        written = pose, twist, self.position[index], rates, self._motor[index], self._laws.effort[index]
+        reading.take(packed, env.local, bodies, roots, joints, self._running[index], *written)
         if not reading.within(FAR, FAST, pose, twist, rates):
             self.fault[index] = True
 

@@ -158,7 +158,7 @@ class Envs(EnvWorlds):
         if level is SnapshotLevel.TRAJECTORY:
             self.scenes[env], drives, momentum = relive(self._recipes[env], rows)
             self.drives.adopt(env, drives)
-            self._momentum.adopt(env, momentum.noted(0))
+            self._momentum.adopt(env, momentum)
         else:
             self._place(env, Motion(*(rows[name] for name in Motion._fields)))
 
@@ -178,7 +178,7 @@ class Envs(EnvWorlds):
     def painter(self) -> Painter:
         from anysim_sapien.render import Painter
 
-        return Painter(self.world, self.recipes.layout, self.parameters.looks, self.options)
+        return Painter(self.world, self.parameters.looks, self.options)
 
     def read_back(self) -> Mapping[str, Array]:
         scene = self.scenes[0]

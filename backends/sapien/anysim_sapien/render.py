@@ -15,7 +15,6 @@ from anysim.geometry.tessellate import triangles
 from anysim.math import pose as P
 from anysim.model.appearance import lying, wrapped
 from anysim.model.world import Box, Capsule, Cylinder, Geom, HeightFieldShape, MeshShape, Plane, Shape, Sphere, World
-from anysim_mechanics.layout import Layout
 from anysim_sapien.library import sapien
 from anysim_sapien.options import SapienOptions
 from anysim_sapien.shapes import X_TO_Z, relief, to_pose
@@ -35,7 +34,7 @@ SUN = (0.3, -0.5, -1.0)
 class Painter:
     """Draws the envs of one engine. Its methods may be called from any thread."""
 
-    def __init__(self, world: World, layout: Layout, looks: Looks, options: SapienOptions) -> None:
+    def __init__(self, world: World, looks: Looks, options: SapienOptions) -> None:
         with drawing:
             device = open_device(options.vulkan_icd)
             self._shader = options.shader
@@ -51,9 +50,10 @@ class Painter:
             self._lights = [self._add_light(local) for local in looks.local.tolist()]
             if not self._lights:
                 self._shine(self._add_light(False), np.array(SUN), np.zeros(3), np.full(3, 0.6), False)
+            entity = [number + 1 for number in (*world.body_entity, -1)]  # the last one is the world's, by its index
             for index, geom in enumerate(world.geoms):
                 if geom.visible:
-                    self._add(world, index, geom, int(layout.geom_entity[index]))
+                    self._add(world, index, geom, entity[geom.body])
 
     def close(self) -> None:
         """Free the device's copies of the world."""

@@ -20,8 +20,13 @@ class StateReader:
         self._packed, self._batch = np.zeros(0), Batch([scene.packing for scene in scenes])
         self._coms: list[Array] = []
         self._com = np.zeros((len(scenes), len(world.bodies), 3))
-        names = ("body_pose", "body_twist", "joint_pos", "joint_vel", "fault")
-        self.fields: Mapping[str, Callable[[], Array]] = {name: getattr(self, name) for name in names}
+        self.fields: Mapping[str, Callable[[], Array]] = {
+            "body_pose": lambda: self._taken("pose"),
+            "body_twist": self.body_twist,
+            "joint_pos": lambda: self._taken("joint_pos"),
+            "joint_vel": lambda: self._taken("joint_vel"),
+            "fault": self.fault,
+        }
         """Reads a fresh array of a field."""
 
     def _read(self) -> tuple[Array, Batch]:
@@ -35,25 +40,17 @@ class StateReader:
             self._blobs = blobs
         return self._packed, self._batch
 
-    def body_pose(self) -> Array:
+    def _taken(self, name: str) -> Array:
         packed, batch = self._read()
-        return packed.take(batch.pose)
+        return packed.take(getattr(batch, name))
 
     def body_twist(self) -> Array:
         coms = [scene.com for scene in self._scenes]
         if len(coms) != len(self._coms) or any(a is not b for a, b in zip(coms, self._coms, strict=True)):
             self._coms, self._com = coms, np.array(coms)
         packed, batch = self._read()
-        velocity, joint_vel = packed.take(batch.velocity), packed.take(batch.joint_vel)
-        return self._twists.of(packed.take(batch.pose), velocity, joint_vel, self._com)
-
-    def joint_pos(self) -> Array:
-        packed, batch = self._read()
-        return packed.take(batch.joint_pos)
-
-    def joint_vel(self) -> Array:
-        packed, batch = self._read()
-        return packed.take(batch.joint_vel)
+        pose, velocity, joint_vel = (packed.take(at) for at in (batch.pose, batch.velocity, batch.joint_vel))
+        return self._twists.of(pose, velocity, joint_vel, self._com)
 
     def fault(self) -> Array:
         packed, batch = self._read()
