@@ -130,6 +130,7 @@ site: $(SITE)  ## build the documentation with its API pages into build/site
 
 bench: $(STAMP)  ## measure speed against the budgets, as ratios
 	$(BIN)/anysim bench step $(ARGS)
+	$(BIN)/anysim bench plan
 	@set -e; for program in $(wildcard benchmarks/*.py); do echo "$$program"; $(BIN)/python $$program; done
 
 wheels: $(STAMP)  ## build the wheels of all packages into dist/ (docs/install.md)
