@@ -94,7 +94,7 @@ class PlanRequest:
         path: False asks for joint positions at the goals alone (`ik`, `dual_ik`): free ones, the nearest to `start`,
             which may itself be in collision then.
         straight: [m] how far the tools may leave the straight line to their pose; None for any path.
-        attached: what is held.
+        attached: what is held; it may touch what it rests on at the start.
         allowed: pairs of names, of bodies or of entities, that may touch.
         padding: [m] distance kept from what is not a robot.
         velocity_scale: part of the joints' velocity limits that is used.
