@@ -58,6 +58,7 @@ class ToolGoal:
         robot, tool: names; the tool moves by those of the request's joints that lie between the root and it.
         poses: (G, 7) candidates, world poses of the tool.
         rotation_weight: (3,) about the tool's axes; 0 leaves that rotation free.
+        slide: (3,) [m] by how much the tool may be off along each of its axes; at the end of a `straight` it is not.
         position_tolerance: [m]
         rotation_tolerance: [rad]
         enabled: one that is not counts for nothing, but keeps its place.
@@ -67,6 +68,7 @@ class ToolGoal:
     tool: str
     poses: Array
     rotation_weight: tuple[float, float, float] = ALL_AXES
+    slide: tuple[float, float, float] = (0.0, 0.0, 0.0)
     position_tolerance: float = 1e-4
     rotation_tolerance: float = 1e-4
     enabled: bool = True
@@ -142,6 +144,8 @@ class PlanRequest:
         for name, (value, shape) in arrays.items():
             if value is not None and (np.shape(value) != shape or not np.isfinite(value).all()):
                 raise AnysimError(f"{name}: expected finite numbers of shape {shape}, got shape {np.shape(value)}")
+        if any(not length >= 0 for goal in used for length in goal.slide):
+            raise AnysimError("expected lengths >= 0 of the slides of goals")
         widths = {len(goal.poses) for goal in used}
         if 0 in widths or (self.pairing is Pairing.PAIRED and len(widths) > 1):
             raise AnysimError(

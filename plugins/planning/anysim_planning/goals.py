@@ -15,6 +15,7 @@ from anysim.model.world import World
 from anysim.planning.api import InverseKinematics, inverse_kinematics
 from anysim.planning.motion import Pairing, PlanRequest, Scene, ToolGoal
 from anysim_planning.scene import PlanningWorld
+from anysim_planning.slides import sliding
 
 DRAWS = 6
 """Starts of a candidate: the live configuration, then random ones as long as what was found collides."""
@@ -25,14 +26,12 @@ COMBINATIONS = 64
 """Choices of several independent tools that are looked at, the nearest first."""
 
 
-_OF_JOINTS = (
-    "joints", "joint_names", "prismatic", "rest", "anchor", "axis", "lower", "upper", "velocity_limit", "initial"
-)  # fmt: skip
+_OF_JOINTS = "joints joint_names prismatic rest anchor axis lower upper velocity_limit initial".split()
 """What a chain has of each joint."""
 
 
 class Arm(NamedTuple):
-    """What moves one tool: its solver, and the request's columns in the order of the solver's joints."""
+    """What moves one tool: its solver, and the request's columns in the order of the solver's joints but for slides."""
 
     solver: InverseKinematics
     columns: Array
@@ -88,7 +87,8 @@ class GoalSolver:
         Raises:
             AnysimError: no such robot or tool, or none of the joints moves it.
         """
-        key = (request.joints, settled, goal.robot, goal.tool, goal.position_tolerance, goal.rotation_tolerance)
+        key = (request.joints, settled, goal.robot, goal.tool, goal.slide)
+        key += (goal.position_tolerance, goal.rotation_tolerance)
         if key not in self._arms:
             world = self._world
             robot = next((r for r in world.robots if r.name == goal.robot), None)
@@ -111,7 +111,7 @@ class GoalSolver:
                 raise AnysimError(f"the tool '{goal.tool}' does not hang from any of the joints of the plan")
             chain = Chain.from_world(world, goal.robot, next(iter(robot.channels)), goal.tool, joints=joints)
             options = {"position_tolerance": goal.position_tolerance, "rotation_tolerance": goal.rotation_tolerance}
-            solver = inverse_kinematics(chain, self._solver, threads=1, **options)
+            solver = inverse_kinematics(sliding(chain, goal.slide), self._solver, threads=1, **options)
             self._arms[key] = Arm(solver, np.array([request.joints.index(name) for name in chain.joint_names]))
         return self._arms[key]
 
@@ -221,10 +221,9 @@ class GoalSolver:
                 rng_seeds=keys,
                 rotation_weight=first.goal.rotation_weight,
             )
+            joint_pos = answer.joint_pos[:, : len(first.arm.columns)]
             ends = np.cumsum([len(parts[k].which) for k in numbers])[:-1]
-            for k, q, good in zip(
-                numbers, np.split(answer.joint_pos, ends), np.split(answer.converged, ends), strict=True
-            ):
+            for k, q, good in zip(numbers, np.split(joint_pos, ends), np.split(answer.converged, ends), strict=True):
                 solved[k] = q, good
         return solved
 
@@ -293,7 +292,9 @@ def _rows(base: Array, part: Part, draw: int) -> tuple[Array, Array, Array, Arra
     """Targets, bases, seeds and keys of a part's candidates. A row depends on its own key alone."""
     chain, arm = part.arm.solver.chain, part.arm
     keys = [np.random.SeedSequence([part.request.seed, part.tool, int(g), draw]) for g in part.which]
-    live = np.clip(np.asarray(part.request.start, dtype=float)[arm.columns], chain.lower, chain.upper)
+    live = np.zeros(len(chain))
+    live[: len(arm.columns)] = np.asarray(part.request.start, dtype=float)[arm.columns]
+    live = np.clip(live, chain.lower, chain.upper)
     seeds = np.tile(live, (len(keys), 1))
     if draw:
         low = np.where(np.isfinite(chain.lower), chain.lower, -np.pi)

@@ -214,7 +214,7 @@ def _subject(request: PlanRequest) -> tuple[object, ...]:
 def _likeness(future: PlanFuture) -> tuple[object, ...]:
     request = future.request
     goals = tuple(
-        (g.robot, g.tool, len(g.poses), g.position_tolerance, g.rotation_tolerance, g.rotation_weight)
+        (g.robot, g.tool, len(g.poses), g.position_tolerance, g.rotation_tolerance, g.rotation_weight, g.slide)
         for g in request.goals
     )
     return request.kind, request.joints, goals, request.straight is None

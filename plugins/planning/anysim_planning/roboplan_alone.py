@@ -3,6 +3,7 @@
 A measure of what is built around it, and no planner: nothing checks its paths. Only its scene is made from a World.
 """
 
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -41,7 +42,7 @@ class RoboplanAlone:
         made = RoboplanScene(world, planned)
         made.take()
         self._scene, self._names, used = made.scene, list(request.joints), [goal for _, goal in enabled(request)]
-        chains = [GoalSolver(world).arm(request, goal).solver.chain for goal in used]
+        chains = [GoalSolver(world).arm(request, replace(goal, slide=(0.0, 0.0, 0.0))).solver.chain for goal in used]
         self._links = [f"link_{planned.model.getJointId(chain.joint_names[-1])}" for chain in chains]
         self._offsets = [
             _link_in_tool(world, scene, goal, int(chain.joints[-1])) for goal, chain in zip(used, chains, strict=True)

@@ -1,4 +1,4 @@
-"""What a report says of tasks that cannot be done: which type each episode failed with, and what was tried before."""
+"""Reports of tasks that cannot be done: which type each episode failed with, and what was tried before."""
 
 from pathlib import Path
 

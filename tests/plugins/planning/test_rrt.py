@@ -90,6 +90,28 @@ def test_a_goal_set_says_of_each_candidate_what_became_of_it(world: World, plann
     assert "1 of 2 candidates can be reached, all of them in collision" in nothing.message
 
 
+def test_a_tool_that_may_slide_is_anywhere_along_its_axis(world: World, planner: RrtPlanner, scene: Scene) -> None:
+    """A pose out of reach along the tool's own axis, which is level; off the axis the tool has no freedom."""
+    chain = Chain.from_world(world, "panda", "arm", "tool")
+    quaternion = np.array([0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5)])  # z of the tool along x of the world
+    far = np.array([[1.5, -0.4, 0.5, *quaternion]])
+    request = reach(world, far)
+    assert planned(planner, request, scene).status is PlanStatus.NO_IK
+    for slide, status in ((1.0, PlanStatus.OK), (float("inf"), PlanStatus.OK), (0.3, PlanStatus.NO_IK)):
+        goal = replace(request.goals[0], slide=(0.0, 0.0, slide))
+        answer = planned(planner, replace(request, goals=(goal,)), scene)
+        assert answer.status is status, answer.message
+        if answer.trajectory is not None:
+            tool = chain.tool_pose(scene.body_pose[chain.root], answer.trajectory.joint_pos[-1])
+            np.testing.assert_allclose(tool[1:3], far[0, 1:3], atol=2e-4)
+            assert P.angle_between(tool[3:], quaternion) < 2e-4
+            assert far[0, 0] - slide - 1e-3 <= tool[0] < 0.8
+    along_x = replace(request.goals[0], slide=(1.0, 0.0, 0.0))  # that is down in the world
+    assert planned(planner, replace(request, goals=(along_x,)), scene).status is PlanStatus.NO_IK
+    with pytest.raises(AnysimError, match="lengths >= 0"):
+        replace(request, goals=(replace(goal, slide=(0.0, 0.0, -0.1)),)).check()
+
+
 def test_a_base_that_stands_elsewhere_moves_the_goal_with_it(world: World, planner: RrtPlanner, scene: Scene) -> None:
     shift = np.zeros_like(scene.body_pose)
     shift[:, 0] = 0.3

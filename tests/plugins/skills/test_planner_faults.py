@@ -22,11 +22,11 @@ ENVS = 3
 SERVICES = {"threads": ThreadedService, "processes": ProcessService}
 CASES = [
     ("raises", "threads", "no_path"),
-    ("dies", "processes", "no_path"),
     *(
         pytest.param(*case, marks=pytest.mark.slow)
         for case in (
             ("raises", "processes", "no_path"),
+            ("dies", "processes", "no_path"),
             ("hangs", "threads", "timeout"),
             ("hangs", "processes", "timeout"),
             ("is slow", "threads", "ok"),
