@@ -22,7 +22,7 @@ from anysim.planning.scenes import Scenes
 from anysim.planning.service import PlannerService, planner_service
 from anysim.task.env import TaskEnv
 from anysim_bench.free_paths import Touching, dense
-from anysim_bench.plan_bare import Bare, bare, length
+from anysim_bench.plan_bare import BareTurns, bare, length
 from anysim_bench.plan_costs import PairCost, PlanCost, ServiceCost
 from anysim_bench.plan_requests import DEADLINE, Arms
 from anysim_bench.resets import resident_mib
@@ -135,7 +135,7 @@ def _in_turns(
     names: Sequence[str],
     asked: list[PlanRequest],
     scene: Scene,
-    other: Bare | None,
+    other: BareTurns | None,
 ) -> tuple[list[PlanAnswer], list[float], list[ServiceCost]]:
     """Answers, seconds of each plan alone in the best turn, and what services take for all of them."""
     answers, spent, alone_cpu = list[PlanAnswer](), [np.inf], np.inf

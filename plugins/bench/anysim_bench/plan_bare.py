@@ -12,7 +12,7 @@ from anysim.model.world import World
 from anysim.planning.motion import PlanRequest, Scene, motion_planner
 
 
-class Alone(Protocol):
+class BarePlanner(Protocol):
     """Roboplan itself."""
 
     def plan(self, request: PlanRequest) -> Array | None:
@@ -37,10 +37,10 @@ class BareCost(NamedTuple):
     length: float
 
 
-class Bare:
+class BareTurns:
     """Roboplan in turns with others; the best turn counts."""
 
-    def __init__(self, alone: Alone, asked: Sequence[PlanRequest]) -> None:
+    def __init__(self, alone: BarePlanner, asked: Sequence[PlanRequest]) -> None:
         self._alone, self._asked = alone, asked
         self._wall = self._cpu = np.inf
         self._paths: list[Array] = []
@@ -65,12 +65,12 @@ class Bare:
         )
 
 
-def bare(world: World, asked: Sequence[PlanRequest], scene: Scene) -> Bare | None:
+def bare(world: World, asked: Sequence[PlanRequest], scene: Scene) -> BareTurns | None:
     """Roboplan with a scene; None where it is not installed."""
     try:
         planner = motion_planner(world, "roboplan")
-        make = cast(Callable[[PlanRequest, Scene], Alone], getattr(planner, "alone"))  # noqa: B009  (of that planner alone)
-        return Bare(make(asked[0], scene), asked)
+        make = cast(Callable[[PlanRequest, Scene], BarePlanner], getattr(planner, "alone"))  # noqa: B009  (of that planner alone)
+        return BareTurns(make(asked[0], scene), asked)
     except PluginError:
         return None
 

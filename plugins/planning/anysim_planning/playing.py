@@ -15,7 +15,7 @@ FOLLOWED = 0.005
 """[m] that a tool may be off the path by which it was to go, with the drives of the catalogue's arms."""
 
 
-class Played(NamedTuple):
+class Playback(NamedTuple):
     """T control steps of an arm.
 
     Attributes:
@@ -41,7 +41,7 @@ class Played(NamedTuple):
         return float(away.max()), float(P.angle_between(self.tool_pose[:, 3:], poses[nearest, 3:]).max())
 
 
-def play(world: World, robot: str, tool: str, times: Array, joint_pos: Array, engine: str | None = None) -> Played:
+def play(world: World, robot: str, tool: str, times: Array, joint_pos: Array, engine: str | None = None) -> Playback:
     """Play joint positions (M, K) of the arm of a tool at times (M,) on an engine, from rest; all else holds still.
 
     Raises:
@@ -74,4 +74,4 @@ def play(world: World, robot: str, tool: str, times: Array, joint_pos: Array, en
         named = f"{simulation.name} {simulation.version}"
     finally:
         simulation.destroy()
-    return Played(named, clock[1:], np.array(joint_rows), np.array(poses))
+    return Playback(named, clock[1:], np.array(joint_rows), np.array(poses))

@@ -26,7 +26,7 @@ IK = {"max_iters": 40, "max_restarts": 50, "step_size": 0.5, "max_time": 0.5}
 """Options with which it solves nearly every goal that can be reached; its own are two restarts in 5 ms."""
 
 
-class RoboplanAlone:
+class BareRoboplan:
     """Roboplan with the scene of one request; others that it is asked have the same joints, limits and tools."""
 
     def __init__(self, world: World, request: PlanRequest, scene: Scene) -> None:
