@@ -58,20 +58,20 @@ class ToolGoal:
         robot, tool: names; the tool moves by those of the request's joints that lie between the root and it.
         poses: (G, 7) candidates, world poses of the tool.
         rotation_weight: (3,) about the tool's axes; 0 leaves that rotation free.
-        slide: (3,) [m] by how much the tool may be off along each of its axes; at the end of a `straight` it is not.
         position_tolerance: [m]
         rotation_tolerance: [rad]
         enabled: one that is not counts for nothing, but keeps its place.
+        slide: (3,) [m] by how much the tool may be off along each of its axes; at the end of a `straight` it is not.
     """
 
     robot: str
     tool: str
     poses: Array
     rotation_weight: tuple[float, float, float] = ALL_AXES
-    slide: tuple[float, float, float] = (0.0, 0.0, 0.0)
     position_tolerance: float = 1e-4
     rotation_tolerance: float = 1e-4
     enabled: bool = True
+    slide: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 class Attachment(NamedTuple):
