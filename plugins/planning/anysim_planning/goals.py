@@ -37,7 +37,7 @@ class Arm(NamedTuple):
     columns: Array
 
 
-class Reached(NamedTuple):
+class GoalConfiguration(NamedTuple):
     """Joint positions (K,) for chosen candidates, one of each tool; -1 for a tool that is switched off."""
 
     chosen: tuple[int, ...]
@@ -47,11 +47,11 @@ class Reached(NamedTuple):
 class Reach(NamedTuple):
     """Free configurations, the nearest first; which candidates (G,) some configuration reaches, free or not."""
 
-    found: list[Reached]
+    found: list[GoalConfiguration]
     reachable: Array
 
 
-class Asked(NamedTuple):
+class ReachQuery(NamedTuple):
     """A request, its scene, and what gives the collision world with everything where that scene has it."""
 
     request: PlanRequest
@@ -124,9 +124,9 @@ class GoalSolver:
 
     def reach(self, request: PlanRequest, scene: Scene, world: PlanningWorld) -> Reach:
         """Free configurations for a request's goals."""
-        return self.reach_all([Asked(request, scene, lambda: world)])[0]
+        return self.reach_all([ReachQuery(request, scene, lambda: world)])[0]
 
-    def reach_all(self, asked: Sequence[Asked]) -> list[Reach]:
+    def reach_all(self, asked: Sequence[ReachQuery]) -> list[Reach]:
         """Those of several requests, each as if it were alone; candidates of one tool are solved together.
 
         Raises:
@@ -191,13 +191,13 @@ class GoalSolver:
             options.append(sorted(rows, key=lambda row: row[:2])[:COMBINATIONS])
         some = max(1, int(COMBINATIONS ** (1.0 / len(search.tools))))
         choices = sorted(product(*(rows[:some] for rows in options)), key=lambda c: sum(row[0] for row in c))
-        found, world = list[Reached](), search.asked.world()
+        found, world = list[GoalConfiguration](), search.asked.world()
         for choice in choices:
             q, chosen = start.copy(), [-1] * len(request.goals)
             for (t, _, arm), (_, g, part) in zip(search.tools, choice, strict=True):
                 q[arm.columns], chosen[t] = part, g
             if not world.hits(q[None])[0]:
-                found.append(Reached(tuple(chosen), q))
+                found.append(GoalConfiguration(tuple(chosen), q))
         return Reach(found, search.reachable)
 
     def _solve(self, parts: Sequence[Part], draw: int) -> list[tuple[Array, Array]]:
@@ -231,7 +231,7 @@ class GoalSolver:
 class _Search:
     """The candidates of one request while some have no free configuration."""
 
-    def __init__(self, asked: Asked, tools: list[tuple[int, ToolGoal, Arm]]) -> None:
+    def __init__(self, asked: ReachQuery, tools: list[tuple[int, ToolGoal, Arm]]) -> None:
         self.asked, self.tools = asked, tools
         columns = np.concatenate([arm.columns for _, _, arm in tools])
         width = len(tools[0][1].poses)
@@ -241,7 +241,7 @@ class _Search:
             raise AnysimError(
                 "tools that share joints choose in pairs and take any path: leave pairing and straight out"
             )
-        self.reachable, self.found = np.zeros(width, bool), list[Reached]()
+        self.reachable, self.found = np.zeros(width, bool), list[GoalConfiguration]()
         self.open = np.arange(width)
         """Candidates without a free configuration that may still get one."""
         self.still = np.ones(width, bool)
@@ -272,7 +272,7 @@ class _Search:
             chosen = [-1] * len(self.asked.request.goals)
             for t, _, _ in self.tools:
                 chosen[t] = int(self.open[row])
-            self.found.append(Reached(tuple(chosen), q[row]))
+            self.found.append(GoalConfiguration(tuple(chosen), q[row]))
         self.still = ~free
         self.open = self.open[self.still]
 

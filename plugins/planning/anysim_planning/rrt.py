@@ -21,7 +21,7 @@ from anysim.planning.motion import (
     Scene,
     Trajectory,
 )
-from anysim_planning.goals import Asked, GoalSolver, Reached
+from anysim_planning.goals import ReachQuery, GoalSolver, GoalConfiguration
 from anysim_planning.lines import straight_line
 from anysim_planning.scene import PlanningWorld, topology
 from anysim_planning.search import connect, dense, edge_check, shortened
@@ -104,7 +104,7 @@ class RrtPlanner(MotionPlanner):
         passed("scene")
         if request.joint_goal is not None:
             q = np.asarray(request.joint_goal, dtype=float)
-            found, statuses = [Reached((0,), q)], [PlanStatus.OK]
+            found, statuses = [GoalConfiguration((0,), q)], [PlanStatus.OK]
             if world.hits(q[None])[0] or (q < world.lower - 1e-9).any() or (q > world.upper + 1e-9).any():
                 return answer(PlanStatus.NO_IK, "the joint positions asked for collide, or are beyond a joint's limit")
         else:
@@ -148,7 +148,7 @@ class RrtPlanner(MotionPlanner):
     ) -> list[PlanAnswer]:
         """Answers of requests without a path."""
         begun, answers = perf_counter(), list[PlanAnswer]()
-        asked = [Asked(r, s, partial(self.world_of, r, s)) for r, s in zip(requests, scenes, strict=True)]
+        asked = [ReachQuery(r, s, partial(self.world_of, r, s)) for r, s in zip(requests, scenes, strict=True)]
         for one, reach, budget in zip(asked, self._goals.reach_all(asked), budgets, strict=True):
             width = len(reach.reachable)
             more: dict[str, Any] = {"solver": self._signature, "world_version": one.scene.version}
@@ -185,7 +185,13 @@ class RrtPlanner(MotionPlanner):
         return path if path is None else shortened(path, free, rng, budget)
 
     def _motion(
-        self, request: PlanRequest, scene: Scene, world: PlanningWorld, goal: Reached, budget: Budget, passed: Any
+        self,
+        request: PlanRequest,
+        scene: Scene,
+        world: PlanningWorld,
+        goal: GoalConfiguration,
+        budget: Budget,
+        passed: Any,
     ) -> Trajectory | None:
         start = np.asarray(request.start, dtype=float)
         velocity = np.minimum(world.velocity_limit, 1e3) * request.velocity_scale
@@ -207,12 +213,12 @@ class RrtPlanner(MotionPlanner):
         return None
 
 
-def _first(one: Reached) -> int:
+def _first(one: GoalConfiguration) -> int:
     """The candidate of the first tool that counts."""
     return next(c for c in one.chosen if c >= 0)
 
 
-def _statuses(found: Sequence[Reached], width: int) -> list[PlanStatus]:
+def _statuses(found: Sequence[GoalConfiguration], width: int) -> list[PlanStatus]:
     free = {_first(one) for one in found}
     return [PlanStatus.OK if g in free else PlanStatus.NO_IK for g in range(width)]
 

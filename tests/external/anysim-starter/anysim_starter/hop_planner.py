@@ -6,7 +6,7 @@ from anysim.conventions import Array
 from anysim.errors import AnysimError
 from anysim.model.world import World
 from anysim.planning.motion import Budget, MotionPlanner, PlanAnswer, PlanRequest, PlanStatus, Scene
-from anysim_planning.goals import GoalSolver, Reached
+from anysim_planning.goals import GoalSolver, GoalConfiguration
 from anysim_planning.scene import PlanningWorld, topology
 from anysim_planning.search import dense, edge_check
 from anysim_planning.time_law import timed
@@ -36,7 +36,9 @@ class HopPlanner(MotionPlanner):
         checks, start = self._world(request, scene), np.asarray(request.start, dtype=float)
         width = next((len(goal.poses) for goal in request.goals if goal.enabled), 1)
 
-        def answer(status: PlanStatus, message: str = "", found: Reached | None = None, **more: object) -> PlanAnswer:
+        def answer(
+            status: PlanStatus, message: str = "", found: GoalConfiguration | None = None, **more: object
+        ) -> PlanAnswer:
             chosen = () if found is None else found.chosen
             each = [PlanStatus.NO_IK if found else status] * width
             for one in goals if found else ():
@@ -73,13 +75,13 @@ class HopPlanner(MotionPlanner):
         self._checks[key].take(scene, request.attached)
         return self._checks[key]
 
-    def _reached(self, request: PlanRequest, scene: Scene, checks: PlanningWorld) -> list[Reached]:
+    def _reached(self, request: PlanRequest, scene: Scene, checks: PlanningWorld) -> list[GoalConfiguration]:
         """Free joint positions of goals, the nearest first."""
         if request.joint_goal is None:
             return self._goals.reach(request, scene, checks).found
         goal = np.asarray(request.joint_goal, dtype=float)
         inside = (goal >= checks.lower).all() and (goal <= checks.upper).all()
-        return [Reached((0,), goal)] if inside and not checks.hits(goal[None])[0] else []
+        return [GoalConfiguration((0,), goal)] if inside and not checks.hits(goal[None])[0] else []
 
     def _path(
         self, start: Array, goal: Array, checks: PlanningWorld, rng: np.random.Generator, budget: Budget
