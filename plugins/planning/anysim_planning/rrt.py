@@ -21,7 +21,7 @@ from anysim.planning.motion import (
     Scene,
     Trajectory,
 )
-from anysim_planning.goals import ReachQuery, GoalSolver, GoalConfiguration
+from anysim_planning.goals import GoalConfiguration, GoalSolver, ReachQuery
 from anysim_planning.lines import straight_line
 from anysim_planning.scene import PlanningWorld, topology
 from anysim_planning.search import connect, dense, edge_check, shortened

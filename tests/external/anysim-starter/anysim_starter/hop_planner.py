@@ -6,7 +6,7 @@ from anysim.conventions import Array
 from anysim.errors import AnysimError
 from anysim.model.world import World
 from anysim.planning.motion import Budget, MotionPlanner, PlanAnswer, PlanRequest, PlanStatus, Scene
-from anysim_planning.goals import GoalSolver, GoalConfiguration
+from anysim_planning.goals import GoalConfiguration, GoalSolver
 from anysim_planning.scene import PlanningWorld, topology
 from anysim_planning.search import dense, edge_check
 from anysim_planning.time_law import timed
