@@ -130,9 +130,10 @@ site: $(SITE)  ## build the documentation with its API pages into build/site
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 	@echo "open build/site/index.html; searching needs a server: $(BIN)/python -m http.server -d build/site"
 
-bench: $(STAMP)  ## measure speed against the budgets, as ratios
+bench: $(TEST)  ## measure speed against the budgets, as ratios
 	$(BIN)/anysim bench step $(ARGS)
 	@set -e; for program in $(wildcard benchmarks/*.py); do echo "$$program"; $(BIN)/python $$program; done
+	$(BIN)/anysim bench plan
 
 wheels: $(STAMP)  ## build the wheels of all packages into dist/ (docs/install.md)
 	@rm -rf dist

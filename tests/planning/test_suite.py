@@ -38,7 +38,7 @@ def test_a_right_planner_passes(planner: str, tmp_path: Path) -> None:
         pytest.importorskip("roboplan.rrt", reason="roboplan is an extra")
     done = run(*SUITE, "--planner", planner, folder=tmp_path)
     assert done.returncode == 0, done.stdout[-4000:]
-    assert re.search(rf"anysim contract: planner {planner} 1.*: 31 passed, 0 skipped", done.stdout)
+    assert re.search(rf"anysim contract: planner {planner} 1.*: 32 passed, 0 skipped", done.stdout)
 
 
 @pytest.mark.slow

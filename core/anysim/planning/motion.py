@@ -61,6 +61,7 @@ class ToolGoal:
         position_tolerance: [m]
         rotation_tolerance: [rad]
         enabled: one that is not counts for nothing, but keeps its place.
+        slide: (3,) [m] by how much the tool may be off along each of its axes; at the end of a `straight` it is not.
     """
 
     robot: str
@@ -70,6 +71,7 @@ class ToolGoal:
     position_tolerance: float = 1e-4
     rotation_tolerance: float = 1e-4
     enabled: bool = True
+    slide: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 class Attachment(NamedTuple):
@@ -94,7 +96,7 @@ class PlanRequest:
         path: False asks for joint positions at the goals alone (`ik`, `dual_ik`): free ones, the nearest to `start`,
             which may itself be in collision then.
         straight: [m] how far the tools may leave the straight line to their pose; None for any path.
-        attached: what is held.
+        attached: what is held; it may touch what it rests on at the start.
         allowed: pairs of names, of bodies or of entities, that may touch.
         padding: [m] distance kept from what is not a robot.
         velocity_scale: part of the joints' velocity limits that is used.
@@ -142,6 +144,8 @@ class PlanRequest:
         for name, (value, shape) in arrays.items():
             if value is not None and (np.shape(value) != shape or not np.isfinite(value).all()):
                 raise AnysimError(f"{name}: expected finite numbers of shape {shape}, got shape {np.shape(value)}")
+        if any(not length >= 0 for goal in used for length in goal.slide):
+            raise AnysimError("expected lengths >= 0 of the slides of goals")
         widths = {len(goal.poses) for goal in used}
         if 0 in widths or (self.pairing is Pairing.PAIRED and len(widths) > 1):
             raise AnysimError(

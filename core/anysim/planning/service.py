@@ -4,6 +4,8 @@ When an answer takes effect is part of the question: after `latency` control ste
 or as soon as it is ready (`latency=None`), which gives up reproducibility.
 """
 
+import os
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,6 +15,9 @@ from anysim import registry
 from anysim.errors import PluginError
 from anysim.model.world import World
 from anysim.planning.motion import Budget, PlanAnswer, PlanRequest, Scene
+
+SERVICE_VARIABLE = "ANYSIM_PLANNER_SERVICE"
+"""The environment variable that names the default service; no result depends on it."""
 
 
 class PlanFuture:
@@ -114,18 +119,24 @@ class PlannerService(ABC):
         self.close()
 
 
-def planner_service(world: World, planner: str = "rrt", workers: int = 1, service: str = "threads") -> PlannerService:
-    """A service whose workers plan with the named planner.
+def default_service() -> str:
+    """`ANYSIM_PLANNER_SERVICE` if set, else planners in processes, where there are any."""
+    return os.environ.get(SERVICE_VARIABLE) or ("threads" if sys.platform == "win32" else "processes")
 
-    Of the services of anysim-planning, `threads` is ready at once but holds up the control loop while it plans;
-    `processes` takes a second or two to start, then leaves the loop alone: it is for runs longer than that.
+
+def planner_service(world: World, planner: str = "rrt", workers: int = 1, service: str | None = None) -> PlannerService:
+    """A service whose workers plan with the named planner; answers are the same bits whichever it is.
+
+    Of the services of anysim-planning, `processes` leaves the control loop alone, but takes a second or two to start;
+    `threads` is ready at once and holds up the loop while it plans. None: the default one.
 
     Raises:
         PluginError: no planner or service of that name is installed, or it is something else.
     """
-    made = registry.load("planners", service)
+    name = service or default_service()
+    made = registry.load("planners", name)
     if not (isinstance(made, type) and issubclass(made, PlannerService)):
-        raise PluginError(f"'{service}' is a planner and no service; try 'processes' or 'threads'")
+        raise PluginError(f"'{name}' is a planner and no service; try 'processes' or 'threads'")
     maker = cast(Callable[..., PlannerService], made)
-    with registry.using("planners", service, (TypeError,)):
+    with registry.using("planners", name, (TypeError,)):
         return maker(world, planner, workers)

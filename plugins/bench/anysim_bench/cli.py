@@ -282,23 +282,25 @@ def plan(
     engine: Annotated[
         str | None, typer.Option("--engine", "-e", help=f"The engine that steps meanwhile; {BY_DEFAULT}")
     ] = None,
-    pairs: Annotated[int, typer.Option(min=0, help="Plans of two arms together; 0 leaves them out.")] = 0,
+    pairs: Annotated[int, typer.Option(min=0, help="Plans of two arms together; 0 leaves them out.")] = 200,
     dual: Annotated[str, typer.Option(help="The robot of the catalogue that has these two arms.")] = "baxter",
     json: AsJson = False,
 ) -> None:
-    """Plan motions alone and in services, and step 16 envs while requests are in flight.
+    """Plan motions alone, in services and by roboplan alone, and step 16 envs while requests are in flight.
 
     All sides plan the same requests in turns; a ratio is that of a service's best turn to the planner's own. Where
     other programs want the cores too, look at the ratio by processor time: worker processes yield to all others.
 
-    The exit code is 1 where shapes touch on a path, looked at by other means than the planner's, or where a service
-    gives other answers than its planner alone.
+    The exit code is 1 where shapes touch on a path, looked at by other means than the planner's, where a service gives
+    other answers than its planner alone, where not all pairs are solved, and where the default service misses a goal:
+    a rate that is too low by both times, or control steps that take longer while it plans.
 
     Examples:
       anysim bench plan --planner rrt --pairs 20
     """
     from anysim.cli.output import print_json
-    from anysim_bench.plan import IK_GOAL, RATIO_GOAL, STALL_GOAL_MS, plan_cost
+    from anysim_bench.plan import plan_cost
+    from anysim_bench.plan_costs import IK_GOAL, RATIO_GOAL, STALL_GOAL_MS
     from anysim_bench.rows import Rows
 
     c = plan_cost(planner, task, requests, goals, engine, service.split(","), dual, pairs)
@@ -313,10 +315,18 @@ def plan(
     rows.add("a planning world for all envs", f"{c.world_ms:.0f} ms, {c.world_mib:.2f} MiB", "")
     rows.add("an env's scene in it", f"{c.scene_ms:.2f} ms, {c.scene_kib:.1f} KiB", "")
     rows.add("plans/s of the planner alone", f"{c.alone:.1f}", "")
+    if (b := c.bare) is None:
+        rows.add("plans/s of roboplan alone", "not installed", "")
+    else:
+        rows.add("plans/s of roboplan alone", f"{b.rate:.1f}", "")
+        rows.add("roboplan alone: solved, free, mean length", f"{b.solved:.0%}, {b.free:.0%}, {b.length:.2f}", "")
     for one in c.services:
         name = f"{one.service}, workers: {one.workers}"
         rates = f"{one.rate:.1f} ({one.ratio:.2f}, by cpu {one.cpu_ratio:.2f})"
         rows.add(f"{name}: plans/s", rates, f"{RATIO_GOAL:g}")
+        if one.bare_ratio is not None and one.bare_cpu_ratio is not None:
+            ratios = f"{one.bare_ratio:.2f}, by cpu {one.bare_cpu_ratio:.2f}"
+            rows.add(f"{name}: of roboplan alone", ratios, f"{RATIO_GOAL:g}")
         rows.add(f"{name}: start [ms]", f"{one.start_ms:.0f}", "")
         rows.add(f"{name}: the same answers", "yes" if one.same else "no", "yes")
     rows.add("99th percentile of a step [ms]", f"{c.step_p99_ms:.2f}", "")
@@ -332,10 +342,12 @@ def plan(
         rows.add(f"two arms of {p.robot}: reached, solved, free", f"{p.reached}, {p.solved}, {p.free}", f"{p.pairs}")
         rows.add(f"two arms of {p.robot}: a plan [ms]", f"{p.plan_ms:.1f}", "")
     if json:
-        print_json(
-            c._asdict() | {"services": [s._asdict() for s in c.services], "pairs": c.pairs and c.pairs._asdict()}
-        )
-    if not c.good:
+        plain = {"services": [s._asdict() for s in c.services], "missed": c.missed}
+        plain |= {"bare": c.bare and c.bare._asdict(), "pairs": c.pairs and c.pairs._asdict()}
+        print_json(c._asdict() | plain)
+    for sentence in c.missed:
+        typer.echo(sentence, err=True)
+    if c.missed:
         raise typer.Exit(1)
 
 

@@ -1,19 +1,19 @@
 """Planning: services against their planner called directly, the quality of plans, and what they do to the loop.
 
 Requests go from free configurations to the tool poses of others, all drawn from a seed. All sides plan the same
-requests in turns, and the best of each counts. A path counts as free if no shapes touch 0.005 rad by 0.005 rad, which
-is looked at after all planning is over, with nothing of the planner.
+requests in turns, roboplan alone among them, and the best of each counts. A path counts as free if no shapes touch
+0.005 rad by 0.005 rad, which is looked at after all planning is over, with nothing of the planner.
 """
 
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from anysim import compile_world, make
+from anysim.conventions import Array
 from anysim.kinematics.chain import Chain
 from anysim.model.world import World
 from anysim.planning.api import inverse_kinematics
@@ -22,15 +22,11 @@ from anysim.planning.scenes import Scenes
 from anysim.planning.service import PlannerService, planner_service
 from anysim.task.env import TaskEnv
 from anysim_bench.free_paths import Touching, dense
+from anysim_bench.plan_bare import BareTurns, bare, length
+from anysim_bench.plan_costs import PairCost, PlanCost, ServiceCost
 from anysim_bench.plan_requests import DEADLINE, Arms
 from anysim_bench.resets import resident_mib
 
-RATIO_GOAL = 0.85
-"""Plans a second of a service with one worker, of those of the planner alone."""
-STALL_GOAL_MS = 2.0
-"""By which the 99th percentile of a control step may grow while requests are in flight."""
-IK_GOAL = 20_000
-"""Solutions a second."""
 WORKERS = (1, 2)
 POSTURES = 1_000
 """Requests for joint positions alone, one candidate each."""
@@ -38,102 +34,6 @@ ROUNDS = 3
 """Turns of all sides on the requests."""
 BLOCKS, STEPS = 4, 100
 """Turns of an idle and a busy loop, and the steps of each."""
-
-
-class ServiceCost(NamedTuple):
-    """A planner service.
-
-    Attributes:
-        service, workers: its name, and how many workers.
-        start_ms: until it has answered a first request, with its kernels compiled before.
-        rate: plans a second.
-        ratio: of the planner's alone, by the clock on the wall.
-        cpu_ratio: the same by processor time, all that workers and this process compute for it.
-        same: whether it gave the answers of the planner alone, bit for bit.
-        busy_p99_ms: 99th percentile of a control step of 16 envs with requests in flight; None for several workers.
-    """
-
-    service: str
-    workers: int
-    start_ms: float
-    rate: float
-    ratio: float
-    cpu_ratio: float
-    same: bool
-    busy_p99_ms: float | None = None
-
-
-class PairCost(NamedTuple):
-    """Two arms planned together: candidates that both are known to reach.
-
-    Attributes:
-        robot: of the catalogue.
-        pairs: how many requests.
-        reached, solved, free: how many had joint positions for both tools, a path, and a path that is free.
-        plan_ms: median of a plan.
-    """
-
-    robot: str
-    pairs: int
-    reached: int
-    solved: int
-    free: int
-    plan_ms: float
-
-
-class PlanCost(NamedTuple):
-    """One planner on one task; times in milliseconds.
-
-    Attributes:
-        planner, task: names.
-        requests, goals: how many requests, of how many candidates each.
-        solved, free: shares of the requests, and of the paths found.
-        length: [rad] mean length of a path.
-        duration: [s] mean time of a trajectory.
-        plan_ms, plan_p95_ms: median and 95th percentile of a plan alone.
-        first_ms: the first plan, in which the planning world is built and kernels are loaded.
-        world_ms, world_mib: time and memory [MiB] of another planning world, which serves all envs.
-        scene_ms, scene_kib: to put an env's scene into it, and what an env keeps [KiB].
-        alone: plans a second of the planner called directly.
-        services: what runs around it.
-        ik: solutions of inverse kinematics a second, from random configurations.
-        postures: requests a second for free joint positions without a path, by who answers: the planner `alone`, one by
-            one, and each service with one worker. None where the planner answers motions only.
-        step_p99_ms: 99th percentile of a control step of 16 envs with nothing to plan.
-        pairs: two arms, where asked for.
-    """
-
-    planner: str
-    task: str
-    requests: int
-    goals: int
-    solved: float
-    free: float
-    length: float
-    duration: float
-    plan_ms: float
-    plan_p95_ms: float
-    first_ms: float
-    world_ms: float
-    world_mib: float
-    scene_ms: float
-    scene_kib: float
-    alone: float
-    services: list[ServiceCost]
-    ik: float
-    postures: dict[str, float] | None
-    step_p99_ms: float
-    pairs: PairCost | None
-
-    @property
-    def good(self) -> bool:
-        """Whether all paths are free, and services answer as their planner does."""
-        return self.free == 1.0 and all(one.same for one in self.services) and self.pairs_are_free
-
-    @property
-    def pairs_are_free(self) -> bool:
-        """Whether two arms never touched on a path."""
-        return self.pairs is None or self.pairs.free == self.pairs.solved
 
 
 def plan_cost(
@@ -164,15 +64,24 @@ def plan_cost(
         made.plan(asked[0], scene, Budget(DEADLINE))
         first = time.perf_counter() - begun
         built, grown, taken = _worlds(world, planner, asked[0], scene, scenes.scene(1))
-        answers, spent, found = _in_turns(world, made, planner, services, asked, scene)
+        other = bare(world, asked, scene)
+        answers, spent, found = _in_turns(world, made, planner, services, asked, scene, other)
         paths = [answer.trajectory.joint_pos for answer in answers if answer.trajectory is not None]
         touching = Touching(world)
-        free = [not touching.any(arms.bodies(scene, dense(path), state.joint_pos[0])) for path in paths]
+
+        def is_free(path: Array) -> bool:
+            return not touching.any(arms.bodies(scene, dense(path), state.joint_pos[0]))
+
+        free = [is_free(path) for path in paths]
+        beside = None if other is None else other.cost(is_free)
         idle, busy = _stalls(env, planner, services, asked, scene)
         found = [
             one._replace(busy_p99_ms=1e3 * float(np.quantile(busy[one.service], 0.99))) if one.workers == 1 else one
             for one in found
         ]
+        if beside is not None:
+            cpu = 1e-3 * beside.cpu_ms
+            found = [o._replace(bare_ratio=o.rate / beside.rate, bare_cpu_ratio=cpu * o.cpu_rate) for o in found]
         postures = _posture_rates(world, made, planner, services, asked, scene) if "ik" in made.capabilities else None
         robot, tool = world.robots[0], next(iter(arms.tools))
         chain = Chain.from_world(world, robot.name, next(iter(robot.channels)), tool, joints=arms.tools[tool])
@@ -183,7 +92,7 @@ def plan_cost(
         goals,
         sum(answer.status is PlanStatus.OK for answer in answers) / requests,
         float(np.mean(free)) if free else 0.0,
-        float(np.mean([np.linalg.norm(np.diff(path, axis=0), axis=1).sum() for path in paths] or [0.0])),
+        float(np.mean([length(path) for path in paths] or [0.0])),
         float(np.mean([a.trajectory.times[-1] for a in answers if a.trajectory is not None] or [0.0])),
         1e3 * float(np.median(spent)),
         1e3 * float(np.quantile(spent, 0.95)),
@@ -193,6 +102,7 @@ def plan_cost(
         1e3 * taken,
         sum(part.nbytes for part in scene[1:]) / 2**10,
         requests / sum(spent),
+        beside,
         found,
         _ik_rate(chain),
         postures,
@@ -219,7 +129,13 @@ def _worlds(world: World, planner: str, request: PlanRequest, scene: Scene, othe
 
 
 def _in_turns(
-    world: World, made: MotionPlanner, planner: str, names: Sequence[str], asked: list[PlanRequest], scene: Scene
+    world: World,
+    made: MotionPlanner,
+    planner: str,
+    names: Sequence[str],
+    asked: list[PlanRequest],
+    scene: Scene,
+    other: BareTurns | None,
 ) -> tuple[list[PlanAnswer], list[float], list[ServiceCost]]:
     """Answers, seconds of each plan alone in the best turn, and what services take for all of them."""
     answers, spent, alone_cpu = list[PlanAnswer](), [np.inf], np.inf
@@ -237,18 +153,28 @@ def _in_turns(
             answers, times = _one_by_one(made, asked, scene)
             spent = min(spent, times, key=sum)
             alone_cpu = min(alone_cpu, time.process_time() - processor)
+            if other is not None:
+                other.turn()
             for kind, service in running.items():
                 begun, processor, before = time.perf_counter(), time.process_time(), service.counts.processor
                 found = [f.result() for f in [service.submit(request, scene) for request in asked]]
                 wall[kind] = min(wall[kind], time.perf_counter() - begun)
                 here = time.process_time() - processor  # planners in threads are part of it
-                there = 0.0 if kind[0] == "threads" else service.counts.processor - before
+                there = service.counts.processor - before if service.beside else 0.0
                 cpu[kind] = min(cpu[kind], here + there)
                 same[kind] &= all(_same(a, b) for a, b in zip(answers, found, strict=True))
                 service.harvest(0)
     best = len(asked) / sum(spent)
     costs = [
-        ServiceCost(*kind, 1e3 * start[kind], (rate := len(asked) / wall[kind]), rate / best, alone_cpu / cpu[kind], ok)
+        ServiceCost(
+            *kind,
+            1e3 * start[kind],
+            (rate := len(asked) / wall[kind]),
+            rate / best,
+            len(asked) / cpu[kind],
+            alone_cpu / cpu[kind],
+            ok,
+        )
         for kind, ok in same.items()
     ]
     return answers, spent, costs

@@ -1,7 +1,7 @@
 """`anysim retarget`: the motion of a recorded tool, as another robot's arm makes it."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -21,16 +21,22 @@ def retarget(
         typer.Option(help="A task or a world file in which the robot stands, by its name there; default: it alone."),
     ] = None,
     seed: Annotated[int, typer.Option(help="Of the postures that it may begin in.")] = 0,
+    play: Annotated[
+        str | None,
+        typer.Option(metavar="ENGINE", help="Let the arm make the motion on this engine, by its own drives."),
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="A file .npz for times, joint positions and errors.")] = None,
     json: AsJson = False,
 ) -> None:
-    """Carry the motion of a recorded tool to another robot, seen from its base; nothing is simulated.
+    """Carry the motion of a recorded tool to another robot, seen from its base; with --play, simulate it there.
 
     Exit code 1 says that a part of the motion is out of reach, or that the robot touches itself or what stands around
-    it; things that lie loose, as what it grasps, may be touched.
+    it; things that lie loose, as what it grasps, may be touched. Played, it says too that the tool was more than 5 mm
+    off the recorded path.
 
     Examples:
       anysim run pick_cube -k 1 --out runs/a && anysim retarget runs/a/episodes/* --robot ur5 --out ur5.npz
+      anysim retarget runs/a/episodes/* --robot ur5 --play mujoco
       anysim retarget runs/a/episodes/* --robot dual_ur5 --tool right --shift 0 -0.8 0
       anysim retarget runs/a/episodes/* --robot panda --within stack_cube
     """
@@ -41,7 +47,7 @@ def retarget(
     from anysim.conventions import IDENTITY_QUATERNION
     from anysim.math import pose as P
     from anysim.record.reader import open_trajectory
-    from anysim_planning import retarget as motions
+    from anysim_planning import playing, retarget as motions
 
     reader = open_trajectory(recording)
     source = compile_world(reader.manifest.spec)
@@ -49,14 +55,15 @@ def retarget(
     done = motions.tool_motion(reader, source, first, its_tool)
     alone = {"world": {"terrain": "none", "robots": {robot: {"robot": robot}}}}
     world = compile_world(alone if within is None else within)
-    arm = motions.arm_of(world, *motions.only_tool(world, robot, tool))
+    its = motions.only_tool(world, robot, tool)
+    arm = motions.arm_of(world, *its)
     base = world.initial_body_pose[arm.root]
     wanted = motions.carried(done.poses, done.base, base, P.pose(shift, IDENTITY_QUATERNION))
     around = motions.Surroundings(world, arm)
     made = motions.retarget(arm, base, done.times, wanted, seed=seed, around=around)
     bad = None if made.free.all() else int(np.argmin(made.free))
     touch = None if bad is None else (float(made.times[bad]), *around.touching(made.joint_pos[bad]))
-    found = {
+    found: dict[str, Any] = {
         "rows": len(made.times),
         "reached": int(made.reached.sum()),
         "position_error_m": float(made.position_error.max()),
@@ -66,9 +73,15 @@ def retarget(
         "first_touch": None if touch is None else dict(zip(("time", "a", "b"), touch, strict=True)),
         "out": None if out is None else str(out),
     }
+    arrays, strays = {"joints": np.array(arm.joint_names), **made._asdict()}, None
+    if play is not None:
+        played = playing.play(world, *its, made.times, made.joint_pos, play)
+        strays = played.strays(made.times, wanted)
+        found["played"] = {"engine": played.engine, "position_error_m": strays[0], "rotation_error_rad": strays[1]}
+        arrays |= {f"played_{name}": getattr(played, name) for name in ("times", "joint_pos", "tool_pose")}
     if out is not None:
         with out.open("wb") as file:
-            np.savez(file, joints=np.array(arm.joint_names), **made._asdict())
+            np.savez(file, **arrays)
     if json:
         print_json(found)
     else:
@@ -82,4 +95,7 @@ def retarget(
                 f"{len(made.free) - found['free']} rows are not free: first at {touch[0]:.2f} s '{touch[1]}' touches "
                 f"'{touch[2]}'; expected a way past it: move the motion with --shift, or take another --seed"
             )
-    raise typer.Exit(int(not (made.reached & made.free).all()))
+        if strays is not None:
+            typer.echo(f"played on {play}: the tool is at most {strays[0] * 1e3:.3g} mm and {strays[1]:.3g} rad off")
+    good = (made.reached & made.free).all() and (strays is None or strays[0] <= playing.FOLLOWED)
+    raise typer.Exit(int(not good))

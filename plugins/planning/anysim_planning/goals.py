@@ -1,6 +1,7 @@
 """Goal sets by inverse kinematics: joint positions that reach candidate poses, free ones only, the nearest first."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import islice, product
 from typing import NamedTuple
 
@@ -14,16 +15,23 @@ from anysim.model.world import World
 from anysim.planning.api import InverseKinematics, inverse_kinematics
 from anysim.planning.motion import Pairing, PlanRequest, Scene, ToolGoal
 from anysim_planning.scene import PlanningWorld
+from anysim_planning.slides import sliding
 
 DRAWS = 6
 """Starts of a candidate: the live configuration, then random ones as long as what was found collides."""
 RESTARTS = 20
+TURNS = 24
+"""Starts of a candidate of tools that share joints: most are in vain where one tool takes them away from the others."""
 COMBINATIONS = 64
 """Choices of several independent tools that are looked at, the nearest first."""
 
 
+_OF_JOINTS = "joints joint_names prismatic rest anchor axis lower upper velocity_limit initial".split()
+"""What a chain has of each joint."""
+
+
 class Arm(NamedTuple):
-    """What moves one tool: its solver, and the request's columns in the order of the solver's joints."""
+    """What moves one tool: its solver, and the request's columns in the order of the solver's joints but for slides."""
 
     solver: InverseKinematics
     columns: Array
@@ -52,7 +60,10 @@ class ReachQuery(NamedTuple):
 
 
 class Part(NamedTuple):
-    """Some candidates of one tool of a request: the goal's place, the goal, what moves it, and which candidates."""
+    """Some candidates of one tool of a request: the goal's place, the goal, what moves it, and which candidates.
+
+    `base` (n, 7) are the poses of the solver's root, a row for each candidate; None: the one that the scene says.
+    """
 
     request: PlanRequest
     scene: Scene
@@ -60,6 +71,7 @@ class Part(NamedTuple):
     goal: ToolGoal
     arm: Arm
     which: Array
+    base: Array | None = None
 
 
 class GoalSolver:
@@ -69,13 +81,14 @@ class GoalSolver:
         self._world, self._solver = world, solver
         self._arms: dict[object, Arm] = {}
 
-    def arm(self, request: PlanRequest, goal: ToolGoal) -> Arm:
-        """What moves a tool.
+    def arm(self, request: PlanRequest, goal: ToolGoal, settled: frozenset[str] = frozenset()) -> Arm:
+        """What moves a tool, without the joints that are settled.
 
         Raises:
             AnysimError: no such robot or tool, or none of the joints moves it.
         """
-        key = (request.joints, goal.robot, goal.tool, goal.position_tolerance, goal.rotation_tolerance)
+        key = (request.joints, settled, goal.robot, goal.tool, goal.slide)
+        key += (goal.position_tolerance, goal.rotation_tolerance)
         if key not in self._arms:
             world = self._world
             robot = next((r for r in world.robots if r.name == goal.robot), None)
@@ -88,12 +101,17 @@ class GoalSolver:
                 above.append(world.body_joint[body])
                 body = world.bodies[body].parent
             places = {world.joints[j].name: j for j in above if j >= 0}
-            joints = [places[name] for name in request.joints if name in places]
+            joints = [places[name] for name in request.joints if name in places and name not in settled]
+            if not joints and settled:
+                raise AnysimError(
+                    f"the tool '{goal.tool}' hangs from no joint of its own: another tool of the plan has all of them; "
+                    f"plan for one of the two"
+                )
             if not joints:
                 raise AnysimError(f"the tool '{goal.tool}' does not hang from any of the joints of the plan")
             chain = Chain.from_world(world, goal.robot, next(iter(robot.channels)), goal.tool, joints=joints)
             options = {"position_tolerance": goal.position_tolerance, "rotation_tolerance": goal.rotation_tolerance}
-            solver = inverse_kinematics(chain, self._solver, threads=1, **options)
+            solver = inverse_kinematics(sliding(chain, goal.slide), self._solver, threads=1, **options)
             self._arms[key] = Arm(solver, np.array([request.joints.index(name) for name in chain.joint_names]))
         return self._arms[key]
 
@@ -112,15 +130,51 @@ class GoalSolver:
         """Those of several requests, each as if it were alone; candidates of one tool are solved together.
 
         Raises:
-            AnysimError: two tools of a request share a joint.
+            AnysimError: tools share joints, and choose each for itself, go straight, or have no others.
         """
         searches = [_Search(one, [(t, g, self.arm(one.request, g)) for t, g in enabled(one.request)]) for one in asked]
         for draw in range(DRAWS):
-            going = [search for search in searches if search.paired and len(search.open)]
+            going = [search for search in searches if search.paired and not search.shared and len(search.open)]
             solved = iter(self._solve([part for search in going for part in search.parts()], draw))
             for search in going:
                 search.take(list(islice(solved, len(search.tools))), draw)
+        for search in searches:
+            if search.shared:
+                self._in_turn(search)
         return [search.reach() if search.paired else self._independent(search) for search in searches]
+
+    def _in_turn(self, search: "_Search") -> None:
+        """Search for tools that share joints: one moves them, the others reach from there; each leads in its turn."""
+        request, scene = search.asked.request, search.asked.scene
+        for draw in range(TURNS):
+            if not len(search.open):
+                return
+            order = [search.tools[(draw + k) % len(search.tools)] for k in range(len(search.tools))]
+            q = np.tile(np.asarray(request.start, dtype=float), (len(search.open), 1))
+            good, led, settled = np.ones(len(q), bool), np.ones(len(q), bool), frozenset[str]()
+            for place, (t, goal, whole) in enumerate(order):
+                arm = self.arm(request, goal, settled & frozenset(whole.solver.chain.joint_names))
+                base = self._base_below(whole, arm, scene, q)
+                ((found, ok),) = self._solve([Part(request, scene, t, goal, arm, search.open, base)], draw)
+                q[:, arm.columns] = found
+                good &= ok
+                led &= ok | (place > 0)
+                settled |= frozenset(arm.solver.chain.joint_names)
+            search.look(q, good)
+            if draw < len(search.tools):  # what a tool does not reach with all joints that move it is out of reach
+                search.open = search.open[led[search.still]]
+
+    def _base_below(self, whole: Arm, arm: Arm, scene: Scene, joint_pos: Array) -> Array:
+        """Poses (n, 7) to give a solver of the last joints of a chain as its root's, the others at (n, K)."""
+        chain, above = whole.solver.chain, len(whole.columns) - len(arm.columns)
+        base = np.tile(self.base(whole, scene), (len(joint_pos), 1))
+        if not above:
+            return base
+        upper = {name: getattr(chain, name)[:above] for name in _OF_JOINTS}
+        first = replace(chain, **upper, tool_offset=chain.rest[above]).tool_pose(
+            base, joint_pos[:, whole.columns[:above]]
+        )
+        return P.compose(first, np.tile(P.inverse(arm.solver.chain.rest[0]), (len(first), 1)))
 
     def _independent(self, search: "_Search") -> Reach:
         request, scene = search.asked.request, search.asked.scene
@@ -153,7 +207,10 @@ class GoalSolver:
         for number, part in enumerate(parts):
             alike.setdefault((id(part.arm), tuple(part.goal.rotation_weight)), []).append(number)
         for numbers in alike.values():
-            rows = [_rows(self.base(parts[k].arm, parts[k].scene), parts[k], draw) for k in numbers]
+            rows = [
+                _rows(self.base(one.arm, one.scene) if one.base is None else one.base, one, draw)
+                for one in (parts[k] for k in numbers)
+            ]
             targets, bases, seeds, keys = (np.concatenate(column) for column in zip(*rows, strict=True))
             first = parts[numbers[0]]
             answer = first.arm.solver.solve(
@@ -164,10 +221,9 @@ class GoalSolver:
                 rng_seeds=keys,
                 rotation_weight=first.goal.rotation_weight,
             )
+            joint_pos = answer.joint_pos[:, : len(first.arm.columns)]
             ends = np.cumsum([len(parts[k].which) for k in numbers])[:-1]
-            for k, q, good in zip(
-                numbers, np.split(answer.joint_pos, ends), np.split(answer.converged, ends), strict=True
-            ):
+            for k, q, good in zip(numbers, np.split(joint_pos, ends), np.split(answer.converged, ends), strict=True):
                 solved[k] = q, good
         return solved
 
@@ -178,13 +234,18 @@ class _Search:
     def __init__(self, asked: ReachQuery, tools: list[tuple[int, ToolGoal, Arm]]) -> None:
         self.asked, self.tools = asked, tools
         columns = np.concatenate([arm.columns for _, _, arm in tools])
-        if len(set(columns.tolist())) < len(columns):
-            raise AnysimError("two tools that share a joint cannot be planned together yet: plan one after the other")
         width = len(tools[0][1].poses)
         self.paired = asked.request.pairing is Pairing.PAIRED or len(tools) == 1
+        self.shared = len(set(columns.tolist())) < len(columns)
+        if self.shared and not (self.paired and asked.request.straight is None):
+            raise AnysimError(
+                "tools that share joints choose in pairs and take any path: leave pairing and straight out"
+            )
         self.reachable, self.found = np.zeros(width, bool), list[GoalConfiguration]()
         self.open = np.arange(width)
         """Candidates without a free configuration that may still get one."""
+        self.still = np.ones(width, bool)
+        """Which of those that were open before the last look still are."""
 
     def parts(self) -> list[Part]:
         """What is to be solved next."""
@@ -198,17 +259,22 @@ class _Search:
         for (_, _, arm), (part, ok) in zip(self.tools, solved, strict=True):
             q[:, arm.columns] = part
             good &= ok
+        self.look(q, good)
+        if draw and not good.any():  # what random starts do not reach either is out of reach
+            self.open = self.open[:0]
+
+    def look(self, q: Array, good: Array) -> None:
+        """Keep what is free of configurations (n, K) for the open candidates, of which some are good (n,)."""
         self.reachable[self.open[good]] = True
         free = good.copy()
         free[good] = ~self.asked.world().hits(q[good]) if good.any() else False
         for row in np.flatnonzero(free):
-            chosen = [-1] * len(request.goals)
+            chosen = [-1] * len(self.asked.request.goals)
             for t, _, _ in self.tools:
                 chosen[t] = int(self.open[row])
             self.found.append(GoalConfiguration(tuple(chosen), q[row]))
-        self.open = self.open[~free]
-        if draw and not good.any():  # what random starts do not reach either is out of reach
-            self.open = self.open[:0]
+        self.still = ~free
+        self.open = self.open[self.still]
 
     def reach(self) -> Reach:
         """What was found, the nearest first."""
@@ -226,7 +292,9 @@ def _rows(base: Array, part: Part, draw: int) -> tuple[Array, Array, Array, Arra
     """Targets, bases, seeds and keys of a part's candidates. A row depends on its own key alone."""
     chain, arm = part.arm.solver.chain, part.arm
     keys = [np.random.SeedSequence([part.request.seed, part.tool, int(g), draw]) for g in part.which]
-    live = np.clip(np.asarray(part.request.start, dtype=float)[arm.columns], chain.lower, chain.upper)
+    live = np.zeros(len(chain))
+    live[: len(arm.columns)] = np.asarray(part.request.start, dtype=float)[arm.columns]
+    live = np.clip(live, chain.lower, chain.upper)
     seeds = np.tile(live, (len(keys), 1))
     if draw:
         low = np.where(np.isfinite(chain.lower), chain.lower, -np.pi)
@@ -234,4 +302,4 @@ def _rows(base: Array, part: Part, draw: int) -> tuple[Array, Array, Array, Arra
         seeds = np.array([np.random.default_rng(key).uniform(low, high) for key in keys])
     numbers = np.array([key.generate_state(1, np.uint64)[0] for key in keys], dtype=np.uint64)
     targets = np.asarray(part.goal.poses, dtype=float)[part.which]
-    return targets, np.tile(base, (len(keys), 1)), seeds, numbers
+    return targets, np.array(np.broadcast_to(base, (len(keys), 7))), seeds, numbers

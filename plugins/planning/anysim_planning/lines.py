@@ -1,5 +1,7 @@
 """Straight lines of tools: joint positions along a line, by inverse kinematics from point to point."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from anysim.conventions import Array
@@ -32,7 +34,7 @@ def straight_line(solver: GoalSolver, request: PlanRequest, scene: Scene, chosen
         for goal, candidate in zip(request.goals, chosen, strict=True):
             if not goal.enabled:
                 continue
-            arm = solver.arm(request, goal)
+            arm = solver.arm(request, replace(goal, slide=(0.0, 0.0, 0.0)))
             base, chain = solver.base(arm, scene), arm.solver.chain
             q = path[0, arm.columns]
             begin = chain.tool_pose(base, q)

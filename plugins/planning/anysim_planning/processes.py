@@ -6,6 +6,7 @@ Messages go over a socket pair that no other process can reach.
 
 import contextlib
 import os
+import signal
 import sys
 from time import perf_counter
 
@@ -74,7 +75,7 @@ class ProcessService(QueuedService):
     def _plan(self, seat: Seat) -> None:
         """Answer the requests of a seat; where it is not known which one its process was lost with, each goes alone."""
         alone = False
-        while seat.jobs:
+        while seat.jobs and not self._closed:
             batch = list[PlanFuture]()
             try:
                 process = self._open(seat)
@@ -120,10 +121,23 @@ class ProcessService(QueuedService):
     def _open(self, seat: Seat) -> "PlannerProcess":
         """The process of a seat, started where there is none; raises `WorkerLost` where that fails."""
         if seat not in self._processes:
-            process = PlannerProcess(self._world, self._path)
+            process = PlannerProcess()
             with self._changed:
                 self._processes[seat] = process
+                if self._closed:
+                    process.stop()
+            try:
+                process.introduce(self._world, self._path)
+            except BaseException:
+                self._drop(seat, 0.0)
+                raise
         return self._processes[seat]
+
+    def _ending(self) -> None:
+        """Nobody waits for a process that is still being loaded, and takes no message before it is."""
+        for process in self._processes.values():
+            if not process.useful:
+                process.stop()
 
     def _start(self, seat: Seat) -> None:
         """Start its process before there is anything to do; where that fails, the first request is told."""
@@ -150,8 +164,8 @@ class PlannerProcess:
         useful: whether it has answered anything.
     """
 
-    def __init__(self, world: World, planner: str) -> None:
-        """Start it, and send the World and the planner's name, or `module:maker`; raises `WorkerLost` if it cannot."""
+    def __init__(self) -> None:
+        """Start it; raises `WorkerLost` if that fails."""
         self.useful, self._batch, self._notes = False, list[PlanFuture](), SharedArrays(NOTES)
         environment = {**os.environ, **dict.fromkeys(THREAD_POOLS, "1")}
         try:
@@ -160,11 +174,15 @@ class PlannerProcess:
             self._notes.close()
             raise WorkerLost(f"could not be started: {error}") from None
         self.pid, self.has_news = self._worker.pid, self._worker.has_news
-        try:
-            self._worker.post((world, planner), self._notes.descriptor)
-        except BaseException:
-            self.end(0.0)
-            raise
+
+    def introduce(self, world: World, planner: str) -> None:
+        """Send the World and the planner's name, or `module:maker`; raises `WorkerLost` if it has ended."""
+        self._worker.post((world, planner), self._notes.descriptor)
+
+    def stop(self) -> None:
+        """Kill it at once, from any thread; its own thread then loses it."""
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(self.pid, signal.SIGKILL)
 
     def note(self, batch: list[PlanFuture]) -> None:
         """Take requests that are asked next."""

@@ -119,6 +119,7 @@ class QueuedService(PlannerService):
         """Cancel what is under way and end the workers; a thread that hangs in a planner ends when that returns."""
         with self._changed:
             self._closed = True
+            self._ending()
             for future in self._waiting:
                 self._cancelled(future, "the service was closed")
             self._queue.clear()
@@ -144,6 +145,9 @@ class QueuedService(PlannerService):
 
     def _stop(self, seat: Seat, future: PlanFuture) -> None:
         """Under the lock: a request that a worker has was given up, as its budget says."""
+
+    def _ending(self) -> None:
+        """Under the lock: the service was closed."""
 
     def _replace_the_hung(self) -> None:
         """Under the lock, with every flush and while a call waits."""
@@ -210,7 +214,7 @@ def _subject(request: PlanRequest) -> tuple[object, ...]:
 def _likeness(future: PlanFuture) -> tuple[object, ...]:
     request = future.request
     goals = tuple(
-        (g.robot, g.tool, len(g.poses), g.position_tolerance, g.rotation_tolerance, g.rotation_weight)
+        (g.robot, g.tool, len(g.poses), g.position_tolerance, g.rotation_tolerance, g.rotation_weight, g.slide)
         for g in request.goals
     )
     return request.kind, request.joints, goals, request.straight is None

@@ -13,6 +13,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.model.world import World
 from anysim.planning.motion import Budget, PlanAnswer, PlanRequest, Scene
+from anysim_planning.roboplan_alone import BareRoboplan
 from anysim_planning.roboplan_scene import GROUP, RoboplanScene, probe, roboplan_module
 from anysim_planning.rrt import KEPT, RrtPlanner
 from anysim_planning.scene import PlanningWorld
@@ -54,6 +55,14 @@ class RoboplanPlanner(RrtPlanner):
         """Search."""
         self._begun = perf_counter()
         return super().plan(request, scene, budget)
+
+    def alone(self, request: PlanRequest, scene: Scene) -> BareRoboplan:
+        """Roboplan itself with this scene, to be compared with what is built around it.
+
+        Raises:
+            PluginError: a part of roboplan that the planner does without is not installed.
+        """
+        return BareRoboplan(self.world, request, scene)
 
     def search(
         self,

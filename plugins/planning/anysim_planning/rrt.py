@@ -63,6 +63,7 @@ class RrtPlanner(MotionPlanner):
                 self._worlds.popitem(last=False)
         self._worlds.move_to_end(key)
         self._worlds[key].take(scene, request.attached)
+        self._worlds[key].rest(np.asarray(request.start, dtype=float), request.padding)
         return self._worlds[key]
 
     def warm_up(self, request: PlanRequest, scene: Scene) -> None:

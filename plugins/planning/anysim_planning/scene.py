@@ -20,6 +20,10 @@ from anysim.model.shapes import HeightFieldShape, MeshShape, Plane, Shape
 from anysim.model.world import Geom, JointType, World
 from anysim.planning.motion import Attachment, PlanRequest, Scene
 
+RESTING = 0.002
+"""[m] that a held thing may be in what it rests on where a motion begins; engines let contacts sink in by less."""
+SLACK = 5e-4
+"""[m] deeper that it may get on the way."""
 FAR = np.array([0.0, 0.0, -1000.0, 0.0, 0.0, 0.0, 1.0])
 """Where things are that are not there."""
 
@@ -64,6 +68,8 @@ class PlanningWorld:
         self._attached = self._holders(request.attached)
         self._build(request, shapes)
         self._pairs(request, every_link)
+        self._resting: list[tuple[int, float]] = []
+        """Pairs that may be nearer than others, and their margins [m]."""
         self._seen: bytes | None = None
 
     # ------------------------------------------------------------------ building
@@ -202,6 +208,40 @@ class PlanningWorld:
         pool = self._pin.BroadPhaseManagerPool_DynamicAABBTreeCollisionManager
         self._pool = pool(self.model, self.geometry, 1)
 
+    def rest(self, start: Array, padding: float) -> None:
+        """Let held things touch what they rest on where a motion begins (K,), but not enter it deeper than there.
+
+        Surfaces of triangles have no inside: what rests on one begins in collision.
+        """
+        pin, pairs = self._pin, self.geometry.collisionPairs
+        self._set_margins(self._pool.getGeometryDatas()[0], 0.0)
+        self._resting = []
+        if not self._attached or not self.hits(start[None])[0]:
+            return
+        data, geometry_data = self.model.createData(), self.geometry.createData()
+        pin.updateGeometryPlacements(self.model, data, self.geometry, geometry_data, start[self.order])
+        for k, pair in enumerate(pairs):
+            if self._may_rest(pair.first, pair.second) and pin.computeCollision(self.geometry, geometry_data, k):
+                deep = -pin.computeDistance(self.geometry, geometry_data, k).min_distance
+                if 0.0 <= deep <= padding + RESTING:
+                    self._resting.append((k, -deep - SLACK))
+        self._set_margins(self._pool.getGeometryDatas()[0])
+
+    def _may_rest(self, first: int, second: int) -> bool:
+        """Whether one of two geoms is held and the other is neither held nor a robot's, and both are solid."""
+        world, solid = self._world, True
+        for g in (first, second):
+            shape = self.geoms[g].shape
+            solid &= not isinstance(shape, HeightFieldShape) and not (isinstance(shape, MeshShape) and shape.concave)
+        held = [self.geoms[g].body in self._attached for g in (first, second)]
+        other = self.geoms[first if held[1] else second].body
+        robot = other != WORLD and world.entities[world.body_entity[other]].kind is EntityKind.ROBOT
+        return solid and held[0] != held[1] and not robot
+
+    def _set_margins(self, geometry_data: Any, margin: float | None = None) -> None:
+        for k, own in self._resting:
+            geometry_data.collisionRequests[k].security_margin = own if margin is None else margin
+
     def _axis_point(self, body: int) -> Array:
         anchor = self._world.joints[self._world.body_joint[body]].anchor
         return P.pose(anchor, (0.0, 0.0, 0.0, 1.0))
@@ -234,6 +274,7 @@ class PlanningWorld:
     def touching(self, joint_pos: Array) -> list[tuple[str, str]]:
         """Names of the geoms that collide in a configuration (K,)."""
         data, geometry_data = self.model.createData(), self.geometry.createData()
+        self._set_margins(geometry_data)
         self._pin.computeCollisions(self.model, data, self.geometry, geometry_data, joint_pos[self.order], False)
         names = [placed.name.partition(":")[2] for placed in self.geometry.geometryObjects]
         pairs = zip(self.geometry.collisionPairs, geometry_data.collisionResults, strict=True)

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -85,6 +86,18 @@ def test_nothing_is_left_behind() -> None:
         assert gone(pids, 2.0)
     assert children() == processes
     assert descriptors() == files
+
+
+def test_closing_waits_for_no_process_that_is_still_loaded(world: World) -> None:
+    processes, threads = children(), threading.active_count()
+    plans = ProcessService(world, "rrt")
+    while not plans.pids:
+        time.sleep(0.001)
+    begun = time.perf_counter()
+    plans.close()
+    assert time.perf_counter() - begun < queued.CLOSING
+    assert threading.active_count() == threads
+    assert children() == processes
 
 
 def test_processes_yield_to_the_control_loop_and_have_no_pools() -> None:

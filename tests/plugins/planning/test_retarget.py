@@ -13,6 +13,8 @@ from anysim.errors import AnysimError
 from anysim.kinematics.chain import Chain
 from anysim.math import pose as P
 from anysim.record.reader import open_trajectory
+from anysim.testing.engines import require_engine
+from anysim_planning.playing import FOLLOWED, play
 from anysim_planning.retarget import Surroundings, arm_of, carried, retarget, tool_motion
 
 ROOM = """
@@ -66,6 +68,29 @@ def test_the_tool_goes_where_the_pandas_went(robot: str, tool: str, tmp_path: Pa
     np.testing.assert_array_equal(again.joint_pos, made.joint_pos)
     fast = retarget(other, to_base, times / 50, wanted, seed=3)
     assert fast.times[-1] > times[-1] / 50
+
+
+@pytest.mark.parametrize(
+    "engine", ["mujoco", *(pytest.param(name, marks=pytest.mark.slow) for name in ("pybullet", "sapien"))]
+)
+@pytest.mark.parametrize(("robot", "tool"), CASES[:2])
+def test_played_by_its_drives_the_tool_stays_on_the_path(engine: str, robot: str, tool: str, tmp_path: Path) -> None:
+    require_engine(engine)
+    panda, other, from_base, to_base = chains(tmp_path, robot, tool)
+    times, poses = motion(panda, from_base)
+    wanted = carried(poses, from_base, to_base, MOUNTS[tool])
+    made = retarget(other, to_base, times, wanted, seed=3)
+    world = compile_world(tmp_path / "room.yaml")
+    played = play(world, "other", tool, made.times, made.joint_pos, engine)
+    assert played.times[-1] >= made.times[-1]
+    assert np.ptp(played.tool_pose[:, :3], axis=0).max() > 0.1, "it has moved"
+    there = other.tool_pose(np.tile(to_base, (len(played.times), 1)), played.joint_pos)
+    np.testing.assert_allclose(played.tool_pose[:, :3], there[:, :3], atol=1e-4)
+    position, rotation = played.strays(made.times, wanted)
+    assert position <= FOLLOWED
+    assert rotation <= 0.03
+    late = played.strays(made.times + 0.5, wanted)  # what it would be against another motion
+    assert late[0] > 3 * FOLLOWED
 
 
 def test_what_is_out_of_reach_is_told_row_by_row(tmp_path: Path) -> None:
@@ -135,10 +160,13 @@ def test_a_recording_of_a_panda_is_made_by_other_arms(tmp_path: Path) -> None:
     (manifest,) = (tmp_path / "out").rglob("manifest.json")
     recording = open_trajectory(manifest.parent)
     words = ["retarget", str(manifest.parent), "-r", "dual_ur5", "--tool", "right", "--shift", "0", "-0.8", "0"]
+    words += ["--play", "mujoco"]
     again = [sys.executable, "-m", "anysim.cli", *words, "--out", str(tmp_path / "made.npz"), "--json"]
     done = subprocess.run(again, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
+    assert found["played"]["engine"].startswith("mujoco ")
+    assert found["played"]["position_error_m"] <= FOLLOWED
     assert found["reached"] == found["rows"] == recording.manifest.steps
     with np.load(tmp_path / "made.npz") as file:
         assert file["joint_pos"].shape == (found["rows"], 6)

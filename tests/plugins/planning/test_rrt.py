@@ -7,8 +7,20 @@ import pytest
 
 from anysim.errors import AnysimError
 from anysim.kinematics.chain import Chain
+from anysim.math import pose as P
+from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.world import World
-from anysim.planning.motion import Attachment, Budget, PlanAnswer, PlanRequest, PlanStatus, Scene, motion_planner
+from anysim.planning.api import inverse_kinematics
+from anysim.planning.motion import (
+    Attachment,
+    Budget,
+    PlanAnswer,
+    PlanRequest,
+    PlanStatus,
+    Scene,
+    ToolGoal,
+    motion_planner,
+)
 from anysim.planning.scenes import Scenes
 from anysim_planning import goals, rrt
 from anysim_planning.rrt import RrtPlanner
@@ -78,6 +90,28 @@ def test_a_goal_set_says_of_each_candidate_what_became_of_it(world: World, plann
     assert "1 of 2 candidates can be reached, all of them in collision" in nothing.message
 
 
+def test_a_tool_that_may_slide_is_anywhere_along_its_axis(world: World, planner: RrtPlanner, scene: Scene) -> None:
+    """A pose out of reach along the tool's own axis, which is level; off the axis the tool has no freedom."""
+    chain = Chain.from_world(world, "panda", "arm", "tool")
+    quaternion = np.array([0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5)])  # z of the tool along x of the world
+    far = np.array([[1.5, -0.4, 0.5, *quaternion]])
+    request = reach(world, far)
+    assert planned(planner, request, scene).status is PlanStatus.NO_IK
+    for slide, status in ((1.0, PlanStatus.OK), (float("inf"), PlanStatus.OK), (0.3, PlanStatus.NO_IK)):
+        goal = replace(request.goals[0], slide=(0.0, 0.0, slide))
+        answer = planned(planner, replace(request, goals=(goal,)), scene)
+        assert answer.status is status, answer.message
+        if answer.trajectory is not None:
+            tool = chain.tool_pose(scene.body_pose[chain.root], answer.trajectory.joint_pos[-1])
+            np.testing.assert_allclose(tool[1:3], far[0, 1:3], atol=2e-4)
+            assert P.angle_between(tool[3:], quaternion) < 2e-4
+            assert far[0, 0] - slide - 1e-3 <= tool[0] < 0.8
+    along_x = replace(request.goals[0], slide=(1.0, 0.0, 0.0))  # that is down in the world
+    assert planned(planner, replace(request, goals=(along_x,)), scene).status is PlanStatus.NO_IK
+    with pytest.raises(AnysimError, match="lengths >= 0"):
+        replace(request, goals=(replace(goal, slide=(0.0, 0.0, -0.1)),)).check()
+
+
 def test_a_base_that_stands_elsewhere_moves_the_goal_with_it(world: World, planner: RrtPlanner, scene: Scene) -> None:
     shift = np.zeros_like(scene.body_pose)
     shift[:, 0] = 0.3
@@ -117,6 +151,61 @@ def test_a_held_object_collides_too(world: World, planner: RrtPlanner, scene: Sc
     assert "'terrain' with 'cube.shape'" in sunk.message
     allowed = replace(request, attached=(low,), allowed=(("cube", "terrain"),))
     assert planned(planner, allowed, scene).status is PlanStatus.OK
+
+
+@pytest.mark.parametrize("name", ["rrt", "roboplan"])
+def test_a_held_object_may_leave_what_it_rests_on_but_not_enter_it(world: World, scene: Scene, name: str) -> None:
+    if name == "roboplan":
+        pytest.importorskip("roboplan.rrt", reason="roboplan is an extra")
+    planner = motion_planner(world, name)
+    chain = Chain.from_world(world, "panda", "arm", "tool")
+    base = scene.body_pose[chain.root]
+    start = reached(chain, base, down((0.45, -0.3, 0.05)))
+    tool = chain.tool_pose(base, start)
+    hand = link_pose(world, scene, start)
+    held = [
+        P.compose(P.inverse(hand), P.pose((*tool[:2], 0.02 - deep), (0.0, 0.0, 0.0, 1.0))) for deep in (4e-4, 0.004)
+    ]
+    resting, sunk = (Attachment("cube", "panda.panda_link7", offset) for offset in held)
+    up = down((*tool[:2], 0.25))
+    for padding in (0.0, 0.005):
+        request = PlanRequest(
+            arm_joints(world), start, (ToolGoal("panda", "tool", up),), attached=(resting,), padding=padding
+        )
+        answer = planned(planner, replace(request, allowed=(("panda", "terrain"),)), scene)
+        assert answer.status is PlanStatus.OK, answer.message
+        heights = cube_heights(world, scene, answer.trajectory.joint_pos, resting)
+        assert heights.min() > 0.02 - 0.001
+        assert heights[-1] > 0.2
+    lower = replace(request, padding=0.0, goals=(ToolGoal("panda", "tool", down((*tool[:2], 0.045))),))
+    lower = replace(lower, allowed=(("panda", "terrain"),))
+    assert planned(planner, lower, scene).status is PlanStatus.NO_IK
+    deep = replace(lower, attached=(sunk,), goals=request.goals)
+    assert planned(planner, deep, scene).status is PlanStatus.START_IN_COLLISION
+    assert planned(planner, replace(deep, attached=(resting,)), scene).status is PlanStatus.OK  # nothing is left over
+
+
+def reached(chain: Chain, base: np.ndarray, pose: np.ndarray) -> np.ndarray:
+    found = inverse_kinematics(chain).solve(
+        pose, base[None], LEFT[None] * [-1, 1, 1, 1, 1, 1, 1], random_restarts=20, rng_seeds=np.zeros(1, np.uint64)
+    )
+    assert found.converged[0]
+    return found.joint_pos[0]
+
+
+def link_pose(world: World, scene: Scene, joint_pos: np.ndarray) -> np.ndarray:
+    """World poses (..., 7) of the link that holds."""
+    rows = np.atleast_2d(joint_pos)
+    positions = np.tile([joint.initial for joint in world.joints], (len(rows), 1))
+    positions[:, :7] = rows
+    bodies = forward_kinematics(world, np.tile(scene.body_pose, (len(rows), 1, 1)), positions)
+    poses = bodies[:, [body.name for body in world.bodies].index("panda.panda_link7")]
+    return poses if joint_pos.ndim > 1 else poses[0]
+
+
+def cube_heights(world: World, scene: Scene, path: np.ndarray, held: Attachment) -> np.ndarray:
+    poses = link_pose(world, scene, path)
+    return P.compose(poses, np.tile(held.offset, (len(path), 1)))[:, 2]
 
 
 def test_padding_keeps_away_and_allowed_pairs_may_touch(world: World, planner: RrtPlanner, scene: Scene) -> None:

@@ -7,6 +7,7 @@ import pytest
 
 from anysim import make
 from anysim.planning.motion import PlanAnswer, PlanRequest, PlanStatus
+from anysim.planning.service import SERVICE_VARIABLE
 from anysim.record.collector import Collector
 from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.runner import SETTLE, SkillPolicy
@@ -57,6 +58,7 @@ def test_no_path_is_planned_again_with_another_seed_before_another_candidate(mon
         return PlanAnswer(PlanStatus.NO_PATH)
 
     monkeypatch.setattr(RrtPlanner, "plan", none)
+    monkeypatch.setenv(SERVICE_VARIABLE, "threads")
     outcomes, said = given_up("behind_wall")
     assert outcomes == [Outcome.NO_PATH] * 2
     ladder = said["ladder"]
@@ -70,6 +72,7 @@ def test_a_planner_that_breaks_fails_the_episode_and_nothing_else(monkeypatch: p
         raise ZeroDivisionError
 
     monkeypatch.setattr(RrtPlanner, "plan", broken)
+    monkeypatch.setenv(SERVICE_VARIABLE, "threads")
     assert given_up("behind_wall")[0] == [Outcome.NO_PATH] * 2
 
 

@@ -11,6 +11,7 @@ import pytest
 from anysim import make
 from anysim.conventions import Array
 from anysim.errors import PluginError, TaskError
+from anysim.planning.service import SERVICE_VARIABLE
 from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.phases import STAY
 from anysim.skills.runner import SkillPolicy
@@ -21,7 +22,7 @@ from anysim_planning import queued
 from anysim_planning.rrt import RrtPlanner
 from anysim_skills import planned_moves
 from anysim_skills.arm import Arm
-from anysim_skills.planning import WORKERS_VARIABLE
+from anysim_skills.planning import WORKERS_VARIABLE, planner_of
 from tests.plugins.skills.test_pick import rollout
 
 WALL = Path(__file__).parent / "worlds/behind_wall.yaml"
@@ -122,6 +123,7 @@ def test_in_real_time_a_planner_that_hangs_is_given_up(monkeypatch: pytest.Monke
     monkeypatch.setattr(RrtPlanner, "plan", lambda *_: go_on.wait(30.0))
     monkeypatch.setattr(planned_moves, "DEADLINE", 0.05)
     monkeypatch.setattr(queued, "GRACE", 0.05)
+    monkeypatch.setenv(SERVICE_VARIABLE, "threads")
     with behind_wall() as env:
         with pytest.warns(UserWarning, match="the run cannot be repeated"):
             arm = Arm.of(env, env.scene.robot("panda"), planner="rrt", latency="realtime")
@@ -204,6 +206,19 @@ def test_one_arm_has_one_planner() -> None:
 def test_a_planner_that_is_not_there_is_told() -> None:
     with behind_wall("task.expert.planner=rtt") as env, pytest.raises(PluginError, match="did you mean 'rrt'"):
         SkillPolicy(env)
+
+
+def test_planning_is_beside_the_loop_unless_the_environment_says_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
+    beside: list[bool] = []
+    for chosen in (None, "threads"):
+        if chosen is not None:
+            monkeypatch.setenv(SERVICE_VARIABLE, chosen)
+        with behind_wall() as env:
+            beside.append(planner_of(env, "rrt").service.beside)
+    assert beside == [True, False]
+    monkeypatch.setenv(SERVICE_VARIABLE, "rrt")
+    with behind_wall() as env, pytest.raises(PluginError, match="is a planner and no service"):
+        planner_of(env, "rrt")
 
 
 @pytest.mark.parametrize("workers", ["0", "two"])

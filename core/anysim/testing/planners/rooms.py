@@ -1,4 +1,4 @@
-"""Worlds for planners: arms of capsules before a wall, and two arms that face each other."""
+"""Worlds for planners: arms of capsules before a wall, one of them on wheels, and two arms that face each other."""
 
 from math import pi
 
@@ -8,7 +8,7 @@ from anysim.conventions import Array
 from anysim.kinematics.chain import Chain
 from anysim.math import pose as P
 from anysim.model.parts import Site
-from anysim.model.world import Box, Capsule, Geom, Sphere, World
+from anysim.model.world import Box, Capsule, Geom, JointType, Sphere, World
 from anysim.planning.motion import PlanRequest, Scene, ToolGoal
 from anysim.testing.arms import PANDA_LINKS, PANDA_TOOL
 from anysim.testing.sketch import Sketch, inertial
@@ -33,6 +33,11 @@ _SHAPES = (
     (7, Capsule(0.04, 0.045), (0.0, 0.0, 0.1), 0.0),
 )
 """Link, shape, position, and turn about x; the arm is a Panda's, its shapes are slimmer."""
+_BASE = (
+    ("base_x", JointType.PRISMATIC, (1.0, 0.0, 0.0)),
+    ("base_y", JointType.PRISMATIC, (0.0, 1.0, 0.0)),
+    ("base_yaw", JointType.REVOLUTE, (0.0, 0.0, 1.0)),
+)
 
 
 def one_arm() -> World:
@@ -51,6 +56,15 @@ def two_arms() -> World:
     sketch.ground()
     _arm(sketch, "left", (-0.55, 0.0, 0.0), 0.0)
     _arm(sketch, "right", (0.55, 0.0, 0.0), pi)
+    return sketch.world()
+
+
+def on_wheels() -> World:
+    """An arm on a base that slides along x and y and turns about z, on the ground, and a wall before it."""
+    sketch = Sketch("on_wheels")
+    sketch.ground()
+    _arm(sketch, "arm", (0.0, 0.0, 0.2), 0.0, wheels=True)
+    sketch.fixed("wall", Box(WALL), (1.0, 0.0, WALL[2]))
     return sketch.world()
 
 
@@ -80,8 +94,15 @@ def tool_pose(world: World, scene: Scene, joint_pos: Array, robot: str = "arm") 
     return chain.tool_pose(base, joint_pos)
 
 
-def _arm(sketch: Sketch, name: str, position: tuple[float, float, float], yaw: float) -> None:
+def _arm(sketch: Sketch, name: str, position: tuple[float, float, float], yaw: float, *, wheels: bool = False) -> None:
     bodies = [sketch.robot(name, position, _turn((0.0, 0.0, yaw)))]
+    for joint, kind, axis in _BASE if wheels else ():
+        heavy = inertial(Sphere(0.1), 20.0)
+        body = sketch.link(joint, bodies[0], kind, axis, heavy, lower=-3.0, upper=3.0, velocity_limit=1.0)
+        sketch.drive(body)
+        bodies = [body]
+    if wheels:
+        sketch.geoms.append(Geom(f"{name}.wheels", bodies[0], Box((0.2, 0.15, 0.05)), (0.0, 0.0, -0.1)))
     for number, link in enumerate(PANDA_LINKS, 1):
         body = sketch.link(
             f"link{number}",

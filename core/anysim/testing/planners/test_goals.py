@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from anysim.planning.motion import Attachment, Pairing, PlanRequest, PlanStatus, ToolGoal
+from anysim.planning.scenes import Scenes
 from anysim.testing.planners import measure, rooms
 from anysim.testing.planners.fixtures import claims, planned
 
@@ -45,6 +46,27 @@ def test_a_base_that_stands_elsewhere(world, scene, plan):
     answer = plan(rooms.reach(world, far[None]), scene._replace(body_pose=moved))
     assert answer.status is PlanStatus.OK, answer.message
     _assert_there(rooms.tool_pose(world, scene._replace(body_pose=moved), answer.trajectory.joint_pos[-1]), far)
+
+
+def test_a_base_that_moves(make_planner):
+    """A base is locked, unless its joints are among those of the request: then it goes to where the tool reaches."""
+    world = rooms.on_wheels()
+    scene, planner = Scenes(world, 1).scene(0), make_planner(world)
+    names, start = rooms.joints(world), np.array([joint.initial for joint in world.joints])
+    behind = start.copy()
+    behind[:3] = 2.0, 0.5, 1.2
+    wanted = rooms.tool_pose(world, scene, behind)
+    goals = (ToolGoal("arm", "tool", wanted[None]),)
+    locked = PlanRequest(names[3:], start[3:], goals, deadline=rooms.LONG)
+    assert planned(planner, locked, scene).status is PlanStatus.NO_IK
+    request = PlanRequest(names, start, goals, deadline=rooms.LONG)
+    answer = planned(planner, request, scene)
+    assert answer.status is PlanStatus.OK, answer.message
+    assert answer.trajectory is not None
+    path = answer.trajectory.joint_pos
+    _assert_there(rooms.tool_pose(world, scene, path[-1]), wanted)
+    assert min(measure.clearance(world, scene, request, path)) >= TOUCH
+    assert measure.breaks(world, request, answer.trajectory) == []
 
 
 @claims("paired")

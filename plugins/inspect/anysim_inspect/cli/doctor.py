@@ -16,7 +16,15 @@ STYLES = {
     "broken": "bold red",
 }  # fmt: skip
 
-VARIABLES = ("ANYSIM_ENGINE", "ANYSIM_CACHE_DIR", "MUJOCO_GL", "VK_DRIVER_FILES", "VK_ICD_FILENAMES", "OMP_NUM_THREADS")
+VARIABLES = (
+    "ANYSIM_ENGINE",
+    "ANYSIM_CACHE_DIR",
+    "ANYSIM_PLANNER_SERVICE",
+    "MUJOCO_GL",
+    "VK_DRIVER_FILES",
+    "VK_ICD_FILENAMES",
+    "OMP_NUM_THREADS",
+)
 """Environment variables that change what anysim or an engine does."""
 
 
