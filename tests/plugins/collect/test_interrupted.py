@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.engine.shards_help import gone
 
 from anysim_inspect.verify import verify_run
+from tests.plugins.sharded.shards_help import gone
 
 WORLDS = Path(__file__).parents[1] / "skills/worlds"
 EPISODES = 8
