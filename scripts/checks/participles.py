@@ -10,8 +10,8 @@ PARTICIPLE = re.compile(
     r"\w{2,}[^e]ed|built|drawn|found|given|gone|held|hung|kept|known|left|lost|made|said|seen|sent|shown|taken|told|worn"
     r"|written"
 )
-NOUNS = ("core", "schemas", "plugins", "tasks")
-"""Where classes are called by nouns; those of backends are still to be renamed."""
+NOUNS = ("core", "schemas", "backends", "plugins", "tasks")
+"""Where classes are called by nouns."""
 
 
 def check(tree: Tree) -> Iterator[Fault]:
@@ -19,7 +19,7 @@ def check(tree: Tree) -> Iterator[Fault]:
     functions: set[str] = set()
     variables: set[str] = set()
     classes: list[tuple[str, Fault]] = []
-    for path in tree.under(*NOUNS, "backends", suffixes=(".py",)):
+    for path in tree.under(*NOUNS, suffixes=(".py",)):
         for node in ast.walk(ast.parse(tree.text(path) or "")):
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
                 functions.add(node.name.strip("_"))
@@ -27,7 +27,7 @@ def check(tree: Tree) -> Iterator[Fault]:
                 variables.add(node.arg.strip("_"))
             elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
                 variables.add(node.id.strip("_"))
-            elif isinstance(node, ast.ClassDef) and path.parts[0] in NOUNS:
+            elif isinstance(node, ast.ClassDef):
                 remedy = f"{node.name} is a function and a variable too; call the class by a noun"
                 classes.append((node.name.strip("_").lower(), Fault(path, node.lineno, remedy)))
     for name, fault in classes:

@@ -34,7 +34,7 @@ TARGET, SPEED, GAINS, FORCE = 1, 2, 4, 8
 """What is to be told of a joint."""
 
 
-class _Ended(NamedTuple):
+class _SubstepEnd(NamedTuple):
     """What an env's efforts are worked out from: the law of its last substep, and the motion (J,) that it left."""
 
     law: Array
@@ -63,7 +63,7 @@ class DampedDrives:
         self._commanded, self._tuned = 0, 0  # how often commands, and gains, were written
         self.kind = {Actuation.EXPLICIT_PD: EXPLICIT, Actuation.NATIVE: NATIVE}.get(world.physics.actuation, LAW)
         self.news = np.zeros((len(joints), 2), dtype=int)
-        self._ended: list[_Ended | None] = [None] * num_envs
+        self._ended: list[_SubstepEnd | None] = [None] * num_envs
         self._update()
 
     def apply(self, control: Control) -> None:
@@ -119,7 +119,7 @@ class DampedDrives:
 
     def note(self, env: int, position: Array, velocity: Array) -> None:
         """After the last substep, with the motion (J,) that it left. Most steps are never asked for."""
-        self._ended[env] = _Ended(self.law, position, velocity)
+        self._ended[env] = _SubstepEnd(self.law, position, velocity)
 
     def exerted(self, env: int, effort: Array) -> None:
         """Write what the env's drives exerted in the last substep into its row of (N, J)."""

@@ -18,14 +18,14 @@ from anysim_mujoco.options import MujocoOptions
 from anysim_mujoco.surfaces import DRY_IMPEDANCE, STIFF_IMPEDANCE, constraint_solref
 
 
-class Built(NamedTuple):
+class BuiltModel(NamedTuple):
     """A compiled model and where the World's things are in it."""
 
     model: Any
     layout: Layout
 
 
-def build(world: World, options: MujocoOptions) -> Built:
+def build(world: World, options: MujocoOptions) -> BuiltModel:
     """Compile a World.
 
     Raises:
@@ -49,7 +49,7 @@ def build(world: World, options: MujocoOptions) -> Built:
     except (ValueError, mujoco.FatalError) as error:
         said = " ".join(str(error).split())
         raise EngineError(f"MuJoCo cannot build the world '{world.name}': {said}") from error
-    return Built(model, Layout.of(world, model, Handles(bodies, joints, geoms, sensors)))
+    return BuiltModel(model, Layout.of(world, model, Handles(bodies, joints, geoms, sensors)))
 
 
 def initial_row(world: World, model: Any, layout: Layout) -> Array:

@@ -12,7 +12,7 @@ from anysim_mujoco.parameters import Parameters
 from anysim_mujoco.state import StateReader
 
 
-class Carried(NamedTuple):
+class CarriedRows(NamedTuple):
     """Copies in the order of the old World. Dof values are position, velocity and warm start."""
 
     time: Array
@@ -29,10 +29,10 @@ def _dofs(batch: Any, q: Array, v: Array) -> tuple[Array, ...]:
     return batch.bind("qpos")[:, q], batch.bind("qvel")[:, v], batch.bind("qacc_warmstart")[:, v]
 
 
-def carried_rows(batch: Any, layout: Layout, reader: StateReader, parameters: Parameters) -> Carried:
+def carried_rows(batch: Any, layout: Layout, reader: StateReader, parameters: Parameters) -> CarriedRows:
     """Copy what a rebuild would lose."""
     poses = np.concatenate([batch.bind("mocap_pos"), batch.bind("mocap_quat")], axis=-1)
-    return Carried(
+    return CarriedRows(
         time=batch.bind("time").copy(),
         joints=_dofs(batch, layout.joint_q, layout.joint_v),
         free=_dofs(batch, layout.free_q, layout.free_v),
@@ -52,7 +52,7 @@ def _shared_rows(before: Array, after: Array, old_rows: Array, new_rows: Array) 
 
 
 def take_rows(
-    carried: Carried,
+    carried: CarriedRows,
     old: World,
     old_layout: Layout,
     new: World,

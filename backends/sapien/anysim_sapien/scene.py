@@ -32,7 +32,7 @@ _configuring = threading.Lock()
 """PhysX takes the configuration of a scene from a global, at the moment the scene is made."""
 
 
-class Left(NamedTuple):
+class LastMotion(NamedTuple):
     """What a substep left in an env's links."""
 
     velocities: list[Array]
@@ -63,7 +63,7 @@ class EnvScene(SceneParts):
         self.body_of: dict[Any, int] = {}
         """World body of each PhysX component, -1 for the world's own geoms."""
         self._packed: bytes | None = None
-        self._left: Left | None = Left([], [])
+        self._left: LastMotion | None = LastMotion([], [])
         if WORLD in recipe.geoms_on:
             self._enter(WORLD, physx.PhysxRigidStaticComponent(), sapien.Pose())
         for body in recipe.layout.actors:
@@ -224,11 +224,11 @@ class EnvScene(SceneParts):
             self._packed = self.pack()
         return self._packed
 
-    def left(self) -> Left:
+    def left(self) -> LastMotion:
         """What the last substep left in the links, whatever was written since."""
         if self._left is None:
             forces = [tree.handle.link_incoming_joint_forces for tree in self.trees]
-            self._left = Left(self.link_velocities(), forces)
+            self._left = LastMotion(self.link_velocities(), forces)
         return self._left
 
     def link_velocities(self) -> list[Array]:
