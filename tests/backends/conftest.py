@@ -5,6 +5,9 @@ from pathlib import Path
 
 import pytest
 
+LIBRARIES = {"mechanics": "numba"}
+"""What a backend is built on, where that has another name."""
+
 
 class Absent(pytest.Module):
     """A module of tests that cannot even be imported here."""
@@ -17,6 +20,6 @@ class Absent(pytest.Module):
 def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector) -> pytest.Module | None:
     """Collect a module in the ordinary way unless its backend is missing."""
     name = module_path.parent.name
-    if all(importlib.util.find_spec(needed) for needed in (name, f"anysim_{name}")):
+    if all(importlib.util.find_spec(needed) for needed in (LIBRARIES.get(name, name), f"anysim_{name}")):
         return None
     return Absent.from_parent(parent, path=module_path)
