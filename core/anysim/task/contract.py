@@ -18,7 +18,7 @@ class Status(StrEnum):
     TRUNCATED = "truncated"
 
 
-Event = TypeVar("Event", bound=Callable[..., None])
+Event = TypeVar("Event", bound=Callable[..., Any])
 
 UNSEEN = "changes_nothing_seen"
 """The mark of an event term, an attribute of the function."""
@@ -30,7 +30,7 @@ def changes_nothing_seen(event: Event) -> Event:
     Videos of a task with other terms at each step are drawn as the steps are made: what such a term changes is not
     recorded.
     """
-    vars(event)[UNSEEN] = True
+    setattr(event, UNSEEN, True)
     return event
 
 
@@ -48,6 +48,11 @@ def at_most(bound: float) -> Callable[[Reward], Reward]:
         return reward
 
     return marked
+
+
+GOES_ON = "goes_on"
+"""The mark of a command or an event, an attribute of its class, that is called at resets and in each step: how many
+numbers its goals have, 7 of a pose and 3 of a velocity."""
 
 
 STATUS_NAMES = np.array([str(s) for s in Status])
