@@ -1,4 +1,4 @@
-"""What each engine makes of each task, into the task's README.md: rates of docs/tasks.json, and what it approximates.
+"""Sections on the engines in the README.md of each task: rates of docs/tasks.json, and what is approximate there.
 
     python scripts/task_pages.py [--check]
 

@@ -51,8 +51,7 @@ def at_most(bound: float) -> Callable[[Reward], Reward]:
 
 
 GOES_ON = "goes_on"
-"""The mark of a command or an event, an attribute of its class, that is called at resets and in each step: how many
-numbers its goals have, 7 of a pose and 3 of a velocity."""
+"""An attribute of classes of commands and events that are called in each step too: how many numbers a goal has."""
 
 
 STATUS_NAMES = np.array([str(s) for s in Status])

@@ -191,8 +191,9 @@ class Visible:
         half, depth = np.tan(np.radians(view.fov) / 2) * np.maximum(seen[:, 2], 1e-9), seen[:, 2]
         off = np.maximum(np.abs(seen[:, 0]) / self._aspect, np.abs(seen[:, 1])) / half
         there = (depth >= self._nearest) & (depth <= self._farthest) & (off <= self._within) & root.present
-        if not self._pixels or self._scene.capture is None:
+        if not self._pixels:
             return there
+        assert self._scene.capture is not None
         seen = self._scene.capture.segmentation(self._camera, self._scene.env_ids)
         return there & (np.isin(seen, self._ids).sum(axis=(1, 2)) >= self._pixels)
 
