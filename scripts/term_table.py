@@ -15,9 +15,10 @@ from typing import Any, Union, get_args, get_origin
 from generated import main
 from pydantic.fields import FieldInfo
 
-from anysim.plugin_parameters import parameters, reference_kind
+from anysim.plugin_parameters import given, parameters, reference_kind
 from anysim.task.conditions import Conditions
 from anysim.task.terms import TERMS
+from anysim_tasks.terms import TERMS as OF_TASKS
 
 TITLES = {
     "observation": "Observations: `(n, k)`",
@@ -35,6 +36,9 @@ def typed(annotation: Any) -> tuple[str, str]:
         if isinstance(extra, FieldInfo):
             bounds = [f"{SIGNS[type(b).__name__]} {next(iter(vars_of(b).values()))}" for b in extra.metadata]
             said = ", ".join([*bounds, *([extra.description] if extra.description else [])])
+    optional = given(annotation)
+    if optional is not annotation:
+        return typed(optional)
     bare = get_args(annotation)[0] if metadata else annotation
     if (kind := reference_kind(bare)) == Conditions.reference_kind:
         return "predicates by name", said
@@ -60,6 +64,8 @@ def spelled(annotation: Any) -> str:
         return "3 values, each may be drawn" if "tuple" in text else "a value, may be drawn"
     if get_origin(annotation) in (Union, UnionType) and NoneType not in get_args(annotation):
         return " or ".join(", ".join(filter(None, typed(part))) for part in get_args(annotation))
+    if text.startswith("collections.abc.Sequence[tuple["):
+        return "points"
     if text == "tuple[str, ...]":
         return "words"
     if text.startswith("tuple["):
@@ -76,7 +82,7 @@ def described(key: str, parameter: inspect.Parameter) -> str:
     if kind == "name of a robot":
         words.append("may be left out where there is one")
     if parameter.default is not inspect.Parameter.empty:
-        words.append(f"default {parameter.default!r}")
+        words.append("may be left out" if parameter.default is None else f"default {parameter.default!r}")
     return f"`{key}`: {', '.join(words)}"
 
 
@@ -95,7 +101,8 @@ def reference() -> str:
     lines: list[str] = []
     for kind, functions in TERMS.items():
         lines += [f"## {TITLES[kind]}", "", "| term | what it is | parameters |", "|---|---|---|"]
-        lines += [row(name, function) for name, function in sorted(functions.items())]
+        every = {**functions, **{f"tasks.{name}": function for name, function in OF_TASKS.get(kind, {}).items()}}
+        lines += [row(name, function) for name, function in sorted(every.items())]
         lines.append("")
     return "\n".join(lines).rstrip()
 

@@ -10,7 +10,8 @@ hands them on to the constructor of its base has the parameters of that one too,
 import inspect
 from collections.abc import Callable, Mapping
 from functools import cache
-from typing import Any, get_type_hints
+from types import NoneType, UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 
@@ -36,8 +37,14 @@ def parameters(function: Callable[..., Any]) -> dict[str, inspect.Parameter]:
 
 
 def reference_kind(annotation: Any) -> str | None:
-    """The kind of handle an annotation stands for, or None for plain data."""
-    return getattr(annotation, "reference_kind", None)
+    """The kind of handle an annotation stands for, or None for plain data. `Frame | None` may be left out."""
+    return getattr(given(annotation), "reference_kind", None)
+
+
+def given(annotation: object) -> object:
+    """The annotation of a value that is given."""
+    parts = get_args(annotation) if get_origin(annotation) in (Union, UnionType) else ()
+    return parts[0] if len(parts) == 2 and parts[1] is NoneType else annotation
 
 
 @cache
@@ -50,7 +57,9 @@ def options_model(function: Callable[..., Any]) -> type[BaseModel]:
         if kind == "robot":  # the only robot of a world need not be named
             fields[name] = (reference | None, None)
         else:
-            annotation = getattr(p.annotation, "written_as", reference) if kind else p.annotation
+            bare = given(p.annotation)
+            annotation = getattr(bare, "written_as", reference) if kind else p.annotation
+            annotation = annotation | None if kind and bare is not p.annotation else annotation
             fields[name] = (annotation, ... if p.default is inspect.Parameter.empty else p.default)
     config = ConfigDict(extra="forbid", frozen=True)
     return create_model(getattr(function, "__name__", "options"), __config__=config, **fields)

@@ -66,13 +66,13 @@ class NamedByKey:
 
 
 NAME_PATTERN = r"^[a-zA-Z][a-zA-Z0-9_]*$"
-REFERENCE_PATTERN = r"^[a-zA-Z][a-zA-Z0-9_]*(\.[^\s]+)?$"
+REFERENCE_PATTERN = r"^[a-zA-Z][a-zA-Z0-9_]*([./][^\s]+)?$"
 
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 """The name of an entity, camera, term…: it becomes the first part of a dotted reference such as `panda.tool`."""
 
 Reference = Annotated[str, Field(pattern=REFERENCE_PATTERN)]
-"""A dotted reference to something in the world: `cube`, `panda.tool`, `cabinet.drawer`, `goal`."""
+"""A reference to something in the world: `cube`, `panda.tool`, `goal`, an affordance `block/mouth`."""
 
 # Strict: the text "0.1" and the boolean `true` are not numbers, and the text "yes" is not a boolean.
 Number = Annotated[float, Strict()]

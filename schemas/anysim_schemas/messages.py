@@ -11,7 +11,7 @@ from anysim_schemas.base import NAME_PATTERN, REFERENCE_PATTERN
 
 PATTERNS = {
     NAME_PATTERN: "a name starts with a letter and has only letters, digits and underscores",
-    REFERENCE_PATTERN: "a reference is a name, or names joined by dots, such as panda.tool",
+    REFERENCE_PATTERN: "a reference is a name, or names joined by dots, such as panda.tool, or by a slash: block/mouth",
 }
 """Patterns that have a name of their own."""
 

@@ -42,7 +42,7 @@ def test_help_teaches() -> None:
 def test_list_names_what_is_installed() -> None:
     rows = json.loads(anysim("list", "engines", "--json").stdout)
     assert {"mujoco", "null"} <= {row["name"] for row in rows}
-    assert "pick_cube" in anysim("list", "tasks").stdout
+    assert "pick_cube" in anysim("list", "tasks", "--no-engines").stdout
     assert "franka_panda" in anysim("list", "robots").stdout
     wrong = anysim("list", "robotz")
     assert wrong.returncode == 2
@@ -221,17 +221,22 @@ def test_a_command_of_a_package_that_is_not_installed_names_the_package(monkeypa
 
 
 def test_list_tasks_says_what_each_is() -> None:
-    rows = {row["name"]: row for row in json.loads(anysim("list", "tasks", "--json").stdout)}
+    rows = {row["name"]: row for row in json.loads(anysim("list", "tasks", "--no-engines", "--json").stdout)}
     cube = rows["pick_cube"]
     assert (cube["family"], cube["horizon"], cube["expert"]) == ("tabletop", 400, "pick")
     assert cube["robots"] == ["franka_panda"]
     assert cube["levels"] == ["L0", "L1", "L2"]
     assert rows["put_away"]["expert"] == "commands"
     assert rows["turn_faucet"]["family"] == "contact_rich"
+    assert Path(cube["picture"]).is_file()
+    assert not Path(cube["picture"]).is_absolute()
 
 
 @pytest.mark.slow
-def test_list_tasks_asks_the_engines() -> None:
-    rows = {row["name"]: row for row in json.loads(anysim("list", "tasks", "--engines", "--json").stdout)}
+def test_list_tasks_asks_the_engines_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ANYSIM_CACHE_DIR", str(tmp_path))
+    rows = {row["name"]: row for row in json.loads(anysim("list", "tasks", "--json").stdout)}
+    assert {row["name"]: row for row in json.loads(anysim("list", "tasks", "--json").stdout)} == rows
+    assert len([*(tmp_path / "task_engines").iterdir()]) == len(rows)
     assert "null" not in rows["pick_cube"]["engines"], "it has no physics"
     assert set(rows["pick_cube"]["engines"]) == set(runnable(Capability.DYNAMICS))

@@ -10,7 +10,7 @@ import anysim
 from anysim.errors import SpecError
 from anysim.task.env import TaskEnv
 from anysim.task.term_registry import bind
-from tests.task.helpers import BLOCKS, blocks
+from tests.task.helpers import BLOCKS, arm, blocks
 from tests.task.test_place_terms import put
 
 HIGH = {"high": {"term": "above", "a": "red", "b": "table", "height": 0.8, "tolerance": 0.3, "distance": 9.0}}
@@ -156,3 +156,52 @@ def test_stage_stops_at_the_first_that_does_not_hold() -> None:
             put(env, "red", (0.0, 0.0, height), (0.0, pitch, 0.0))
             assert stage().tolist() == [said]
             assert seen().tolist() == [each]
+
+
+@pytest.mark.parametrize(("by", "said"), [(0.1, [False, True, True]), (-0.1, [False, False, False])])
+def test_a_joint_has_moved_since_the_first_step(by: float, said: list[bool]) -> None:
+    with arm() as env:
+        env.reset(seed=0)
+        moved = bind("predicate", "joint_moved", {"joint": "panda.panda_joint1", "by": by}, env.scene, "test")
+        joint, found = env.engine.index.joint("panda.panda_joint1"), []
+        for position in (0.3, 0.41, 0.4001):
+            env.scene.elapsed[:] += 1
+            env.engine.set_joint_state(np.array([[position]]), np.zeros((1, 1)), None, [joint])
+            env.scene.look(None)
+            found += moved().tolist()
+        assert found == said
+
+
+def test_progress_counts_what_has_held_in_its_order_and_loses_nothing() -> None:
+    with blocks() as env:
+        env.reset(seed=0)
+        progress = bind("observation", "progress", {"of": {**TILTED, **HIGH}}, env.scene, "test")
+        said: list[float] = []
+        for height, pitch in ((0.9, 0.0), (0.2, 1.0), (0.2, 0.0), (0.9, 0.0), (0.2, 0.0)):
+            placed(env, height, pitch)
+            assert progress().tolist() == progress().tolist()
+            said += progress()[:, 0].tolist()
+        assert said == [0.0, 0.5, 0.5, 1.0, 1.0]
+        env.reset(seed=0)
+        assert progress().tolist() == [[0.0]]
+        placed(env, 0.9, 1.0)
+        assert progress().tolist() == [[1.0]], "one after the other in the same step"
+
+
+def test_the_action_s_size_and_its_rate() -> None:
+    with arm(2) as env:
+        env.reset(seed=0)
+        size, older, rate = (
+            bind("reward", n, {}, env.scene, "t") for n in ("action_l2", "action_rate", "action_rate_l2")
+        )
+        before = np.zeros((2, env.action_dim))
+        for seed in range(3):
+            action = np.random.default_rng(seed).uniform(-1.0, 1.0, before.shape)
+            env.step(action)
+            np.testing.assert_allclose(size(), (action**2).sum(axis=1))
+            assert size().tolist() == older().tolist()
+            for _ in range(2):
+                np.testing.assert_allclose(rate(), ((action - before) ** 2).sum(axis=1))
+            before = action
+        env.reset(mask=np.array([True, False]))
+        assert rate().tolist() == [0.0], "an episode begins without an action"

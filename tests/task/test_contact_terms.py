@@ -51,6 +51,9 @@ def test_what_rests_on_something_presses_on_it_with_its_weight(engine: str) -> N
         light, heavy = (
             bind("predicate", "touching", {"sensor": "over", "force": force}, env.scene, "t") for force in (1.5, 2.5)
         )
+        gentle, firm = (
+            bind("predicate", "touching", {"sensor": "over", "most": most}, env.scene, "t") for most in (2.2, 1.8)
+        )
         between = bind("predicate", "grasped", {"left": "under", "right": "over"}, env.scene, "t")
         status: list[str] = []
         while not status or status[-1] == "running":
@@ -60,6 +63,7 @@ def test_what_rests_on_something_presses_on_it_with_its_weight(engine: str) -> N
                 np.testing.assert_allclose(env.obs["policy"][0], [0.0, 0.0, 0.7 * G], atol=0.05)
                 assert result.reward[0] == pytest.approx(0.7 * G / 10.0, abs=0.005)
                 assert (light().tolist(), heavy().tolist()) == ([True], [False]), "the lid weighs 1.96 N"
+                assert (gentle().tolist(), firm().tolist()) == ([True], [False])
                 assert between().all(), "floor and lid press from opposite sides"
         assert status[-1] == "failed", "0.7 kg are more than 6 N for more than 5 steps"
 

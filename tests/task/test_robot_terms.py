@@ -134,3 +134,26 @@ def test_a_channel_without_a_controller_has_no_action() -> None:
     task = {"horizon": 5, "observations": {"policy": ["channel_action"]}}
     with pytest.raises(AnysimError, match=r"'arm.arm' has no controller.*channels with one: arm.eef"):
         anysim.make({**GO1, "world": mute, "task": task})
+
+
+def test_targets_and_the_width_of_a_gripper() -> None:
+    with arm(2) as env:
+        env.reset(seed=1)
+        scene, robot = env.scene, env.scene.robot("panda")
+        for opening in (-1.0, 1.0):
+            action = np.zeros((2, env.action_dim))
+            action[:, -1] = opening
+            for _ in range(40):
+                env.step(action)
+            width = terms.gripper_width(scene, robot=robot)
+            np.testing.assert_allclose(width, 0.08 * (opening > 0), atol=1e-3)
+            target = terms.commanded_position(scene, robot=robot, channel="eef")
+            np.testing.assert_allclose(target, env.engine.control.position[:, 7 : 7 + target.shape[1]])
+            assert ((target > 0.03) == (opening > 0)).all()
+        assert np.allclose(
+            terms.commanded_position(scene, robot=robot),
+            terms.channel_joint_pos(scene, robot=robot, relative="zero"),
+            atol=0.05,
+        )
+        with pytest.raises(AnysimError, match=r"'panda.arm' is no gripper.*grippers: eef"):
+            terms.gripper_width(scene, robot=robot, channel="arm")

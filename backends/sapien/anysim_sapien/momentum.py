@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from anysim.conventions import Array, xyzw_from_wxyz
-from anysim_mechanics.momentum_balance import Balance, Given, MomentumBalance, Substep
+from anysim_mechanics.momentum_balance import Balance, Circumstances, MomentumBalance, Substep
 from anysim_sapien.recipe import Recipes
 from anysim_sapien.scene import EnvScene
 
@@ -17,7 +17,7 @@ class _SubstepNotes(NamedTuple):
     before: bytes
     links_before: list[Array]
     after: bytes
-    given: Given
+    given: Circumstances
 
     def substep(self) -> Substep:
         """The same as arrays."""
@@ -59,7 +59,7 @@ class Momentum:
     def after(self, env: int, scene: EnvScene, pushes: Array | None) -> None:
         """After the last substep, with `pushes` (K, 7): bodies and the wrenches that were on them."""
         self._balance[env] = None
-        given = Given(scene.gravity, scene.mass, scene.rubbing, scene.slowing, pushes)
+        given = Circumstances(scene.gravity, scene.mass, scene.rubbing, scene.slowing, pushes)
         self.noted[env] = _SubstepNotes(scene, *self._before, scene.packed(), given)
 
     def balance(self, env: int) -> Balance:

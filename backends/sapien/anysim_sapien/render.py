@@ -139,7 +139,8 @@ class Painter:
             opacity = self._skins.give(
                 self._materials[index], colors[index], int(textures[index]), int(materials[index])
             )
-            self._shapes[index].visibility = opacity if body == WORLD or there[body] else 0.0
+            shown = colors[index, 3] > 0.0 and (body == WORLD or there[body])
+            self._shapes[index].visibility = opacity if shown else 0.0
 
     def _read(self, camera: Any, images: dict[str, Array], row: int, look: Look) -> None:
         seen = camera.get_picture("Segmentation")[..., 1]

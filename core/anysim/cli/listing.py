@@ -1,5 +1,6 @@
 """`anysim list`: what is installed."""
 
+import os
 from contextlib import suppress
 from typing import TYPE_CHECKING, Annotated
 
@@ -8,6 +9,7 @@ import typer
 from anysim.cli.options import AsJson
 
 if TYPE_CHECKING:
+    from anysim.conventions import Array
     from anysim_schemas.load import LoadedRun
 
 
@@ -19,8 +21,8 @@ def list_(
         ),
     ],
     engines: Annotated[
-        bool, typer.Option("--engines", help="Of tasks: which engines can run them, which takes a moment for each.")
-    ] = False,
+        bool, typer.Option(help="Of tasks: which engines can run them, which takes a moment where it is not known yet.")
+    ] = True,
     json: AsJson = False,
 ) -> None:
     """List what is installed of a kind, and where it comes from.
@@ -103,7 +105,7 @@ def _tasks(ask_engines: bool, json: bool) -> None:
             row |= {"robots": [one.robot for one in spec.world.robots.values()], "levels": list(spec.levels)}
             row |= {"what": task.description}
             if (picture := path.with_name("picture.jpg")).exists():
-                row["picture"] = str(picture)
+                row["picture"] = os.path.relpath(picture)
             if ask_engines:
                 row["engines"] = _able(loaded, name)
         except AnysimError as error:
@@ -120,18 +122,30 @@ def _tasks(ask_engines: bool, json: bool) -> None:
 
 
 def _able(loaded: "LoadedRun", name: str) -> list[str]:
-    """The engines with physics that can run a task."""
+    """The engines with physics that can run a task; asked again where the task, its robots or an engine changed."""
+    import numpy as np
+
+    from anysim import __version__, cache
     from anysim.api import check_engine, compile_world
+    from anysim.assets.catalogue import load_robot
     from anysim.engine.capability import Capability
-    from anysim.engine.factory import engine_class, runnable
+    from anysim.engine.factory import availability, engine_class, runnable
     from anysim.errors import CapabilityError
 
-    world, able = compile_world(loaded), list[str]()
-    for engine in runnable(Capability.DYNAMICS):
-        with suppress(CapabilityError):
-            check_engine(loaded, world, engine_class(engine), name)
-            able.append(engine)
-    return able
+    engines = runnable(Capability.DYNAMICS)
+
+    def ask() -> dict[str, "Array"]:
+        world, able = compile_world(loaded), list[str]()
+        for engine in engines:
+            with suppress(CapabilityError):
+                check_engine(loaded, world, engine_class(engine), name)
+                able.append(engine)
+        return {"engines": np.array(able, dtype=str)}
+
+    robots = [repr(load_robot(robot.robot)) for robot in loaded.spec.world.robots.values()]
+    each = [f"{engine} {availability(engine).version} {engine_class(engine).capabilities!r}" for engine in engines]
+    key = cache.digest(__version__, repr(loaded.spec.to_dict()), *robots, *each)
+    return cache.load_or_make("task_engines", key, ask)["engines"].tolist()
 
 
 def _capabilities() -> None:

@@ -87,14 +87,14 @@ def working_on(what: str, in_a_pipe: bool = False) -> Iterator[Callable[[str], o
         yield lambda words: status.update(f"{words}…")
 
 
-class Progress(Protocol):
+class Counter(Protocol):
     """What is called once per finished thing: its line, and a few words on how all of it goes."""
 
     def __call__(self, line: str, standing: str = "") -> object: ...
 
 
 @contextmanager
-def counting(what: str, total: int, quiet: bool = False) -> Iterator[Progress]:
+def counting(what: str, total: int, quiet: bool = False) -> Iterator[Counter]:
     """Call what it gives once per finished thing: a progress bar for a person, the line in a pipe, else nothing."""
     if quiet:
         yield lambda line, standing="": None

@@ -196,6 +196,11 @@ class CaptureManager(Manager):
         """Images (n, H, W, 3) uint8 of a camera at this control step, with its brightness and noise."""
         return self._seen(camera, ("rgb",), env_ids, np.ones(len(env_ids), dtype=bool))[camera]
 
+    def segmentation(self, camera: str, env_ids: Array) -> Array:
+        """Segmentation images (n, H, W) int32 of a camera at this control step."""
+        due = np.ones(len(env_ids), dtype=bool)
+        return self._seen(camera, ("segmentation",), env_ids, due)[_kept_as(camera, "segmentation")]
+
     def _seen(self, camera: str, channels: Sequence[str], env_ids: Array, due: Array) -> dict[str, Array]:
         """The latest images of these envs, by `_kept_as`: of this control step where `due`, or where there is none."""
         now, names = self.episodes.elapsed[env_ids], [self._room(camera, channel) for channel in channels]

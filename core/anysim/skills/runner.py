@@ -10,7 +10,7 @@ from anysim import registry
 from anysim.conventions import Array
 from anysim.errors import AnysimError, SpecError, SpecIssue, TaskError
 from anysim.planning.service import PlannerService
-from anysim.plugin_parameters import checked, options_model, parameters, reference_kind
+from anysim.plugin_parameters import checked, given, options_model, parameters, reference_kind
 from anysim.skills.base import OUTCOMES, Outcome, Skill
 from anysim.skills.commands import CommandSequence
 from anysim.skills.phases import MovingSkill
@@ -31,10 +31,10 @@ def bind_skill(name: str, params: Mapping[str, Any], env: TaskEnv, path: str) ->
     values = checked(options_model(skill_class), params, path)
     keywords: dict[str, Any] = {}
     for key, parameter in parameters(skill_class).items():
-        value, handle = getattr(values, key), reference_kind(parameter.annotation)
-        if handle is not None:
+        value, view = getattr(values, key), given(parameter.annotation)
+        if reference_kind(view) is not None:
             try:
-                value = resolve(handle, value, env.scene)
+                value = resolve(view, value, env.scene)
             except AnysimError as error:
                 raise SpecError([SpecIssue("", f"{path}.{key}", str(error))]) from None
         keywords[key] = _from_file(env, f"{path}.{key}", value) if isinstance(value, Path) else value

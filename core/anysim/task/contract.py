@@ -18,7 +18,7 @@ class Status(StrEnum):
     TRUNCATED = "truncated"
 
 
-Event = TypeVar("Event", bound=Callable[..., None])
+Event = TypeVar("Event", bound=Callable[..., Any])
 
 UNSEEN = "changes_nothing_seen"
 """The mark of an event term, an attribute of the function."""
@@ -30,7 +30,7 @@ def changes_nothing_seen(event: Event) -> Event:
     Videos of a task with other terms at each step are drawn as the steps are made: what such a term changes is not
     recorded.
     """
-    vars(event)[UNSEEN] = True
+    setattr(event, UNSEEN, True)
     return event
 
 
@@ -48,6 +48,10 @@ def at_most(bound: float) -> Callable[[Reward], Reward]:
         return reward
 
     return marked
+
+
+GOES_ON = "goes_on"
+"""An attribute of classes of commands and events that are called in each step too: how many numbers a goal has."""
 
 
 STATUS_NAMES = np.array([str(s) for s in Status])

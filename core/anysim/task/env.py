@@ -69,10 +69,11 @@ class TaskEnv:
         self.actions, self.capture = self._manager(ActionManager), self._manager(CaptureManager)
         self.action_dim = self.actions.dim
         self.scene = SceneView(engine, self._episodes, self._manager(TerrainManager))
+        self.scene.capture = self.capture
         self.scene.action_columns = {name: slice(s.start, s.stop) for name, s in self.action_spaces.items()}
         self.bindings = Bindings(spec.collect, self.num_envs, self.streams)
         self.mdp = Mdp(spec.task, self.scene, self.streams, located, self.bindings)
-        self.capture.goals = self.scene.goals
+        self.capture.goals = self.scene.poses
         self.scene.last_action = np.zeros((self.num_envs, self.action_dim))
         self.counterfactuals = Counterfactuals(self.managers, self.mdp, engine, self.streams)
         for manager in self.managers:

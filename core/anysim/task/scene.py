@@ -17,9 +17,11 @@ from anysim.engine.state import State
 from anysim.errors import NameLookupError, TaskError, listing, suggest
 from anysim.geometry.bounds import EntityShape
 from anysim.managers.base import Episodes
+from anysim.managers.camera import CaptureManager
 from anysim.managers.terrain import TerrainManager
 from anysim.math import pose as P
 from anysim.model import frames
+from anysim.model.affordance_lookup import find_affordance
 from anysim.model.slots import members, single
 from anysim.model.world import BodyKind, Channel, Entity
 from anysim.task.memory import Memory
@@ -37,7 +39,7 @@ class SceneView:
         self.index = engine.index
         episodes = Episodes(engine.num_envs) if episodes is None else episodes
         self.goals: dict[str, Array] = {}
-        """Goal poses (N, 7) by command name."""
+        """What commands want, by name: poses (N, 7), and of a commanded velocity (N, 3)."""
         self.drawn: dict[str, tuple[Array, Array]] = {}
         """What `Bindings.rows` returns."""
         self.last_action = np.zeros((engine.num_envs, 0))
@@ -50,6 +52,8 @@ class SceneView:
         """The manager of tiles and levels; None in a scene without managers."""
         self.elapsed = episodes.elapsed
         """Control steps since each env's reset (N,)."""
+        self.capture: CaptureManager | None = None
+        """The manager that keeps images; None in a scene without managers."""
         self.memories: list[Memory] = []
         """What terms remember, in the order in which they were made."""
         self._rows: Array | slice = slice(None)
@@ -89,6 +93,11 @@ class SceneView:
         return self._rows
 
     @property
+    def poses(self) -> dict[str, Array]:
+        """The goals that are poses (N, 7)."""
+        return {name: goal for name, goal in self.goals.items() if goal.shape[1] == 7}
+
+    @property
     def env_ids(self) -> Array:
         """The envs at hand (n,)."""
         return self._env_ids
@@ -102,7 +111,7 @@ class SceneView:
         """The handle of a frame or goal."""
         handle = self._frames.get(name)
         if handle is None:
-            handle = GoalFrame(self, name) if name in self.goals else self._world_frame(name)
+            handle = GoalFrame(self, name) if name in self.poses else self._world_frame(name)
             self._frames[name] = handle
         return handle
 
@@ -110,10 +119,12 @@ class SceneView:
         try:
             return self._frame_of(name)
         except NameLookupError as error:
-            goals = f" Goals: {listing(self.goals)}{suggest(name, list(self.goals))}." if self.goals else ""
+            goals = f" Goals: {listing(self.poses)}{suggest(name, list(self.poses))}." if self.poses else ""
             raise NameLookupError(f"{error}.{goals}") from None
 
     def _frame_of(self, name: str) -> "Frame":
+        if "/" in name:
+            return self._affordance(name)
         world, (owner, dot, part) = self.engine.world, name.partition(".")
         if not members(world, owner):
             return BodyFrame(self, name, self.index.frame(name))
@@ -122,6 +133,15 @@ class SceneView:
             return SlotFrame(self, name, columns_of(world, name)[0])
         whole = f"{slot.name}{dot}{part}"
         return BodyFrame(self, whole, self.index.frame(whole))
+
+    def _affordance(self, name: str) -> "Frame":
+        """The frame of an affordance, `cabinet/drawer_1.handle`."""
+        world, (owner, _, local) = self.engine.world, name.partition("/")
+        slots = members(world, owner)
+        if not (slots and varies(world, slot := single(world, owner))):
+            return BodyFrame(self, name, find_affordance(world, f"{owner}.{local}").frame)
+        each = (find_affordance(world, f"{world.entities[e].name}.{local}").frame for e in slot.entities)
+        return SlotFrame(self, name, Column(slot.name, slot.entities, tuple(each)))
 
     def memory(self, width: int = 1) -> Callable[[Callable[[Array, Array], Array]], Array]:
         """A new `Memory`, as the function that updates the rows at hand and returns them (n, width)."""

@@ -8,12 +8,9 @@ from typing import Any
 
 from anysim import registry
 from anysim.errors import AnysimError, PluginError, SpecError, SpecIssue, listing, suggest
-from anysim.plugin_parameters import checked, options_model, parameters, reference_kind
+from anysim.plugin_parameters import checked, given, options_model, parameters, reference_kind
 from anysim.task.conditions import Conditions
-from anysim.task.contact_view import ContactView
-from anysim.task.joints import JointView, RangedJointView
-from anysim.task.scene import DrawnView, Frame, ObjectView, RobotView, SceneView
-from anysim.task.slot_frames import CategoryView
+from anysim.task.scene import Frame, RobotView, SceneView
 from anysim_schemas.task import PredicateTermSpec
 
 BUILTIN = "anysim"
@@ -66,12 +63,12 @@ def bind(kind: str, term: str, params: Mapping[str, Any], scene: SceneView, path
     keywords: dict[str, Any] = {}
     for name, parameter in parameters(function).items():
         value = getattr(values, name)
-        handle = reference_kind(parameter.annotation)
-        if handle == Conditions.reference_kind:
+        view = given(parameter.annotation)
+        if view is Conditions and value is not None:
             value = _conditions(value, scene, f"{path}.{name}")
-        elif handle is not None:
+        elif reference_kind(view) is not None:
             try:
-                value = resolve(handle, value, scene)
+                value = resolve(view, value, scene)
             except AnysimError as error:
                 raise SpecError([SpecIssue("", f"{path}.{name}", str(error))]) from None
         keywords[name] = value
@@ -93,20 +90,13 @@ def _conditions(specs: Mapping[str, PredicateTermSpec], scene: SceneView, path: 
     return Conditions(calls)
 
 
-Handle = Frame | RobotView | ObjectView | JointView | CategoryView | ContactView | DrawnView
-
-
-def resolve(kind: str, name: str | None, scene: SceneView) -> Handle:
-    """The handle that a reference in a YAML file stands for."""
-    if kind == "robot":
-        return scene.robot(scene.index.robot(name).name)
-    assert name is not None
-    if kind in ("joint", "ranged joint"):
-        return (JointView if kind == "joint" else RangedJointView)(scene, name)
-    if kind == "drawn value":
-        return DrawnView(scene, name)
-    if kind == ContactView.reference_kind:
-        return ContactView(scene, name)
-    if kind == "category":
-        return scene.category(name)
-    return ObjectView(scene, name) if kind == "object" else scene.frame(name)
+def resolve(view: object, name: object, scene: SceneView) -> object:
+    """The handle that a reference in a YAML file stands for; `view` is its class. None for one that was left out."""
+    if view is RobotView:
+        return scene.robot(scene.index.robot(None if name is None else str(name)).name)
+    if name is None:
+        return None
+    if view is Frame:
+        return scene.frame(str(name))
+    assert isinstance(view, type)
+    return view(scene, name)

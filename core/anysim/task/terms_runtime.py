@@ -1,6 +1,7 @@
 """The task's terms, bound to a scene: commands, observations, rewards, success, failure, events."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from functools import partial, reduce
 from math import isfinite
 from typing import Any, NamedTuple
@@ -16,11 +17,11 @@ from anysim.plugin_parameters import options_model
 from anysim.randomization.draw import draw_rows, is_random
 from anysim.randomization.streams import Streams
 from anysim.task.bindings import Bindings, bind_term
-from anysim.task.contract import Obs
+from anysim.task.contract import GOES_ON, Obs
 from anysim.task.observation_noise import ObservedTerm
 from anysim.task.scene import SceneView
 from anysim.task.term_registry import find
-from anysim_schemas.task import EventTermSpec, TaskSpec
+from anysim_schemas.task import EventTermSpec, TaskSpec, TermSpec
 
 Term = Callable[..., Any]
 
@@ -57,8 +58,9 @@ class Mdp:
         self.bindings = Bindings(None, scene.engine.num_envs, streams) if bindings is None else bindings
         scene.drawn = self.bindings.rows()
         n = scene.engine.num_envs
-        for name in spec.command:
-            scene.goals[name] = np.tile(np.array([0, 0, 0, 0, 0, 0, 1.0]), (n, 1))
+        widths = {name: _goes_on("command", term) for name, term in spec.command.items()}
+        for name, width in widths.items():
+            scene.goals[name] = np.tile(np.array([0.0, 0, 0, 0, 0, 0, 1][: width or 7]), (n, 1))
         self.held = np.zeros(n, dtype=np.int64)
         """Consecutive control steps for which all success terms were true (N,)."""
         issues: list[SpecIssue] = []
@@ -80,6 +82,7 @@ class Mdp:
             return bound
 
         self._commands = terms("command", spec.command, "command")
+        self._lasting = {name for name, width in widths.items() if width}
         rewards = terms("reward", spec.rewards, "rewards")
         success = terms("predicate", spec.success, "success").values()
         self._judged = [*success, *terms("predicate", spec.failure, "failure").values()]
@@ -100,8 +103,9 @@ class Mdp:
             raise SpecError(issues)
         self._memories = tuple(scene.memories)
         self._rewards, self._weights = list(rewards.values()), [spec.rewards[name].weight for name in rewards]
+        always = {name for name, event in spec.events.items() if _goes_on("event", event) is not None}
         self._due = {
-            when: {name: term for name, term in events.items() if spec.events[name].when == when}
+            when: {n: t for n, t in events.items() if spec.events[n].when == when or n in always}
             for when in ("reset", "step")
         }
 
@@ -126,18 +130,23 @@ class Mdp:
             memory.forget(env_ids)
         self.bindings.draw(env_ids)
         self._run_events("reset", 0)
-        for name, term in self._commands.items():
-            goals = self.scene.goals[name]
-            with term.blame:
-                goal = term.call(partial(self._draw, f"command/{name}", 0))
-            _fit(term, goal, (len(env_ids), goals.shape[1]))
-            goals[env_ids] = goal
-        self.scene.moment += 1  # goals have moved
+        self._set_goals(self._commands, env_ids, 0)
         for term in self._altered:
             term.reset(env_ids)
 
+    def _set_goals(self, names: Iterable[str], env_ids: Array, tick: Any) -> None:
+        for name in names:
+            term, goals = self._commands[name], self.scene.goals[name]
+            with term.blame:
+                goal = term.call(partial(self._draw, f"command/{name}", tick))
+            _fit(term, goal, (len(env_ids), goals.shape[1]))
+            goals[env_ids] = goal
+        self.scene.moment += 1  # goals have moved
+
     def interval_events(self) -> None:
-        """Events of the kind `when: step`, for the rows at hand."""
+        """Events of the kind `when: step`, and goals that go on, for the rows at hand."""
+        if self._lasting:
+            self._set_goals(sorted(self._lasting), self.scene.env_ids, self.scene.elapsed[self.scene.rows])
         if self._due["step"]:
             self._run_events("step", self.scene.elapsed[self.scene.rows])
             self.scene.moment += 1  # whatever they moved is seen
@@ -261,6 +270,12 @@ class Mdp:
         self.scene.moment += 1
         for term in self._altered:
             term.restore(env_ids, data)
+
+
+def _goes_on(kind: str, spec: TermSpec) -> int | None:
+    """How many numbers the goals have of a command, or an event, that is called in each step; None for the others."""
+    with suppress(AnysimError):  # of a term that there is not `bind` tells
+        return vars(find(kind, spec.term)).get(GOES_ON)
 
 
 def _combined(both: np.ufunc, values: Sequence[Array], shape: tuple[int, ...]) -> Array:

@@ -83,6 +83,10 @@ class Assembly:
         )
         return body
 
+    def name_of(self, body: int) -> str:
+        """The name of a link."""
+        return self._bodies[body].name
+
     def solid(
         self,
         body: int,

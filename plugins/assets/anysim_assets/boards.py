@@ -18,7 +18,7 @@ def hook(
     """An L that lies on its side: a handle along x, and at its +x end a hook towards +y.
 
     Its frame is in the middle of the handle. Frames: `grip`, near the handle's free end; `inner`, the middle of the
-    hook's side that pulls, x away from it towards the free end. Affordance: `grip`, from above.
+    hook's side that pulls, x away from it towards the free end. Affordances: `grip`, from above, and the hook, `inner`.
 
     Args:
         length: of the handle [m].
@@ -41,6 +41,7 @@ def hook(
     body.afford(
         Affordance("grip", AffordanceKind.HANDLE, "grip", ("base.handle",), ("carry", "drag"), ((0.0, 0.0, -1.0),))
     )
+    body.afford(Affordance("inner", AffordanceKind.HOOK, "inner", ("base.hook",), ("drag",)))
     return body.model()
 
 
@@ -79,4 +80,5 @@ def tee(
             0, name, (-corner[0], middle - corner[1], -half), (corner[0], middle + corner[1], half), density, color
         )
         body.site(0, name, (0.0, middle, 0.0))
+    body.afford(Affordance("body", AffordanceKind.BODY, "", ("base.bar", "base.stem"), ("carry", "push")))
     return body.model()

@@ -1,6 +1,7 @@
 """A push button on a housing."""
 
 from anysim.assets.model import ImportedModel
+from anysim.model.affordances import Affordance, AffordanceKind
 from anysim.model.world import Box, Cylinder, JointType
 from anysim_assets.assembly import Assembly
 from anysim_schemas.base import Color, NonNegative, Positive
@@ -59,4 +60,7 @@ def button(
     thickness = radius / 2
     body.solid(link, "knob", Cylinder(radius, thickness / 2), (0.0, 0.0, thickness / 2), density, cap_color)
     body.site(link, "cap.top", (0.0, 0.0, thickness))
+    body.afford(
+        Affordance("cap", AffordanceKind.BUTTON, "cap.top", ("cap.knob",), ("press",), joint="cap", depth=travel)
+    )
     return body.model()

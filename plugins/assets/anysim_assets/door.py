@@ -35,8 +35,8 @@ def door(
 
     The frame's x goes through the opening. The link and joint `leaf` is closed at zero and positive is open; its hinge
     is upright at the left edge, seen along x. `out` swings to the side of +x, where the handle is, `in` to the other.
-    There is no latch: the leaf stays where its friction holds it. The frame `leaf.handle` is as on a cabinet, x away
-    from the leaf.
+    The leaf stays where its friction holds it; the event `tasks.latch` makes a latch. The frame `leaf.handle` is as on
+    a cabinet, x away from the leaf.
 
     Args:
         size: thickness, width and height of the leaf [m].

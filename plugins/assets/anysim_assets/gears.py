@@ -6,6 +6,7 @@ from typing import Annotated
 from pydantic import Field
 
 from anysim.assets.model import ImportedModel
+from anysim.model.affordances import Affordance, AffordanceKind
 from anysim.model.world import Box, Cylinder, JointType
 from anysim_assets.assembly import Assembly, ring, turned
 from anysim_schemas.base import Color, NonNegative, Positive
@@ -64,6 +65,8 @@ def gear(
     _teeth(body, 0, teeth, module, outer, height, 0.0, density, color)
     body.site(0, "hole", (0.0, 0.0, 0.0))
     body.site(0, "mouth", (0.0, 0.0, hub_height))
+    hole = Affordance("hole", AffordanceKind.HOLE, "mouth", use=("insert",), depth=hub_height, clearance=clearance)
+    body.afford(hole)
     return body.model()
 
 
@@ -115,6 +118,7 @@ def gear_stand(
     body.solid(0, "shaft", Cylinder(shaft / 2, shaft_height / 2), foot, density, color)
     body.site(0, "shaft", (0.0, 0.0, plate))
     body.site(0, "shaft_head", (0.0, 0.0, plate + shaft_height))
+    body.afford(Affordance("shaft", AffordanceKind.TIP, "shaft_head", ("base.shaft",), ("insert",)))
     for name, side in (("left", 1.0), ("right", -1.0)):
         above = plate + 0.1 * height
         link = body.link(
@@ -122,6 +126,8 @@ def gear_stand(
         )
         body.solid(link, "disc", Cylinder(root, height / 2), (0.0, 0.0, height / 2), density, gear_color)
         _teeth(body, link, teeth, module, root, height, pi / teeth, density, gear_color)
+        down = ((0.0, 0.0, -1.0),)
+        body.afford(Affordance(name, AffordanceKind.RIM, name, (f"{name}.disc",), ("turn",), down, joint=name))
     return body.model()
 
 

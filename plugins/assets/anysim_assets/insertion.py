@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from anysim.assets.model import ImportedModel
+from anysim.model.affordances import Affordance, AffordanceKind
 from anysim.model.world import Box, Cylinder
 from anysim_assets.assembly import Assembly, ring, turned
 from anysim_schemas.base import Color, Positive
@@ -34,6 +35,7 @@ def peg(
         color: of the peg.
     """
     body = Assembly("peg")
+    body.afford(Affordance("tip", AffordanceKind.TIP, "tip", ("base.shaft",), ("insert",)))
     half = width / 2
     shape = Box((half, half, length / 2)) if section == "square" else Cylinder(half, length / 2)
     if along == "z":
@@ -93,6 +95,7 @@ def hole_block(
         ring(body, 0, "piece", (inner, outer), height, pieces, density, color)
     body.site(0, "hole", (0.0, 0.0, 0.0))
     body.site(0, "mouth", (0.0, 0.0, height))
+    body.afford(_hole(height, clearance))
     return body.model()
 
 
@@ -135,4 +138,9 @@ def side_hole(
     out = turned((0.0, 1.0, 0.0), -pi / 2)
     body.site(0, "hole", (half, 0.0, outer), out)
     body.site(0, "mouth", (-half, 0.0, outer), out)
+    body.afford(_hole(depth, clearance))
     return body.model()
+
+
+def _hole(depth: float, clearance: float) -> Affordance:
+    return Affordance("mouth", AffordanceKind.HOLE, "mouth", use=("insert",), depth=depth, clearance=clearance)

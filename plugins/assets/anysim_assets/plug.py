@@ -52,6 +52,8 @@ def plug(
     body.site(0, "tip", (0.0, 0.0, -height - prong[2]))
     body.site(0, "head", (0.0, 0.0, height))
     body.afford(Affordance("body", AffordanceKind.BODY, "", ("base.body",), ("carry", "insert")))
+    pieces = tuple(f"base.prong_{number + 1}" for number in range(prongs))
+    body.afford(Affordance("tip", AffordanceKind.TIP, "tip", pieces, ("insert",)))
     return body.model()
 
 

@@ -6,6 +6,7 @@ from typing import Annotated
 from pydantic import Field
 
 from anysim.assets.model import ImportedModel
+from anysim.model.affordances import Affordance, AffordanceKind
 from anysim.model.world import Capsule, Cylinder, JointType
 from anysim_assets.assembly import Assembly, turned
 from anysim_assets.parameters import Angle
@@ -74,4 +75,6 @@ def rope(
     body.site(0, "first", (-pitch / 2, 0.0, 0.0))
     body.site(bodies[links // 2], "middle", (0.0, 0.0, 0.0))
     body.site(bodies[-1], "last", (pitch, 0.0, 0.0))
+    for name, rod in (("first", "base.rod"), ("last", f"{body.name_of(bodies[-1])}.rod")):
+        body.afford(Affordance(name, AffordanceKind.HANDLE, name, (rod,), ("carry", "drag"), ((0.0, 0.0, -1.0),)))
     return body.model()

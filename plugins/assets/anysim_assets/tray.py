@@ -1,6 +1,7 @@
 """An open tray or bin: a floor and four walls."""
 
 from anysim.assets.model import ImportedModel
+from anysim.model.affordances import Affordance, AffordanceKind
 from anysim_assets.assembly import Assembly
 from anysim_assets.parameters import Size
 from anysim_schemas.base import Color, Positive
@@ -34,4 +35,6 @@ def tray(
     ):
         body.board(0, name, low, high, density, color)
     body.site(0, "inside", (0.0, 0.0, wall))
+    walls = tuple(f"base.{name}" for name in ("back", "front", "right", "left"))
+    body.afford(Affordance("rim", AffordanceKind.RIM, "", walls, ("carry",), ((0.0, 0.0, -1.0),)))
     return body.model()

@@ -22,10 +22,8 @@ from anysim.model.slots import single
 from anysim.model.world import Body, BodyKind, Entity, JointType, Vec3, World
 from anysim_banks.pieces import Piece, piece_of
 
-GRASPED = frozenset(
-    {AffordanceKind.HANDLE, AffordanceKind.RIM, AffordanceKind.BODY, AffordanceKind.LEVER, AffordanceKind.TIP}
-)
-"""Kinds that fingers close on; the others are pressed, or something goes into them."""
+GRASPED = frozenset({AffordanceKind.HANDLE, AffordanceKind.RIM, AffordanceKind.BODY, AffordanceKind.LEVER})
+"""Kinds that fingers close on; the others are pressed, go into something, or have something go into or hang on them."""
 
 STATIONS = 5
 """Points of a joint's way."""

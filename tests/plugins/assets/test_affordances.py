@@ -1,5 +1,8 @@
 """Affordances: every builder of things to handle declares them, and a World gives them back with indices."""
 
+from dataclasses import replace
+from importlib.metadata import entry_points
+
 import numpy as np
 import pytest
 
@@ -7,8 +10,11 @@ from anysim.api import compile_world
 from anysim.assets.procedural import build
 from anysim.compile.edit import without_entity
 from anysim.errors import NameLookupError, SpecError
+from anysim.math import pose as P
 from anysim.model.affordance_lookup import affordances_of, find_affordance
 from anysim.model.affordances import AffordanceKind
+from anysim.model.frames import find_frame
+from anysim.model.hash import world_hash
 from anysim.model.world import Capsule, World
 
 OBJECTS = {
@@ -43,6 +49,67 @@ def test_builders_declare_what_is_taken_hold_of(world: World, name: str, kind: A
     assert world.joints[found.joint].name == joint
     assert found.geoms
     assert {world.geoms[g].body for g in found.geoms} == {world.joints[found.joint].body} == {found.frame.body}
+
+
+EMITTED = {
+    "button": {"cap": "button"},
+    "cabinet": {"drawer_1.handle": "handle", "door_1.handle": "handle"},
+    "cart": {"body.handle": "handle"},
+    "door": {"leaf.handle": "handle"},
+    "faucet": {"lever.handle": "lever"},
+    "gear": {"hole": "hole", "body": "body"},
+    "gear_stand": {"shaft": "tip", "left": "rim", "right": "rim"},
+    "hinge_box": {"lid.handle": "handle"},
+    "hole_block": {"mouth": "hole", "body": "body"},
+    "hook": {"grip": "handle", "inner": "hook", "body": "body"},
+    "jar": {"cap": "body"},
+    "mug": {"handle": "handle", "rim": "rim", "body": "body"},
+    "peg": {"tip": "tip", "body": "body"},
+    "plug": {"tip": "tip", "body": "body"},
+    "rocker_switch": {"rocker.on": "button", "rocker.off": "button"},
+    "rope": {"first": "handle", "last": "handle"},
+    "side_hole": {"mouth": "hole", "body": "body"},
+    "socket": {"mouth": "hole", "body": "body"},
+    "tee": {"body": "body"},
+    "tray": {"rim": "rim", "body": "body"},
+    "valve": {"wheel.handle": "rim"},
+}
+ROBOTS = {"ackermann_base", "camera_body", "differential_base", "holonomic_base", "parallel_gripper"}
+"""Builders of what moves and holds others."""
+
+
+def test_every_builder_of_ours_is_in_the_table() -> None:
+    ours = {entry.name for entry in entry_points(group="anysim.assets") if entry.value.startswith("anysim_assets.")}
+    assert ours == EMITTED.keys() | ROBOTS
+    assert {kind for kinds in EMITTED.values() for kind in kinds.values()} == {*AffordanceKind}
+
+
+@pytest.mark.parametrize("builder", EMITTED)
+def test_every_builder_emits_affordances_that_are_found_in_a_world(builder: str) -> None:
+    world = compile_world({"world": {"objects": {"thing": {"source": f"procedural:{builder}"}}}})
+    declared = {one.name: one for one in affordances_of(world, 0)}
+    assert EMITTED[builder].items() <= {name: str(one.kind) for name, one in declared.items()}.items()
+    for name, one in declared.items():
+        found = find_affordance(world, f"thing.{name}")
+        assert len(found.geoms) == len(one.pieces)
+        assert all(world.geoms[g].body == found.frame.body or one.frame == "" for g in found.geoms)
+        assert (found.joint >= 0) == bool(one.joint)
+
+
+def test_a_world_has_the_same_hash_whatever_its_things_afford(world: World) -> None:
+    assert any(entity.affordances for entity in world.entities)
+    bare = replace(world, entities=tuple(replace(entity, affordances=()) for entity in world.entities))
+    assert world_hash(bare) == world_hash(world)
+
+
+def test_a_peg_goes_into_the_hole_that_its_block_declares() -> None:
+    for builder, depth in (("hole_block", 0.05), ("side_hole", 0.08)):
+        world = compile_world({"world": {"objects": {"block": {"source": f"procedural:{builder}"}}}})
+        hole, end = find_affordance(world, "block.mouth"), find_frame(world, "block.hole")
+        mouth = P.pose(hole.frame.position, hole.frame.quaternion)
+        inside = P.compose(mouth, np.array([0.0, 0.0, -hole.spec.depth, 0.0, 0.0, 0.0, 1.0]))
+        assert hole.spec.depth == depth
+        np.testing.assert_allclose(inside[:3], end.position, atol=1e-12)
 
 
 def test_the_frame_of_a_bar_has_its_z_along_it(world: World) -> None:

@@ -5,22 +5,32 @@ Kinds, by the module they are in: observations `(scene) -> (n, k)`, rewards `(sc
 remembers something during an episode is a class, made with `(scene, *, parameters)`, whose instances are called.
 """
 
+import inspect
+import re
 from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
-from anysim.task.terms import commands, events, observations, predicates, rewards
-from anysim.task.terms.combinations import PREDICATES
+from anysim.task.terms import combinations, commands, events, observations, predicates, rewards
 
 
-def _named(module: ModuleType) -> dict[str, Callable[..., Any]]:
-    return {name: getattr(module, name) for name in module.__all__}
+def _named(*modules: ModuleType) -> dict[str, Callable[..., Any]]:
+    """The public functions and classes that these modules define, by name; `GoalPath` is `goal_path`."""
+    found = {
+        re.sub(r"(?<=.)(?=[A-Z])", "_", name).lower().removesuffix("_"): value
+        for module in modules
+        for name, value in vars(module).items()
+        if (inspect.isfunction(value) or inspect.isclass(value))
+        and value.__module__ == module.__name__
+        and name[0] != "_"
+    }
+    return dict(sorted(found.items()))
 
 
 TERMS = {
     "observation": _named(observations),
     "reward": _named(rewards),
-    "predicate": dict(sorted((_named(predicates) | PREDICATES).items())),
+    "predicate": _named(predicates, combinations),
     "command": _named(commands),
     "event": _named(events),
 }

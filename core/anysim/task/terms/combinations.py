@@ -1,6 +1,6 @@
-"""Predicates made of others: `of` is a mapping of predicates, as under `success`.
+"""Predicates made of others, and those with a memory: `of` is a mapping of predicates, as under `success`.
 
-Those with a memory count control steps: it is empty when an episode begins, and part of every snapshot.
+A memory counts control steps: it is empty when an episode begins, and part of every snapshot.
 """
 
 from collections.abc import Sequence
@@ -13,6 +13,7 @@ from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.conditions import Conditions
 from anysim.task.contact_view import ContactView
+from anysim.task.joints import JointView
 from anysim.task.scene import Frame, SceneView
 from anysim.task.terms.geometry import Axis, axis_of
 from anysim_schemas.base import Number
@@ -20,17 +21,17 @@ from anysim_schemas.base import Number
 Steps = Annotated[int, Field(ge=1, description="consecutive control steps")]
 
 
-def every(scene: SceneView, *, of: Conditions) -> Array:
+def all_(scene: SceneView, *, of: Conditions) -> Array:
     """All of them hold."""
     return of.all()
 
 
-def some(scene: SceneView, *, of: Conditions) -> Array:
+def any_(scene: SceneView, *, of: Conditions) -> Array:
     """At least one of them holds."""
     return np.logical_or.reduce(of.each())
 
 
-def none(scene: SceneView, *, of: Conditions) -> Array:
+def not_(scene: SceneView, *, of: Conditions) -> Array:
     """None of them holds."""
     return ~np.logical_or.reduce(of.each())
 
@@ -40,7 +41,7 @@ def k_of(scene: SceneView, *, of: Conditions, count: Annotated[int, Field(ge=1)]
     return of.each().sum(axis=0) >= count
 
 
-class Lasting:
+class Hold:
     """All of them have held for so many control steps, without a break."""
 
     def __init__(self, scene: SceneView, *, of: Conditions, steps: Steps = 10) -> None:
@@ -79,7 +80,7 @@ class After:
         return (was[:, 0] > 0) & self._of.all()
 
 
-class FrameTurn:
+class Turned:
     """A frame has turned about one of its axes by at least an angle since the episode's first step, turns counted.
 
     The axis should stay where it is in the world, and the frame turn by less than half a turn in a control step.
@@ -134,14 +135,16 @@ class Followed:
         return before + (P.norm(place - due) <= self._tolerance)[:, None]
 
 
-PREDICATES = {
-    "after": After,
-    "all": every,
-    "any": some,
-    "followed": Followed,
-    "force_over": ForceOver,
-    "hold": Lasting,
-    "k_of": k_of,
-    "not": none,
-    "turned": FrameTurn,
-}
+class JointMoved:
+    """A joint has moved by at least so much since the episode's first step, upwards; downwards where it is negative."""
+
+    def __init__(
+        self, scene: SceneView, *, joint: JointView, by: Annotated[float, Field(description="[rad, m]")]
+    ) -> None:
+        self._joint, self._by, self._update = joint, by, scene.memory()
+
+    def __call__(self) -> Array:
+        position = self._joint.position
+        begun = self._update(lambda before, first: np.where(first[:, None], position[:, None], before))
+        moved = position - begun[:, 0]
+        return moved >= self._by if self._by >= 0 else moved <= self._by

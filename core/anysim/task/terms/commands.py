@@ -1,10 +1,11 @@
 """Commands: `(scene, draw, *, parameters) -> (n, 7)` goal poses, drawn when an episode starts.
 
-`draw(name, value)` gives one draw of a spec's value for each env at hand, from a stream of its own.
+`draw(name, value)` gives one draw of a spec's value for each env at hand, from a stream of its own, and
+`draw(name, value, where)` for those where a mask is true. A class with `goes_on` is asked again in each step.
 """
 
-from collections.abc import Callable
-from typing import Annotated, Any
+from collections.abc import Callable, Sequence
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -12,11 +13,10 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.scene import Frame, ObjectView, SceneView
-from anysim_schemas.values import FloatValue, Vec3Value
+from anysim_schemas.base import Number
+from anysim_schemas.values import FloatValue, PositiveValue, Vec3Value
 
-__all__ = ["goal_above", "goal_at", "goal_beside", "goal_from", "goal_pose"]
-
-Draw = Callable[[str, Any], Array]
+Draw = Callable[..., Array]
 
 
 def _upright(position: Array) -> Array:
@@ -93,3 +93,43 @@ def goal_beside(
     far, angle = draw("distance", distance), draw("direction", direction)
     along = np.stack([np.cos(angle), np.sin(angle), np.zeros(len(angle))], axis=1)
     return _upright(frame.position + far[:, None] * along)
+
+
+class GoalPath:
+    """A point that moves along the line through some points, in the axes of a frame, and stays at its end.
+
+    It starts at the first of them when the episode begins. A path that is `closed` goes on from its end to its start.
+    """
+
+    goes_on = 7
+
+    def __init__(
+        self,
+        scene: SceneView,
+        *,
+        path: Annotated[
+            Sequence[tuple[Number, Number, Number]],
+            Field(min_length=2, description="[m] in the frame's axes, or the world's; on tiled ground from the tile"),
+        ],
+        speed: Annotated[PositiveValue, Field(description="[m/s]")],
+        frame: Frame | None = None,
+        closed: bool = False,
+    ) -> None:
+        self._scene, self._frame, self._speed, self._closed = scene, frame, speed, closed
+        self._points = np.array([*path, path[0]] if closed else path)
+        self._at = np.concatenate([[0.0], np.cumsum(P.norm(np.diff(self._points, axis=0)))])
+        self._update, self._dt = scene.memory(), scene.engine.world.physics.control_dt
+
+    def __call__(self, draw: Draw) -> Array:
+        def begin(before: Array, first: Array) -> Array:
+            speed = before.copy()
+            speed[first, 0] = draw("speed", self._speed, first)
+            return speed
+
+        scene = self._scene
+        far = self._update(begin)[:, 0] * scene.elapsed[scene.rows] * self._dt
+        far = far % self._at[-1] if self._closed else far
+        place = np.stack([np.interp(far, self._at, self._points[:, k]) for k in range(3)], axis=1)
+        if self._frame is None:
+            return _upright(place + scene.origin[scene.rows])
+        return _upright(self._frame.position + P.rotate(self._frame.quaternion, place))

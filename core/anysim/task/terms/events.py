@@ -4,8 +4,10 @@
 """
 
 from collections.abc import Callable
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from anysim.conventions import Array
 from anysim.errors import TaskError
@@ -13,9 +15,7 @@ from anysim.math.pose import norm
 from anysim.task.contract import changes_nothing_seen
 from anysim.task.scene import Frame, ObjectView, SceneView
 from anysim_schemas.base import NonNegative
-from anysim_schemas.values import NonNegativeValue, Vec3Value
-
-__all__ = ["climb_levels", "push", "set_friction"]
+from anysim_schemas.values import FloatValue, NonNegativeValue, Vec3Value
 
 Draw = Callable[..., Array]
 
@@ -53,3 +53,20 @@ def set_friction(scene: SceneView, draw: Draw, *, object: ObjectView, friction: 
     for entity, ids in object.by_entity(scene.env_ids):
         geoms = scene.index.geoms_of(entity)
         scene.engine.set_parameters("geom.friction", np.repeat(values[ids, None], len(geoms), axis=1), ids, geoms)
+
+
+def visibility(
+    scene: SceneView,
+    draw: Draw,
+    *,
+    object: ObjectView,
+    visible: Annotated[FloatValue, Field(description="0 hides it, 1 shows it")] = 0.0,
+) -> None:
+    """Hide an object from all cameras, or show it again; it is there and is felt all the same."""
+    shown = np.zeros(scene.engine.num_envs)
+    shown[scene.env_ids] = draw("visible", visible)
+    for entity, ids in object.by_entity(scene.env_ids):
+        geoms = scene.index.geoms_of(entity)
+        color = scene.engine.get_parameters("geom.color", ids, geoms)
+        color[..., 3] = np.array([scene.engine.world.geoms[g].color[3] for g in geoms]) * (shown[ids] > 0.5)[:, None]
+        scene.engine.set_parameters("geom.color", color, ids, geoms)

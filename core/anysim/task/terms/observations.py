@@ -11,8 +11,10 @@ from anysim.math import pose as P
 from anysim.task.conditions import Conditions
 from anysim.task.contact_view import ContactView
 from anysim.task.joints import RangedJointView
+from anysim.task.references import PointsView
 from anysim.task.scene import DrawnView, Frame, ObjectView, RobotView, SceneView
 from anysim.task.slot_frames import CategoryView
+from anysim.task.terms.geometry import least_turn
 from anysim_schemas.base import Number, Positive
 
 _DOWN = np.array([0.0, 0.0, -1.0])
@@ -93,13 +95,24 @@ def commanded_velocity(scene: SceneView, *, robot: RobotView, channel: str = "ba
     return scene.engine.control.velocity[scene.rows][:, robot.channel_columns(channel).drives]
 
 
-__all__ = [
-    "base_ang_vel", "base_lin_vel", "base_pose", "category_offset", "category_pose", "category_present",
-    "category_twist", "channel_action", "channel_joint_pos", "channel_joint_vel", "commanded_velocity", "contact_force",
-    "drawn", "frame_pose", "frame_twist", "goal_position", "height_scan", "holds", "joint_opening", "joint_pos",
-    "joint_vel", "last_action", "object_joint_pos", "object_joint_vel", "offset", "present", "projected_gravity",
-    "relative_pose", "time_left", "tool_pose", "tool_twist",
-]  # fmt: skip
+def commanded_position(scene: SceneView, *, robot: RobotView, channel: str = "arm") -> Array:
+    """The joint targets of a channel's drives now [rad, m]."""
+    return scene.engine.control.position[scene.rows][:, robot.channel_columns(channel).drives]
+
+
+def gripper_width(scene: SceneView, *, robot: RobotView, channel: str = "eef") -> Array:
+    """How far a gripper is open [m], of fingers that turn [rad]: the sum over its joints from where it is closed."""
+    own = robot.channel(channel)
+    if own.closed is None:
+        grippers = [name for name, one in robot.model.channels.items() if one.closed is not None]
+        raise TaskError(
+            f"the channel '{robot.name}.{channel}' is no gripper: its entry in the catalogue has no `closed` "
+            f"(grippers: {listing(grippers)})"
+        )
+    fingers = [scene.engine.world.joints[joint] for joint in own.joints]
+    closed = np.clip(own.closed, [j.lower for j in fingers], [j.upper for j in fingers])  # targets may lie beyond
+    position = scene.state.joint_pos[scene.rows][:, robot.channel_columns(channel).joints]
+    return np.abs(position - closed).sum(axis=1, keepdims=True)
 
 
 def joint_pos(scene: SceneView, *, robot: RobotView) -> Array:
@@ -162,6 +175,25 @@ def relative_pose(scene: SceneView, *, a: Frame, b: Frame) -> Array:
     return P.unsigned(P.compose(P.inverse(a.pose), b.pose))
 
 
+def relative_rotation(scene: SceneView, *, a: Frame, b: Frame, symmetry: Annotated[int, Field(ge=1)] = 1) -> Array:
+    """Turn from a to b in the axes of a, as a rotation vector [rad]; b may look the same 1/symmetry of a turn on.
+
+    Of the turns about its z axis that b may be given without a difference it is to the nearest.
+    """
+    return least_turn(a.quaternion, b.quaternion, symmetry)
+
+
+def points(scene: SceneView, *, points: PointsView, frame: Frame) -> Array:
+    """Points one after the other, in the axes of a frame [m]; zero for those that are not there."""
+    return _offsets(frame, points.positions, points.present)
+
+
+def _offsets(frame: Frame, positions: Array, present: Array) -> Array:
+    apart = positions - frame.position[:, None]
+    turn = np.broadcast_to(frame.quaternion[:, None], (*apart.shape[:2], 4))
+    return _flat(np.where(present[..., None], P.rotate_inverse(turn, apart), 0.0))
+
+
 def contact_force(
     scene: SceneView,
     *,
@@ -175,6 +207,22 @@ def contact_force(
 def holds(scene: SceneView, *, of: Conditions) -> Array:
     """1 for each of the predicates that holds, 0 for the others, in order: how far a task has come."""
     return of.each().T.astype(np.float64)
+
+
+class Progress:
+    """Share of the predicates that are behind: each counts once it holds after all before it did, until the end."""
+
+    def __init__(self, scene: SceneView, *, of: Conditions) -> None:
+        self._of, self._update = of, scene.memory()
+
+    def __call__(self) -> Array:
+        return self._update(self._pass) / len(self._of)
+
+    def _pass(self, before: Array, first: Array) -> Array:
+        behind = before[:, 0]
+        for number, holds in enumerate(self._of.each()):
+            behind = behind + ((behind == number) & holds)
+        return behind[:, None]
 
 
 def time_left(scene: SceneView, *, steps: Annotated[int, Field(ge=1, description="the horizon")]) -> Array:
@@ -204,9 +252,7 @@ def category_twist(scene: SceneView, *, category: CategoryView) -> Array:
 
 def category_offset(scene: SceneView, *, frame: Frame, category: CategoryView) -> Array:
     """From a frame to each instance of a category, in the frame's axes [m]; zero for absent ones."""
-    apart = category.positions - frame.position[:, None]
-    turn = np.broadcast_to(frame.quaternion[:, None], (*apart.shape[:2], 4))
-    return _flat(np.where(category.present[..., None], P.rotate_inverse(turn, apart), 0.0))
+    return _offsets(frame, category.positions, category.present)
 
 
 def height_scan(

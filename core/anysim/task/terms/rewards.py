@@ -12,29 +12,12 @@ from anysim.task.contact_view import ContactView
 from anysim.task.contract import at_most
 from anysim.task.joints import RangedJointView
 from anysim.task.scene import Frame, RobotView, SceneView
-from anysim.task.terms.geometry import Axis, axis_of, turned_by
-
-__all__ = [
-    "action_rate",
-    "alive",
-    "angle",
-    "axis_angle",
-    "contact_force",
-    "distance",
-    "effort",
-    "height",
-    "joint_limit",
-    "joint_progress",
-    "joint_speed",
-    "speed",
-    "stage",
-    "tanh_distance",
-]
+from anysim.task.terms.geometry import Axes, Axis, along, axis_of, turned_by
 
 
-def distance(scene: SceneView, *, a: Frame, b: Frame) -> Array:
-    """Distance of two frames' origins [m]."""
-    return P.norm(b.position - a.position)
+def distance(scene: SceneView, *, a: Frame, b: Frame, axes: Axes = "xyz") -> Array:
+    """Distance of two frames' origins [m], along these axes of the world."""
+    return along(b.position - a.position, axes)
 
 
 @at_most(1.0)
@@ -44,9 +27,10 @@ def tanh_distance(
     a: Frame,
     b: Frame,
     scale: Annotated[float, Field(gt=0, description="distance at which the reward has dropped to 0.24 [m]")] = 0.1,
+    axes: Axes = "xyz",
 ) -> Array:
-    """1 - tanh(distance / scale): 1 when the frames coincide, 0 far away."""
-    return 1.0 - np.tanh(P.norm(b.position - a.position) / scale)
+    """1 - tanh(distance / scale): 1 when the frames coincide, 0 far away, along these axes of the world."""
+    return 1.0 - np.tanh(along(b.position - a.position, axes) / scale)
 
 
 @at_most(1.0)
@@ -60,10 +44,30 @@ def joint_progress(
     return 1.0 - np.abs(joint.opening - target)
 
 
-def action_rate(scene: SceneView) -> Array:
+def action_l2(scene: SceneView) -> Array:
     """Sum of the squared action components."""
     action = scene.last_action[scene.rows]
     return P.dot(action, action) if action.shape[1] else np.zeros(len(action))
+
+
+def action_rate(scene: SceneView) -> Array:
+    """The older name of `action_l2`, which tasks and their recordings keep; the rate itself is `action_rate_l2`."""
+    return action_l2(scene)
+
+
+class ActionRateL2:
+    """Sum of the squared changes of the action's components since the control step before; the first is from zero."""
+
+    def __init__(self, scene: SceneView) -> None:
+        width = max((columns.stop for columns in scene.action_columns.values()), default=0)
+        self._scene, self._update = scene, scene.memory(width + 1)  # the action, and what the change came to
+
+    def __call__(self) -> Array:
+        return self._update(self._change)[:, -1]
+
+    def _change(self, before: Array, first: Array) -> Array:
+        action = self._scene.last_action[self._scene.rows]
+        return np.concatenate([action, np.sum((action - before[:, :-1]) ** 2, axis=1, keepdims=True)], axis=1)
 
 
 @at_most(1.0)

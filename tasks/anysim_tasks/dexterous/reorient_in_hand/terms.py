@@ -8,7 +8,7 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.task.contract import at_most
 from anysim.task.scene import Frame, SceneView
-from anysim.task.terms.combinations import FrameTurn
+from anysim.task.terms.combinations import Turned
 
 
 @at_most(1.0)
@@ -21,7 +21,7 @@ def spin(
 
 
 @at_most(1.0)
-class TurnedShare(FrameTurn):
+class TurnedShare(Turned):
     """How far a frame has turned about one of its axes since the first step, as a share of `angle`, up to 1.
 
     Turns the other way count less than nothing.

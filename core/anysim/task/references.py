@@ -1,0 +1,104 @@
+"""Holes, inner spaces and points, as terms see them."""
+
+from collections.abc import Sequence
+from math import isfinite
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.errors import NameLookupError, listing
+from anysim.geometry import polygon as G
+from anysim.geometry.convex_parts import IDENTITY, Pose, Solid
+from anysim.math import pose as P
+from anysim.model.affordance_lookup import find_affordance
+from anysim.model.affordances import AffordanceKind
+from anysim.model.world import World
+from anysim.placement.support_surfaces import choose, surfaces
+from anysim.task.scene import SceneView
+from anysim.task.slot_frames import CategoryView
+from anysim_schemas.base import Reference
+
+
+class HoleView:
+    """What something goes into, along -z of its frame. In YAML: `block/mouth`."""
+
+    reference_kind: ClassVar[str] = "hole"
+
+    def __init__(self, scene: SceneView, name: str) -> None:
+        owner, _, local = name.partition("/")
+        found = find_affordance(scene.engine.world, f"{owner}.{local}")
+        if found.spec.kind is not AffordanceKind.HOLE:
+            raise NameLookupError(f"'{name}' is a {found.spec.kind}, and nothing goes into it; name a hole")
+        self._frame = scene.frame(f"{owner}/{found.spec.name}")
+        self.depth, self.clearance = found.spec.depth, found.spec.clearance
+
+    def place(self, position: Array) -> Array:
+        """Positions (n, 3) in the axes of the hole's mouth [m]."""
+        return P.rotate_inverse(self._frame.quaternion, position - self._frame.position)
+
+
+class InnerSpace(NamedTuple):
+    """The room inside of an entity, as a box that moves with one of its bodies.
+
+    `low` and `high` (3,) [m] are corners in the axes of the root as it is at first, `mount` (7,) is the body there.
+    """
+
+    body: int
+    mount: Array
+    low: Array
+    high: Array
+
+    @classmethod
+    def of(cls, world: World, name: str, part: str = "") -> "InnerSpace":
+        """That over the largest floor with walls around it, or with something above it; or over a certain one.
+
+        Raises:
+            NameLookupError: the entity has none; lists the surfaces that it has.
+        """
+        solid = Solid(world, world.entities[world.entity_numbers[name]])
+        every = surfaces(world, solid)
+        found = choose(every, part, inside=True)
+        if found is None:
+            wanted = f"no surface '{part}'" if part else "no floor that walls surround"
+            raise NameLookupError(f"'{name}' has {wanted} (surfaces: {listing([one.name for one in every])})")
+        top = found.height + found.headroom
+        if not isfinite(top):
+            top = max(placed.high[2] for placed in solid.at(Pose((0.0, 0.0, 0.0), IDENTITY)).parts)
+        (x0, y0), (x1, y1) = G.bounds((found.polygon,))
+        root = world.initial_body_pose[world.entities[world.entity_numbers[name]].root]
+        mount = P.compose(P.inverse(root), world.initial_body_pose[found.body])
+        return cls(found.body, mount, np.array([x0, y0, found.height]), np.array([x1, y1, top]))
+
+    def holds(self, body_pose: Array, position: Array, rim: float) -> Array:
+        """Whether positions (n, 3) are in it, `rim` [m] or more below its upper end; of bodies at poses (n, 7)."""
+        place = P.rotate_inverse(body_pose[:, 3:], position - body_pose[:, :3])
+        turn = np.broadcast_to(self.mount[3:], (len(place), 4))
+        seen = self.mount[:3] + P.rotate(turn, place)
+        return np.all((seen >= self.low) & (seen <= self.high - np.array([0.0, 0.0, rim])), axis=1)
+
+
+class PointsView:
+    """Several points. In YAML: a category, or a list of categories, frames and goals."""
+
+    reference_kind: ClassVar[str] = "set of points"
+    written_as = Reference | tuple[Reference, ...]
+
+    def __init__(self, scene: SceneView, names: str | Sequence[str]) -> None:
+        every = [names] if isinstance(names, str) else names
+        categories = scene.engine.world.categories
+        self._parts = [CategoryView(scene, name) if name in categories else scene.frame(name) for name in every]
+
+    @property
+    def positions(self) -> Array:
+        """(n, K, 3) [m]."""
+        return np.concatenate(
+            [part.positions if isinstance(part, CategoryView) else part.position[:, None] for part in self._parts],
+            axis=1,
+        )
+
+    @property
+    def present(self) -> Array:
+        """(n, K) bool: which of them are there."""
+        each = (part.present.reshape(len(part.present), -1) for part in self._parts)
+        return np.concatenate(list(each), axis=1)
