@@ -334,3 +334,14 @@ def test_a_writer_without_images_says_so_at_once(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(type(writer), "open_images", TrajectoryWriter.open_images)
     assert hindrances(spec) == ["the writer 'mcap' writes no images"]
     assert film_mode(spec) == "live"
+
+
+def test_a_goal_that_moves_is_filmed_live() -> None:
+    path = "task.command.lead={term: goal_path, path: [[0.4, 0, 0.6], [0.5, 0, 0.6]], speed: 0.1}"
+    moving = load("pick_cube", overrides=[path]).spec
+    assert hindrances(moving) == ["the goal 'lead' moves, and where it was is not recorded"]
+    assert film_mode(moving) == "live"
+    latch = "task.events.bolt={term: tasks.latch, joint: cabinet.drawer_1, by: cabinet.drawer_2, position: 0.1}"
+    assert hindrances(load("pick_cube", overrides=[latch]).spec) == []
+    hidden = "task.events.hide={term: visibility, object: cube, when: step}"
+    assert "the event 'hide' acts at each step" in hindrances(load("pick_cube", overrides=[hidden]).spec)[0]

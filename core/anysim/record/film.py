@@ -17,7 +17,7 @@ from anysim.record.header import CameraInfo, camera_info
 from anysim.record.writer import TrajectoryWriter
 from anysim.task.contract import UNSEEN
 from anysim.task.env import TaskEnv
-from anysim.task.term_registry import find
+from anysim.task.term_registry import find, goes_on
 from anysim_schemas.run import RunSpec
 
 FilmMode = Literal["live", "success"]
@@ -51,8 +51,12 @@ def hindrances(spec: RunSpec) -> list[str]:
         f"the event '{name}' acts at each step, and its term '{event.term}' is not marked as one that changes nothing "
         "that is seen (anysim.task.contract.changes_nothing_seen)"
         for name, event in (spec.task.events if spec.task is not None else {}).items()
-        if event.when == "step" and not getattr(find("event", event.term), UNSEEN, False)
+        if (event.when == "step" or goes_on("event", event) is not None)
+        and not getattr(find("event", event.term), UNSEEN, False)
     ]
+    for name, term in (spec.task.command if spec.task is not None else {}).items():
+        if goes_on("command", term) == 7:
+            reasons.append(f"the goal '{name}' moves, and where it was is not recorded")
     writer: type[TrajectoryWriter] = registry.load("writers", spec.record.writer)
     if spec.record.cameras and writer.open_images is TrajectoryWriter.open_images:
         reasons.append(f"the writer '{spec.record.writer}' writes no images")

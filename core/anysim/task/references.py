@@ -30,12 +30,8 @@ class HoleView:
         found = find_affordance(scene.engine.world, f"{owner}.{local}")
         if found.spec.kind is not AffordanceKind.HOLE:
             raise NameLookupError(f"'{name}' is a {found.spec.kind}, and nothing goes into it; name a hole")
-        self._frame = scene.frame(f"{owner}/{found.spec.name}")
+        self.frame = scene.frame(f"{owner}/{found.spec.name}")
         self.depth, self.clearance = found.spec.depth, found.spec.clearance
-
-    def place(self, position: Array) -> Array:
-        """Positions (n, 3) in the axes of the hole's mouth [m]."""
-        return P.rotate_inverse(self._frame.quaternion, position - self._frame.position)
 
 
 class InnerSpace(NamedTuple):

@@ -2,6 +2,7 @@
 
 import inspect
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from functools import partial
 from types import ModuleType
 from typing import Any
@@ -10,8 +11,9 @@ from anysim import registry
 from anysim.errors import AnysimError, PluginError, SpecError, SpecIssue, listing, suggest
 from anysim.plugin_parameters import checked, given, options_model, parameters, reference_kind
 from anysim.task.conditions import Conditions
+from anysim.task.contract import GOES_ON
 from anysim.task.scene import Frame, RobotView, SceneView
-from anysim_schemas.task import PredicateTermSpec
+from anysim_schemas.task import PredicateTermSpec, TermSpec
 
 BUILTIN = "anysim"
 
@@ -40,6 +42,12 @@ def find(kind: str, name: str) -> Callable[..., Any]:
         hint = f"; did you mean '{others[0]}.{bare}'?" if others else suggest(bare, list(functions))
         raise PluginError(f"no {kind} term is named '{name}'{hint} ({kind} terms: {listing(functions, 30)})")
     return functions[bare]
+
+
+def goes_on(kind: str, spec: TermSpec) -> int | None:
+    """How many numbers the goals have of a command, or an event, that is called in each step; None for the others."""
+    with suppress(AnysimError):  # of a term that there is not `bind` tells
+        return vars(find(kind, spec.term)).get(GOES_ON)
 
 
 def term_names(library: str) -> list[str]:

@@ -1,7 +1,6 @@
 """The task's terms, bound to a scene: commands, observations, rewards, success, failure, events."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
 from functools import partial, reduce
 from math import isfinite
 from typing import Any, NamedTuple
@@ -17,11 +16,11 @@ from anysim.plugin_parameters import options_model
 from anysim.randomization.draw import draw_rows, is_random
 from anysim.randomization.streams import Streams
 from anysim.task.bindings import Bindings, bind_term
-from anysim.task.contract import GOES_ON, Obs
+from anysim.task.contract import Obs
 from anysim.task.observation_noise import ObservedTerm
 from anysim.task.scene import SceneView
-from anysim.task.term_registry import find
-from anysim_schemas.task import EventTermSpec, TaskSpec, TermSpec
+from anysim.task.term_registry import find, goes_on
+from anysim_schemas.task import EventTermSpec, TaskSpec
 
 Term = Callable[..., Any]
 
@@ -58,7 +57,7 @@ class Mdp:
         self.bindings = Bindings(None, scene.engine.num_envs, streams) if bindings is None else bindings
         scene.drawn = self.bindings.rows()
         n = scene.engine.num_envs
-        widths = {name: _goes_on("command", term) for name, term in spec.command.items()}
+        widths = {name: goes_on("command", term) for name, term in spec.command.items()}
         for name, width in widths.items():
             scene.goals[name] = np.tile(np.array([0.0, 0, 0, 0, 0, 0, 1][: width or 7]), (n, 1))
         self.held = np.zeros(n, dtype=np.int64)
@@ -103,7 +102,7 @@ class Mdp:
             raise SpecError(issues)
         self._memories = tuple(scene.memories)
         self._rewards, self._weights = list(rewards.values()), [spec.rewards[name].weight for name in rewards]
-        always = {name for name, event in spec.events.items() if _goes_on("event", event) is not None}
+        always = {name for name, event in spec.events.items() if goes_on("event", event) is not None}
         self._due = {
             when: {n: t for n, t in events.items() if spec.events[n].when == when or n in always}
             for when in ("reset", "step")
@@ -270,12 +269,6 @@ class Mdp:
         self.scene.moment += 1
         for term in self._altered:
             term.restore(env_ids, data)
-
-
-def _goes_on(kind: str, spec: TermSpec) -> int | None:
-    """How many numbers the goals have of a command, or an event, that is called in each step; None for the others."""
-    with suppress(AnysimError):  # of a term that there is not `bind` tells
-        return vars(find(kind, spec.term)).get(GOES_ON)
 
 
 def _combined(both: np.ufunc, values: Sequence[Array], shape: tuple[int, ...]) -> Array:

@@ -5,10 +5,9 @@ Kinds, by the module they are in: observations `(scene) -> (n, k)`, rewards `(sc
 remembers something during an episode is a class, made with `(scene, *, parameters)`, whose instances are called.
 """
 
-import inspect
 import re
 from collections.abc import Callable
-from types import ModuleType
+from types import FunctionType, ModuleType
 from typing import Any
 
 from anysim.task.terms import combinations, commands, events, observations, predicates, rewards
@@ -20,9 +19,7 @@ def _named(*modules: ModuleType) -> dict[str, Callable[..., Any]]:
         re.sub(r"(?<=.)(?=[A-Z])", "_", name).lower().removesuffix("_"): value
         for module in modules
         for name, value in vars(module).items()
-        if (inspect.isfunction(value) or inspect.isclass(value))
-        and value.__module__ == module.__name__
-        and name[0] != "_"
+        if isinstance(value, type | FunctionType) and value.__module__ == module.__name__ and name[0] != "_"
     }
     return dict(sorted(found.items()))
 

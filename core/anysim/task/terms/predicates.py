@@ -139,7 +139,7 @@ def inserted(
     lateral: Annotated[float, Field(gt=0, description="from its axis [m]; the clearance where left out")] | None = None,
 ) -> Array:
     """The origin of a, such as the tip of a peg, is so far in a hole that its asset declares, and near its axis."""
-    place = hole.place(a.position)
+    place = P.rotate_inverse(hole.frame.quaternion, a.position - hole.frame.position)
     aside = hole.clearance if lateral is None else lateral
     return (-place[:, 2] >= share * hole.depth) & (P.norm(place[:, :2]) <= aside)
 
