@@ -154,11 +154,12 @@ def test_a_peg_falls_to_the_bottom_of_its_hole(task: str, engine: str) -> None:
 
 
 @pytest.mark.parametrize("task", [*CASES, "pick_cube"])
-def test_a_task_has_a_page_with_its_levels_and_a_picture(task: str) -> None:
+def test_a_task_has_a_page_with_its_difficulty_its_levels_and_a_picture(task: str) -> None:
     folder = task_path(task).parent
     levels = list(load(task).spec.levels)
     assert levels == [] or levels[:3] == ["L0", "L1", "L2"]
     page = (folder / "README.md").read_text()
     assert ("| levels | " in page) == bool(levels)
+    assert any(f"\n| difficulty | {said} |\n" in page for said in ("easy", "medium", "hard"))
     assert "![" in page
     assert (folder / "picture.jpg").stat().st_size < 100_000
