@@ -145,6 +145,9 @@ def test_a_run_goes_on_and_comes_out_the_same(tiny: Path) -> None:
     same = [pair for pair in told["engines"] if pair["policy"] is None]
     assert [(pair["seeds"], pair["agree"]) for pair in same] == [(16, 1.0)]
 
+    spent = json.loads((out / "costs.json").read_text())
+    assert [(one["episodes"], one["cpu_s"] > 0, one["cpu_s_per_success"]) for one in spent] == [(4, True, None)] * 8
+
     written = (out / "results.json").read_bytes(), (out / "results.html").read_bytes()
     assert ElementTree.fromstring(written[1].decode().partition("\n")[2]) is not None
     log = out / "reach/mujoco/zero/episodes.jsonl"
@@ -274,4 +277,8 @@ def test_figures_against_an_example_by_hand() -> None:
     over_tasks = next(one for one in told["ranks"] if one["task"] is None)
     assert (over_tasks["kendall"], over_tasks["mmrv"]) == (-1.0, 0.5)
     assert over_tasks["mmrv_reversed"] == pytest.approx(1 / 3)
-    assert matrix(told) == (("trained on", "x", "y"), [["x", "88%", "67%"], ["y", "12%", "100%"]])
+    # 0.75 and 1 on two tasks, each of which a bootstrap may draw twice; 2 of 3, and 4 of 4
+    assert matrix(told) == (
+        ("trained on", "x", "y"),
+        [["x", "88% (75% to 100%)", "67% (21% to 94%)"], ["y", "12% (0% to 25%)", "100% (51% to 100%)"]],
+    )

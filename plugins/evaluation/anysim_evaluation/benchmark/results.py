@@ -10,7 +10,7 @@ from anysim.math.statistics import wilson
 from anysim.task.contract import Status
 from anysim_evaluation.benchmark.ranks import kendall, mean_interval, mmrv, mmrv_tolerant, pearson
 from anysim_evaluation.driver import FAULT, Episode
-from anysim_evaluation.summary import agreement
+from anysim_evaluation.summary import agreement, effort
 from anysim_schemas.benchmark import BenchmarkSpec
 
 
@@ -43,8 +43,8 @@ def row(cell: Cell, found: Episodes, spec: BenchmarkSpec) -> dict[str, Any]:
     """Rates of one cell with Wilson's intervals at 95 %; success, failure and truncation sum up to 1.
 
     Faults of the simulation are counted apart and are no attempts. `length` is the mean over successes of the steps by
-    the median steps of the reference; None without either. `outcomes` has a letter for each seed in order: s, f, t, and
-    x for a fault.
+    the median steps of the reference; None without either. What successes took is told by `effort`. `outcomes` has a
+    letter for each seed in order: s, f, t, and x for a fault.
     """
     episodes = [found[cell][seed] for seed in sorted(found[cell])]
     valid = [e for e in episodes if e.status != FAULT]
@@ -60,6 +60,7 @@ def row(cell: Cell, found: Episodes, spec: BenchmarkSpec) -> dict[str, Any]:
     return told | {
         "failures": dict(sorted(types.items(), key=lambda item: (-item[1], item[0]))),
         "length": fmean(won) / median(unit) if won and unit else None,
+        **effort(valid),
         "outcomes": "".join("x" if e.status == FAULT else str(e.status)[0] for e in episodes),
     }
 
@@ -161,11 +162,19 @@ def _rank(sides: Sequence[tuple[float, float]], spreads: Sequence[tuple[Any, Any
 
 
 def _matrix(spec: BenchmarkSpec, rows: Rows) -> Iterator[dict[str, Any]]:
-    """Policies by the engine that they were trained on, and the engine that they are evaluated on."""
+    """Policies by the engine that they were trained on, and the engine that they are evaluated on.
+
+    The interval is Wilson's for one policy on one task, else that of a bootstrap which draws from all of their rates.
+    """
     for trained_on in spec.engines:
         trained = [name for name, policy in spec.policies.items() if policy.trained_on == trained_on]
         for engine in spec.engines:
-            by_policy = [_rates(spec, rows, engine, policy) for policy in trained]
-            means = [fmean(rates) for rates in by_policy if rates]
-            if means:
-                yield {"trained_on": trained_on, "engine": engine, "policies": trained, "success": fmean(means)}
+            cells = [
+                rows[cell] for name in trained for task in spec.tasks if (cell := Cell(task, engine, name)) in rows
+            ]
+            cells = [one for one in cells if one["success"] is not None]
+            if cells:
+                rates = [one["success"] for one in cells]
+                interval = cells[0]["success_interval"] if len(cells) == 1 else list(mean_interval(rates))
+                mean = {"success": fmean(rates), "interval": interval}
+                yield {"trained_on": trained_on, "engine": engine, "policies": trained, **mean}
