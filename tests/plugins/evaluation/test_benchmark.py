@@ -100,6 +100,16 @@ def test_the_file_of_a_policy_is_frozen(tiny: Path, tmp_path: Path) -> None:
     assert len(said) == 2
 
 
+def test_the_policy_that_a_task_ships_is_frozen(tiny: Path) -> None:
+    text = TEXT.replace("short: {task: reach", "short: {task: stand_still")
+    tiny.write_text(text.replace("zero: zero", "zero: shipped"))
+    named = freezing.parts(load_protocol(str(tiny)))
+    assert len(named["tasks.short.shipped"]) == 64
+    assert "tasks.reach.shipped" not in named
+    tiny.write_text(text)
+    assert named.keys() - freezing.parts(load_protocol(str(tiny))).keys() == {"tasks.short.shipped"}
+
+
 def test_a_frozen_file_is_its_hash(tiny: Path) -> None:
     loaded = load_protocol(str(tiny))
     loaded.frozen.write_text(loaded.frozen.read_text().replace("12 steps", "13 steps"))
