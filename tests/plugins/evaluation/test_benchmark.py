@@ -278,6 +278,10 @@ def test_figures_against_an_example_by_hand() -> None:
     means = {(one["engine"], one["policy"]): (one["tasks"], one["success"]) for one in told["means"]}
     assert means["x", "good"] == (2, 0.875)
     assert means["y", "bad"] == (1, 1.0)
+    alone = next(one for one in told["means"] if one["tasks"] == 1 and one["policy"] == "bad")
+    assert alone["interval"] == pytest.approx(
+        (0.51, 1.0), abs=0.005
+    )  # Wilson's of 4 of 4: one task cannot be drawn twice
     by_policy = {one["engine"]: one for one in told["policies"]}
     assert (by_policy["x"]["seeds"], by_policy["x"]["only_first"], by_policy["x"]["only_second"]) == (8, 6, 0)
     assert by_policy["x"]["p"] == pytest.approx(2 / 2**6)

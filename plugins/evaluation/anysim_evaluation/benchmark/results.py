@@ -68,21 +68,25 @@ def row(cell: Cell, found: Episodes, spec: BenchmarkSpec) -> dict[str, Any]:
 Rows = Mapping[Cell, Mapping[str, Any]]
 
 
-def _rates(spec: BenchmarkSpec, rows: Rows, engine: str, policy: str) -> list[float]:
-    """Success rates by task, of the tasks that were run."""
-    cells = (Cell(task, engine, policy) for task in spec.tasks)
-    return [rows[cell]["success"] for cell in cells if cell in rows and rows[cell]["success"] is not None]
+def _run(spec: BenchmarkSpec, rows: Rows, engine: str, policies: Sequence[str]) -> list[Mapping[str, Any]]:
+    """The rows of policies on an engine, of the tasks that were run."""
+    cells = (Cell(task, engine, policy) for policy in policies for task in spec.tasks)
+    return [rows[cell] for cell in cells if cell in rows and rows[cell]["success"] is not None]
+
+
+def _mean(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """The mean success of rows with its interval: a bootstrap that draws rows, or Wilson's where there is one alone."""
+    rates = [one["success"] for one in found]
+    interval = list(mean_interval(rates)) if len(found) > 1 else found[0]["success_interval"]
+    return {"success": fmean(rates), "interval": interval}
 
 
 def _means(spec: BenchmarkSpec, rows: Rows) -> Iterator[dict[str, Any]]:
     """The mean success of each policy on each engine over the tasks, each task with the same weight."""
     for policy in spec.policies:
         for engine in spec.engines:
-            if rates := _rates(spec, rows, engine, policy):
-                interval = list(mean_interval(rates))
-                yield {"engine": engine, "policy": policy, "tasks": len(rates), "success": fmean(rates)} | {
-                    "interval": interval
-                }
+            if found := _run(spec, rows, engine, [policy]):
+                yield {"engine": engine, "policy": policy, "tasks": len(found), **_mean(found)}
 
 
 def _pooled(found: Episodes, engine: str, policies: Sequence[str], named: bool = True) -> dict[Any, Episode]:
@@ -138,7 +142,7 @@ def _ranks(spec: BenchmarkSpec, rows: Rows) -> Iterator[dict[str, Any]]:
                     continue
                 here, there = ([pair[side]["success"] for pair in both] for side in (0, 1))
                 sides.append((fmean(here), fmean(there)))
-                if task is None:
+                if len(both) > 1:
                     spreads.append((mean_interval(here), mean_interval(there)))
                 else:
                     a, b = (tuple(both[0][side]["success_interval"]) for side in (0, 1))
@@ -162,19 +166,9 @@ def _rank(sides: Sequence[tuple[float, float]], spreads: Sequence[tuple[Any, Any
 
 
 def _matrix(spec: BenchmarkSpec, rows: Rows) -> Iterator[dict[str, Any]]:
-    """Policies by the engine that they were trained on, and the engine that they are evaluated on.
-
-    The interval is Wilson's for one policy on one task, else that of a bootstrap which draws from all of their rates.
-    """
+    """Policies by the engine that they were trained on, and the engine that they are evaluated on."""
     for trained_on in spec.engines:
         trained = [name for name, policy in spec.policies.items() if policy.trained_on == trained_on]
         for engine in spec.engines:
-            cells = [
-                rows[cell] for name in trained for task in spec.tasks if (cell := Cell(task, engine, name)) in rows
-            ]
-            cells = [one for one in cells if one["success"] is not None]
-            if cells:
-                rates = [one["success"] for one in cells]
-                interval = cells[0]["success_interval"] if len(cells) == 1 else list(mean_interval(rates))
-                mean = {"success": fmean(rates), "interval": interval}
-                yield {"trained_on": trained_on, "engine": engine, "policies": trained, **mean}
+            if found := _run(spec, rows, engine, trained):
+                yield {"trained_on": trained_on, "engine": engine, "policies": trained, **_mean(found)}
