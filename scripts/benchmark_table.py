@@ -2,10 +2,11 @@
 
     python scripts/benchmark_table.py [--check]
 
-The figures are made by two commands; the first goes on where it was cut off:
+The figures are made by these commands; the first goes on where it was cut off:
 
     anysim benchmark run core12 --workers 2 --out runs/core12
     cp runs/core12/results.json docs/benchmark.json
+    cp runs/core12/costs.json docs/benchmark_costs.json
 
 `--check` writes nothing and exits with 1 if the page has drifted from docs/benchmark.json.
 """
@@ -13,6 +14,7 @@ The figures are made by two commands; the first goes on where it was cut off:
 import json
 import sys
 from collections.abc import Mapping, Sequence
+from statistics import fmean
 from typing import Any
 
 from generated import ROOT, main
@@ -20,6 +22,15 @@ from generated import ROOT, main
 from anysim_evaluation.benchmark.page import agreement, ranks
 
 STORE = ROOT / "docs" / "benchmark.json"
+COSTS = ROOT / "docs" / "benchmark_costs.json"
+TOOK = {
+    "length": ("length", ".2f"),
+    "commands_done": ("commands done", ".0%"),
+    "retries_per_success": ("retries", ".2f"),
+    "sim_s_per_success": ("simulated s", ".1f"),
+    "cpu_s_per_success": ("CPU s", ".2f"),
+}
+"""What is told of successes: of each figure its column and format."""
 
 
 def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -32,9 +43,26 @@ def percent(share: float | None) -> str:
     return "" if share is None else f"{share:.0%}"
 
 
+def took(told: Mapping[str, Any], costs: Sequence[Mapping[str, Any]]) -> str:
+    """What successes took on each engine with each policy: means over the tasks that have the figure."""
+    spent = {(one["task"], one["engine"], one["policy"]): one["cpu_s_per_success"] for one in costs}
+    found: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for one in told["rows"]:
+        cpu_s = spent.get((one["task"], one["engine"], one["policy"]))
+        found.setdefault((one["policy"], one["engine"]), []).append({**one, "cpu_s_per_success": cpu_s})
+    rows: list[list[str]] = []
+    for (policy, engine), cells in found.items():
+        values = [[value for one in cells if (value := one.get(name)) is not None] for name in TOOK]
+        if any(values):
+            figures = (format(fmean(v), form) if v else "" for v, (_, form) in zip(values, TOOK.values(), strict=True))
+            rows.append([f"`{policy}`", engine, *figures])
+    return table(["policy", "engine", *(column for column, _ in TOOK.values())], rows)
+
+
 def section() -> str:
     """What is said of the results."""
     told: Mapping[str, Any] = json.loads(STORE.read_text("utf-8"))
+    costs = json.loads(COSTS.read_text("utf-8")) if COSTS.exists() else []
     engines = list(dict.fromkeys(one["engine"] for one in told["means"]))
     policies = list(dict.fromkeys(one["policy"] for one in told["means"]))
     means = {(one["policy"], one["engine"]): one for one in told["means"]}
@@ -63,6 +91,8 @@ def section() -> str:
             table(["policy", *engines], by_mean),
             f"Success by task on {', '.join(engines)}:",
             table(["task", *(f"`{policy}`" for policy in policies)], by_task),
+            "What a success took, means over the tasks (the reference has a length of 1; CPU seconds are of one run):",
+            took(told, costs),
             "Order of the policies by their means:",
             table(columns, orders),
             "Agreement of engines, seed by seed:",

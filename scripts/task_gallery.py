@@ -3,17 +3,21 @@
     python scripts/task_gallery.py [--check]
     python scripts/task_gallery.py --measure [TASK …]
 
-`--measure` draws the picture of each task that has none, and evaluates a random policy and the expert where the task is
-new or has changed; it takes minutes for a task, and goes on where it was cut off. The figures of the tasks of `core12`
-are those of docs/benchmark.json. `--check` writes nothing and exits with 1 if the page has drifted.
+`--measure` draws the picture of each task that has none, and evaluates the expert and a random policy where the task is
+new or has changed, one policy on one engine at a time, short tasks first. It takes minutes for each, and goes on where
+it was cut off: finished ones are in docs/tasks.json, the episodes of the one at hand in runs/gallery. Figures of the
+tasks of `core12` are those of docs/benchmark.json where these have as many episodes. `--check` writes nothing and exits
+with 1 if the page has drifted, or if an expert solves less than the difficulty of its task promises.
 """
 
 import json
+import re
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from benchmark_table import STORE as BENCHMARK, table
 from generated import ROOT, main
@@ -21,13 +25,18 @@ from PIL import Image
 
 from anysim import registry
 from anysim.api import load, task_path
+from anysim.math.statistics import wilson
 from anysim.record.commit import write_whole
 from anysim.task.snapshot import spec_hash
 
 STORE = ROOT / "docs" / "tasks.json"
+RUNS = ROOT / "runs" / "gallery"
 ENGINES = ("mujoco", "pybullet", "sapien")
-POLICIES = ("random", "expert")
-EPISODES, SPLIT = 16, "test"
+EPISODES = {"expert": 50, "random": 16}
+"""Of each task on each engine."""
+SPLIT = "test"
+PROMISED = {"easy": (0.9, 0.8, 0.8), "medium": (0.7, 0.6, 0.6), "hard": (0.0, 0.0, 0.0)}
+"""The least success of an expert on each engine, by the difficulty of its task."""
 WIDTH, HEIGHT = 300, 225
 """Of one engine's part of a picture [px]."""
 
@@ -37,8 +46,16 @@ ABOVE = "{from: [-0.35, -0.95, 1.45], look_at: [0.42, 0.0, 0.5], fov: 45.0}"
 Figures = dict[str, Any]
 
 
+class Cell(NamedTuple):
+    """A policy of a task on an engine."""
+
+    task: str
+    policy: str
+    engine: str
+
+
 def stored() -> Figures:
-    """What was measured of each task."""
+    """What was measured of each task: of each policy and engine the number of successes, of attempts and of faults."""
     return json.loads(STORE.read_text("utf-8")) if STORE.exists() else {}
 
 
@@ -48,47 +65,67 @@ def tasks() -> list[str]:
     return sorted(own, key=lambda name: (task_path(name).parent.parent.name, name))
 
 
+def difficulty(name: str) -> str:
+    """How hard a task is for a scripted policy, as its page says."""
+    page = task_path(name).with_name("README.md")
+    said = re.search(r"^\| difficulty \| (\w+)", page.read_text("utf-8"), re.MULTILINE)
+    if said is None or said[1] not in PROMISED:
+        raise SystemExit(f"{page}: expected a row '| difficulty | … |' with one of {', '.join(PROMISED)}")
+    return said[1]
+
+
 def measure(only: list[str]) -> None:
     """Draw and evaluate what is new or has changed."""
     known = stored()
-    benchmark: Figures = json.loads(BENCHMARK.read_text("utf-8"))
-    for name in tasks():
-        if only and name not in only:
-            continue
+    specs = {name: spec_hash(load(name).spec) for name in only or tasks()}
+    for name in specs:
         picture = task_path(name).with_name("picture.jpg")
         if not picture.exists():
             draw(name, picture)
-        spec = spec_hash(load(name).spec)
-        if known.get(name, {}).get("spec") == spec:
-            continue
-        sys.stderr.write(f"{name}: evaluating\n")
-        rows = [row for row in benchmark["rows"] if row["task"] == name and row["policy"] in POLICIES]
-        if benchmark["parts"].get(f"tasks.{name}.spec") != spec:
-            rows = [
-                row for policy in POLICIES if policy != "expert" or solvable(name) for row in evaluated(name, policy)
-            ]
-        known[name] = {"spec": spec, **{policy: {} for policy in POLICIES}}
-        for row in rows:
-            known[name][row["policy"]][row["engine"]] = [round(row["success"] * row["attempts"]), row["attempts"]]
+    left = [cell for cell in cells(list(specs)) if not _enough(known.get(cell.task, {}), cell, specs[cell.task])]
+    for number, cell in enumerate(left, 1):
+        sys.stderr.write(f"{number} of {len(left)}: {' '.join(cell)}\n")
+        figures = known.get(cell.task, {})
+        if figures.get("spec") != specs[cell.task]:
+            figures = {"spec": specs[cell.task], **{policy: {} for policy in EPISODES}}
+        figures[cell.policy][cell.engine] = _benchmarked(cell, specs[cell.task]) or evaluated(cell, specs[cell.task])
+        known = stored() | {cell.task: figures}
         write_whole(STORE.parent, {STORE.name: json.dumps(known, indent=1, sort_keys=True) + "\n"})
 
 
-def solvable(name: str) -> bool:
-    """Whether a task has an expert, which hard ones may lack."""
-    spec = load(name).spec
-    return bool(spec.task and spec.task.expert) or bool(spec.collect and spec.collect.commands)
+def cells(names: list[str]) -> Iterator[Cell]:
+    """What is to be measured of tasks, the shortest first."""
+    specs = {name: load(name).spec for name in names}
+    for name, spec in sorted(specs.items(), key=lambda entry: entry[1].task.horizon if entry[1].task else 0):
+        has_expert = bool(spec.task and spec.task.expert) or bool(spec.collect and spec.collect.commands)
+        policies = [policy for policy in EPISODES if policy != "expert" or has_expert]
+        yield from (Cell(name, policy, engine) for engine in ENGINES for policy in policies)
 
 
-def evaluated(name: str, policy: str) -> list[Figures]:
-    """What `anysim evaluate` says of a policy on each engine."""
-    with tempfile.TemporaryDirectory() as folder:
-        words = ["evaluate", name, "--policy", policy, "--engine", "all", "--split", SPLIT, "--out", folder]
-        _anysim(*words, "--episodes", str(EPISODES))
-        told: Figures = json.loads((Path(folder) / "evaluation.json").read_text("utf-8"))
-    return [
-        {"policy": policy, "engine": engine, "success": found["success_rate"], "attempts": found["attempts"]}
-        for engine, found in told["engines"].items()
-    ]
+def _enough(figures: Figures, cell: Cell, spec: str) -> bool:
+    _, attempts, faults = figures.get(cell.policy, {}).get(cell.engine, (0, 0, 0))
+    return figures.get("spec") == spec and attempts + faults >= EPISODES[cell.policy]
+
+
+def _benchmarked(cell: Cell, spec: str) -> list[int] | None:
+    """What the benchmark says of it, if it is the same task and has as many episodes."""
+    told: Figures = json.loads(BENCHMARK.read_text("utf-8"))
+    if told["parts"].get(f"tasks.{cell.task}.spec") != spec or told["episodes"] < EPISODES[cell.policy]:
+        return None
+    for row in told["rows"]:
+        if (row["task"], row["policy"], row["engine"]) == cell:
+            return [round(row["success"] * row["attempts"]), row["attempts"], row["faults"]]
+    return None
+
+
+def evaluated(cell: Cell, spec: str) -> list[int]:
+    """What `anysim evaluate` says of it."""
+    folder, count = RUNS / cell.task / spec[:12] / cell.policy, EPISODES[cell.policy]
+    words = ["evaluate", cell.task, "--policy", cell.policy, "--engine", cell.engine, "--split", SPLIT]
+    _anysim(*words, "--episodes", str(count), "--out", str(folder))
+    told: Figures = json.loads((folder / "evaluation.json").read_text("utf-8"))
+    found = told["engines"][cell.engine]
+    return [found["successes"], found["attempts"], found["faults"]]
 
 
 def draw(name: str, path: Path) -> None:
@@ -109,7 +146,7 @@ def _anysim(*words: str) -> None:
 def page() -> str:
     """A table of all tasks, then each with its picture."""
     known = stored()
-    columns = ("task", "robots", "steps", "levels", "expert", "solved by it on MuJoCo, PyBullet, SAPIEN", "by chance")
+    columns = ("task", "difficulty", "robots", "steps", "expert", "MuJoCo", "PyBullet", "SAPIEN", "by chance")
     rows: list[list[str]] = []
     parts: list[str] = []
     family = ""
@@ -120,8 +157,10 @@ def page() -> str:
         commands = spec.collect.commands if spec.collect else ()
         expert = f"`{task.expert.skill}`" if task.expert else f"{len(commands)} commands" if commands else "none"
         robots = ", ".join(dict.fromkeys(one.robot for one in spec.world.robots.values()))
-        solved = [_rates(known.get(name, {}).get(policy, {})) for policy in ("expert", "random")]
-        rows.append([f"[`{name}`](#{name})", robots, str(task.horizon), " ".join(spec.levels), expert, *solved])
+        figures = known.get(name, {})
+        solved = [_rate(figures.get("expert", {}).get(engine)) for engine in ENGINES]
+        chance = _chance(figures.get("random", {}))
+        rows.append([f"[`{name}`](#{name})", difficulty(name), robots, str(task.horizon), expert, *solved, chance])
         if folder.parent.name != family:
             family = folder.parent.name
             parts.append(f"## {family.replace('_', ' ')}")
@@ -132,13 +171,37 @@ def page() -> str:
     return "\n\n".join([table(columns, rows), *parts])
 
 
-def _rates(found: dict[str, list[int]]) -> str:
-    counts = [found.get(engine) for engine in ENGINES]
-    return " / ".join("-" if count is None else f"{count[0]} of {count[1]}" for count in counts)
+def _rate(found: list[int] | None) -> str:
+    """A count with Wilson's interval in percent."""
+    if found is None:
+        return "-"
+    won, attempts, faults = found
+    low, high = wilson(won, attempts)
+    return f"{won} of {attempts} ({100 * low:.0f} to {100 * high:.0f})" + (f", {faults} faults" if faults else "")
+
+
+def _chance(found: dict[str, list[int]]) -> str:
+    if len({found[engine][1] for engine in found}) != 1:
+        return " / ".join(_rate(found.get(engine)) for engine in ENGINES)
+    counts = (str(found[engine][0]) if engine in found else "-" for engine in ENGINES)
+    return f"{' / '.join(counts)} of {next(iter(found.values()))[1]}"
+
+
+def broken_promises() -> Iterator[str]:
+    """The experts that solve less than the difficulty of their task promises."""
+    for name, figures in stored().items():
+        for engine, least in zip(ENGINES, PROMISED[difficulty(name)], strict=True):
+            won, attempts, _ = figures.get("expert", {}).get(engine, (0, 0, 0))
+            if attempts and won < least * attempts:
+                words = f"its expert solves {won} of {attempts} on {engine}, not {least:.0%}"
+                yield f"{name} is {difficulty(name)}, and {words}"
 
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--measure"]:
         measure(sys.argv[2:])
         sys.argv[1:] = []
-    sys.exit(main(__doc__, "tasks", "task_gallery.py", ["docs/tasks.md"], page))
+    code = main(__doc__, "tasks", "task_gallery.py", ["docs/tasks.md"], page)
+    broken = list(broken_promises())
+    sys.stderr.writelines(f"{line}\n" for line in broken)
+    sys.exit(code or bool(broken))

@@ -182,6 +182,11 @@ class TaskSpec(Spec):
         default=None, description="values whose spread follows the success rate of each env, where learners ask for it"
     )
     expert: ExpertSpec | None = Field(default=None, description="a scripted solution")
+    shipped: str | None = Field(
+        default=None,
+        min_length=1,
+        description="a trained solution, run by `--policy shipped`: its file, as `package:my_tasks/walk/policy.onnx`",
+    )
 
     @field_validator("observations")
     @classmethod

@@ -9,6 +9,8 @@ from anysim.api import load, task_path
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
+from anysim_evaluation.driver import drive, episode_seeds
+from anysim_evaluation.policy import make_policy
 from tests.tasks.cases import CASES
 from tests.tasks.states import blind, failed, judged, put, rewarded, seen, set_opening
 
@@ -19,6 +21,10 @@ VARIANTS = {"peg_in_hole_2mm", "insert_round_peg", "nut_on_peg", "usb_insert", "
 """Those that differ from another task in sizes alone, or share its world or its way."""
 SETTLING = "robot.hand_", "partner.hand_", "hand.", "dog.", "walker."
 """Joints of a hand, which an action of zero sends to the middle of their ranges, and of legs that take up a weight."""
+SHIPPED = ["stand_still"]
+"""Those that come with a trained policy."""
+DEEPEST, REPLAYED = 2e-3, 50
+"""How far things may be inside of one another at a reset [m], and steps that are replayed."""
 TASKS = [pytest.param(task, marks=pytest.mark.slow) if task in VARIANTS else task for task in CASES]
 
 
@@ -92,6 +98,44 @@ def test_nothing_random_solves_a_task_or_falls_at_once(task: str) -> None:
         assert "success" not in env.status.tolist()
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["mujoco", "pybullet", "sapien"])
+@pytest.mark.parametrize("task", [*CASES, "pick_cube"])
+def test_a_task_begins_apart_bears_random_actions_and_replays_exactly(task: str, engine: str) -> None:
+    """Nothing is inside of anything at a reset, no action is a fault, and the same ones do the same, bit by bit."""
+    require_engine(engine)
+    with blind(task, engine) as env:
+        env.reset(seed=11)
+        env.engine.step(1)  # two engines look for contacts in a step alone, at its beginning
+        assert (env.engine.contacts().depth < DEEPEST).all()
+        actions = np.random.default_rng(0).uniform(*env.action_bounds, (REPLAYED, 2, env.action_dim))
+        first, again = _replayed(env, actions), _replayed(env, actions)
+        assert not env.info["fault"].any()
+        assert first == again
+
+
+def _replayed(env: TaskEnv, actions: np.ndarray) -> list[bytes]:
+    """All that is seen of each step after a reset; envs whose episode has ended rest."""
+    env.reset(seed=11)
+    told: list[bytes] = []
+    for action in actions:
+        if env.running.any():
+            result = env.step(action, env.running)
+            state = env.engine.get_state()
+            seen_now = [*result.obs.values(), result.reward, state.body_pose, state.joint_pos, state.joint_vel]
+            told.append(b"".join(array.tobytes() for array in seen_now))
+    return told
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("task", SHIPPED)
+def test_the_policy_that_a_task_ships_solves_it(task: str, engine: str) -> None:
+    require_engine(engine)
+    with blind(task, engine, 8) as env:
+        told = list(drive(env, make_policy(env, "shipped"), episode_seeds("validation", 0, 8)))
+    assert [episode.status for episode in told] == ["success"] * 8
+
+
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_button_comes_back(engine: str) -> None:
     require_engine(engine)
@@ -123,11 +167,13 @@ def test_a_peg_falls_to_the_bottom_of_its_hole(task: str, engine: str) -> None:
 
 
 @pytest.mark.parametrize("task", [*CASES, "pick_cube"])
-def test_a_task_has_a_page_with_its_levels_and_a_picture(task: str) -> None:
+def test_a_task_has_a_page_with_its_difficulty_its_levels_and_a_picture(task: str) -> None:
     folder = task_path(task).parent
     levels = list(load(task).spec.levels)
     assert levels == [] or levels[:3] == ["L0", "L1", "L2"]
+    assert (task in SHIPPED) == (folder / "policy.onnx").exists()
     page = (folder / "README.md").read_text()
     assert ("| levels | " in page) == bool(levels)
+    assert any(f"\n| difficulty | {said} |\n" in page for said in ("easy", "medium", "hard"))
     assert "![" in page
     assert (folder / "picture.jpg").stat().st_size < 100_000

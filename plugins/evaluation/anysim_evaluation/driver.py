@@ -10,7 +10,7 @@ from anysim.conventions import Array
 from anysim.errors import TaskError
 from anysim.task.contract import Status
 from anysim.task.env import TaskEnv
-from anysim_evaluation.policy import Judging, Policy
+from anysim_evaluation.policy import Judging, Policy, Striving
 
 SPLITS = {"train": range(10_000), "validation": range(10_000, 10_200), "test": range(20_000, 20_200)}
 """Episode seeds by split. Nothing is tuned on those of `test`."""
@@ -49,6 +49,10 @@ class Episode:
         failure: the type of a failure, in a word; empty for a success.
         steps: control steps.
         total_reward: the sum of its rewards.
+        sim_s: simulated [s].
+        retries: how often the policy tried again; None where it cannot say.
+        done: commands of the task that are done; None where it has none, or the policy cannot say.
+        required: those that there are.
     """
 
     seed: int
@@ -56,6 +60,10 @@ class Episode:
     failure: str
     steps: int
     total_reward: float
+    sim_s: float = 0.0
+    retries: int | None = None
+    done: int | None = None
+    required: int | None = None
 
 
 def drive(
@@ -79,6 +87,8 @@ def drive(
     chunks: list[Array] = [np.zeros((0, env.action_dim))] * env.num_envs
     action = np.tile(np.clip(np.zeros(env.action_dim), *env.action_bounds), (env.num_envs, 1))
     judging = policy if isinstance(policy, Judging) else None
+    striving = policy if isinstance(policy, Striving) else None
+    control_dt = env.engine.world.physics.control_dt
 
     def shown(group: str) -> bool:
         return privileged if group == "privileged" else groups is None or group in groups
@@ -128,7 +138,9 @@ def drive(
             status = FAULT if faults[i] else str(Status.FAILED) if status == Status.RUNNING else status
             why = "" if judging is None else judging.failure(i)
             failure = "" if status == Status.SUCCESS else FAULT if faults[i] else why or status
-            yield Episode(seed, status, failure, int(env.scene.elapsed[i]), float(total[i]))
+            steps = int(env.scene.elapsed[i])
+            told = (None, None, None) if striving is None else striving.effort(i, status == Status.SUCCESS)
+            yield Episode(seed, status, failure, steps, float(total[i]), round(steps * control_dt, 6), *told)
         env.retire(over)
         begin(over)
 

@@ -61,6 +61,29 @@ class Judging(Protocol):
         ...
 
 
+class Effort(NamedTuple):
+    """What an episode took a policy.
+
+    Attributes:
+        retries: how often it tried again.
+        done: commands of the task that are done, None where it has none.
+        required: those that there are.
+    """
+
+    retries: int
+    done: int | None
+    required: int | None
+
+
+@runtime_checkable
+class Striving(Protocol):
+    """A policy that counts what an episode took, as the expert does."""
+
+    def effort(self, env: int, success: bool) -> Effort:
+        """Of the episode of an env, which has just ended."""
+        ...
+
+
 class PolicyName(NamedTuple):
     """`NAME`, `NAME:KEY=VALUE,KEY=VALUE`, `MODULE:FUNCTION`, or a file.
 

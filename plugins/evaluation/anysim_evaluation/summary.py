@@ -4,10 +4,11 @@ from collections import Counter
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import asdict
 from itertools import combinations
-from statistics import median
+from math import sqrt
+from statistics import fmean, median
 from typing import Any, TypeVar
 
-from anysim.math.statistics import wilson
+from anysim.math.statistics import Z95, wilson
 from anysim.task.contract import Status
 from anysim_evaluation.driver import FAULT, Episode
 
@@ -32,15 +33,45 @@ def summary(episodes: Sequence[Episode]) -> dict[str, Any]:
         "failures": dict(sorted(failures.items(), key=lambda item: (-item[1], item[0]))),
         "faults": len(episodes) - len(valid),
         "steps": median(e.steps for e in won) if won else None,
+        **effort(valid),
         "episodes": [asdict(e) for e in sorted(episodes, key=lambda e: e.seed)],
     }
+
+
+def effort(valid: Sequence[Episode]) -> dict[str, float | None]:
+    """What successes took, of episodes without faults; None where there is no success, or nothing is said of it.
+
+    `sim_s_per_success` and `retries_per_success` are those of all episodes, failed ones too, by the number of
+    successes; `commands_done` is the mean share of a task's commands that were done.
+    """
+    won = sum(e.status == Status.SUCCESS for e in valid)
+    retries = [e.retries for e in valid if e.retries is not None]
+    shares = [e.done / e.required for e in valid if e.done is not None and e.required]
+    return {
+        "sim_s_per_success": sum(e.sim_s for e in valid) / won if won else None,
+        "retries_per_success": sum(retries) / won if won and retries else None,
+        "commands_done": fmean(shares) if shares else None,
+    }
+
+
+def gap_interval(only_first: int, only_second: int, n: int) -> tuple[float, float]:
+    """The 95 % interval of a difference of two success rates on the same n seeds (Bonett and Price 2012).
+
+    `only_first` and `only_second` are the seeds that one of the two alone has solved; no seeds say nothing: (-1, 1).
+    """
+    if n == 0:
+        return -1.0, 1.0
+    first, second = (only_first + 1) / (n + 2), (only_second + 1) / (n + 2)
+    middle, half = first - second, Z95 * sqrt((first + second - (first - second) ** 2) / (n + 2))
+    return max(-1.0, middle - half), min(1.0, middle + half)
 
 
 def agreement(a: Mapping[K, Episode], b: Mapping[K, Episode]) -> dict[str, Any]:
     """How far two engines, or two policies, agree on the seeds that both have run without a fault.
 
     `agree` is the share of seeds with the same outcome; `kappa` is Cohen's (1960), None where one outcome is all there
-    is; `p` is McNemar's exact test of equal success (1947), two-sided, on the seeds that differ.
+    is; `gap` is how much more often the first succeeds, with its 95 % interval; `p` is McNemar's exact test of equal
+    success (1947), two-sided, on the seeds that differ.
     """
     from scipy.stats import binomtest
 
@@ -48,7 +79,9 @@ def agreement(a: Mapping[K, Episode], b: Mapping[K, Episode]) -> dict[str, Any]:
     pairs = [(a[seed].status == Status.SUCCESS, b[seed].status == Status.SUCCESS) for seed in shared]
     n, only_a, only_b = len(pairs), pairs.count((True, False)), pairs.count((False, True))
     if n == 0:
-        return {"seeds": 0, "agree": None, "kappa": None, "only_first": 0, "only_second": 0, "p": None}
+        return {"seeds": 0, "agree": None, "kappa": None, "only_first": 0, "only_second": 0} | dict.fromkeys(
+            ("gap", "gap_interval", "p")
+        )
     observed = 1 - (only_a + only_b) / n
     first, second = sum(x for x, _ in pairs) / n, sum(y for _, y in pairs) / n
     chance = first * second + (1 - first) * (1 - second)
@@ -59,6 +92,8 @@ def agreement(a: Mapping[K, Episode], b: Mapping[K, Episode]) -> dict[str, Any]:
         "kappa": (observed - chance) / (1 - chance) if chance < 1 else None,
         "only_first": only_a,
         "only_second": only_b,
+        "gap": (only_a - only_b) / n,
+        "gap_interval": list(gap_interval(only_a, only_b, n)),
         "p": float(binomtest(only_a, differing).pvalue) if differing else 1.0,
     }
 

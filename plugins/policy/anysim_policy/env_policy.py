@@ -1,4 +1,7 @@
-"""Policies of whole envs from files that say what they observe: ONNX, as `anysim train` writes it, and TorchScript."""
+"""Policies of whole envs from files that say what they observe: ONNX, as `anysim train` writes it, and TorchScript.
+
+A file is named by its path, or by the task that it comes with.
+"""
 
 import hashlib
 import json
@@ -8,8 +11,9 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
+from anysim.assets.uri import locate
 from anysim.conventions import Array
-from anysim.errors import TaskError, listing
+from anysim.errors import AssetError, TaskError, listing
 from anysim.task.contract import Obs
 from anysim.task.env import TaskEnv
 from anysim_policy.runtimes import described_model
@@ -97,3 +101,20 @@ class FileEnvPolicy:
         if given.shape[-1] != self._dim or given.ndim not in (2, 3):
             raise TaskError(f"the policy {self._path} gave {given.shape[1:]} for an observation, not ({self._dim},)")
         return given
+
+
+class ShippedEnvPolicy(FileEnvPolicy):
+    """The policy file that comes with a task, which its key `shipped` names."""
+
+    def __init__(self, env: TaskEnv) -> None:
+        task = env.spec.task
+        if task is None or task.shipped is None:
+            raise TaskError(
+                f"the policy 'shipped': no trained policy comes with '{env.name}'; train one with `anysim train`, "
+                "evaluate it as --policy FILE.onnx, or name its file in task.shipped"
+            )
+        try:
+            path = locate(task.shipped).path
+        except AssetError as error:
+            raise TaskError(f"the policy 'shipped' of '{env.name}', which task.shipped names: {error}") from None
+        super().__init__(env, path=str(path))

@@ -100,6 +100,16 @@ def test_the_file_of_a_policy_is_frozen(tiny: Path, tmp_path: Path) -> None:
     assert len(said) == 2
 
 
+def test_the_policy_that_a_task_ships_is_frozen(tiny: Path) -> None:
+    text = TEXT.replace("short: {task: reach", "short: {task: stand_still")
+    tiny.write_text(text.replace("zero: zero", "zero: shipped"))
+    named = freezing.parts(load_protocol(str(tiny)))
+    assert len(named["tasks.short.shipped"]) == 64
+    assert "tasks.reach.shipped" not in named
+    tiny.write_text(text)
+    assert named.keys() - freezing.parts(load_protocol(str(tiny))).keys() == {"tasks.short.shipped"}
+
+
 def test_a_frozen_file_is_its_hash(tiny: Path) -> None:
     loaded = load_protocol(str(tiny))
     loaded.frozen.write_text(loaded.frozen.read_text().replace("12 steps", "13 steps"))
@@ -144,6 +154,9 @@ def test_a_run_goes_on_and_comes_out_the_same(tiny: Path) -> None:
     assert [one["outcomes"] for one in told["rows"]] == ["tttt"] * 8
     same = [pair for pair in told["engines"] if pair["policy"] is None]
     assert [(pair["seeds"], pair["agree"]) for pair in same] == [(16, 1.0)]
+
+    spent = json.loads((out / "costs.json").read_text())
+    assert [(one["episodes"], one["cpu_s"] > 0, one["cpu_s_per_success"]) for one in spent] == [(4, True, None)] * 8
 
     written = (out / "results.json").read_bytes(), (out / "results.html").read_bytes()
     assert ElementTree.fromstring(written[1].decode().partition("\n")[2]) is not None
@@ -265,6 +278,10 @@ def test_figures_against_an_example_by_hand() -> None:
     means = {(one["engine"], one["policy"]): (one["tasks"], one["success"]) for one in told["means"]}
     assert means["x", "good"] == (2, 0.875)
     assert means["y", "bad"] == (1, 1.0)
+    alone = next(one for one in told["means"] if one["tasks"] == 1 and one["policy"] == "bad")
+    assert alone["interval"] == pytest.approx(
+        (0.51, 1.0), abs=0.005
+    )  # Wilson's of 4 of 4: one task cannot be drawn twice
     by_policy = {one["engine"]: one for one in told["policies"]}
     assert (by_policy["x"]["seeds"], by_policy["x"]["only_first"], by_policy["x"]["only_second"]) == (8, 6, 0)
     assert by_policy["x"]["p"] == pytest.approx(2 / 2**6)
@@ -274,4 +291,8 @@ def test_figures_against_an_example_by_hand() -> None:
     over_tasks = next(one for one in told["ranks"] if one["task"] is None)
     assert (over_tasks["kendall"], over_tasks["mmrv"]) == (-1.0, 0.5)
     assert over_tasks["mmrv_reversed"] == pytest.approx(1 / 3)
-    assert matrix(told) == (("trained on", "x", "y"), [["x", "88%", "67%"], ["y", "12%", "100%"]])
+    # 0.75 and 1 on two tasks, each of which a bootstrap may draw twice; 2 of 3, and 4 of 4
+    assert matrix(told) == (
+        ("trained on", "x", "y"),
+        [["x", "88% (75% to 100%)", "67% (21% to 94%)"], ["y", "12% (0% to 25%)", "100% (51% to 100%)"]],
+    )

@@ -22,7 +22,7 @@ from anysim_evaluation.expert import ExpertPolicy
 from anysim_evaluation.log import EpisodeLog
 from anysim_evaluation.page import page
 from anysim_evaluation.policy import make_policy
-from anysim_evaluation.summary import agreement, agreements, summary
+from anysim_evaluation.summary import agreement, agreements, gap_interval, summary
 
 BLIND = ["record.cameras=[]"]
 SEEDS = episode_seeds("validation", 0, 5)
@@ -186,6 +186,8 @@ def test_agreement_is_cohens_and_mcnemars() -> None:
     assert told["agree"] == pytest.approx(0.7)
     assert told["kappa"] == pytest.approx(0.4)
     assert told["p"] == pytest.approx(0.3018, abs=1e-3)  # two-sided, 5 or fewer of 15 fair coins
+    # 6/52 and 11/52: -5/52 -+ 1.96 sqrt((17/52 - (5/52)^2) / 52)
+    assert (told["gap"], *told["gap_interval"]) == pytest.approx((-0.1, -0.2494, 0.0571), abs=1e-3)
     same = agreement(dict(list(a.items())[:3]), a)
     assert (same["agree"], same["kappa"], same["p"]) == (1.0, None, 1.0)
     assert agreement(a, {})["seeds"] == 0
@@ -194,6 +196,34 @@ def test_agreement_is_cohens_and_mcnemars() -> None:
         ("x", "z"),
         ("y", "z"),
     ]
+
+
+def test_the_interval_of_a_gap_covers_it() -> None:
+    """Ten thousand pairs of rates on 40 shared seeds: 95 in 100 intervals hold the true difference."""
+    drawn = np.random.default_rng(0).multinomial(40, [0.6, 0.2, 0.05, 0.15], size=10_000)
+    held = [low <= 0.15 <= high for low, high in (gap_interval(int(b), int(c), 40) for _, b, c, _ in drawn)]
+    assert np.mean(held) == pytest.approx(0.95, abs=0.015)
+    assert gap_interval(0, 0, 0) == (-1.0, 1.0)
+
+
+def test_what_successes_took() -> None:
+    said = [("success", 3.0, 1, 2), ("success", 5.0, 0, 2), ("failed", 4.0, 3, 1)]
+    told = summary(
+        [Episode(k, s, "", 1, 0.0, sim_s, retries, done, 2) for k, (s, sim_s, retries, done) in enumerate(said)]
+    )
+    assert (told["sim_s_per_success"], told["retries_per_success"]) == (6.0, 2.0)
+    assert told["commands_done"] == pytest.approx(5 / 6)
+    silent = summary([Episode(1, "failed", "lost", 1, 0.0, 2.0)])
+    assert [silent[key] for key in ("sim_s_per_success", "retries_per_success", "commands_done")] == [None] * 3
+
+
+def test_the_expert_tells_its_retries_and_commands() -> None:
+    far = ["world.layout.cube.x=0.75", "world.layout.cube.y=0.6"]
+    assert {(e.retries, e.done, e.required) for e in run("pick_cube", "expert", 5, *far)} == {(1, None, None)}
+    assert {e.retries for e in run("pick_cube", "expert:retries=off", 5, *far)} == {0}
+    short = run("put_away", "expert", 5, "task.horizon=300")
+    assert {(e.status, e.retries, e.done, e.required, e.sim_s) for e in short} == {("truncated", 0, 1, 3, 6.0)}
+    assert {(e.retries, e.done) for e in run("reach", "zero", 5, "task.horizon=3")} == {(None, None)}
 
 
 def test_from_the_command_line_and_again(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from anysim import registry
 from anysim.errors import TaskError
+from anysim.testing.engines import require_engine
 from anysim_learning.gymnasium import GymEnv, GymVectorEnv
 from tests.task.helpers import arm, blocks
 
@@ -115,19 +116,20 @@ def test_an_unknown_form_of_action_is_refused() -> None:
 # ------------------------------------------------------------------ installed tasks by name
 
 
-def checked(task: str) -> None:
+def checked(task: str, engine: str = "mujoco") -> None:
     """Gymnasium's checker on a task by its name, and a vector env of it."""
+    require_engine(engine)
     blind = ["record.cameras=[]"]
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=".*Box.*(infinity|unbounded).*")
         warnings.filterwarnings("ignore", message=".*not having any render modes.*|.*render_mode.*")
         # advice: bases are driven in m/s, and hands by joint positions
         warnings.filterwarnings("ignore", message=".*we recommend using a symmetric and normalized space.*")
-        single = gym.make(f"anysim_learning.envs:anysim/{task}-v0", engine="mujoco", overrides=blind)
+        single = gym.make(f"anysim_learning.envs:anysim/{task}-v0", engine=engine, overrides=blind)
         check_env(single.unwrapped, skip_render_check=True)
         assert "privileged" not in single.observation_space.spaces
         single.close()
-    many = gym.make_vec(f"anysim/{task}-v0", num_envs=2, engine="mujoco", overrides=blind, autoreset_mode="SameStep")
+    many = gym.make_vec(f"anysim/{task}-v0", num_envs=2, engine=engine, overrides=blind, autoreset_mode="SameStep")
     obs, info = many.reset(seed=3)
     assert many.observation_space.contains(obs)
     assert info["episode_seed"].shape == (2,)
@@ -147,3 +149,10 @@ def test_a_task_is_made_by_its_name() -> None:
 @pytest.mark.parametrize("task", [name for name in registry.names("tasks") if name != "push_cube"])
 def test_every_task_is_made_by_its_name(task: str) -> None:
     checked(task)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["pybullet", "sapien"])
+@pytest.mark.parametrize("task", ["push_cube", "open_drawer", "dex_reach_tips", "stand_still", "nav_to_pose"])
+def test_tasks_of_each_family_are_made_on_the_other_engines(task: str, engine: str) -> None:
+    checked(task, engine)

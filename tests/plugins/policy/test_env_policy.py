@@ -13,7 +13,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 import anysim
 from anysim.errors import TaskError
-from anysim_policy.env_policy import FileEnvPolicy
+from anysim_policy.env_policy import FileEnvPolicy, ShippedEnvPolicy
 from anysim_policy.trust import TRUSTED
 
 
@@ -118,3 +118,17 @@ def test_torchscript_gives_what_onnx_gives(tmp_path: Path, monkeypatch: pytest.M
         monkeypatch.setenv(TRUSTED, str(tmp_path))
         given = [FileEnvPolicy(env, path=str(tmp_path / name)).act(obs, np.arange(2)) for name in ("p.onnx", "p.pt")]
         assert np.abs(given[0] - given[1]).max() < 1e-5
+
+
+def test_a_task_that_ships_no_policy_says_so() -> None:
+    with reach(1) as env, pytest.raises(TaskError, match=r"no trained policy comes with 'reach'; train one with"):
+        ShippedEnvPolicy(env)
+
+
+def test_a_shipped_file_that_is_not_there_is_refused_by_its_key() -> None:
+    named = 'task.shipped="package:anysim_tasks/none.onnx"'
+    with (
+        anysim.make("reach", engine="mujoco", num_envs=1, overrides=["record.cameras=[]", named]) as env,
+        pytest.raises(TaskError, match=r"of 'reach', which task\.shipped names: .*none\.onnx"),
+    ):
+        ShippedEnvPolicy(env)

@@ -9,8 +9,9 @@ from typing import Any
 
 from anysim import registry
 from anysim.api import compile_world, load as load_task
+from anysim.assets.uri import locate
 from anysim.engine.factory import availability
-from anysim.errors import PluginError, RecordError, SpecError
+from anysim.errors import AssetError, PluginError, RecordError, SpecError
 from anysim.math import statistics
 from anysim.plugin_parameters import checked, options_model
 from anysim.record.commit import write_whole
@@ -22,6 +23,8 @@ from anysim_evaluation.benchmark.protocol import Protocol, overrides
 FORMAT = "anysim-frozen-1"
 METRIC_CODE = (driver, summary, statistics, ranks, results)
 """The modules whose code makes figures of episodes."""
+SHIPPED = "shipped"
+"""The policy that comes with a task."""
 
 
 def parts(protocol: Protocol) -> dict[str, str]:
@@ -93,6 +96,7 @@ def _policy_parts(protocol: Protocol) -> Iterator[tuple[str, str]]:
 
 
 def _task_parts(protocol: Protocol) -> Iterator[tuple[str, str]]:
+    named = {policies.parse(policy.policy).name for policy in protocol.spec.policies.values()}
     for name, task in protocol.spec.tasks.items():
         loaded = load_task(protocol.source(name), overrides=overrides(task))
         spec = loaded.spec
@@ -110,6 +114,11 @@ def _task_parts(protocol: Protocol) -> Iterator[tuple[str, str]]:
         yield f"tasks.{name}.horizon", f"{spec.task.horizon} steps"
         yield f"tasks.{name}.spec", spec_hash(spec)
         yield f"tasks.{name}.world", compile_world(loaded).hash
+        if spec.task.shipped and SHIPPED in named:
+            try:
+                yield f"tasks.{name}.shipped", _hash(iter([locate(spec.task.shipped).path]))
+            except AssetError as error:
+                raise protocol.fault(f"tasks.{name}", f"task.shipped: {error}") from None
 
 
 def hash_of(said: Mapping[str, str]) -> str:

@@ -142,7 +142,7 @@ def ranks(told: Summary) -> Table:
 
 def agreement(told: Summary) -> Table:
     """How far two engines have the same outcomes on the same seeds: columns and rows."""
-    columns = ("engines", "policy", "episodes", "same outcome", "kappa", "one alone", "p")
+    columns = ("engines", "policy", "episodes", "same outcome", "kappa", "one alone", "more success", "95 %", "p")
     order = sorted(told["engines"], key=lambda one: one["policy"] is not None)
     return columns, [
         [f"{escape(one['first'])} and {escape(one['second'])}", escape(one["policy"] or "all"), *_pair(one)]
@@ -152,7 +152,7 @@ def agreement(told: Summary) -> Table:
 
 def paired(told: Summary) -> Table:
     """Each policy against the reference: columns and rows."""
-    columns = ("engine", "policies", "episodes", "same outcome", "kappa", "one alone", "p")
+    columns = ("engine", "policies", "episodes", "same outcome", "kappa", "one alone", "more success", "95 %", "p")
     return columns, [
         [escape(one["engine"]), f"{escape(one['first'])} and {escape(one['second'])}", *_pair(one)]
         for one in told["policies"]
@@ -161,21 +161,25 @@ def paired(told: Summary) -> Table:
 
 def _pair(one: Summary) -> list[str]:
     alone = f"{one['only_first']} and {one['only_second']}"
-    return [str(one["seeds"]), f"{one['agree']:.1%}", figure(one["kappa"]), alone, figure(one["p"], ".3g")]
+    gap = f"{one['gap']:+.1%}", "{:+.1%} to {:+.1%}".format(*one["gap_interval"])
+    return [str(one["seeds"]), f"{one['agree']:.1%}", figure(one["kappa"]), alone, *gap, figure(one["p"], ".3g")]
 
 
 def matrix(told: Summary) -> Table:
     """Mean success by the engine that policies were trained on and the one they are evaluated on: columns and rows."""
     engines = list(dict.fromkeys(one["engine"] for one in told["matrix"]))
-    found = {(one["trained_on"], one["engine"]): one["success"] for one in told["matrix"]}
+    found = {
+        (one["trained_on"], one["engine"]): "{:.0%} ({:.0%} to {:.0%})".format(one["success"], *one["interval"])
+        for one in told["matrix"]
+    }
     trained = list(dict.fromkeys(one["trained_on"] for one in told["matrix"]))
-    rows = [[escape(a), *(figure(found.get((a, b)), ".0%") for b in engines)] for a in trained]
+    rows = [[escape(a), *(found.get((a, b), "") for b in engines)] for a in trained]
     return ("trained on", *map(escape, engines)), rows
 
 
 def _all(rows: Sequence[Summary]) -> Table:
-    columns = ("task", "engine", "policy", "episodes", "success", "95 %", "failed", "out of time", "length", "failures")
-    return (*columns, "faults"), [
+    columns = ("task", "engine", "policy", "episodes", "success", "95 %", "failed", "out of time", "length")
+    return (*columns, "commands done", "retries", "simulated s", "failures", "faults"), [
         [
             *(escape(one[key]) for key in ("task", "engine", "policy")),
             str(one["attempts"]),
@@ -184,6 +188,9 @@ def _all(rows: Sequence[Summary]) -> Table:
             figure(one["failure"], ".0%"),
             figure(one["truncation"], ".0%"),
             figure(one["length"]),
+            figure(one["commands_done"], ".0%"),
+            figure(one["retries_per_success"]),
+            figure(one["sim_s_per_success"], ".1f"),
             escape(", ".join(f"{count} {kind}" for kind, count in one["failures"].items())),
             str(one["faults"]),
         ]

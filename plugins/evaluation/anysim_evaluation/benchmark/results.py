@@ -10,7 +10,7 @@ from anysim.math.statistics import wilson
 from anysim.task.contract import Status
 from anysim_evaluation.benchmark.ranks import kendall, mean_interval, mmrv, mmrv_tolerant, pearson
 from anysim_evaluation.driver import FAULT, Episode
-from anysim_evaluation.summary import agreement
+from anysim_evaluation.summary import agreement, effort
 from anysim_schemas.benchmark import BenchmarkSpec
 
 
@@ -43,8 +43,8 @@ def row(cell: Cell, found: Episodes, spec: BenchmarkSpec) -> dict[str, Any]:
     """Rates of one cell with Wilson's intervals at 95 %; success, failure and truncation sum up to 1.
 
     Faults of the simulation are counted apart and are no attempts. `length` is the mean over successes of the steps by
-    the median steps of the reference; None without either. `outcomes` has a letter for each seed in order: s, f, t, and
-    x for a fault.
+    the median steps of the reference; None without either. What successes took is told by `effort`. `outcomes` has a
+    letter for each seed in order: s, f, t, and x for a fault.
     """
     episodes = [found[cell][seed] for seed in sorted(found[cell])]
     valid = [e for e in episodes if e.status != FAULT]
@@ -60,6 +60,7 @@ def row(cell: Cell, found: Episodes, spec: BenchmarkSpec) -> dict[str, Any]:
     return told | {
         "failures": dict(sorted(types.items(), key=lambda item: (-item[1], item[0]))),
         "length": fmean(won) / median(unit) if won and unit else None,
+        **effort(valid),
         "outcomes": "".join("x" if e.status == FAULT else str(e.status)[0] for e in episodes),
     }
 
@@ -67,21 +68,25 @@ def row(cell: Cell, found: Episodes, spec: BenchmarkSpec) -> dict[str, Any]:
 Rows = Mapping[Cell, Mapping[str, Any]]
 
 
-def _rates(spec: BenchmarkSpec, rows: Rows, engine: str, policy: str) -> list[float]:
-    """Success rates by task, of the tasks that were run."""
-    cells = (Cell(task, engine, policy) for task in spec.tasks)
-    return [rows[cell]["success"] for cell in cells if cell in rows and rows[cell]["success"] is not None]
+def _run(spec: BenchmarkSpec, rows: Rows, engine: str, policies: Sequence[str]) -> list[Mapping[str, Any]]:
+    """The rows of policies on an engine, of the tasks that were run."""
+    cells = (Cell(task, engine, policy) for policy in policies for task in spec.tasks)
+    return [rows[cell] for cell in cells if cell in rows and rows[cell]["success"] is not None]
+
+
+def _mean(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """The mean success of rows with its interval: a bootstrap that draws rows, or Wilson's where there is one alone."""
+    rates = [one["success"] for one in found]
+    interval = list(mean_interval(rates)) if len(found) > 1 else found[0]["success_interval"]
+    return {"success": fmean(rates), "interval": interval}
 
 
 def _means(spec: BenchmarkSpec, rows: Rows) -> Iterator[dict[str, Any]]:
     """The mean success of each policy on each engine over the tasks, each task with the same weight."""
     for policy in spec.policies:
         for engine in spec.engines:
-            if rates := _rates(spec, rows, engine, policy):
-                interval = list(mean_interval(rates))
-                yield {"engine": engine, "policy": policy, "tasks": len(rates), "success": fmean(rates)} | {
-                    "interval": interval
-                }
+            if found := _run(spec, rows, engine, [policy]):
+                yield {"engine": engine, "policy": policy, "tasks": len(found), **_mean(found)}
 
 
 def _pooled(found: Episodes, engine: str, policies: Sequence[str], named: bool = True) -> dict[Any, Episode]:
@@ -137,7 +142,7 @@ def _ranks(spec: BenchmarkSpec, rows: Rows) -> Iterator[dict[str, Any]]:
                     continue
                 here, there = ([pair[side]["success"] for pair in both] for side in (0, 1))
                 sides.append((fmean(here), fmean(there)))
-                if task is None:
+                if len(both) > 1:
                     spreads.append((mean_interval(here), mean_interval(there)))
                 else:
                     a, b = (tuple(both[0][side]["success_interval"]) for side in (0, 1))
@@ -165,7 +170,5 @@ def _matrix(spec: BenchmarkSpec, rows: Rows) -> Iterator[dict[str, Any]]:
     for trained_on in spec.engines:
         trained = [name for name, policy in spec.policies.items() if policy.trained_on == trained_on]
         for engine in spec.engines:
-            by_policy = [_rates(spec, rows, engine, policy) for policy in trained]
-            means = [fmean(rates) for rates in by_policy if rates]
-            if means:
-                yield {"trained_on": trained_on, "engine": engine, "policies": trained, "success": fmean(means)}
+            if found := _run(spec, rows, engine, trained):
+                yield {"trained_on": trained_on, "engine": engine, "policies": trained, **_mean(found)}

@@ -16,6 +16,7 @@ from anysim.api import make
 from anysim.errors import AnysimError, CapabilityError, RecordError, TaskError
 from anysim.record.commit import write_whole
 from anysim.record.incoming import FileLock, claim
+from anysim.task.contract import Status
 from anysim_evaluation.benchmark.freezing import of_cell
 from anysim_evaluation.benchmark.protocol import Protocol, overrides
 from anysim_evaluation.benchmark.results import Cell
@@ -25,6 +26,8 @@ from anysim_evaluation.policy import make_policy
 
 WATCH_S = 0.2
 """How often a worker looks whether its parent is there, and a parent what its workers have done [s]."""
+COST = "cost.jsonl"
+"""CPU seconds of the episodes, in the folder of the cell: no figures of the benchmark, no two runs have the same."""
 ABSENT = "absent.json"
 """Why a policy cannot be run on an engine, in the folder of the cell."""
 WORKER = ".worker"
@@ -159,9 +162,30 @@ def run_job(job: Job, tell: Tell) -> None:
             (folder(job.out, cell) / ABSENT).unlink(missing_ok=True)
             with EpisodeLog(folder(job.out, cell), what) as log:
                 left = [seed for seed in protocol.seeds() if seed not in log.episodes]
+                began = time.process_time()
                 for episode in drive(env, driven, left, privileged=policy.privileged, groups=spec.modality):
                     log.add(episode)
+                    _charge(folder(job.out, cell) / COST, episode.seed, time.process_time() - began)
+                    began = time.process_time()
                     tell(f"{'/'.join(cell)} seed {episode.seed}: {episode.failure or 'success'}")
+
+
+def _charge(path: Path, seed: int, cpu_s: float) -> None:
+    with path.open("a", encoding="utf-8") as file:
+        file.write(json.dumps({"seed": seed, "cpu_s": round(cpu_s, 4)}) + "\n")
+
+
+def costs(out: Path, found: Mapping[Cell, Mapping[int, Episode]]) -> Iterator[dict[str, Any]]:
+    """CPU seconds of each cell by its successes, from the episodes whose cost was kept; None where none succeeded."""
+    for cell, episodes in found.items():
+        path = folder(out, cell) / COST
+        kept = map(json.loads, path.read_text("utf-8").splitlines() if path.exists() else ())
+        spent = {row["seed"]: row["cpu_s"] for row in kept if row["seed"] in episodes}
+        if spent:
+            won = sum(episodes[seed].status == Status.SUCCESS for seed in spent)
+            cpu_s = round(sum(spent.values()), 3)
+            of_success = round(cpu_s / won, 4) if won else None
+            yield {**cell._asdict(), "episodes": len(spent), "cpu_s": cpu_s, "cpu_s_per_success": of_success}
 
 
 def _absent(job: Job, cell: Cell, error: AnysimError, tell: Tell) -> None:

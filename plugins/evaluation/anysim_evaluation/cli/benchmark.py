@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(help="Compare policies on the tasks and engines of a frozen protocol.", no_args_is_help=True)
 
-RESULTS, PAGE = "results.json", "results.html"
+RESULTS, PAGE, COSTS = "results.json", "results.html", "costs.json"
 
 Name = Annotated[
     str, typer.Argument(metavar="PROTOCOL", help="A shipped protocol (`anysim benchmark list`) or a YAML file.")
@@ -135,7 +135,7 @@ def run(
 
 
 def write_results(loaded: "Protocol", parts: "Mapping[str, str]", changed: list[str], folder: Path) -> dict[str, Any]:
-    """Sum up the episodes that are there; the same bytes for the same episodes.
+    """Sum up the episodes that are there; the same bytes for the same episodes, but for what they cost.
 
     Returns:
         What results.json holds.
@@ -162,7 +162,9 @@ def write_results(loaded: "Protocol", parts: "Mapping[str, str]", changed: list[
         "absent": absent,
         **figures(loaded.spec, found),
     }
-    write_whole(folder, {RESULTS: dumps(told, indent=1) + "\n", PAGE: page(told)})
+    spent = list(running.costs(folder, found))
+    files = {RESULTS: dumps(told, indent=1) + "\n", PAGE: page(told), COSTS: dumps(spent, indent=1) + "\n"}
+    write_whole(folder, files)
     return told
 
 

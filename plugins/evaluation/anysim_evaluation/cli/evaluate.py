@@ -37,7 +37,7 @@ def evaluate(
         typer.Option(
             "--policy",
             "-p",
-            help="expert, expert:sigma=0.03, random, zero, MODULE:FUNCTION, FILE.onnx, or an installed one.",
+            help="expert, expert:sigma=0.03, shipped, random, zero, MODULE:FUNCTION, FILE.onnx, or an installed one.",
         ),
     ] = "expert",
     engine: Annotated[
