@@ -24,6 +24,8 @@ STEEPEST = 0.3
 """Sine of the elevation from which on a hand that comes from below, or whose fingers point up, is no candidate."""
 OVER = 0.15
 """[m] that the hand is higher on its way to where it approaches from."""
+BALL = 0.01
+"""Of its size, by which a ball is not as long in all directions."""
 LEAST = 0.05
 """[m] that a tool is above the lowest point of the object."""
 
@@ -31,8 +33,8 @@ LEAST = 0.05
 class DexGrasp(PhasedSkill):
     """Close the hand of `robot` around `object` by a synergy, each finger until it touches, then lift.
 
-    The tool's z is out of the palm and its y along the fingers. Candidates lay its x along the object's long axis and
-    come from all sides across it; `place` is where that axis then is in the tool's frame.
+    The tool's z is out of the palm and its y along the fingers. Candidates lay its x along the object's long axis, the
+    vertical for a ball, and come from all sides across it; `place` is where that axis then is in the tool's frame.
     """
 
     def __init__(
@@ -104,6 +106,8 @@ class DexGrasp(PhasedSkill):
         """(n, g, 7) tool poses."""
         thing, size = self._object.root.pose[at], self._shapes.size(ids)
         long = P.rotate(thing[:, 3:], np.eye(3)[np.argmax(size, axis=1)])
+        ball = np.ptp(size, axis=1) < BALL * size.max(axis=1)
+        long = np.where(ball[:, None], np.array([0.0, 0.0, 1.0]), long)
         middle = thing[:, :3] + P.rotate(thing[:, 3:], np.broadcast_to(self._offset, (len(at), 3)))
         return around(middle, long, self._place)
 

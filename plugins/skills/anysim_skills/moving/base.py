@@ -52,8 +52,10 @@ class Base(Mover):
 
     def __init__(self, env: TaskEnv, robot: RobotView, channel: str, link: str) -> None:
         self.env = env
-        self.frame = env.scene.frame(f"{robot.name}.{link}") if link else robot.base
         self._slice = env.actions.slice_of(robot.name, channel)
+        moved, own = self._slice.controller.robot.root, env.engine.index.entity(robot.name).root
+        planar = env.scene.frame(env.engine.world.bodies[moved].name)  # its own frame is the rail, which stays
+        self.frame = env.scene.frame(f"{robot.name}.{link}") if link else robot.base if moved == own else planar
         labels = tuple(self._slice.controller.labels)
         if labels not in (HOLONOMIC, DIFFERENTIAL):
             known = listing([f"({', '.join(names)})" for names in (HOLONOMIC, DIFFERENTIAL)])
