@@ -434,6 +434,15 @@ CASES: dict[str, Case] = {
         [_shifted("box", x=0.05), _shifted("box", z=-0.05), _moving("dog", 0.2)],
         ("walk",),
     ),
+    "g1_place_in_bowl": Case(
+        _towards("ball", lambda env: offset(seen(env, "bowl.inside"), z=0.042)),
+        [
+            _shifted("ball", x=0.04),
+            _shifted("ball", z=0.02),
+            _moving("ball"),
+            lambda env: set_joint(env, "g1.right_elbow_joint", 1.0),
+        ],
+    ),
     "g1_transport_box": Case(
         _towards("box", lambda env: offset(seen(env, "other_table"), z=0.475)),
         [_shifted("box", x=0.4), _shifted("box", z=0.015), _moving("box")],

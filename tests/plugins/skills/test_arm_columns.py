@@ -13,6 +13,7 @@ from anysim.task.scene import ObjectView
 from anysim.testing.engines import require_engine
 from anysim_skills.arm import Arm
 from anysim_skills.grasping.grasp import Grasp
+from anysim_skills.moving.base import Base
 from tests.tasks.states import blinding
 
 TASK = "g1_transport_box"
@@ -43,6 +44,8 @@ def test_two_arms_of_one_channel_go_each_its_way_while_the_base_is_elsewhere() -
     with g1() as env:
         env.reset(seed=1)
         ids, robot = np.arange(2), env.scene.robot("g1")
+        env.scene.look(None)
+        start = env.scene.frame("g1.pelvis").position[:, :2].copy()
         drive = np.zeros((2, env.action_dim))
         drive[:, :3] = [-0.2, 0.1, 0.3]
         for _ in range(60):
@@ -50,6 +53,9 @@ def test_two_arms_of_one_channel_go_each_its_way_while_the_base_is_elsewhere() -
         for _ in range(20):
             env.step(np.zeros((2, env.action_dim)))
         env.scene.look(None)
+        pelvis = env.scene.frame("g1.pelvis")
+        assert np.array_equal(Base.of(env, robot).frame.pose, pelvis.pose), "not the rail below it"
+        assert (P.norm(pelvis.position[:, :2] - start) > 0.1).all()
         arms = [Arm.of(env, robot, tool=tool) for tool in ("left_hand", "right_hand")]
         ways = np.array([0.0, 0.03, 0.06]), np.array([0.04, 0.0, -0.05])
         targets = []
