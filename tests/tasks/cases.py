@@ -434,6 +434,20 @@ CASES: dict[str, Case] = {
         [_shifted("box", x=0.05), _shifted("box", z=-0.05), _moving("dog", 0.2)],
         ("walk",),
     ),
+    "g1_place_in_bowl": Case(
+        _towards("ball", lambda env: offset(seen(env, "bowl.inside"), z=0.042)),
+        [
+            _shifted("ball", x=0.04),
+            _shifted("ball", z=0.02),
+            _moving("ball"),
+            lambda env: set_joint(env, "g1.right_elbow_joint", 1.0),
+        ],
+    ),
+    "g1_transport_box": Case(
+        _towards("box", lambda env: offset(seen(env, "other_table"), z=0.475)),
+        [_shifted("box", x=0.4), _shifted("box", z=0.015), _moving("box")],
+        ("left", "right"),
+    ),
     "loco_open_door": Case(
         _opening("door.leaf", 0.0, 0.18),
         [lambda env: set_opening(env, "door.leaf", 0.12), _tilted("dog", 0.4)],

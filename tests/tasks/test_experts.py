@@ -37,6 +37,8 @@ TASKS = [
     "tidy_bin",
     "nav_to_pose",
     "walk_to_pose",
+    "g1_place_in_bowl",
+    "g1_transport_box",
     "loco_grasp",
     "loco_open_door",
     "loco_push_box",

@@ -12,8 +12,7 @@ from typing import Self
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.errors import TaskError
-from anysim.kinematics.chain import Chain
+from anysim.errors import TaskError, listing
 from anysim.math import pose as P
 from anysim.model.world import JointType
 from anysim.planning.api import inverse_kinematics
@@ -21,6 +20,7 @@ from anysim.planning.service import PlannerService
 from anysim.skills.phases import GO_ON, STAY, Mover, Phase
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
+from anysim_skills.arm_columns import ArmColumns
 from anysim_skills.env_lifetime import PerEnv
 from anysim_skills.planned_moves import PLANNED_STEPS, PlannedMoves, Stage
 from anysim_skills.planning import LATENCY, Latency, planner_of
@@ -48,7 +48,9 @@ _ARMS: PerEnv[tuple[str, str, str, str], "Arm"] = PerEnv()
 
 
 class Arm(Mover):
-    """One arm and gripper of a robot in all envs.
+    """One arm of a robot in all envs, with its gripper where it has one.
+
+    Of a channel with several arms it moves the joints that the catalogue gives to the `group` of its tool.
 
     Attributes:
         tool: the frame that is moved.
@@ -60,7 +62,7 @@ class Arm(Mover):
         command: (N, 7) where the tool is told to be now.
         joints: (N, K) what the joints are told.
         grip: (N, 3) [m] where what is held was in the tool's frame when it was taken.
-        aperture: [m] how wide the gripper opens; infinite where its fingers turn.
+        aperture: [m] how wide the gripper opens; infinite where its fingers turn, or there is none.
         stuck: (N,) bool: the last step towards the target had no inverse kinematics.
         plans: its planned moves; None as long as no skill has a planner.
     """
@@ -70,12 +72,13 @@ class Arm(Mover):
     def __init__(self, env: TaskEnv, robot: RobotView, channel: str, gripper: str, tool: str, solver: str) -> None:
         self.env, self.robot = env, robot
         self.tool = robot.tool(tool)
-        self.chain = Chain.from_world(env.engine.world, robot.name, channel, tool)
+        self._columns = ArmColumns(env, robot, channel, tool)
+        self.chain = self._columns.chain
+        self._eef = env.actions.slice_of(robot.name, gripper) if gripper in robot.model.channels else None
         self.solver = inverse_kinematics(self.chain, solver)
-        self._arm, self._eef = env.actions.slice_of(robot.name, channel), env.actions.slice_of(robot.name, gripper)
         self._dt = env.engine.world.physics.control_dt
-        self._fingers = np.array(env.engine.index.robot(robot.name).channels[gripper].joints, dtype=int)
-        self.aperture = _aperture(env, robot, gripper)
+        self._fingers = np.array(robot.channel(gripper).joints if self._eef is not None else (), dtype=int)
+        self.aperture = _aperture(env, robot, gripper) if self._eef is not None else float("inf")
         n = env.num_envs
         self.target, self.command = np.zeros((n, 7)), np.zeros((n, 7))
         self.speed, self.lead = np.zeros(n), np.full(n, LEAD)
@@ -245,9 +248,19 @@ class Arm(Mover):
         tool = self.tool.pose[at]
         return P.rotate_inverse(tool[:, 3:], thing.position[at] - tool[:, :3])
 
+    def check_gripper(self) -> None:
+        """Refuse to grasp with an arm that has no gripper.
+
+        Raises:
+            TaskError: the robot has no channel for it.
+        """
+        if self._eef is None:
+            channels = listing(list(self.robot.model.channels))
+            raise TaskError(f"'{self.robot.name}' has no gripper to grasp with, a channel `eef` (channels: {channels})")
+
     def finger_speed(self, ids: Array) -> Array:
         """(n,) [rad/s, m/s] of the fastest joint of the gripper."""
-        return np.abs(self.env.scene.state.joint_vel[np.ix_(ids, self._fingers)]).max(axis=1)
+        return np.abs(self.env.scene.state.joint_vel[np.ix_(ids, self._fingers)]).max(axis=1, initial=0.0)
 
     def reach(self, ids: Array, targets: Array) -> tuple[Array, Array]:
         """Inverse kinematics of many tool poses (n, g, 7): from the live configuration, else from where it began.
@@ -287,8 +300,9 @@ class Arm(Mover):
                 self._led(ids[led])
             if not led.all():
                 self._straight(ids[~led], self.tool.position[~led])
-        action[ids, self._arm.start : self._arm.stop] = self._arm.controller.action_for(self.joints[ids], ids)
-        action[ids, self._eef.start : self._eef.stop] = np.where(self.closed[ids], -1.0, 1.0)[:, None]
+        self._columns.write(ids, self.joints[ids], action)
+        if self._eef is not None:
+            action[ids, self._eef.start : self._eef.stop] = np.where(self.closed[ids], -1.0, 1.0)[:, None]
 
     def _led(self, ids: Array) -> None:
         """The joints are told by a plan: commands follow them."""

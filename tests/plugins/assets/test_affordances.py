@@ -15,7 +15,7 @@ from anysim.model.affordance_lookup import affordances_of, find_affordance
 from anysim.model.affordances import AffordanceKind
 from anysim.model.frames import find_frame
 from anysim.model.hash import world_hash
-from anysim.model.world import Capsule, World
+from anysim.model.world import Box, Capsule, World
 
 OBJECTS = {
     "first": {"source": {"box": [0.04, 0.06, 0.1]}},
@@ -52,6 +52,7 @@ def test_builders_declare_what_is_taken_hold_of(world: World, name: str, kind: A
 
 
 EMITTED = {
+    "bowl": {"rim": "rim", "body": "body"},
     "button": {"cap": "button"},
     "cabinet": {"drawer_1.handle": "handle", "door_1.handle": "handle"},
     "cart": {"body.handle": "handle"},
@@ -172,3 +173,36 @@ def test_a_mug_is_held_by_its_handle_its_rim_or_as_a_whole() -> None:
 def test_a_mug_that_does_not_fit_is_refused(params: dict[str, float], path: str) -> None:
     with pytest.raises(SpecError, match=rf"params\.{path}: a "):
         build("mug", params)
+
+
+def test_a_bowl_is_a_hollow_that_opens_upwards_and_is_held_by_its_rim() -> None:
+    world = compile_world({"world": {"objects": {"bowl": {"source": "procedural:bowl"}}}})
+    assert [one.name for one in affordances_of(world, 0)] == ["rim", "body"]
+    rim = find_affordance(world, "bowl.rim")
+    assert len(rim.geoms) == 16
+    assert rim.frame.position == pytest.approx((0.0, 0.0, 0.06))
+    inner = []
+    for number in rim.geoms:
+        board = world.geoms[number]
+        assert isinstance(board.shape, Box)
+        half = board.shape.half_size
+        # the ends of the middle of its inner side: at the edge of the floor, and at the rim
+        ends = [P.rotate(np.array(board.quaternion), np.array([-half[0], 0.0, z * half[2]])) for z in (-1.0, 1.0)]
+        inner.append([np.array(board.position) + end for end in ends])
+        lean = P.rotate(np.array(board.quaternion), np.array([0.0, 0.0, 1.0]))
+        assert np.dot(lean[:2], board.position[:2]) > 0.0, "it leans outwards"
+    low, high = np.moveaxis(np.array(inner), 1, 0)
+    assert np.hypot(low[:, 0], low[:, 1]) == pytest.approx(0.04)
+    assert np.hypot(high[:, 0], high[:, 1]) == pytest.approx(0.08)
+    assert low[:, 2] == pytest.approx(0.005)
+    assert high[:, 2] == pytest.approx(0.06)
+    heading = np.sort(np.arctan2(high[:, 1], high[:, 0]))
+    assert np.diff(heading) == pytest.approx(np.pi / 8), "all around"
+    widths = [world.geoms[g].shape for g in rim.geoms]
+    assert all(isinstance(one, Box) and one.half_size[1] >= 0.08 * np.tan(np.pi / 16) - 1e-12 for one in widths)
+
+
+@pytest.mark.parametrize(("params", "path"), [({"foot": 0.08}, "foot"), ({"wall": 0.03}, "wall")])
+def test_a_bowl_that_does_not_fit_is_refused(params: dict[str, float], path: str) -> None:
+    with pytest.raises(SpecError, match=rf"params\.{path}: "):
+        build("bowl", params)

@@ -12,7 +12,7 @@ from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import ObjectView, RobotView
-from anysim_skills.arm import Arm
+from anysim_skills.arm import LEAD, Arm
 from anysim_skills.choice import Choice
 from anysim_skills.grasping.candidates import DOWN, TOP_DOWN, across, from_above
 from anysim_skills.grasping.grasp import CLOSING_STEPS, ROOM, Metres, Speed, closed
@@ -27,9 +27,16 @@ PAIRS = 2 * TOP_DOWN * TOP_DOWN
 class BiLift(PhasedSkill):
     """Lift `object` by `lift` with `robot` and `partner`, each at one of its two ends, `ends` from its origin.
 
+    The two arms may be those of one robot, which have a tool each.
+
     A candidate is a pair of grasps: who takes which end, and how the hands are turned. What one of the arms does not
     reach is not chosen for either. The object never tilts by more than `tilt`, else it is put down as unstable.
+
+    Attributes:
+        closing_steps: control steps that closing may take.
     """
+
+    closing_steps = CLOSING_STEPS + 1
 
     def __init__(
         self,
@@ -43,6 +50,9 @@ class BiLift(PhasedSkill):
             Field(description="[m] the two places to grasp, in the object's frame"),
         ],
         tool: str = "tool",
+        partner_tool: Annotated[
+            str, Field(description="the tool of the partner; named as the robot's where empty")
+        ] = "",
         solver: str = "numba_ik",
         hover: Metres = 0.1,
         lift: Metres = 0.15,
@@ -52,12 +62,14 @@ class BiLift(PhasedSkill):
         hold: Annotated[int, Field(ge=1, description="control steps above")] = 10,
         phase_steps: Annotated[int, Field(ge=1, description="control steps that a move may take")] = 200,
     ) -> None:
-        self.arms = tuple(Arm.of(env, one, tool=tool, solver=solver) for one in (robot, partner))
+        tools = (robot, tool), (partner, partner_tool or tool)
+        self.arms = tuple(Arm.of(env, one, tool=name, solver=solver) for one, name in tools)
         self._object, self._ends = object, np.array(ends)
         self._shapes = ObjectShapes(env.scene, object)
         self._back = np.array([*(-hover * DOWN), 0.0, 0.0, 0.0, 0.0])
         self._lift, self._tilt, self._hold, self._late = lift, tilt, hold, phase_steps
         self._speed, self._lift_speed = speed, lift_speed
+        self._lead = LEAD
         self._dt = env.engine.world.physics.control_dt
         n = env.num_envs
         self._choice = Choice(n, PAIRS)
@@ -72,7 +84,7 @@ class BiLift(PhasedSkill):
             Phase("choose", self._choose, self._chosen, 1),
             Phase("approach", None, self._approach, self._late),
             Phase("descend", None, self._descend, self._late),
-            Phase("close", self._close, self._closing, CLOSING_STEPS + 1),
+            Phase("close", self._close, self._closing, self.closing_steps),
             Phase("lift", self._take, self._lifting, self._late + int(self._lift / (self._lift_speed * self._dt))),
         )
 
@@ -93,9 +105,9 @@ class BiLift(PhasedSkill):
     # ------------------------------------------------------------------ to the object
 
     def _open(self, ids: Array, at: Array) -> None:
-        for arm in self.arms:
+        for number, arm in enumerate(self.arms):
             arm.closed[ids] = False
-            arm.go(ids, arm.tool.pose[at] + self._back, self._speed)
+            arm.go(ids, self.before(arm.tool.pose[at], number), self._speed)
 
     def _backing_off(self, ids: Array, at: Array) -> Array:
         return np.where(self._both(ids, at) | (self.steps[ids] >= self._late), GO_ON, STAY)
@@ -104,8 +116,14 @@ class BiLift(PhasedSkill):
         """(n,) bool: both arms have arrived."""
         return self.arms[0].arrived(ids, at) & self.arms[1].arrived(ids, at)
 
-    def _grasps(self, at: Array) -> Array:
-        """(n, end, turn, 7) tool poses at the ends, from above."""
+    def before(self, grasps: Array, hand: int) -> Array:
+        """Where a hand, 0 or 1, is before and after its grasps (..., 7)."""
+        del hand
+        return grasps + self._back
+
+    def grasps(self, at: Array, hand: int) -> Array:
+        """(n, end, turn, 7) tool poses of a hand, 0 or 1, at the ends: here from above, and the same for both."""
+        del hand
         thing = self._object.root.pose[at]
         turns = from_above(thing)
         places = [thing[:, :3] + P.rotate(thing[:, 3:], np.broadcast_to(end, (len(at), 3))) for end in self._ends]
@@ -115,12 +133,12 @@ class BiLift(PhasedSkill):
 
     def _choose(self, ids: Array, at: Array) -> None:
         """The pair with the least motion of the arm that has more of it."""
-        n, grasps = len(ids), self._grasps(at)
-        up = np.array([0.0, 0.0, self._lift, 0.0, 0.0, 0.0, 0.0])
-        ways = np.stack([grasps + self._back, grasps, grasps + up], axis=3)
+        n, up = len(ids), np.array([0.0, 0.0, self._lift, 0.0, 0.0, 0.0, 0.0])
         widths = across(self._shapes.size(ids))
         efforts: list[Array] = []
-        for arm in self.arms:
+        for number, arm in enumerate(self.arms):
+            grasps = self.grasps(at, number)
+            ways = np.stack([self.before(grasps, number), grasps, grasps + up], axis=3)
             arm.closed[ids] = False
             effort = arm.reach(ids, ways.reshape(n, -1, 7))[1].reshape(n, 2, TOP_DOWN, 3).max(axis=3)
             efforts.append(np.where((widths > arm.aperture - ROOM)[:, None], np.inf, effort))
@@ -138,12 +156,12 @@ class BiLift(PhasedSkill):
         """(n, 7) of each arm: its grasp of the chosen pair."""
         end, turns = np.divmod(self._pair[ids], TOP_DOWN * TOP_DOWN)
         first, second = np.divmod(turns, TOP_DOWN)
-        grasps, row = self._grasps(at), np.arange(len(ids))
-        return grasps[row, end, first], grasps[row, 1 - end, second]
+        row = np.arange(len(ids))
+        return self.grasps(at, 0)[row, end, first], self.grasps(at, 1)[row, 1 - end, second]
 
     def _approach(self, ids: Array, at: Array) -> Array:
-        for arm, target in zip(self.arms, self._targets(ids, at), strict=True):
-            arm.go(ids, target + self._back, self._speed)
+        for number, target in enumerate(self._targets(ids, at)):
+            self.arms[number].go(ids, self.before(target, number), self._speed)
         return np.where(self._both(ids, at), GO_ON, STAY)
 
     def _descend(self, ids: Array, at: Array) -> Array:
@@ -172,17 +190,25 @@ class BiLift(PhasedSkill):
 
     def _lifting(self, ids: Array, at: Array) -> Array:
         """Both commands rise by the same height, and only while both tools follow."""
-        with_it = np.maximum(*(arm.ahead(ids, at) for arm in self.arms)) < BEHIND
+        with_it = self.behind(ids, at) < BEHIND
         self._risen[ids] = np.minimum(self._lift, self._risen[ids] + with_it * self._lift_speed * self._dt)
         for number, arm in enumerate(self.arms):
             target = self._begun[ids, number]
             target[:, 2] += self._risen[ids]
-            arm.go(ids, target, 1.5 * self._lift_speed)
-        up = (self._risen[ids] >= self._lift) & self._both(ids, at)
+            arm.go(ids, target, 1.5 * self._lift_speed, self._lead)
+        up = (self._risen[ids] >= self._lift) & self.up(ids, at)
         self._held[ids] = (self._held[ids] + 1) * up
         held = self.arms[0].holds(ids, at, self._object.root) & self.arms[1].holds(ids, at, self._object.root)
         lost = ~held | (self.tilted(ids, at) > self._tilt)
         return np.where(lost, _UNSTABLE, np.where(self._held[ids] >= self._hold, GO_ON, STAY))
+
+    def behind(self, ids: Array, at: Array) -> Array:
+        """(n,) [m] how far the hand that is further behind its command has to come up."""
+        return np.maximum(*(arm.ahead(ids, at) for arm in self.arms))
+
+    def up(self, ids: Array, at: Array) -> Array:
+        """(n,) bool: both hands are where they are to be above."""
+        return self._both(ids, at)
 
     def tilted(self, ids: Array, at: Array) -> Array:
         """(n,) [rad] how far the object leans from how it lay, whatever its heading."""

@@ -39,8 +39,9 @@ class BiScoop(BiLift):
         self._back = -self._back
         self.movers = (*self.arms, *self.hands)
 
-    def _grasps(self, at: Array) -> Array:
-        """(n, end, turn, 7) tool poses under the ends; all turns are the same."""
+    def grasps(self, at: Array, hand: int) -> Array:
+        """(n, end, turn, 7) tool poses under the ends; all turns are the same, and those of both hands."""
+        del hand
         thing = self._object.root.pose[at]
         ends = [thing[:, :3] + P.rotate(thing[:, 3:], np.broadcast_to(end, (len(at), 3))) for end in self._ends]
         grasps = np.zeros((len(at), 2, TOP_DOWN, 7))

@@ -24,15 +24,15 @@ STEEPEST = 0.3
 """Sine of the elevation from which on a hand that comes from below, or whose fingers point up, is no candidate."""
 OVER = 0.15
 """[m] that the hand is higher on its way to where it approaches from."""
-LEAST = 0.05
-"""[m] that a tool is above the lowest point of the object."""
+BALL = 0.01
+"""Of its size, by which a ball is not as long in all directions."""
 
 
 class DexGrasp(PhasedSkill):
     """Close the hand of `robot` around `object` by a synergy, each finger until it touches, then lift.
 
-    The tool's z is out of the palm and its y along the fingers. Candidates lay its x along the object's long axis and
-    come from all sides across it; `place` is where that axis then is in the tool's frame.
+    The tool's z is out of the palm and its y along the fingers. Candidates lay its x along the object's long axis, the
+    vertical for a ball, and come from all sides across it; `place` is where that axis then is in the tool's frame.
     """
 
     def __init__(
@@ -47,6 +47,10 @@ class DexGrasp(PhasedSkill):
         solver: str = "numba_ik",
         place: Annotated[tuple[float, float, float], Field(description="[m] in the tool's frame")] = (0.0, 0.0, 0.0),
         offset: Offset = (0.0, 0.0, 0.0),
+        tilt: Annotated[
+            float, Field(ge=0, description="[rad] by which the palm looks down from across the axis")
+        ] = 0.0,
+        least: Annotated[float, Field(gt=0, description="[m] that the tool is above the object's lowest point")] = 0.05,
         hover: Metres = 0.12,
         lift: Metres = 0.1,
         links: Annotated[int, Field(ge=1, description="of fingers that touch what is held")] = 3,
@@ -56,7 +60,8 @@ class DexGrasp(PhasedSkill):
         self.arm = Arm.of(env, robot, gripper=hand, tool=tool, solver=solver)
         self.hand = Hand.of(env, robot, channel=hand)
         self._object, self._synergy = object, self.hand.named(synergy)
-        self._place, self._offset = np.array(place), np.array(offset)
+        self._place, self._offset, self._tilt = np.array(place), np.array(offset), tilt
+        self._least = least
         self._hover, self._lift, self._links = hover, lift, links
         self._speed, self._late = speed, phase_steps
         self._shapes = ObjectShapes(env.scene, object)
@@ -104,8 +109,11 @@ class DexGrasp(PhasedSkill):
         """(n, g, 7) tool poses."""
         thing, size = self._object.root.pose[at], self._shapes.size(ids)
         long = P.rotate(thing[:, 3:], np.eye(3)[np.argmax(size, axis=1)])
+        ball = np.ptp(size, axis=1) < BALL * size.max(axis=1)
+        long = np.where(ball[:, None], np.array([0.0, 0.0, 1.0]), long)
         middle = thing[:, :3] + P.rotate(thing[:, 3:], np.broadcast_to(self._offset, (len(at), 3)))
-        return around(middle, long, self._place)
+        grasps = around(middle, long, self._place)
+        return tilted(grasps, middle, self._place, self._tilt) if self._tilt else grasps
 
     def _choose(self, ids: Array, at: Array) -> None:
         self.hand.open(ids)
@@ -117,7 +125,7 @@ class DexGrasp(PhasedSkill):
         lowest = self._object.root.position[at, 2] - self._shapes.below(ids, self._object.root.pose[at])
         turn = grasps[..., 3:]
         out, fingers = (P.rotate(turn, np.broadcast_to(np.eye(3)[k], (n, g, 3)))[..., 2] for k in (2, 1))
-        bad = (out > STEEPEST) | (fingers > STEEPEST) | (grasps[..., 2] < lowest[:, None] + LEAST)
+        bad = (out > STEEPEST) | (fingers > STEEPEST) | (grasps[..., 2] < lowest[:, None] + self._least)
         effort = np.where(bad, np.inf, effort)
         self._goal[ids] = grasps[np.arange(n), self._choice.choose(ids, effort)]
 
@@ -195,6 +203,17 @@ def around(middle: Array, long: Array, place: Array) -> Array:
     columns = np.stack([x, P.cross(z, x), z], axis=-1)
     turn = np.array([P.from_matrix(m) for m in columns.reshape(-1, 3, 3)]).reshape(*x.shape[:2], 4)
     return np.concatenate([middle[:, None] - P.rotate(turn, np.broadcast_to(place, x.shape)), turn], axis=-1)
+
+
+def tilted(grasps: Array, middle: Array, place: Array, angle: float) -> Array:
+    """Tool poses (n, g, 7) that have points (n, 3) at `place`, turned about those so that the palms look down more."""
+    down = np.array([0.0, 0.0, -1.0])
+    out = P.rotate(grasps[..., 3:], np.broadcast_to([0.0, 0.0, 1.0], (*grasps.shape[:2], 3)))
+    axis = P.cross(out, np.broadcast_to(down, out.shape))
+    level = P.norm(axis)
+    axis = axis / np.maximum(level, 1e-6)[..., None]
+    turn = P.multiply(P.from_axis_angle(axis, angle * (level > 1e-6)), grasps[..., 3:])  # not where it looks down or up
+    return np.concatenate([middle[:, None] - P.rotate(turn, np.broadcast_to(place, out.shape)), turn], axis=-1)
 
 
 def _along(poses: Array, distance: float) -> Array:

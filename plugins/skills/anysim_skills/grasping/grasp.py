@@ -76,6 +76,7 @@ class Grasp(PhasedSkill):
     ) -> None:
         """`then` is what comes next: a candidate with which that cannot be done is not chosen."""
         self.arm = Arm.of(env, robot, tool=tool, solver=solver, planner=planner, latency=latency)
+        self.arm.check_gripper()
         self._plans = bool(planner)
         self._object, self._then, self._lift = object, then, lift
         self._speed, self._descend_speed, self._steps = speed, descend_speed, phase_steps

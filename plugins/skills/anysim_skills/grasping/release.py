@@ -1,8 +1,10 @@
 """Release: open the gripper, wait until the fingers rest, and draw the hand back."""
 
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from anysim.conventions import Array
 from anysim.math import pose as P
@@ -11,6 +13,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.grasping.grasp import SETTLED, Metres, Speed
+from anysim_skills.grasping.hand import Hand
 
 OPENING_STEPS = 25
 
@@ -25,12 +28,14 @@ class Release(PhasedSkill):
         robot: RobotView,
         tool: str = "tool",
         solver: str = "numba_ik",
+        hand: Annotated[str, Field(description="the channel of a hand with several fingers; empty: a gripper")] = "",
         retreat: Metres = 0.1,
         speed: Speed = 0.2,
     ) -> None:
         self.arm = Arm.of(env, robot, tool=tool, solver=solver)
+        self.hand = Hand.of(env, robot, channel=hand) if hand else None
         self._back, self._speed = np.array([[0.0, 0.0, -retreat, 0.0, 0.0, 0.0, 1.0]]), speed
-        super().__init__(env, [self.arm])
+        super().__init__(env, [self.arm] if self.hand is None else [self.arm, self.hand])
 
     def make_phases(self) -> Sequence[Phase]:
         return (
@@ -41,6 +46,8 @@ class Release(PhasedSkill):
     def _open(self, ids: Array, at: Array) -> None:
         del at
         self.arm.closed[ids] = False
+        if self.hand is not None:
+            self.hand.open(ids)
         self.arm.stay(ids)
 
     def _opening(self, ids: Array, at: Array) -> Array:

@@ -52,8 +52,11 @@ class Base(Mover):
 
     def __init__(self, env: TaskEnv, robot: RobotView, channel: str, link: str) -> None:
         self.env = env
-        self.frame = env.scene.frame(f"{robot.name}.{link}") if link else robot.base
         self._slice = env.actions.slice_of(robot.name, channel)
+        self.frame = env.scene.frame(f"{robot.name}.{link}") if link else robot.base
+        moved = self._slice.controller.robot.root
+        if not link and moved != env.engine.index.entity(robot.name).root:  # under a planar base the rail stays
+            self.frame = env.scene.frame(env.engine.world.bodies[moved].name)
         labels = tuple(self._slice.controller.labels)
         if labels not in (HOLONOMIC, DIFFERENTIAL):
             known = listing([f"({', '.join(names)})" for names in (HOLONOMIC, DIFFERENTIAL)])

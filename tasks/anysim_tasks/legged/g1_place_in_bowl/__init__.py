@@ -1,0 +1,1 @@
+"""Put a ball into a bowl with the hand of a humanoid."""

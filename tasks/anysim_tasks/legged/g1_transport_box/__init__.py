@@ -1,0 +1,1 @@
+"""Carry a box from one table to another between two palms."""
