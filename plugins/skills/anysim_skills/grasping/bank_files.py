@@ -23,17 +23,24 @@ class Banks:
     """The candidates of each entity that an object can be, from one bank or several.
 
     Attributes:
-        pose: (E, G, 7) tool poses in the object's frame; what an entity has fewer of is filled up.
+        pose: (E, G, 7) tool poses in the frame of the body that is held; what an entity has fewer of is filled up.
         width: (E, G) [m].
         score: (E, G) the higher the better; -infinite where nothing is, or did not pass on this engine.
         about: versions of the banks and of their counts, for records.
     """
 
     def __init__(
-        self, env: TaskEnv, aperture: float, object: ObjectView, path: Path, living: Path | None, pinned: str
+        self,
+        env: TaskEnv,
+        aperture: float,
+        object: ObjectView,
+        path: Path,
+        living: Path | None,
+        pinned: str,
+        body: int | None = None,
     ) -> None:
         """As of `BankedGrasps`; `aperture` [m] is how wide the gripper opens."""
-        self._env, self._aperture, self._object, self._path = env, aperture, object, path
+        self._env, self._aperture, self._object, self._path, self._body = env, aperture, object, path, body
         if pinned and living is None:
             raise _at("pinned", "counts are pinned, but none are kept; say where they are with `living`")
         found = self._read()
@@ -96,13 +103,16 @@ class Banks:
     def _of(self, entity: Entity, found: list[Bank]) -> list[Bank]:
         """The banks of an entity."""
         world, gripper = self._env.engine.world, self._aperture
-        own = asset_hash(world, entity, entity.root)
-        banks = [bank for bank in found if bank.asset_hash == own]
+        held = entity.root if self._body is None else self._body
+        own, link = asset_hash(world, entity, held), held - entity.body_start
+        banks = [bank for bank in found if (bank.asset_hash, _link(bank)) == (own, link)]
         more = f"build one with `anysim bank build {self._env.name} --object {self._object.name}`"
         if not banks:
             has = listing([f"{bank.affordance} of {bank.asset}" for bank in found])
-            words = f"{self._path} holds no bank of '{entity.name}' as it is here, of the digest {own[:12]}"
-            raise _at("bank", f"{words}: shapes, surfaces, mass and joints must be the same (banks: {has}); {more}")
+            name = world.bodies[held].name if link else entity.name
+            words = f"{self._path} holds no bank of '{name}' as it is here, of the digest {own[:12]}"
+            same = "shapes, surfaces, mass, joints and the link that is held"
+            raise _at("bank", f"{words}: {same} must be the same (banks: {has}); {more}")
         fit = [bank for bank in banks if abs(_stroke(bank) - gripper) <= SAME_STROKE]
         if not fit:
             has = listing(sorted({f"{bank.gripper}, which opens {_stroke(bank):g} m" for bank in banks}))
@@ -120,6 +130,12 @@ class Banks:
 def _stroke(bank: Bank) -> float:
     stroke = bank.provenance.get("stroke")
     return float(stroke) if isinstance(stroke, int | float) else float("nan")
+
+
+def _link(bank: Bank) -> int:
+    """Which of its asset's links it is on; 0 is the root."""
+    link = bank.provenance.get("link", 0)
+    return link if isinstance(link, int) else -1
 
 
 def _prior(bank: Bank) -> float:
