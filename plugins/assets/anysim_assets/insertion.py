@@ -6,12 +6,20 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from anysim.assets.model import ImportedModel
+from anysim.model.affordances import Affordance, AffordanceKind
 from anysim.model.world import Box, Cylinder
 from anysim_assets.assembly import Assembly, ring, turned
 from anysim_schemas.base import Color, Positive
 from anysim_schemas.errors import KeyFault
 
 Section = Literal["square", "round"]
+TIP = Affordance("tip", AffordanceKind.TIP, "tip", use=("insert",))
+"""The end that goes ahead; its frame's z points back along the thing."""
+
+
+def hole(depth: float, clearance: float) -> Affordance:
+    """A hole at the frame `mouth`, `depth` [m] from there to its end, with `clearance` [m] to each side."""
+    return Affordance("mouth", AffordanceKind.HOLE, "mouth", use=("insert",), depth=depth, clearance=clearance)
 
 
 def peg(
@@ -25,6 +33,8 @@ def peg(
 ) -> ImportedModel:
     """A peg, its frame in its middle. Frames: `tip` in the middle of its lower end, `head` of its upper one.
 
+    Affordance: `tip`, which goes into a hole.
+
     Args:
         section: of the peg.
         width: edge length of a square peg, diameter of a round one [m].
@@ -34,6 +44,7 @@ def peg(
         color: of the peg.
     """
     body = Assembly("peg")
+    body.afford(TIP)
     half = width / 2
     shape = Box((half, half, length / 2)) if section == "square" else Cylinder(half, length / 2)
     if along == "z":
@@ -62,7 +73,7 @@ def hole_block(
     """A block with a hole through it for a peg; its frame is in the middle of its bottom, where the hole ends.
 
     Boxes around the hole, so that each engine has the same hole. Frames: `hole`, the lower end of the hole, and
-    `mouth`, its upper end, both with z out of it.
+    `mouth`, its upper end, both with z out of it. Affordance: `mouth`.
 
     Args:
         section: of the hole.
@@ -93,6 +104,7 @@ def hole_block(
         ring(body, 0, "piece", (inner, outer), height, pieces, density, color)
     body.site(0, "hole", (0.0, 0.0, 0.0))
     body.site(0, "mouth", (0.0, 0.0, height))
+    body.afford(hole(height, clearance))
     return body.model()
 
 
@@ -108,7 +120,7 @@ def side_hole(
     """A standing block with a square hole through it along x, in the middle of its height; its frame is at its bottom.
 
     Four boxes around the hole. Frames: `hole`, the far end of the hole, and `mouth`, the near one, both with z out of
-    the mouth, against the block's x.
+    the mouth, against the block's x. Affordance: `mouth`.
 
     Args:
         width: edge length of the peg [m].
@@ -135,4 +147,5 @@ def side_hole(
     out = turned((0.0, 1.0, 0.0), -pi / 2)
     body.site(0, "hole", (half, 0.0, outer), out)
     body.site(0, "mouth", (-half, 0.0, outer), out)
+    body.afford(hole(depth, clearance))
     return body.model()

@@ -7,6 +7,7 @@ from pydantic import Field
 from anysim.assets.model import ImportedModel
 from anysim.model.affordances import Affordance, AffordanceKind
 from anysim_assets.assembly import Assembly
+from anysim_assets.insertion import TIP, hole
 from anysim_assets.parameters import Size
 from anysim_schemas.base import Color, Positive
 from anysim_schemas.errors import KeyFault
@@ -52,6 +53,7 @@ def plug(
     body.site(0, "tip", (0.0, 0.0, -height - prong[2]))
     body.site(0, "head", (0.0, 0.0, height))
     body.afford(Affordance("body", AffordanceKind.BODY, "", ("base.body",), ("carry", "insert")))
+    body.afford(TIP)
     return body.model()
 
 
@@ -98,8 +100,7 @@ def socket(
         body.board(0, f"wall_{number}", (low, -deep, 0.0), (high, deep, height), density, color)
     body.site(0, "hole", (0.0, 0.0, height - prong[2]))
     body.site(0, "mouth", (0.0, 0.0, height))
-    hole = Affordance("mouth", AffordanceKind.HOLE, "mouth", use=("insert",), depth=prong[2], clearance=clearance)
-    body.afford(hole)
+    body.afford(hole(prong[2], clearance))
     return body.model()
 
 
