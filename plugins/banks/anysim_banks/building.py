@@ -1,9 +1,10 @@
 """The building of the banks of an asset or a task, one affordance after the other."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from anysim import registry
 from anysim.api import compile_world
 from anysim.errors import AssetError
 from anysim.model.affordance_lookup import affordances_of
@@ -12,12 +13,14 @@ from anysim.model.world import EntityKind, World
 from anysim.skills.bank import Bank
 from anysim_banks.anchors import Anchor, anchored, read_anchors
 from anysim_banks.gripper import gripper as gripper_by_name
+from anysim_banks.hand import hand
+from anysim_banks.hand_grasps import HandGrasps
 from anysim_banks.insertion import insertions
 from anysim_banks.making import Order, made, stamp, tried_on
 from anysim_banks.method import Grasps, Method
 from anysim_banks.reach import Base
 from anysim_banks.store import bank_path, stored, write
-from anysim_banks.subject import graspable, subjects
+from anysim_banks.subject import Subject, graspable, subjects
 from anysim_schemas.object_source import MESH_ENDINGS, PROCEDURAL
 
 _ASSETS = (".urdf", ".xml", ".mjcf", *MESH_ENDINGS)
@@ -90,19 +93,19 @@ def works(wish: Wish) -> list[Work]:
         AnysimError: the asset or task cannot be had; a name does not exist.
     """
     world, names = _world(wish.what)
-    hand = gripper_by_name(wish.gripper)
+    grasps = _grasps(wish.gripper)
     chosen = [wish.object] if wish.object else names
     if wish.anchors is not None:
         if len(chosen) != 1:
             raise AssetError(f"anchors are on one object; name it with --object (objects: {', '.join(chosen)})")
         document = read_anchors(wish.anchors)
         pairs = anchored(world, chosen[0], document)
-        return [Work(chosen[0], Grasps(subject, hand), anchor, document.spec.source) for subject, anchor in pairs]
+        return [Work(chosen[0], grasps(subject), anchor, document.spec.source) for subject, anchor in pairs]
     found: list[Work] = []
     for name in chosen:
         into = [] if wish.robot else list(insertions(world, name, wish.affordance))
         if not into or (not wish.affordance and graspable(world, world.entity_numbers[name])):
-            found += [Work(name, Grasps(one, hand)) for one in subjects(world, name, wish.affordance)]
+            found += [Work(name, grasps(one)) for one in subjects(world, name, wish.affordance)]
         found += [Work(name, one) for one in into]
     if not found:
         raise AssetError(
@@ -135,6 +138,15 @@ def build_all(todo: Sequence[Work], wish: Wish) -> Iterator[Row]:
             yield Row(name, None, path, 0.0, f"{name}: {error}")
             continue
         yield Row(name, bank, path, rate, f"{name}: {', '.join(said) or 'there already'}")
+
+
+def _grasps(name: str) -> Callable[[Subject], Method]:
+    """Grasps with a robot's hand, or with a procedural gripper."""
+    if name in registry.names("robots"):
+        fingers = hand(name)
+        return lambda subject: HandGrasps(subject, fingers)
+    gripper = gripper_by_name(name)
+    return lambda subject: Grasps(subject, gripper)
 
 
 def _world(what: str) -> tuple[World, list[str]]:

@@ -55,6 +55,7 @@ class Banks:
     Attributes:
         pose: (E, G, 7) tool poses in the frame of the body that is held; what an entity has fewer of is filled up.
         width: (E, G) [m].
+        kind: for each entity the kinds of its candidates.
         score: (E, G) the higher the better; -infinite where nothing is, or did not pass on this engine.
         about: versions of the banks and of their counts, for records.
         keys: those of `bank` and `pinned` among a skill's parameters.
@@ -88,6 +89,7 @@ class Banks:
             np.full(shape, np.inf),
             np.full(shape, -np.inf),
         )
+        self.kind = [[kind for bank in banks for kind in bank.kind] for banks in used]
         for row, banks in enumerate(used):
             counts = [LivingBank(bank, engine, living) for bank in banks] if living is not None else []
             ends = np.cumsum([len(bank) for bank in banks])

@@ -44,17 +44,18 @@ class BankedGrasps(BankedChoice):
         pinned: str = "",
         body: int | None = None,
         fit: Fit | None = None,
+        goals: int = GOALS,
     ) -> None:
         """`bank` is a file or a folder, `living` a folder of counts, which must be of the version `pinned` if given.
 
         `body` is the part of the object that is held, by its number in the World; None: its root. `fit` is the hand;
-        None: a gripper with two fingers.
+        None: a gripper with two fingers. `goals` bounds a goal set.
 
         Raises:
             SpecError: at `bank`: there is none of this object, for this gripper and engine; at `pinned`: other counts.
         """
         banks = Banks(env, fit or OfGripper(arm.aperture), object, bank, living, pinned, body)
-        super().__init__(env, object, banks, GOALS)
+        super().__init__(env, object, banks, goals)
         self._shapes = ObjectShapes(env.scene, object)
         self._hand = _corners(arm)
         self._room = np.ones((2, *self.banks.score.shape), dtype=bool)

@@ -13,6 +13,9 @@ from anysim.task.scene import ObjectView
 from anysim_skills.grasping.bank_files import Banks
 from anysim_skills.grasping.outcomes import OUTCOMES
 
+ALIKE = 0.8
+"""Of the best score: what is better than that is as good, and the nearest of those is taken."""
+
 
 class BankedChoice:
     """Candidates of `object`, of which at most `goals` are a goal set.
@@ -45,6 +48,11 @@ class BankedChoice:
         page = np.argsort(-score, axis=1, kind="stable")[:, : self._page.shape[1]]
         self._page[ids], self._left[ids] = page, np.isfinite(score).sum(axis=1)
         return page, score[np.arange(len(ids))[:, None], page]
+
+    def alike(self, ids: Array, fit: Array) -> Array:
+        """(n, g) bool: those of the goal sets that fit (n, g) and are as good as the best that does."""
+        score = np.where(fit, self.banks.score[self.which(ids)[:, None], self._page[ids]], -np.inf)
+        return fit & (score >= ALIKE * score.max(axis=1, keepdims=True))
 
     def choose(self, ids: Array, place: Array, reachable: Array) -> None:
         """Take the candidates at these places (n,) of the goal sets; none where nothing is reachable (n,) bool."""

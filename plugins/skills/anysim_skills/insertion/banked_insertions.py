@@ -16,8 +16,6 @@ from anysim.task.scene import BodyFrame, Frame, ObjectView
 from anysim_skills.grasping.bank_files import KEYS, Banks
 from anysim_skills.grasping.banked_choice import BankedChoice
 
-ALIKE = 0.8
-"""Of the best score: what is better than that is as good, and the nearest of those is taken."""
 _BACK = np.array([1.0, 0.0, 0.0, 0.0])
 """From a candidate's frame, whose z is ahead, to a tip's, whose z points back: half a turn about x."""
 
@@ -73,7 +71,7 @@ class BankedInsertions(BankedChoice):
     def good(self, ids: Array) -> Array:
         """(n, g) bool, of the goal sets: as good as the best of those that were not given up."""
         _, score = self.offer(ids, self.banks.score[self.which(ids)].copy())
-        return np.isfinite(score) & (score >= ALIKE * score[:, :1])
+        return self.alike(ids, np.isfinite(score))
 
     def turns(self, ids: Array) -> Array:
         """(n, g, 4) the tip's orientations in the world in these envs' goal sets."""
