@@ -15,6 +15,11 @@ from anysim_schemas.errors import KeyFault
 Section = Literal["square", "round"]
 
 
+def hole(depth: float, clearance: float) -> Affordance:
+    """A hole at the frame `mouth`, `depth` [m] from there to its end, with `clearance` [m] to each side."""
+    return Affordance("mouth", AffordanceKind.HOLE, "mouth", use=("insert",), depth=depth, clearance=clearance)
+
+
 def peg(
     *,
     section: Section = "square",
@@ -25,6 +30,8 @@ def peg(
     color: Color = (0.85, 0.55, 0.15),
 ) -> ImportedModel:
     """A peg, its frame in its middle. Frames: `tip` in the middle of its lower end, `head` of its upper one.
+
+    Affordance: `tip`, which goes into a hole.
 
     Args:
         section: of the peg.
@@ -64,7 +71,7 @@ def hole_block(
     """A block with a hole through it for a peg; its frame is in the middle of its bottom, where the hole ends.
 
     Boxes around the hole, so that each engine has the same hole. Frames: `hole`, the lower end of the hole, and
-    `mouth`, its upper end, both with z out of it.
+    `mouth`, its upper end, both with z out of it. Affordance: `mouth`.
 
     Args:
         section: of the hole.
@@ -95,7 +102,7 @@ def hole_block(
         ring(body, 0, "piece", (inner, outer), height, pieces, density, color)
     body.site(0, "hole", (0.0, 0.0, 0.0))
     body.site(0, "mouth", (0.0, 0.0, height))
-    body.afford(_hole(height, clearance))
+    body.afford(hole(height, clearance))
     return body.model()
 
 
@@ -111,7 +118,7 @@ def side_hole(
     """A standing block with a square hole through it along x, in the middle of its height; its frame is at its bottom.
 
     Four boxes around the hole. Frames: `hole`, the far end of the hole, and `mouth`, the near one, both with z out of
-    the mouth, against the block's x.
+    the mouth, against the block's x. Affordance: `mouth`.
 
     Args:
         width: edge length of the peg [m].
@@ -138,9 +145,5 @@ def side_hole(
     out = turned((0.0, 1.0, 0.0), -pi / 2)
     body.site(0, "hole", (half, 0.0, outer), out)
     body.site(0, "mouth", (-half, 0.0, outer), out)
-    body.afford(_hole(depth, clearance))
+    body.afford(hole(depth, clearance))
     return body.model()
-
-
-def _hole(depth: float, clearance: float) -> Affordance:
-    return Affordance("mouth", AffordanceKind.HOLE, "mouth", use=("insert",), depth=depth, clearance=clearance)

@@ -7,6 +7,7 @@ from pydantic import Field
 from anysim.assets.model import ImportedModel
 from anysim.model.affordances import Affordance, AffordanceKind
 from anysim_assets.assembly import Assembly
+from anysim_assets.insertion import hole
 from anysim_assets.parameters import Size
 from anysim_schemas.base import Color, Positive
 from anysim_schemas.errors import KeyFault
@@ -100,8 +101,7 @@ def socket(
         body.board(0, f"wall_{number}", (low, -deep, 0.0), (high, deep, height), density, color)
     body.site(0, "hole", (0.0, 0.0, height - prong[2]))
     body.site(0, "mouth", (0.0, 0.0, height))
-    hole = Affordance("mouth", AffordanceKind.HOLE, "mouth", use=("insert",), depth=prong[2], clearance=clearance)
-    body.afford(hole)
+    body.afford(hole(prong[2], clearance))
     return body.model()
 
 

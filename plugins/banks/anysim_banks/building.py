@@ -1,20 +1,26 @@
 """The building of the banks of an asset or a task, one affordance after the other."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from anysim import registry
 from anysim.api import compile_world
 from anysim.errors import AssetError
 from anysim.model.affordance_lookup import affordances_of
+from anysim.model.affordances import AffordanceKind
 from anysim.model.world import EntityKind, World
 from anysim.skills.bank import Bank
 from anysim_banks.anchors import Anchor, anchored, read_anchors
-from anysim_banks.gripper import Gripper, gripper as gripper_by_name
+from anysim_banks.gripper import gripper as gripper_by_name
+from anysim_banks.hand import hand
+from anysim_banks.hand_grasps import HandGrasps
+from anysim_banks.insertion import insertions
 from anysim_banks.making import Order, made, stamp, tried_on
+from anysim_banks.method import Grasps, Method
 from anysim_banks.reach import Base
 from anysim_banks.store import bank_path, stored, write
-from anysim_banks.subject import GRASPED, Subject, subjects
+from anysim_banks.subject import Subject, graspable, subjects
 from anysim_schemas.object_source import MESH_ENDINGS, PROCEDURAL
 
 _ASSETS = (".urdf", ".xml", ".mjcf", *MESH_ENDINGS)
@@ -41,8 +47,7 @@ class Work(NamedTuple):
     """One bank to be made."""
 
     name: str
-    subject: Subject
-    gripper: Gripper
+    method: Method
     anchor: Anchor | None = None
     source: str = ""
 
@@ -88,17 +93,24 @@ def works(wish: Wish) -> list[Work]:
         AnysimError: the asset or task cannot be had; a name does not exist.
     """
     world, names = _world(wish.what)
-    hand = gripper_by_name(wish.gripper)
+    grasps = _grasps(wish.gripper)
     chosen = [wish.object] if wish.object else names
     if wish.anchors is not None:
         if len(chosen) != 1:
             raise AssetError(f"anchors are on one object; name it with --object (objects: {', '.join(chosen)})")
         document = read_anchors(wish.anchors)
         pairs = anchored(world, chosen[0], document)
-        return [Work(chosen[0], subject, hand, anchor, document.spec.source) for subject, anchor in pairs]
-    found = [Work(name, one, hand) for name in chosen for one in subjects(world, name, wish.affordance)]
+        return [Work(chosen[0], grasps(subject), anchor, document.spec.source) for subject, anchor in pairs]
+    found: list[Work] = []
+    for name in chosen:
+        into = [] if wish.robot else list(insertions(world, name, wish.affordance))
+        if not into or (not wish.affordance and graspable(world, world.entity_numbers[name])):
+            found += [Work(name, grasps(one)) for one in subjects(world, name, wish.affordance)]
+        found += [Work(name, one) for one in into]
     if not found:
-        raise AssetError(f"nothing in '{wish.what}' affords a grasp: free objects and what builders declare do")
+        raise AssetError(
+            f"nothing in '{wish.what}' affords a grasp, or a hole for a tip: free objects and what builders declare do"
+        )
     return found
 
 
@@ -106,10 +118,10 @@ def build_all(todo: Sequence[Work], wish: Wish) -> Iterator[Row]:
     """Make, or complete, one bank after the other; each is written as soon as an engine is done with it."""
     order = Order(wish.raw, wish.keep, wish.seed, wish.robot, wish.bases)
     for work in todo:
-        path = bank_path(wish.out, work.name, work.subject, work.gripper, wish.robot)
-        name = f"{work.name}.{work.subject.affordance.name}"
+        path = bank_path(wish.out, work.name, work.method, wish.robot)
+        name = f"{work.name}.{work.method.subject.affordance.name}"
         said: list[str] = []
-        bank, rate = stored(path, work.subject, work.gripper, order), 0.0
+        bank, rate = stored(path, work.method, order), 0.0
         if bank is not None and stamp(wish.engines[0]) not in bank.passed:
             bank = None  # the first engine decides what is in it
         try:
@@ -117,10 +129,10 @@ def build_all(todo: Sequence[Work], wish: Wish) -> Iterator[Row]:
                 about: dict[str, object] = {}
                 if work.anchor is not None:
                     about = {"anchors": work.source, "prior": work.anchor.prior, "use": list(work.anchor.use)}
-                bank, rate = made(work.subject, work.gripper, wish.engines[0], order, said.append, about)
+                bank, rate = made(work.method, wish.engines[0], order, said.append, about)
                 write(path, bank)
             for engine in wish.engines[1:]:
-                bank = tried_on(bank, work.subject, work.gripper, [engine], said.append)
+                bank = tried_on(bank, work.method, [engine], said.append)
                 write(path, bank)
         except AssetError as error:
             yield Row(name, None, path, 0.0, f"{name}: {error}")
@@ -128,8 +140,17 @@ def build_all(todo: Sequence[Work], wish: Wish) -> Iterator[Row]:
         yield Row(name, bank, path, rate, f"{name}: {', '.join(said) or 'there already'}")
 
 
+def _grasps(name: str) -> Callable[[Subject], Method]:
+    """Grasps with a robot's hand, or with a procedural gripper."""
+    if name in registry.names("robots"):
+        fingers = hand(name)
+        return lambda subject: HandGrasps(subject, fingers)
+    gripper = gripper_by_name(name)
+    return lambda subject: Grasps(subject, gripper)
+
+
 def _world(what: str) -> tuple[World, list[str]]:
-    """The World of a task, or of one asset alone, and its objects that afford a grasp."""
+    """The World of a task, or of one asset alone, and its objects that afford a grasp or have a hole."""
     if what.lstrip().startswith("{"):
         world = compile_world({}, overrides=[f"world.objects.object.source={what}"])
     elif what.startswith(PROCEDURAL) or what.lower().split("#")[0].endswith(_ASSETS):
@@ -141,6 +162,7 @@ def _world(what: str) -> tuple[World, list[str]]:
     names = [
         entity.name
         for number, entity in enumerate(world.entities)
-        if entity.kind is EntityKind.OBJECT and any(a.kind in GRASPED for a in affordances_of(world, number))
+        if entity.kind is EntityKind.OBJECT
+        and (graspable(world, number) or any(a.kind is AffordanceKind.HOLE for a in affordances_of(world, number)))
     ]
     return world, names

@@ -35,7 +35,11 @@ def build(
     ] = "mujoco",
     gripper: Annotated[
         str,
-        typer.Option("--gripper", "-g", help="A procedural gripper; parallel_gripper:stroke=0.1,force=40 has others."),
+        typer.Option(
+            "--gripper",
+            "-g",
+            help="A procedural gripper, as parallel_gripper:stroke=0.1,force=40, or a robot whose hand has fingers.",
+        ),
     ] = "parallel_gripper",
     raw: Annotated[int, typer.Option(min=1, help="How many grasps are sampled of each affordance.")] = 2000,
     keep: Annotated[int, typer.Option(min=1, help="How many are kept of each, as different as they can be.")] = 64,

@@ -9,15 +9,13 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.engine.factory import availability
 from anysim.errors import AssetError
-from anysim.math import pose as P
 from anysim.skills.bank import Bank
-from anysim_banks.collision import CollisionFilter
 from anysim_banks.diversity import diverse
-from anysim_banks.gripper import Gripper
+from anysim_banks.method import Method
 from anysim_banks.reach import Base, Reach
-from anysim_banks.sampling import Candidates, sample
+from anysim_banks.sampling import Candidates
 from anysim_banks.subject import Subject
-from anysim_banks.trial import CREEP, HARDEST, LONG, SHIFT, TURN, Trial
+from anysim_banks.trial import CREEP
 
 Say = Callable[[str], object]
 FEW = 2
@@ -44,7 +42,7 @@ class Order:
 
 
 def made(
-    subject: Subject, gripper: Gripper, engine: str, order: Order, say: Say, about: Mapping[str, object] | None = None
+    method: Method, engine: str, order: Order, say: Say, about: Mapping[str, object] | None = None
 ) -> tuple[Bank, float]:
     """A new bank, tried on one engine, and how many raw candidates were judged per CPU second.
 
@@ -53,22 +51,18 @@ def made(
     Raises:
         AssetError: nothing that was sampled could be held; says what became of it.
     """
-    began = process_time()
+    began, subject = process_time(), method.subject
     rng = np.random.default_rng([order.seed, int(subject.hash[:8], 16), int(subject.place[:8], 16)])
-    found = sample(subject.pieces, subject.affordance, subject.frame, order.raw, gripper.max_width, rng)
-    if subject.region is not None:
-        point, radius = subject.region
-        there = P.rotate(subject.frame[3:], np.array(point)) + subject.frame[:3]
-        found = found.take(np.flatnonzero(P.norm(found.pose[:, :3] - there) <= radius))
+    found = method.sampled(order.raw, rng)
     raw = len(found.width)
-    free = found.take(np.flatnonzero(CollisionFilter(gripper, subject.around).free(found.pose, found.width)))
+    free = found.take(np.flatnonzero(method.free(found)))
     clear = len(free.width)
     say(f"{clear} of {raw} are free of collision")
     standing: dict[str, object] = {}
-    if order.robot:
+    if order.robot and isinstance(subject, Subject):
         free, standing = _within_reach(free, subject, order, rng)
         say(f"{len(free.width)} of those within reach of {order.robot}")
-    with Trial(gripper, subject, engine) as trial:
+    with method.trial(engine) as trial:
         easy = trial.run(free, hard=False)
         held = np.flatnonzero(easy.margin >= 1.0)
         tried = held[diverse(free.take(held), easy.margin[held], FEW * order.keep)]
@@ -82,12 +76,7 @@ def made(
     rate = raw / max(process_time() - began, 1e-9)
     say(f"{len(held)} held on {engine}, {int(easy.missed.sum())} missed")
     if len(best) == 0:
-        wide = f"nothing there is narrower than {gripper.max_width:g} m" if raw == 0 else f"{raw} grasps were sampled"
-        raise AssetError(
-            f"no grasp of {subject.asset} {subject.affordance.name} was held: {wide}, {clear} free of "
-            f"collision, {len(held)} held, none of those for half a second; another gripper, or an affordance with "
-            "other pieces or approaches, may do"
-        )
+        raise AssetError(method.failed(raw, clear, len(held)))
     kept = tried[best]
     counts: dict[str, object] = {
         "raw": raw,
@@ -98,17 +87,16 @@ def made(
         "asked": order.asked,
         "place": subject.place,
         "link": subject.link,
-        "stroke": round(gripper.stroke, _POSE_DIGITS),
-        "test": {"hardest": HARDEST, "shift": SHIFT, "turn": TURN, "long": LONG, "creep": list(CREEP)},
+        **method.about(),
         **standing,
         **(about or {}),
     }
     bank = Bank(
         subject.asset,
         subject.affordance.name,
-        gripper.name,
+        method.tool.name,
         subject.hash,
-        gripper.hash,
+        method.tool.hash,
         np.round(free.pose[kept], _POSE_DIGITS),
         np.round(free.width[kept], _POSE_DIGITS),
         tuple(str(kind) for kind in free.kind[kept]),
@@ -128,14 +116,14 @@ def _within_reach(
     return free.take(np.flatnonzero(found.grasps.any(axis=0))), {"robot": order.robot, **stands}
 
 
-def tried_on(bank: Bank, subject: Subject, gripper: Gripper, engines: Sequence[str], say: Say) -> Bank:
+def tried_on(bank: Bank, method: Method, engines: Sequence[str], say: Say) -> Bank:
     """The bank with marks of what is held on more engines; those that it was tried on already are passed over."""
     for engine in engines:
         if stamp(engine) in bank.passed:
             continue
         width = bank.width
         grasps = Candidates(bank.pose, width, np.array(bank.kind), np.zeros(len(width), dtype=int))
-        with Trial(gripper, subject, engine) as trial:
+        with method.trial(engine) as trial:
             margin = trial.run(grasps).margin
             held = (margin >= 1.0) & trial.lasting(grasps)
         passed: dict[str, Array] = {**bank.passed, stamp(engine): held}

@@ -82,10 +82,15 @@ def subjects(world: World, entity: str, only: str = "") -> list[Subject]:
     if only:
         return [subject(world, find_affordance(world, f"{entity}.{only}"))]
     number = _number(world, entity)
-    specs = [one for one in affordances_of(world, number) if one.kind in GRASPED]
+    specs = graspable(world, number)
     if not specs:
         raise AssetError(f"'{entity}' has no affordance that fingers close on; declare one in its asset")
     return [subject(world, resolve_affordance(world, number, one)) for one in specs]
+
+
+def graspable(world: World, entity: int) -> list[Affordance]:
+    """What an entity, by its index, affords fingers to close on."""
+    return [a for a in affordances_of(world, entity) if a.kind in GRASPED]
 
 
 def subject_of(world: World, entity: str, spec: Affordance, region: Region | None) -> Subject:

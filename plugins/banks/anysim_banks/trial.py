@@ -8,6 +8,7 @@ affordance, as its guides would let it. The long test keeps the easy one's loads
 axis: a thin bar that is held far from the thing's weight turns in the fingers slowly.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import replace
 from typing import NamedTuple, Self
 
@@ -43,7 +44,7 @@ ENVS = {"mujoco": 64}
 """How many grasps are tried at once; of engines with a scene for each env fewer."""
 
 _GRAVITY = 9.81
-_DT, _SUBSTEPS = 0.002, 10
+_DT, SUBSTEPS = 0.002, 10
 _CLOSING = 6  # control steps; the fingers start 2 mm away
 _HOLD, _RAMP = 3, 8  # control steps of the easy and of the hard test: in the first what is let go falls 18 mm
 _KP, _KD = 1000.0, 300.0
@@ -59,7 +60,7 @@ class Verdicts(NamedTuple):
     missed: Array
 
 
-class _ClosedGrip(NamedTuple):
+class ClosedGrip(NamedTuple):
     """Things in closed fingers: poses (n, 7), which have got away, which were missed, and where loads begin."""
 
     held: Array
@@ -68,13 +69,12 @@ class _ClosedGrip(NamedTuple):
     start: Snapshot
 
 
-class Trial:
-    """An engine with a gripper and a subject in each env. Close it, or use it in `with`."""
+class HeldTrial(ABC):
+    """An engine with a hand that is fixed and a subject in each env. Close it, or use it in `with`."""
 
-    def __init__(self, gripper: Gripper, subject: Subject, engine: str, envs: int | None = None) -> None:
-        self._gripper, self._subject = gripper, subject
+    def __init__(self, world: World, subject: Subject, engine: str, envs: int | None = None) -> None:
+        self.world, self._subject = world, subject
         self._n = envs or ENVS.get(engine, 16)
-        self.world = _world(gripper, subject)
         self._sim: SimEngine = create_simulation(engine).create_world(self.world, self._n)
         self._thing = next(i for i, b in enumerate(self.world.bodies) if b.name == "thing")
         self._loads = _loads(subject)
@@ -94,7 +94,7 @@ class Trial:
         n, margin, missed = 0, np.zeros(len(candidates.width)), np.zeros(len(candidates.width), dtype=bool)
         for part in self._parts(candidates):
             rows = np.arange(n, n + len(part.width))
-            margin[rows], missed[rows] = self._try(part.pose, part.width, hard)
+            margin[rows], missed[rows] = self._try(part, hard)
             n += len(rows)
         return Verdicts(margin, missed)
 
@@ -108,7 +108,7 @@ class Trial:
         return [candidates.take(np.arange(i, min(i + self._n, n))) for i in range(0, n, self._n)]
 
     def _lasting(self, part: Candidates, limits: tuple[float, float]) -> Array:
-        closed = self._close(part.pose, part.width)
+        closed = self.closed(part)
         held = ~closed.gone
         for load in self._loads[::2]:
             alive = np.flatnonzero(held)
@@ -118,8 +118,8 @@ class Trial:
             held[alive] = self._loaded(alive, closed.held[alive], load, LONG, 0, limits) > 0
         return held
 
-    def _try(self, pose: Array, width: Array, hard: bool) -> tuple[Array, Array]:
-        closed = self._close(pose, width)
+    def _try(self, part: Candidates, hard: bool) -> tuple[Array, Array]:
+        closed = self.closed(part)
         margin = np.where(closed.gone, 0.0, HARDEST if hard else 1.0)
         for number, load in enumerate(self._loads):
             alive = np.flatnonzero(margin >= 1.0)
@@ -130,26 +130,9 @@ class Trial:
             margin[alive] = np.minimum(margin[alive], self._loaded(alive, closed.held[alive], load, _HOLD, ramp))
         return margin, closed.missed
 
-    def _close(self, pose: Array, width: Array) -> _ClosedGrip:
+    @abstractmethod
+    def closed(self, part: Candidates) -> ClosedGrip:
         """Close the fingers on things at these grasps, one in each env."""
-        sim, ids = self._sim, np.arange(len(width))
-        sim.reset(ids)
-        at = P.compose(self._gripper.tool, P.inverse(pose))
-        sim.set_body_state(at[:, None], np.zeros((len(ids), 1, 6)), ids, [self._thing])
-        upper = self.world.joints[0].upper
-        apart = np.minimum(0.5 * (width + SPARE), upper)
-        sim.set_joint_state(np.repeat(apart[:, None], 2, axis=1), np.zeros((len(ids), 2)), ids)
-        closed = -1.25 * self._gripper.force / _KP  # beyond touching: a finger presses with all its force at any width
-        sim.set_control(position=np.full((len(ids), 2), closed), env_ids=ids)
-        for _ in range(_CLOSING):
-            sim.step(_SUBSTEPS, ids)
-        state = sim.get_state()
-        held = state.body_pose[ids, self._thing].copy()
-        grip = state.joint_pos[ids].sum(axis=1)
-        missed = (grip < MISSED * width) | (state.fault[ids] != 0)
-        moved = P.norm(held[:, :3] - at[:, :3]) > DISPLACED[0]
-        gone = missed | moved | (P.angle_between(held[:, 3:], at[:, 3:]) > DISPLACED[1])
-        return _ClosedGrip(held, gone, missed, sim.snapshot(ids))
 
     def _loaded(
         self, ids: Array, held: Array, load: Array, hold: int, ramp: int, limits: tuple[float, float] = (SHIFT, TURN)
@@ -161,7 +144,7 @@ class Trial:
             times = 1.0 + (HARDEST - 1.0) * max(0, step + 1 - hold) / _RAMP
             sim, rows = self._sim, ids[left]
             sim.apply_wrench(times * wrench[left, None], [self._thing], rows)
-            sim.step(_SUBSTEPS, rows)
+            sim.step(SUBSTEPS, rows)
             now = sim.get_state().body_pose[rows, self._thing]
             shift = P.norm(now[:, :3] - held[left, :3])
             turn = P.angle_between(now[:, 3:], held[left, 3:])
@@ -173,15 +156,49 @@ class Trial:
         return reached
 
 
-def _world(gripper: Gripper, subject: Subject) -> World:
-    physics = Physics(dt=_DT, control_dt=_DT * _SUBSTEPS, gravity=(0.0, 0.0, 0.0), impratio=1.0)
+class Trial(HeldTrial):
+    """Trials with a gripper of two fingers."""
+
+    def __init__(self, gripper: Gripper, subject: Subject, engine: str, envs: int | None = None) -> None:
+        self._gripper = gripper
+        super().__init__(_world(gripper, subject), subject, engine, envs)
+
+    def closed(self, part: Candidates) -> ClosedGrip:
+        sim, ids, width = self._sim, np.arange(len(part.width)), part.width
+        sim.reset(ids)
+        at = P.compose(self._gripper.tool, P.inverse(part.pose))
+        sim.set_body_state(at[:, None], np.zeros((len(ids), 1, 6)), ids, [self._thing])
+        upper = self.world.joints[0].upper
+        apart = np.minimum(0.5 * (width + SPARE), upper)
+        sim.set_joint_state(np.repeat(apart[:, None], 2, axis=1), np.zeros((len(ids), 2)), ids)
+        closed = -1.25 * self._gripper.force / _KP  # beyond touching: a finger presses with all its force at any width
+        sim.set_control(position=np.full((len(ids), 2), closed), env_ids=ids)
+        for _ in range(_CLOSING):
+            sim.step(SUBSTEPS, ids)
+        state = sim.get_state()
+        held = state.body_pose[ids, self._thing].copy()
+        grip = state.joint_pos[ids].sum(axis=1)
+        missed = (grip < MISSED * width) | (state.fault[ids] != 0)
+        moved = P.norm(held[:, :3] - at[:, :3]) > DISPLACED[0]
+        gone = missed | moved | (P.angle_between(held[:, 3:], at[:, 3:]) > DISPLACED[1])
+        return ClosedGrip(held, gone, missed, sim.snapshot(ids))
+
+
+def with_thing(hand: ImportedModel, subject: Subject) -> WorldBuilder:
+    """A World without weight, with a hand that is fixed and the subject, free."""
+    physics = Physics(dt=_DT, control_dt=_DT * SUBSTEPS, gravity=(0.0, 0.0, 0.0), impratio=1.0)
     builder = WorldBuilder(World("trial", physics=physics))
-    builder.add("gripper", EntityKind.ROBOT, gripper.model, root=BodyKind.STATIC)
+    builder.add("gripper", EntityKind.ROBOT, hand, root=BodyKind.STATIC)
     own = subject.world
     names = tuple("" for _ in own.geoms)
     numbered = tuple(replace(g, name=f"piece{i}") for i, g in enumerate(own.geoms))
     model = ImportedModel("thing", (subject.body,), geoms=numbered, geom_links=names, meshes=own.meshes, links={"": 0})
     builder.add("thing", EntityKind.OBJECT, model, root=BodyKind.FREE)
+    return builder
+
+
+def _world(gripper: Gripper, subject: Subject) -> World:
+    builder = with_thing(gripper.model, subject)
     builder.actuators += [
         Actuator(joint.name, number, ControlMode.POSITION, _KP, _KD, gripper.force)
         for number, joint in enumerate(builder.joints)

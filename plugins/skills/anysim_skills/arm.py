@@ -262,14 +262,17 @@ class Arm(Mover):
         """(n,) [rad/s, m/s] of the fastest joint of the gripper."""
         return np.abs(self.env.scene.state.joint_vel[np.ix_(ids, self._fingers)]).max(axis=1, initial=0.0)
 
-    def reach(self, ids: Array, targets: Array) -> tuple[Array, Array]:
+    def reach(self, ids: Array, targets: Array, seeds: Array | None = None) -> tuple[Array, Array]:
         """Inverse kinematics of many tool poses (n, g, 7): from the live configuration, else from where it began.
+
+        `seeds` (n, g, K) are configurations in place of the live one.
 
         Returns:
             joint_pos (n, g, K) and the largest joint motion (n, g) to get there; infinite where there is no solution.
         """
         n, g = targets.shape[:2]
-        seeds = np.repeat(self.env.scene.state.joint_pos[np.ix_(ids, self.chain.joints)], g, axis=0)
+        live = self.env.scene.state.joint_pos[np.ix_(ids, self.chain.joints)]
+        seeds = np.repeat(live, g, axis=0) if seeds is None else seeds.reshape(n * g, -1)
         keys = np.repeat(self.env.streams.episode_seed[ids], g)
         base = np.repeat(self._base(ids), g, axis=0)
         found = self.solver.solve(targets.reshape(-1, 7), base, seeds, random_restarts=0, rng_seeds=keys)

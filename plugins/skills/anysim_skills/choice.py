@@ -7,6 +7,11 @@ from anysim.math import pose as P
 from anysim.skills.phases import Rung
 from anysim_skills.arm import Arm
 
+POINTS = 4
+"""Of a line of a few centimetres, at which the arm must reach it; four times as many on the way there."""
+JUMP = 0.5
+"""[rad] that no joint moves between two of them: more is another posture."""
+
 
 class Choice:
     """Candidates of each env in the order of their effort, and how many of them have been given up."""
@@ -47,6 +52,43 @@ class Choice:
     def none_left(self, ids: Array) -> Array:
         """(n,) bool: no candidate can be reached that has not been given up."""
         return self._reachable[ids] <= self._given_up[ids]
+
+
+def motion_along(arm: Arm, ids: Array, at: Array, ways: Array) -> Array:
+    """(n, count, s) the joint motion to the first pose of ways (n, count, s, 7), as `arm` goes from where it is.
+
+    From each pose on that is not reached straight, in one posture, from the one before, it is infinite. To the first
+    one the arm may change its posture, to what it has there from where it began.
+    """
+    n, count = ways.shape[:2]
+    shape = (n, count, len(arm.chain))
+    live = np.broadcast_to(arm.env.scene.state.joint_pos[np.ix_(ids, arm.chain.joints)][:, None], shape)
+    here = np.broadcast_to(arm.tool.pose[at][:, None], (n, count, 7))
+    joints, straight = _along(arm, ids, here, ways[:, :, 0], live, 4 * POINTS)
+    turned, reached = arm.reach(ids, ways[:, :, 0], np.broadcast_to(arm.chain.initial, shape))
+    joints = np.where(straight[..., None], joints, turned)
+    good = straight | np.isfinite(reached)
+    motion, found = np.abs(joints - live).max(axis=2), [good]
+    for number in range(1, ways.shape[2]):
+        joints, on = _along(arm, ids, ways[:, :, number - 1], ways[:, :, number], joints, POINTS)
+        found.append(found[-1] & on)
+    return np.where(np.stack(found, axis=2), motion[..., None], np.inf)
+
+
+def _along(arm: Arm, ids: Array, begin: Array, end: Array, joints: Array, points: int) -> tuple[Array, Array]:
+    """Joints (n, count, K) at the ends of straight lines between poses (n, count, 7), and (n, count) if they get there.
+
+    `joints` are those at the beginnings. How many points are looked at does not depend on the other envs.
+    """
+    one, other = begin.reshape(-1, 7), end.reshape(-1, 7)
+    length, turn = P.norm(other[:, :3] - one[:, :3]), P.angle_between(one[:, 3:], other[:, 3:])
+    good = np.ones(begin.shape[:2], dtype=bool)
+    for share in np.arange(1, points + 1) / points:
+        distance = np.where(length > 0.0, share * length, 1.0)
+        pose = P.step_toward(one, other, distance, np.maximum(share * turn, 1e-9))
+        joints, step = arm.reach(ids, pose.reshape(begin.shape), joints)
+        good &= step < JUMP
+    return joints, good
 
 
 def turns_against(frames: Array, count: int) -> Array:

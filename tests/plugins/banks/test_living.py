@@ -10,6 +10,7 @@ from anysim.api import compile_world
 from anysim.skills.living_bank import LivingBank
 from anysim_banks.gripper import gripper
 from anysim_banks.making import Order, made
+from anysim_banks.method import Grasps
 from anysim_banks.sampling import Candidates
 from anysim_banks.subject import subjects
 from anysim_banks.trial import Trial
@@ -25,7 +26,7 @@ def test_outcomes_raise_the_yield_of_a_badly_ordered_bank(tmp_path: Path, living
         compile_world({"world": {"objects": {"box": {"source": {"box": [0.04, 0.06, 0.1]}, "mass": mass}}}})
         for mass in (0.1, 2.2)
     )
-    bank, _ = made(subjects(light, "box")[0], hand, "mujoco", Order(200, 24), print)
+    bank, _ = made(Grasps(subjects(light, "box")[0], hand), "mujoco", Order(200, 24), print)
     every = Candidates(bank.pose, bank.width, np.array(bank.kind), np.zeros(len(bank), dtype=int))
     with Trial(hand, subjects(heavy, "box")[0], "mujoco", envs=24) as trial:
         held = trial.run(every, hard=False).margin >= 1.0

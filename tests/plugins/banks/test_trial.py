@@ -10,6 +10,7 @@ from anysim.errors import AssetError
 from anysim.model.world import World
 from anysim_banks.gripper import Gripper, gripper
 from anysim_banks.making import Order, made, tried_on
+from anysim_banks.method import Grasps
 from anysim_banks.sampling import Candidates, sample, tool_turn
 from anysim_banks.subject import subjects
 from anysim_banks.trial import CREEP, HARDEST, Trial
@@ -77,10 +78,10 @@ def test_a_handle_is_pulled_along_its_joint(hand: Gripper) -> None:
     assert door.pull is not None
     np.testing.assert_allclose(drawer.pull, [1.0, 0.0, 0.0])
     assert abs(float(door.pull[0])) > 0.95, "a door's handle begins to move out of its front"
-    bank, rate = made(drawer, hand, "mujoco", Order(60, 8), print)
+    bank, rate = made(Grasps(drawer, hand), "mujoco", Order(60, 8), print)
     assert rate > 0
     assert (bank.approach[:, 0] < -0.5).all(), "from the front"
-    again, _ = made(drawer, hand, "mujoco", Order(60, 8), print)
+    again, _ = made(Grasps(drawer, hand), "mujoco", Order(60, 8), print)
     assert again.version == bank.version
     assert 4 <= len(bank) <= 8
     np.testing.assert_array_equal(np.sort(bank.margin)[::-1], bank.margin)
@@ -89,7 +90,7 @@ def test_a_handle_is_pulled_along_its_joint(hand: Gripper) -> None:
 def test_a_thing_too_wide_says_so(hand: Gripper) -> None:
     world = compile_world({"world": {"objects": {"crate": {"source": {"box": [0.3, 0.3, 0.3]}}}}})
     with pytest.raises(AssetError, match=r"no grasp of crate body was held: nothing there is narrower than 0\.081 m"):
-        made(subjects(world, "crate")[0], hand, "mujoco", Order(20, 4), print)
+        made(Grasps(subjects(world, "crate")[0], hand), "mujoco", Order(20, 4), print)
 
 
 @pytest.mark.slow
@@ -102,9 +103,9 @@ def test_most_of_what_mujoco_keeps_is_held_on_the_other_engines(
 ) -> None:
     world = compile_world({"world": {"objects": {"thing": {"source": source}}}})
     [thing] = subjects(world, "thing", affordance)
-    bank, _ = made(thing, hand, "mujoco", Order(300, 32), print)
+    bank, _ = made(Grasps(thing, hand), "mujoco", Order(300, 32), print)
     others = [e for e in ("pybullet", "sapien") if e in ENGINES]
-    bank = tried_on(bank, thing, hand, others, print)
+    bank = tried_on(bank, Grasps(thing, hand), others, print)
     for engine in others:
         assert bank.passed_on(engine).mean() >= 0.9
 

@@ -1,14 +1,17 @@
-"""Banks of the cube of `pick_cube`, written by hand."""
+"""Banks of the cube of `pick_cube` and of a drawer's handle, written by hand."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from anysim.api import compile_world
 from anysim.math import pose as P
 from anysim.model.affordance_lookup import asset_hash
+from anysim.model.frames import find_frame
 from anysim.skills.bank import Bank
 
 DOWN = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
@@ -31,15 +34,26 @@ def cube_bank(*poses: np.ndarray, asset: str = "", stroke: float = 0.08) -> Bank
     """These grasps of the cube, of falling margins."""
     world = compile_world("pick_cube")
     cube = world.entities[world.entity_numbers["cube"]]
-    own, n = asset or asset_hash(world, cube, cube.root), len(poses)
-    margin, passed = (
-        np.arange(n, 0, -1.0) + 1.0,
-        {e: np.ones(n, dtype=bool) for e in ("mujoco 3", "pybullet 3", "sapien 3")},
-    )
-    about = {"stroke": stroke}
-    return Bank(
-        "cube", "body", "hand", own, "g", np.stack(poses), np.full(n, 0.04), ("box",) * n, margin, passed, about
-    )
+    return _bank("cube", "body", asset or asset_hash(world, cube, cube.root), poses, 0.04, {"stroke": stroke})
+
+
+def handle_bank(*poses: np.ndarray, part: str = "drawer_1") -> Bank:
+    """Grasps of the handle of a part of the cabinet of `open_drawer`, in its handle's frame, of falling margins."""
+    world = compile_world("open_drawer")
+    cabinet = world.entities[world.entity_numbers["cabinet"]]
+    body = next(b for b, one in enumerate(world.bodies) if one.name == f"cabinet.{part}")
+    frame = find_frame(world, f"cabinet.{part}.handle")
+    at = np.array([*frame.position, *frame.quaternion])
+    about = {"stroke": 0.08, "link": body - cabinet.body_start}
+    placed = [P.compose(at, pose) for pose in poses]
+    return _bank("cabinet", f"{part}.handle", asset_hash(world, cabinet, body), placed, 0.016, about)
+
+
+def _bank(asset: str, affordance: str, own: str, poses: Sequence[np.ndarray], width: float, about: Any) -> Bank:
+    n = len(poses)
+    passed = {e: np.ones(n, dtype=bool) for e in ("mujoco 3", "pybullet 3", "sapien 3")}
+    margin, kind = np.arange(n, 0, -1.0) + 1.0, ("box",) * n
+    return Bank(asset, affordance, "hand", own, "g", np.stack(poses), np.full(n, width), kind, margin, passed, about)
 
 
 def written(folder: Path, bank: Bank, name: str = "bank.json") -> Path:
@@ -49,10 +63,10 @@ def written(folder: Path, bank: Bank, name: str = "bank.json") -> Path:
     return path
 
 
-def task(folder: Path, **expert: str) -> Path:
-    """A file in this folder with `pick_cube`, whose expert is given these parameters from line 4 on."""
-    lines = ["extends: task:pick_cube", "task:", "  expert:", *(f"    {key}: {value}" for key, value in expert.items())]
-    path = folder / "pick.yaml"
+def task(folder: Path, of: str = "pick_cube", **expert: str) -> Path:
+    """A file in this folder with a task, whose expert is given these parameters from line 4 on."""
+    lines = [f"extends: task:{of}", "task:", "  expert:", *(f"    {key}: {value}" for key, value in expert.items())]
+    path = folder / f"{of}.yaml"
     path.write_text("\n".join([*lines, ""]))
     return path
 

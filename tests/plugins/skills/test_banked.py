@@ -59,19 +59,19 @@ def test_a_grasp_that_fails_is_given_up_for_the_next_one(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("expert", "words"),
     [
-        ({"bank": "other.json"}, r"pick\.yaml:4:\d+: task\.expert\.bank: .*no bank of 'cube' as it is here"),
+        ({"bank": "other.json"}, r"pick_cube\.yaml:4:\d+: task\.expert\.bank: .*no bank of 'cube' as it is here"),
         (
             {"bank": "narrow.json"},
-            r"pick\.yaml:4:\d+: task\.expert\.bank: .*another gripper \(hand, which opens 0\.04 m",
+            r"pick_cube\.yaml:4:\d+: task\.expert\.bank: .*another gripper \(hand, which opens 0\.04 m",
         ),
-        ({"bank": "none.json"}, r"pick\.yaml:4:\d+: task\.expert\.bank: there is no bank at"),
+        ({"bank": "none.json"}, r"pick_cube\.yaml:4:\d+: task\.expert\.bank: there is no bank at"),
         ({"bank": "empty"}, r"task\.expert\.bank: there are no banks in the folder"),
-        ({"bank": "../bank.json"}, r"pick\.yaml:4:\d+: task\.expert\.bank: '\.\./bank\.json' leaves"),
+        ({"bank": "../bank.json"}, r"pick_cube\.yaml:4:\d+: task\.expert\.bank: '\.\./bank\.json' leaves"),
         ({"bank": "sapien.json"}, r"task\.expert\.bank: .*not tried on 'mujoco'"),
-        ({"bank": "bank.json", "pinned": "abc"}, r"pick\.yaml:5:\d+: task\.expert\.pinned: .*say where they are"),
+        ({"bank": "bank.json", "pinned": "abc"}, r"pick_cube\.yaml:5:\d+: task\.expert\.pinned: .*say where they are"),
         (
             {"bank": "bank.json", "living": "counts", "pinned": "abc"},
-            r"pick\.yaml:6:\d+: task\.expert\.pinned: the counts",
+            r"pick_cube\.yaml:6:\d+: task\.expert\.pinned: the counts",
         ),
     ],
 )

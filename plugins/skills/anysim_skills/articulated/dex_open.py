@@ -13,7 +13,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import RobotView
 from anysim_skills.articulated.bar_grasps import hooks
 from anysim_skills.articulated.handle import CLEAR, AtHandle, Share, in_world
-from anysim_skills.articulated.open import OVERSHOOT, Open
+from anysim_skills.articulated.open import OVERSHOOT, Pulls
 from anysim_skills.grasping.dex_grasp import STEEPEST
 from anysim_skills.grasping.hand import Hand
 
@@ -23,7 +23,7 @@ PUSHED_BACK = 0.1
 """Of the range, by which fingers that straighten behind the bar may push the part back."""
 
 
-class DexOpen(Open):
+class DexOpen(Pulls):
     """Open `part` by its handle with a hand that has several fingers: they go in beside the bar and hook behind it.
 
     The tool's z is out of the palm and its y along the fingers; `place` is where the middle of the bar is in the tool's
@@ -47,7 +47,9 @@ class DexOpen(Open):
         self.hand = Hand.of(env, robot)
         self._synergy, self.place = self.hand.named(synergy), place
         self._asked = fraction
-        super().__init__(env, fraction=min(1.0 - OVERSHOOT, fraction + PUSHED_BACK), robot=robot, **options)
+        self._fraction = min(1.0 - OVERSHOOT, fraction + PUSHED_BACK)
+        self.share = min(1.0, self._fraction + OVERSHOOT)
+        super().__init__(env, robot=robot, **options)  # pyright: ignore[reportArgumentType]
         self.movers = (self.arm, self.hand)
 
     def excluded(self, grasps: Array) -> Array:

@@ -1,6 +1,7 @@
 """A hand at a handle: what opening and closing have in common."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -16,14 +17,18 @@ from anysim.task.scene import RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.articulated.bar_grasps import TURNS, bar_grasps
 from anysim_skills.articulated.part import Part
-from anysim_skills.choice import Choice
-from anysim_skills.grasping.grasp import CLOSING_STEPS, Speed, closed
+from anysim_skills.choice import Choice, motion_along
+from anysim_skills.grasping.banked import BankedGrasps
+from anysim_skills.grasping.grasp import CLOSING_STEPS, ROOM, Speed, closed
 from anysim_skills.planning import LATENCY, Latency, PlannerName
 
 STATIONS = 5
 """Points of the part's way at which a grasp must be reachable."""
 CLEAR = 0.1
 """[m] the hand is before the handle when it comes, and after it has gone."""
+
+AWAY = 0.06
+"""[m] that a grasp of a bank is to let the hand go back, once the part is where it is to be."""
 
 STALLED = 50
 """Control steps in which a part that is moved does not get on by `PROGRESS` before it counts as jammed."""
@@ -37,7 +42,7 @@ class AtHandle(PhasedSkill):
     """A skill that moves a part by its handle, whose frame is `<part>.handle`.
 
     Of ten grasps of the bar the one is chosen that reaches the way to the handle and the whole way of the part with the
-    least motion.
+    least motion; of those of a bank the best that reaches them.
     """
 
     first_rungs: ClassVar[Mapping[Outcome, Rung]] = {**FIRST_RUNGS, Outcome.JAMMED: Rung.BACK_OFF}
@@ -55,6 +60,9 @@ class AtHandle(PhasedSkill):
     def __init__(
         self,
         env: TaskEnv,
+        bank: Path | None = None,
+        living: Path | None = None,
+        pinned: str = "",
         *,
         robot: RobotView,
         part: RangedJointView,
@@ -67,15 +75,21 @@ class AtHandle(PhasedSkill):
         planner: PlannerName = "",
         latency: Latency = LATENCY,
     ) -> None:
+        """`bank`, `living` and `pinned` are of skills that close on the handle."""
         self.arm = Arm.of(env, robot, tool=tool, solver=solver, planner=planner, latency=latency)
         self._plans = bool(planner)
         self.part = Part(env.scene, part)
         self.handle = self.part.handle()
         self.speed, self.part_speed, self.lead, self.late = speed, part_speed, lead, steps
+        self._bank: BankedGrasps | None = None
+        if bank is not None:
+            self._bank = BankedGrasps(env, self.arm, self.part.owner, bank, living, pinned, self.part.body)
         n = env.num_envs
-        self._choice = Choice(n, len(self.turns))
+        self._choice = Choice(n, len(self.turns) if self._bank is None else self._bank.goal_count)
         self._turn = np.zeros((n, 4))
-        """The chosen orientation in the handle's frame."""
+        """The chosen orientation in the handle's frame, where it is of no bank."""
+        self._local = np.zeros((n, 7))
+        """The chosen tool pose in the part's frame, where it is of a bank."""
         self._grip = np.zeros((n, 7))
         """The tool in the part's frame when the part begins to move."""
         self._left, self._since = np.zeros(n), np.zeros(n, dtype=np.int64)
@@ -85,11 +99,25 @@ class AtHandle(PhasedSkill):
     def start(self, env_ids: Array) -> None:
         super().start(env_ids)
         self._choice.again(env_ids)
+        if self._bank is not None:
+            self._bank.start(env_ids)
         self.phase[env_ids] = 1
 
     def retry(self, rung: Rung, env: int) -> int | None:
-        phase = self._choice.retry(rung, env)
+        phase = self._choice.retry(rung, env) if self._bank is None else self._next_of_bank(self._bank, rung, env)
         return 1 if phase == 0 and self.phases[self.phase[env]] == "plan" else phase  # it is away from the part already
+
+    def _next_of_bank(self, bank: BankedGrasps, rung: Rung, env: int) -> int | None:
+        """The next candidate where one is left; away from the part also all of them again."""
+        if rung not in (Rung.CANDIDATE, Rung.RESAMPLE, Rung.BACK_OFF):
+            return None
+        left = bank.give_up(env)
+        if rung is Rung.BACK_OFF and not left:
+            bank.again(env)
+        return 0 if left or rung is Rung.BACK_OFF else None
+
+    def about(self, env: int) -> dict[str, object]:
+        return super().about(env) if self._bank is None else self._bank.about(env)
 
     def approach_phases(self) -> list[Phase]:
         """Away from the part, choose, before the handle, to the handle."""
@@ -130,13 +158,49 @@ class AtHandle(PhasedSkill):
         return np.where(self.arm.arrived(ids, at, 0.01, 0.1) | (self.steps[ids] >= self.late - 1), GO_ON, STAY)
 
     def _choose(self, ids: Array, at: Array) -> None:
+        if self._bank is not None:
+            self._choose_of_bank(self._bank, ids, at)
+            return
         handle = self.handle.pose[at]
         grasps = bar_grasps(handle, self.turns)
         grasps[..., :3] += (self.depth(ids)[:, None] * _into(handle))[:, None] - in_world(grasps, self.place)
-        n, g = grasps.shape[:2]
-        clear = grasps - CLEAR * np.concatenate([in_world(grasps, self.onto), np.zeros((n, g, 4))], axis=-1)
-        ways = np.concatenate([clear[:, :, None], self._stations(at, grasps)], axis=2)
+        ways = self._ways(at, grasps)
         self._turn[ids] = self.turns[self._choice.least_motion(self.arm, ids, ways, self.excluded(grasps))]
+
+    def _choose_of_bank(self, bank: BankedGrasps, ids: Array, at: Array) -> None:
+        """The best candidate, either way round, with which the arm goes the whole way in one posture, and off the part.
+
+        Then those with which it does not get off, those with which it changes its posture under way, and last those at
+        which the hand touches more than the handle.
+        """
+        part, rows = self.part.pose(at), np.arange(len(ids))
+        goals, widths = bank.goals(ids, part, CLEAR, self.part.owner.root.pose[at])
+        grasps, room = bank.both_ways(ids, goals)
+        rank, effort = np.zeros(room.shape), np.zeros(room.shape)
+        for number, way in enumerate(grasps):
+            motion = motion_along(self.arm, ids, at, self._there_and_away(at, way))
+            rank[number] = 1.0 * np.isinf(motion[..., -2]) + np.isinf(motion[..., -1]) + 3.0 * ~room[number]
+            stations = self._ways(at, way).reshape(len(ids), -1, 7)
+            effort[number] = self.arm.reach(ids, stations)[1].reshape(*way.shape[:2], -1).max(axis=2)
+        rank[np.isinf(effort) | (widths > self.arm.aperture - ROOM)] = np.inf
+        count = bank.goal_count
+        chosen = self._choice.choose(ids, np.arange(count) + count * rank.min(axis=0))
+        bank.choose(ids, chosen, ~self._choice.none_left(ids))
+        turn = np.lexsort((effort[:, rows, chosen], rank[:, rows, chosen]), axis=0)[0]
+        self._local[ids] = P.compose(P.inverse(part), grasps[turn, rows, chosen])
+
+    def _ways(self, at: Array, grasps: Array) -> Array:
+        """(n, G, S + 1, 7) tools at (n, G, 7) from where they come on, to where the part is to go."""
+        return np.concatenate([self._short_of(grasps, CLEAR)[:, :, None], self._stations(at, grasps)], axis=2)
+
+    def _there_and_away(self, at: Array, grasps: Array) -> Array:
+        """(n, G, S + 2, 7) the same, and off the part in the end."""
+        ways = self._ways(at, grasps)
+        return np.concatenate([ways, self._short_of(ways[:, :, -1], AWAY)[:, :, None]], axis=2)
+
+    def _short_of(self, grasps: Array, distance: float) -> Array:
+        back = np.concatenate([in_world(grasps, self.onto), np.zeros((*grasps.shape[:2], 4))], axis=-1)
+        return grasps - distance * back
 
     def _stations(self, at: Array, grasps: Array) -> Array:
         """(n, G, S, 7) where tools at (n, G, 7) are on the way of the part."""
@@ -150,6 +214,10 @@ class AtHandle(PhasedSkill):
 
     def at_handle(self, ids: Array, at: Array, short_of: float) -> Array:
         """Tool poses (n, 7) at the handle, or short of it on the hand's way [m]."""
+        if self._bank is not None:
+            grasp = P.compose(self.part.pose(at), self._local[ids])
+            grasp[:, :3] -= short_of * in_world(grasp, self.onto)
+            return grasp
         handle = self.handle.pose[at]
         grasp = np.concatenate([handle[:, :3], P.multiply(handle[:, 3:], self._turn[ids])], axis=1)
         grasp[:, :3] += self.depth(ids)[:, None] * _into(handle) - short_of * in_world(grasp, self.onto)
@@ -178,6 +246,8 @@ class AtHandle(PhasedSkill):
     def close(self, ids: Array, at: Array) -> None:
         """Begin to close the fingers."""
         del at
+        if self._bank is not None:
+            self._bank.closed(ids)
         self.arm.closed[ids] = True
         self.arm.stay(ids)
 

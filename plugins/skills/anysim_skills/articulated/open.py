@@ -9,6 +9,7 @@ from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.phases import GO_ON, STAY, Phase
 from anysim.task.env import TaskEnv
 from anysim_skills.articulated.handle import AtHandle, Share
+from anysim_skills.grasping.banked import BankFile, CountsFolder, Pinned
 
 SLIP = 0.04
 """[m] a hand that is further than this from where it took hold of the part has lost it."""
@@ -16,13 +17,10 @@ OVERSHOOT = 0.05
 """Of the range: how much further the hand is commanded than asked, so that a drive's yielding does not fall short."""
 
 
-class Open(AtHandle):
-    """Open `part` with `robot` by its handle, up to a share of its range."""
+class Pulls(AtHandle):
+    """A skill that pulls a part open to the share `_fraction` of its range."""
 
-    def __init__(self, env: TaskEnv, *, fraction: Share = 0.8, **options: object) -> None:
-        self._fraction = fraction
-        self.share = min(1.0, fraction + OVERSHOOT)
-        super().__init__(env, **options)  # pyright: ignore[reportArgumentType]
+    _fraction: float
 
     def make_phases(self) -> Sequence[Phase]:
         return (
@@ -40,6 +38,24 @@ class Open(AtHandle):
 
     def succeeded(self, env_ids: Array, at: Array) -> Array:
         return np.where(self.part.joint.opening[at] >= self._fraction - 0.02, GO_ON, _MISSED)
+
+
+class Open(Pulls):
+    """Open `part` with `robot` by its handle, up to a share of its range."""
+
+    def __init__(
+        self,
+        env: TaskEnv,
+        *,
+        fraction: Share = 0.8,
+        bank: BankFile = None,
+        living: CountsFolder = None,
+        pinned: Pinned = "",
+        **options: object,
+    ) -> None:
+        self._fraction = fraction
+        self.share = min(1.0, fraction + OVERSHOOT)
+        super().__init__(env, bank, living, pinned, **options)  # pyright: ignore[reportArgumentType]
 
 
 _JAMMED = OUTCOMES.index(Outcome.JAMMED)

@@ -1,7 +1,9 @@
 """Banks of an object from files: those that hold for what it is, for the gripper and the engine, and their counts."""
 
 import hashlib
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -16,26 +18,65 @@ from anysim.task.scene import ObjectView
 
 SAME_STROKE = 0.01
 """[m] by which the bank's gripper and the arm's may open differently."""
+KEYS = ("bank", "pinned")
+"""The parameters of a skill at which it is told what does not fit."""
 _NOTHING = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+
+
+class Fit(Protocol):
+    """What a bank must be for."""
+
+    def holds(self, bank: Bank) -> bool:
+        """Whether it is."""
+        ...
+
+    def otherwise(self, banks: Sequence[Bank]) -> tuple[str, str]:
+        """What is wrong with banks that are not, and what the command that makes one is to be told besides."""
+        ...
+
+
+class OfGripper(NamedTuple):
+    """For a gripper with two fingers that opens so wide [m]."""
+
+    aperture: float
+
+    def holds(self, bank: Bank) -> bool:
+        return abs(_stroke(bank) - self.aperture) <= SAME_STROKE
+
+    def otherwise(self, banks: Sequence[Bank]) -> tuple[str, str]:
+        has = listing(sorted({f"{bank.gripper}, which opens {_stroke(bank):g} m" for bank in banks}))
+        words = f"is for another gripper ({has}); this one opens {self.aperture:g} m"
+        return words, f" --gripper parallel_gripper:stroke={self.aperture:g}"
 
 
 class Banks:
     """The candidates of each entity that an object can be, from one bank or several.
 
     Attributes:
-        pose: (E, G, 7) tool poses in the object's frame; what an entity has fewer of is filled up.
+        pose: (E, G, 7) tool poses in the frame of the body that is held; what an entity has fewer of is filled up.
         width: (E, G) [m].
+        kind: for each entity the kinds of its candidates.
         score: (E, G) the higher the better; -infinite where nothing is, or did not pass on this engine.
         about: versions of the banks and of their counts, for records.
+        keys: those of `bank` and `pinned` among a skill's parameters.
     """
 
     def __init__(
-        self, env: TaskEnv, aperture: float, object: ObjectView, path: Path, living: Path | None, pinned: str
+        self,
+        env: TaskEnv,
+        fit: Fit,
+        object: ObjectView,
+        path: Path,
+        living: Path | None,
+        pinned: str,
+        body: int | None = None,
+        keys: tuple[str, str] = KEYS,
     ) -> None:
-        """As of `BankedGrasps`; `aperture` [m] is how wide the gripper opens."""
-        self._env, self._aperture, self._object, self._path = env, aperture, object, path
+        """As of `BankedGrasps`."""
+        self._env, self._fit, self._object, self._path, self._body = env, fit, object, path, body
+        self.keys = keys
         if pinned and living is None:
-            raise _at("pinned", "counts are pinned, but none are kept; say where they are with `living`")
+            raise _at(keys[1], "counts are pinned, but none are kept; say where they are with `living`")
         found = self._read()
         used = [self._of(entity, found) for entity in object.entities]
         engine = env.engine.name
@@ -48,6 +89,7 @@ class Banks:
             np.full(shape, np.inf),
             np.full(shape, -np.inf),
         )
+        self.kind = [[kind for bank in banks for kind in bank.kind] for banks in used]
         for row, banks in enumerate(used):
             counts = [LivingBank(bank, engine, living) for bank in banks] if living is not None else []
             ends = np.cumsum([len(bank) for bank in banks])
@@ -68,7 +110,7 @@ class Banks:
                 words = (
                     f"the counts in {living} are of version {counted}, pinned is '{pinned}': outcomes were added since"
                 )
-                raise _at("pinned", f"{words}; restore them, or drop the pin")
+                raise _at(keys[1], f"{words}; restore them, or drop the pin")
 
     def note(self, which: int, number: int, success: bool) -> None:
         """An outcome of a candidate of an entity, if outcomes are kept."""
@@ -88,38 +130,46 @@ class Banks:
         try:
             found = [read_bank(file) for file in files]
         except AssetError as error:
-            raise _at("bank", str(error)) from None
+            raise _at(self.keys[0], str(error)) from None
         if not found:
-            raise _at("bank", f"there are no banks in the folder {self._path}; make one with `anysim bank build`")
+            raise _at(self.keys[0], f"there are no banks in the folder {self._path}; make one with `anysim bank build`")
         return found
 
     def _of(self, entity: Entity, found: list[Bank]) -> list[Bank]:
         """The banks of an entity."""
-        world, gripper = self._env.engine.world, self._aperture
-        own = asset_hash(world, entity, entity.root)
-        banks = [bank for bank in found if bank.asset_hash == own]
+        world = self._env.engine.world
+        held = entity.root if self._body is None else self._body
+        own, link = asset_hash(world, entity, held), held - entity.body_start
+        banks = [bank for bank in found if (bank.asset_hash, _link(bank)) == (own, link)]
         more = f"build one with `anysim bank build {self._env.name} --object {self._object.name}`"
         if not banks:
             has = listing([f"{bank.affordance} of {bank.asset}" for bank in found])
-            words = f"{self._path} holds no bank of '{entity.name}' as it is here, of the digest {own[:12]}"
-            raise _at("bank", f"{words}: shapes, surfaces, mass and joints must be the same (banks: {has}); {more}")
-        fit = [bank for bank in banks if abs(_stroke(bank) - gripper) <= SAME_STROKE]
+            name = world.bodies[held].name if link else entity.name
+            words = f"{self._path} holds no bank of '{name}' as it is here, of the digest {own[:12]}"
+            same = "shapes, surfaces, mass, joints and the link that is held"
+            raise _at(self.keys[0], f"{words}: {same} must be the same (banks: {has}); {more}")
+        fit = [bank for bank in banks if self._fit.holds(bank)]
         if not fit:
-            has = listing(sorted({f"{bank.gripper}, which opens {_stroke(bank):g} m" for bank in banks}))
-            words = f"{self._path} is for another gripper ({has}); this one opens {gripper:g} m"
-            raise _at("bank", f"{words}; {more} --gripper parallel_gripper:stroke={gripper:g}")
+            words, besides = self._fit.otherwise(banks)
+            raise _at(self.keys[0], f"{self._path} {words}; {more}{besides}")
         return fit
 
     def _passed(self, bank: Bank, engine: str) -> Array:
         try:
             return bank.passed_on(engine)
         except AssetError as error:
-            raise _at("bank", str(error)) from None
+            raise _at(self.keys[0], str(error)) from None
 
 
 def _stroke(bank: Bank) -> float:
     stroke = bank.provenance.get("stroke")
     return float(stroke) if isinstance(stroke, int | float) else float("nan")
+
+
+def _link(bank: Bank) -> int:
+    """Which of its asset's links it is on; 0 is the root."""
+    link = bank.provenance.get("link", 0)
+    return link if isinstance(link, int) else -1
 
 
 def _prior(bank: Bank) -> float:

@@ -14,6 +14,8 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.choice import Choice
+from anysim_skills.grasping.banked import BankedGrasps, BankFile, CountsFolder, Pinned
+from anysim_skills.grasping.banked_hand import OfHand, synergies
 from anysim_skills.grasping.grasp import Metres, Offset, Speed
 from anysim_skills.grasping.hand import Hand
 from anysim_skills.object_shapes import ObjectShapes
@@ -26,6 +28,8 @@ OVER = 0.15
 """[m] that the hand is higher on its way to where it approaches from."""
 BALL = 0.01
 """Of its size, by which a ball is not as long in all directions."""
+GOALS = 64
+"""So many candidates of a bank are a goal set."""
 
 
 class DexGrasp(PhasedSkill):
@@ -33,6 +37,7 @@ class DexGrasp(PhasedSkill):
 
     The tool's z is out of the palm and its y along the fingers. Candidates lay its x along the object's long axis, the
     vertical for a ball, and come from all sides across it; `place` is where that axis then is in the tool's frame.
+    Those of a bank say where the hand is and by which synergy it closes.
     """
 
     def __init__(
@@ -56,17 +61,26 @@ class DexGrasp(PhasedSkill):
         links: Annotated[int, Field(ge=1, description="of fingers that touch what is held")] = 3,
         speed: Speed = 0.3,
         phase_steps: Annotated[int, Field(ge=1, description="control steps that a move may take")] = 250,
+        bank: BankFile = None,
+        living: CountsFolder = None,
+        pinned: Pinned = "",
     ) -> None:
         self.arm = Arm.of(env, robot, gripper=hand, tool=tool, solver=solver)
         self.hand = Hand.of(env, robot, channel=hand)
-        self._object, self._synergy = object, self.hand.named(synergy)
-        self._place, self._offset, self._tilt = np.array(place), np.array(offset), tilt
-        self._least = least
+        self._object = object
+        self._synergy = np.full(env.num_envs, self.hand.named(synergy))
+        self._place, self._offset = np.array(place), np.array(offset)
+        self._tilt, self._least = tilt, least
         self._hover, self._lift, self._links = hover, lift, links
         self._speed, self._late = speed, phase_steps
         self._shapes = ObjectShapes(env.scene, object)
         n = env.num_envs
-        self._choice = Choice(n, 2 * ANGLES)
+        self._bank: BankedGrasps | None = None
+        if bank is not None:
+            fit = OfHand(env.engine.index.robot(robot.name).model, self.hand)
+            self._bank = BankedGrasps(env, self.arm, object, bank, living, pinned, fit=fit, goals=GOALS)
+            self._synergies = synergies(self.hand, self._bank.banks.kind, self._bank.banks.score.shape[1])
+        self._choice = Choice(n, 2 * ANGLES if self._bank is None else self._bank.goal_count)
         self._goal, self._rest = np.zeros((n, 7)), np.zeros(n)
         super().__init__(env, [self.arm, self.hand])
 
@@ -85,16 +99,25 @@ class DexGrasp(PhasedSkill):
     def start(self, env_ids: Array) -> None:
         super().start(env_ids)
         self._choice.again(env_ids)
+        if self._bank is not None:
+            self._bank.start(env_ids)
         self.phase[env_ids] = 1
 
     def retry(self, rung: Rung, env: int) -> int | None:
         """The next candidate where one is left; else away from the object, and all of them again."""
+        if self._bank is not None and rung in (Rung.CANDIDATE, Rung.RESAMPLE):
+            return 0 if self._bank.give_up(env) else None
         if rung is Rung.CANDIDATE and self._choice.next(env):
             return 0
         if rung is Rung.BACK_OFF:
             self._choice.again(env)
+            if self._bank is not None:
+                self._bank.again(env)
             return 0
         return None
+
+    def about(self, env: int) -> dict[str, object]:
+        return super().about(env) if self._bank is None else self._bank.about(env)
 
     # ------------------------------------------------------------------ to the object
 
@@ -117,6 +140,9 @@ class DexGrasp(PhasedSkill):
 
     def _choose(self, ids: Array, at: Array) -> None:
         self.hand.open(ids)
+        if self._bank is not None:
+            self._choose_of_bank(self._bank, ids, at)
+            return
         grasps = self._candidates(ids, at)
         up = np.array([0.0, 0.0, self._lift, 0.0, 0.0, 0.0, 0.0])
         ways = np.stack([_along(grasps, -self._hover), grasps, grasps + up], axis=2)
@@ -128,6 +154,22 @@ class DexGrasp(PhasedSkill):
         bad = (out > STEEPEST) | (fingers > STEEPEST) | (grasps[..., 2] < lowest[:, None] + self._least)
         effort = np.where(bad, np.inf, effort)
         self._goal[ids] = grasps[np.arange(n), self._choice.choose(ids, effort)]
+
+    def _choose_of_bank(self, bank: BankedGrasps, ids: Array, at: Array) -> None:
+        """Of those as good as the best that the arm reaches, before, at and after it, the one of the least motion.
+
+        A hand does not come from below. One from behind the object would push it over on its way there.
+        """
+        grasps, widths = bank.goals(ids, self._object.root.pose[at], self._hover)
+        up = np.array([0.0, 0.0, self._lift, 0.0, 0.0, 0.0, 0.0])
+        ways = np.stack([_along(grasps, -self._hover), grasps, grasps + up], axis=2)
+        effort = self.arm.reach(ids, ways.reshape(len(ids), -1, 7))[1].reshape(ways.shape[:3]).max(axis=2)
+        bad = (P.rotate(grasps[..., 3:], np.broadcast_to(np.eye(3)[2], (*grasps.shape[:2], 3)))[..., 2]) > STEEPEST
+        fit = np.isfinite(effort) & np.isfinite(widths) & ~bad
+        chosen = self._choice.choose(ids, np.where(bank.alike(ids, fit), effort, np.inf))
+        bank.choose(ids, chosen, ~self._choice.none_left(ids))
+        self._goal[ids] = grasps[np.arange(len(ids)), chosen]
+        self._synergy[ids] = self._synergies[bank.which(ids), bank.number[ids]]
 
     def _chosen(self, ids: Array, at: Array) -> Array:
         none = self._choice.none_left(ids)
@@ -154,7 +196,9 @@ class DexGrasp(PhasedSkill):
     def _close(self, ids: Array, at: Array) -> None:
         del at
         self.arm.stay(ids)
-        self.hand.close(ids, self._synergy)
+        if self._bank is not None:
+            self._bank.closed(ids)
+        self.hand.close(ids, self._synergy[ids])
 
     def _closing(self, ids: Array, at: Array) -> Array:
         del at

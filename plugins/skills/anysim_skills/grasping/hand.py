@@ -36,6 +36,8 @@ class Hand(Mover):
         press: of s, beyond contact.
         s: (N, F) how far each finger is closed.
         joints: (K,) world indices of the channel's joints.
+        names: (K,) of these, without the robot's.
+        opened: (K,) [rad] where they are open.
         told: (N, K) where the joints are to be, in envs that are told so; NaN in the others.
         stopped: (N, F) bool: it has touched something, or is closed.
     """
@@ -54,12 +56,12 @@ class Hand(Mover):
         self.fingers, self.synergies = tuple(entry.groups), tuple(entry.synergies)
         joints = [world.actuators[a].joint for a in view.actuators]
         self.joints = np.array(joints, dtype=np.int64)
-        names = [world.joints[j].name.removeprefix(f"{robot.name}.") for j in joints]
+        self.names = tuple(world.joints[j].name.removeprefix(f"{robot.name}.") for j in joints)
         owner = {name: f for f, group in enumerate(entry.groups.values()) for name in group}
-        self._finger = np.array([owner.get(name, -1) for name in names], dtype=int)
+        self._finger = np.array([owner.get(name, -1) for name in self.names], dtype=int)
         """(K,) the finger of each drive."""
-        self._opened = np.array(view.opened, dtype=float)
-        self._ways = np.array([np.array(q, dtype=float) - self._opened for q in entry.synergies.values()])
+        self.opened = np.array(view.opened, dtype=float)
+        self._ways = np.array([np.array(q, dtype=float) - self.opened for q in entry.synergies.values()])
         self._of_body = _fingers_of_bodies(
             env, robot.name, {j: f for j, f in zip(joints, self._finger.tolist(), strict=True) if f >= 0}
         )
@@ -88,6 +90,10 @@ class Hand(Mover):
         """
         return _index("synergy", synergy, self.synergies)
 
+    def postures(self) -> dict[str, Array]:
+        """The synergies (K,) [rad] by name."""
+        return {name: self.opened + way for name, way in zip(self.synergies, self._ways, strict=True)}
+
     def pointing(self, finger: str, synergy: str) -> Array:
         """(K,) joint positions of a posture in which one finger is open.
 
@@ -95,7 +101,7 @@ class Hand(Mover):
             TaskError: the hand has no such finger or posture.
         """
         bent = self._finger != _index("finger", finger, self.fingers)
-        return self._opened + bent * self._ways[self.named(synergy)]
+        return self.opened + bent * self._ways[self.named(synergy)]
 
     def renew(self, ids: Array) -> None:
         """These envs have just been reset."""
@@ -111,8 +117,8 @@ class Hand(Mover):
         """Open all fingers."""
         self.closing[ids], self.s[ids], self.stopped[ids], self.told[ids] = False, 0.0, False, np.nan
 
-    def close(self, ids: Array, synergy: int) -> None:
-        """Close towards a posture."""
+    def close(self, ids: Array, synergy: int | Array) -> None:
+        """Close towards a posture, or to one in each env (n,)."""
         self.closing[ids], self.synergy[ids], self.told[ids] = True, synergy, np.nan
 
     def go(self, ids: Array, targets: Array) -> None:
@@ -151,7 +157,7 @@ class Hand(Mover):
             self.s[own] = np.minimum(s, 1.0)
             self.stopped[own] |= touched | (self.s[own] >= 1.0)
         share = np.where(self._finger >= 0, self.s[ids][:, self._finger], self.s[ids].min(axis=1)[:, None])
-        targets = self._opened + share * self._ways[self.synergy[ids]]
+        targets = self.opened + share * self._ways[self.synergy[ids]]
         targets = np.where(np.isnan(self.told[ids]), targets, self.told[ids])
         action[ids, self._slice.start : self._slice.stop] = self._slice.controller.action_for(targets, ids)
 

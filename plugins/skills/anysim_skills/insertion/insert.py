@@ -1,6 +1,7 @@
 """Insert: put a held peg into a hole, with a spiral search where it does not find it, and let go of it."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated
 
 import numpy as np
@@ -13,8 +14,12 @@ from anysim.skills.phases import GO_ON, STAY, Phase, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.arm import Arm
+from anysim_skills.choice import Choice
+from anysim_skills.grasping.bank_files import KEYS
+from anysim_skills.grasping.banked import CountsFolder, Pinned
 from anysim_skills.grasping.grasp import Metres, Speed
 from anysim_skills.grasping.held import RESTING, Moves, PutsDown
+from anysim_skills.insertion.banked_insertions import BankedInsertions
 
 GENTLE = 0.012
 """[m] lead of the command while the peg is lowered: it bounds the force."""
@@ -28,6 +33,9 @@ TURNED = 1e-6
 """Of the vector part of a quaternion: a tip's axes that are turned further are not those of the object."""
 TURN = 0.35
 """[rad] of the spiral in a control step."""
+InsertionsFile = Annotated[
+    Path | None, Field(description="a bank of insertions, or a folder of banks; none: turns by `symmetry`")
+]
 
 
 class Insert(PutsDown):
@@ -39,6 +47,7 @@ class Insert(PutsDown):
     def __init__(
         self,
         env: TaskEnv,
+        keys: tuple[str, str] = KEYS,
         *,
         robot: RobotView,
         object: ObjectView,
@@ -57,28 +66,51 @@ class Insert(PutsDown):
         lower_speed: Speed = 0.05,
         retreat: Metres = 0.1,
         steps: Annotated[int, Field(ge=1, description="control steps that a move may take")] = 200,
+        bank: InsertionsFile = None,
+        living: CountsFolder = None,
+        pinned: Pinned = "",
     ) -> None:
+        """`keys` are those at which is told what does not fit in `bank` and `pinned`."""
         self._tip, self._hole, self._mouth = tip, hole, mouth
         self._symmetry, self._above, self._align, self._depth = symmetry, above, align, depth
         self._pitch, self._reach = pitch, reach
         self._touched = np.zeros(env.num_envs)
+        self._bank: BankedInsertions | None = None
+        if bank is not None:
+            self._bank = BankedInsertions(env, object, tip, mouth, bank, living, pinned, keys)
+        self._choice = Choice(env.num_envs, 1 if self._bank is None else self._bank.goal_count)
         arm = Arm.of(env, robot, tool=tool, solver=solver)
         super().__init__(env, arm, object, Moves(speed, lower_speed, retreat, steps))
 
     def make_phases(self) -> Sequence[Phase]:
         return (
-            Phase("transport", self.take, self._transport, self.moves.steps),
+            Phase("transport", self._begin, self._transport, self.moves.steps),
             Phase("align", None, self._aligning, ALIGNING_STEPS + 1),
-            Phase("lower", None, self._lowering, self.moves.steps),
+            Phase("lower", self._carry_out, self._lowering, self.moves.steps),
             Phase("search", self._touch, self._searching, SEARCHING_STEPS + 1),
             Phase("seat", None, self._seating, self.moves.steps),
             *self.let_go(),
         )
 
+    def start(self, env_ids: Array) -> None:
+        super().start(env_ids)
+        self._choice.again(env_ids)
+        if self._bank is not None:
+            self._bank.start(env_ids)
+
     def retry(self, rung: Rung, env: int) -> int | None:
-        """From above again where it jammed; what is not held any more has to be grasped again."""
-        del env
-        return 0 if rung is Rung.REPLAN else None
+        """From above again where it jammed, of a bank with the next turn; else it has to be grasped again."""
+        if self._bank is None:
+            return 0 if rung is Rung.REPLAN else None
+        if rung not in (Rung.REPLAN, Rung.CANDIDATE):
+            return None
+        left = self._bank.give_up(env)
+        if rung is Rung.REPLAN and not left:
+            self._bank.again(env)
+        return 0 if left or rung is Rung.REPLAN else None
+
+    def about(self, env: int) -> dict[str, object]:
+        return super().about(env) if self._bank is None else self._bank.about(env)
 
     # ------------------------------------------------------------------ where the tip is, and is to be
 
@@ -86,6 +118,10 @@ class Insert(PutsDown):
         """Poses (n, 7) of the object, its tip along the hole's axes at offsets (n, 3) from the mouth."""
         thing, mouth = self.object.root.pose[at], self._mouth.pose[at]
         to_tip = P.compose(P.inverse(thing), self._tip.pose[at])
+        if self._bank is not None:
+            tip = self._bank.turn(self.env.scene.env_ids[at], self._tip.quaternion[at])
+            point = mouth[:, :3] + P.rotate(mouth[:, 3:], offset)
+            return P.compose(np.concatenate([point, tip], axis=1), P.inverse(to_tip))
         turned = P.norm(to_tip[:, 3:6]) > TURNED
         along = np.where(turned[:, None], P.multiply(thing[:, 3:], to_tip[:, 3:]), thing[:, 3:])
         seen = P.multiply(P.conjugate(mouth[:, 3:]), along)
@@ -103,10 +139,16 @@ class Insert(PutsDown):
         held = P.compose(P.inverse(self.object.root.pose[at]), self.arm.tool.pose[at])
         return P.compose(self._fitting(at, offset), held)
 
+    def _ends(self, at: Array) -> tuple[Array, Array]:
+        """(n, 3) offsets over the mouth and at the hole's end."""
+        over, inside = np.zeros((2, len(at), 3))
+        over[:, 2], inside[:, 2] = 2 * self._above, -P.norm(self._hole.position[at] - self._mouth.position[at])
+        return over, inside
+
     def wanted(self, ids: Array, at: Array, grasps: Array) -> Array:
         """Tool poses (n, g, 2, 7) over the mouth and at the hole's end, in grasps (n, g, 7)."""
-        over, inside = np.zeros((2, len(ids), 3))
-        over[:, 2], inside[:, 2] = 2 * self._above, -P.norm(self._hole.position[at] - self._mouth.position[at])
+        del ids
+        over, inside = self._ends(at)
         held = P.compose(P.inverse(self.object.root.pose[at])[:, None], grasps)
         ends = [P.compose(self._fitting(at, offset)[:, None], held) for offset in (over, inside)]
         return np.stack(ends, axis=2)
@@ -122,6 +164,27 @@ class Insert(PutsDown):
 
     # ------------------------------------------------------------------ phases
 
+    def _begin(self, ids: Array, at: Array) -> None:
+        self.take(ids, at)
+        if self._bank is not None:
+            self._choose(self._bank, ids, at)
+
+    def _choose(self, bank: BankedInsertions, ids: Array, at: Array) -> None:
+        """Of the turns that are as good as the best the one that needs the least motion."""
+        good, turns = bank.good(ids), bank.turns(ids)
+        tip, mouth = self._tip.pose[at], self._mouth.pose[at]
+        held = P.compose(P.inverse(tip), self.arm.tool.pose[at])[:, None]
+        points = [mouth[:, :3] + P.rotate(mouth[:, 3:], offset) for offset in self._ends(at)]
+        ways = [np.concatenate([np.broadcast_to(p[:, None], (*turns.shape[:2], 3)), turns], axis=2) for p in points]
+        tools = np.stack([P.compose(way, np.broadcast_to(held, way.shape)) for way in ways], axis=2)
+        chosen = self._choice.least_motion(self.arm, ids, tools, ~good)
+        bank.choose(ids, chosen, ~self._choice.none_left(ids))
+
+    def _carry_out(self, ids: Array, at: Array) -> None:
+        del at
+        if self._bank is not None:
+            self._bank.closed(ids)
+
     def _transport(self, ids: Array, at: Array) -> Array:
         """Out along the axis first where the tip is lower than it is to pass, then across."""
         found, over = self._found(at), np.zeros((len(ids), 3))
@@ -135,7 +198,8 @@ class Insert(PutsDown):
         up = np.concatenate([here[:, :2], goal[rise, 2:3]], axis=1)
         goal[rise, :3], goal[rise, 3:] = np.where(out[:, 2:] > UPRIGHT, up, ahead), here[:, 3:]
         self.arm.go(ids, goal, self.moves.speed)
-        return self.held(ids, at, np.where(~far & ~rise, GO_ON, STAY))
+        said = self.held(ids, at, np.where(~far & ~rise, GO_ON, STAY))
+        return said if self._bank is None else np.where(self._bank.number[ids] < 0, _NO_IK, said)
 
     def _aligning(self, ids: Array, at: Array) -> Array:
         over = np.zeros((len(ids), 3))
@@ -183,5 +247,6 @@ class Insert(PutsDown):
         return np.where(self._depth_of(at) >= self._depth - 0.1, GO_ON, _LOST)
 
 
+_NO_IK = OUTCOMES.index(Outcome.NO_IK)
 _LOST = OUTCOMES.index(Outcome.LOST)
 _JAMMED = OUTCOMES.index(Outcome.JAMMED)

@@ -10,7 +10,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.grasping.banked import BankFile, CountsFolder, Pinned
 from anysim_skills.grasping.grasp import Grasp, Metres, Offset, Speed
-from anysim_skills.insertion.insert import Insert
+from anysim_skills.insertion.insert import Insert, InsertionsFile
 
 
 class PickInsert(SkillSequence):
@@ -35,10 +35,15 @@ class PickInsert(SkillSequence):
         bank: BankFile = None,
         living: CountsFolder = None,
         pinned: Pinned = "",
+        insertions: InsertionsFile = None,
+        pinned_insertions: Pinned = "",
     ) -> None:
+        """`bank` is of grasps, `insertions` of turns in which the object goes into the hole; `living` is of both."""
         arm = {"robot": robot, "object": object, "tool": tool, "solver": solver, "speed": speed}
         known = {"bank": bank, "living": living, "pinned": pinned}
-        insert = Insert(env, **arm, tip=tip, hole=hole, mouth=mouth, symmetry=symmetry)
+        into = {"bank": insertions, "living": living, "pinned": pinned_insertions}
+        keys = ("insertions", "pinned_insertions")
+        insert = Insert(env, keys, **arm, **into, tip=tip, hole=hole, mouth=mouth, symmetry=symmetry)
         members = {"grasp": Grasp(env, insert, **arm, **known, offset=offset, hover=hover, lift=0.0), "insert": insert}
         again = {("insert", why): "grasp" for why in (Outcome.UNSTABLE_GRASP, Outcome.LOST)}
         super().__init__(env, members, back=again, max_attempts=max_attempts)
