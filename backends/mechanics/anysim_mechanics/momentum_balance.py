@@ -30,7 +30,7 @@ class Balance(NamedTuple):
     doubt: Array
 
 
-class Conditions(NamedTuple):
+class Circumstances(NamedTuple):
     """What an env was under in a substep.
 
     Attributes:
@@ -81,7 +81,7 @@ class MomentumBalance:
         """Where there was no substep."""
         return Balance(np.zeros((len(self._parent), 3)), np.full(len(self._parent), np.inf))
 
-    def solve(self, substep: Substep, given: Conditions) -> Balance:
+    def solve(self, substep: Substep, given: Circumstances) -> Balance:
         """Net contact forces of a substep."""
         (force, doubt), moving, mass = self.unknown(), self._moving, given.mass[self._moving]
         before = substep.before[moving]
@@ -99,7 +99,7 @@ class MomentumBalance:
         doubt[moving] = (given.friction @ self._doubts)[moving]
         return Balance(force, doubt)
 
-    def _dragged(self, before: Array, given: Conditions) -> Array:
+    def _dragged(self, before: Array, given: Circumstances) -> Array:
         """(M, 3) [N] what damping takes of what moves."""
         moving = self._moving
         pushed = np.zeros((len(self._parent), 3))

@@ -5,19 +5,19 @@ from typing import NamedTuple
 import numpy as np
 
 from anysim.conventions import Array, xyzw_from_wxyz
-from anysim_mechanics.momentum_balance import Balance, Conditions, MomentumBalance, Substep
+from anysim_mechanics.momentum_balance import Balance, Circumstances, MomentumBalance, Substep
 from anysim_sapien.recipe import Recipes
 from anysim_sapien.scene import EnvScene
 
 
-class _RawSubstep(NamedTuple):
+class _SubstepNotes(NamedTuple):
     """What a substep did to an env: as read, since most steps are never asked about."""
 
     scene: EnvScene
     before: bytes
     links_before: list[Array]
     after: bytes
-    given: Conditions
+    given: Circumstances
 
     def substep(self) -> Substep:
         """The same as arrays."""
@@ -40,7 +40,7 @@ class Momentum:
     def __init__(self, recipes: Recipes, num_envs: int) -> None:
         turns = [xyzw_from_wxyz(np.asarray(in_child.q, dtype=float)) for _, in_child in recipes.frames]
         self._rule = MomentumBalance(recipes.world, np.array(turns).reshape(-1, 4))
-        self.noted: list[_RawSubstep | None] = [None] * num_envs
+        self.noted: list[_SubstepNotes | None] = [None] * num_envs
         """What the last substep of each env did; None where there was none."""
         self._balance: list[Balance | None] = [None] * num_envs
 
@@ -59,8 +59,8 @@ class Momentum:
     def after(self, env: int, scene: EnvScene, pushes: Array | None) -> None:
         """After the last substep, with `pushes` (K, 7): bodies and the wrenches that were on them."""
         self._balance[env] = None
-        given = Conditions(scene.gravity, scene.mass, scene.rubbing, scene.slowing, pushes)
-        self.noted[env] = _RawSubstep(scene, *self._before, scene.packed(), given)
+        given = Circumstances(scene.gravity, scene.mass, scene.rubbing, scene.slowing, pushes)
+        self.noted[env] = _SubstepNotes(scene, *self._before, scene.packed(), given)
 
     def balance(self, env: int) -> Balance:
         """Net contact forces of the env's last substep; all in doubt where there was none."""

@@ -15,7 +15,7 @@ from anysim_mechanics import articulation as K
 from anysim_mechanics.computed_drives import DriveArrays, TreeDrives
 from anysim_mechanics.damped_drives import DampedDrives, native_targets, substep
 from anysim_mechanics.link_twists import LinkTwists
-from anysim_mechanics.momentum_balance import Conditions, MomentumBalance, Substep
+from anysim_mechanics.momentum_balance import Circumstances, MomentumBalance, Substep
 from anysim_mechanics.trees import frames_of, trees_of
 
 
@@ -100,7 +100,7 @@ def test_what_is_left_of_momentum_is_the_contact():
     mass = np.array([body.inertial.mass for body in world.bodies])
     slowing = np.zeros((count, 2))
     slowing[box, 0] = 0.5
-    given = Conditions(
+    given = Circumstances(
         np.array([0.0, 0.0, -9.81]), mass, np.zeros(len(world.joints)), slowing, np.array([[box, *push, 0, 0, 0]])
     )
     rule, still = MomentumBalance(world, np.tile([0.0, 0.0, 0.0, 1.0], (len(world.joints), 1))), np.zeros((count, 3))
