@@ -423,19 +423,8 @@ def weight(
         motion[0, i] = position[joints[i]]
     for k in range(7):
         place[k] = root[k]
-    dynamics(
-        joint_ints,
-        joint_floats,
-        bodies[numbers],
-        np.zeros((n + 1, 6)),
-        gravity,
-        place,
-        motion,
-        first,
-        np.empty((size, size)),
-        np.empty(size),
-        known,
-    )
+    wrench, mass, bias = np.zeros((n + 1, 6)), np.empty((size, size)), np.empty(size)
+    dynamics(joint_ints, joint_floats, bodies[numbers], wrench, gravity, place, motion, first, mass, bias, known)
     for v in range(size):
         if not math.isfinite(known[v]):
             return False

@@ -13,6 +13,9 @@ from anysim_mechanics import articulation as K
 from anysim_mechanics.drive_gains import DriveGains
 from anysim_mechanics.trees import Frames, Tree
 
+_TERMS = np.array([K.STIFFNESS, K.DRAG, K.PULL, K.FEED, K.BOUND, K.LIMIT])
+"""Columns of drives that follow from commands and gains, in the order of `DriveGains.write`."""
+
 
 class DriveArrays:
     """Arrays of the drive law: per joint, per body, and what the last step left.
@@ -51,11 +54,7 @@ class DriveArrays:
 
     def command(self, control: Control) -> None:
         """Take over commands: what the modes leave of the gains, and the part of the law that has no state in it."""
-        joint, terms = self.gains.joint, self.gains.terms(control)
-        at = self.drives[:, joint]
-        at[:, :, K.STIFFNESS], at[:, :, K.DRAG], at[:, :, K.LIMIT] = terms.stiffness, terms.damping, self.gains.limit
-        at[:, :, K.PULL], at[:, :, K.FEED], at[:, :, K.BOUND] = terms.pull, control.effort, terms.bound
-        self.drives[:, joint] = at
+        self.gains.write(control, self.drives.swapaxes(1, 2), _TERMS)
 
     def lifted(self) -> Array:
         """(B,) bool: bodies whose weight is compensated in any env."""

@@ -67,12 +67,10 @@ def _friction(pairs: Sequence[Pair], spread: list[Array], balance: Balance) -> A
         balance: net contact forces, and by how much they may be off.
     """
     touched = {body for pair in pairs if pair.pressure.any() for body in (pair.first, pair.second)}
-    rows = {
-        body: i for i, body in enumerate(sorted(b for b in touched if b != WORLD and np.isfinite(balance.doubt[b])))
-    }
-    if not rows:
+    known = sorted(body for body in touched if body != WORLD and np.isfinite(balance.doubt[body]))
+    if not known:
         return np.zeros((len(pairs), 3))
-    left = balance.force[list(rows)]
+    rows, left = {body: i for i, body in enumerate(known)}, balance.force[known]
     enters = np.zeros((len(rows), len(pairs)))
     for column, pair in enumerate(pairs):
         for body, sign in ((pair.first, 1.0), (pair.second, -1.0)):
@@ -82,7 +80,7 @@ def _friction(pairs: Sequence[Pair], spread: list[Array], balance: Balance) -> A
     free = np.array(spread)
     matrix = np.einsum("ac,cij,bc->aibj", enters, free, enters).reshape(3 * len(rows), -1)
     diagonal = np.einsum("ac,cii->a", np.abs(enters), free).repeat(3)
-    matrix[np.diag_indices(len(matrix))] += _NOISE**2 * diagonal + (balance.doubt[list(rows)] ** 2).repeat(3) + 1e-18
+    matrix[np.diag_indices(len(matrix))] += _NOISE**2 * diagonal + (balance.doubt[known] ** 2).repeat(3) + 1e-18
     weight = np.linalg.solve(matrix, left.ravel()).reshape(-1, 3)
     return np.einsum("cij,ac,aj->ci", free, enters, weight)
 

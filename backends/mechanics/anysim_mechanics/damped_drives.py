@@ -12,7 +12,7 @@ Kernels that call each other share one file because numba's cache notices a chan
 compiled with fast-math, and none adds in an order that depends on the number of envs: an env's bits are its own.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
 
 import numpy as np
 
@@ -21,11 +21,14 @@ from anysim.engine.control import Control
 from anysim.errors import EngineError
 from anysim.math.compiled import compiled
 from anysim.model.world import Actuation, World
-from anysim_mechanics.drive_gains import DriveGains, LawTerms
+from anysim_mechanics.drive_gains import DriveGains
 from anysim_mechanics.journal import Journal, Op
 
 PUSH, FEED, STIFFNESS, DAMPING, BOUND, ASKED, PASSIVE, GIVEN = range(8)
 """Rows of a law (N, 8, J); `ASKED` bounds what the targets ask for, `GIVEN` is what the last substep was given."""
+
+_TERMS = np.array([STIFFNESS, DAMPING, PUSH, FEED, ASKED, BOUND])
+"""Rows that follow from commands and gains, in the order of `DriveGains.write`."""
 
 LAW, EXPLICIT, NATIVE = range(3)
 """What computes the drives: the library their damping, the law alone, or the library all of it."""
@@ -34,20 +37,12 @@ TARGET, SPEED, GAINS, FORCE = 1, 2, 4, 8
 """What is to be told of a joint."""
 
 
-class _SubstepEnd(NamedTuple):
-    """What an env's efforts are worked out from: the law of its last substep, and the motion (J,) that it left."""
-
-    law: Array
-    position: Array
-    velocity: Array
-
-
 class DampedDrives:
     """The drives of all envs; how a library is told of them is a subclass's to say.
 
     Attributes:
         gains, passive: what may be changed: the drives' gains, and the joints' own damping (N, J).
-        terms: the law's for the present commands, None before any. law: (N, 8, J) the same of each joint.
+        control: the present commands, None before any. law: (N, 8, J) that of each joint.
         told: (N, ...) what the library has been told of the drives of each env; not a number where nothing yet.
     """
 
@@ -63,12 +58,14 @@ class DampedDrives:
         self._commanded, self._tuned = 0, 0  # how often commands, and gains, were written
         self.kind = {Actuation.EXPLICIT_PD: EXPLICIT, Actuation.NATIVE: NATIVE}.get(world.physics.actuation, LAW)
         self.news = np.zeros((len(joints), 2), dtype=int)
-        self._ended: list[_SubstepEnd | None] = [None] * num_envs
+        self._last: list[tuple[Array, Callable[[], tuple[Array, Array]]] | None] = [None] * num_envs
+        """By env the law of its last substep, and what reads the motion that it left."""
         self._update()
 
     def apply(self, control: Control) -> None:
         """Take over the commands of all envs."""
-        self.control = Control(*(part.copy() for part in control))
+        position, velocity, effort, mode = (part.copy() for part in control)
+        self.control = Control(position, velocity, effort, mode.astype(np.int8, copy=False))
         self._commanded += 1
         self._update()
 
@@ -80,14 +77,9 @@ class DampedDrives:
     def _update(self) -> None:
         """Make the law: a new array, since efforts of the last substep may yet be asked for."""
         self.law = np.zeros((len(self.passive), 8, self.passive.shape[1]))
-        self.law[:, [BOUND, ASKED]], self.law[:, PASSIVE] = np.inf, self.passive
-        self.terms: LawTerms | None = None
+        self.law[:, BOUND : ASKED + 1], self.law[:, PASSIVE] = np.inf, self.passive
         if self.control is not None:
-            joint, terms = self.gains.joint, self.gains.terms(self.control)
-            self.law[:, PUSH, joint], self.law[:, FEED, joint] = terms.pull, self.control.effort
-            self.law[:, STIFFNESS, joint], self.law[:, DAMPING, joint] = terms.stiffness, terms.damping
-            self.law[:, BOUND, joint], self.law[:, ASKED, joint] = self.gains.limit, terms.bound
-            self.terms = terms
+            self.gains.write(self.control, self.law, _TERMS)
 
     # ------------------------------------------------------------------ other scenes
 
@@ -101,8 +93,8 @@ class DampedDrives:
 
     def set_gains(self, env: int, values: Array) -> None:
         """Write an env's kp, kd, limits (A,) and passive damping (J,), one after the other."""
-        own, a = self.gains, len(self.gains.joint)
-        own.kp[env], own.kd[env], own.limit[env] = values[: 3 * a].reshape(3, a)
+        a = len(self.gains.joint)
+        self.gains.values[:, env] = values[: 3 * a].reshape(3, a)
         self.passive[env] = values[3 * a :]
         self.refresh()
 
@@ -112,20 +104,19 @@ class DampedDrives:
             journal.commanded, control = self._commanded, self.control
             journal.renew(Op.CONTROL, b"" if control is None else np.concatenate([c[env] for c in control]).tobytes())
         if journal.tuned != self._tuned:
-            journal.tuned, own = self._tuned, self.gains
-            journal.renew(Op.GAINS, b"".join(v[env].tobytes() for v in (own.kp, own.kd, own.limit, self.passive)))
+            journal.tuned = self._tuned
+            journal.renew(Op.GAINS, self.gains.values[:, env].tobytes() + self.passive[env].tobytes())
 
     # ------------------------------------------------------------------ what was exerted
 
-    def note(self, env: int, position: Array, velocity: Array) -> None:
-        """After the last substep, with the motion (J,) that it left. Most steps are never asked for."""
-        self._ended[env] = _SubstepEnd(self.law, position, velocity)
+    def note(self, env: int, motion: Callable[[], tuple[Array, Array]]) -> None:
+        """After the last substep: `motion` reads the positions and velocities (J,) that it left, if it is asked for."""
+        self._last[env] = self.law, motion
 
     def exerted(self, env: int, effort: Array) -> None:
         """Write what the env's drives exerted in the last substep into its row of (N, J)."""
-        ended = self._ended[env]
-        if ended is not None:
-            exerted(ended.law, env, ended.position, ended.velocity, self.kind, effort)
+        if (last := self._last[env]) is not None:
+            exerted(last[0], env, *last[1](), self.kind, effort)
 
 
 @compiled
@@ -237,3 +228,59 @@ def exerted(law: Array, env: int, position: Array, velocity: Array, kind: int, e
         if kind != EXPLICIT:
             value -= law[env, DAMPING, j] * velocity[j]
         effort[env, j] = _clip(value, law[env, BOUND, j])
+
+
+@compiled
+def _target(
+    position: float, velocity: float, feed: float, stiffness: float, damping: float, whole: float
+) -> tuple[float, float]:
+    """Targets of a native drive: feed-forward moves one of them, a joint's own damping that of the velocity."""
+    stiff = stiffness > 0.0
+    push = damping * velocity + (0.0 if stiff else feed)
+    return position + (feed / stiffness if stiff else 0.0), push / whole if whole > 0.0 else 0.0
+
+
+@compiled
+def native_targets(
+    position: Array,
+    velocity: Array,
+    effort: Array,
+    stiffness: Array,
+    damping: Array,
+    whole: Array,
+    place: Array,
+    speed: Array,
+) -> None:
+    """What a library's own drives are told for commands; all are (N, A).
+
+    Args:
+        position, velocity, effort: the commands.
+        stiffness, damping: of the drives in their modes.
+        whole: damping and the joints' own. place, speed: the drives' targets, written.
+    """
+    for env in range(position.shape[0]):
+        for a in range(position.shape[1]):
+            told = position[env, a], velocity[env, a], effort[env, a]
+            place[env, a], speed[env, a] = _target(*told, stiffness[env, a], damping[env, a], whole[env, a])
+
+
+@compiled
+def native_terms(position: Array, velocity: Array, joint: Array, law: Array, unbounded: float, wanted: Array) -> None:
+    """Write terms (N, J, 6) of a library's own drives, as in `changes`, for commands (N, A) and the law (N, 8, J)."""
+    for e in range(wanted.shape[0]):
+        for j in range(wanted.shape[1]):
+            wanted[e, j, :] = 0.0
+            wanted[e, j, 3], wanted[e, j, 4] = law[e, PASSIVE, j], unbounded
+        for a in range(position.shape[1]):
+            j = joint[a]
+            stiffness, damping, feed = law[e, STIFFNESS, j], law[e, DAMPING, j], law[e, FEED, j]
+            whole, driven = damping + law[e, PASSIVE, j], stiffness > 0.0 or damping > 0.0
+            fed = feed if driven else 0.0
+            place, wanted[e, j, 1] = _target(position[e, a], velocity[e, a], fed, stiffness, damping, whole)
+            wanted[e, j, 0] = place if stiffness > 0.0 else 0.0
+            wanted[e, j, 2], wanted[e, j, 3] = stiffness, whole
+            # a drive in effort mode exerts a force, and its joint's damping has no limit
+            if driven:
+                wanted[e, j, 4] = min(law[e, BOUND, j], unbounded)
+            else:
+                wanted[e, j, 5] = _clip(feed, law[e, BOUND, j])

@@ -40,9 +40,8 @@ class GravityCompensation:
     def renew(self, env: int, tree: Tree, position: Array) -> bool:
         """Work out the torques of a tree at the env's joint positions (J,); False where they are not finite."""
         bodies, gravity, root = (part[env] for part in (self._arrays.bodies, self._arrays.gravity, self._arrays.roots))
-        shape = tree.joint_ints, tree.joint_floats, bodies, tree.bodies
-        state = gravity, root[tree.bodies[0]], position
-        return K.weight(*shape, *state, tree.joints, tree.first, self.torque[env])
+        terms = tree.joint_ints, tree.joint_floats, bodies, tree.bodies, gravity, root[tree.bodies[0]], position
+        return K.weight(*terms, tree.joints, tree.first, self.torque[env])
 
     def spend(self, env: int, steps: int) -> int:
         """How many of some steps the torques are good for; these are counted."""

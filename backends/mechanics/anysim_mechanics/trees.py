@@ -94,16 +94,8 @@ def _tree(world: World, frames: Frames, number: int, bodies: list[int]) -> Tree:
             multiplier[i] *= leader.mimic.multiplier
             leader = world.joints[leader.mimic.joint]
     free = world.bodies[bodies[0]].kind is BodyKind.FREE
-    return Tree(
-        number,
-        np.array(bodies, dtype=int),
-        np.array(joints, dtype=int),
-        free,
-        6 if free else 0,
-        ints,
-        floats,
-        multiplier,
-    )
+    indices = np.array(bodies, dtype=int), np.array(joints, dtype=int)
+    return Tree(number, *indices, free, 6 if free else 0, ints, floats, multiplier)
 
 
 def link_pose(world: World, frames: Frames, body: int) -> Array:

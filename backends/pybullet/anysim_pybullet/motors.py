@@ -17,8 +17,8 @@ from anysim.engine.control import Control, acting_gains
 from anysim.errors import EngineError
 from anysim.kinematics.dynamics import mass_matrix
 from anysim.model.world import World
+from anysim_mechanics.damped_drives import native_targets
 from anysim_mechanics.drive_gains import DriveGains
-from anysim_mechanics.native_targets import native_targets
 from anysim_mechanics.trees import Tree
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.client import Env

@@ -7,7 +7,6 @@ import numpy as np
 
 from anysim.model.world import Actuation, World
 from anysim_mechanics import damped_drives as D
-from anysim_mechanics.native_targets import native_targets
 from anysim_sapien.scene import UNBOUNDED, EnvScene
 
 
@@ -56,21 +55,9 @@ class NativeDrives(D.DampedDrives):
     def _update(self) -> None:
         """Make PhysX' terms from those of the law."""
         super()._update()
-        self.wanted[...] = 0.0
-        self.wanted[:, :, 3], self.wanted[:, :, 4] = self.passive, UNBOUNDED
-        if self.control is None or self.terms is None:
-            return
-        (stiffness, damping, *_), joint, limit = self.terms, self.gains.joint, self.gains.limit
-        position, velocity, feed, _ = self.control
-        # a drive in effort mode exerts a force, and its joint's damping has no limit
-        stiff, driven = stiffness > 0, (stiffness > 0) | (damping > 0)
-        whole = damping + self.passive[:, joint]
-        place, speed = np.empty_like(feed), np.empty_like(feed)
-        native_targets(position, velocity, np.where(driven, feed, 0.0), stiffness, damping, whole, place, speed)
-        limits = np.where(driven, np.minimum(limit, UNBOUNDED), UNBOUNDED)
-        force = np.where(driven, 0.0, np.clip(feed, -limit, limit))
-        terms = np.where(stiff, place, 0.0), speed, stiffness, whole, limits, force
-        self.wanted[:, joint] = np.stack(terms, axis=-1)
+        none = np.zeros((len(self.passive), 0))
+        position, velocity, *_ = (none, none) if self.control is None else self.control
+        D.native_terms(position, velocity, self.gains.joint, self.law, UNBOUNDED, self.wanted)
 
     def begin(self, env: int, scene: EnvScene) -> None:
         """Tell PhysX what changed."""

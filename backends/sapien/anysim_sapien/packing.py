@@ -79,6 +79,11 @@ class Packing:
         packing.check(scene)
         return packing
 
+    def joints(self, packed: bytes) -> tuple[Array, Array]:
+        """Positions and velocities (J,) of joints in a packed state, float64."""
+        state = np.frombuffer(packed, dtype=np.float32)
+        return state.take(self.joint_pos).astype(float), state.take(self.joint_vel).astype(float)
+
     def check(self, scene: Any) -> None:
         """Compare with what SAPIEN's getters say.
 

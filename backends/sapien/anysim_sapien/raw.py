@@ -30,9 +30,7 @@ def raw_loop(envs: "Envs", control: Control) -> Callable[[int], None]:
     recipes = Recipes(native, envs.options)
     scenes = [EnvScene(recipes.of(o.recipe.present), envs.parameters.of(env)) for env, o in enumerate(originals)]
     own = NativeDrives(native, len(scenes))
-    for name in ("kp", "kd", "limit"):
-        getattr(own.gains, name)[...] = getattr(drives.gains, name)
-    own.passive[...] = drives.passive
+    own.gains.values[...], own.passive[...] = drives.gains.values, drives.passive
     own.apply(control)
     for env, (scene, original) in enumerate(zip(scenes, originals, strict=True)):
         put_motion(scene, motion_of(original))

@@ -1,6 +1,7 @@
 """Steps of an env: in a run, and in the same way when its journal is played again."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -39,7 +40,7 @@ def advance(scene: EnvScene, drives: Drives, momentum: Momentum, row: int, pushe
     scene.stepped(n_steps)
     momentum.after(row, scene, pushes)
     if driven:
-        drives.note(row, scene.joint_positions(), scene.joint_velocities())
+        drives.note(row, partial(scene.packing.joints, scene.packed()))
     if pushed:
         journal.flush()
 

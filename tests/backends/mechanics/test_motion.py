@@ -13,10 +13,9 @@ from anysim.model.world import Actuation, BodyKind, Inertial
 from anysim.testing import worlds
 from anysim_mechanics import articulation as K
 from anysim_mechanics.computed_drives import DriveArrays, TreeDrives
-from anysim_mechanics.damped_drives import DampedDrives, substep
+from anysim_mechanics.damped_drives import DampedDrives, native_targets, substep
 from anysim_mechanics.link_twists import LinkTwists
 from anysim_mechanics.momentum_balance import Circumstances, MomentumBalance, Substep
-from anysim_mechanics.native_targets import native_targets
 from anysim_mechanics.trees import frames_of, trees_of
 
 
@@ -137,7 +136,7 @@ def test_force_and_damping_are_the_law_together(actuation):
     assert force - (drives.told[0, 0] - own) * velocity == pytest.approx(law, rel=1e-6)
     assert drives.told[0, 0] == pytest.approx(own if actuation is Actuation.EXPLICIT_PD else own + kd)
     effort = np.zeros((1, joints))
-    drives.note(0, position.astype(float), velocity.astype(float))
+    drives.note(0, lambda: (position.astype(float), velocity.astype(float)))
     drives.exerted(0, effort)
     assert effort[0] == pytest.approx(law, rel=1e-6)
 
