@@ -9,6 +9,8 @@ from anysim.skills.runner import SkillPolicy
 from tests.plugins.skills.test_honest_failures import given_up
 from tests.plugins.skills.test_manipulation import WORLDS, solved
 
+ENGINES = ["mujoco", pytest.param("pybullet", marks=pytest.mark.slow), pytest.param("sapien", marks=pytest.mark.slow)]
+
 
 def test_an_object_is_dragged_to_its_goal_on_mujoco_and_never_lifted() -> None:
     with make(WORLDS / "drag.yaml", engine="mujoco", num_envs=4) as env:
@@ -35,3 +37,14 @@ def test_one_that_a_wall_keeps_from_its_goal_is_jammed() -> None:
     goal = ("task.command.goal.x=0.28", "task.command.goal.y=0.0", "task.horizon=900")
     outcomes, _ = given_up("drag", wall, *place, *goal)
     assert set(outcomes) <= {Outcome.JAMMED, Outcome.UNSTABLE_GRASP}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_plate_that_no_gripper_spans_is_dragged_by_fingers_pressed_onto_it(engine: str) -> None:
+    assert solved("drag_down", engine, 4) >= 0.75
+
+
+def test_fingers_that_slip_on_a_plate_have_lost_it() -> None:
+    """Its support holds the plate better than the fingers do."""
+    outcomes, _ = given_up("drag_down", "world.objects.table.friction=4.0")
+    assert set(outcomes) == {Outcome.LOST}
