@@ -100,6 +100,7 @@ def _conditions(specs: Mapping[str, PredicateTermSpec], scene: SceneView, path: 
 
 def resolve(view: object, name: object, scene: SceneView) -> object:
     """The handle that a reference in a YAML file stands for; `view` is its class. None for one that was left out."""
+    view = getattr(view, "__origin__", view)  # of one that is annotated
     if view is RobotView:
         return scene.robot(scene.index.robot(None if name is None else str(name)).name)
     if name is None:
