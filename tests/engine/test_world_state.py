@@ -7,6 +7,8 @@ import anysim
 from anysim.engine.base import SimEngine
 from anysim.engine.snapshots.world_state import WorldState
 from anysim.errors import SnapshotError
+from anysim.testing import worlds
+from anysim.testing.kinematic import NullEngine
 from tests.runtime import light
 
 CLOSE = 1e-6
@@ -127,3 +129,17 @@ def test_a_state_without_commands_holds_where_the_joints_are() -> None:
         env.reset(seed=9)
         env.engine.set_world_state(bare)
         assert np.allclose(env.engine.control.position, full.joint_pos)
+
+
+def test_a_light_that_was_changed_is_carried() -> None:
+    with NullEngine() as first, NullEngine() as second:
+        first.create_world(worlds.lit(), 2)
+        second.create_world(worlds.lit(), 2)
+        built = second.get_parameters("light.intensity")
+        first.set_parameters("light.intensity", 0.5 * built)
+        assert second.set_world_state(first.world_state()) == ((), ())
+        assert np.array_equal(second.get_parameters("light.intensity"), 0.5 * built)
+        second.set_world_state(second.world_state())
+        first.set_parameters("light.intensity", built)
+        second.set_world_state(first.world_state())
+        assert np.array_equal(second.get_parameters("light.intensity"), built)

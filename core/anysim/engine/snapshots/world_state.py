@@ -285,8 +285,8 @@ def _parameters(engine: "SimEngine", records: EnvRecords, state: WorldState, ids
 
 def _known(world: World, target: str, state: WorldState) -> Array:
     """(K,) bool: whether the state speaks of the things of a target, which for geoms is their body."""
-    if target == "world":
-        return np.ones(1, dtype=bool)
+    if target in ("world", "lights"):
+        return np.ones(len(names_of(world, target)), dtype=bool)
     bodies = set(state.bodies)
     if target == "geoms":
         return np.array([g.body < 0 or world.bodies[g.body].name in bodies for g in world.geoms], dtype=bool)
