@@ -12,6 +12,7 @@ import pytest
 from pydantic import BaseModel
 
 import anysim
+from anysim import registry
 from anysim.api import compile_world, load
 from anysim.errors import AnysimError
 from anysim.record.collector import Collector
@@ -177,6 +178,14 @@ def expert_of(spec: Any, out: Path) -> Any:
         return policy.name, said
 
 
+def shipped_of(spec: Any, out: Path) -> Any:
+    """What is said of a shipped policy that is not there."""
+    del out
+    with anysim.make(spec) as env, pytest.raises(AnysimError) as told:
+        registry.load("env_policies", "shipped")(env)
+    return str(told.value)
+
+
 class Still:
     """A policy: zeros."""
 
@@ -246,6 +255,7 @@ SEEN: dict[str, Callable[[Any, Path], Any]] = {
     "stepped": stepped_of,
     "engine": engine_of,
     "expert": expert_of,
+    "shipped": shipped_of,
     "recorded": recorded_of,
     "filmed": filmed_of,
 }

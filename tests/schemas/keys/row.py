@@ -4,10 +4,10 @@ from typing import Any, Literal, NamedTuple
 
 from tests.task.helpers import BLOCKS
 
-Seen = Literal["world", "episode", "stepped", "engine", "expert", "recorded", "filmed"]
+Seen = Literal["world", "episode", "stepped", "engine", "expert", "shipped", "recorded", "filmed"]
 """The World's hash · what two envs draw, observe and earn on the kinematic engine, and the same where those that ended
-are stepped too · the engine that was made, and what it was given · the task's expert · the files of recorded episodes ·
-the same with images, and which were observed."""
+are stepped too · the engine that was made, and what it was given · the task's expert · what is said of its shipped
+policy · the files of recorded episodes · the same with images, and which were observed."""
 
 FILE: dict[str, Any] = {
     **BLOCKS,

@@ -51,6 +51,7 @@ ROWS: dict[str, Row] = {
     "PhysicsSpec.actuation": row("physics.actuation=native", given=ARM),
     "PhysicsSpec.velocity_limits": row("physics.velocity_limits=enforce", given=ARM),
     "TaskSpec.description": row("task.description=stack them", given="record.keep=all", seen="recorded"),
+    "TaskSpec.shipped": row("task.shipped=package:numpy/none.onnx", seen="shipped"),
     "TaskSpec.horizon": row("task.horizon=2", seen="episode"),
     "TaskSpec.command": row("task.command.goal.height=0.5", seen="episode"),
     "TaskSpec.observations": row("task.observations.policy=[{term: frame_pose, frame: ball}]", seen="episode"),
