@@ -1,4 +1,4 @@
-"""The results of the shipped benchmark in docs/benchmark.md, from docs/benchmark.json.
+"""The results of two benchmarks in docs/benchmark.md, from docs/benchmark.json and docs/transfer.json.
 
     python scripts/benchmark_table.py [--check]
 
@@ -8,7 +8,8 @@ The figures are made by these commands; the first goes on where it was cut off:
     cp runs/core12/results.json docs/benchmark.json
     cp runs/core12/costs.json docs/benchmark_costs.json
 
-`--check` writes nothing and exits with 1 if the page has drifted from docs/benchmark.json.
+docs/transfer.json is made by those of its section. `--check` writes nothing and exits with 1 if the page has drifted
+from these files.
 """
 
 import json
@@ -19,9 +20,10 @@ from typing import Any
 
 from generated import ROOT, main
 
-from anysim_evaluation.benchmark.page import agreement, ranks
+from anysim_evaluation.benchmark.page import agreement, matrix, ranks
 
 STORE = ROOT / "docs" / "benchmark.json"
+TRANSFER = ROOT / "docs" / "transfer.json"
 COSTS = ROOT / "docs" / "benchmark_costs.json"
 TOOK = {
     "length": ("length", ".2f"),
@@ -101,5 +103,22 @@ def section() -> str:
     )
 
 
+def transfer() -> str:
+    """Policies by the engine that they were trained on and the one they were evaluated on."""
+    told: Mapping[str, Any] = json.loads(TRANSFER.read_text("utf-8"))
+    said = f"{told['episodes']} episodes each (seeds {told['parts']['seeds']}), with Wilson's intervals at 95 %:"
+    alike = "Agreement of the engines, seed by seed, of all policies together:"
+    pairs = agreement({"engines": [one for one in told["engines"] if one["policy"] is None]})
+    return "\n\n".join([said, table(*matrix(told)), alike, table(*pairs)])
+
+
 if __name__ == "__main__":
-    sys.exit(main(__doc__, "benchmark", "benchmark_table.py", ("docs/benchmark.md",), section))
+    pages = ("docs/benchmark.md",)
+    codes = [
+        main(__doc__, *named)
+        for named in (
+            ("benchmark", "benchmark_table.py", pages, section),
+            ("transfer", "benchmark_table.py", pages, transfer),
+        )
+    ]
+    sys.exit(max(codes))
