@@ -28,16 +28,21 @@ def main(description: str | None, name: str, script: str, pages: Sequence[str], 
         section = content()
     except PluginError as error:
         raise SystemExit(str(error)) from None
-    drifted = 0
-    for page in pages:
-        path = ROOT / page
-        text = path.read_text("utf-8")
-        new = replaced(text, name, script, section, path)
-        if new == text:
-            continue
-        drifted += 1
-        if check:
-            sys.stderr.write(f"{page}: the section '{name}' has drifted; run python scripts/{script}\n")
-        else:
-            path.write_text(new, "utf-8")
-    return 1 if check and drifted else 0
+    drifted = [drift(ROOT / page, name, script, section, check=check) for page in pages]
+    return 1 if check and any(drifted) else 0
+
+
+def drift(path: Path, name: str, script: str, section: str, *, check: bool, text: str | None = None) -> bool:
+    """Whether a page has drifted from a section: that is told with `check`, else mended.
+
+    `text` is the page with the marks of the section, where it may have none yet.
+    """
+    old = path.read_text("utf-8")
+    new = replaced(old if text is None else text, name, script, section, path)
+    if new == old:
+        return False
+    if check:
+        sys.stderr.write(f"{path.relative_to(ROOT)}: the section '{name}' has drifted; run python scripts/{script}\n")
+    else:
+        path.write_text(new, "utf-8")
+    return True
