@@ -26,8 +26,9 @@ from anysim.model.affordance_lookup import (
 from anysim.model.affordances import Affordance, AffordanceKind
 from anysim.model.world import Body, BodyKind, EntityKind, Geom, Mesh, World
 from anysim_banks.collision import geometry_of
-from anysim_banks.pieces import Piece, piece_of
+from anysim_banks.pieces import Piece
 from anysim_banks.sampling import Candidates
+from anysim_banks.subject import pieces_about
 
 AHEAD = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 """Half a turn about x: from a tip, whose z points back along the thing, to the candidate's frame, whose z is ahead."""
@@ -192,20 +193,13 @@ def _peg(world: World, found: FoundAffordance) -> Peg:
 
 
 def _solid(world: World, entity: int, number: int) -> Solid:
-    owner = world.entities[entity]
-    to_body = P.inverse(world.initial_body_pose[number])
     pieces: list[Piece] = []
     geoms: list[Geom] = []
-    for body in range(owner.body_start, owner.body_stop):
-        relative = P.compose(to_body, world.initial_body_pose[body])
-        for i in world.body_geoms[body]:
-            piece = piece_of(world, i) if world.geoms[i].collides else None
-            if piece is not None:
-                at = P.compose(relative, piece.pose)
-                x, y, z, *turn = at.tolist()
-                pieces.append(piece._replace(pose=at))
-                moved = replace(collision_geom(world.geoms[i], 0), position=(x, y, z), quaternion=tuple(turn))
-                geoms.append(replace(moved, name=f"piece{len(geoms)}"))
+    for geom, piece in pieces_about(world, world.entities[entity], number):
+        x, y, z, *turn = piece.pose.tolist()
+        pieces.append(piece)
+        moved = replace(collision_geom(world.geoms[geom], 0), position=(x, y, z), quaternion=tuple(turn))
+        geoms.append(replace(moved, name=f"piece{len(geoms)}"))
     used = {getattr(geom.shape, "mesh", "") for geom in geoms}
     meshes = tuple(mesh for mesh in world.meshes if mesh.name in used)
     inertial = world.bodies[number].inertial

@@ -1,6 +1,7 @@
 """The subject of a bank: one affordance of an entity, its body alone, and what stands beside it."""
 
 import hashlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -138,7 +139,7 @@ def subject(world: World, found: FoundAffordance, region: Region | None = None) 
         spec,
         frame,
         pieces,
-        tuple(_around(world, owner, number)),
+        tuple(piece for _, piece in pieces_about(world, owner, number)),
         alone,
         World("subject", bodies=(alone,), geoms=geoms, meshes=meshes),
         _way(world, found),
@@ -149,16 +150,15 @@ def subject(world: World, found: FoundAffordance, region: Region | None = None) 
     )
 
 
-def _around(world: World, owner: Entity, number: int) -> list[Piece]:
+def pieces_about(world: World, owner: Entity, number: int) -> Iterator[tuple[int, Piece]]:
+    """The geoms of an entity that collide, each with its piece in the frame of a body, as they are built."""
     to_body = P.inverse(world.initial_body_pose[number])
-    found: list[Piece] = []
     for body in range(owner.body_start, owner.body_stop):
         relative = P.compose(to_body, world.initial_body_pose[body])
         for geom in world.body_geoms[body]:
             piece = piece_of(world, geom) if world.geoms[geom].collides else None
             if piece is not None:
-                found.append(piece._replace(pose=P.compose(relative, piece.pose)))
-    return found
+                yield geom, piece._replace(pose=P.compose(relative, piece.pose))
 
 
 def _way(world: World, found: FoundAffordance) -> Array:
