@@ -8,7 +8,7 @@ import pytest
 
 from anysim.errors import NameLookupError
 from anysim.geometry.bounds import EntityShape, ground_top, shape_bounds
-from anysim.geometry.tessellate import convex_hull
+from anysim.geometry.triangles import convex_hull
 from anysim.math import pose as P
 from anysim.model.world import (
     Box,
