@@ -103,11 +103,6 @@ def _tell(name: str, report: Report, all_engines: bool, verbose: bool) -> None:
     typer.echo(f"{name}: {verdict}")
 
 
-def check_one(name: str, engine: str | None, all_engines: bool, overrides: list[str]) -> list[str]:
-    """Every fault of one file, a sentence each; empty if it can be run."""
-    return report_on(name, engine, all_engines, overrides).faults
-
-
 def report_on(name: str, engine: str | None, all_engines: bool, overrides: list[str]) -> Report:
     """Every fault of one file and of its levels, and what each engine that is asked says to it."""
     report, levels = _report_on(name, engine, all_engines, overrides)
