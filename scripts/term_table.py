@@ -16,7 +16,7 @@ from generated import main
 from pydantic.fields import FieldInfo
 
 from anysim.plugin_parameters import given, parameters, reference_kind
-from anysim.task.conditions import Conditions
+from anysim.task.references import Conditions
 from anysim.task.terms import TERMS
 from anysim_tasks.terms import TERMS as OF_TASKS
 

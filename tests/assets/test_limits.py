@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anysim.assets import mesh_budget, meshes
+from anysim.assets import bounded_files, meshes
+from anysim.assets.bounded_files import opened_image
 from anysim.assets.ground_files import read_heights
-from anysim.assets.images import opened_image
 from anysim.errors import AssetError
 from anysim_schemas.limits import (
     ARRAY_BYTES,
@@ -224,7 +224,7 @@ def test_a_geometry_that_is_there_a_thousand_times_counts_so_often(
     (tmp_path / "a.glb").write_bytes(scene.export(file_type="glb"))
     assert meshes.visual_parts(tmp_path / "a.glb")
     monkeypatch.setattr(meshes, "MESH_FACES", MESH_FACES._replace(value=100))
-    monkeypatch.setattr(mesh_budget, "MESH_FACES", MESH_FACES._replace(value=100))
+    monkeypatch.setattr(bounded_files, "MESH_FACES", MESH_FACES._replace(value=100))
     with pytest.raises(AssetError, match="has 108 triangles"):
         meshes.collision_mesh(tmp_path / "a.glb")
 

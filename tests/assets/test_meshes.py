@@ -12,7 +12,7 @@ from anysim.assets import meshes
 from anysim.compile.edit import with_object, with_robot
 from anysim.compile.world import compile_world
 from anysim.errors import AssetError
-from anysim.geometry.tessellate import convex_hull
+from anysim.geometry.triangles import convex_hull
 from anysim_schemas.run import WorldSpec
 
 

@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from anysim import registry
-from anysim.cli.check import check_one, report_on
+from anysim.cli.check import report_on
 from anysim.cli.main import app
 from anysim.errors import listing
 
@@ -19,7 +19,7 @@ FILES = sorted(BROKEN.glob("*.yaml"))
 @pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
 def test_a_broken_file_gives_its_golden_message(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(BROKEN)
-    faults = check_one(path.name, engine=None, all_engines=False, overrides=[])
+    faults = report_on(path.name, engine=None, all_engines=False, overrides=[]).faults
     text = "".join(f"{fault}\n" for fault in faults)
     for place, word in (
         (sysconfig.get_paths()["purelib"], "<site-packages>"),
@@ -41,11 +41,11 @@ def test_there_are_enough_of_them() -> None:
 
 
 def test_the_installed_task_has_no_faults() -> None:
-    assert check_one("pick_cube", engine="mujoco", all_engines=False, overrides=[]) == []
+    assert report_on("pick_cube", engine="mujoco", all_engines=False, overrides=[]).faults == []
 
 
 def test_a_world_that_an_engine_cannot_run_is_refused_before_it_is_built() -> None:
-    faults = check_one("pick_cube", engine="null", all_engines=False, overrides=[])
+    faults = report_on("pick_cube", engine="null", all_engines=False, overrides=[]).faults
     assert len(faults) == 1
     assert "null cannot run pick_cube: camera 'front' gives rgb (render: rgb)" in faults[0]
 

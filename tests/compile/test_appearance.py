@@ -12,7 +12,7 @@ from anysim.compile.appearance import material, material_name, texture, texture_
 from anysim.engine.capability import Capability
 from anysim.engine.requirements import needs_of
 from anysim.errors import AssetError, SpecError
-from anysim.geometry.tessellate import triangles
+from anysim.geometry.triangles import triangles
 from anysim.model.appearance import lying, wrapped
 from anysim.model.shapes import Box, Capsule, Cylinder, Sphere
 from anysim_schemas.matter import MaterialSpec, TextureSpec

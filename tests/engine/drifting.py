@@ -11,7 +11,7 @@ from anysim.engine.capability import Capabilities, Capability
 from anysim.engine.control import Control
 from anysim.engine.one_world.base import EnvWorlds, OneWorldPerEnv
 from anysim.engine.one_world.last_substep import LastSubstep
-from anysim.engine.parameter_table import ParameterTable
+from anysim.engine.parameters import ParameterTable
 from anysim.engine.state import Availability, SnapshotLevel
 from anysim.math import pose as P
 from anysim.model.world import World

@@ -6,7 +6,7 @@ import trimesh
 from scipy.spatial import KDTree
 
 from anysim.conventions import Array
-from anysim.geometry.decimate import FAR, FEW, NEARLY_ALL, decimated, deviation
+from anysim.geometry.triangles import FAR, FEW, NEARLY_ALL, decimated, deviation
 
 Surface = tuple[Array, Array]
 

@@ -20,7 +20,7 @@ from anysim.engine.capability import Capability
 from anysim.engine.factory import create_simulation
 from anysim.engine.parameters import PARAMETERS
 from anysim.engine.state import FIELDS, Snapshot, SnapshotLevel
-from anysim.geometry.tessellate import convex_hull
+from anysim.geometry.triangles import convex_hull
 from anysim.math import pose as P
 from anysim.model.world import (
     Box,

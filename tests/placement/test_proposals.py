@@ -108,7 +108,7 @@ def test_a_proposer_is_told_the_scene_and_what_it_says_is_in_the_record() -> Non
 def test_a_file_beside_the_world(tmp_path) -> None:
     """Relative to the YAML that names it, wherever one is; `anysim check` reads it."""
     import anysim
-    from anysim.cli.check import check_one
+    from anysim.cli.check import report_on
 
     (tmp_path / "plans").mkdir()
     (tmp_path / "plans" / "plan.json").write_text(json.dumps(propose(red={"position": [0.1, 0.2, 0.42]})))
@@ -118,7 +118,7 @@ def test_a_file_beside_the_world(tmp_path) -> None:
         env.reset(seed=0)
         assert np.allclose(env.engine.get_state().body_pose[0, env.engine.index.body("red"), :3], [0.1, 0.2, 0.425])
     (tmp_path / "plans" / "plan.json").write_text('{"poses": {"red": {"position": [0.1]}}}')
-    said = "\n".join(check_one(str(tmp_path / "world.yaml"), None, False, []))
+    said = "\n".join(report_on(str(tmp_path / "world.yaml"), None, False, []).faults)
     assert "poses.red.position" in said
 
 

@@ -15,7 +15,7 @@ import pytest
 import anysim
 from anysim import registry
 from anysim.api import load
-from anysim.cli.check import check_one
+from anysim.cli.check import report_on
 from anysim.engine.base import SimEngine
 from anysim.errors import RecordError, SpecError
 from anysim.record.collector import Collector, run_header
@@ -319,10 +319,10 @@ def test_what_cannot_be_filmed_later_says_why(monkeypatch: pytest.MonkeyPatch) -
 
 def test_check_says_where_it_was_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     _spec(monkeypatch)
-    fault, *more = check_one("pick_cube", None, False, [REPAINT, "record.film=success"])
+    fault, *more = report_on("pick_cube", None, False, [REPAINT, "record.film=success"]).faults
     assert more == []
     assert fault.startswith("-o record.film=success: record.film: episodes cannot be filmed")
-    assert check_one("pick_cube", None, False, [PUSH, "record.film=success"]) == []
+    assert report_on("pick_cube", None, False, [PUSH, "record.film=success"]).faults == []
 
 
 def test_a_writer_without_images_says_so_at_once(monkeypatch: pytest.MonkeyPatch, writer: TrajectoryWriter) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.engine.parameter_table import ParameterTable
+from anysim.engine.parameters import ParameterTable
 from anysim.errors import EngineError
 from anysim.kinematics.inertia import tensor
 from anysim.math import matrix as M

@@ -17,7 +17,7 @@ from anysim.conventions import WORLD, Array
 from anysim.engine.cameras import CameraView
 from anysim.engine.lighting import Look, Looks
 from anysim.errors import EngineError
-from anysim.geometry.tessellate import triangles
+from anysim.geometry.triangles import triangles
 from anysim.math import pose as P
 from anysim.model.appearance import NONE, lying, wrapped
 from anysim.model.world import Box, Geom, HeightField, HeightFieldShape, Mesh, MeshShape, Plane, World

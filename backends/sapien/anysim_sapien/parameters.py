@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array, xyzw_from_wxyz
-from anysim.engine.parameter_table import ParameterTable
+from anysim.engine.parameters import ParameterTable
 from anysim.errors import EngineError
 from anysim.kinematics.dynamics import gain
 from anysim.kinematics.inertia import check_physical, from_principal, principal

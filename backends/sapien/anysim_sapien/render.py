@@ -11,7 +11,7 @@ import numpy as np
 from anysim.conventions import WORLD, Array
 from anysim.engine.cameras import CameraView
 from anysim.engine.lighting import Look, Looks
-from anysim.geometry.tessellate import triangles
+from anysim.geometry.triangles import triangles
 from anysim.math import pose as P
 from anysim.model.appearance import lying, wrapped
 from anysim.model.world import Box, Capsule, Cylinder, Geom, HeightFieldShape, MeshShape, Plane, Shape, Sphere, World

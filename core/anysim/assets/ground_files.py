@@ -9,8 +9,7 @@ from typing import Any, cast
 import numpy as np
 
 from anysim.assets import meshes
-from anysim.assets.images import opened_image
-from anysim.assets.mesh_budget import bounded, check
+from anysim.assets.bounded_files import bounded, check, opened_image
 from anysim.conventions import Array
 from anysim.errors import AssetError, listing
 from anysim.model.ground import MeshGround

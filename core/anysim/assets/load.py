@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from anysim import registry
-from anysim.assets.mesh_budget import bounded
+from anysim.assets.bounded_files import bounded
 from anysim.assets.meshes import VISUAL_ERROR
 from anysim.assets.model import ImportedModel, strange_number
 from anysim.assets.procedural import from_uri

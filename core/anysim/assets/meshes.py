@@ -7,18 +7,17 @@ parameters, never of the result, so that it is equal on all machines.
 import io
 import re
 from itertools import islice
+from math import inf, nan
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from anysim import cache
-from anysim.assets.collada import ColladaHead, declared
-from anysim.assets.mesh_budget import bounded, check, mesh_bytes
+from anysim.assets.bounded_files import bounded, check, mesh_bytes, plain_xml
 from anysim.conventions import Array
 from anysim.errors import AssetError
-from anysim.geometry.decimate import FEW, decimated
-from anysim.geometry.tessellate import convex_hull
+from anysim.geometry.triangles import FEW, convex_hull, decimated
 from anysim.math import matrix as M
 from anysim.model.world import Mesh, Vec3
 from anysim_schemas.limits import MESH_BYTES, MESH_FACES
@@ -38,6 +37,13 @@ class VisualPart(NamedTuple):
 
     mesh: Mesh
     color: Color | None
+
+
+class _ColladaHead(NamedTuple):
+    """The head of a .dae: metres in its unit, and the axis that points up, `X`, `Y` or `Z`."""
+
+    metres: float = 1.0
+    up: str = "Y"
 
 
 class _Piece(NamedTuple):
@@ -105,7 +111,7 @@ def visual_parts(
         scale: component-wise; a negative one mirrors.
         upright: turn files whose up axis is y (.glb, and .dae that say so) to z up. References in a URDF do not want
             that: there the axes are taken as they are, whatever the file declares.
-        error: [m] that the surface may be off, see `anysim.geometry.decimate`; 0 keeps every triangle.
+        error: [m] that the surface may be off, see `anysim.geometry.triangles`; 0 keeps every triangle.
 
     Raises:
         AssetError: an unknown format, a damaged file, no triangles.
@@ -153,8 +159,38 @@ def _key(path: Path, *parameters: object) -> str:
     return cache.digest(_VERSION, path.suffix.lower(), data, materials, *(repr(p) for p in parameters))
 
 
-def _declared(path: Path, data: bytes) -> ColladaHead:
-    return declared(path, data) if path.suffix.lower() == ".dae" else ColladaHead()
+def _declared(path: Path, data: bytes) -> _ColladaHead:
+    """What `<asset>` of a .dae says of the whole file; COLLADA's defaults, metres and y, where it says nothing.
+
+    Read as XML and not by a pattern: quotes of either kind, blanks around `=` and comments are all in use.
+
+    Raises:
+        AssetError: no XML, XML that declares entities, a unit that is no positive number of metres.
+    """
+    if path.suffix.lower() != ".dae":
+        return _ColladaHead()
+    from lxml import etree
+
+    try:
+        plain_xml(data)
+        events = etree.iterparse(
+            io.BytesIO(data), ("end",), tag="{*}asset", resolve_entities=False, no_network=True, huge_tree=True
+        )
+        # parts of the file may have an `asset` of their own, which declares nothing of the rest
+        asset = next((one for _, one in events if sum(1 for _ in one.iterancestors()) == 1), None)
+    except (ValueError, etree.XMLSyntaxError) as error:
+        raise AssetError(f"{path}: cannot be read as a mesh: {error}") from error
+    if asset is None:
+        return _ColladaHead()
+    unit, up = asset.find("{*}unit"), asset.findtext("{*}up_axis", "").strip()
+    said = "1" if unit is None else unit.get("meter", "1")
+    try:
+        metres = float(said)
+    except ValueError:
+        metres = nan
+    if not 0.0 < metres < inf:
+        raise AssetError(f"{path}: <unit meter='{said[:30]}'> is not the number of metres of its unit, such as 0.001")
+    return _ColladaHead(metres, up[0] if up in ("X_UP", "Y_UP", "Z_UP") else "Y")
 
 
 def _material_files(path: Path, data: bytes) -> list[Path]:

@@ -23,7 +23,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
-from anysim.assets.mesh_budget import bounded
+from anysim.assets.bounded_files import bounded
 from anysim.errors import AssetError, listing, suggest
 from anysim.math.arrays import shown
 from anysim_schemas.files import name_problem

@@ -1,5 +1,6 @@
 """`anysim check`: read files and say everything that is wrong with them."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -10,6 +11,10 @@ from anysim.cli.options import AsJson, Engine, Overrides, Verbose
 if TYPE_CHECKING:
     from anysim.model.world import World
     from anysim_schemas.load import LoadedRun
+    from anysim_schemas.task import TaskSpec
+
+STEPS_AHEAD = 100
+"""Control steps of reward that a learner with the usual discount of 0.99 looks ahead: 1 / (1 - 0.99)."""
 
 
 class Answer(NamedTuple):
@@ -98,11 +103,6 @@ def _tell(name: str, report: Report, all_engines: bool, verbose: bool) -> None:
     typer.echo(f"{name}: {verdict}")
 
 
-def check_one(name: str, engine: str | None, all_engines: bool, overrides: list[str]) -> list[str]:
-    """Every fault of one file, a sentence each; empty if it can be run."""
-    return report_on(name, engine, all_engines, overrides).faults
-
-
 def report_on(name: str, engine: str | None, all_engines: bool, overrides: list[str]) -> Report:
     """Every fault of one file and of its levels, and what each engine that is asked says to it."""
     report, levels = _report_on(name, engine, all_engines, overrides)
@@ -120,7 +120,6 @@ def _report_on(
     from anysim.api import compile_world, dry_run, load, place_of
     from anysim.engine.conditioning import doubts
     from anysim.errors import AnysimError, AssetError, PluginFailure, SpecError, SpecIssue
-    from anysim.task import ending_worth
     from anysim_schemas.files import exists
 
     past: list[SpecIssue] = []
@@ -131,7 +130,7 @@ def _report_on(
             dry_run(loaded, world)
             _check_film(loaded)
         found = [doubt[:2] for doubt in doubts(world)]
-        found += [] if loaded.spec.task is None else ending_worth.doubts(loaded.spec.task)
+        found += [] if loaded.spec.task is None else _too_little_for_success(loaded.spec.task)
         warnings = tuple(str(SpecIssue(place_of(loaded, path), path, sentence)) for path, sentence in found)
         engines = registry.names("engines") if all_engines else [engine or loaded.spec.engine.name]
         if any(issue.path.startswith("engine") for issue in past):
@@ -147,6 +146,29 @@ def _report_on(
     faults = [*map(str, past), *(refused if len(refused) == len(answers) else [])]
     levels = tuple(loaded.spec.levels) if loaded.spec.level is None else ()
     return Report(faults, () if past else answers, warnings, world), levels
+
+
+def _too_little_for_success(task: "TaskSpec") -> Iterator[tuple[str, str]]:
+    """The key to change and a sentence, where success ends the steps' rewards and is worth less than they are.
+
+    A learner would do better by not succeeding. Counted are terms that say how much they are `at_most`.
+    """
+    from anysim.task.contract import MOST
+    from anysim.task.term_registry import find
+
+    if task.on_success != "end" or not task.success:
+        return
+    steps = min(task.horizon, STEPS_AHEAD)
+    bounds = [(term.weight, vars(find("reward", term.term)).get(MOST, 0.0)) for term in task.rewards.values()]
+    gain = steps * sum(max(weight * most, 0.0) for weight, most in bounds)
+    worth = sum(term.reward for term in task.success.values())
+    if worth < gain:
+        yield (
+            "task.success",
+            f"success is worth {worth:g} and ends rewards of up to {gain:g} in the {steps} steps that a learner with a "
+            f"discount of 0.99 looks ahead, so that not to succeed can pay more; give a predicate of success `reward: "
+            f"{gain - worth:g}` or more, or say `on_success: continue`",
+        )
 
 
 def _ask(engine: str, loaded: "LoadedRun", world: "World", name: str) -> Answer:

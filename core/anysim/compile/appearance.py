@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anysim import registry
-from anysim.assets.images import opened_image
+from anysim.assets.bounded_files import opened_image
 from anysim.assets.uri import locate
 from anysim.conventions import Array
 from anysim.errors import Issues

@@ -103,10 +103,6 @@ class EntityShape:
             places.setdefault(placed.shape, []).append(placed.pose)
         return [(shape, np.stack(poses)) for shape, poses in places.items()]
 
-    def lowest_point(self, quaternion: Array) -> Array:
-        """Height (...) [m] of the lowest point above the root's origin, for root orientations (..., 4)."""
-        return self.bounds(_at_origin(quaternion))[0][..., 2]
-
     def top_height(self, root_pose: Array) -> Array:
         """World height (...) [m] of the highest point, root at poses (..., 7)."""
         return self.bounds(root_pose)[1][..., 2]
@@ -121,7 +117,3 @@ class EntityShape:
 def ground_top(world: World, low: Array, high: Array) -> Array:
     """The greatest height (...) [m] of the ground under rectangles from `low` to `high` (..., 2); 0 without ground."""
     return np.nan_to_num(world.ground.top(low, high), nan=0.0)
-
-
-def _at_origin(quaternion: Array) -> Array:
-    return np.concatenate([np.zeros((*np.shape(quaternion)[:-1], 3)), quaternion], axis=-1)

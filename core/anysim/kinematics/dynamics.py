@@ -18,11 +18,6 @@ from anysim.math import matrix as M, pose as P
 from anysim.model.world import BodyKind, JointType, World
 
 
-def velocity_size(world: World) -> int:
-    """V, the length of the generalised velocity."""
-    return len(world.joints) + 6 * sum(body.kind is BodyKind.FREE for body in world.bodies)
-
-
 def driven_trees(world: World) -> list[list[int]]:
     """The bodies of each tree that has a drive, in order; trees whose joints follow each other are one.
 

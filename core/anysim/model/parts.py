@@ -20,6 +20,11 @@ ORIGIN: Vec3 = (0.0, 0.0, 0.0)
 FAR = 1e6
 """[rad] or [m] A limit of a joint that is further out is none: engines each have a number of their own for that."""
 
+NEVER_HASHED = MappingProxyType({"hashed": "never"})
+"""Marks a field that shapes nothing that happens."""
+HASHED_IF_GIVEN = MappingProxyType({"hashed": "if given"})
+"""Marks a field that came later: worlds that leave it alone keep their hash."""
+
 
 class BodyKind(StrEnum):
     """How a body may move."""
@@ -243,7 +248,7 @@ class Entity:
     category: str = ""
     instance: int = 0
     family: str = "rigid"
-    affordances: tuple[Affordance, ...] = field(default=(), metadata=MappingProxyType({"hashed": "never"}))
+    affordances: tuple[Affordance, ...] = field(default=(), metadata=NEVER_HASHED)
     """Where it is taken hold of, in local names. No engine reads them: they shape nothing that happens by itself."""
 
     @property
@@ -304,7 +309,7 @@ class Robot:
     model: str
     channels: Mapping[str, Channel]
     tools: Mapping[str, int]
-    entry: RobotModelSpec | None = field(default=None, compare=False, metadata=MappingProxyType({"hashed": "never"}))
+    entry: RobotModelSpec | None = field(default=None, compare=False, metadata=NEVER_HASHED)
     """Its entry in the catalogue, for controllers; None for one that is in none. What it says of physics is above."""
 
 
@@ -322,7 +327,7 @@ class Physics:
     impratio: float = 1.0
     actuation: Actuation = Actuation.IMPLICIT_PD
     velocity_limits: bool = False
-    extent: float = field(default=DEFAULT_EXTENT, metadata=MappingProxyType({"hashed": "if given"}))
+    extent: float = field(default=DEFAULT_EXTENT, metadata=HASHED_IF_GIVEN)
     """Distance from the origin along an axis [m] beyond which a body has left the world."""
 
     @property

@@ -8,7 +8,6 @@ body; their frames survive as sites. All joints here have one degree of freedom;
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +16,8 @@ from anysim.conventions import Array
 from anysim.model.appearance import Material as Material, Texture as Texture
 from anysim.model.parts import (
     FAR as FAR,
+    HASHED_IF_GIVEN,
+    NEVER_HASHED,
     ORIGIN as ORIGIN,
     Actuation as Actuation,
     Actuator as Actuator,
@@ -62,12 +63,6 @@ if TYPE_CHECKING:
     from anysim.model.ground import Ground
 
 
-NEVER_HASHED = MappingProxyType({"hashed": "never"})
-"""Marks a field that shapes nothing that happens."""
-HASHED_IF_GIVEN = MappingProxyType({"hashed": "if given"})
-"""Marks a field that came later: worlds that leave it alone keep their hash."""
-
-
 @dataclass(frozen=True)
 class World:
     """Everything an engine needs to build, and nothing about any engine."""
@@ -99,11 +94,9 @@ class World:
     tiles: tuple[Tile, ...] = ()
     """Pieces of tiled ground, row by row; an env's scene stands on one of them. Empty where there is one ground."""
     scenery: Scenery = field(default=Scenery(), metadata=HASHED_IF_GIVEN)
-    notes: tuple[tuple[str, str], ...] = field(
-        default=(), compare=False, metadata=MappingProxyType({"hashed": "never"})
-    )
+    notes: tuple[tuple[str, str], ...] = field(default=(), compare=False, metadata=NEVER_HASHED)
     """The name of a thing, and what its source says that is not so here; see `anysim.assets.model.ImportNote`."""
-    visual_error: float | None = field(default=None, compare=False, metadata=MappingProxyType({"hashed": "never"}))
+    visual_error: float | None = field(default=None, compare=False, metadata=NEVER_HASHED)
     """How far [m] what is only looked at may be off in what is added later; see `anysim.assets.meshes.light_mesh`."""
 
     @cached_property

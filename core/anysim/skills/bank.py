@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from anysim.assets.mesh_budget import bounded
+from anysim.assets.bounded_files import bounded
 from anysim.conventions import Array
 from anysim.errors import AssetError, listing
 from anysim.math import pose as P

@@ -1,13 +1,14 @@
-"""Holes, inner spaces and points, as terms see them."""
+"""Holes, inner spaces, points, contact sensors and conditions, as terms see them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import isfinite
-from typing import ClassVar, NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
 from anysim.conventions import Array
-from anysim.errors import NameLookupError, listing
+from anysim.errors import NameLookupError, listing, suggest
 from anysim.geometry import polygon as G
 from anysim.geometry.convex_parts import IDENTITY, Pose, Solid
 from anysim.math import pose as P
@@ -17,7 +18,8 @@ from anysim.model.world import World
 from anysim.placement.support_surfaces import choose, surfaces
 from anysim.task.scene import SceneView
 from anysim.task.slot_frames import CategoryView
-from anysim_schemas.base import Reference
+from anysim_schemas.base import Name, Reference
+from anysim_schemas.task import ByTerm, PredicateTermSpec
 
 
 class HoleView:
@@ -98,3 +100,50 @@ class PointsView:
         """(n, K) bool: which of them are there."""
         each = (part.present.reshape(len(part.present), -1) for part in self._parts)
         return np.concatenate(list(each), axis=1)
+
+
+class ContactView:
+    """A contact sensor. In YAML: its name under `world.contact_sensors`."""
+
+    reference_kind: ClassVar[str] = "contact sensor"
+
+    def __init__(self, scene: SceneView, name: str) -> None:
+        known = [sensor.name for sensor in scene.engine.world.contact_sensors]
+        if name not in known:
+            raise NameLookupError(
+                f"there is no contact sensor '{name}'{suggest(name, known)} (contact sensors: {listing(known)}); "
+                f"declare it as `world.contact_sensors.{name}: {{body: …, against: …}}`"
+            )
+        self.scene, self._index = scene, known.index(name)
+
+    @property
+    def force(self) -> Array:
+        """(n, 3) [N] on the sensor's body, world axes: the net force of its contacts in the last substep."""
+        return self.scene.state.contact_force[self.scene.rows, self._index]
+
+    @property
+    def strength(self) -> Array:
+        """(n,) [N] size of the force."""
+        return P.norm(self.force)
+
+
+class Conditions:
+    """What a predicate combines. In YAML: a mapping of predicates, as under `success`."""
+
+    reference_kind: ClassVar[str] = "condition"
+    written_as = Annotated[dict[Name, PredicateTermSpec], ByTerm, Field(min_length=1)]
+
+    def __init__(self, calls: Sequence[Callable[[], Array]]) -> None:
+        self._calls = tuple(calls)
+
+    def __len__(self) -> int:
+        """How many they are."""
+        return len(self._calls)
+
+    def each(self) -> Array:
+        """(C, n) bool: which of them hold."""
+        return np.stack([call() for call in self._calls])
+
+    def all(self) -> Array:
+        """(n,) bool: whether all of them hold."""
+        return np.logical_and.reduce(self.each())

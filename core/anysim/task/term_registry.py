@@ -10,8 +10,8 @@ from typing import Any
 from anysim import registry
 from anysim.errors import AnysimError, PluginError, SpecError, SpecIssue, listing, suggest
 from anysim.plugin_parameters import checked, given, options_model, parameters, reference_kind
-from anysim.task.conditions import Conditions
 from anysim.task.contract import GOES_ON
+from anysim.task.references import Conditions
 from anysim.task.scene import Frame, RobotView, SceneView
 from anysim_schemas.task import PredicateTermSpec, TermSpec
 

@@ -17,8 +17,7 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Capabilities, Capability as C
 from anysim.engine.control import POSITION, VELOCITY, Control
-from anysim.engine.parameter_table import ParameterTable
-from anysim.engine.parameters import PARAMETERS
+from anysim.engine.parameters import PARAMETERS, ParameterTable
 from anysim.engine.presence import Lifecycle
 from anysim.engine.state import Availability, SnapshotLevel
 from anysim.math import pose as P

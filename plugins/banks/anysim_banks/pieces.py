@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.geometry.tessellate import convex_hull
+from anysim.geometry.triangles import convex_hull
 from anysim.model.world import Box, Capsule, Cylinder, Mesh, MeshShape, Shape, Sphere, World
 
 HULL_VERTICES = 64

@@ -17,8 +17,16 @@ from anysim.conventions import Array
 from anysim.kinematics.chain import Chain
 from anysim.model.world import World
 from anysim.planning.api import inverse_kinematics
-from anysim.planning.motion import Budget, MotionPlanner, PlanAnswer, PlanRequest, PlanStatus, Scene, motion_planner
-from anysim.planning.scenes import Scenes
+from anysim.planning.motion import (
+    Budget,
+    MotionPlanner,
+    PlanAnswer,
+    PlanRequest,
+    PlanStatus,
+    Scene,
+    Scenes,
+    motion_planner,
+)
 from anysim.planning.service import PlannerService, planner_service
 from anysim.task.env import TaskEnv
 from anysim_bench.free_paths import Touching, dense

@@ -14,8 +14,7 @@ from anysim.kinematics.chain import Chain
 from anysim.math import pose as P
 from anysim.model.world import BodyKind, EntityKind, World
 from anysim.planning.api import ALL_AXES, inverse_kinematics
-from anysim.planning.motion import PlanRequest
-from anysim.planning.scenes import Scene
+from anysim.planning.motion import PlanRequest, Scene
 from anysim.record.reader import TrajectoryReader
 from anysim_planning.scene import PlanningWorld
 

@@ -11,7 +11,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from anysim.conventions import IDENTITY_QUATERNION, Array
-from anysim.geometry.tessellate import convex_hull
+from anysim.geometry.triangles import convex_hull
 from anysim.kinematics.pinocchio_model import from_se3
 from anysim.math import pose as P
 from anysim.model.shapes import Box, Capsule, Cylinder, HeightFieldShape, MeshShape, Plane, Shape, Sphere

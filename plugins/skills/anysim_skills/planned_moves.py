@@ -15,8 +15,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.planning.api import InverseKinematics
-from anysim.planning.motion import Attachment, PlanAnswer, PlanRequest, PlanStatus, ToolGoal, Trajectory
-from anysim.planning.scenes import Scenes
+from anysim.planning.motion import Attachment, PlanAnswer, PlanRequest, PlanStatus, Scenes, ToolGoal, Trajectory
 from anysim.planning.service import PlanFuture
 from anysim.skills.base import OUTCOMES, Outcome
 from anysim.task.env import TaskEnv

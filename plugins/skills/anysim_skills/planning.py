@@ -8,8 +8,7 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.errors import TaskError
 from anysim.model.world import World
-from anysim.planning.motion import motion_planner
-from anysim.planning.scenes import Scenes
+from anysim.planning.motion import Scenes, motion_planner
 from anysim.planning.service import planner_service
 from anysim.task.env import TaskEnv
 from anysim_skills.env_lifetime import PerEnv

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from anysim.assets.mesh_budget import check
+from anysim.assets.bounded_files import check
 from anysim.assets.meshes import collision_mesh, visual_parts
 from anysim.assets.model import ImportNote
 from anysim.assets.uri import resolve_reference

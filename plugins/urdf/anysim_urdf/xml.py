@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from anysim.assets.xml import xml_root
+from anysim.assets.bounded_files import xml_root
 from anysim.conventions import Array
 from anysim.errors import AssetError, listing
 from anysim.math import pose as P

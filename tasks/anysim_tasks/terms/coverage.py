@@ -8,8 +8,8 @@ from pydantic import Field
 
 from anysim.conventions import Array
 from anysim.math import pose as P
-from anysim.task.conditions import Conditions
 from anysim.task.contract import at_most
+from anysim.task.references import Conditions
 from anysim.task.scene import Frame, SceneView
 from anysim_schemas.base import Positive
 

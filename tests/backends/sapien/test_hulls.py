@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from anysim.geometry.tessellate import convex_hull
+from anysim.geometry.triangles import convex_hull
 from anysim.kinematics import inertia
 from anysim.model.world import Mesh, MeshShape
 from anysim_sapien.declared import AUDIT_ALLOWANCES

@@ -7,8 +7,7 @@ from anysim import compile_world
 from anysim.errors import EngineError
 from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.world import World
-from anysim.planning.motion import motion_planner
-from anysim.planning.scenes import Scenes
+from anysim.planning.motion import Scenes, motion_planner
 from anysim_bench.free_paths import Touching, dense
 from anysim_bench.plan_requests import Arms
 from tests.plugins.planning.conftest import LEFT, RIGHT, ROOM

@@ -6,8 +6,7 @@ import pytest
 from anysim import compile_world
 from anysim.math import pose as P
 from anysim.model.world import World
-from anysim.planning.motion import PlanRequest, Scene, ToolGoal
-from anysim.planning.scenes import Scenes
+from anysim.planning.motion import PlanRequest, Scene, Scenes, ToolGoal
 
 ROOM = """
 world:

@@ -8,8 +8,16 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from anysim.errors import AnysimError
-from anysim.planning.motion import Budget, PlanAnswer, PlanRequest, PlanStatus, RequestKind, ToolGoal, motion_planner
-from anysim.planning.scenes import Scenes
+from anysim.planning.motion import (
+    Budget,
+    PlanAnswer,
+    PlanRequest,
+    PlanStatus,
+    RequestKind,
+    Scenes,
+    ToolGoal,
+    motion_planner,
+)
 from anysim.planning.service import planner_service
 from anysim.testing.planners import rooms
 from anysim_planning.queued import BATCH, MOTIONS

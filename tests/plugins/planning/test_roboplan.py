@@ -10,8 +10,7 @@ import pytest
 from anysim.errors import PluginError
 from anysim.math import pose as P
 from anysim.model.world import World
-from anysim.planning.motion import Attachment, Budget, PlanRequest, PlanStatus, Scene, motion_planner
-from anysim.planning.scenes import Scenes
+from anysim.planning.motion import Attachment, Budget, PlanRequest, PlanStatus, Scene, Scenes, motion_planner
 from anysim.testing.planners import rooms
 from anysim_planning import roboplan_scene
 from anysim_planning.roboplan_planner import RoboplanPlanner

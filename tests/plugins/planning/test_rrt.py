@@ -18,10 +18,10 @@ from anysim.planning.motion import (
     PlanRequest,
     PlanStatus,
     Scene,
+    Scenes,
     ToolGoal,
     motion_planner,
 )
-from anysim.planning.scenes import Scenes
 from anysim_planning import goals, rrt
 from anysim_planning.rrt import RrtPlanner
 from anysim_planning.threads import ThreadedService

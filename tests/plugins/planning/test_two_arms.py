@@ -12,8 +12,7 @@ from anysim.kinematics.chain import Chain
 from anysim.math import pose as P
 from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.world import World
-from anysim.planning.motion import Budget, Pairing, PlanRequest, PlanStatus, Scene, ToolGoal, motion_planner
-from anysim.planning.scenes import Scenes
+from anysim.planning.motion import Budget, Pairing, PlanRequest, PlanStatus, Scene, Scenes, ToolGoal, motion_planner
 
 TWO = """
 world:

@@ -5,7 +5,7 @@ import numpy as np
 from anysim import make
 from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.runner import SkillPolicy
-from anysim.task.contact_view import ContactView
+from anysim.task.references import ContactView
 from anysim.testing.engines import require_engine
 from tests.tasks.states import blinding
 

@@ -10,10 +10,8 @@ from typing import Any
 
 import mujoco
 
-from anysim.assets.images import opened_image
-from anysim.assets.mesh_budget import bounded, check, mesh_bytes
+from anysim.assets.bounded_files import bounded, check, mesh_bytes, opened_image, xml_root
 from anysim.assets.uri import resolve_reference
-from anysim.assets.xml import xml_root
 from anysim.errors import AssetError
 from anysim_schemas.limits import (
     ASSET_BYTES,

@@ -7,7 +7,7 @@ from typing import Any
 
 import mujoco
 
-from anysim.assets.mesh_budget import bounded
+from anysim.assets.bounded_files import bounded
 from anysim.assets.model import ImportNote
 from anysim.errors import AssetError, listing, suggest
 from anysim_mujoco.log import silence

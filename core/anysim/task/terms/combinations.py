@@ -11,9 +11,8 @@ from pydantic import Field
 
 from anysim.conventions import Array
 from anysim.math import pose as P
-from anysim.task.conditions import Conditions
-from anysim.task.contact_view import ContactView
 from anysim.task.joints import JointView
+from anysim.task.references import Conditions, ContactView
 from anysim.task.scene import Frame, SceneView
 from anysim.task.terms.geometry import Axis, axis_of
 from anysim_schemas.base import Number

@@ -8,10 +8,8 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.errors import TaskError, listing
 from anysim.math import pose as P
-from anysim.task.conditions import Conditions
-from anysim.task.contact_view import ContactView
 from anysim.task.joints import RangedJointView
-from anysim.task.references import PointsView
+from anysim.task.references import Conditions, ContactView, PointsView
 from anysim.task.scene import DrawnView, Frame, ObjectView, RobotView, SceneView
 from anysim.task.slot_frames import CategoryView
 from anysim.task.terms.geometry import least_turn

@@ -8,9 +8,8 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.errors import TaskError
 from anysim.math import pose as P
-from anysim.task.contact_view import ContactView
 from anysim.task.joints import JointView, RangedJointView
-from anysim.task.references import HoleView, InnerSpace, PointsView
+from anysim.task.references import ContactView, HoleView, InnerSpace, PointsView
 from anysim.task.scene import Frame, ObjectView, RobotView, SceneView
 from anysim.task.slot_frames import CategoryView
 from anysim.task.terms.geometry import Axes, Axis, along, axis_of, turned_by

@@ -7,10 +7,9 @@ from pydantic import Field
 
 from anysim.conventions import Array
 from anysim.math import pose as P
-from anysim.task.conditions import Conditions
-from anysim.task.contact_view import ContactView
 from anysim.task.contract import at_most
 from anysim.task.joints import RangedJointView
+from anysim.task.references import Conditions, ContactView
 from anysim.task.scene import Frame, RobotView, SceneView
 from anysim.task.terms.geometry import Axes, Axis, along, axis_of, turned_by
 

@@ -5,8 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from anysim.model.world import World
-from anysim.planning.motion import Budget, MotionPlanner, PlanAnswer, PlanRequest, Scene
-from anysim.planning.scenes import Scenes
+from anysim.planning.motion import Budget, MotionPlanner, PlanAnswer, PlanRequest, Scene, Scenes
 from anysim.testing import plugin
 from anysim.testing.planners import rooms
 

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from anysim.planning.motion import Attachment, Pairing, PlanRequest, PlanStatus, ToolGoal
-from anysim.planning.scenes import Scenes
+from anysim.planning.motion import Attachment, Pairing, PlanRequest, PlanStatus, Scenes, ToolGoal
 from anysim.testing.planners import measure, rooms
 from anysim.testing.planners.fixtures import claims, planned
 

@@ -10,8 +10,8 @@ from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
-from anysim.task.contact_view import ContactView
 from anysim.task.env import TaskEnv
+from anysim.task.references import ContactView
 from anysim.task.scene import Frame, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.grasping.grasp import Metres, Speed

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from anysim.assets.mesh_budget import bounded
+from anysim.assets.bounded_files import bounded
 from anysim.assets.model import ImportedModel
 from anysim.conventions import Array
 from anysim.errors import AssetError

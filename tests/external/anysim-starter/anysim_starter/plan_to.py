@@ -7,8 +7,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.kinematics.chain import Chain
-from anysim.planning.motion import Budget, PlanRequest, PlanStatus, ToolGoal, Trajectory, motion_planner
-from anysim.planning.scenes import Scenes
+from anysim.planning.motion import Budget, PlanRequest, PlanStatus, Scenes, ToolGoal, Trajectory, motion_planner
 from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.phases import GO_ON, STAY, Mover, Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv

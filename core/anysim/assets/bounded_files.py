@@ -1,13 +1,32 @@
-"""Size of a mesh file from its headers and words, before a parser spends time and memory on it."""
+"""Files of assets, read within their limits: bytes, images, XML, and meshes by their headers and words.
 
+What a parser would spend time and memory on is refused before the parser runs.
+"""
+
+import io
 import json
 import re
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 from anysim.errors import AssetError
 from anysim_schemas.files import RefusedFileError, read_plain
-from anysim_schemas.limits import JSON_BYTES, MESH_BYTES, MESH_FACES, MESH_NODES, Limit
+from anysim_schemas.limits import (
+    IMAGE_BYTES,
+    IMAGE_PIXELS,
+    JSON_BYTES,
+    MESH_BYTES,
+    MESH_FACES,
+    MESH_NODES,
+    MODEL_BYTES,
+    MODEL_DEPTH,
+    MODEL_ELEMENTS,
+    Limit,
+)
 
 _ENCODINGS = frozenset({b"utf-8", b"us-ascii", b"ascii", b"iso-8859-1", b"latin1", b"windows-1252"})
 _DAE_FACES = re.compile(
@@ -15,6 +34,9 @@ _DAE_FACES = re.compile(
     rb"""<(?:triangles|polylist|polygons|trifans|tristrips)\b[^>]{0,300}?count\s*=\s*["'](\d+)"""
 )
 _XML_ENCODING = re.compile(rb"""\s*<\?xml[^>]*?encoding\s*=\s*["']([^"']*)""")
+_DECLARATION = re.compile(rb"""<\?xml\s+version\s*=\s*["'][^"'?]*["']([^?>]*)\?>""")
+_IMAGE_FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "PPM", "GIF", "WEBP", "TGA")
+"""Others run programs (EPS) or have parsers without maintainers."""
 
 
 def bounded(path: Path, limit: Limit) -> bytes:
@@ -49,6 +71,67 @@ def plain_xml(data: bytes) -> None:
         raise ValueError("its encoding is not UTF-8, in which XML entities could hide")
     if b"<!ENTITY" in data:
         raise ValueError("declares XML entities, which are not read")
+
+
+@contextmanager
+def opened_image(path: Path, limit: Limit = IMAGE_PIXELS) -> Iterator[Any]:
+    """An image (`PIL.Image.Image`) of at most `limit` pixels, not decoded yet.
+
+    Raises:
+        AssetError: no plain file, too large, or no image; also for what decoding in the `with` block raises.
+    """
+    from PIL import Image
+
+    data = bounded(path, IMAGE_BYTES)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            image = Image.open(io.BytesIO(data), formats=_IMAGE_FORMATS)
+        with image:
+            check(path, limit, image.width * image.height)
+            yield image
+    except AssetError:
+        raise
+    except Image.DecompressionBombError as error:
+        raise AssetError(f"{path}: {limit.sentence()}") from error
+    except Exception as error:  # decoders of eight formats raise what they like
+        raise AssetError(
+            f"{path}: cannot be read as an image ({type(error).__name__}); expected PNG, JPEG, TIFF or BMP"
+        ) from error
+
+
+def _declared(found: re.Match[bytes]) -> bytes:
+    """An XML declaration of version 1.0 at the beginning, elsewhere spaces."""
+    return b'<?xml version="1.0"' + found[1] + b"?>" if found.start() == 0 else b" " * len(found[0])
+
+
+def xml_root(path: Path) -> tuple[Any, bytes]:
+    """The root element (`lxml.etree`) of a file without comments, entities and DTDs; and the file's bytes.
+
+    Files in use declare versions of XML that there are not, or begin with something else: neither counts.
+
+    Raises:
+        AssetError: see `bounded`; not well-formed, a document type declaration, an encoding that hides elements, too
+            many elements or levels.
+    """
+    from lxml import etree
+
+    data = bounded(path, MODEL_BYTES).rstrip(b"\0 \t\r\n")
+    parser = etree.XMLParser(
+        resolve_entities=False, load_dtd=False, no_network=True, huge_tree=False, remove_comments=True, remove_pis=True
+    )
+    if not plain_encoding(data):
+        raise AssetError(f"{path}: its encoding is not UTF-8; save it as UTF-8")
+    check(path, MODEL_ELEMENTS, len(re.findall(rb"<[A-Za-z_]", data)))
+    try:
+        root = etree.fromstring(_DECLARATION.sub(_declared, data), parser)
+    except etree.XMLSyntaxError as error:
+        if "Excessive depth" in str(error):
+            raise AssetError(f"{path}: {MODEL_DEPTH.sentence()}") from error
+        raise AssetError(f"{path}: not well-formed XML: {error.msg}") from error
+    if root.getroottree().docinfo.internalDTD is not None:
+        raise AssetError(f"{path}: has a document type declaration (entities), which a model does not need")
+    return root, data
 
 
 def mesh_bytes(path: Path) -> bytes:
