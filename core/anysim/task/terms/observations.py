@@ -9,7 +9,7 @@ from anysim.conventions import Array
 from anysim.errors import TaskError, listing
 from anysim.math import pose as P
 from anysim.task.conditions import Conditions
-from anysim.task.contact_view import ContactView
+from anysim.task.contact_view import ContactView, SensorView
 from anysim.task.joints import RangedJointView
 from anysim.task.references import PointsView
 from anysim.task.scene import DrawnView, Frame, ObjectView, RobotView, SceneView
@@ -202,6 +202,11 @@ def contact_force(
 ) -> Array:
     """The net force on the body of a contact sensor, world axes [N]."""
     return np.clip(sensor.force, -limit, limit)
+
+
+def sensor(scene: SceneView, *, of: SensorView) -> Array:
+    """What is seen of a sensor: one field of it, `imu.acceleration`, or all but its `time` and `valid`."""
+    return of.values()
 
 
 def holds(scene: SceneView, *, of: Conditions) -> Array:
