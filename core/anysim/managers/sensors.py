@@ -13,7 +13,7 @@ from anysim import registry
 from anysim.conventions import Array
 from anysim.engine.capability import Need
 from anysim.engine.snapshots.row_checks import refuse_range
-from anysim.errors import NameLookupError, PluginError, SpecError, SpecIssue, TaskError, listing, suggest
+from anysim.errors import AnysimError, NameLookupError, PluginError, SpecError, SpecIssue, TaskError, listing, suggest
 from anysim.managers.base import Manager, Overridable, random_fields
 from anysim.math import pose as P
 from anysim.model.world import World
@@ -152,6 +152,8 @@ class SensorManager(Manager):
                 self._channels[name] = _Channel(name, spec, sensor, every, self.streams, who)
             except SpecError as error:
                 issues.extend(error.issues)
+            except AnysimError as error:
+                issues.append(SpecIssue("", path, str(error)))
         arrays = [f"sensor_{name}_{key}" for name, channel in self._channels.items() for key in channel.fields]
         if twice := sorted({array for array in arrays if arrays.count(array) > 1}):
             issues.append(SpecIssue("", "world.sensors", f"'{twice[0]}' would be recorded twice; rename a sensor"))

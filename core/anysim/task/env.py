@@ -103,9 +103,9 @@ class TaskEnv:
         self._observers.call("after_build", env=self)
 
     def _sensor(self, kind: str, params: Mapping[str, Any], path: str) -> Sensor:
-        made, who = registry.load("sensors", kind), f"{self.located(path)}: the sensor '{kind}'"
-        with registry.Blame(who, registry.origin(made), prefix=True):
-            sensor: object = bind_function(made, f"sensor '{kind}'", params, self.scene, path)
+        made, who = registry.load("sensors", kind), f"the sensor '{kind}'"
+        with registry.Blame(f"{self.located(path)}: {who}", registry.origin(made)):
+            sensor: object = bind_function(made, who.removeprefix("the "), params, self.scene, path)
         if isinstance(sensor, Sensor):
             return sensor
         raise PluginError(f"{who} of {registry.origin(made)} is no Sensor; derive it from anysim.sensors.base.Sensor")
