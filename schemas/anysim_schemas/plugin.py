@@ -6,11 +6,11 @@ plugin declares; the loader then validates the slot with it and reports its erro
 There are two kinds of slots:
 - a `dict[str, Any]` field annotated with `PluginSlot`: `engine.options`, `record.options`, `actions.*.params`,
   `source.params` of a procedural object;
-- a spec with the class attribute `plugin_kind`, whose parameters stand beside its own fields: terms and skills. The
-  name of the plugin is in the field `term`, or in the one that `plugin_name_field` names.
+- a spec with the class attribute `plugin_kind`, whose parameters stand beside its own fields: terms, skills, sensors.
+  The name of the plugin is in the field `term`, or in the one that `plugin_name_field` names.
 
-The kinds are engine, writer, controller, asset, observation, reward, predicate, command, event and skill. A parameter
-of a term or skill may say `$name`: what that can be is checked where it is bound.
+The kinds are engine, writer, controller, asset, observation, reward, predicate, command, event, skill and sensor.
+A parameter of a term or skill may say `$name`: what that can be is checked where it is bound.
 """
 
 import re

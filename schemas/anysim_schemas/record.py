@@ -16,6 +16,9 @@ class RecordSpec(Spec):
         default_factory=dict, description="options owned by the writer"
     )
     cameras: tuple[Name, ...] = Field(default=(), description="cameras of the world whose images become videos")
+    sensors: tuple[Name, ...] | None = Field(
+        default=None, description="sensors of the world whose readings are recorded; all of them if not given"
+    )
     fps: Positive = Field(default=25.0, description="frames per second of the videos; every n-th control step")
     markers: Flag = Field(
         default=True, description="goals are marked in the videos; of a camera that is observed, task.images says"

@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 from anysim_schemas.base import Flag, Length, Name, NonNegative, Number, Positive, Spec, Vec3
 from anysim_schemas.object_source import PACKAGES
 from anysim_schemas.objects import ContactSpec
+from anysim_schemas.sensors import SensorNoiseSpec
 from anysim_schemas.vehicle import VehicleSpec
 
 Category = Literal["arm", "dual_arm", "hand", "base", "mobile_manipulator", "humanoid", "quadruped", "camera"]
@@ -81,14 +82,17 @@ class LegSpec(Spec):
     sole_height: Number = Field(default=0.0, description="flat foot: height of its frame above the sole [m]")
 
 
-class SensorSpec(Spec):
-    """A place for a sensor on the robot, a frame that worlds refer to: `cameras: {wrist: {mount: panda.camera}}`."""
+class SensorPlaceSpec(Spec):
+    """A place for a sensor on the robot: `cameras: {wrist: {mount: panda.camera}}`, `sensors: {imu: go2.body_imu}`."""
 
     kind: Literal["camera", "imu", "force_torque", "lidar", "tactile"] = Field(description="what belongs there")
     link: str = Field(description="the link that carries it")
     position: Vec3 = Field(default=(0.0, 0.0, 0.0), description="place in the link's frame [m]")
     roll_pitch_yaw: Vec3 = Field(
         default=(0.0, 0.0, 0.0), description="orientation in the link's frame [rad]; a camera looks along z, y down"
+    )
+    noise: dict[Name, SensorNoiseSpec] = Field(
+        default_factory=dict, description="noise by field of the sensor, as its data sheet has it; a world may say more"
     )
 
 
@@ -174,7 +178,7 @@ class RobotModelSpec(Spec):
     channels: dict[str, ChannelSpec] = Field(description="the groups of joints that are commanded, by name")
     home: dict[str, Number] = Field(default_factory=dict, description="joint positions [rad] or [m]; 0 where not given")
     tools: dict[str, ToolSpec] = Field(default_factory=dict, description="frames that tasks refer to, by name")
-    sensors: dict[str, SensorSpec] = Field(default_factory=dict, description="places for sensors, by name")
+    sensors: dict[str, SensorPlaceSpec] = Field(default_factory=dict, description="places for sensors, by name")
     vehicle: VehicleSpec | None = Field(default=None, description="how it drives, where it does")
     legs: dict[Name, LegSpec] = Field(default_factory=dict, description="its legs by name, front left first")
     collision: dict[str, tuple[SolidSpec, ...]] = Field(

@@ -18,6 +18,7 @@ from anysim_schemas.record import RecordSpec
 from anysim_schemas.regions import RegionSpec
 from anysim_schemas.robots import RobotSpec
 from anysim_schemas.rooms import RoomSpec
+from anysim_schemas.sensors import SensorSpec
 from anysim_schemas.task import TaskSpec
 from anysim_schemas.terrain import TerrainSpec
 
@@ -41,6 +42,9 @@ class WorldSpec(Spec):
     lights: dict[Name, LightSpec] = Field(default_factory=dict, description="lights by name")
     scenery: ScenerySpec = Field(default=ScenerySpec(), description="background, ambient light and shadows")
     contact_sensors: dict[Name, ContactSensorSpec] = Field(default_factory=dict, description="contact sensors by name")
+    sensors: dict[Name, SensorSpec] | None = Field(
+        default=None, description="sensors by name: what terms read through `sensor`, and what is recorded"
+    )
     collisions: CollisionsSpec = Field(default=CollisionsSpec(), description="what passes through what")
     visual_error: NonNegative | None = Field(
         default=None,
@@ -78,3 +82,17 @@ class RunSpec(Spec):
         default=None, description="commands of an episode that is collected; the task's expert where not given"
     )
     record: RecordSpec = Field(default=RecordSpec(), description="what is written, and by whom")
+
+    @model_validator(mode="after")
+    def _sensors_are_read(self) -> Self:
+        sensors = self.world.sensors or {}
+        for name, sensor in sensors.items():
+            try:
+                sensor.steps(self.physics.control_dt)
+            except KeyFault as fault:
+                raise KeyFault(str(fault), "world", "sensors", name, *fault.path) from None
+        for place, name in enumerate(self.record.sensors or ()):
+            if name not in sensors:
+                known = ", ".join(sensors) or "none"
+                raise KeyFault(f"there is no sensor '{name}' (sensors: {known})", "record", "sensors", str(place))
+        return self

@@ -23,11 +23,11 @@ from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_drawing
 from anysim_schemas.base import Spec
 from anysim_schemas.run import RunSpec
-from tests.schemas.keys import layout, run, world
+from tests.schemas.keys import layout, run, sensors, world
 from tests.schemas.keys.row import FILE, Row
 
 HERE = Path(__file__).parent
-ROWS: dict[str, Row] = {**run.ROWS, **world.ROWS, **layout.ROWS}
+ROWS: dict[str, Row] = {**run.ROWS, **world.ROWS, **layout.ROWS, **sensors.ROWS}
 STEPS, EPISODES = 4, 3
 
 

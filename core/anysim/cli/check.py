@@ -117,7 +117,7 @@ def _report_on(
 ) -> tuple[Report, tuple[str, ...]]:
     """The report on a file as it is, and its levels where none of them is chosen."""
     from anysim import registry
-    from anysim.api import compile_world, dry_run, load, place_of
+    from anysim.api import compile_world, dry_run, load, place_of, watched
     from anysim.engine.conditioning import doubts
     from anysim.errors import AnysimError, AssetError, PluginFailure, SpecError, SpecIssue
     from anysim_schemas.files import exists
@@ -126,8 +126,8 @@ def _report_on(
     try:
         loaded = load(Path(name) if exists(name) else name, overrides=overrides, past=past)
         world = compile_world(loaded)
-        if loaded.spec.task is not None:
-            dry_run(loaded, world)
+        if loaded.spec.task is not None or loaded.spec.world.sensors:
+            dry_run(watched(loaded), world)
             _check_film(loaded)
         found = [doubt[:2] for doubt in doubts(world)]
         found += [] if loaded.spec.task is None else _too_little_for_success(loaded.spec.task)

@@ -39,7 +39,7 @@ from anysim.model.world import (
 )
 from anysim.randomization.distributions import extremes, nominal
 from anysim_schemas.object_source import PROCEDURAL
-from anysim_schemas.robot_model import ChannelSpec, GainSpec, RobotModelSpec, SensorSpec, ToolSpec
+from anysim_schemas.robot_model import ChannelSpec, GainSpec, RobotModelSpec, SensorPlaceSpec, ToolSpec
 from anysim_schemas.robots import RobotSpec
 
 
@@ -307,7 +307,7 @@ class _Assembly:
             self._frame(builder, entity, "sensors", name, spec)
 
     def _frame(
-        self, builder: WorldBuilder, entity: Entity, kind: str, name: str, spec: ToolSpec | SensorSpec
+        self, builder: WorldBuilder, entity: Entity, kind: str, name: str, spec: ToolSpec | SensorPlaceSpec
     ) -> int | None:
         """Add the site of a tool or sensor; None where its link is not there or its name is taken."""
         frames = self.model.frames

@@ -17,6 +17,7 @@ from pydantic import BaseModel
 
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
+from anysim.engine.capability import Need
 from anysim.engine.parameters import PARAMETERS
 from anysim.errors import TaskError
 from anysim.model.world import World
@@ -38,11 +39,12 @@ RESET_ORDER = (
     "light",
     "camera",
     "capture",
+    "sensors",
     "task",
 )
 """How much of each spread is drawn from, then the ground, what is there, where it is and what it is like, how its
-joints stand and what pulls at it, then the robots and what their drives hold, the lights and the cameras, and the task
-last, on the settled scene."""
+joints stand and what pulls at it, then the robots and what their drives hold, the lights, the cameras and sensors, and
+the task last, on the settled scene."""
 
 
 class Overridable(NamedTuple):
@@ -127,6 +129,10 @@ class Manager(ABC):
         Names are those of `anysim.engine.parameters`. Asked after `build`; an engine that cannot change one of them is
         refused before it builds anything.
         """
+        return ()
+
+    def needs(self) -> Iterable[Need]:
+        """What this run asks of an engine beyond what its World does; asked after `build`, too."""
         return ()
 
     def bind(self, engine: SimEngine) -> None:

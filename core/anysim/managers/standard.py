@@ -1,6 +1,6 @@
 """The managers that every env has, and what they ask of an engine, checked before anything is built."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 from anysim.engine.base import SimEngine
 from anysim.engine.capability import Need, check
@@ -15,6 +15,7 @@ from anysim.managers.object_parameters import SceneManager
 from anysim.managers.population import PopulationManager
 from anysim.managers.randomized_parameters import LightManager, SceneParameterManager
 from anysim.managers.robot_reset import RobotResetManager
+from anysim.managers.sensors import SensorManager
 from anysim.managers.terrain import TerrainManager
 from anysim.model.world import World
 from anysim.randomization.streams import Streams
@@ -30,6 +31,8 @@ def standard_managers(spec: RunSpec, world: World, num_envs: int, proposals: Pro
     ]  # fmt: skip
     if spec.task is not None and spec.task.curriculum:
         managers.append(CurriculumManager())
+    if spec.world.sensors:
+        managers.append(SensorManager())
     for manager in managers:
         manager.configure(spec, streams, episodes)
         manager.build(world)
@@ -58,7 +61,7 @@ def unchangeable(
 def check_run(
     engine: type[SimEngine] | SimEngine,
     world: World,
-    managers: Iterable[Manager],
+    managers: Sequence[Manager],
     source: str,
     place: Callable[[str], str] = str,
     options: object = None,
@@ -71,4 +74,5 @@ def check_run(
         CapabilityError: lists every need that the engine does not meet.
     """
     refusals = [*engine.refusals(world, options), *unchangeable(engine, managers, place)]
-    return check(engine.name, engine.capabilities, needs_of(world), source, refusals, place)
+    needs = [*needs_of(world), *(need for manager in managers for need in manager.needs())]
+    return check(engine.name, engine.capabilities, needs, source, refusals, place)

@@ -213,6 +213,12 @@ def rotation_vector(q: Array) -> Array:
     return q[..., :3] * scale[..., None]
 
 
+def from_rotation_vector(v: Array) -> Array:
+    """Unit quaternions (..., 4) of rotation vectors (..., 3)."""
+    half = 0.5 * norm(v)[..., None]
+    return np.concatenate([0.5 * np.sinc(half / np.pi) * v, np.cos(half)], axis=-1)
+
+
 def angle_between(a: Array, b: Array) -> Array:
     """The angle [rad] (...) of the rotation from a to b (..., 4)."""
     return norm(rotation_vector(multiply(conjugate(a), b)))

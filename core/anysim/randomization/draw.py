@@ -7,6 +7,7 @@ Noise is drawn anew at each control step. It depends on the episode, the stream'
 env goes on with the same noise and nothing is kept; nor is it noted draw by draw, as the seed gives it again.
 """
 
+from math import exp, expm1, sqrt
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.randomization.distributions import draw_one, extremes, nominal
 from anysim.randomization.streams import OVERRIDDEN, Origin, Streams
+from anysim_schemas.sensors import SensorNoiseSpec
 from anysim_schemas.values import Choice, Distribution
 
 
@@ -78,6 +80,57 @@ def note_noise(value: Any, name: str, streams: Streams, env_ids: Array, source: 
         text = f"at each step: {value.model_dump(mode='json', exclude_defaults=True)}"
         for env in env_ids.tolist():
             streams.note(env, name, text, Origin(name, source))
+
+
+class FieldNoise:
+    """The error of several numbers: a bias that walks, white noise, and what else is drawn at each reading.
+
+    `bias` and `walk` (N, size) are its state; the walk is 0 at an episode's first reading.
+    """
+
+    def __init__(
+        self, spec: SensorNoiseSpec, name: str, source: str, streams: Streams, size: int, period: float
+    ) -> None:
+        """`name` begins the names of its streams; `period` [s] is between two readings."""
+        self._spec, self._name, self._source, self._streams = spec, name, source, streams
+        self.bias, self.walk = np.zeros((streams.num_envs, size)), np.zeros((streams.num_envs, size))
+        time = spec.walk_time
+        self._keeps = 1.0 if time is None else exp(-period / time)
+        variance = period if time is None else -0.5 * time * expm1(-2.0 * period / time)
+        self._stride, self._white = spec.walk * sqrt(variance), spec.white / sqrt(period)
+
+    def reset(self, env_ids: Array) -> None:
+        """Draw the bias of new episodes."""
+        name, source, bias = f"{self._name}/bias", f"{self._source}.bias", self._spec.bias
+        self.walk[env_ids] = 0.0
+        if bias is not None:
+            once, size = np.zeros(len(env_ids), dtype=np.int64), self.bias.shape[1]
+            self.bias[env_ids] = rows = noise_rows(bias, name, self._streams, env_ids, once, size)
+            for env, row in zip(env_ids.tolist(), rows.tolist(), strict=True) if is_random(bias) else ():
+                self._streams.note(env, name, tuple(row), Origin(name, source))
+        note_noise(self._spec.noise, f"{self._name}/noise", self._streams, env_ids, f"{self._source}.noise")
+
+    def added(self, rows: Array, env_ids: Array, ticks: Array) -> Array:
+        """Rows (E, size) of the control steps (E,) with their error; the walk goes on by a reading."""
+        if self._stride:
+            step = self._stride * (ticks > 0)[:, None] * self._normal("walk", env_ids, ticks)
+            self.walk[env_ids] = self._keeps * self.walk[env_ids] + step
+            rows = rows + self.walk[env_ids]
+        if self._spec.bias is not None:
+            rows = rows + self.bias[env_ids]
+        if self._white:
+            rows = rows + self._white * self._normal("white", env_ids, ticks)
+        if self._spec.noise is not None:
+            name = f"{self._name}/noise"
+            rows = rows + noise_rows(self._spec.noise, name, self._streams, env_ids, ticks, rows.shape[1])
+        return rows
+
+    def _normal(self, part: str, env_ids: Array, ticks: Array) -> Array:
+        """Standard normal draws (E, size) of a stream of their own."""
+        name, rows = f"{self._name}/{part}", np.empty((len(env_ids), self.bias.shape[1]))
+        for row, (env, tick) in enumerate(zip(env_ids.tolist(), ticks.tolist(), strict=True)):
+            rows[row] = self._streams.shared_generator(env, name, tick).standard_normal(rows.shape[1])
+        return rows
 
 
 class DelayLine:

@@ -111,7 +111,11 @@ class Header(NamedTuple):
 
 
 def state_layout(
-    world: World, fields: Iterable[str], action: Sequence[str], obs: Mapping[str, Array] | None = None
+    world: World,
+    fields: Iterable[str],
+    action: Sequence[str],
+    obs: Mapping[str, Array] | None = None,
+    sensors: Mapping[str, Array] | None = None,
 ) -> StateLayout:
     """The layout of frames of a World.
 
@@ -119,6 +123,7 @@ def state_layout(
         fields: names of `State` arrays and of `control_position`, `control_velocity`, `control_effort`.
         action: names of the action's components.
         obs: an example of one env's observation groups; `images/…` are left out.
+        sensors: arrays (n, …) of what is recorded of sensors.
     """
     bodies, joints, drives = len(world.bodies), len(world.joints), len(world.actuators)
     shapes = {
@@ -133,7 +138,7 @@ def state_layout(
         joints=tuple(j.name for j in world.joints),
         actuators=tuple(a.name for a in world.actuators),
         action=tuple(action),
-        state={name: shapes[name] for name in fields},
+        state={name: shapes[name] for name in fields} | {name: a.shape[1:] for name, a in (sensors or {}).items()},
         obs={k: ArrayLayout.model_validate({"shape": v.shape, "dtype": str(v.dtype)}) for k, v in groups.items()},
     )
 

@@ -240,11 +240,13 @@ def begin(env: TaskEnv, manifest: Manifest) -> None:
 
 def _run(env: TaskEnv, reader: TrajectoryReader) -> tuple[dict[str, Array], dict[str, Array]]:
     """The state (…) after the reset, and the states (T, …) after each step as far as the replayed episode goes."""
-    fields = tuple(reader.manifest.layout.state)
     begin(env, reader.manifest)
+    fields = tuple(reader.manifest.layout.state)
+    own = [name for name in fields if name not in env.sensor_rows(np.arange(1))]
 
     def now() -> dict[str, Array]:
-        rows = state_rows(env.engine.get_state(), 0, fields, env.engine.control)
+        rows = state_rows(env.engine.get_state(), 0, own, env.engine.control)
+        rows |= {name: sensed[0] for name, sensed in env.sensor_rows(np.arange(1)).items()}
         return {name: np.array(values) for name, values in rows.items()}
 
     start = now()

@@ -6,24 +6,28 @@ from typing import Any, Self, TypeVar
 
 import numpy as np
 
+from anysim import registry
 from anysim.controllers.action_space import ActionSpaces
 from anysim.conventions import Array
 from anysim.engine import arguments
 from anysim.engine.base import SimEngine
 from anysim.engine.snapshots.row_checks import damaged, refuse_range
-from anysim.errors import AnysimError, SnapshotError, TaskError
+from anysim.errors import AnysimError, PluginError, SnapshotError, TaskError
 from anysim.hooks import Observing
 from anysim.managers.action import ActionManager
 from anysim.managers.base import RESET_ORDER, Manager
 from anysim.managers.camera import CaptureManager
 from anysim.managers.curriculum import CurriculumManager
+from anysim.managers.sensors import SensorManager
 from anysim.managers.terrain import TerrainManager
 from anysim.math import arrays
+from anysim.sensors.base import Sensor
 from anysim.task.bindings import Bindings
 from anysim.task.contract import FAILED, RUNNING, STATUS_NAMES, SUCCESS, TRUNCATED, Obs, StepResult
 from anysim.task.overrides import Counterfactuals
 from anysim.task.scene import SceneView
 from anysim.task.snapshot import EnvSnapshot, refuse_foreign, spec_hash
+from anysim.task.term_registry import bind_function
 from anysim.task.terms_runtime import Mdp
 from anysim_schemas.run import RunSpec
 
@@ -70,6 +74,10 @@ class TaskEnv:
         self.action_dim = self.actions.dim
         self.scene = SceneView(engine, self._episodes, self._manager(TerrainManager))
         self.scene.capture = self.capture
+        self.sensors = next((manager for manager in self.managers if isinstance(manager, SensorManager)), None)
+        if self.sensors is not None:
+            self.sensors.attach(self._sensor, self.scene.look)
+            self.scene.sensors = self.sensors
         self.scene.action_columns = {name: slice(s.start, s.stop) for name, s in self.action_spaces.items()}
         self.bindings = Bindings(spec.collect, self.num_envs, self.streams)
         self.mdp = Mdp(spec.task, self.scene, self.streams, located, self.bindings)
@@ -93,6 +101,14 @@ class TaskEnv:
         self.image_shapes = self.capture.image_shapes
         """The shape of each observed image, by `images/CAMERA`."""
         self._observers.call("after_build", env=self)
+
+    def _sensor(self, kind: str, params: Mapping[str, Any], path: str) -> Sensor:
+        made, who = registry.load("sensors", kind), f"the sensor '{kind}'"
+        with registry.Blame(f"{self.located(path)}: {who}", registry.origin(made)):
+            sensor: object = bind_function(made, who.removeprefix("the "), params, self.scene, path)
+        if isinstance(sensor, Sensor):
+            return sensor
+        raise PluginError(f"{who} of {registry.origin(made)} is no Sensor; derive it from anysim.sensors.base.Sensor")
 
     def _manager(self, kind: type[_Kind]) -> _Kind:
         return next(manager for manager in self.managers if isinstance(manager, kind))
@@ -128,6 +144,10 @@ class TaskEnv:
     def running(self) -> Array:
         """(N,) bool: reset, and not ended."""
         return self._code == RUNNING
+
+    def sensor_rows(self, env_ids: Array) -> dict[str, Array]:
+        """What is recorded of sensors (n, …), by the names of the arrays."""
+        return {} if self.sensors is None else self.sensors.recorded(env_ids)
 
     def instruction(self, env: int) -> str:
         """The task in words, as it is in an env's episode."""
@@ -176,6 +196,8 @@ class TaskEnv:
         self.scene.meet()
         self.scene.look(ids)
         self.mdp.reset(ids)
+        if self.sensors is not None:
+            self.sensors.begin(ids)
         self.counterfactuals.mark(ids, plan)
         rows = self._observe(ids)
         self._store(rows, ids)
@@ -245,6 +267,8 @@ class TaskEnv:
         rows = slice(None) if ids is None else ids
         self._episodes.elapsed[rows] += 1
         self.scene.look(ids)
+        if self.sensors is not None:
+            self.sensors.sample(self.scene.env_ids)
         self._evaluate(rows)
         reward = self._reward(ids)
         self.mdp.interval_events()

@@ -6,9 +6,10 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.snapshots.row_checks import refuse_range
-from anysim.randomization.draw import DelayLine, draw_rows, is_random, longest_delay, noise_rows, note_noise
-from anysim.randomization.streams import Origin, Streams
+from anysim.randomization.draw import DelayLine, FieldNoise, draw_rows, longest_delay
+from anysim.randomization.streams import Streams
 from anysim.task.scene import SceneView
+from anysim_schemas.sensors import SensorNoiseSpec
 from anysim_schemas.task import ObservationTermSpec
 
 
@@ -29,7 +30,7 @@ class ObservedTerm:
         self._scene, self._streams = scene, streams
         self._longest = longest_delay(spec.delay)
         self._line: DelayLine | None = None
-        self._bias: Array | None = None
+        self._noise: FieldNoise | None = None
 
     @staticmethod
     def alters(spec: ObservationTermSpec) -> bool:
@@ -38,30 +39,22 @@ class ObservedTerm:
 
     def reset(self, env_ids: Array) -> None:
         """Draw the delay and the bias of new episodes; the scene must be looking at these rows."""
-        size = self._size()
+        noise = self._room()
         if self._line is not None:
             delay = draw_rows(
                 self._spec.delay, f"{self._name}/delay", self._streams, env_ids, source=f"{self._source}.delay"
             )
             self._line.reset(env_ids, delay.astype(np.int64))
-        bias = self._spec.bias
-        if self._bias is not None and bias is not None:
-            name, once = f"{self._name}/bias", np.zeros(len(env_ids), dtype=np.int64)
-            rows = noise_rows(bias, name, self._streams, env_ids, once, size)
-            self._bias[env_ids] = rows
-            if is_random(bias):
-                for env, row in zip(env_ids.tolist(), rows.tolist(), strict=True):
-                    self._streams.note(env, name, tuple(row), Origin(name, f"{self._source}.bias"))
-        note_noise(self._spec.noise, f"{self._name}/noise", self._streams, env_ids, f"{self._source}.noise")
+        noise.reset(env_ids)
 
-    def _size(self) -> int:
+    def _room(self) -> FieldNoise:
         """Make room at first use: only then it is known how many numbers the term has."""
-        size, n = self._term().shape[1], len(self._scene.elapsed)
-        if self._longest and self._line is None:
-            self._line = DelayLine(n, size, self._longest)
-        if self._spec.bias is not None and self._bias is None:
-            self._bias = np.zeros((n, size))
-        return size
+        if self._noise is None:
+            size, spec = self._term().shape[1], SensorNoiseSpec(noise=self._spec.noise, bias=self._spec.bias)
+            self._noise = FieldNoise(spec, self._name, self._source, self._streams, size, 1.0)
+            if self._longest:
+                self._line = DelayLine(len(self._scene.elapsed), size, self._longest)
+        return self._noise
 
     def __call__(self) -> Array:
         """Rows (n, D) for the envs at hand."""
@@ -70,20 +63,15 @@ class ObservedTerm:
         if self._line is not None:
             self._line.write(ids, ticks, rows)
             rows = self._line.read(ids, ticks)
-        if self._bias is not None:
-            rows = rows + self._bias[ids]
-        if self._spec.noise is not None:
-            rows = rows + noise_rows(self._spec.noise, f"{self._name}/noise", self._streams, ids, ticks, rows.shape[1])
-        return rows
+        return rows if self._noise is None else self._noise.added(rows, ids, ticks)
 
     def snapshot(self, env_ids: Array) -> dict[str, Array]:
         """Copies of what was seen in the last steps, and of what was drawn for the episode."""
-        self._size()
-        data: dict[str, Array] = {}
+        noise, data = self._room(), dict[str, Array]()
         if self._line is not None:
             data |= {"delay": self._line.delay[env_ids], "rows": self._line.rows[env_ids]}
-        if self._bias is not None:
-            data["bias"] = self._bias[env_ids]
+        if self._spec.bias is not None:
+            data["bias"] = noise.bias[env_ids]
         return {f"{self._name}.{key}": value for key, value in data.items()}
 
     def refuse_rows(self, data: Mapping[str, Array]) -> None:
@@ -93,9 +81,9 @@ class ObservedTerm:
 
     def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
         """Write what `snapshot` returned; the scene must be looking at these rows."""
-        self._size()
+        noise = self._room()
         if self._line is not None:
             self._line.delay[env_ids] = data[f"{self._name}.delay"]
             self._line.rows[env_ids] = data[f"{self._name}.rows"]
-        if self._bias is not None:
-            self._bias[env_ids] = data[f"{self._name}.bias"]
+        if self._spec.bias is not None:
+            noise.bias[env_ids] = data[f"{self._name}.bias"]

@@ -1,4 +1,4 @@
-"""Holes, inner spaces, points, contact sensors and conditions, as terms see them."""
+"""Holes, inner spaces, points, sensors and conditions, as terms see them."""
 
 from collections.abc import Callable, Sequence
 from math import isfinite
@@ -11,6 +11,7 @@ from anysim.conventions import Array
 from anysim.errors import NameLookupError, listing, suggest
 from anysim.geometry import polygon as G
 from anysim.geometry.convex_parts import IDENTITY, Pose, Solid
+from anysim.managers.sensors import EVERY_SENSOR
 from anysim.math import pose as P
 from anysim.model.affordance_lookup import find_affordance
 from anysim.model.affordances import AffordanceKind
@@ -125,6 +126,26 @@ class ContactView:
     def strength(self) -> Array:
         """(n,) [N] size of the force."""
         return P.norm(self.force)
+
+
+class SensorView:
+    """What is seen of a sensor. In YAML: its name under `world.sensors`, or one of its fields, `imu.acceleration`."""
+
+    reference_kind: ClassVar[str] = "sensor"
+
+    def __init__(self, scene: SceneView, name: str) -> None:
+        if scene.sensors is None:
+            raise NameLookupError(f"there is no sensor '{name}': the world has none; declare it under `world.sensors`")
+        self.scene, (self.name, _, field) = scene, name.partition(".")
+        self._manager, every = scene.sensors, scene.sensors.fields(self.name)
+        self.fields = (field,) if field else tuple(key for key in every if key not in EVERY_SENSOR)
+        """Those that are meant: one, or all of the sensor's own."""
+        self.values()
+
+    def values(self) -> Array:
+        """(n, k): the fields, one after the other."""
+        parts = [self._manager.reading(self.name, key, self.scene.rows) for key in self.fields]
+        return np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1, dtype=np.float64)
 
 
 class Conditions:

@@ -64,8 +64,14 @@ def bind(kind: str, term: str, params: Mapping[str, Any], scene: SceneView, path
     Raises:
         SpecError: at `path`, a parameter is wrong, or names nothing in this world.
     """
-    function = find(kind, term)
-    with registry.Blame(f"{path}: the signature of the term '{term}'", registry.origin(function)):
+    return bind_function(find(kind, term), f"term '{term}'", params, scene, path)
+
+
+def bind_function(
+    function: Callable[..., Any], what: str, params: Mapping[str, Any], scene: SceneView, path: str
+) -> Callable[..., Any]:
+    """As `bind`, for a function that is found already; `what` it is, for errors."""
+    with registry.Blame(f"{path}: the signature of the {what}", registry.origin(function)):
         model = options_model(function)
     values = checked(model, params, path)
     keywords: dict[str, Any] = {}

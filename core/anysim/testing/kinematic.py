@@ -19,7 +19,7 @@ from anysim.engine.capability import Capabilities, Capability as C
 from anysim.engine.control import POSITION, VELOCITY, Control
 from anysim.engine.parameters import PARAMETERS, ParameterTable
 from anysim.engine.presence import Lifecycle
-from anysim.engine.state import Availability, SnapshotLevel
+from anysim.engine.state import Availability, ContactPoints, SnapshotLevel
 from anysim.math import pose as P
 from anysim.model.forward_kinematics import forward_kinematics
 from anysim.model.world import BodyKind, JointType, World
@@ -64,6 +64,7 @@ class NullEngine(SimEngine):
             C.CONTROL_EFFORT: _IGNORED,
             C.VELOCITY_LIMITS: "position drives alone heed them, and always",
             C.CONTACT_SENSORS: "read zero: kinematic engine",
+            C.CONTACT_POINTS: "there are none: kinematic engine",
             **dict.fromkeys(
                 (
                     C.CONTACTS_STATIC,
@@ -171,6 +172,9 @@ class NullEngine(SimEngine):
             return np.zeros((n, len(self.world.contact_sensors), 3))
         state = (self._envs.roots, self._envs.twists, self._envs.position, self._envs.velocity)
         return np.array([not all(np.isfinite(part[i]).all() for part in state) for i in range(n)], dtype=bool)
+
+    def _contacts(self, ids: Array) -> ContactPoints:
+        return ContactPoints.joined([])
 
     def _forward_twists(self) -> Array:
         """World twists (N, B, 6): a link's is its parent's, carried to its origin, plus what its joint adds."""

@@ -9,7 +9,7 @@ from anysim.conventions import Array
 from anysim.errors import TaskError, listing
 from anysim.math import pose as P
 from anysim.task.joints import RangedJointView
-from anysim.task.references import Conditions, ContactView, PointsView
+from anysim.task.references import Conditions, ContactView, PointsView, SensorView
 from anysim.task.scene import DrawnView, Frame, ObjectView, RobotView, SceneView
 from anysim.task.slot_frames import CategoryView
 from anysim.task.terms.geometry import least_turn
@@ -200,6 +200,11 @@ def contact_force(
 ) -> Array:
     """The net force on the body of a contact sensor, world axes [N]."""
     return np.clip(sensor.force, -limit, limit)
+
+
+def sensor(scene: SceneView, *, of: SensorView) -> Array:
+    """What is seen of a sensor: one field of it, `imu.acceleration`, or all but its `time` and `valid`."""
+    return of.values()
 
 
 def holds(scene: SceneView, *, of: Conditions) -> Array:

@@ -1,0 +1,1 @@
+"""A barometer for anysim."""
