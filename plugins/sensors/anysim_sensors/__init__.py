@@ -1,0 +1,1 @@
+"""Sensors on one compiled geometry of the neutral model: it knows shapes and poses, and no engine."""
