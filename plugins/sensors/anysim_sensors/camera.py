@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from anysim.conventions import Array
+from anysim.errors import AnysimError
 from anysim_sensors.scene import SceneGeometry
 from anysim_sensors.tables import GeomPoses
 
@@ -25,6 +26,8 @@ class Images(NamedTuple):
         geom: (N, H, W) int32, index among the World's geoms, -1.
         distance: (N, H, W) [m] along the ray.
         normal: (N, H, W, 3) outward, world frame; no rows if it was not asked for.
+        whole: (N, ids) int32, the pixels that each entity would have with nothing in front of it; no rows if it was not
+            asked for.
     """
 
     depth: Array
@@ -32,6 +35,7 @@ class Images(NamedTuple):
     geom: Array
     distance: Array
     normal: Array
+    whole: Array
 
 
 class EntityPixels(NamedTuple):
@@ -40,18 +44,13 @@ class EntityPixels(NamedTuple):
     Attributes:
         box: (N, ids, 4) int32 first column and row and those after the last; zeros where it is not seen.
         visible: (N, ids) int32, its pixels; those of the ground have the id 0, and those where nothing is seen.
-        whole: (N, ids) int32, the pixels that it would have with nothing in front of it, inside of the image.
+        occlusion: (N, ids) which part of it is hidden by other things, 0 to 1; NaN for the ground, and for what would
+            not be in the image.
     """
 
     box: Array
     visible: Array
-    whole: Array
-
-    @property
-    def occlusion(self) -> Array:
-        """(N, ids) which part of it is hidden by other things, 0 to 1; NaN for what is not in the image."""
-        with np.errstate(invalid="ignore"):
-            return np.where(self.whole > 0, 1 - self.visible / self.whole, np.nan)
+    occlusion: Array
 
 
 class RayCamera:
@@ -68,7 +67,7 @@ class RayCamera:
         """`fov` is the vertical field of view [degrees], one for all envs or (N,)."""
         from anysim_sensors.kernels import images, rays
 
-        self._kernels, self._cover = images, rays.cover
+        self._kernels, self._view = images, rays.view
         self.width, self.height, self.near, self.far = width, height, near, far
         self.focal = height / (2 * np.tan(np.radians(np.atleast_1d(np.asarray(fov, dtype=float))) / 2))
         x, y = np.meshgrid(np.arange(width) + 0.5 - width / 2, np.arange(height) + 0.5 - height / 2)
@@ -76,7 +75,6 @@ class RayCamera:
         along = np.stack([x.ravel() / f, y.ravel() / f, np.ones((len(self.focal), x.size))], axis=-1)
         self.directions = along / np.linalg.norm(along, axis=-1, keepdims=True)
         self._reach = far / float(self.directions[..., 2].min())
-        self._origin = np.zeros(self.directions.shape)
 
     def images(
         self,
@@ -86,20 +84,48 @@ class RayCamera:
         *,
         seen: Array | None = None,
         normals: bool = False,
-        threads: int = 1,
+        whole: bool = False,
     ) -> Images:
-        """What the camera sees from poses (N, 7) of its optical frame; arguments as of `SceneGeometry.rays`."""
-        hits = scene.rays(
-            posed, frames, self._origin, self.directions, reach=self._reach, seen=seen, normals=normals, threads=threads
+        """What the camera sees from poses (N, 7) of its optical frame.
+
+        Args:
+            scene: the shapes.
+            posed: where they are.
+            frames: (N, 7).
+            seen: (G,) bool, geoms that count; see `SceneGeometry.without`.
+            normals: whether normals are computed.
+            whole: whether pixels are counted that are hidden by other things, for `entities`.
+        """
+        envs, rows = len(frames), self.directions.shape[1]
+        distance, number = np.empty((envs, rows)), np.empty((envs, rows), dtype=np.int32)
+        normal = np.zeros((envs if normals else 0, rows, 3))
+        area = np.empty((envs if whole else 0, len(scene.world.entities) + 1), dtype=np.int32)
+        self._view(
+            scene.geoms,
+            scene.triangles,
+            posed,
+            scene.all if seen is None else seen,
+            np.ascontiguousarray(frames, dtype=float),
+            self.directions,
+            self.focal,
+            self.width,
+            self._reach,
+            float(self.far),
+            distance,
+            number,
+            normal,
+            area,
         )
-        depth, ids = np.empty(hits.distance.shape, dtype=np.float32), np.empty(hits.distance.shape, dtype=np.int32)
-        self._kernels.draw(
-            hits.distance, hits.geom, self.directions, self.near, self.far, scene.segmentation, depth, ids
-        )
-        shape = (len(frames), self.height, self.width)
-        normal = hits.normal.reshape(*shape, 3) if normals else hits.normal
+        depth, ids = np.empty((envs, rows), dtype=np.float32), np.empty((envs, rows), dtype=np.int32)
+        self._kernels.draw(distance, number, self.directions, self.near, self.far, scene.segmentation, depth, ids)
+        shape = (envs, self.height, self.width)
         return Images(
-            depth.reshape(shape), ids.reshape(shape), hits.geom.reshape(shape), hits.distance.reshape(shape), normal
+            depth.reshape(shape),
+            ids.reshape(shape),
+            number.reshape(shape),
+            distance.reshape(shape),
+            normal.reshape(-1, *shape[1:], 3),
+            np.roll(area, 1, axis=1),
         )
 
     def points(self, images: Images, frames: Array) -> Array:
@@ -131,16 +157,21 @@ class RayCamera:
         )
         return flow.reshape(*images.depth.shape, 2)
 
-    def entities(self, scene: SceneGeometry, images: Images, frames: Array, posed: GeomPoses) -> EntityPixels:
-        """Boxes around what is seen of each entity, and how much of it is hidden."""
-        envs, count = len(frames), len(scene.world.entities) + 1
+    def entities(self, images: Images) -> EntityPixels:
+        """Boxes around what is seen of each entity, and how much of it is hidden, of images with `whole` areas.
+
+        Raises:
+            AnysimError: the images have none.
+        """
+        if len(images.whole) != len(images.depth):
+            raise AnysimError("these images do not count what is hidden; draw them with whole=True")
+        envs, count = images.whole.shape
         box, area = np.empty((envs, count, 4), dtype=np.int32), np.empty((envs, count), dtype=np.int32)
         self._kernels.surround(images.segmentation.reshape(envs, -1), self.width, box, area)
-        whole = np.empty((envs, count), dtype=np.int32)
-        self._cover(
-            scene.geoms, scene.triangles, posed, scene.all, frames, self.directions, self._reach, float(self.far), whole
-        )
-        return EntityPixels(box, area, np.roll(whole, 1, axis=1))
+        hidden = np.full((envs, count), np.nan)
+        np.divide(images.whole - area, images.whole, out=hidden, where=images.whole > 0)
+        hidden[:, 0] = np.nan
+        return EntityPixels(box, area, hidden)
 
     @staticmethod
     def _flat(images: Images) -> tuple[Array, Array]:

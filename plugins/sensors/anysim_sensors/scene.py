@@ -173,7 +173,7 @@ class SceneGeometry:
         if envs != len(posed.there):
             raise AnysimError(f"{envs} frames for {len(posed.there)} envs; give one pose (7,) for each env")
         distance, number = np.empty((envs, rows)), np.empty((envs, rows), dtype=np.int32)
-        normal = np.empty((envs if normals else 0, rows, 3))
+        normal = np.zeros((envs if normals else 0, rows, 3))
         frames = np.ascontiguousarray(frames, dtype=float)
         mask = self.all if seen is None else seen
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from anysim.engine.cameras import CameraView
+from anysim.errors import AnysimError
 from anysim.math import pose as P
 from anysim.model.world import Box, Plane, Sphere
 from anysim.testing.sketch import Sketch
@@ -39,6 +40,23 @@ def test_depth_and_segmentation_are_those_of_the_reference() -> None:
     assert (np.isfinite(images.depth[0]) == seen).all()
     assert np.abs(images.depth[0][seen] - answer.depth[seen]).max() < 2e-6  # float32 at 12 m
     assert images.depth.dtype == np.float32
+
+
+@pytest.mark.parametrize("whole", [False, True])
+def test_pixels_are_the_rays_of_the_scene_to_the_bit(whole: bool) -> None:
+    """A camera tries each geom where it may be seen alone, some of them behind it or across its plane."""
+    rng = np.random.default_rng(4)
+    world = worlds.crowd(rng, 170)
+    scene = SceneGeometry(world)
+    eyes = [looking((0.3, -0.2, 1.0), (1.0, 2.0, 0.8)), looking((-5.0, 3.0, 4.0), (0.0, 0.0, 0.5))]
+    frames = np.stack(eyes)
+    posed = scene.posed(np.repeat(world.initial_body_pose[None], 2, axis=0))
+    camera = RayCamera(W, H, FOV)
+    images = camera.images(scene, posed, frames, normals=True, whole=whole)
+    hits = scene.rays(posed, frames, np.zeros((W * H, 3)), camera.directions[0], normals=True)
+    assert images.distance.tobytes() == hits.distance.tobytes()
+    assert images.geom.tobytes() == hits.geom.tobytes()
+    assert images.normal.tobytes() == hits.normal.tobytes()
 
 
 def scene_of(ball=(0.0, 0.0, 1.0), box=(-1.0, 0.0, 1.0)):
@@ -104,17 +122,20 @@ def test_boxes_and_how_much_is_hidden() -> None:
     posed = scene.posed(scene.world.initial_body_pose[None])
     frame = looking((4.0, 0.0, 1.0), (0.0, 0.0, 1.0))[None]
     camera = RayCamera(W, H, FOV)
-    images = camera.images(scene, posed, frame)
-    found = camera.entities(scene, images, frame, posed)
+    images = camera.images(scene, posed, frame, whole=True)
+    found = camera.entities(images)
     for number in (1, 2):
         rows, columns = np.nonzero(images.segmentation[0] == number)
         assert found.box[0, number].tolist() == [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
         assert found.visible[0, number] == len(rows)
         alone = camera.images(scene, posed, frame, seen=scene.on([number - 1]))
-        assert found.whole[0, number] == (alone.segmentation[0] == number).sum()
+        assert images.whole[0, number] == (alone.segmentation[0] == number).sum()
     assert found.occlusion[0, 1] == 0.0
     hidden = (np.pi * 0.3**2 / 16) / (1.2 * 1.2 / 4.8**2)  # solid angles, about
     assert found.occlusion[0, 2] == pytest.approx(hidden, rel=0.1)
+    assert np.isnan(found.occlusion[0, 0])
+    with pytest.raises(AnysimError, match="draw them with whole=True"):
+        camera.entities(camera.images(scene, posed, frame))
 
 
 def test_near_and_far_are_along_the_axis() -> None:

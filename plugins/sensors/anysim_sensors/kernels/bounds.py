@@ -169,6 +169,8 @@ def _bound(geoms: Geoms, g: int, frame: Array, low: Array, high: Array) -> None:
         low[i], high[i] = a - slack(a), b + slack(b)
     if geoms.sheet[g]:  # what is below it is in it
         low[2] = -ENDLESS
+    if kind == PLANE and frame[8] == 1.0:  # level
+        high[2] = frame[11] + slack(frame[11])
 
 
 @compiled

@@ -350,6 +350,8 @@ def fill(
                 continue
             bottom = max(low, posed.low[e, g, 2] - near_enough - frames[e, 2])
             top = min(high, posed.high[e, g, 2] + near_enough - frames[e, 2])
+            if bottom > top:
+                continue
             # the box around the geom's box in the grid, in cells
             x = (posed.low[e, g, 0] + posed.high[e, g, 0]) / 2 - frames[e, 0]
             y = (posed.low[e, g, 1] + posed.high[e, g, 1]) / 2 - frames[e, 1]

@@ -28,36 +28,18 @@ def _inverse(d: float) -> float:
 
 
 @compiled
-def _enter(
-    a0: float,
-    a1: float,
-    a2: float,
-    b0: float,
-    b1: float,
-    b2: float,
-    ox: float,
-    oy: float,
-    oz: float,
-    ix: float,
-    iy: float,
-    iz: float,
-) -> float:
-    """Distance at which a ray of origin o and inverse direction i enters the box from a to b; inf if it does not."""
-    p, q = (a0 - ox) * ix, (b0 - ox) * ix
+def _enter(box: Array, i: int, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float) -> float:
+    """Distance at which a ray of origin o and inverse direction i enters box i (6,); inf if it does not."""
+    p, q = (box[i, 0] - ox) * ix, (box[i, 3] - ox) * ix
     enter, leave = (p, q) if p < q else (q, p)
-    p, q = (a1 - oy) * iy, (b1 - oy) * iy
+    p, q = (box[i, 1] - oy) * iy, (box[i, 4] - oy) * iy
     low, high = (p, q) if p < q else (q, p)
     enter, leave = enter if enter > low else low, leave if leave < high else high
-    p, q = (a2 - oz) * iz, (b2 - oz) * iz
+    p, q = (box[i, 2] - oz) * iz, (box[i, 5] - oz) * iz
     low, high = (p, q) if p < q else (q, p)
     enter, leave = enter if enter > low else low, leave if leave < high else high
     enter = enter if enter > 0.0 else 0.0
     return enter if enter <= leave * ALMOST else np.inf
-
-
-@compiled
-def _node(box: Array, i: int, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float) -> float:
-    return _enter(box[i, 0], box[i, 1], box[i, 2], box[i, 3], box[i, 4], box[i, 5], ox, oy, oz, ix, iy, iz)
 
 
 @compiled
@@ -92,7 +74,8 @@ def _slab(x: float, d: float, half: float) -> tuple[float, float]:
     """Where a line is between -half and half along an axis: from, to."""
     if d == 0.0:
         return (-np.inf, np.inf) if abs(x) <= half else (np.inf, -np.inf)
-    a, b = (-half - x) / d, (half - x) / d
+    inverse = 1.0 / d
+    a, b = (-half - x) * inverse, (half - x) * inverse
     return (a, b) if a < b else (b, a)
 
 
@@ -101,6 +84,8 @@ def _convex(
     kind: int, s0: float, s1: float, s2: float, x: float, y: float, z: float, dx: float, dy: float, dz: float
 ) -> float:
     """Distance at which a ray in its frame crosses the surface of a convex shape; inf if it does not."""
+    if kind == PLANE:
+        return -z / dz if dz < 0.0 and z >= 0.0 else np.inf
     if kind == SPHERE:
         enter, leave = _ball(x, y, z, dx, dy, dz, s0)
     elif kind == BOX:
@@ -165,7 +150,7 @@ def _mesh(
     """Distance to the first triangle that a ray in the mesh's frame meets within the limit, and which; inf, -1."""
     best, found = limit, -1
     ix, iy, iz = _inverse(dx), _inverse(dy), _inverse(dz)
-    enter = _node(box, root, x, y, z, ix, iy, iz)
+    enter = _enter(box, root, x, y, z, ix, iy, iz)
     if enter > limit or enter == np.inf:
         return np.inf, -1
     node, top = root, 0
@@ -179,7 +164,7 @@ def _mesh(
             descend = False
         else:
             one, two = node + 1, to
-            a, b = _node(box, one, x, y, z, ix, iy, iz), _node(box, two, x, y, z, ix, iy, iz)
+            a, b = _enter(box, one, x, y, z, ix, iy, iz), _enter(box, two, x, y, z, ix, iy, iz)
             if b < a:
                 one, two, a, b = two, one, b, a
             if b <= best and b < np.inf:
@@ -196,11 +181,8 @@ def _mesh(
 
 
 @compiled
-def _outward(
-    geoms: Geoms, corner: Array, g: int, triangle: int, x: float, y: float, z: float
-) -> tuple[float, float, float]:
-    """The outward normal of a geom at a point of its surface, both in its frame; of no particular length."""
-    kind, s0, s1, s2 = geoms.kind[g], geoms.size[g, 0], geoms.size[g, 1], geoms.size[g, 2]
+def _outward(kind: int, s0: float, s1: float, s2: float, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """The outward normal of a shape at a point of its surface, both in its frame; of no particular length."""
     if kind == SPHERE:
         return x, y, z
     if kind == PLANE:
@@ -216,10 +198,13 @@ def _outward(
         if abs(z) - s1 > math.sqrt(x * x + y * y) - s0:
             return 0.0, 0.0, math.copysign(1.0, z)
         return x, y, 0.0
-    if kind == CAPSULE:
-        return x, y, z - min(max(z, -s1), s1)
-    e0, e1, e2 = corner[triangle, 3], corner[triangle, 4], corner[triangle, 5]
-    f0, f1, f2 = corner[triangle, 6], corner[triangle, 7], corner[triangle, 8]
+    return x, y, z - min(max(z, -s1), s1)
+
+
+@compiled
+def _flat(c: Array, i: int) -> tuple[float, float, float]:
+    """The normal of triangle i, of no particular length."""
+    e0, e1, e2, f0, f1, f2 = c[i, 3], c[i, 4], c[i, 5], c[i, 6], c[i, 7], c[i, 8]
     return e1 * f2 - e2 * f1, e2 * f0 - e0 * f2, e0 * f1 - e1 * f0
 
 
@@ -238,8 +223,8 @@ def place_rays(frame: Array, origins: Array, directions: Array, rays: Array) -> 
     for r in range(origins.shape[0]):
         ox, oy, oz = origins[r, 0], origins[r, 1], origins[r, 2]
         dx, dy, dz = directions[r, 0], directions[r, 1], directions[r, 2]
-        length = math.sqrt(dx * dx + dy * dy + dz * dz)
-        dx, dy, dz = dx / length, dy / length, dz / length
+        scale = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
+        dx, dy, dz = scale * dx, scale * dy, scale * dz
         for k in range(3):
             a, b, c = turn[k]
             rays[r, k] = frame[k] + a * ox + b * oy + c * oz
@@ -293,14 +278,37 @@ def choose(posed: GeomPoses, e: int, seen: Array, rays: Array, reach: float, can
 
 @compiled
 def gather(posed: GeomPoses, e: int, geoms: Geoms, candidates: Array, count: int, boxes: Array, shapes: Array) -> None:
-    """Boxes (6, C) and shapes (C, 15: frame and size) of the candidates next to each other."""
+    """Boxes (C, 6) and shapes (C, 15: frame and size) of the candidates next to each other."""
     for i in range(count):
         g = candidates[i]
         for k in range(3):
-            boxes[k, i], boxes[3 + k, i] = posed.low[e, g, k], posed.high[e, g, k]
+            boxes[i, k], boxes[i, 3 + k] = posed.low[e, g, k], posed.high[e, g, k]
             shapes[i, 12 + k] = geoms.size[g, k]
         for k in range(12):
             shapes[i, k] = posed.frame[e, g, k]
+
+
+@compiled
+def _turned(f: Array, k: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """A vector of the world in the axes of candidate k, whose rows of shapes are f."""
+    return (
+        f[k, 0] * x + f[k, 3] * y + f[k, 6] * z,
+        f[k, 1] * x + f[k, 4] * y + f[k, 7] * z,
+        f[k, 2] * x + f[k, 5] * y + f[k, 8] * z,
+    )
+
+
+@compiled
+def _write_normal(
+    kind: int, corner: Array, triangle: int, f: Array, k: int, x: float, y: float, z: float, out: Array, r: int
+) -> None:
+    """The outward unit normal, world frame, of candidate k at a point of the world."""
+    a, b, c = _turned(f, k, x - f[k, 9], y - f[k, 10], z - f[k, 11])
+    a, b, c = _outward(kind, f[k, 12], f[k, 13], f[k, 14], a, b, c) if triangle < 0 else _flat(corner, triangle)
+    length = math.sqrt(a * a + b * b + c * c)
+    scale = 1.0 / length if length > 0.0 else 0.0
+    for j in range(3):
+        out[r, j] = (f[k, 3 * j] * a + f[k, 3 * j + 1] * b + f[k, 3 * j + 2] * c) * scale
 
 
 @compiled
@@ -327,12 +335,12 @@ def cast(
         reach: the longest distance, or inf.
         distance: (N, R) written, inf where nothing is met.
         number: (N, R) int32 written, the World's index of the geom, -1.
-        normal: (N, R, 3) written, outward, world frame; zeros. With N = 0 rows none are written.
+        normal: (N, R, 3) zeros, written where something is met: outward, world frame. Of 0 rows none is.
     """
     most = seen.shape[0]
     rays = np.empty((origins.shape[1], 9))
     candidates, slot, away = np.empty(most, np.int32), np.empty(most, np.int32), np.empty(most)
-    boxes, shapes, entry = np.empty((6, most)), np.empty((most, 15)), np.empty(most)
+    boxes, shapes, entry = np.empty((most, 6)), np.empty((most, 15)), np.empty(most)
     stack, near = np.empty(128, np.int32), np.empty(128)
     geom_stack, geom_near = np.empty(128, np.int32), np.empty(128)
     box, link, corner = triangles.box, triangles.link, triangles.corner
@@ -355,20 +363,7 @@ def cast(
                 geom_stack[0], geom_near[0], top = 0, 0.0, 1
             else:
                 for j in range(count):
-                    entry[j] = _enter(
-                        boxes[0, j],
-                        boxes[1, j],
-                        boxes[2, j],
-                        boxes[3, j],
-                        boxes[4, j],
-                        boxes[5, j],
-                        ox,
-                        oy,
-                        oz,
-                        ix,
-                        iy,
-                        iz,
-                    )
+                    entry[j] = _enter(boxes, j, ox, oy, oz, ix, iy, iz)
             while True:
                 if tree:
                     if top == 0:
@@ -380,8 +375,8 @@ def cast(
                     leaf, to = posed.link[e, node, 0], posed.link[e, node, 1]
                     if leaf == 0:
                         one, two = node + 1, to
-                        a = _node(posed.box[e], one, ox, oy, oz, ix, iy, iz)
-                        b = _node(posed.box[e], two, ox, oy, oz, ix, iy, iz)
+                        a = _enter(posed.box[e], one, ox, oy, oz, ix, iy, iz)
+                        b = _enter(posed.box[e], two, ox, oy, oz, ix, iy, iz)
                         if b < a:
                             one, two, a, b = two, one, b, a
                         if b <= best and b < np.inf:
@@ -402,101 +397,130 @@ def cast(
                     k = i
                     i += 1
                 g = candidates[k]
-                kind = geoms.kind[g]
-                x, y, z = ox - shapes[k, 9], oy - shapes[k, 10], oz - shapes[k, 11]
-                u = shapes[k, 0] * dx + shapes[k, 3] * dy + shapes[k, 6] * dz
-                v = shapes[k, 1] * dx + shapes[k, 4] * dy + shapes[k, 7] * dz
-                w = shapes[k, 2] * dx + shapes[k, 5] * dy + shapes[k, 8] * dz
-                a = shapes[k, 0] * x + shapes[k, 3] * y + shapes[k, 6] * z
-                b = shapes[k, 1] * x + shapes[k, 4] * y + shapes[k, 7] * z
-                c = shapes[k, 2] * x + shapes[k, 5] * y + shapes[k, 8] * z
+                a, b, c = _turned(shapes, k, ox - shapes[k, 9], oy - shapes[k, 10], oz - shapes[k, 11])
+                u, v, w = _turned(shapes, k, dx, dy, dz)
                 triangle = -1
-                if kind == PLANE:
-                    t = -c / w if w < 0.0 and c >= 0.0 else np.inf
-                elif kind > CYLINDER:
+                if geoms.kind[g] > CYLINDER:
                     root = triangles.root[geoms.mesh[g]]
                     t, triangle = _mesh(box, link, corner, root, a, b, c, u, v, w, best, stack, near)
                 else:
-                    t = _convex(kind, shapes[k, 12], shapes[k, 13], shapes[k, 14], a, b, c, u, v, w)
+                    t = _convex(geoms.kind[g], shapes[k, 12], shapes[k, 13], shapes[k, 14], a, b, c, u, v, w)
                 if t < best or (t == best and t < np.inf and (chosen < 0 or g < candidates[chosen])):
                     best, chosen, which = t, k, triangle
             distance[e, r] = best if chosen >= 0 else np.inf
             number[e, r] = geoms.number[candidates[chosen]] if chosen >= 0 else -1
-            if normal.shape[0] > 0:
-                normal[e, r, 0], normal[e, r, 1], normal[e, r, 2] = 0.0, 0.0, 0.0
-                if chosen >= 0:
-                    f, k = shapes[chosen], chosen
-                    x, y, z = ox + best * dx - f[9], oy + best * dy - f[10], oz + best * dz - f[11]
-                    a, b, c = _outward(
-                        geoms,
-                        corner,
-                        candidates[k],
-                        which,
-                        f[0] * x + f[3] * y + f[6] * z,
-                        f[1] * x + f[4] * y + f[7] * z,
-                        f[2] * x + f[5] * y + f[8] * z,
-                    )
-                    length = math.sqrt(a * a + b * b + c * c)
-                    if length > 0.0:
-                        for j in range(3):
-                            normal[e, r, j] = (f[3 * j] * a + f[3 * j + 1] * b + f[3 * j + 2] * c) / length
+            if normal.shape[0] > 0 and chosen >= 0:
+                x, y, z = ox + best * dx, oy + best * dy, oz + best * dz
+                _write_normal(geoms.kind[candidates[chosen]], corner, which, shapes, chosen, x, y, z, normal[e], r)
 
 
 @compiled
-def cover(
+def _window(posed: GeomPoses, e: int, g: int, camera: Array, width: int, height: int, focal: float, out: Array) -> None:
+    """The columns and rows, first and after the last, in which a geom may be seen, as far as its box tells."""
+    out[0], out[1], out[2], out[3] = width, 0, height, 0
+    x, y, z, w = camera[3], camera[4], camera[5], camera[6]
+    behind = 0
+    for corner in range(8):
+        a = (posed.high if corner & 1 else posed.low)[e, g, 0] - camera[0]
+        b = (posed.high if corner & 2 else posed.low)[e, g, 1] - camera[1]
+        c = (posed.high if corner & 4 else posed.low)[e, g, 2] - camera[2]
+        right = (1 - 2 * (y * y + z * z)) * a + 2 * (x * y + z * w) * b + 2 * (x * z - y * w) * c
+        down = 2 * (x * y - z * w) * a + (1 - 2 * (x * x + z * z)) * b + 2 * (y * z + x * w) * c
+        ahead = 2 * (x * z + y * w) * a + 2 * (y * z - x * w) * b + (1 - 2 * (x * x + y * y)) * c
+        if ahead < 1e-6:
+            behind += 1
+            continue
+        u = min(max(right / ahead * focal + width / 2 - 0.5, -1.0), width + 1.0)
+        v = min(max(down / ahead * focal + height / 2 - 0.5, -1.0), height + 1.0)
+        out[0], out[1] = min(out[0], max(math.floor(u), 0)), max(out[1], min(math.ceil(u) + 1, width))
+        out[2], out[3] = min(out[2], max(math.floor(v), 0)), max(out[3], min(math.ceil(v) + 1, height))
+    if behind == 8:
+        out[1] = 0
+    elif behind > 0:
+        out[0], out[1], out[2], out[3] = 0, width, 0, height
+
+
+@compiled
+def view(
     geoms: Geoms,
     triangles: Triangles,
     posed: GeomPoses,
     seen: Array,
     frames: Array,
     directions: Array,
+    focal: Array,
+    width: int,
     reach: float,
     far: float,
+    distance: Array,
+    number: Array,
+    normal: Array,
     area: Array,
 ) -> None:
-    """How many rays from a frame's origin meet each entity, whatever is in front of it.
+    """The same as `cast` for the pixels of a pinhole camera, geom by geom where it may be seen, so that many are cheap.
 
-    Arguments as of `cast`, with unit directions, from the origin; what is farther than `far` [m] along z counts not.
-    `area` (N, entities + 1) int32 is written, last what is of none.
+    Args:
+        geoms, triangles, posed, seen, frames, reach, distance, number, normal: as of `cast`.
+        directions: (N or 1, R, 3) of the pixels in the optical frame, row by row.
+        focal: (N or 1,) [pixels].
+        width: of the image.
+        far: [m] along the optical axis; what is farther is not counted in the area.
+        area: (N, entities + 1) int32 written, the pixels that each entity has with nothing in front of it, last what is
+            of none. Of 0 rows none is.
     """
-    most = seen.shape[0]
-    rays, origins = np.empty((directions.shape[1], 9)), np.zeros((directions.shape[1], 3))
-    candidates, away, last = np.empty(most, np.int32), np.empty(most), np.empty(area.shape[1], np.int64)
-    boxes, shapes = np.empty((6, most)), np.empty((most, 15))
+    most, size = seen.shape[0], directions.shape[1]
+    rays, origins = np.empty((size, 9)), np.zeros((size, 3))
+    candidates, keys = np.empty(most, np.int32), np.empty(most, np.int64)
+    away, window = np.empty(most), np.empty(4, np.int64)
+    boxes, shapes = np.empty((most, 6)), np.empty((most, 15))
+    chosen, which, last = np.empty(size, np.int32), np.empty(size, np.int32), np.empty(size, np.int32)
     stack, near = np.empty(128, np.int32), np.empty(128)
     box, link, corner = triangles.box, triangles.link, triangles.corner
+    whole = area.shape[0] > 0
     for e in range(frames.shape[0]):
         p = e if directions.shape[0] > 1 else 0
         place_rays(frames[e], origins, directions[p], rays)
         count = choose(posed, e, seen, rays, reach, candidates, away)
+        for k in range(
+            count
+        ):  # those of an entity next to each other, so that one mark a pixel tells that it was counted
+            keys[k] = (geoms.entity[candidates[k]] + 1) * most + candidates[k]
+        keys[:count].sort()
+        for k in range(count):
+            candidates[k] = keys[k] % most
         gather(posed, e, geoms, candidates, count, boxes, shapes)
-        last[:] = -1
-        area[e] = 0
-        for r in range(rays.shape[0]):
-            ox, oy, oz, dx, dy, dz = rays[r, 0], rays[r, 1], rays[r, 2], rays[r, 3], rays[r, 4], rays[r, 5]
-            ix, iy, iz = rays[r, 6], rays[r, 7], rays[r, 8]
-            for k in range(count):
-                enter = _enter(
-                    boxes[0, k], boxes[1, k], boxes[2, k], boxes[3, k], boxes[4, k], boxes[5, k], ox, oy, oz, ix, iy, iz
-                )
-                entity = geoms.entity[candidates[k]]
-                if enter > reach or enter == np.inf or last[entity] == r:
-                    continue
-                kind = geoms.kind[candidates[k]]
-                x, y, z = ox - shapes[k, 9], oy - shapes[k, 10], oz - shapes[k, 11]
-                u = shapes[k, 0] * dx + shapes[k, 3] * dy + shapes[k, 6] * dz
-                v = shapes[k, 1] * dx + shapes[k, 4] * dy + shapes[k, 7] * dz
-                w = shapes[k, 2] * dx + shapes[k, 5] * dy + shapes[k, 8] * dz
-                a = shapes[k, 0] * x + shapes[k, 3] * y + shapes[k, 6] * z
-                b = shapes[k, 1] * x + shapes[k, 4] * y + shapes[k, 7] * z
-                c = shapes[k, 2] * x + shapes[k, 5] * y + shapes[k, 8] * z
-                if kind == PLANE:
-                    t = -c / w if w < 0.0 and c >= 0.0 else np.inf
-                elif kind > CYLINDER:
-                    root = triangles.root[geoms.mesh[candidates[k]]]
-                    t, _ = _mesh(box, link, corner, root, a, b, c, u, v, w, reach, stack, near)
-                else:
-                    t = _convex(kind, shapes[k, 12], shapes[k, 13], shapes[k, 14], a, b, c, u, v, w)
-                if t < np.inf and t * directions[p, r, 2] <= far:
-                    last[entity] = r
-                    area[e, entity] += 1
+        chosen[:], which[:], last[:] = -1, -1, -2
+        distance[e] = np.inf
+        if whole:
+            area[e] = 0
+        for k in range(count):
+            g = candidates[k]
+            kind, entity = geoms.kind[g], geoms.entity[g]
+            root = triangles.root[geoms.mesh[g]] if geoms.mesh[g] >= 0 else 0
+            _window(posed, e, g, frames[e], width, size // width, focal[p], window)
+            for row in range(window[2], window[3]):
+                for r in range(row * width + window[0], row * width + window[1]):
+                    best = min(distance[e, r], reach)
+                    ox, oy, oz, dx, dy, dz = rays[r, 0], rays[r, 1], rays[r, 2], rays[r, 3], rays[r, 4], rays[r, 5]
+                    enter = _enter(boxes, k, ox, oy, oz, rays[r, 6], rays[r, 7], rays[r, 8])
+                    if enter > (reach if whole else best) or enter == np.inf:
+                        continue
+                    a, b, c = _turned(shapes, k, ox - shapes[k, 9], oy - shapes[k, 10], oz - shapes[k, 11])
+                    u, v, w = _turned(shapes, k, dx, dy, dz)
+                    triangle, limit = -1, reach if whole else best
+                    if kind > CYLINDER:
+                        t, triangle = _mesh(box, link, corner, root, a, b, c, u, v, w, limit, stack, near)
+                    else:
+                        t = _convex(kind, shapes[k, 12], shapes[k, 13], shapes[k, 14], a, b, c, u, v, w)
+                    if t < best or (t == best and t < np.inf and (chosen[r] < 0 or g < candidates[chosen[r]])):
+                        distance[e, r], chosen[r], which[r] = t, k, triangle
+                    if whole and t < np.inf and t * directions[p, r, 2] <= far and last[r] != entity:
+                        area[e, entity] += 1
+                        last[r] = entity
+        for r in range(size):
+            k = chosen[r]
+            number[e, r] = geoms.number[candidates[k]] if k >= 0 else -1
+            if normal.shape[0] > 0 and k >= 0:
+                t = distance[e, r]
+                x, y, z = rays[r, 0] + t * rays[r, 3], rays[r, 1] + t * rays[r, 4], rays[r, 2] + t * rays[r, 5]
+                _write_normal(geoms.kind[candidates[k]], corner, which[r], shapes, k, x, y, z, normal[e], r)
