@@ -98,7 +98,7 @@ class PlanRequest:
         straight: [m] how far the tools may leave the straight line to their pose; None for any path.
         attached: what is held; it may touch what it rests on at the start.
         allowed: pairs of names, of bodies or of entities, that may touch.
-        padding: [m] distance kept from what is not a robot.
+        padding: [m] distance that a robot keeps from what is not itself, other robots too.
         velocity_scale: part of the joints' velocity limits that is used.
         acceleration: [rad/s^2] or [m/s^2] limit of each joint.
         seed: all that is random is drawn from it.

@@ -66,7 +66,7 @@ class Mover(ABC):
 
     @property
     def planners(self) -> tuple[PlannerService, ...]:
-        """The services that plan its moves."""
+        """The services that plan its moves; skills flush them at the end of each control step."""
         return ()
 
     def describe(self, env: int) -> dict[str, object]:
@@ -142,6 +142,8 @@ class MovingSkill(Skill):
         self.decide(ids, np.arange(len(ids)))
         for mover in self.movers:
             mover.act(ids, action)
+        for service in dict.fromkeys(service for mover in self.movers for service in mover.planners):
+            service.flush()  # the questions of all movers and envs in this control step together
 
     def moment(self, env: int) -> tuple[int, ...]:
         return int(self.phase[env]), int(self.outcome[env]), int(self.attempts[env])

@@ -332,8 +332,9 @@ def plan(
     rows.add("99th percentile of a step [ms]", f"{c.step_p99_ms:.2f}", "")
     for one in c.services:
         if one.busy_p99_ms is not None:
-            most = f"{c.step_p99_ms + STALL_GOAL_MS:.2f}"
-            rows.add(f"{one.service}: the same with {requests} in flight", f"{one.busy_p99_ms:.2f}", most)
+            grown = f"{one.busy_p99_ms:.2f} ({one.busy_p99_ms - c.step_p99_ms:+.2f})"
+            most = f"{c.step_p99_ms + STALL_GOAL_MS:.2f} ({STALL_GOAL_MS:+.2f})"
+            rows.add(f"{one.service}: the same with {requests} in flight", grown, most)
     rows.add("inverse kinematics/s", f"{c.ik:,.0f}", f"{IK_GOAL:,}")
     for name, rate in (c.postures or {}).items():
         rows.add(f"joint positions without a path/s, {name}", f"{rate:,.0f}", "")

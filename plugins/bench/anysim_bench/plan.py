@@ -27,7 +27,7 @@ from anysim.planning.motion import (
     Scenes,
     motion_planner,
 )
-from anysim.planning.service import PlannerService, planner_service
+from anysim.planning.service import PlanFuture, PlannerService, planner_service
 from anysim.task.env import TaskEnv
 from anysim_bench.free_paths import Touching, dense
 from anysim_bench.plan_bare import BareTurns, bare, length
@@ -191,14 +191,20 @@ def _in_turns(
 def _stalls(
     env: TaskEnv, planner: str, names: Sequence[str], asked: list[PlanRequest], scene: Scene
 ) -> tuple[list[float], dict[str, list[float]]]:
-    """Seconds of control steps of all envs: with nothing to plan, and with each service's requests in flight."""
+    """Seconds of control steps of all envs: with nothing to plan, and with all requests in flight in each service.
+
+    What has been answered is asked again in the next step, whose time that is part of.
+    """
     action = np.zeros((env.num_envs, env.action_dim))
     idle, busy = list[float](), {name: list[float]() for name in names}
 
-    def step(service: PlannerService | None = None) -> float:
+    def step(service: PlannerService | None = None, futures: list[PlanFuture] | None = None) -> float:
         if not env.running.all():
             env.reset(mask=~env.running)
         begun = time.perf_counter()
+        if service is not None and futures is not None:
+            futures[:] = [service.submit(f.request, scene, latency=None) if f.done else f for f in futures]
+            service.flush()
         env.step(action)
         if service is not None:
             service.harvest(0)
@@ -213,11 +219,8 @@ def _stalls(
         for _ in range(BLOCKS):
             idle.extend(step() for _ in range(STEPS))
             for name, service in running.items():
-                futures = []
-                for _ in range(STEPS):
-                    if all(future.done for future in futures):
-                        futures = [service.submit(request, scene, latency=None) for request in asked]
-                    busy[name].append(step(service))
+                futures = [service.submit(request, scene, latency=None) for request in asked]
+                busy[name].extend(step(service, futures) for _ in range(STEPS))
                 for future in futures:
                     future.cancel()
                 service.submit(asked[0], scene).result()  # after which its worker is idle

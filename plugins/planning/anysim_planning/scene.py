@@ -68,8 +68,8 @@ class PlanningWorld:
         self._attached = self._holders(request.attached)
         self._build(request, shapes)
         self._pairs(request, every_link)
-        self._resting: list[tuple[int, float]] = []
-        """Pairs that may be nearer than others, and their margins [m]."""
+        self._margins: list[tuple[int, float]] = []
+        """Pairs that have to keep a distance, or may be nearer than others, and how much [m]."""
         self._seen: bytes | None = None
 
     # ------------------------------------------------------------------ building
@@ -158,6 +158,13 @@ class PlanningWorld:
         self.geometry.removeAllCollisionPairs()
         for k in sorted(set(range(len(pairs))) - set(touching)):
             self.geometry.addCollisionPair(pin.CollisionPair(*pairs[k]))
+        robot = np.array([*(entity.kind is EntityKind.ROBOT for entity in world.entities), False])[entities]
+        self._between = [
+            k
+            for k, pair in enumerate(self.geometry.collisionPairs)
+            if robot[pair.first] and robot[pair.second] and entities[pair.first] != entities[pair.second]
+        ]
+        """Pairs of two robots, whose shapes are not grown: each would keep the distance from itself as well."""
 
     def _named(self, name: str, bodies: Array, entities: Array) -> Array:
         """(P,) bool: which geoms belong to a body or an entity; a geom of the world has a name of its own."""
@@ -209,13 +216,15 @@ class PlanningWorld:
         self._pool = pool(self.model, self.geometry, 1)
 
     def rest(self, start: Array, padding: float) -> None:
-        """Let held things touch what they rest on where a motion begins (K,), but not enter it deeper than there.
+        """Keep robots apart, and let held things touch what they rest on at a start (K,), but enter it no deeper.
 
         Surfaces of triangles have no inside: what rests on one begins in collision.
         """
         pin, pairs = self._pin, self.geometry.collisionPairs
-        self._set_margins(self._pool.getGeometryDatas()[0], 0.0)
-        self._resting = []
+        checked = self._pool.getGeometryDatas()[0]
+        self._set_margins(checked, 0.0)
+        self._margins = [(k, padding) for k in self._between]
+        self._set_margins(checked)
         if not self._attached or not self.hits(start[None])[0]:
             return
         data, geometry_data = self.model.createData(), self.geometry.createData()
@@ -224,8 +233,8 @@ class PlanningWorld:
             if self._may_rest(pair.first, pair.second) and pin.computeCollision(self.geometry, geometry_data, k):
                 deep = -pin.computeDistance(self.geometry, geometry_data, k).min_distance
                 if 0.0 <= deep <= padding + RESTING:
-                    self._resting.append((k, -deep - SLACK))
-        self._set_margins(self._pool.getGeometryDatas()[0])
+                    self._margins.append((k, -deep - SLACK))
+        self._set_margins(checked)
 
     def _may_rest(self, first: int, second: int) -> bool:
         """Whether one of two geoms is held and the other is neither held nor a robot's, and both are solid."""
@@ -239,7 +248,7 @@ class PlanningWorld:
         return solid and held[0] != held[1] and not robot
 
     def _set_margins(self, geometry_data: Any, margin: float | None = None) -> None:
-        for k, own in self._resting:
+        for k, own in self._margins:
             geometry_data.collisionRequests[k].security_margin = own if margin is None else margin
 
     def _axis_point(self, body: int) -> Array:

@@ -6,7 +6,7 @@ more than `lead`, which bounds the force with which it presses on what it cannot
 skill asks for a planned move instead.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Self
 
 import numpy as np
@@ -17,12 +17,13 @@ from anysim.math import pose as P
 from anysim.model.world import JointType
 from anysim.planning.api import inverse_kinematics
 from anysim.planning.service import PlannerService
-from anysim.skills.phases import GO_ON, STAY, Mover, Phase
+from anysim.skills.phases import Mover, Phase
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.arm_columns import ArmColumns
 from anysim_skills.env_lifetime import PerEnv
-from anysim_skills.planned_moves import PLANNED_STEPS, PlannedMoves, Stage
+from anysim_skills.planned_arms import PlannedArm
+from anysim_skills.planned_moves import PlannedMoves, Stage
 from anysim_skills.planning import LATENCY, Latency, planner_of
 from anysim_skills.sag import Sag
 
@@ -64,7 +65,8 @@ class Arm(Mover):
         grip: (N, 3) [m] where what is held was in the tool's frame when it was taken.
         aperture: [m] how wide the gripper opens; infinite where its fingers turn, or there is none.
         stuck: (N,) bool: the last step towards the target had no inverse kinematics.
-        plans: its planned moves; None as long as no skill has a planner.
+        plans: the planned moves of it alone; None as long as no skill has a planner for these.
+        moves: all planned moves that it takes part in, those with another arm too, each with its place in them.
     """
 
     plans: PlannedMoves | None = None
@@ -91,6 +93,7 @@ class Arm(Mover):
         self._stalled, self._detour = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=bool)
         self._way = np.zeros((n, len(self.chain)))
         """Where the joints go on a detour."""
+        self.moves: dict[PlannedMoves, int] = {}
 
     @classmethod
     def of(
@@ -120,38 +123,42 @@ class Arm(Mover):
         key = (robot.name, channel, gripper, tool)
         arm = _ARMS.of(env, key, lambda: cls(env, robot, channel, gripper, tool, solver))
         if planner:
-            arm.plan_with(planner, latency, tool)
+            arm.plan_with(planner, latency)
         return arm  # pyright: ignore[reportReturnType]
 
-    def plan_with(self, planner: str, latency: Latency, tool: str) -> None:
+    def plan_with(self, planner: str, latency: Latency) -> None:
         """Have moves planned from now on."""
         if self.plans is None:
-            made = planner_of(self.env, planner)
-            self.plans = PlannedMoves(self.env, made, latency, self.solver, (self.robot.name, tool), self.joints)
-        known = self.plans.planner.name, self.plans.latency
-        if known != (planner, latency):
-            raise TaskError(
-                f"skills plan moves of '{self.robot.name}' with {known[0]} at a latency of {known[1]} control steps, "
-                f"and with {planner} at {latency}; give all skills of an arm the same planner and latency"
-            )
+            self.plans = planned_moves((self,), planner, latency)
+        self.agree(planner, latency)
+
+    def agree(self, planner: str, latency: Latency) -> None:
+        """Refuse another planner or latency than that of its planned moves."""
+        for plans in self.moves:
+            if (plans.planner.name, plans.latency) != (planner, latency):
+                raise TaskError(
+                    f"skills plan moves of '{self.robot.name}' with {plans.planner.name} at a latency of "
+                    f"{plans.latency} control steps, and with {planner} at {latency}; give all skills of an arm the "
+                    f"same planner and latency"
+                )
 
     # ------------------------------------------------------------------ what skills ask and say; the scene looks at ids
 
     def renew(self, ids: Array) -> None:
         """These envs have just been reset: whatever was commanded is forgotten."""
         self._fresh[ids] = True
-        if self.plans is not None:
-            self.plans.renew(ids)
+        for plans in self.moves:
+            plans.renew(ids)
 
     @property
     def planners(self) -> tuple[PlannerService, ...]:
         """The service that plans its moves, if they are planned."""
-        return () if self.plans is None else (self.plans.planner.service,)
+        return tuple(dict.fromkeys(plans.planner.service for plans in self.moves))
 
     def describe(self, env: int) -> dict[str, object]:
         """What records say of how it is moved."""
         del env
-        return {} if self.plans is None else {"planner": self.plans.describe()}
+        return {"planner": next(iter(self.moves)).describe()} if self.moves else {}
 
     def prepare(self, ids: Array) -> None:
         """Begin from where the arm is, in envs that have been reset; the scene looks at `ids`."""
@@ -169,15 +176,17 @@ class Arm(Mover):
 
     def go(self, ids: Array, target: Array, speed: float, lead: float = LEAD) -> None:
         """Move straight towards tool poses (n, 7) at a speed [m/s]."""
-        if self.plans is not None:
-            self.plans.drop(ids)
+        self._leave_plans(ids)
         self.target[ids], self.speed[ids], self.lead[ids] = target, speed, lead
 
     def stay(self, ids: Array) -> None:
         """Hold the commanded pose."""
-        if self.plans is not None:
-            self.plans.drop(ids)
+        self._leave_plans(ids)
         self.target[ids] = self.command[ids]
+
+    def _leave_plans(self, ids: Array) -> None:
+        for plans in self.moves:
+            plans.drop(ids)
 
     def plan(
         self,
@@ -205,19 +214,20 @@ class Arm(Mover):
         """
         if self.plans is None:
             raise TaskError(f"the arm of '{self.robot.name}' has no planner; give one to `Arm.of`")
-        self.target[ids] = self.command[ids]
-        self.plans.ask(ids, goals, held, then, touched)
+        self.stay(ids)
+        self.plans.ask(
+            ids, list(goals[:, None]), held, None if then is None else then.reshape(len(ids), 1, -1, 7), touched
+        )
 
     def planned(self, ids: Array) -> Array:
         """(n,) STAY while a move is planned or followed, GO_ON where it has arrived, else its failure in OUTCOMES."""
         assert self.plans is not None
-        stage = self.plans.stage[ids]
-        failed = np.where(stage == Stage.FAILED, self.plans.failure[ids], STAY)
-        return np.where(stage == Stage.ARRIVED, GO_ON, failed)
+        return self.plans.said(ids)
 
     def planned_phase(self, ask: Callable[[Array, Array], None]) -> Phase:
         """A phase that begins with `ask`, which calls `plan` for envs and their rows, and ends where the move does."""
-        return Phase("plan", ask, lambda ids, _: self.planned(ids), PLANNED_STEPS)
+        assert self.plans is not None
+        return self.plans.phase(ask)
 
     def arrived(self, ids: Array, at: Array, distance: float = ARRIVED, angle: float = TURNED) -> Array:
         """(n,) bool: the tool is at its target. `at` are the rows of these envs in the scene."""
@@ -295,24 +305,23 @@ class Arm(Mover):
 
     def act(self, ids: Array, action: Array) -> None:
         """Write the action of these envs, which the scene looks at: one step towards their targets."""
-        if self.plans is None:
-            self._straight(ids, self.tool.position)
-        else:
-            led = self.plans.move(ids)
-            if led.any():
-                self._led(ids[led])
-            if not led.all():
-                self._straight(ids[~led], self.tool.position[~led])
+        led = np.zeros(len(ids), dtype=bool)
+        for plans, place in self.moves.items():
+            own = plans.move(ids)
+            if own.any():
+                self._follow(ids[own], plans, place)
+            led |= own
+        if not led.all():
+            self._straight(ids[~led], self.tool.position[~led])
         self._columns.write(ids, self.joints[ids], action)
         if self._eef is not None:
             action[ids, self._eef.start : self._eef.stop] = np.where(self.closed[ids], -1.0, 1.0)[:, None]
 
-    def _led(self, ids: Array) -> None:
+    def _follow(self, ids: Array, plans: PlannedMoves, place: int) -> None:
         """The joints are told by a plan: commands follow them."""
-        assert self.plans is not None
         self.command[ids] = self.chain.tool_pose(self._base(ids), self.joints[ids])
-        under_way = self.plans.stage[ids] != Stage.ARRIVED
-        self.target[ids] = np.where(under_way[:, None], self.command[ids], self.plans.goal[ids])
+        under_way = plans.stage[ids] != Stage.ARRIVED
+        self.target[ids] = np.where(under_way[:, None], self.command[ids], plans.goal[ids, place])
         self.stuck[ids], self._stalled[ids], self._detour[ids] = False, 0, False
 
     def _straight(self, ids: Array, tool: Array) -> None:
@@ -360,6 +369,16 @@ class Arm(Mover):
         self.joints[rows] += share[:, None] * left
         self.command[rows] = self.target[rows]  # the line goes on from its end
         self._detour[rows] = share < 1.0
+
+
+def planned_moves(arms: Sequence[Arm], planner: str, latency: Latency) -> PlannedMoves:
+    """Moves of one arm, or of several that move at once, planned from now on."""
+    env = arms[0].env
+    planned = [PlannedArm(a.robot.name, a.tool.name.partition(".")[2], a.solver, a.joints) for a in arms]
+    made = PlannedMoves(env, planner_of(env, planner), latency, planned)
+    for place, arm in enumerate(arms):
+        arm.moves[made] = place
+    return made
 
 
 def _aperture(env: TaskEnv, robot: RobotView, gripper: str) -> float:

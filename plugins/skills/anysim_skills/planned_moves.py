@@ -1,10 +1,11 @@
-"""Planned moves of an arm: a question to the planner, the wait for its answer, and the way along the trajectory.
+"""Planned moves of arms: a question to the planner, the wait for its answer, and the way along the trajectory.
 
 An answer takes effect a fixed number of control steps after its question, by the env's own clock; a loop that is there
 earlier waits. So what an env does depends on no other env, nor on the number of workers.
 """
 
 import warnings
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from time import perf_counter
@@ -14,12 +15,13 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.math import pose as P
-from anysim.planning.api import InverseKinematics
 from anysim.planning.motion import Attachment, PlanAnswer, PlanRequest, PlanStatus, Scenes, ToolGoal, Trajectory
 from anysim.planning.service import PlanFuture
 from anysim.skills.base import OUTCOMES, Outcome
+from anysim.skills.phases import GO_ON, STAY, Phase
 from anysim.task.env import TaskEnv
 from anysim.task.scene import ObjectView
+from anysim_skills.planned_arms import PlannedArm, PlannedArms
 from anysim_skills.planning import REALTIME, EnvPlanner, Latency
 
 PADDING = 0.01
@@ -37,13 +39,6 @@ PLANNED_STEPS = 500
 """Control steps that a planned move may take; the planner's limits end it long before."""
 PATIENCE = 50
 """Control steps without getting on after which the controller has not followed."""
-RESTARTS = 20
-LINE_POINTS = 8
-"""Of each straight line after a planned move, from which its joint positions are interpolated."""
-JUMP = 0.5
-"""[rad] that no joint moves between two of them: more is another posture."""
-POSTURES = 24
-"""Seeds of other postures at a goal, where the lines after it cannot be gone from the nearest one."""
 
 
 class Stage(IntEnum):
@@ -60,9 +55,9 @@ class Way(NamedTuple):
     """What a move is to lead to.
 
     Attributes:
-        goals: (G, 7) tool poses.
-        then: (S, 7) the ends of straight lines after the move that have to be free too, or None.
-        touched: the entity that the robot may touch on those lines, or None.
+        goals: (A, G, 7) tool poses of each arm; several arms take the same one of the G.
+        then: (A, S, 7) the ends of straight lines after the move that have to be free too, or None.
+        touched: the entity that the robots may touch on those lines, or None.
         settled: the posture at the goal is not to be changed any more.
     """
 
@@ -90,24 +85,17 @@ class Question:
 
 
 class PlannedMoves:
-    """The planned moves of one arm in all envs.
+    """The planned moves of one arm, or of several that move at once, in all envs.
+
+    Several arms have one plan, in which none of them hits another, and keep pace along it.
 
     Attributes:
         stage: (N,) of `Stage`.
         failure: (N,) index into OUTCOMES, where the stage is FAILED.
-        goal: (N, 7) the tool pose that was chosen of the goals.
+        goal: (N, A, 7) the tool poses that were chosen of the goals.
     """
 
-    def __init__(
-        self,
-        env: TaskEnv,
-        planner: EnvPlanner,
-        latency: Latency,
-        solver: InverseKinematics,
-        tool: tuple[str, str],
-        joints: Array,
-    ) -> None:
-        """`tool` is of a robot, by their names; `joints` (N, K) is what the arm tells its joints, written here."""
+    def __init__(self, env: TaskEnv, planner: EnvPlanner, latency: Latency, arms: Sequence[PlannedArm]) -> None:
         if latency == REALTIME:
             warnings.warn(
                 "plans take effect once they are ready (latency: realtime): what is recorded replays, but the run "
@@ -115,20 +103,16 @@ class PlannedMoves:
                 stacklevel=2,
             )
         self.planner, self.latency = planner, latency
-        self._env, self._solver, self._chain, self._joints = env, solver, solver.chain, joints
-        self._robot, self._tool = tool
-        world = env.engine.world
-        self._holder = world.sites[env.engine.index.robot(self._robot).tools[self._tool]].body
-        drives = {a.joint: a.kd / a.kp for a in world.actuators if a.kp > 0}
-        self._behind = np.array([drives.get(j, 0.0) for j in self._chain.joints.tolist()])
-        """[s] by which a joint that moves evenly is behind its target: damping over stiffness of its drive."""
+        self._env, self._arms = env, PlannedArms(env, arms)
         n = env.num_envs
         self.stage, self.failure = np.zeros((2, n), dtype=np.int64)
-        self.goal = np.zeros((n, 7))
+        self.goal = np.zeros((n, len(arms), 7))
         self._questions: dict[int, Question] = {}
         self._paths: dict[int, Array] = {}
         """(S, K) for each env that follows one: where the joints are told to be in each control step."""
         self._row, self._waited, self._asked = np.zeros((3, n), dtype=np.int64)
+        self._moved, self._led = np.full(n, -1), np.zeros(n, dtype=bool)
+        """The control step of the last `move`, and what it said."""
 
     def describe(self) -> dict[str, object]:
         """For records."""
@@ -137,10 +121,10 @@ class PlannedMoves:
     def renew(self, ids: Array) -> None:
         """These envs have just been reset."""
         self.drop(ids)
-        self._asked[ids] = 0
+        self._asked[ids], self._moved[ids] = 0, -1
 
     def drop(self, ids: Array) -> None:
-        """Something else moves the arm in these envs from here on."""
+        """Something else moves the arms in these envs from here on."""
         for i in ids[self.stage[ids] != Stage.NONE].tolist():
             if (question := self._questions.pop(i, None)) is not None:
                 question.future.cancel()
@@ -148,26 +132,43 @@ class PlannedMoves:
             self.stage[i] = Stage.NONE
 
     def ask(
-        self, ids: Array, goals: Array, held: ObjectView | None, then: Array | None, touched: ObjectView | None
+        self,
+        ids: Array,
+        goals: Sequence[Array],
+        held: ObjectView | None,
+        then: Array | None,
+        touched: ObjectView | None,
     ) -> None:
-        """Plan in these envs; see `Arm.plan`."""
+        """Plan in these envs; the skill that asks sees to it that the service is flushed, as `MovingSkill.act` does.
+
+        Args:
+            ids: the envs.
+            goals: of each env the goal sets (A, G, 7) of its arms.
+            held: what is in the hand of the first arm; see `Arm.plan`.
+            then: (n, A, S, 7), or None.
+            touched: see `Arm.plan`.
+        """
         self.drop(ids)
         holding, touching = _present(held, ids), _present(touched, ids)
+        begin = np.clip(self._arms.told(ids), self._arms.lower, self._arms.upper)
         for row, i in enumerate(ids.tolist()):
+            sets = np.array(goals[row])
             request = PlanRequest(
-                self._chain.joint_names,
-                np.clip(self._joints[i], self._chain.lower, self._chain.upper),
-                (ToolGoal(self._robot, self._tool, goals[row].copy(), (1.0, 1.0, 1.0), *TOLERANCE),),
+                self._arms.joint_names,
+                begin[row],
+                tuple(
+                    ToolGoal(arm.robot, arm.tool, poses, (1.0, 1.0, 1.0), *TOLERANCE)
+                    for arm, poses in zip(self._arms.arms, sets, strict=True)
+                ),
                 attached=(self._attached(i, holding[i]),) if i in holding else (),
                 padding=PADDING,
                 velocity_scale=VELOCITY_SCALE,
                 seed=self._seed(i),
                 deadline=DEADLINE,
             )
-            lines = None if then is None else then[row].reshape(-1, 7).copy()
-            self._submit(i, request, Way(request.goals[0].poses, lines, touching.get(i)))
+            lines = None if then is None else then[row].copy()
+            self._submit(i, request, Way(sets, lines, touching.get(i)))
         self.stage[ids] = Stage.PLANNING
-        self.planner.service.flush()
 
     def _submit(self, env: int, request: PlanRequest, way: Way) -> None:
         scene = self._env.scene
@@ -184,34 +185,53 @@ class PlannedMoves:
 
     def _attached(self, env: int, entity: str) -> Attachment:
         world, pose = self._env.engine.world, self._env.scene.state.body_pose[env]
-        root = world.entities[world.entity_numbers[entity]].root
-        offset = P.compose(P.inverse(pose[self._holder]), pose[root])
-        return Attachment(entity, world.bodies[self._holder].name, offset)
+        root, holder = world.entities[world.entity_numbers[entity]].root, self._arms.holder
+        offset = P.compose(P.inverse(pose[holder]), pose[root])
+        return Attachment(entity, world.bodies[holder].name, offset)
+
+    # ------------------------------------------------------------------ what skills ask
+
+    def said(self, ids: Array) -> Array:
+        """(n,) STAY while a move is planned or followed, GO_ON where it has arrived, else its failure in OUTCOMES."""
+        stage = self.stage[ids]
+        failed = np.where(stage == Stage.FAILED, self.failure[ids], STAY)
+        return np.where(stage == Stage.ARRIVED, GO_ON, failed)
+
+    def phase(self, ask: Callable[[Array, Array], None]) -> Phase:
+        """A phase that begins with `ask`, which asks for envs and their rows, and ends where the move does."""
+        return Phase("plan", ask, lambda ids, _: self.said(ids), PLANNED_STEPS)
 
     # ------------------------------------------------------------------ moving
 
     def move(self, ids: Array) -> Array:
-        """Tell the joints where to be in this control step; (n,) bool: in which envs that was told."""
-        if self.latency == REALTIME and self._questions:
-            self.planner.service.flush()  # without waiting for a worker that hangs; this is where one is replaced
+        """Tell the joints where to be in this control step; (n,) bool: in which envs that was told.
+
+        Each of several arms asks; the first of them in a control step moves all.
+        """
+        step = self._env.scene.elapsed[ids]
+        fresh = self._moved[ids] != step
+        self._moved[ids] = step
+        self._advance(ids[fresh])
+        return self._led[ids]
+
+    def _advance(self, ids: Array) -> None:
         for i in ids[self.stage[ids] == Stage.PLANNING].tolist():
             question = self._questions[i]
             if question.future.done if question.due is None else self._env.scene.elapsed[i] >= question.due:
                 self._answered(i)
-        led = np.isin(self.stage[ids], (Stage.PLANNING, Stage.FOLLOWING))
+        self._led[ids] = np.isin(self.stage[ids], (Stage.PLANNING, Stage.FOLLOWING))
         following = ids[self.stage[ids] == Stage.FOLLOWING]
         if len(following):
-            actual = self._env.scene.state.joint_pos[np.ix_(following, self._chain.joints)]
-            lag = np.abs(self._joints[following] - actual).max(axis=1)
+            actual = self._env.scene.state.joint_pos[np.ix_(following, self._arms.numbers)]
+            lag = np.abs(self._arms.told(following) - actual).max(axis=1)
             for i, behind in zip(following.tolist(), lag.tolist(), strict=True):
                 self._follow(i, behind)
-        return led
 
     def _follow(self, env: int, lag: float) -> None:
         path, row = self._paths[env], int(self._row[env])
         self._waited[env] += 1
         if row < len(path) and lag < LAG:
-            self._joints[env] = path[row]
+            self._arms.tell(env, path[row])
             self._row[env], self._waited[env] = row + 1, 0
         elif row >= len(path) and lag < NEAR:
             self.stage[env] = Stage.ARRIVED
@@ -229,7 +249,6 @@ class PlannedMoves:
         answer, request = self._wait(question.future), question.future.request
         if answer.status is PlanStatus.START_IN_COLLISION and request.padding:
             self._submit(env, replace(request, padding=0.0), question.way)
-            self.planner.service.flush()
             return
         why = self._judged(env, question, answer)
         if why is None and question.way.then is not None and answer.trajectory is not None:
@@ -242,24 +261,20 @@ class PlannedMoves:
         self._paths[env] = self._told(answer.trajectory)
         self._row[env] = self._waited[env] = 0
         chosen = answer.chosen[0] if answer.chosen else 0
-        self.goal[env], self.stage[env] = question.way.goals[chosen], Stage.FOLLOWING
+        self.goal[env], self.stage[env] = question.way.goals[:, chosen], Stage.FOLLOWING
 
     def _otherwise(self, env: int, question: Question, answer: PlanAnswer) -> bool:
         """Whether a posture at the chosen goal from which the lines can be gone is there, and now asked for."""
         request, way = question.future.request, question.way
         if way.settled:
             return False
-        count, rng = POSTURES, np.random.default_rng(request.seed)
-        seeds = rng.uniform(self._chain.lower, self._chain.upper, (count, len(self._chain)))
-        goal, base = np.tile(way.goals[answer.chosen[0]], (count, 1)), np.tile(self._base(env), (count, 1))
-        found = self._solver.solve(goal, base, seeds, random_restarts=0, rng_seeds=np.zeros(count, dtype=np.uint64))
-        postures, scene = found.joint_pos[found.converged], question.scenes.scene(0)
+        chosen, scene = way.goals[:, answer.chosen[0]], question.scenes.scene(0)
+        postures = self._arms.postures(env, chosen, request.seed)
         for posture in postures[np.argsort(np.abs(postures - request.start).max(axis=1), kind="stable")]:
             free = self.planner.checker.is_free(request, scene, posture[None])
             if free and self._after(env, question, posture) is None:
                 wanted = replace(request, goals=(), joint_goal=posture, seed=self._seed(env))
-                self._submit(env, wanted, way._replace(goals=goal[:1], settled=True))
-                self.planner.service.flush()
+                self._submit(env, wanted, way._replace(goals=chosen[:, None], settled=True))
                 return True
         return False
 
@@ -271,7 +286,7 @@ class PlannedMoves:
             np.column_stack([np.interp(steps, trajectory.times, column) for column in rows.T])
             for rows in (trajectory.joint_pos, trajectory.joint_vel)
         )
-        return np.clip(position + self._behind * velocity, self._chain.lower, self._chain.upper)
+        return np.clip(position + self._arms.behind * velocity, self._arms.lower, self._arms.upper)
 
     def _wait(self, future: PlanFuture) -> PlanAnswer:
         """The answer; one that is late is waited for and counted."""
@@ -286,7 +301,7 @@ class PlannedMoves:
     def _judged(self, env: int, question: Question, answer: PlanAnswer) -> Outcome | None:
         """Why an answer is of no use; None where it is."""
         if answer.status is PlanStatus.NO_IK:
-            return Outcome.COLLISION if self._reachable(env, question.way.goals) else Outcome.NO_IK
+            return Outcome.COLLISION if self._arms.reach(env, question.way.goals) else Outcome.NO_IK
         if answer.status is not PlanStatus.OK or answer.trajectory is None:
             return _OUTCOMES.get(answer.status, Outcome.NO_PATH)
         request, path = question.future.request, answer.trajectory.joint_pos
@@ -295,34 +310,17 @@ class PlannedMoves:
         stale = scenes.is_stale(0, answer) and not self.planner.checker.is_free(request, scenes.scene(0), path)
         return Outcome.NO_PATH if stale else None
 
-    def _reachable(self, env: int, goals: Array) -> bool:
-        """Whether the arm reaches one of the tool poses (G, 7), free or not."""
-        seeds, base = np.tile(self._chain.initial, (len(goals), 1)), np.tile(self._base(env), (len(goals), 1))
-        keys = np.full(len(goals), self._env.streams.episode_seed[env])
-        found = self._solver.solve(goals, base, seeds, random_restarts=RESTARTS, rng_seeds=keys)
-        return bool(found.converged.any())
-
     def _after(self, env: int, question: Question, joints: Array) -> Outcome | None:
         """Why the straight lines from joint positions (K,) to the poses after the move cannot be gone."""
         assert question.way.then is not None
-        begin, keys = self._chain.tool_pose(self._base(env), joints), np.zeros(1, dtype=np.uint64)
-        rows = [joints]
-        for end in question.way.then:
-            reach, turn = P.norm((end - begin)[None, :3])[0], 2 * np.pi
-            for part in np.linspace(0.0, 1.0, LINE_POINTS)[1:]:
-                pose, seed = P.step_toward(begin[None], end[None], part * reach, part * turn), rows[-1][None]
-                found = self._solver.solve(pose, self._base(env)[None], seed, random_restarts=0, rng_seeds=keys)
-                if not found.converged[0] or np.abs(found.joint_pos[0] - rows[-1]).max() > JUMP:
-                    return Outcome.NO_IK
-                rows.append(found.joint_pos[0])
-            begin = end
-        touching = () if question.way.touched is None else ((self._robot, question.way.touched),)
+        rows = self._arms.lines(env, joints, question.way.then)
+        if rows is None:
+            return Outcome.NO_IK
+        touched = question.way.touched
+        touching = () if touched is None else tuple((arm.robot, touched) for arm in self._arms.arms)
         request = replace(question.future.request, allowed=touching, padding=0.0)
-        free = self.planner.checker.is_free(request, question.scenes.scene(0), np.array(rows))
+        free = self.planner.checker.is_free(request, question.scenes.scene(0), rows)
         return None if free else Outcome.COLLISION
-
-    def _base(self, env: int) -> Array:
-        return self._env.scene.state.body_pose[env, self._chain.root]
 
 
 def _present(thing: ObjectView | None, ids: Array) -> dict[int, str]:

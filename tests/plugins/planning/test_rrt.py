@@ -22,6 +22,7 @@ from anysim.planning.motion import (
     ToolGoal,
     motion_planner,
 )
+from anysim.testing.planners import measure, rooms
 from anysim_planning import goals, rrt
 from anysim_planning.rrt import RrtPlanner
 from anysim_planning.threads import ThreadedService
@@ -266,3 +267,19 @@ def test_unknown_names_are_told_with_those_that_exist(world: World, planner: Rrt
         planned(planner, across(world, allowed=(("panda", "wal"),)), scene)
     with pytest.raises(AnysimError, match="'numba_ik' is no planner of motion"):
         motion_planner(world, "numba_ik")
+
+
+def test_two_robots_keep_the_padding_from_each_other() -> None:
+    """Where they are nearer to each other than to anything else, by arithmetic of the suite."""
+    room, rng, seen = rooms.two_arms(), np.random.default_rng(5), 0
+    scene, planner = Scenes(room, 1).scene(0), motion_planner(room)
+    lower, upper = (np.array([getattr(joint, end) for joint in room.joints]) for end in ("lower", "upper"))
+    for _ in range(2000):
+        q = rng.uniform(np.maximum(lower, -2.0), np.minimum(upper, 2.0))
+        request = PlanRequest(rooms.joints(room), q, joint_goal=q, allowed=(("left", "left"), ("right", "right")))
+        ground, between = measure.clearance(room, scene, request, q[None])
+        if 0.02 < between < min(ground, 0.2) - 0.02:
+            near = (between - 0.01, between + 0.01)
+            assert [planner.is_free(replace(request, padding=d), scene, q[None]) for d in near] == [True, False]
+            seen += 1
+    assert seen > 10

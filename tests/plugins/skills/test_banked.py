@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from anysim import make
+from anysim.api import compile_world, dry_run, load
 from anysim.errors import SpecError
 from anysim.record.collector import Collector
 from anysim.skills.bank import read_bank
@@ -15,6 +16,7 @@ from anysim.skills.living_bank import LivingBank
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
+from anysim_skills.grasping import banked
 from tests.plugins.skills.banks import DOWN, badly_chosen, cube_bank, shifted, task, tilted, written
 from tests.plugins.skills.test_manipulation import WORLDS
 from tests.plugins.skills.test_pick import rollout
@@ -86,6 +88,16 @@ def test_what_does_not_fit_is_refused_at_its_key(tmp_path: Path, expert: dict[st
         SkillPolicy(env)
 
 
+def test_a_check_without_the_engine_looks_at_what_was_tried_on_it() -> None:
+    """A bank holds for the engine that the file names, though names are looked up on the kinematic one."""
+    for engine in ("mujoco", "sapien"):
+        loaded = load("place_mug", overrides=[f"engine={engine}"])
+        dry_run(loaded, compile_world(loaded))
+    loaded = load("place_mug", overrides=["engine='null'"])
+    with pytest.raises(SpecError, match=r"task\.expert\.bank: .* was not tried on 'null'"):
+        dry_run(loaded, compile_world(loaded))
+
+
 def test_a_folder_has_what_fits_among_others(tmp_path: Path) -> None:
     (tmp_path / "banks").mkdir()
     bank = cube_bank(DOWN)
@@ -153,3 +165,17 @@ def test_envs_do_not_disturb_each_other(tmp_path: Path) -> None:
             rollout(env, SkillPolicy(env), 120)
             finals.append(env.engine.get_state().joint_pos[0].copy())
     assert (finals[0] == finals[1]).all()
+
+
+def test_what_the_own_hand_has_no_room_for_comes_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Grasps of a mug's rim that are as deep as the bank's gripper are held up by the hand of a Panda."""
+    slipped: list[bool] = []
+    for less in (banked.WITHOUT_ROOM, 0.0):
+        monkeypatch.setattr(banked, "WITHOUT_ROOM", less)
+        require_engine("pybullet")
+        with make("place_mug", engine="pybullet", num_envs=8, overrides=["record.cameras=[]"]) as env:
+            env.reset(seed=4001)
+            policy = SkillPolicy(env)
+            rollout(env, policy, 400)
+            slipped.append(any("ladder" in policy.describe(i) for i in range(8)))
+    assert slipped == [False, True]

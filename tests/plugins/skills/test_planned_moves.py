@@ -65,6 +65,8 @@ def driven(env: TaskEnv, arm: Arm, steps: int, until: Callable[[], bool] = lambd
         env.scene.look(ids)
         action = np.zeros((env.num_envs, env.action_dim))
         arm.act(ids, action)
+        for service in arm.planners:
+            service.flush()
         env.step(action)
         seen.append(env.engine.get_state().joint_pos[0, arm.chain.joints])
     return np.array(seen)
@@ -109,6 +111,7 @@ def test_in_real_time_an_answer_takes_effect_once_it_is_ready() -> None:
         arm.plan(ids, np.tile([0.42, 0.32, 0.6, 1.0, 0.0, 0.0, 0.0], (2, 1, 1)))
         assert arm.plans is not None
         futures = [question.future for question in arm.plans._questions.values()]
+        arm.plans.planner.service.flush()
         while not all(future.done for future in futures):
             assert arm.plans.planner.service.counts.late == 0  # nobody waits
             time.sleep(0.01)

@@ -26,6 +26,9 @@ GOALS = 16
 CLEARANCE = -0.002
 """[m] the hand stays so far above what the object rests on; the box around a pad reaches a little further than it."""
 
+WITHOUT_ROOM = 1e6
+"""By which a grasp scores less where the robot's own hand touches more of a thing than the bank's gripper does."""
+
 BankFile = Annotated[Path | None, Field(description="a bank of grasps, or a folder of banks; none: from above")]
 CountsFolder = Annotated[Path | None, Field(description="keeps outcomes of the bank's candidates, and goes by them")]
 Pinned = Annotated[str, Field(description="version of the counts that are believed; none are added to them")]
@@ -60,9 +63,12 @@ class BankedGrasps(BankedChoice):
         self._hand = _corners(arm)
         self._room = np.ones((2, *self.banks.score.shape), dtype=bool)
         """(2, E, G) either way round; only looked at for parts of furniture, which is all around."""
-        if body is not None:
-            for row, entity in enumerate(object.entities):
+        self._liked = self.banks.score.copy()
+        for row, entity in enumerate(object.entities):
+            if body is not None:
                 self._room[:, row] = [has_room(arm, entity, body, way) for way in _both(self.banks.pose[row])]
+            elif fit is None:
+                self._liked[row] -= WITHOUT_ROOM * ~has_room(arm, entity, entity.root, self.banks.pose[row])
 
     def goals(
         self, ids: Array, held_pose: Array, hover: float, object_pose: Array | None = None
@@ -77,7 +83,7 @@ class BankedGrasps(BankedChoice):
         low = np.minimum(self._lowest(poses), self._lowest(before(poses, hover)))
         root = held_pose if object_pose is None else object_pose
         floor = root[:, 2] - self._shapes.below(ids, root)
-        page, score = self.offer(ids, np.where(low > floor[:, None] + CLEARANCE, self.banks.score[which], -np.inf))
+        page, score = self.offer(ids, np.where(low > floor[:, None] + CLEARANCE, self._liked[which], -np.inf))
         return poses[rows, page], np.where(np.isfinite(score), self.banks.width[which[:, None], page], np.inf)
 
     def both_ways(self, ids: Array, goals: Array) -> tuple[Array, Array]:

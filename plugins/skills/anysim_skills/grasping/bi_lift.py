@@ -13,15 +13,19 @@ from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import ObjectView, RobotView
 from anysim_skills.arm import LEAD, Arm
+from anysim_skills.arm_pair import ArmPair
 from anysim_skills.choice import Choice
 from anysim_skills.grasping.candidates import DOWN, TOP_DOWN, across, from_above
 from anysim_skills.grasping.grasp import CLOSING_STEPS, ROOM, Metres, Speed, closed
 from anysim_skills.object_shapes import ObjectShapes
+from anysim_skills.planning import LATENCY, Latency, PlannerName
 
 BEHIND = 0.03
 """[m] while the command of one arm is further ahead of its tool than this, both wait."""
 PAIRS = 2 * TOP_DOWN * TOP_DOWN
 """Which arm takes which end, and how each hand is turned."""
+CHOOSE, PLAN = 1, 2
+"""Phases."""
 
 
 class BiLift(PhasedSkill):
@@ -61,9 +65,12 @@ class BiLift(PhasedSkill):
         lift_speed: Speed = 0.1,
         hold: Annotated[int, Field(ge=1, description="control steps above")] = 10,
         phase_steps: Annotated[int, Field(ge=1, description="control steps that a move may take")] = 200,
+        planner: PlannerName = "",
+        latency: Latency = LATENCY,
     ) -> None:
         tools = (robot, tool), (partner, partner_tool or tool)
         self.arms = tuple(Arm.of(env, one, tool=name, solver=solver) for one, name in tools)
+        self._together = ArmPair.of(*self.arms, planner=planner, latency=latency) if planner else None
         self._object, self._ends = object, np.array(ends)
         self._shapes = ObjectShapes(env.scene, object)
         self._back = np.array([*(-hover * DOWN), 0.0, 0.0, 0.0, 0.0])
@@ -82,6 +89,7 @@ class BiLift(PhasedSkill):
         return (
             Phase("back off", self._open, self._backing_off, self._late),
             Phase("choose", self._choose, self._chosen, 1),
+            *([self._together.planned_phase(self._plan)] if self._together else ()),
             Phase("approach", None, self._approach, self._late),
             Phase("descend", None, self._descend, self._late),
             Phase("close", self._close, self._closing, self.closing_steps),
@@ -91,12 +99,15 @@ class BiLift(PhasedSkill):
     def start(self, env_ids: Array) -> None:
         super().start(env_ids)
         self._choice.again(env_ids)
-        self.phase[env_ids] = 1
+        self.phase[env_ids] = CHOOSE
 
     def retry(self, rung: Rung, env: int) -> int | None:
-        """The next pair where one is left; else away from the object, and all of them again."""
+        """Another plan; the next pair where one is left; else away from the object, and all of them again."""
+        planning = self._together is not None and self.phase[env] == PLAN
+        if rung is Rung.REPLAN and planning:
+            return PLAN
         if rung is Rung.CANDIDATE and self._choice.next(env):
-            return 0
+            return CHOOSE if planning else 0
         if rung is Rung.BACK_OFF:
             self._choice.again(env)
             return 0
@@ -158,6 +169,14 @@ class BiLift(PhasedSkill):
         first, second = np.divmod(turns, TOP_DOWN)
         row = np.arange(len(ids))
         return self.grasps(at, 0)[row, end, first], self.grasps(at, 1)[row, 1 - end, second]
+
+    def _plan(self, ids: Array, at: Array) -> None:
+        """Both arms before the chosen pair in one plan, from where both go on in a line."""
+        assert self._together is not None
+        targets = self._targets(ids, at)
+        before = np.stack([self.before(target, number) for number, target in enumerate(targets)], axis=1)
+        then = np.stack(targets, axis=1)[:, :, None]
+        self._together.plan(ids, list(before[:, :, None]), then=then, touched=self._object)
 
     def _approach(self, ids: Array, at: Array) -> Array:
         for number, target in enumerate(self._targets(ids, at)):

@@ -85,7 +85,11 @@ class Bring(PhasedSkill):
 
     def _planned(self, ids: Array, at: Array) -> Array:
         held = self.arm.holds(ids, at, self._object.root)
-        return np.where(held, self.arm.planned(ids), _UNSTABLE)
+        return np.where(held, self.planned(ids), _UNSTABLE)
+
+    def planned(self, ids: Array) -> Array:
+        """(n,) how the planned move stands, as `Arm.planned` says."""
+        return self.arm.planned(ids)
 
     def _enter(self, ids: Array, at: Array) -> None:
         self.arm.take(ids, at, self._object.root)

@@ -8,9 +8,12 @@ from anysim.skills.base import Outcome
 from anysim.skills.sequence import SkillSequence
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
+from anysim_skills.arm import Arm
 from anysim_skills.grasping.bring import Bring
 from anysim_skills.grasping.grasp import Grasp, Metres, Offset, Speed
+from anysim_skills.grasping.hold_out import HoldOut
 from anysim_skills.grasping.release import Release
+from anysim_skills.planning import LATENCY, Latency, PlannerName
 
 
 class Handover(SkillSequence):
@@ -32,11 +35,21 @@ class Handover(SkillSequence):
         retreat: Metres = 0.15,
         speed: Speed = 0.3,
         max_attempts: Annotated[int, Field(ge=1)] = 3,
+        planner: PlannerName = "",
+        latency: Latency = LATENCY,
     ) -> None:
+        """With a `planner` both arms go to the meeting at once, in one plan."""
         both = {"object": object, "tool": tool, "solver": solver}
-        hold_out = Bring(env, **both, robot=robot, goal=meeting, speed=speed)
+        plans = {"planner": planner, "latency": latency}
+        if planner:
+            taker = Arm.of(env, receiver, tool=tool, solver=solver)
+            hold_out = HoldOut(env, taker, take, hover, **both, **plans, robot=robot, goal=meeting, speed=speed)
+        else:
+            hold_out = Bring(env, **both, robot=robot, goal=meeting, speed=speed)
         members = {
-            "grasp": Grasp(env, hold_out, **both, robot=robot, offset=give, hover=hover, lift=0.05, speed=speed),
+            "grasp": Grasp(
+                env, hold_out, **both, robot=robot, offset=give, hover=hover, lift=0.05, speed=speed, **plans
+            ),
             "hold out": hold_out,
             "take": Grasp(env, **both, robot=receiver, offset=take, hover=hover, lift=0.0, speed=speed),
             "let go": Release(env, robot=robot, tool=tool, solver=solver, retreat=retreat),
