@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from anysim import make
+from anysim import make, registry
 from anysim.errors import SpecError
+from anysim.plugin_parameters import parameters
 from anysim.record.collector import Collector
 from anysim.skills.bank import read_bank
 from anysim.skills.living_bank import LivingBank
@@ -84,6 +85,34 @@ def test_what_does_not_fit_is_refused_at_its_key(tmp_path: Path, expert: dict[st
     (tmp_path / "empty").mkdir()
     with env_of(task(tmp_path, **expert)) as env, pytest.raises(SpecError, match=words):
         SkillPolicy(env)
+
+
+@pytest.mark.parametrize(
+    ("of", "key"),
+    [
+        ("pick_cube", "bank"),
+        ("place_on_pad", "bank"),
+        ("lift_cube", "bank"),
+        ("open_drawer", "bank"),
+        ("dex_grasp", "bank"),
+        ("peg_in_hole", "bank` or `insertions"),
+    ],
+)
+def test_counts_without_a_bank_are_refused(tmp_path: Path, of: str, key: str) -> None:
+    """Each skill that has both parameters: the counts would be of nothing, and would be left out silently."""
+    words = rf"{of}\.yaml:4:\d+: task\.expert\.living: .* there is no `{key}`; make one with `anysim bank build`"
+    with env_of(task(tmp_path, of, living="counts")) as env, pytest.raises(SpecError, match=words):
+        SkillPolicy(env)
+    words = rf"{of}\.yaml:4:\d+: task\.expert\.pinned: .* there is no `bank`"
+    with env_of(task(tmp_path, of, pinned="abc")) as env, pytest.raises(SpecError, match=words):
+        SkillPolicy(env)
+
+
+def test_each_skill_that_counts_is_tried_without_a_bank() -> None:
+    """`grasp`, `insert` and `take_hold` are what the others are made of, or share their constructor with one."""
+    counting = {name for name in registry.names("skills") if "living" in parameters(registry.load("skills", name))}
+    tried = {"pick", "pick_place", "lift", "open", "dex_grasp", "pick_insert"}
+    assert counting == tried | {"grasp", "insert", "take_hold"}
 
 
 def test_a_folder_has_what_fits_among_others(tmp_path: Path) -> None:

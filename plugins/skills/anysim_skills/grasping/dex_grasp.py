@@ -14,6 +14,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.choice import Choice
+from anysim_skills.grasping.bank_files import refuse_counts
 from anysim_skills.grasping.banked import BankedGrasps, BankFile, CountsFolder, Pinned
 from anysim_skills.grasping.banked_hand import OfHand, synergies
 from anysim_skills.grasping.grasp import Metres, Offset, Speed
@@ -75,6 +76,7 @@ class DexGrasp(PhasedSkill):
         self._speed, self._late = speed, phase_steps
         self._shapes = ObjectShapes(env.scene, object)
         n = env.num_envs
+        refuse_counts(bank, living, pinned)
         self._bank: BankedGrasps | None = None
         if bank is not None:
             fit = OfHand(env.engine.index.robot(robot.name).model, self.hand)

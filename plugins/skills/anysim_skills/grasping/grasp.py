@@ -14,6 +14,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.choice import Choice
+from anysim_skills.grasping.bank_files import refuse_counts
 from anysim_skills.grasping.banked import BankedGrasps, BankFile, CountsFolder, Pinned, before
 from anysim_skills.grasping.candidates import DOWN, TOP_DOWN, across, from_above
 from anysim_skills.object_shapes import ObjectShapes
@@ -86,6 +87,7 @@ class Grasp(PhasedSkill):
         self.turn = np.zeros((n, 4))
         """(N, 4) the tool's orientation in the chosen grasp."""
         self._hover = hover
+        refuse_counts(bank, living, pinned)
         self._bank = None if bank is None else BankedGrasps(env, self.arm, object, bank, living, pinned)
         self._choice = Choice(n, TOP_DOWN if self._bank is None else self._bank.goal_count)
         self._rest = np.zeros(n)
