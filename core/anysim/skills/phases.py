@@ -113,7 +113,10 @@ class MovingSkill(Skill):
         del following
 
     def wanted(self, ids: Array, at: Array, grasps: Array) -> Array:
-        """Tool poses (n, g, m, 7) that it needs with grasps (n, g, 7), of envs (n,), their rows in the scene."""
+        """Tool poses (n, g, m, 7) that it needs with grasps (n, g, 7), of envs (n,), their rows in the scene.
+
+        (n, g, c, m, 7) where one of c ways is enough; a way with NaN is none.
+        """
         del ids, at
         return np.zeros((*grasps.shape[:2], 0, 7))
 

@@ -46,6 +46,12 @@ class SkillSequence(MovingSkill):
             self._past[i] = ()
         self._go(env_ids, 0)
 
+    def foresee(self, following: MovingSkill) -> None:
+        self.members[-1].foresee(following)
+
+    def wanted(self, ids: Array, at: Array, grasps: Array) -> Array:
+        return self.members[0].wanted(ids, at, grasps)
+
     def decide(self, ids: Array, at: Array) -> None:
         for number, member in enumerate(self.members):
             here = (self.phase[ids] == number) & (self.outcome[ids] == STAY)

@@ -103,15 +103,38 @@ def works(wish: Wish) -> list[Work]:
         return [Work(chosen[0], grasps(subject), anchor, document.spec.source) for subject, anchor in pairs]
     found: list[Work] = []
     for name in chosen:
-        into = [] if wish.robot else list(insertions(world, name, wish.affordance))
-        if not into or (not wish.affordance and graspable(world, world.entity_numbers[name])):
-            found += [Work(name, grasps(one)) for one in subjects(world, name, wish.affordance)]
-        found += [Work(name, one) for one in into]
+        holes = _holes(world, name, wish.affordance)
+        into = list(insertions(world, name, wish.affordance)) if holes else []
+        closed_on = not holes or (not wish.affordance and bool(graspable(world, world.entity_numbers[name])))
+        if not closed_on and (wish.robot or not into) and (wish.object or wish.affordance):
+            raise AssetError(_no_insertions(holes[0], wish))
+        found += [Work(name, grasps(one)) for one in (subjects(world, name, wish.affordance) if closed_on else ())]
+        found += [Work(name, one) for one in ([] if wish.robot else into)]
     if not found:
         raise AssetError(
             f"nothing in '{wish.what}' affords a grasp, or a hole for a tip: free objects and what builders declare do"
         )
     return found
+
+
+def _holes(world: World, name: str, only: str) -> list[str]:
+    """The holes of an object, each as `object.hole`, or the one that is named."""
+    number = world.entity_numbers.get(name)
+    known = [] if number is None else affordances_of(world, number)
+    return [f"{name}.{a.name}" for a in known if a.kind is AffordanceKind.HOLE and only in ("", a.name)]
+
+
+def _no_insertions(hole: str, wish: Wish) -> str:
+    """Why no bank is made of a hole."""
+    if wish.robot:
+        return (
+            f"{hole} is a hole: what {wish.robot} reaches there follows from how it holds what goes in, so --robot is "
+            "for banks of grasps alone; drop it, or name what is grasped with --object"
+        )
+    return (
+        f"nothing free in '{wish.what}' has a tip that goes into {hole}; a hole that is itself brought over a peg, as "
+        "that of a nut, has no bank: `insert` takes its turns from `symmetry`"
+    )
 
 
 def build_all(todo: Sequence[Work], wish: Wish) -> Iterator[Row]:

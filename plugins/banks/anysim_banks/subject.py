@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.errors import AssetError
+from anysim.errors import AssetError, listing
 from anysim.math import pose as P
 from anysim.model.affordance_lookup import (
     FoundAffordance,
@@ -85,7 +85,10 @@ def subjects(world: World, entity: str, only: str = "") -> list[Subject]:
     number = _number(world, entity)
     specs = graspable(world, number)
     if not specs:
-        raise AssetError(f"'{entity}' has no affordance that fingers close on; declare one in its asset")
+        has = listing([one.name for one in affordances_of(world, number)])
+        raise AssetError(
+            f"'{entity}' has no affordance that fingers close on (it has: {has}); declare one in its asset"
+        )
     return [subject(world, resolve_affordance(world, number, one)) for one in specs]
 
 

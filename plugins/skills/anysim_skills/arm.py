@@ -272,10 +272,13 @@ class Arm(Mover):
         """(n,) [rad/s, m/s] of the fastest joint of the gripper."""
         return np.abs(self.env.scene.state.joint_vel[np.ix_(ids, self._fingers)]).max(axis=1, initial=0.0)
 
-    def reach(self, ids: Array, targets: Array, seeds: Array | None = None) -> tuple[Array, Array]:
+    def reach(
+        self, ids: Array, targets: Array, seeds: Array | None = None, where: Array | None = None
+    ) -> tuple[Array, Array]:
         """Inverse kinematics of many tool poses (n, g, 7): from the live configuration, else from where it began.
 
-        `seeds` (n, g, K) are configurations in place of the live one.
+        `seeds` (n, g, K) are configurations in place of the live one. Only those `where` (n, g) bool says so are looked
+        at; the others count as out of reach.
 
         Returns:
             joint_pos (n, g, K) and the largest joint motion (n, g) to get there; infinite where there is no solution.
@@ -284,18 +287,17 @@ class Arm(Mover):
         live = self.env.scene.state.joint_pos[np.ix_(ids, self.chain.joints)]
         seeds = np.repeat(live, g, axis=0) if seeds is None else seeds.reshape(n * g, -1)
         keys = np.repeat(self.env.streams.episode_seed[ids], g)
-        base = np.repeat(self._base(ids), g, axis=0)
-        found = self.solver.solve(targets.reshape(-1, 7), base, seeds, random_restarts=0, rng_seeds=keys)
-        moved = np.where(found.converged, np.abs(found.joint_pos - seeds).max(axis=1), np.inf)
-        joints, left = found.joint_pos, np.flatnonzero(~found.converged)
+        base, poses = np.repeat(self._base(ids), g, axis=0), targets.reshape(-1, 7)
+        asked = np.arange(n * g) if where is None else np.flatnonzero(where)
+        found = self.solver.solve(poses[asked], base[asked], seeds[asked], random_restarts=0, rng_seeds=keys[asked])
+        joints, moved = seeds.copy(), np.full(n * g, np.inf)
+        joints[asked], reached, left = found.joint_pos, asked[found.converged], asked[~found.converged]
         if len(left):
             home = np.repeat(self.chain.initial[None], len(left), axis=0)
-            again = self.solver.solve(
-                targets.reshape(-1, 7)[left], base[left], home, random_restarts=0, rng_seeds=keys[left]
-            )
+            again = self.solver.solve(poses[left], base[left], home, random_restarts=0, rng_seeds=keys[left])
             won = left[again.converged]
-            joints[won] = again.joint_pos[again.converged]
-            moved[won] = np.abs(joints[won] - seeds[won]).max(axis=1)
+            joints[won], reached = again.joint_pos[again.converged], np.concatenate([reached, won])
+        moved[reached] = np.abs(joints[reached] - seeds[reached]).max(axis=1)
         return joints.reshape(n, g, -1), moved.reshape(n, g)
 
     def _base(self, ids: Array) -> Array:

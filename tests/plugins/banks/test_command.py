@@ -1,6 +1,7 @@
 """`anysim bank`: banks of assets and tasks, what is there already, anchors, and inputs that are wrong."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -113,6 +114,34 @@ def test_what_cannot_be_grasped_says_why() -> None:
     assert "no parallel gripper" in str(result.exception)
     result = anysim("build", BOX, "--gripper", "parallel_gripper:stroke=wide")
     assert "stroke=wide" in str(result.exception)
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        (("peg_in_hole", "--object", "block", "--robot", "franka_panda"), "block.mouth is a hole: what franka_panda"),
+        (
+            ("peg_in_hole", "--object", "block", "-a", "mouth", "--robot", "mobile_panda"),
+            "--robot is for banks of grasps alone",
+        ),
+        (("nut_on_peg", "--object", "nut", "-a", "mouth"), "nothing free in .* has a tip that goes into nut.mouth"),
+        (("nut_on_peg", "--object", "post"), r"'post' has no affordance that fingers close on \(it has: tip\)"),
+        (("pick_cube", "--object", "cub"), "there is no entity 'cub'; did you mean 'cube'"),
+    ],
+)
+def test_insertions_that_no_bank_is_made_of_are_refused(asked: tuple[str, ...], words: str) -> None:
+    result = anysim("build", *asked, *FEW)
+    assert result.exit_code != 0
+    assert re.search(words, str(result.exception)), result.exception
+
+
+def test_what_a_robot_reaches_of_a_task_with_holes_is_its_grasps() -> None:
+    rows = built("peg_in_hole", "--robot", "franka_panda")
+    assert [row["affordance"] for row in rows] == ["peg.body"]
+
+
+def test_a_nut_has_grasps() -> None:
+    assert [row["affordance"] for row in built("nut_on_peg")] == ["nut.body"]
 
 
 def test_things_of_one_name_have_files_of_their_own() -> None:

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from anysim import make
+from anysim import make, registry
 from anysim.api import compile_world, dry_run, load
 from anysim.errors import SpecError
+from anysim.plugin_parameters import parameters
 from anysim.record.collector import Collector
 from anysim.skills.bank import read_bank
 from anysim.skills.living_bank import LivingBank
@@ -96,6 +97,34 @@ def test_a_check_without_the_engine_looks_at_what_was_tried_on_it() -> None:
     loaded = load("place_mug", overrides=["engine='null'"])
     with pytest.raises(SpecError, match=r"task\.expert\.bank: .* was not tried on 'null'"):
         dry_run(loaded, compile_world(loaded))
+
+
+@pytest.mark.parametrize(
+    ("of", "key"),
+    [
+        ("pick_cube", "bank"),
+        ("place_on_pad", "bank"),
+        ("lift_cube", "bank"),
+        ("open_drawer", "bank"),
+        ("dex_grasp", "bank"),
+        ("peg_in_hole", "bank` or `insertions"),
+    ],
+)
+def test_counts_without_a_bank_are_refused(tmp_path: Path, of: str, key: str) -> None:
+    """Each skill that has both parameters: the counts would be of nothing, and would be left out silently."""
+    words = rf"{of}\.yaml:4:\d+: task\.expert\.living: .* there is no `{key}`; make one with `anysim bank build`"
+    with env_of(task(tmp_path, of, living="counts")) as env, pytest.raises(SpecError, match=words):
+        SkillPolicy(env)
+    words = rf"{of}\.yaml:4:\d+: task\.expert\.pinned: .* there is no `bank`"
+    with env_of(task(tmp_path, of, pinned="abc")) as env, pytest.raises(SpecError, match=words):
+        SkillPolicy(env)
+
+
+def test_each_skill_that_counts_is_tried_without_a_bank() -> None:
+    """`grasp`, `insert` and `take_hold` are what the others are made of, or share their constructor with one."""
+    counting = {name for name in registry.names("skills") if "living" in parameters(registry.load("skills", name))}
+    tried = {"pick", "pick_place", "lift", "open", "dex_grasp", "pick_insert"}
+    assert counting == tried | {"grasp", "insert", "take_hold"}
 
 
 def test_a_folder_has_what_fits_among_others(tmp_path: Path) -> None:

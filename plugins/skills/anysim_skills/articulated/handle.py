@@ -18,6 +18,7 @@ from anysim_skills.arm import Arm
 from anysim_skills.articulated.bar_grasps import TURNS, bar_grasps
 from anysim_skills.articulated.part import Part
 from anysim_skills.choice import Choice, motion_along
+from anysim_skills.grasping.bank_files import refuse_counts
 from anysim_skills.grasping.banked import BankedGrasps
 from anysim_skills.grasping.grasp import CLOSING_STEPS, ROOM, Speed, closed
 from anysim_skills.planning import LATENCY, Latency, PlannerName
@@ -81,6 +82,7 @@ class AtHandle(PhasedSkill):
         self.part = Part(env.scene, part)
         self.handle = self.part.handle()
         self.speed, self.part_speed, self.lead, self.late = speed, part_speed, lead, steps
+        refuse_counts(bank, living, pinned)
         self._bank: BankedGrasps | None = None
         if bank is not None:
             self._bank = BankedGrasps(env, self.arm, self.part.owner, bank, living, pinned, self.part.body)

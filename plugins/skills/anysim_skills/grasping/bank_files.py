@@ -23,6 +23,18 @@ KEYS = ("bank", "pinned")
 _NOTHING = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 
 
+def refuse_counts(bank: Path | None, living: Path | None, pinned: str, keys: tuple[str, str] = KEYS) -> None:
+    """Refuse counts, or a version of them, where there is no bank whose candidates they would be of.
+
+    Raises:
+        SpecError: at `living`, or at the second of `keys`.
+    """
+    given = "living" if living is not None else keys[1] if pinned else ""
+    if bank is None and given:
+        words = f"outcomes are counted of the candidates of a bank, but there is no `{keys[0]}`; make one with "
+        raise _at(given, f"{words}`anysim bank build` and name it at `{keys[0]}`, or drop `{given}`")
+
+
 class Fit(Protocol):
     """What a bank must be for."""
 

@@ -9,12 +9,13 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.skills.base import OUTCOMES, Outcome
-from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
+from anysim.skills.phases import GO_ON, STAY, MovingSkill, Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.grasping.grasp import Metres, Speed
 from anysim_skills.grasping.held import RAISED, turned_about
+from anysim_skills.look_ahead import LookAhead
 from anysim_skills.planned_moves import PLANNED_STEPS
 from anysim_skills.planning import LATENCY, Latency, PlannerName
 
@@ -46,6 +47,7 @@ class Bring(PhasedSkill):
         self._object, self._goal, self._speed, self._tolerance = object, goal, speed, tolerance
         self._hold, self._late = hold, steps
         self._held = np.zeros(env.num_envs, dtype=np.int64)
+        self._ahead = LookAhead(self.arm)
         super().__init__(env, [self.arm])
 
     def make_phases(self) -> Sequence[Phase]:
@@ -62,13 +64,15 @@ class Bring(PhasedSkill):
         """Another plan; None: what is not held any more has to be grasped again."""
         return 1 if rung is Rung.REPLAN and self._plans and self.phase[env] == 1 else None
 
+    def foresee(self, following: MovingSkill) -> None:
+        self._ahead.foresee(following)
+
     def wanted(self, ids: Array, at: Array, grasps: Array) -> Array:
-        """Tool poses (n, g, 1, 7) that bring the object to the goal in grasps (n, g, 7)."""
-        del ids
+        """Tool poses (n, g, c, m, 7) that bring the object to the goal in grasps (n, g, 7), and on from there."""
         poses = grasps[:, :, None].copy()
         held = poses[..., :3] - self._object.root.position[at][:, None, None]
         poses[..., :3] = self._goal.position[at][:, None, None] + held
-        return poses
+        return self._ahead.ways(ids, at, grasps, poses)
 
     def _raise(self, ids: Array, at: Array) -> None:
         """Off what it stands on, so that nothing is touched where the plan begins."""

@@ -9,15 +9,17 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.skills.base import OUTCOMES, Outcome
-from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
+from anysim.skills.phases import GO_ON, STAY, MovingSkill, Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.choice import Choice
+from anysim_skills.grasping.bank_files import refuse_counts
 from anysim_skills.grasping.banked import BankedGrasps, BankFile, CountsFolder, Pinned
 from anysim_skills.grasping.banked_hand import OfHand, synergies
 from anysim_skills.grasping.grasp import Metres, Offset, Speed
 from anysim_skills.grasping.hand import Hand
+from anysim_skills.look_ahead import LookAhead
 from anysim_skills.object_shapes import ObjectShapes
 
 ANGLES = 16
@@ -75,6 +77,7 @@ class DexGrasp(PhasedSkill):
         self._speed, self._late = speed, phase_steps
         self._shapes = ObjectShapes(env.scene, object)
         n = env.num_envs
+        refuse_counts(bank, living, pinned)
         self._bank: BankedGrasps | None = None
         if bank is not None:
             fit = OfHand(env.engine.index.robot(robot.name).model, self.hand)
@@ -82,6 +85,7 @@ class DexGrasp(PhasedSkill):
             self._synergies = synergies(self.hand, self._bank.banks.kind, self._bank.banks.score.shape[1])
         self._choice = Choice(n, 2 * ANGLES if self._bank is None else self._bank.goal_count)
         self._goal, self._rest = np.zeros((n, 7)), np.zeros(n)
+        self._ahead = LookAhead(self.arm)
         super().__init__(env, [self.arm, self.hand])
 
     def make_phases(self) -> Sequence[Phase]:
@@ -95,6 +99,9 @@ class DexGrasp(PhasedSkill):
             Phase("lift", self._take, self._lifting, self._late),
             Phase("hold", None, self._holding, 30),
         )
+
+    def foresee(self, following: MovingSkill) -> None:
+        self._ahead.foresee(following)
 
     def start(self, env_ids: Array) -> None:
         super().start(env_ids)
@@ -152,7 +159,7 @@ class DexGrasp(PhasedSkill):
         turn = grasps[..., 3:]
         out, fingers = (P.rotate(turn, np.broadcast_to(np.eye(3)[k], (n, g, 3)))[..., 2] for k in (2, 1))
         bad = (out > STEEPEST) | (fingers > STEEPEST) | (grasps[..., 2] < lowest[:, None] + self._least)
-        effort = np.where(bad, np.inf, effort)
+        effort = self._ahead.effort(ids, at, grasps, np.where(bad, np.inf, effort))
         self._goal[ids] = grasps[np.arange(n), self._choice.choose(ids, effort)]
 
     def _choose_of_bank(self, bank: BankedGrasps, ids: Array, at: Array) -> None:
@@ -166,6 +173,8 @@ class DexGrasp(PhasedSkill):
         effort = self.arm.reach(ids, ways.reshape(len(ids), -1, 7))[1].reshape(ways.shape[:3]).max(axis=2)
         bad = (P.rotate(grasps[..., 3:], np.broadcast_to(np.eye(3)[2], (*grasps.shape[:2], 3)))[..., 2]) > STEEPEST
         fit = np.isfinite(effort) & np.isfinite(widths) & ~bad
+        effort = self._ahead.effort(ids, at, grasps, np.where(fit, effort, np.inf))
+        fit = np.isfinite(effort)
         chosen = self._choice.choose(ids, np.where(bank.alike(ids, fit), effort, np.inf))
         bank.choose(ids, chosen, ~self._choice.none_left(ids))
         self._goal[ids] = grasps[np.arange(len(ids)), chosen]

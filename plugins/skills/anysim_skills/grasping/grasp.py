@@ -1,7 +1,7 @@
 """Grasp: close the gripper on an object, and lift it."""
 
 from collections.abc import Sequence
-from typing import Annotated, Protocol
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -14,8 +14,10 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.choice import Choice
+from anysim_skills.grasping.bank_files import refuse_counts
 from anysim_skills.grasping.banked import BankedGrasps, BankFile, CountsFolder, Pinned, before
 from anysim_skills.grasping.candidates import DOWN, TOP_DOWN, across, from_above
+from anysim_skills.look_ahead import LookAhead, TakesOver
 from anysim_skills.object_shapes import ObjectShapes
 from anysim_skills.planning import LATENCY, Latency, PlannerName
 
@@ -39,14 +41,6 @@ def closed(ids: Array, steps: Array, *arms: Arm) -> Array:
     """(n,) GO_ON where the fingers of all arms have come to rest, or their control steps (n,) are over; else STAY."""
     settled = (steps >= 5) & (np.max([arm.finger_speed(ids) for arm in arms], axis=0) < SETTLED)
     return np.where(settled | (steps >= CLOSING_STEPS), GO_ON, STAY)
-
-
-class TakesOver(Protocol):
-    """A skill that goes on with what a grasp holds."""
-
-    def wanted(self, ids: Array, at: Array, grasps: Array) -> Array:
-        """Tool poses (n, g, m, 7) that it will need, of envs (n,), their rows in the scene and grasps (n, g, 7)."""
-        ...
 
 
 class Grasp(PhasedSkill):
@@ -78,7 +72,7 @@ class Grasp(PhasedSkill):
         self.arm = Arm.of(env, robot, tool=tool, solver=solver, planner=planner, latency=latency)
         self.arm.check_gripper()
         self._plans = bool(planner)
-        self._object, self._then, self._lift = object, then, lift
+        self._object, self._ahead, self._lift = object, LookAhead(self.arm, then), lift
         self._speed, self._descend_speed, self._steps = speed, descend_speed, phase_steps
         self._offset, self._part_only = np.array(offset), part_only
         self._back = np.array([*(-hover * DOWN), 0.0, 0.0, 0.0, 0.0])
@@ -86,6 +80,7 @@ class Grasp(PhasedSkill):
         self.turn = np.zeros((n, 4))
         """(N, 4) the tool's orientation in the chosen grasp."""
         self._hover = hover
+        refuse_counts(bank, living, pinned)
         self._bank = None if bank is None else BankedGrasps(env, self.arm, object, bank, living, pinned)
         self._choice = Choice(n, TOP_DOWN if self._bank is None else self._bank.goal_count)
         self._rest = np.zeros(n)
@@ -107,8 +102,7 @@ class Grasp(PhasedSkill):
         return phases
 
     def foresee(self, following: MovingSkill) -> None:
-        if self._then is None and self.arm in following.movers:
-            self._then = following
+        self._ahead.foresee(following)
 
     def start(self, env_ids: Array) -> None:
         super().start(env_ids)
@@ -151,11 +145,13 @@ class Grasp(PhasedSkill):
         self.arm.closed[ids] = False
         grasps, widths = self._candidates(ids, at)
         targets = np.stack([self._before(grasps), grasps], axis=2)
-        if self._then is not None:
-            targets = np.concatenate([targets, self._then.wanted(ids, at, grasps)], axis=2)
         n, g, m = targets.shape[:3]
         effort = self.arm.reach(ids, targets.reshape(n, g * m, 7))[1].reshape(n, g, m).max(axis=2)
         effort[widths > self.arm.aperture - ROOM] = np.inf
+        if self._lift:
+            raised = grasps + np.array([0.0, 0.0, self._lift, 0.0, 0.0, 0.0, 0.0])
+            effort[np.isinf(self.arm.reach(ids, raised, where=np.isfinite(effort))[1])] = np.inf
+        effort = self._ahead.effort(ids, at, grasps, effort)
         if self._bank is not None:  # they are in order
             effort = np.where(np.isfinite(effort), np.arange(g), np.inf)
         chosen = self._choice.choose(ids, effort)

@@ -5,6 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from anysim.skills.base import Outcome
+from anysim.skills.phases import MovingSkill
 from anysim.skills.sequence import SkillSequence
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
@@ -46,13 +47,18 @@ class Handover(SkillSequence):
             hold_out = HoldOut(env, taker, take, hover, **both, **plans, robot=robot, goal=meeting, speed=speed)
         else:
             hold_out = Bring(env, **both, robot=robot, goal=meeting, speed=speed)
+        self._take = Grasp(env, **both, robot=receiver, offset=take, hover=hover, lift=0.0, speed=speed)
         members = {
             "grasp": Grasp(
                 env, hold_out, **both, robot=robot, offset=give, hover=hover, lift=0.05, speed=speed, **plans
             ),
             "hold out": hold_out,
-            "take": Grasp(env, **both, robot=receiver, offset=take, hover=hover, lift=0.0, speed=speed),
+            "take": self._take,
             "let go": Release(env, robot=robot, tool=tool, solver=solver, retreat=retreat),
         }
         again = {("hold out", Outcome.UNSTABLE_GRASP): "grasp"}
         super().__init__(env, members, back=again, max_attempts=max_attempts)
+
+    def foresee(self, following: MovingSkill) -> None:
+        """It is the receiver that goes on with the object."""
+        self._take.foresee(following)

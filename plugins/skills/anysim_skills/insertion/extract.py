@@ -35,9 +35,8 @@ class Extract(SkillSequence):
     ) -> None:
         """`clear` [m] is how far the frame `tip` gets beyond `mouth`, whose z points out of the hole."""
         arm = {"robot": robot, "object": object, "tool": tool, "solver": solver}
-        members = {
-            "grasp": Grasp(env, **arm, offset=offset, hover=hover, lift=0.0, speed=speed),
-            "pull out": PullOut(env, **arm, tip=tip, mouth=mouth, clear=clear, speed=pull_speed, lead=lead),
-        }
+        pull = PullOut(env, **arm, tip=tip, mouth=mouth, clear=clear, speed=pull_speed, lead=lead)
+        grasp = Grasp(env, pull, **arm, offset=offset, hover=hover, lift=0.0, speed=speed)
+        members = {"grasp": grasp, "pull out": pull}
         again = {("pull out", why): "grasp" for why in (Outcome.UNSTABLE_GRASP, Outcome.LOST)}
         super().__init__(env, members, back=again, max_attempts=max_attempts)

@@ -15,7 +15,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.choice import Choice
-from anysim_skills.grasping.bank_files import KEYS
+from anysim_skills.grasping.bank_files import KEYS, refuse_counts
 from anysim_skills.grasping.banked import CountsFolder, Pinned
 from anysim_skills.grasping.grasp import Metres, Speed
 from anysim_skills.grasping.held import RESTING, Moves, PutsDown
@@ -75,6 +75,7 @@ class Insert(PutsDown):
         self._symmetry, self._above, self._align, self._depth = symmetry, above, align, depth
         self._pitch, self._reach = pitch, reach
         self._touched = np.zeros(env.num_envs)
+        refuse_counts(bank, living, pinned, keys)
         self._bank: BankedInsertions | None = None
         if bank is not None:
             self._bank = BankedInsertions(env, object, tip, mouth, bank, living, pinned, keys)

@@ -8,6 +8,7 @@ from anysim.skills.base import Outcome
 from anysim.skills.sequence import SkillSequence
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
+from anysim_skills.grasping.bank_files import refuse_counts
 from anysim_skills.grasping.banked import BankFile, CountsFolder, Pinned
 from anysim_skills.grasping.grasp import Grasp, Metres, Offset, Speed
 from anysim_skills.insertion.insert import Insert, InsertionsFile
@@ -40,9 +41,11 @@ class PickInsert(SkillSequence):
     ) -> None:
         """`bank` is of grasps, `insertions` of turns in which the object goes into the hole; `living` is of both."""
         arm = {"robot": robot, "object": object, "tool": tool, "solver": solver, "speed": speed}
-        known = {"bank": bank, "living": living, "pinned": pinned}
-        into = {"bank": insertions, "living": living, "pinned": pinned_insertions}
         keys = ("insertions", "pinned_insertions")
+        if insertions is None:
+            refuse_counts(bank, living, "", ("bank` or `insertions", ""))
+        known = {"bank": bank, "living": living if bank else None, "pinned": pinned}
+        into = {"bank": insertions, "living": living if insertions else None, "pinned": pinned_insertions}
         insert = Insert(env, keys, **arm, **into, tip=tip, hole=hole, mouth=mouth, symmetry=symmetry)
         members = {"grasp": Grasp(env, insert, **arm, **known, offset=offset, hover=hover, lift=0.0), "insert": insert}
         again = {("insert", why): "grasp" for why in (Outcome.UNSTABLE_GRASP, Outcome.LOST)}

@@ -9,11 +9,12 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.skills.base import OUTCOMES, Outcome
-from anysim.skills.phases import FIRST_RUNGS, GO_ON, STAY, Phase, PhasedSkill, Rung
+from anysim.skills.phases import FIRST_RUNGS, GO_ON, STAY, MovingSkill, Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.grasping.grasp import Metres, Speed
+from anysim_skills.look_ahead import LookAhead
 
 WIGGLE = np.deg2rad(2.0)
 """[rad] by which a peg that sticks is tilted to and fro."""
@@ -55,6 +56,7 @@ class PullOut(PhasedSkill):
         """(N, 7) the tool in the mouth's frame when the pull begins; (N,) [m] how far out the tip then was."""
         self._best, self._since = np.zeros(n), np.zeros(n, dtype=np.int64)
         """How far out the tip was at the last progress, and the control steps since then."""
+        self._ahead = LookAhead(self.arm)
         super().__init__(env, [self.arm])
 
     def make_phases(self) -> Sequence[Phase]:
@@ -64,6 +66,17 @@ class PullOut(PhasedSkill):
         """From where it is; what is not held any more has to be grasped again."""
         del env
         return 0 if rung is Rung.REPLAN else None
+
+    def foresee(self, following: MovingSkill) -> None:
+        self._ahead.foresee(following)
+
+    def wanted(self, ids: Array, at: Array, grasps: Array) -> Array:
+        """Tool poses (n, g, c, m, 7) with the object drawn out in grasps (n, g, 7), and on from there."""
+        way = np.zeros((len(ids), 3))
+        way[:, 2] = np.maximum(self._clear - self.out(at), 0.0)
+        poses = grasps[:, :, None].copy()
+        poses[..., :3] += P.rotate(self._mouth.quaternion[at], way)[:, None, None]
+        return self._ahead.ways(ids, at, grasps, poses)
 
     def out(self, at: Array) -> Array:
         """(n,) [m] of the tip beyond the mouth along its axis; below zero inside of the hole."""

@@ -40,11 +40,10 @@ class Unplug(SkillSequence):
         """`clear` [m] is how far the frame `tip` gets beyond `mouth`, whose z points out of the hole."""
         arm = {"robot": robot, "object": object, "tool": tool, "solver": solver}
         place = Place(env, **arm, target=target, speed=speed, above=above, retreat=above, tolerance=tolerance)
-        members = {
-            "grasp": Grasp(env, place, **arm, offset=offset, hover=hover, lift=0.0, speed=speed),
-            "pull out": PullOut(env, **arm, tip=tip, mouth=mouth, clear=clear, speed=pull_speed, lead=lead),
-            "place": place,
-        }
+        pull = PullOut(env, **arm, tip=tip, mouth=mouth, clear=clear, speed=pull_speed, lead=lead)
+        pull.foresee(place)
+        grasp = Grasp(env, pull, **arm, offset=offset, hover=hover, lift=0.0, speed=speed)
+        members = {"grasp": grasp, "pull out": pull, "place": place}
         slipped = (Outcome.UNSTABLE_GRASP, Outcome.LOST)
         again = {(where, why): "grasp" for where in ("pull out", "place") for why in slipped}
         super().__init__(env, members, back=again, max_attempts=max_attempts)

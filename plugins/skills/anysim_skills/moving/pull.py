@@ -75,6 +75,15 @@ class Pull(PhasedSkill):
             Phase("leave", None, self._draw_off, self._late),
         )
 
+    def wanted(self, ids: Array, at: Array, grasps: Array) -> Array:
+        """Tool poses (n, g, 3, 7) with the hook over and behind the object, and at the end, in grasps (n, g, 7)."""
+        way = level_way(self._object, self._goal, at)
+        line = way / np.maximum(P.norm(way), 1e-9)[:, None]
+        behind = self._behind(ids, at, self._clearance, line)
+        over = behind + np.array([0.0, 0.0, self._rise])
+        ends = over, behind, self._behind(ids, at, 0.0, line) + way
+        return np.stack([_tools_for(self._inner.pose[at], grasps, line, place) for place in ends], axis=2)
+
     def _raise(self, ids: Array, at: Array) -> None:
         self.arm.take(ids, at, self._hook.root)
         up = self._object.root.position[at, 2] + self._rise - self._inner.position[at, 2]
@@ -122,25 +131,29 @@ class Pull(PhasedSkill):
 
     # ------------------------------------------------------------------ where
 
-    def _behind(self, ids: Array, at: Array, clearance: float) -> Array:
-        """(n, 3) where the inner side is, so far behind the object."""
+    def _behind(self, ids: Array, at: Array, clearance: float, line: Array | None = None) -> Array:
+        """(n, 3) where the inner side is, so far behind the object, for a pull along lines (n, 3)."""
         reach = self._shapes.radius(ids) + clearance
-        return self._object.root.position[at] - reach[:, None] * self._line[ids]
+        return self._object.root.position[at] - reach[:, None] * (self._line[ids] if line is None else line)
 
     def _tool_for(self, ids: Array, at: Array, place: Array) -> Array:
         """Tool poses (n, 7) with the inner side at `place` (n, 3), its x along the pull, as it is held now."""
-        inner, tool = self._inner.pose[at], self.arm.tool.pose[at]
-        x = P.rotate(inner[:, 3:], np.broadcast_to(np.array([1.0, 0.0, 0.0]), (len(ids), 3)))
-        line = self._line[ids]
-        half = 0.5 * np.arctan2(x[:, 0] * line[:, 1] - x[:, 1] * line[:, 0], P.dot(x[:, :2], line[:, :2]))
-        turn = np.stack([np.zeros_like(half), np.zeros_like(half), np.sin(half), np.cos(half)], axis=1)
-        offset = P.rotate(turn, tool[:, :3] - inner[:, :3])
-        return np.concatenate([place + offset, P.multiply(turn, tool[:, 3:])], axis=1)
+        return _tools_for(self._inner.pose[at], self.arm.tool.pose[at][:, None], self._line[ids], place)[:, 0]
 
     def _held(self, ids: Array, at: Array, said: Array) -> Array:
         self._stuck[ids] = (self._stuck[ids] + 1) * self.arm.stuck[ids]
         said = np.where(self._stuck[ids] > STUCK, _NO_IK, said)
         return np.where(self.arm.holds(ids, at, self._hook.root), said, _UNSTABLE)
+
+
+def _tools_for(inner: Array, tools: Array, line: Array, place: Array) -> Array:
+    """Tool poses (n, g, 7) with an inner side (n, 7) at `place` (n, 3), its x along lines (n, 3), as tools hold it."""
+    x = P.rotate(inner[:, 3:], np.broadcast_to(np.array([1.0, 0.0, 0.0]), (len(inner), 3)))
+    half = 0.5 * np.arctan2(x[:, 0] * line[:, 1] - x[:, 1] * line[:, 0], P.dot(x[:, :2], line[:, :2]))
+    turn = np.stack([np.zeros_like(half), np.zeros_like(half), np.sin(half), np.cos(half)], axis=1)
+    turns = np.broadcast_to(turn[:, None], (*tools.shape[:2], 4))
+    offset = P.rotate(turns, tools[..., :3] - inner[:, None, :3])
+    return np.concatenate([place[:, None] + offset, P.multiply(turns, tools[..., 3:])], axis=2)
 
 
 class PullWithTool(SkillSequence):
@@ -165,10 +178,10 @@ class PullWithTool(SkillSequence):
         max_attempts: Annotated[int, Field(ge=1)] = 3,
     ) -> None:
         arm = {"robot": robot, "tool": tool, "solver": solver, "speed": speed}
-        grasp = Grasp(env, **arm, object=hook, offset=offset, part_only=True, hover=hover, lift=0.05)
         pull = Pull(
             env, **arm, hook=hook, inner=inner, object=object, goal=goal, tolerance=tolerance, pull_speed=pull_speed
         )
+        grasp = Grasp(env, pull, **arm, object=hook, offset=offset, part_only=True, hover=hover, lift=0.05)
         again = {("pull", why): "grasp" for why in (Outcome.UNSTABLE_GRASP,)}
         super().__init__(env, {"grasp": grasp, "pull": pull}, back=again, max_attempts=max_attempts)
 

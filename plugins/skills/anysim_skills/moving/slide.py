@@ -52,10 +52,10 @@ class Slide(PutsDown):
         super().__init__(env, arm, object, Moves(speed, slide_speed, retreat, steps))
 
     def wanted(self, ids: Array, at: Array, grasps: Array) -> Array:
-        """Tool poses (n, g, 1, 7) at the goal for grasps (n, g, 7): what chooses a grasp looks at them."""
+        """Tool poses (n, g, 1, 7) that have the object at the goal in grasps (n, g, 7)."""
         del ids
         poses = grasps[:, :, None].copy()
-        poses[..., :2] = self._goal.position[at][:, None, None, :2]
+        poses[..., :2] += self._to_goal(at)[:, None, None]
         return poses
 
     def make_phases(self) -> Sequence[Phase]:

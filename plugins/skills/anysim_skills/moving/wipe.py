@@ -68,6 +68,7 @@ class Wipe(PhasedSkill):
     ) -> None:
         self.arm = Arm.of(env, robot, tool=tool, solver=solver)
         self._patch, self._tip, self._size, self._press, self._share = patch, tip, size, press, share
+        self._held_tip = tip.name.partition(".")[0] != robot.name
         self._clear, self._speed, self._wipe_speed, self._late = clear, speed, wipe_speed, steps
         self._dt = env.engine.world.physics.control_dt
         n = env.num_envs
@@ -108,6 +109,16 @@ class Wipe(PhasedSkill):
         """(n,) share of the rectangle that the tip has been over while in contact."""
         return self._coverage.share(ids)
 
+    def wanted(self, ids: Array, at: Array, grasps: Array) -> Array:
+        """Tool poses (n, g, TURNS, 5, 7) at the corners, in grasps (n, g, 7) of what the tip is a frame of."""
+        n, g = grasps.shape[:2]
+        held = np.broadcast_to(self._grips(at)[:, None], (n, g, 3))
+        if self._held_tip:
+            held = P.rotate_inverse(grasps[..., 3:], self._tip.position[at][:, None] - grasps[..., :3])
+        turns = turns_against(self._patch.quaternion[at], TURNS)
+        found = self._corners(at, np.tile(turns, (1, g, 1)), np.repeat(held, TURNS, axis=1))
+        return found.reshape(n, g, TURNS, *found.shape[2:])
+
     # ------------------------------------------------------------------ where the tip is, and is to be
 
     def _grips(self, at: Array) -> Array:
@@ -115,17 +126,21 @@ class Wipe(PhasedSkill):
         tool = self.arm.tool.pose[at]
         return P.rotate_inverse(tool[:, 3:], self._tip.position[at] - tool[:, :3])
 
-    def _at(self, at: Array, turns: Array, points: Array) -> Array:
-        """Tool poses (n, g, 7) of turns (n, g, 4) with the tip at points (n, g, 3) of the patch's frame."""
-        patch, grip = self._patch.pose[at][:, None], self._grips(at)[:, None]
+    def _at(self, at: Array, turns: Array, points: Array, grip: Array) -> Array:
+        """Tool poses (n, g, 7) of turns (n, g, 4) with the tip at points (n, g, 3) of the patch's frame.
+
+        In the tool's frame it is at (n, g, 3), or at (n, 1, 3).
+        """
+        patch = self._patch.pose[at][:, None]
         quaternion = np.broadcast_to(patch[..., 3:], (*points.shape[:-1], 4))
         place = patch[..., :3] + P.rotate(quaternion, points)
         return np.concatenate([place - P.rotate(turns, np.broadcast_to(grip, place.shape)), turns], axis=-1)
 
     def _move(self, ids: Array, at: Array, point: Array, height: Array, speed: float, lead: float = LEAD) -> None:
         """Towards points (n, 2) of the patch at heights (n,)."""
-        target = np.concatenate([point, height[:, None]], axis=1)
-        self.arm.go(ids, self._at(at, self._turn[ids, None], target[:, None])[:, 0], speed, lead)
+        target = np.concatenate([point, height[:, None]], axis=1)[:, None]
+        pose = self._at(at, self._turn[ids, None], target, self._grips(at)[:, None])[:, 0]
+        self.arm.go(ids, pose, speed, lead)
 
     def _seen(self, at: Array) -> Array:
         """(n, 3) [m] the tip in the patch's frame."""
@@ -146,11 +161,15 @@ class Wipe(PhasedSkill):
     def _choose(self, ids: Array, at: Array) -> None:
         self.arm.closed[ids] = True
         turns = turns_against(self._patch.quaternion[at], TURNS)
+        targets = self._corners(at, turns, self._grips(at)[:, None])
+        self._turn[ids] = turns[np.arange(len(ids)), self._choice.least_motion(self.arm, ids, targets)]
+
+    def _corners(self, at: Array, turns: Array, grip: Array) -> Array:
+        """Tool poses (n, g, 5, 7) of turns (n, g, 4) over a corner of the rectangle, and at each."""
         x, y = 0.5 * self._size[0], 0.5 * self._size[1]
         corners = [(-x, -y, self._clear), *((sx * x, sy * y, 0.0) for sx in (-1, 1) for sy in (-1, 1))]
-        shape = (len(ids), TURNS, 3)
-        targets = np.stack([self._at(at, turns, np.broadcast_to(np.array(c), shape)) for c in corners], axis=2)
-        self._turn[ids] = turns[np.arange(len(ids)), self._choice.least_motion(self.arm, ids, targets)]
+        shape = (*turns.shape[:2], 3)
+        return np.stack([self._at(at, turns, np.broadcast_to(np.array(c), shape), grip) for c in corners], axis=2)
 
     def _chosen(self, ids: Array, at: Array) -> Array:
         del at

@@ -9,12 +9,13 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.skills.base import OUTCOMES, Outcome
-from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
+from anysim.skills.phases import GO_ON, STAY, MovingSkill, Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.choice import Choice
 from anysim_skills.grasping.grasp import CLOSING_STEPS, ROOM, Metres, Offset, Speed, closed
+from anysim_skills.look_ahead import LookAhead
 from anysim_skills.object_shapes import ObjectShapes
 
 SIDES = 4
@@ -48,6 +49,7 @@ class GraspSide(PhasedSkill):
         self._shapes = ObjectShapes(env.scene, object)
         n = env.num_envs
         self._choice, self._turn, self._rest = Choice(n, SIDES * len(SLOPES)), np.zeros((n, 4)), np.zeros(n)
+        self._ahead = LookAhead(self.arm)
         super().__init__(env, [self.arm])
 
     def make_phases(self) -> Sequence[Phase]:
@@ -59,6 +61,9 @@ class GraspSide(PhasedSkill):
             Phase("close", self._close, self._closing, CLOSING_STEPS + 1),
             Phase("lift", self._raise, self._rising, self._late),
         )
+
+    def foresee(self, following: MovingSkill) -> None:
+        self._ahead.foresee(following)
 
     def start(self, env_ids: Array) -> None:
         super().start(env_ids)
@@ -94,7 +99,9 @@ class GraspSide(PhasedSkill):
         wide = (high - low)[:, [1, 0, 1, 0]] > self.arm.aperture - ROOM
         deep = np.concatenate([-low[:, :2], high[:, :2]], axis=1) > FINGER  # towards a hand that comes along +x, ...
         misfits = np.repeat(wide | deep, len(SLOPES), axis=1)
-        self._turn[ids] = turns[np.arange(len(ids)), self._choice.least_motion(self.arm, ids, targets, misfits)]
+        effort = self.arm.reach(ids, targets.reshape(len(ids), -1, 7))[1].reshape(targets.shape[:3]).max(axis=2)
+        effort = self._ahead.effort(ids, at, grasps, np.where(misfits, np.inf, effort))
+        self._turn[ids] = turns[np.arange(len(ids)), self._choice.choose(ids, effort)]
 
     def _chosen(self, ids: Array, at: Array) -> Array:
         absent = ~self._object.present[at]

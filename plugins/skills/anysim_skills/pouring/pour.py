@@ -102,8 +102,29 @@ class Pour(PhasedSkill):
 
     # ------------------------------------------------------------------ where the vessel is to be
 
+    def wanted(self, ids: Array, at: Array, grasps: Array) -> Array:
+        """Tool poses (n, g, c, m, 7) of all headings and lips away from the hand, the steepest first, in grasps."""
+        count, (n, g) = HEADINGS * LIPS, grasps.shape[:2]
+        headings, lips = (np.broadcast_to(options, (n, count)) for options in _options())
+        grip = P.compose(P.inverse(self._vessel.root.pose[at])[:, None], grasps)[:, :, None]
+        ways = np.zeros((n, g, count, STATIONS, 7))
+        for station, tilt in enumerate(self._tilts()[::-1]):
+            vessel = self._vessels(ids, at, headings, lips, np.full((n, count), tilt))[:, None]
+            ways[:, :, :, station] = P.compose(*np.broadcast_arrays(vessel, grip))
+        ways[self._over_hand(at, grasps[..., 3:])] = np.nan
+        return ways
+
+    def _tilts(self) -> Array:
+        return np.linspace(0.0, self._angle, STATIONS)
+
     def _tools(self, ids: Array, at: Array, heading: Array, lip: Array, tilt: Array) -> Array:
         """Tool poses (n, g, 7) that hold the vessel tilted (n, g) [rad] towards headings, a lip over the target."""
+        grip = P.compose(P.inverse(self._vessel.root.pose[at]), self.arm.tool.pose[at])[:, None]
+        vessel = self._vessels(ids, at, heading, lip, tilt)
+        return P.compose(vessel, np.broadcast_to(grip, vessel.shape))
+
+    def _vessels(self, ids: Array, at: Array, heading: Array, lip: Array, tilt: Array) -> Array:
+        """Where the vessel then is (n, g, 7)."""
         zero = np.zeros_like(tilt)
         level = np.stack([-np.sin(heading), np.cos(heading), zero], axis=-1)
         upright = P.from_axis_angle(np.broadcast_to([0.0, 0.0, 1.0], (*tilt.shape, 3)), heading - lip)
@@ -113,9 +134,7 @@ class Pour(PhasedSkill):
         way = np.stack([np.cos(heading), np.sin(heading), zero], axis=-1)
         place = self._target(ids, at)[:, None] - self._short * way - P.rotate(turn, at_lip)
         place[..., 2] += top * np.maximum(np.cos(tilt), 0.0)  # what hangs below the lip passes over the target too
-        grip = P.compose(P.inverse(self._vessel.root.pose[at]), self.arm.tool.pose[at])[:, None]
-        wanted = np.concatenate([place, turn], axis=-1)
-        return P.compose(wanted, np.broadcast_to(grip, wanted.shape))
+        return np.concatenate([place, turn], axis=-1)
 
     def _target(self, ids: Array, at: Array) -> Array:
         """(n, 3) [m] over the middle of `into`."""
@@ -135,23 +154,22 @@ class Pour(PhasedSkill):
         """The heading and lip that are reached with the least motion, away from the hand."""
         self.arm.take(ids, at, self._vessel.root)
         self._tilt[ids] = 0.0
-        heading = np.repeat(2 * np.pi / HEADINGS * np.arange(HEADINGS), LIPS)
-        lip = np.tile(2 * np.pi / LIPS * np.arange(LIPS), HEADINGS)
+        heading, lip = _options()
         n, g = len(ids), HEADINGS * LIPS
         headings, lips = np.broadcast_to(heading, (n, g)), np.broadcast_to(lip, (n, g))
-        tilts = np.linspace(0.0, self._angle, STATIONS)
-        targets = np.stack([self._tools(ids, at, headings, lips, np.full((n, g), tilt)) for tilt in tilts], axis=2)
+        targets = [self._tools(ids, at, headings, lips, np.full((n, g), tilt)) for tilt in self._tilts()]
+        targets = np.stack(targets, axis=2)
         effort = self.arm.reach(ids, targets.reshape(n, -1, 7))[1].reshape(n, g, STATIONS).max(axis=2)
-        effort[self._over_hand(at, lip)] = np.inf
+        effort[self._over_hand(at, self.arm.tool.quaternion[at][:, None])[:, 0]] = np.inf
         number = self._choice.choose(ids, effort)
         self._heading[ids], self._lip[ids] = heading[number], lip[number]
 
-    def _over_hand(self, at: Array, lip: Array) -> Array:
-        """(n, g) bool: a lip on the side of the hand."""
-        tool, vessel = self.arm.tool.quaternion[at], self._vessel.root.quaternion[at]
-        out = P.rotate(tool, np.broadcast_to(np.array([0.0, 0.0, -1.0]), (len(at), 3)))
-        seen = P.rotate_inverse(vessel, out)
-        return seen[:, :1] * np.cos(lip) + seen[:, 1:2] * np.sin(lip) > AT_HAND
+    def _over_hand(self, at: Array, tools: Array) -> Array:
+        """(n, g, c) bool of hands turned as (n, g, 4): options whose lip is on the side of the hand."""
+        out = P.rotate(tools, np.broadcast_to(np.array([0.0, 0.0, -1.0]), (*tools.shape[:2], 3)))
+        seen = P.rotate_inverse(np.broadcast_to(self._vessel.root.quaternion[at][:, None], tools.shape), out)
+        lip = _options()[1]
+        return seen[..., :1] * np.cos(lip) + seen[..., 1:2] * np.sin(lip) > AT_HAND
 
     def _chosen(self, ids: Array, at: Array) -> Array:
         empty = ~self._contents.present[at].any(axis=1)
@@ -187,6 +205,12 @@ class Pour(PhasedSkill):
 
     def succeeded(self, env_ids: Array, at: Array) -> Array:
         return np.where(self.poured(env_ids, at) >= self._amount, GO_ON, _LOST)
+
+
+def _options() -> tuple[Array, Array]:
+    """(c,) [rad] headings and lips that are tried."""
+    heading = np.repeat(2 * np.pi / HEADINGS * np.arange(HEADINGS), LIPS)
+    return heading, np.tile(2 * np.pi / LIPS * np.arange(LIPS), HEADINGS)
 
 
 _NO_IK, _ADVERSE = OUTCOMES.index(Outcome.NO_IK), OUTCOMES.index(Outcome.ADVERSE_STATE)
