@@ -281,16 +281,6 @@ def _loaded(source: str | Path | LoadedRun | Mapping[str, Any], overrides: Seque
     return replace(load(source.data, overrides=overrides), files=source.files) if overrides else source
 
 
-def _only_robot(loaded: LoadedRun) -> str:
-    names = list(loaded.spec.world.robots)
-    if len(names) != 1:
-        raise TaskError(
-            f"robot= replaces the only robot of a task, and this one has {listing(names)}; "
-            "say which: overrides=['world.robots.NAME.robot=…']"
-        )
-    return names[0]
-
-
 def make(
     source: str | Path | LoadedRun | Mapping[str, Any],
     *,
@@ -311,8 +301,9 @@ def make(
         engine: an installed engine by name; wins over the file, whose options are kept for the engine it names. Or what
             the key `engine` of a file holds, in its place: `{"name": "pybullet", "shards": 2}`.
         num_envs: parallel environments; wins over the file.
-        robot: another robot in the place of the task's own, by its name in the catalogue; it needs the channels and
-            tools that the task uses. A task with several robots takes `overrides` that say which.
+        robot: another robot in the place of the task's own, by its name in the catalogue: one of the task's
+            `alternates`, or another that has the channels and tools which the task uses. A task with several robots
+            that does not list it takes `overrides` that say which.
         seed: seeds the envs now; otherwise the first `reset(seed=...)` does.
         overrides: dotted overrides, as `-o` on the command line.
         base: the folder that relative asset paths are relative to; that of the file where there is one.
@@ -345,7 +336,7 @@ def make(
         seed = whole("seed", seed, TaskError)
     more = [*overrides, *([] if num_envs is None else [f"num_envs={num_envs}"])]
     loaded = _loaded(source, more)
-    others = [] if robot is None else [f"world.robots.{_only_robot(loaded)}.robot={json.dumps(robot)}"]
+    others = [] if robot is None else [f"robot={json.dumps(robot)}"]
     if engine is not None and loaded.spec.engine.name != engine:  # the options of a file are those of its own engine
         others.append(f"engine={_as_text(engine)}")
     if others:

@@ -8,10 +8,12 @@ from anysim_schemas.messages import listing, suggest
 from anysim_schemas.nodes import Fault, Node
 from anysim_schemas.shapes import Shapes
 
+_CHOICES = ("level", "levels", "robot", "alternates")
+
 
 def split(overrides: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Overrides of levels and of which of them it is, and the others, which are on top of what a level changes."""
-    about = [text for text in overrides if text.partition("=")[0].partition(".")[0].strip() in ("level", "levels")]
+    """Overrides that choose a level or a robot or say what it changes, and the others, which are on top of that."""
+    about = [text for text in overrides if text.partition("=")[0].partition(".")[0].strip() in _CHOICES]
     return about, [text for text in overrides if text not in about]
 
 

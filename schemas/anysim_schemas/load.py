@@ -7,6 +7,7 @@ from typing import Any, Generic, TypeVar, cast
 
 from pydantic import BaseModel, ValidationError
 
+from anysim_schemas.alternates import with_robot
 from anysim_schemas.entries import places
 from anysim_schemas.errors import SpecError, SpecIssue
 from anysim_schemas.faults import locate
@@ -125,7 +126,7 @@ def load(
         raise SpecError(in_order([*reader.fatal, *faults], order))
     about, others = split(overrides)
     root = with_level(override(reader.merged(nodes), about, shapes, faults), shapes, faults)
-    root = override(root, others, shapes, faults)
+    root = override(with_robot(root, shapes, faults), others, shapes, faults)
     refused = {fault.mark for fault in faults if fault.mark.line}  # what such a value is taken for says nothing new
     spec, invalid = _validated(model, root, resolver)
     if spec is None or faults or invalid:

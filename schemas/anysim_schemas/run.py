@@ -74,6 +74,16 @@ class RunSpec(Spec):
         default_factory=dict,
         description="levels of difficulty: what each changes, as a file that extends this one would",
     )
+    robot: str | None = Field(
+        default=None,
+        description="a robot of the catalogue in the place of the task's own; one of the `alternates`, or another that "
+        "has the channels and tools which the task uses",
+    )
+    alternates: dict[Name, dict[str, Any]] = Field(
+        default_factory=dict,
+        description="other robots that the task is for, by their names in the catalogue: what each changes, as a file "
+        "that extends this one would",
+    )
     seed: Integer = Field(default=0, ge=0, lt=2**64, description="seed of everything that is drawn")
     physics: PhysicsSpec = Field(default=PhysicsSpec(), description="time steps and gravity")
     world: WorldSpec = Field(default=WorldSpec(), description="what exists, where it goes and what looks at it")

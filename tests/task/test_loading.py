@@ -99,8 +99,8 @@ def test_a_file_without_a_task_is_named(tmp_path: Path) -> None:
 
 
 def test_another_robot_takes_the_place_of_the_only_one() -> None:
-    with pytest.raises(TaskError, match="this one has panda, partner; say which"):
-        anysim.make("handover", robot="ur5_gripper")
+    with pytest.raises(SpecError, match="this one has robot, partner; say which"):
+        anysim.make("bi_dex_lift", robot="ur5_gripper")
     with pytest.raises(SpecError, match=r"tabletop.yaml:\d+:\d+: .*'unitree_go1' has no channel 'arm'"):
         anysim.make("pick_cube", robot="unitree_go1")
     with pytest.raises(SpecError, match="did you mean 'ur5_gripper'"):

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from anysim.cli.options import AsJson, Engine, Overrides, Verbose
+from anysim.cli.options import AsJson, Engine, Overrides, Robot, Verbose, with_robot
 
 if TYPE_CHECKING:
     from anysim.model.world import World
@@ -42,6 +42,7 @@ def check(
     files: Annotated[list[str], typer.Argument(metavar="FILE…", help="YAML files, or installed tasks by name.")],
     engine: Engine = None,
     all_engines: Annotated[bool, typer.Option("--all-engines", help="Ask every installed engine.")] = False,
+    robot: Robot = None,
     override: Overrides = None,
     verbose: Verbose = False,
     json: AsJson = False,
@@ -53,11 +54,12 @@ def check(
 
     Examples:
       anysim check my_world.yaml
+      anysim check pick_cube --robot ur5_gripper
       anysim check pick_cube --all-engines --verbose
     """
     from anysim.cli.output import print_json
 
-    reports = {name: report_on(name, engine, all_engines, override or []) for name in files}
+    reports = {name: report_on(name, engine, all_engines, with_robot(override, robot)) for name in files}
     if json:
         print_json({name: _as_data(report) for name, report in reports.items()})
     else:
@@ -104,10 +106,10 @@ def _tell(name: str, report: Report, all_engines: bool, verbose: bool) -> None:
 
 
 def report_on(name: str, engine: str | None, all_engines: bool, overrides: list[str]) -> Report:
-    """Every fault of one file and of its levels, and what each engine that is asked says to it."""
-    report, levels = _report_on(name, engine, all_engines, overrides)
-    for level in levels:
-        faults = _report_on(name, engine, all_engines, [*overrides, f"level={level}"])[0].faults
+    """Every fault of one file, its levels and alternates, and what each engine that is asked says to it."""
+    report, choices = _report_on(name, engine, all_engines, overrides)
+    for choice in choices:
+        faults = _report_on(name, engine, all_engines, [*overrides, choice])[0].faults
         report = report._replace(faults=report.faults + [fault for fault in faults if fault not in report.faults])
     return report
 
@@ -115,7 +117,7 @@ def report_on(name: str, engine: str | None, all_engines: bool, overrides: list[
 def _report_on(
     name: str, engine: str | None, all_engines: bool, overrides: list[str]
 ) -> tuple[Report, tuple[str, ...]]:
-    """The report on a file as it is, and its levels where none of them is chosen."""
+    """The report on a file as it is, and overrides that choose its levels, and alternates, where none is chosen."""
     from anysim import registry
     from anysim.api import compile_world, dry_run, load, place_of, watched
     from anysim.engine.conditioning import doubts
@@ -144,8 +146,21 @@ def _report_on(
         return Report([*map(str, past), f"{name}: {error}"]), ()
     refused = [answer.refusal for answer in answers if answer.refusal]
     faults = [*map(str, past), *(refused if len(refused) == len(answers) else [])]
-    levels = tuple(loaded.spec.levels) if loaded.spec.level is None else ()
-    return Report(faults, () if past else answers, warnings, world), levels
+    spec = loaded.spec
+    choices = [f"level={level}" for level in spec.levels] if spec.level is None else []
+    choices += [] if spec.robot else [f"robot={robot}" for robot in spec.alternates if _is_here(robot)]
+    return Report(faults, () if past else answers, warnings, world), tuple(choices)
+
+
+def _is_here(robot: str) -> bool:
+    """Whether the files of an alternate are installed; what is no robot at all is to be told."""
+    from anysim.assets.catalogue import load_robot, missing_source
+    from anysim.errors import AnysimError
+
+    try:
+        return not missing_source(load_robot(robot))
+    except AnysimError:
+        return True
 
 
 def _too_little_for_success(task: "TaskSpec") -> Iterator[tuple[str, str]]:

@@ -103,6 +103,7 @@ def _tasks(ask_engines: bool, json: bool) -> None:
             expert = task.expert.skill if task.expert else "commands" if spec.collect and spec.collect.commands else ""
             row |= {"family": path.parent.parent.name, "horizon": task.horizon, "expert": expert}
             row |= {"robots": [one.robot for one in spec.world.robots.values()], "levels": list(spec.levels)}
+            row |= {"alternates": list(spec.alternates)}
             row |= {"what": task.description}
             if (picture := path.with_name("picture.jpg")).exists():
                 row["picture"] = os.path.relpath(picture)
@@ -113,7 +114,16 @@ def _tasks(ask_engines: bool, json: bool) -> None:
     if json:
         print_json(rows)
         return
-    columns = ("name", "family", "robots", "horizon", "levels", *(["engines"] if ask_engines else []), "expert")
+    columns = (
+        "name",
+        "family",
+        "robots",
+        "alternates",
+        "horizon",
+        "levels",
+        *(["engines"] if ask_engines else []),
+        "expert",
+    )
     told = [
         [", ".join(map(str, v)) if isinstance(v := row.get(c, ""), list) else v for c in (*columns, "from", "what")]
         for row in rows

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from json import dumps
 from typing import Annotated, Any
 
 import typer
@@ -30,8 +31,18 @@ Overrides = Annotated[
         "-o", "--override", metavar="KEY=VALUE", help="Override a value: `-o physics.dt=0.004`. May be repeated."
     ),
 ]
+Robot = Annotated[
+    str | None,
+    typer.Option(help="A robot in the place of the task's own: one of its alternates, or another of the catalogue."),
+]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say what is approximate, with each measured error.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document for machines.")]
+
+
+def with_robot(overrides: list[str] | None, robot: str | None) -> list[str]:
+    """The overrides of a command, and the robot that it names."""
+    return [*(overrides or ()), *([] if robot is None else [f"robot={dumps(robot)}"])]
+
 
 UNWRAPPED = "\b\n"
 """What a paragraph of help begins with to keep its lines."""

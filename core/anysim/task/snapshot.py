@@ -21,8 +21,8 @@ from anysim.errors import SnapshotError, listing
 from anysim.randomization.streams import Streams
 from anysim_schemas.run import RunSpec
 
-_ELSEWHERE = frozenset({"engine", "num_envs", "record"})
-"""Keys of a spec that do not say what an episode is; the engine has a stamp of its own."""
+_ELSEWHERE = frozenset({"engine", "num_envs", "record", "robot", "alternates"})
+"""Keys of a spec that do not say what an episode is; the engine has a stamp of its own, the robot is in the world."""
 
 
 @lru_cache(maxsize=16)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from anysim.cli.options import BROKE, AsJson, Engine, NumEnvs, Overrides, Seed, Verbose
+from anysim.cli.options import BROKE, AsJson, Engine, NumEnvs, Overrides, Robot, Seed, Verbose, with_robot
 
 if TYPE_CHECKING:
     from anysim.record.collector import EpisodeResult
@@ -44,6 +44,7 @@ def run(
         str | None, typer.Option("--bytes", metavar="SIZE", help="The same, once 500MB, 2GB… are kept.")
     ] = None,
     seed: Seed = None,
+    robot: Robot = None,
     override: Overrides = None,
     out: Annotated[
         Path | None,
@@ -68,6 +69,7 @@ def run(
 
     Examples:
       anysim run pick_cube --num-envs 16 --episodes 64 --seed 1
+      anysim run stack_cube --robot ur5_gripper
       anysim run pick_cube -o world.objects.cube.mass=0.3 --out runs/heavy
       anysim run pick_cube=3 push_cube=1 --num-envs 16 --hours 2 --bytes 20GB --out runs/mixed
     """
@@ -78,7 +80,7 @@ def run(
 
     if out is not None and (file := file_at(out)) is not None:
         raise no_directory("--out", file)
-    parts = mixture(tasks)
+    parts, overrides = mixture(tasks), with_robot(override, robot)
     limits = Limits(hours, None if max_bytes is None else parse_bytes(max_bytes))
     bounded = hours is not None or max_bytes is not None
     total = episodes if episodes is not None else UNBOUNDED if bounded else 1
@@ -87,7 +89,7 @@ def run(
         for part, count in zip(parts, shared_out(parts, total), strict=True):
             if count == 0:
                 continue
-            order = Order(part, engine, num_envs, seed, override or (), strict_observers, verbose, json)
+            order = Order(part, engine, num_envs, seed, overrides, strict_observers, verbose, json)
             own = out if out is None or len(parts) == 1 else out / Path(part.task).stem
             ends = bounded and episodes is None
             collections.append(_begin(stack, order, own, count, None if ends else count, limits))

@@ -25,7 +25,7 @@ def whole(title: str, lines: Iterator[str]) -> str:
 
 
 def _body(told: Mapping[str, Any], title: str) -> Iterator[str]:
-    level = f", level {told['level']}" if told["level"] else ""
+    level = "".join(f", {key} {told[key]}" for key in ("level", "robot") if told[key])
     yield f"<h1>{title}</h1><p>{told['num_episodes']} episodes of the split {escape(told['split'])}{escape(level)}.</p>"
     engines: Mapping[str, Any] = told["engines"]
     rows = [

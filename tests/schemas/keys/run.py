@@ -32,6 +32,10 @@ ROWS: dict[str, Row] = {
     "RunSpec.levels": row(
         "levels.fixed.world.objects.red.fixed=true", given=("levels.fixed.physics.dt=0.001", "level=fixed")
     ),
+    "RunSpec.robot": row("robot=z1", given="alternates.z1.world.robots.arm.robot=z1"),
+    "RunSpec.alternates": row(
+        "alternates.z1.world.objects.red.fixed=true", given=("alternates.z1.world.robots.arm.robot=z1", "robot=z1")
+    ),
     "RunSpec.physics": row("physics={dt: 0.001}"),
     "RunSpec.world": row("world.objects.red.fixed=true"),
     "RunSpec.task": row("task.horizon=2", seen="episode"),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from anysim.cli.options import AsJson, Overrides, Task
+from anysim.cli.options import AsJson, Overrides, Robot, Task, with_robot
 
 if TYPE_CHECKING:
     from anysim_evaluation.driver import Episode
@@ -49,6 +49,7 @@ def evaluate(
     ] = "validation",
     first: Annotated[int, typer.Option("--seed", "-s", min=0, help="The place in the split to begin at.")] = 0,
     level: Annotated[str | None, typer.Option(help="A level of difficulty that the task has.")] = None,
+    robot: Robot = None,
     num_envs: Annotated[
         int | None,
         typer.Option(
@@ -79,6 +80,7 @@ def evaluate(
     Examples:
       anysim evaluate pick_cube --engine all --episodes 100 --videos 2
       anysim evaluate pick_cube --policy expert:sigma=0.1 --level L2
+      anysim evaluate stack_cube --robot ur5_gripper
       anysim evaluate reach --policy my_policies:reach --split test
       anysim evaluate maniskill:PickCube-v1 --policy my_policies:pick
     """
@@ -90,15 +92,15 @@ def evaluate(
     from anysim_evaluation.page import page
     from anysim_evaluation.summary import agreements, summary
 
-    overrides = [*(override or ()), *([] if level is None else [f"level={level}"])]
+    overrides = [*with_robot(override, robot), *([] if level is None else [f"level={level}"])]
     seeds = episode_seeds(split, first, episodes)
     question = Question(task, policy, split, seeds, overrides, min(num_envs or MOST_ENVS, episodes), privileged)
-    said = [Path(task).stem, policy, *([level] if level else []), split]
+    said = [Path(task).stem, policy, *([level] if level else []), *([robot] if robot else []), split]
     folder = out or Path("runs") / "-".join(["evaluate", *map(_plain, said)])
     done: dict[str, dict[int, Episode]] = {}
     films: dict[str, list[str]] = {}
     if is_external(task):
-        given = {"--engine": engine, "--level": level, "--override": override, "--num-envs": num_envs}
+        given = {"--engine": engine, "--level": level, "--robot": robot, "--override": override, "--num-envs": num_envs}
         _refuse_for_external(task, {**given, "--privileged": privileged, "--videos": videos})
         done = _evaluate_external(question, folder, json)
     for name in [] if done else _engines(engine):
@@ -117,6 +119,7 @@ def evaluate(
         "task": task,
         "policy": policy,
         "level": level,
+        "robot": robot,
         "split": split,
         "num_episodes": episodes,
         "engines": {name: summary(list(found.values())) for name, found in done.items()},

@@ -23,6 +23,9 @@ class Close(AtHandle):
     def make_phases(self) -> Sequence[Phase]:
         return (*self.approach_phases(), Phase("push", self.take, self._push, 3 * self.late), *self.phases_away())
 
+    def excluded(self, grasps: Array) -> None:
+        """None: it pushes with what it touches."""
+
     def depth(self, ids: Array) -> Array:
         return np.full(len(ids), 0.02)  # the finger tips come close to the front
 

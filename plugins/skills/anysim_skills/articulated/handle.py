@@ -21,6 +21,7 @@ from anysim_skills.choice import Choice, motion_along
 from anysim_skills.grasping.bank_files import refuse_counts
 from anysim_skills.grasping.banked import BankedGrasps
 from anysim_skills.grasping.grasp import CLOSING_STEPS, ROOM, Speed, closed
+from anysim_skills.grasping.hand_room import has_room
 from anysim_skills.planning import LATENCY, Latency, PlannerName
 
 STATIONS = 5
@@ -28,6 +29,8 @@ STATIONS = 5
 CLEAR = 0.1
 """[m] the hand is before the handle when it comes, and after it has gone."""
 
+SHORT = 0.006
+"""[m] a hand that comes as near to where it is to be is there."""
 AWAY = 0.06
 """[m] that a grasp of a bank is to let the hand go back, once the part is where it is to be."""
 
@@ -87,6 +90,10 @@ class AtHandle(PhasedSkill):
         if bank is not None:
             self._bank = BankedGrasps(env, self.arm, self.part.owner, bank, living, pinned, self.part.body)
         n = env.num_envs
+        frame = env.engine.index.frame(self.handle.name)
+        grasps = bar_grasps(np.array([[*frame.position, *frame.quaternion]]), self.turns)[0]
+        self._cramped = ~has_room(self.arm, self.part.owner.entities[0], frame.body, grasps, SHORT)
+        """(G,) bool: something is in the way of the open hand, further than it may stop short."""
         self._choice = Choice(n, len(self.turns) if self._bank is None else self._bank.goal_count)
         self._turn = np.zeros((n, 4))
         """The chosen orientation in the handle's frame, where it is of no bank."""
@@ -136,9 +143,11 @@ class AtHandle(PhasedSkill):
         return np.zeros(len(ids))
 
     def excluded(self, grasps: Array) -> Array | None:
-        """(n, G) bool of tool poses (n, G, 7): those that are not to be chosen."""
-        del grasps
-        return None
+        """(n, G) bool of tool poses (n, G, 7): those that are not to be chosen.
+
+        Those which the open hand is kept from by what is around the handle, as long as there are others.
+        """
+        return None if self._cramped.all() else np.broadcast_to(self._cramped, grasps.shape[:2])
 
     def to_go(self, at: Array) -> Array:
         """(n,) [m, rad] that the part is to be moved."""
@@ -238,7 +247,7 @@ class AtHandle(PhasedSkill):
 
     def _reach_in(self, ids: Array, at: Array) -> Array:
         self.arm.go(ids, self.at_handle(ids, at, 0.0), self.speed / 2, 0.02)
-        there = self.arm.arrived(ids, at, 0.006, 0.06)
+        there = self.arm.arrived(ids, at, SHORT, 0.06)
         return np.where(there | ((self.steps[ids] >= 10) & self.arm.touching(ids, at)), GO_ON, STAY)
 
     def closing_phase(self) -> Phase:

@@ -17,6 +17,7 @@ from anysim_skills.choice import Choice
 from anysim_skills.grasping.bank_files import refuse_counts
 from anysim_skills.grasping.banked import BankedGrasps, BankFile, CountsFolder, Pinned, before
 from anysim_skills.grasping.candidates import DOWN, TOP_DOWN, across, from_above
+from anysim_skills.grasping.hand_room import beyond_tool
 from anysim_skills.look_ahead import LookAhead, TakesOver
 from anysim_skills.object_shapes import ObjectShapes
 from anysim_skills.planning import LATENCY, Latency, PlannerName
@@ -85,6 +86,8 @@ class Grasp(PhasedSkill):
         self._choice = Choice(n, TOP_DOWN if self._bank is None else self._bank.goal_count)
         self._rest = np.zeros(n)
         self._shapes = ObjectShapes(env.scene, object)
+        self._tips = beyond_tool(self.arm)
+        """[m] from the tool to the finger tips, which stay above what the object lies on."""
         super().__init__(env, [self.arm])
 
     def make_phases(self) -> Sequence[Phase]:
@@ -181,9 +184,9 @@ class Grasp(PhasedSkill):
         thing = self._object.root.pose[at]
         if self._bank is not None:
             return self._bank.position(ids, thing)
-        if not self._offset.any():
-            return thing[:, :3]
-        return thing[:, :3] + P.rotate(thing[:, 3:], np.broadcast_to(self._offset, (len(at), 3)))
+        place = thing[:, :3] + P.rotate(thing[:, 3:], np.broadcast_to(self._offset, (len(at), 3)))
+        lowest = thing[:, 2] - self._shapes.below(ids, thing) + self._tips
+        return np.concatenate([place[:, :2], np.maximum(place[:, 2], lowest)[:, None]], axis=1)
 
     def _grasp(self, ids: Array, at: Array) -> Array:
         return np.concatenate([self._place(ids, at), self.turn[ids]], axis=1)

@@ -12,6 +12,8 @@ from anysim.model.world import Entity, Geom, MeshShape, World
 from anysim.placement.clearance import TOUCH, ClearanceQuery
 from anysim_skills.arm import Arm
 
+_UPRIGHT = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+
 
 def hand_geoms(arm: Arm) -> Iterator[tuple[Geom, Array]]:
     """What collides of a hand as it begins, with the poses (7,) of its bodies in the tool's frame."""
@@ -25,17 +27,23 @@ def hand_geoms(arm: Arm) -> Iterator[tuple[Geom, Array]]:
             yield from ((world.geoms[i], to_tool) for i in world.body_geoms[number] if world.geoms[i].collides)
 
 
-def has_room(arm: Arm, entity: Entity, body: int, poses: Array) -> Array:
+def beyond_tool(arm: Arm) -> float:
+    """[m] how far fingers reach beyond the tool, along its z; 0 where nothing of the hand collides."""
+    parts = _parts(arm.env.engine.world, arm)
+    return max(0.0, float(_at(parts, _UPRIGHT).high[2])) if parts else 0.0
+
+
+def has_room(arm: Arm, entity: Entity, body: int, poses: Array, within: float = TOUCH) -> Array:
     """(G,) bool: at tool poses (G, 7) in the frame of a body of an entity the open hand is nowhere inside of that.
 
-    The entity's joints are where they begin.
+    Or no more than `within` [m]. The entity's joints are where they begin.
     """
     world = arm.env.engine.world
     hand, query = _parts(world, arm), ClearanceQuery(world)
     to_root = P.compose(P.inverse(world.initial_body_pose[entity.root]), world.initial_body_pose[body])
-    thing = Solid(world, entity).at(pose_of(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])))
+    thing = Solid(world, entity).at(pose_of(_UPRIGHT))
     tools = P.compose(np.broadcast_to(to_root, poses.shape), poses)
-    return np.array([query.gap(_at(hand, tool), thing, 0.0) > -TOUCH for tool in tools], dtype=bool)
+    return np.array([query.gap(_at(hand, tool), thing, 0.0) > -within for tool in tools], dtype=bool)
 
 
 def _parts(world: World, arm: Arm) -> list[tuple[Part, Array]]:
