@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from anysim.cli.options import BROKE, AsJson, Engine, NumEnvs, Overrides, Robot, Seed, Verbose, with_robot
+from anysim_collect.mixture import Balance
 
 if TYPE_CHECKING:
-    from anysim.record.collector import EpisodeResult
     from anysim.task.env import TaskEnv
+    from anysim_collect.endings import Ran
     from anysim_collect.mixture import Limits, Part
-    from anysim_collect.tally import Tally
     from anysim_collect.turns import Collection
 
 Tasks = Annotated[
@@ -43,6 +43,12 @@ def run(
     max_bytes: Annotated[
         str | None, typer.Option("--bytes", metavar="SIZE", help="The same, once 500MB, 2GB… are kept.")
     ] = None,
+    balance: Annotated[
+        Balance,
+        typer.Option(
+            help="What several tasks get by their weights: episodes; or kept segments, or CPU seconds, by stored costs."
+        ),
+    ] = Balance.EPISODES,
     seed: Seed = None,
     robot: Robot = None,
     override: Overrides = None,
@@ -72,8 +78,11 @@ def run(
       anysim run stack_cube --robot ur5_gripper
       anysim run pick_cube -o world.objects.cube.mass=0.3 --out runs/heavy
       anysim run pick_cube=3 push_cube=1 --num-envs 16 --hours 2 --bytes 20GB --out runs/mixed
+      anysim run pick_cube put_away --balance segments --num-envs 16 --episodes 64 --out runs/mixed
     """
     from anysim.record.commit import file_at, no_directory
+    from anysim_collect.balance import balanced
+    from anysim_collect.endings import tell, tell_mixture
     from anysim_collect.live import showing
     from anysim_collect.mixture import UNBOUNDED, Limits, mixture, parse_bytes, shared_out
     from anysim_collect.turns import collect
@@ -81,6 +90,11 @@ def run(
     if out is not None and (file := file_at(out)) is not None:
         raise no_directory("--out", file)
     parts, overrides = mixture(tasks), with_robot(override, robot)
+    if balance is not Balance.EPISODES:
+        parts = balanced(parts, [engine or _own_engine(part.task, overrides) for part in parts], balance)
+    if len(parts) > 1 and not json:
+        shares = ", ".join(f"{part.task} {part.share:.1%}" for part in parts)
+        typer.echo(f"shares of the episodes, to balance {balance}: {shares}")
     limits = Limits(hours, None if max_bytes is None else parse_bytes(max_bytes))
     bounded = hours is not None or max_bytes is not None
     total = episodes if episodes is not None else UNBOUNDED if bounded else 1
@@ -95,12 +109,13 @@ def run(
             collections.append(_begin(stack, order, own, count, None if ends else count, limits))
         with showing(collections, json) as show:
             collect(collections, show)
-        runs = [_end(one) for one in collections]
-    if not json:
-        for ran in runs:
-            _tell(ran)
+        runs = _end(collections, balance)
     if json:
         _print_json(runs)
+    else:
+        for ran in runs:
+            tell(ran)
+        tell_mixture(runs[0].mixture)
     if any(ran.tally.lost for ran in runs):
         raise typer.Exit(BROKE)
     if sum(ran.tally.successes for ran in runs) < min_success * sum(ran.tally.attempts for ran in runs):
@@ -108,36 +123,31 @@ def run(
 
 
 def report(
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="A run's directory, as of `anysim run --out`.")],
+    directory: Annotated[
+        Path,
+        typer.Argument(
+            metavar="DIR", help="A run's directory, or one that holds those of several tasks: as of `anysim run --out`."
+        ),
+    ],
     json: AsJson = False,
 ) -> None:
-    """Say what became of the episodes of a run: success by command, failures by type, retries, cost.
+    """Say what became of the episodes of a run: success by command, failures by type, retries, cost, shares of tasks.
 
     Examples:
       anysim report runs/heavy
+      anysim report runs/mixed
     """
-    from anysim.cli.output import print_json, print_table
-    from anysim_collect.report import PAGE_FILE, read_report
+    from anysim.cli.output import print_json
+    from anysim_collect.endings import tell_mixture, tell_report
+    from anysim_collect.report import read_reports
 
-    told = read_report(directory)
+    reports = read_reports(directory)
     if json:
-        print_json(told)
+        print_json(reports[directory] if directory in reports else {"runs": list(reports.values())})
         return
-    low, high = told["interval"]
-    typer.echo(
-        f"{told['task']} on {told['engine']}: {told['successes']} of {told['attempts']} ({low:.0%} to {high:.0%})"
-    )
-    print_table(
-        "By command",
-        ("command", "begun", "succeeded", "failures"),
-        [(c["command"], c["begun"], c["succeeded"], _counts(c["failures"])) for c in told["commands"]],
-    )
-    for title, counts in (("Failures", told["failures"]), ("Retries", told["ladder"])):
-        if counts:
-            print_table(title, ("type", "times"), list(counts.items()))
-    if told["planning"]:
-        print_table("Planning", ("", ""), [(name, f"{value:.3g}") for name, value in told["planning"].items()])
-    typer.echo(f"the page: {directory / PAGE_FILE}")
+    for place, told in reports.items():
+        tell_report(place, told)
+    tell_mixture(next(iter(reports.values())).get("mixture", {}))
 
 
 class Order(NamedTuple):
@@ -151,18 +161,6 @@ class Order(NamedTuple):
     strict_observers: bool
     verbose: bool
     json: bool
-
-
-class Ran(NamedTuple):
-    """A run that has ended. `stopped` is the limit that ended it, in words."""
-
-    directory: Path
-    results: "list[EpisodeResult]"
-    tally: "Tally"
-    steps: int
-    parts: dict[str, float]
-    stopped: str
-    page: Path
 
 
 def _begin(
@@ -196,11 +194,25 @@ def _begin(
     return made
 
 
-def _end(one: "Collection") -> Ran:
-    """Write the report of a collection that has ended."""
-    from anysim_collect.report import report_of, write_report
+def _end(collections: "Sequence[Collection]", balance: Balance) -> "list[Ran]":
+    """Write the reports of collections that have ended."""
+    from anysim_collect.endings import Ran
+    from anysim_collect.report import mixed, write_report
 
-    env, results = one.env, sorted(one.results, key=lambda r: (r.env, r.episode))
+    reports = [_report(one) for one in collections]
+    mixture = mixed(reports, [one.share for one in collections], balance)
+    ended: list[Ran] = []
+    for one, report in zip(collections, reports, strict=True):
+        page = write_report(one.out, report | {"mixture": mixture})
+        results, steps = sorted(one.results, key=lambda r: (r.env, r.episode)), one.collector.times.steps
+        ended.append(Ran(one.out, results, one.tally, steps, report["wall_s"], one.limits.reached(), page, mixture))
+    return ended
+
+
+def _report(one: "Collection") -> dict[str, Any]:
+    from anysim_collect.report import report_of
+
+    env = one.env
     what = {
         "task": env.name,
         "engine": env.engine.name,
@@ -208,9 +220,14 @@ def _end(one: "Collection") -> Ran:
         "num_envs": env.num_envs,
         "seed": one.seed,
     }
-    parts = one.collector.times.parts(one.wall)
-    page = write_report(one.out, report_of(what, one.tally, parts, one.cpu, one.planners))
-    return Ran(one.out, results, one.tally, one.collector.times.steps, parts, one.limits.reached(), page)
+    return report_of(what, one.tally, one.collector.times.parts(one.wall), one.cpu, one.planners)
+
+
+def _own_engine(task: str, overrides: Sequence[str]) -> str:
+    """The engine that a task's file names."""
+    from anysim.api import load
+
+    return load(task, overrides=overrides).spec.engine.name
 
 
 def _announce(
@@ -227,96 +244,9 @@ def _announce(
     typer.echo(f"trajectories: {directory}" + (f" (resuming: {present} are there already)" if present else ""))
 
 
-def _print_json(runs: Sequence[Ran]) -> None:
+def _print_json(runs: "Sequence[Ran]") -> None:
     from anysim.cli.output import print_json
+    from anysim_collect.endings import as_data
 
-    told = [_plain(ran) for ran in runs]
-    print_json(told[0] if len(told) == 1 else {"runs": told})
-
-
-def _plain(ran: Ran) -> dict[str, Any]:
-    results, tally = ran.results, ran.tally
-    episodes = [
-        {
-            "env": r.env,
-            "episode": r.episode,
-            "episode_seed": r.episode_seed,
-            "status": r.status,
-            "steps": r.steps,
-            "total_reward": r.total_reward,
-            "outcome": r.outcome,
-            "path": str(r.path) if r.path else None,
-            "resumed": r.resumed,
-            "reruns": r.reruns,
-            "lost": r.lost,
-            "fault": r.fault,
-        }
-        for r in results
-    ]
-    wall = sum(ran.parts.values())
-    speed = {"steps": ran.steps, "wall_s": wall, "steps_per_s": ran.steps / wall, "where_s": ran.parts}
-    counts = {"attempts": tally.attempts, "successes": tally.successes, "reruns": sum(r.reruns for r in results)}
-    counts |= {"lost": tally.lost, "faults": sum(bool(r.fault) for r in results)}
-    return {"out": str(ran.directory), **counts, "episodes": episodes, "speed": speed, "report": str(ran.page)}
-
-
-def _tell(ran: Ran) -> None:
-    from anysim.cli.output import print_table
-
-    results, tally, steps = ran.results, ran.tally, ran.steps
-    faults = [r for r in results if r.fault]
-    wall = sum(ran.parts.values())
-    if len(results) <= MOST_ROWS:
-        print_table(
-            "Episodes",
-            ("env", "episode", "status", "steps", "return", "attempts", "last phase"),
-            [_row(r) for r in results],
-        )
-    if tally.failures or len(tally.commands) > 1:
-        print_table(
-            "By command",
-            ("command", "begun", "succeeded", "failures"),
-            [(c["command"], c["begun"], c["succeeded"], _counts(c["failures"])) for c in tally.to_dict()["commands"]],
-        )
-    if steps:
-        print_table(
-            "Where the time went",
-            ("part", "seconds", "share"),
-            [(part, f"{seconds:.2f}", f"{seconds / wall:.1%}") for part, seconds in ran.parts.items()],
-        )
-        typer.echo(f"{steps:,} control steps in {wall:.1f} s: {steps / wall:,.0f} steps/s")
-    if reruns := sum(r.reruns for r in results):
-        typer.echo(f"{reruns} times an episode lost its worker process and was begun anew: no failures of the task")
-    if faults:
-        first = f"env {faults[0].env} episode {faults[0].episode}: {faults[0].fault}"
-        typer.echo(f"{len(faults)} of the attempts ended in a fault of the simulation; the first: {first}", err=True)
-    if tally.lost:
-        typer.echo(f"error: {tally.lost} episodes lost every worker process they had, and were given up", err=True)
-    if ran.stopped:
-        typer.echo(f"ended at the limit of {ran.stopped}")
-    total = tally.attempts
-    rate = f"{tally.successes / total:.1%}" if total else "none"
-    typer.echo(
-        f"{tally.successes} of {total} attempts succeeded ({rate}); "
-        f"{tally.kept} trajectories in {ran.directory / 'episodes'}; the report: {ran.page}"
-    )
-
-
-MOST_ROWS = 200
-"""Episodes that are listed one by one; of more the report tells."""
-
-
-def _row(r: "EpisodeResult") -> tuple[Any, ...]:
-    return (
-        r.env,
-        r.episode,
-        r.status,
-        r.steps,
-        f"{r.total_reward:.2f}",
-        r.outcome.get("attempt"),
-        r.outcome.get("phase"),
-    )
-
-
-def _counts(counts: dict[str, int]) -> str:
-    return ", ".join(f"{count} {why}" for why, count in counts.items())
+    told = [as_data(ran) for ran in runs]
+    print_json(told[0] if len(told) == 1 else {"runs": told, "mixture": runs[0].mixture})

@@ -4,6 +4,7 @@ import re
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,6 +15,14 @@ UNBOUNDED = 1_000_000
 
 _UNITS = {"": 1, "k": 10**3, "M": 10**6, "G": 10**9, "T": 10**12}
 _BYTES = re.compile(r"(\d+(?:\.\d+)?) ?([kMGT]?)B?")
+
+
+class Balance(StrEnum):
+    """What the tasks of a mixture get by their weights: episodes, kept segments, or CPU seconds."""
+
+    EPISODES = "episodes"
+    SEGMENTS = "segments"
+    SECONDS = "seconds"
 
 
 class Part(NamedTuple):

@@ -5,6 +5,8 @@ from html import escape
 from importlib.resources import files
 from typing import Any
 
+from anysim_collect.report import MIXTURE_COLUMNS, mixture_rows
+
 WIDTH, HEIGHT = 240, 14
 """[px] of a bar."""
 
@@ -57,6 +59,7 @@ def _body(report: Mapping[str, Any], title: str) -> Iterator[str]:
     total = sum(report["wall_s"].values()) or 1.0
     parts = [(name, f"{s:.2f}", _share(s / total)) for name, s in report["wall_s"].items()]
     yield from _table("Where the time went", ("part", "seconds", ""), parts)
+    yield from _table("Mixture", MIXTURE_COLUMNS, mixture_rows(report["mixture"]))
     yield from _table("Planning", ("", ""), [(name, f"{value:g}") for name, value in report["planning"].items()])
 
 

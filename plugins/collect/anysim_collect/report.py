@@ -1,7 +1,7 @@
 """Reports: `report.json` and `report.html` in the directory of a run, whole or not at all."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +37,44 @@ def report_of(
         "cpu_s_per_kept": cpu_s / fresh if fresh > 0 else None,
         "wall_s": parts,
         "planning": planning,
+        "mixture": {},
     }
+
+
+def mixed(reports: Sequence[dict[str, Any]], shares: Sequence[float], balance: str) -> dict[str, Any]:
+    """What each of several tasks was to have, its share of the episodes, and what it got; empty for one task.
+
+    Args:
+        reports: one for each task.
+        shares: of the episodes, for each.
+        balance: what the shares are to balance.
+    """
+    if len(reports) == 1:
+        return {}
+    tasks = [
+        {"task": report["task"], "engine": report["engine"], "share": share}
+        | {key: report[key] for key in ("attempts", "kept", "segments")}
+        | {"cpu_s": report["cpu_s"] + report["planning"].get("CPU [s]", 0.0)}
+        for report, share in zip(reports, shares, strict=True)
+    ]
+    return {"balance": balance, "tasks": tasks}
+
+
+MIXTURE_COLUMNS = ("task", "share", "episodes", "trajectories", "segments", "CPU s")
+
+
+def mixture_rows(mixture: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    """A row for each task, with the shares of all in brackets."""
+    tasks = mixture.get("tasks", ())
+    totals = {key: sum(one[key] for one in tasks) or 1 for key in ("attempts", "kept", "segments", "cpu_s")}
+    return [
+        (
+            one["task"],
+            f"{one['share']:.1%}",
+            *(f"{one[key]:,.4g} ({one[key] / total:.1%})" for key, total in totals.items()),
+        )
+        for one in tasks
+    ]
 
 
 def planned(planners: Sequence[PlannerService]) -> dict[str, float]:
@@ -67,6 +104,16 @@ def write_report(out: Path, report: dict[str, Any]) -> Path:
     text = json.dumps(report, indent=2, sort_keys=True) + "\n"
     write_whole(out, {REPORT_FILE: text, PAGE_FILE: page(report)})
     return out / PAGE_FILE
+
+
+def read_reports(out: Path) -> dict[Path, dict[str, Any]]:
+    """The report of a run, or those of the tasks of a mixture, by directory.
+
+    Raises:
+        RecordError: there is none, or it is none of ours.
+    """
+    below = sorted(path.parent for path in out.glob(f"*/{REPORT_FILE}"))
+    return {place: read_report(place) for place in ([out] if (out / REPORT_FILE).exists() else below or [out])}
 
 
 def read_report(out: Path) -> dict[str, Any]:

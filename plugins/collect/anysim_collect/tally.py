@@ -27,6 +27,7 @@ class Tally:
     Attributes:
         attempts: episodes that were run to their ends; those that lost every worker are in `lost` alone.
         kept: trajectories on the disk; `resumed` of them were there before.
+        segments: in those that are kept; an expert's episode is one.
         failures: by type.
         ladder: rungs that were climbed, by what had failed: `no_ik -> candidate`.
         commands: by number and name, in order.
@@ -35,6 +36,7 @@ class Tally:
     attempts: int = 0
     successes: int = 0
     kept: int = 0
+    segments: int = 0
     kept_bytes: int = 0
     resumed: int = 0
     lost: int = 0
@@ -51,7 +53,9 @@ class Tally:
             return
         self.attempts += 1
         self.successes += result.success
-        self.kept += result.path is not None
+        if result.path is not None:
+            self.kept += 1
+            self.segments += len(result.outcome.get("segments", ())) if "command" in result.outcome else 1
         self.kept_bytes += size
         self.resumed += result.resumed
         self.faults += bool(result.fault)
@@ -89,6 +93,7 @@ class Tally:
             "successes": self.successes,
             "interval": list(wilson(self.successes, self.attempts)),
             "kept": self.kept,
+            "segments": self.segments,
             "kept_bytes": self.kept_bytes,
             "resumed": self.resumed,
             "lost": self.lost,

@@ -96,6 +96,7 @@ def counted() -> Tally:
 def test_a_tally_tells_commands_and_failures_apart() -> None:
     told = counted().to_dict()
     assert (told["attempts"], told["successes"], told["kept"], told["kept_bytes"]) == (3, 1, 1, 500)
+    assert told["segments"] == 2, "those of the trajectory that is kept"
     assert told["failures"] == {"no_ik": 1, "truncated": 1}
     assert told["ladder"] == {"no_ik -> candidate": 1, "no_ik -> give up": 1}
     first, second = told["commands"]
@@ -110,7 +111,7 @@ def test_an_expert_is_one_command_and_a_lost_episode_is_no_attempt() -> None:
     tally.add(result(skill="pick", phase="bring: carry", outcome="ok"))
     tally.add(EpisodeResult(0, 1, 1, "failed", 0, 0.0, {}, lost=True))
     told = tally.to_dict()
-    assert (told["attempts"], told["lost"]) == (1, 1)
+    assert (told["attempts"], told["lost"], told["segments"]) == (1, 1, 1)
     assert [(c["command"], c["begun"]) for c in told["commands"]] == [("pick", 1)]
 
 
