@@ -57,8 +57,8 @@ class Distances(NamedTuple):
 class SceneGeometry:
     """The geoms of a World that collide, or those that are visible, as tables for compiled kernels.
 
-    The first one of a process compiles the kernels or reads them from numba's cache. It may be used from several
-    threads; the kernels run without the interpreter lock.
+    A kernel is compiled by its first call, or read from numba's cache. It may be used from several threads; kernels run
+    without the interpreter lock.
 
     Attributes:
         geoms: the tables, see `anysim_sensors.tables.Geoms`; one row a geom.

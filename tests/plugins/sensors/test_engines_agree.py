@@ -56,8 +56,31 @@ def test_no_ray_of_five_thousand_is_a_millimetre_off_mujocos(seed: int, count: i
     assert same[met].mean() > 0.999
 
 
+def test_where_mujocos_rays_meet_other_things_than_ours() -> None:
+    """A plane ends there where it is no longer drawn; a field has a base there, with sides, and is a sheet here."""
+    require_engine("mujoco")
+    origins = np.array([[0.0, 0.0, 1.0], [0.3, 0.2, -2.0], [3.0, 0.1, -0.32]])
+    directions = np.array([[20.0, 0.0, -1.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])
+    hills = ground.hills(as_mesh=False)
+    for world, row in ((worlds.crowd(np.random.default_rng(0), 0), 0), (hills, 1), (hills, 2)):
+        ray = origins[[row]], directions[[row]]
+        scene = SceneGeometry(world)
+        with create_simulation("mujoco") as engine:
+            engine.create_world(world)
+            theirs = engine.raycast(*(v[None] for v in ray)).distance[0, 0]
+            ours = scene.rays(scene.posed(engine.get_state().body_pose), HERE[None], *ray).distance[0, 0]
+        if row == 0:
+            assert np.isinf(theirs)
+            assert ours == pytest.approx(np.hypot(20.0, 1.0))
+        elif row == 1:
+            assert ours == pytest.approx(2.0 + world.ground.heights_at(origins[1]))
+            assert theirs < ours - 0.05  # the base
+        else:
+            assert theirs == pytest.approx(1.0, abs=1e-6)  # a side, below the field's lowest height
+            assert np.isinf(ours)
+
+
 def test_a_height_field_is_met_as_by_mujoco_from_above() -> None:
-    """From below MuJoCo meets the base that it puts under a field; here it is met from below."""
     require_engine("mujoco")
     world = ground.hills(as_mesh=False)
     rng = np.random.default_rng(1)

@@ -365,6 +365,7 @@ def fill(
             begin = int(max(math.floor((b - q) / cell + rows / 2), 0.0))
             end = int(min(math.ceil((b + q) / cell + rows / 2), float(rows)))
             frame, kind = posed.frame[e, g], geoms.kind[g]
+            root = triangles.root[geoms.mesh[g]] if kind > CYLINDER else 0
             for i in range(begin, end):
                 for j in range(first, last):
                     if solid[e, i, j]:
@@ -372,15 +373,21 @@ def fill(
                     a, b = (j + 0.5 - columns / 2) * cell, (i + 0.5 - rows / 2) * cell
                     x = frames[e, 0] + cos * a - sin * b - frame[9]
                     y = frames[e, 1] + sin * a + cos * b - frame[10]
-                    height = bottom
+                    height, outside = bottom, False
                     while height <= top:
                         z = frames[e, 2] + height - frame[11]
                         u = frame[0] * x + frame[3] * y + frame[6] * z
                         v = frame[1] * x + frame[4] * y + frame[7] * z
                         w = frame[2] * x + frame[5] * y + frame[8] * z
                         if kind > CYLINDER:
-                            root = triangles.root[geoms.mesh[g]]
-                            away, _, _, _ = meshed(triangles, root, u, v, w, np.inf, stack, near)
+                            # once outside, it need not be known how far away what is far away is
+                            gap = 0.0 if geoms.sheet[g] else math.sqrt(_node(triangles.box, root, u, v, w))
+                            limit = 4 * cell if outside else np.inf
+                            away = gap
+                            if gap <= near_enough:
+                                away, _, _, _ = meshed(triangles, root, u, v, w, limit, stack, near)
+                                away = min(away, limit)
+                            outside = True
                         else:
                             away, _, _, _ = convex(kind, geoms.size[g, 0], geoms.size[g, 1], geoms.size[g, 2], u, v, w)
                         if away <= near_enough:
