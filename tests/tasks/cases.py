@@ -360,6 +360,14 @@ CASES: dict[str, Case] = {
         _towards("cube", lambda env: offset(seen(env, "pad"), z=0.019)),
         [_shifted("cube", x=0.05), _shifted("cube", z=0.01), _moving("cube")],
     ),
+    "pick_place_wall": Case(
+        _towards("cube", lambda env: offset(seen(env, "pad"), z=0.019)),
+        [_shifted("cube", x=0.05), _shifted("cube", z=0.01), _moving("cube")],
+    ),
+    "place_mug": Case(
+        _towards("mug", lambda env: level(offset(seen(env, "coaster"), z=-0.001), seen(env, "mug"))),
+        [_shifted("mug", x=0.05), _shifted("mug", z=0.01), _tilted("mug", 0.15), _moving("mug")],
+    ),
     "stack_cube": Case(
         _towards("cube", lambda env: offset(seen(env, "base"), z=0.04)),
         [_shifted("cube", x=0.04), _shifted("cube", z=0.01), _moving("cube")],

@@ -11,6 +11,8 @@ from tests.tasks.states import blind, blinding
 TASKS = [
     "reach",
     "place_on_pad",
+    "pick_place_wall",
+    "place_mug",
     "stack_cube",
     "push_cube",
     "open_drawer",

@@ -1,0 +1,1 @@
+"""Carry a cube from one side of a wall to a pad on the other."""
