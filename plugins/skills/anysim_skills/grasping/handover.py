@@ -10,7 +10,7 @@ from anysim.skills.sequence import SkillSequence
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.grasping.bring import Bring
-from anysim_skills.grasping.grasp import Grasp, Metres, Offset, Speed
+from anysim_skills.grasping.grasp import Force, Grasp, Metres, Offset, Speed
 from anysim_skills.grasping.release import Release
 
 
@@ -32,13 +32,17 @@ class Handover(SkillSequence):
         hover: Metres = 0.12,
         retreat: Metres = 0.15,
         speed: Speed = 0.3,
+        force: Force = None,
         max_attempts: Annotated[int, Field(ge=1)] = 3,
     ) -> None:
         both = {"object": object, "tool": tool, "solver": solver}
+        close = {"force": force, "hover": hover, "speed": speed}
         hold_out = Bring(env, **both, robot=robot, goal=meeting, speed=speed)
-        self._take = Grasp(env, **both, robot=receiver, offset=take, hover=hover, lift=0.0, speed=speed)
+        self._take = Grasp(env, **both, **close, robot=receiver, offset=take, lift=0.0)
         members = {
-            "grasp": Grasp(env, hold_out, **both, robot=robot, offset=give, hover=hover, lift=0.05, speed=speed),
+            "grasp": Grasp(
+                env, hold_out, **both, robot=robot, force=force, offset=give, hover=hover, lift=0.05, speed=speed
+            ),
             "hold out": hold_out,
             "take": self._take,
             "let go": Release(env, robot=robot, tool=tool, solver=solver, retreat=retreat),
