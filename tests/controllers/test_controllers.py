@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from anysim.controllers.base import ChannelView
-from anysim.controllers.gripper import GripperBinary, GripperContinuous
+from anysim.controllers.gripper import GripperBinary, GripperContinuous, GripperForce
 from anysim.controllers.joint import JointDeltaPosition, JointPosition
 from anysim.controllers.robot import ControlledRobot
 from anysim.errors import TaskError
@@ -83,6 +83,38 @@ def test_gripper_binary() -> None:
     assert np.allclose(controller.action_for(np.array([[0.04], [-0.01]]), np.array([0, 1])), [[1.0], [-1.0]])
     with pytest.raises(TaskError, match="no `opened` and `closed` targets"):
         GripperBinary(ARM, 1)
+
+
+def test_a_gripper_presses_with_the_share_of_its_force_and_closes_as_fast_with_any() -> None:
+    """5 N of 20: the target is 5 N / kp beyond the finger; while it moves, its damping is added, up to the limit."""
+    place, speed = np.array([[0.03]]), np.array([[0.0]])
+    robot = SimpleNamespace(name="r", dt=0.002, control_dt=0.02, joint_pos=lambda _: place, joint_vel=lambda _: speed)
+    hand = replace(
+        HAND,
+        robot=cast(ControlledRobot, robot),
+        kp=np.array([1e3]),
+        kd=np.array([300.0]),
+        effort_limit=np.array([20.0]),
+    )
+    controller, ids, little = GripperForce(hand, 1), np.array([0]), np.array([[-0.25]])
+    controller.reset(ids, place)
+    assert (controller.period, controller.low, controller.high) == (0.002, -1.0, 1.0)
+    assert np.allclose(controller.apply(little, ids).position, 0.03 - 0.005)
+    speed[:] = -0.02
+    assert np.allclose(controller.update(ids).position, 0.03 - 0.005), "it has not moved on: chatter"
+    place = place - 0.0004
+    assert np.allclose(controller.apply(little, ids).position, 0.0296 - 0.005 - 0.006)
+    speed[:] = 0.0
+    assert np.allclose(controller.update(ids).position, 0.0296 - 0.005), "it has touched"
+    place, speed[:] = place - 0.004, -0.2
+    assert np.allclose(controller.apply(little, ids).position, 0.0256 - 0.02), "never more than the limit"
+    assert np.allclose(controller.apply(np.array([[-1.0]]), ids).position, -0.01), "all of it: as gripper_binary"
+    kept = controller.snapshot(ids)
+    assert np.allclose(controller.apply(np.array([[0.0]]), ids).position, 0.04)
+    controller.restore(ids, kept)
+    assert np.allclose(controller.update(ids).position, -0.01)
+    with pytest.raises(TaskError, match="no effort limit of which gripper_force takes a share"):
+        GripperForce(HAND, 1)
 
 
 def test_a_continuous_gripper_opens_as_far_as_it_is_told_and_closes_beyond_contact() -> None:

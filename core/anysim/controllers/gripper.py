@@ -33,6 +33,56 @@ class GripperBinary(Controller):
         return np.where(nearer_open, 1.0, -1.0)[:, None]
 
 
+class GripperForce(GripperBinary):
+    """One number opens (>= 0) or closes (< 0) the gripper, which then presses with that share of its effort limit.
+
+    The target is as far beyond the fingers as makes their drives press so hard (kp), and further by what their damping
+    takes, so that they close as fast with a little force as with all of it. That holds for as long as they move on: as
+    they have in the control step before, and do in this physics step. So it ends at contact, and none comes of chatter.
+    """
+
+    def __init__(self, channel: ChannelView, num_envs: int) -> None:
+        super().__init__(channel, num_envs)
+        if not (channel.kp > 0).all() or not np.isfinite(channel.effort_limit).all():
+            raise TaskError(
+                f"the drives of '{channel.name}' have no stiffness, or no effort limit of which gripper_force takes a "
+                "share; give them `kp` and `effort_limit` in the robot's entry, or use gripper_binary"
+            )
+        self.period = channel.robot.dt
+        self._way = np.sign(self._closed - self._opened)
+        self._action = np.zeros((num_envs, 1))
+        self._place, self._speed = np.zeros((2, num_envs, len(channel)))
+        """(N, K) where the joints were at the last action, and how fast they had closed since the one before."""
+
+    def reset(self, env_ids: Array, targets: Array) -> None:
+        del targets
+        self._action[env_ids], self._speed[env_ids] = 0.0, 0.0
+        self._place[env_ids] = self.channel.joint_pos(env_ids)
+
+    def apply(self, action: Array, env_ids: Array | None) -> Command:
+        rows, here = slice(None) if env_ids is None else env_ids, self.channel.joint_pos(env_ids)
+        self._action[rows] = action
+        self._speed[rows] = (here - self._place[rows]) * self._way / self.channel.robot.control_dt
+        self._place[rows] = here
+        return self.update(env_ids)
+
+    def update(self, env_ids: Array | None) -> Command:
+        channel, rows = self.channel, slice(None) if env_ids is None else env_ids
+        action, now = self._action[rows], channel.joint_vel(env_ids) * self._way
+        force = np.minimum(np.maximum(-action, 0.0), 1.0) * channel.effort_limit
+        damped = channel.kd * np.maximum(np.minimum(self._speed[rows], now), 0.0)
+        beyond = np.minimum(force + damped, channel.effort_limit) / channel.kp
+        pressing = np.where(action > -1.0, channel.joint_pos(env_ids) + self._way * beyond, self._closed)
+        return Command(position=np.where(action >= 0, self._opened, pressing))
+
+    def snapshot(self, env_ids: Array) -> dict[str, Array]:
+        return {"action": self._action[env_ids], "place": self._place[env_ids], "speed": self._speed[env_ids]}
+
+    def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
+        self._action[env_ids] = data["action"]
+        self._place[env_ids], self._speed[env_ids] = data["place"], data["speed"]
+
+
 class GripperContinuous(Controller):
     """One number says how far the gripper is open; the lowest one closes it with all its force.
 

@@ -11,8 +11,9 @@ from typing import Self
 
 import numpy as np
 
+from anysim.controllers.gripper import GripperForce
 from anysim.conventions import Array
-from anysim.errors import TaskError, listing
+from anysim.errors import SpecError, SpecIssue, TaskError, listing
 from anysim.math import pose as P
 from anysim.model.world import JointType
 from anysim.planning.api import inverse_kinematics
@@ -60,6 +61,7 @@ class Arm(Mover):
         speed: (N,) [m/s] of the commanded tool.
         lead: (N,) [m] bound of the distance from the tool to its command.
         closed: (N,) bool, whether the gripper is told to close.
+        press: (N,) with which share of its force it then presses; all of it again once it has opened.
         command: (N, 7) where the tool is told to be now.
         joints: (N, K) what the joints are told.
         grip: (N, 3) [m] where what is held was in the tool's frame when it was taken.
@@ -84,6 +86,7 @@ class Arm(Mover):
         n = env.num_envs
         self.target, self.command = np.zeros((n, 7)), np.zeros((n, 7))
         self.speed, self.lead = np.zeros(n), np.full(n, LEAD)
+        self.press = np.ones(n)
         self.closed, self.stuck = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
         self.grip = np.zeros((n, 3))
         self.joints = np.zeros((n, len(self.chain)))
@@ -268,6 +271,29 @@ class Arm(Mover):
             channels = listing(list(self.robot.model.channels))
             raise TaskError(f"'{self.robot.name}' has no gripper to grasp with, a channel `eef` (channels: {channels})")
 
+    def share_of(self, force: float | None) -> float:
+        """The share of the gripper's force with which each finger presses by so much [N]; None: all of it.
+
+        Raises:
+            SpecError: at `force`, why the gripper cannot be told to press so hard.
+        """
+        if force is None:
+            return 1.0
+        self.check_gripper()
+        assert self._eef is not None
+        channel, controller = f"{self.robot.name}.{self._eef.channel}", self._eef.controller
+        limit = controller.channel.effort_limit
+        if not isinstance(controller, GripperForce):
+            key = f"world.robots.{self.robot.name}.actions.{self._eef.channel}"
+            words = f"'{channel}' always closes with all its force; say `gripper_force` at {key}, or leave `force` out"
+        elif not np.isfinite(self.aperture) or np.ptp(limit) > 0:
+            words = f"the fingers of '{channel}' turn, or are not alike: what they press with is not known"
+        elif force > limit[0]:
+            words = f"a finger of '{channel}' presses with at most {limit[0]:g} N, {force:g} N are asked for"
+        else:
+            return force / float(limit[0])
+        raise SpecError([SpecIssue("", "force", words)])
+
     def finger_speed(self, ids: Array) -> Array:
         """(n,) [rad/s, m/s] of the fastest joint of the gripper."""
         return np.abs(self.env.scene.state.joint_vel[np.ix_(ids, self._fingers)]).max(axis=1, initial=0.0)
@@ -317,7 +343,8 @@ class Arm(Mover):
             self._straight(ids[~led], self.tool.position[~led])
         self._columns.write(ids, self.joints[ids], action)
         if self._eef is not None:
-            action[ids, self._eef.start : self._eef.stop] = np.where(self.closed[ids], -1.0, 1.0)[:, None]
+            self.press[ids[~self.closed[ids]]] = 1.0
+            action[ids, self._eef.start : self._eef.stop] = np.where(self.closed[ids], -self.press[ids], 1.0)[:, None]
 
     def _follow(self, ids: Array, plans: PlannedMoves, place: int) -> None:
         """The joints are told by a plan: commands follow them."""

@@ -58,6 +58,8 @@ class AtHandle(PhasedSkill):
     """[m] the bar's middle in the tool's frame."""
     onto: ClassVar[tuple[float, float, float]] = (0.0, 0.0, 1.0)
     """The direction in the tool's frame in which the hand comes to the bar."""
+    force: float | None = None
+    """[N] with which each finger presses; None: all that the gripper has."""
     closing_steps: ClassVar[int] = CLOSING_STEPS
     """Control steps after which fingers count as closed."""
 
@@ -81,6 +83,7 @@ class AtHandle(PhasedSkill):
     ) -> None:
         """`bank`, `living` and `pinned` are of skills that close on the handle."""
         self.arm = Arm.of(env, robot, tool=tool, solver=solver, planner=planner, latency=latency)
+        self._press = self.arm.share_of(self.force)
         self._plans = bool(planner)
         self.part = Part(env.scene, part)
         self.handle = self.part.handle()
@@ -259,7 +262,7 @@ class AtHandle(PhasedSkill):
         del at
         if self._bank is not None:
             self._bank.closed(ids)
-        self.arm.closed[ids] = True
+        self.arm.closed[ids], self.arm.press[ids] = True, self._press
         self.arm.stay(ids)
 
     def closing(self, ids: Array, at: Array) -> Array:

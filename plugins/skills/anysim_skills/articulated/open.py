@@ -10,6 +10,7 @@ from anysim.skills.phases import GO_ON, STAY, Phase
 from anysim.task.env import TaskEnv
 from anysim_skills.articulated.handle import AtHandle, Share
 from anysim_skills.grasping.banked import BankFile, CountsFolder, Pinned
+from anysim_skills.grasping.grasp import Force
 
 SLIP = 0.04
 """[m] a hand that is further than this from where it took hold of the part has lost it."""
@@ -51,10 +52,12 @@ class Open(Pulls):
         bank: BankFile = None,
         living: CountsFolder = None,
         pinned: Pinned = "",
+        force: Force = None,
         **options: object,
     ) -> None:
         self._fraction = fraction
         self.share = min(1.0, fraction + OVERSHOOT)
+        self.force = force
         super().__init__(env, bank, living, pinned, **options)  # pyright: ignore[reportArgumentType]
 
 

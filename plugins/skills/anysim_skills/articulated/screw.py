@@ -17,6 +17,7 @@ from anysim.task.joints import RangedJointView
 from anysim_skills.arm import TURN_RATE
 from anysim_skills.articulated.handle import AtHandle, Share
 from anysim_skills.choice import turns_against
+from anysim_skills.grasping.grasp import Force
 
 AHEAD = 0.3
 """[rad] the hand is told to be at most this far ahead of the part: what bounds the torque."""
@@ -48,13 +49,14 @@ class Screw(AtHandle):
         fraction: Share = 0.97,
         stroke: Annotated[float, Field(gt=0, le=np.pi, description="[rad] of the part with one grasp")] = 2.3,
         part_speed: Annotated[float, Field(gt=0, description="[rad/s] of the part")] = 1.2,
+        force: Force = None,
         **options: object,
     ) -> None:
         if part.found[0].type is not JointType.REVOLUTE:
             raise TaskError(
                 f"'{part.name}' does not turn, it is a {part.found[0].type.value} joint; `open` moves a slide"
             )
-        self.share, self._stroke = fraction, stroke
+        self.share, self._stroke, self.force = fraction, stroke, force
         self._goal, self._way = np.zeros((2, env.num_envs))
         """[rad] where the part is to be at the end of the stroke, and the sign of the turn to there."""
         super().__init__(env, part=part, part_speed=part_speed, **options)  # pyright: ignore[reportArgumentType]

@@ -11,6 +11,7 @@ from anysim.skills.phases import GO_ON, Phase
 from anysim.task.env import TaskEnv
 from anysim_skills.articulated.handle import AtHandle
 from anysim_skills.grasping.banked import BankFile, CountsFolder, Pinned
+from anysim_skills.grasping.grasp import Force
 
 NEAR = 0.03
 """[m] a hand that is further from the handle than this has not got hold of it."""
@@ -26,8 +27,10 @@ class TakeHold(AtHandle):
         bank: BankFile = None,
         living: CountsFolder = None,
         pinned: Pinned = "",
+        force: Force = None,
         **options: object,
     ) -> None:
+        self.force = force
         super().__init__(env, bank, living, pinned, **options)  # pyright: ignore[reportArgumentType]
 
     def make_phases(self) -> Sequence[Phase]:

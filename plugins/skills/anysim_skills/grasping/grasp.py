@@ -34,6 +34,9 @@ CHOOSE, PLAN = 1, 2
 Offset = Annotated[
     tuple[float, float, float], Field(description="[m] from the object's origin to the grasp, in the object's frame")
 ]
+Force = Annotated[
+    float | None, Field(gt=0, description="[N] with which each finger presses; none: all that the gripper has")
+]
 Metres = Annotated[float, Field(gt=0, description="[m]")]
 Speed = Annotated[float, Field(gt=0, description="[m/s] of the tool")]
 
@@ -62,6 +65,7 @@ class Grasp(PhasedSkill):
         lift: Annotated[float, Field(ge=0, description="[m]; 0 leaves that to the next skill")] = 0.1,
         speed: Speed = 0.4,
         descend_speed: Speed = 0.2,
+        force: Force = None,
         phase_steps: Annotated[int, Field(ge=1, description="control steps that a move may take")] = 150,
         planner: PlannerName = "",
         latency: Latency = LATENCY,
@@ -72,6 +76,7 @@ class Grasp(PhasedSkill):
         """`then` is what comes next: a candidate with which that cannot be done is not chosen."""
         self.arm = Arm.of(env, robot, tool=tool, solver=solver, planner=planner, latency=latency)
         self.arm.check_gripper()
+        self._press = self.arm.share_of(force)
         self._plans = bool(planner)
         self._object, self._ahead, self._lift = object, LookAhead(self.arm, then), lift
         self._speed, self._descend_speed, self._steps = speed, descend_speed, phase_steps
@@ -207,7 +212,7 @@ class Grasp(PhasedSkill):
         del at
         if self._bank is not None:
             self._bank.closed(ids)
-        self.arm.closed[ids] = True
+        self.arm.closed[ids], self.arm.press[ids] = True, self._press
         self.arm.go(ids, np.concatenate([self.arm.command[ids, :3], self.turn[ids]], axis=1), self._speed)
 
     def _closing(self, ids: Array, at: Array) -> Array:

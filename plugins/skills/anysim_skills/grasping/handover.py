@@ -11,7 +11,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.grasping.bring import Bring
-from anysim_skills.grasping.grasp import Grasp, Metres, Offset, Speed
+from anysim_skills.grasping.grasp import Force, Grasp, Metres, Offset, Speed
 from anysim_skills.grasping.hold_out import HoldOut
 from anysim_skills.grasping.release import Release
 from anysim_skills.planning import LATENCY, Latency, PlannerName
@@ -35,23 +35,23 @@ class Handover(SkillSequence):
         hover: Metres = 0.12,
         retreat: Metres = 0.15,
         speed: Speed = 0.3,
+        force: Force = None,
         max_attempts: Annotated[int, Field(ge=1)] = 3,
         planner: PlannerName = "",
         latency: Latency = LATENCY,
     ) -> None:
         """With a `planner` both arms go to the meeting at once, in one plan."""
         both = {"object": object, "tool": tool, "solver": solver}
+        close = {"force": force, "hover": hover, "speed": speed}
         plans = {"planner": planner, "latency": latency}
         if planner:
             taker = Arm.of(env, receiver, tool=tool, solver=solver)
             hold_out = HoldOut(env, taker, take, hover, **both, **plans, robot=robot, goal=meeting, speed=speed)
         else:
             hold_out = Bring(env, **both, robot=robot, goal=meeting, speed=speed)
-        self._take = Grasp(env, **both, robot=receiver, offset=take, hover=hover, lift=0.0, speed=speed)
+        self._take = Grasp(env, **both, **close, robot=receiver, offset=take, lift=0.0)
         members = {
-            "grasp": Grasp(
-                env, hold_out, **both, robot=robot, offset=give, hover=hover, lift=0.05, speed=speed, **plans
-            ),
+            "grasp": Grasp(env, hold_out, **both, **close, **plans, robot=robot, offset=give, lift=0.05),
             "hold out": hold_out,
             "take": self._take,
             "let go": Release(env, robot=robot, tool=tool, solver=solver, retreat=retreat),

@@ -12,7 +12,7 @@ from anysim.skills.phases import GO_ON, STAY, Phase
 from anysim.task.env import TaskEnv
 from anysim.task.scene import ObjectView, RobotView
 from anysim_skills.grasping.banked import BankFile, CountsFolder, Pinned
-from anysim_skills.grasping.grasp import Grasp, Metres, Offset, Speed
+from anysim_skills.grasping.grasp import Force, Grasp, Metres, Offset, Speed
 from anysim_skills.planning import LATENCY, Latency, PlannerName
 
 
@@ -32,6 +32,7 @@ class Lift(Grasp):
         offset: Offset = (0.0, 0.0, 0.0),
         hover: Metres = 0.1,
         speed: Speed = 0.4,
+        force: Force = None,
         planner: PlannerName = "",
         latency: Latency = LATENCY,
         bank: BankFile = None,
@@ -42,7 +43,7 @@ class Lift(Grasp):
         arm = {"robot": robot, "object": object, "tool": tool, "solver": solver, "speed": speed}
         arm |= {"planner": planner, "latency": latency}
         known = {"bank": bank, "living": living, "pinned": pinned}
-        super().__init__(env, **arm, **known, offset=offset, hover=hover, lift=height)
+        super().__init__(env, **arm, **known, force=force, offset=offset, hover=hover, lift=height)
 
     def make_phases(self) -> Sequence[Phase]:
         return (*super().make_phases(), Phase("hold", None, self._holding, self._hold + 1))

@@ -10,7 +10,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.grasping.banked import BankFile, CountsFolder, Pinned
 from anysim_skills.grasping.bring import Bring
-from anysim_skills.grasping.grasp import Grasp, Metres, Speed
+from anysim_skills.grasping.grasp import Force, Grasp, Metres, Speed
 from anysim_skills.planning import LATENCY, Latency, PlannerName
 
 
@@ -29,6 +29,7 @@ class Pick(SkillSequence):
         hover: Metres = 0.1,
         speed: Speed = 0.4,
         descend_speed: Speed = 0.2,
+        force: Force = None,
         max_attempts: Annotated[int, Field(ge=1)] = 3,
         phase_steps: Annotated[int, Field(ge=1)] = 150,
         planner: PlannerName = "",
@@ -43,7 +44,7 @@ class Pick(SkillSequence):
         known = {"bank": bank, "living": living, "pinned": pinned}
         pace = {"hover": hover, "descend_speed": descend_speed, "phase_steps": phase_steps}
         bring = Bring(env, **arm, goal=goal)
-        grasp = Grasp(env, bring, **arm, **known, **pace, lift=0.0)
+        grasp = Grasp(env, bring, **arm, **known, **pace, force=force, lift=0.0)
         super().__init__(
             env,
             {"grasp": grasp, "bring": bring},

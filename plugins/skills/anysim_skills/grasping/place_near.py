@@ -13,7 +13,7 @@ from anysim.skills.phases import GO_ON, Phase, PhasedSkill
 from anysim.skills.sequence import SkillSequence
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
-from anysim_skills.grasping.grasp import Metres, Speed
+from anysim_skills.grasping.grasp import Force, Metres, Speed
 from anysim_skills.grasping.pick_place import PickPlace
 from anysim_skills.grasping.tidy import Names, handles
 from anysim_skills.object_shapes import ObjectShapes
@@ -89,6 +89,7 @@ class PlaceNear(SkillSequence):
         solver: str = "numba_ik",
         hover: Metres = 0.1,
         speed: Speed = 0.4,
+        force: Force = None,
         above: Annotated[float, Field(gt=0, description="[m] over the place on the way there and back")] = 0.1,
         tolerance: Annotated[float, Field(gt=0, description="[m] horizontally, once it rests")] = 0.03,
         max_attempts: Annotated[int, Field(ge=1)] = 3,
@@ -96,7 +97,7 @@ class PlaceNear(SkillSequence):
         """Where there is no room it fails with `adverse_state` before anything is touched."""
         side = ChooseSide(env, object, near, target, gap, avoid)
         arm = {"robot": robot, "tool": tool, "solver": solver, "hover": hover, "speed": speed}
-        pace = {"above": above, "tolerance": tolerance, "max_attempts": max_attempts}
+        pace = {"above": above, "tolerance": tolerance, "max_attempts": max_attempts, "force": force}
         put = PickPlace(env, **arm, **pace, object=object, target=side.beside)
         super().__init__(env, {"side": side, "put": put})
 

@@ -7,7 +7,7 @@ from pydantic import Field
 from anysim.skills.sequence import SkillSequence
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
-from anysim_skills.grasping.grasp import Grasp, Metres, Offset, Speed
+from anysim_skills.grasping.grasp import Force, Grasp, Metres, Offset, Speed
 from anysim_skills.grasping.place import Place
 
 
@@ -27,12 +27,13 @@ class Regrasp(SkillSequence):
         solver: str = "numba_ik",
         hover: Metres = 0.1,
         speed: Speed = 0.4,
+        force: Force = None,
         tolerance: Annotated[float, Field(gt=0, description="[m] horizontally, once it rests")] = 0.03,
     ) -> None:
         """An object that is lost on the way is grasped where it lies."""
         arm = {"robot": robot, "object": object, "tool": tool, "solver": solver, "speed": speed}
         members = {
             "put down": Place(env, **arm, target=target, retreat=hover, tolerance=tolerance),
-            "grasp": Grasp(env, **arm, offset=offset, hover=hover, lift=lift),
+            "grasp": Grasp(env, **arm, force=force, offset=offset, hover=hover, lift=lift),
         }
         super().__init__(env, members, optional=["put down"])

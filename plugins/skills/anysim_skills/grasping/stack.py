@@ -7,7 +7,7 @@ from pydantic import Field
 from anysim.skills.sequence import SkillSequence
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, RobotView
-from anysim_skills.grasping.grasp import Metres, Speed
+from anysim_skills.grasping.grasp import Force, Metres, Speed
 from anysim_skills.grasping.pick_place import PickPlace
 from anysim_skills.grasping.tidy import Objects, handles
 
@@ -26,12 +26,13 @@ class Stack(SkillSequence):
         solver: str = "numba_ik",
         hover: Metres = 0.1,
         speed: Speed = 0.4,
+        force: Force = None,
         above: Annotated[float, Field(gt=0, description="[m] over the place on the way there and back")] = 0.06,
         tolerance: Annotated[float, Field(gt=0, description="[m] horizontally, once it rests")] = 0.015,
         max_attempts: Annotated[int, Field(ge=1, description="for each object")] = 3,
     ) -> None:
         arm = {"robot": robot, "tool": tool, "solver": solver, "hover": hover, "speed": speed}
-        pace = {"above": above, "tolerance": tolerance, "max_attempts": max_attempts}
+        pace = {"above": above, "tolerance": tolerance, "max_attempts": max_attempts, "force": force}
         members: dict[str, PickPlace] = {}
         below = base
         for thing in handles(env, objects):

@@ -9,7 +9,7 @@ from anysim.errors import NameLookupError, SpecError, SpecIssue
 from anysim.skills.sequence import SkillSequence
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
-from anysim_skills.grasping.grasp import Metres, Speed
+from anysim_skills.grasping.grasp import Force, Metres, Speed
 from anysim_skills.grasping.pick_place import PickPlace
 from anysim_skills.grasping.spot import Spot
 
@@ -32,12 +32,13 @@ class Tidy(SkillSequence):
         solver: str = "numba_ik",
         hover: Metres = 0.1,
         speed: Speed = 0.4,
+        force: Force = None,
         above: Annotated[float, Field(gt=0, description="[m] over the place on the way there and back")] = 0.1,
         tolerance: Annotated[float, Field(gt=0, description="[m] horizontally, once it rests")] = 0.03,
         max_attempts: Annotated[int, Field(ge=1, description="for each object")] = 3,
     ) -> None:
         arm = {"robot": robot, "tool": tool, "solver": solver, "hover": hover, "speed": speed}
-        pace = {"above": above, "tolerance": tolerance, "max_attempts": max_attempts}
+        pace = {"above": above, "tolerance": tolerance, "max_attempts": max_attempts, "force": force}
         members: dict[str, PickPlace] = {}
         for number, thing in enumerate(handles(env, objects)):
             spot = Spot(target, 0.0, spacing * (number - (len(objects) - 1) / 2))

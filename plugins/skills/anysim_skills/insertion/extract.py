@@ -8,7 +8,7 @@ from anysim.skills.base import Outcome
 from anysim.skills.sequence import SkillSequence
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
-from anysim_skills.grasping.grasp import Grasp, Metres, Offset, Speed
+from anysim_skills.grasping.grasp import Force, Grasp, Metres, Offset, Speed
 from anysim_skills.insertion.pull_out import Lead, PullOut
 
 
@@ -29,6 +29,7 @@ class Extract(SkillSequence):
         hover: Metres = 0.1,
         clear: Metres = 0.03,
         speed: Speed = 0.4,
+        force: Force = None,
         pull_speed: Speed = 0.15,
         lead: Lead = 0.03,
         max_attempts: Annotated[int, Field(ge=1)] = 3,
@@ -36,7 +37,7 @@ class Extract(SkillSequence):
         """`clear` [m] is how far the frame `tip` gets beyond `mouth`, whose z points out of the hole."""
         arm = {"robot": robot, "object": object, "tool": tool, "solver": solver}
         pull = PullOut(env, **arm, tip=tip, mouth=mouth, clear=clear, speed=pull_speed, lead=lead)
-        grasp = Grasp(env, pull, **arm, offset=offset, hover=hover, lift=0.0, speed=speed)
+        grasp = Grasp(env, pull, **arm, force=force, offset=offset, hover=hover, lift=0.0, speed=speed)
         members = {"grasp": grasp, "pull out": pull}
         again = {("pull out", why): "grasp" for why in (Outcome.UNSTABLE_GRASP, Outcome.LOST)}
         super().__init__(env, members, back=again, max_attempts=max_attempts)

@@ -10,7 +10,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.grasping.bank_files import refuse_counts
 from anysim_skills.grasping.banked import BankFile, CountsFolder, Pinned
-from anysim_skills.grasping.grasp import Grasp, Metres, Offset, Speed
+from anysim_skills.grasping.grasp import Force, Grasp, Metres, Offset, Speed
 from anysim_skills.insertion.insert import Insert, InsertionsFile
 
 
@@ -31,6 +31,7 @@ class PickInsert(SkillSequence):
         offset: Offset = (0.0, 0.0, 0.0),
         hover: Metres = 0.1,
         speed: Speed = 0.4,
+        force: Force = None,
         symmetry: Annotated[int, Field(ge=1, description="turns about the axis in which the object fits")] = 4,
         max_attempts: Annotated[int, Field(ge=1)] = 3,
         bank: BankFile = None,
@@ -47,6 +48,9 @@ class PickInsert(SkillSequence):
         known = {"bank": bank, "living": living if bank else None, "pinned": pinned}
         into = {"bank": insertions, "living": living if insertions else None, "pinned": pinned_insertions}
         insert = Insert(env, keys, **arm, **into, tip=tip, hole=hole, mouth=mouth, symmetry=symmetry)
-        members = {"grasp": Grasp(env, insert, **arm, **known, offset=offset, hover=hover, lift=0.0), "insert": insert}
+        members = {
+            "grasp": Grasp(env, insert, **arm, **known, force=force, offset=offset, hover=hover, lift=0.0),
+            "insert": insert,
+        }
         again = {("insert", why): "grasp" for why in (Outcome.UNSTABLE_GRASP, Outcome.LOST)}
         super().__init__(env, members, back=again, max_attempts=max_attempts)

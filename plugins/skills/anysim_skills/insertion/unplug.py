@@ -8,7 +8,7 @@ from anysim.skills.base import Outcome
 from anysim.skills.sequence import SkillSequence
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
-from anysim_skills.grasping.grasp import Grasp, Metres, Offset, Speed
+from anysim_skills.grasping.grasp import Force, Grasp, Metres, Offset, Speed
 from anysim_skills.grasping.place import Place
 from anysim_skills.insertion.pull_out import Lead, PullOut
 
@@ -31,6 +31,7 @@ class Unplug(SkillSequence):
         hover: Metres = 0.1,
         clear: Metres = 0.05,
         speed: Speed = 0.4,
+        force: Force = None,
         pull_speed: Speed = 0.15,
         lead: Lead = 0.03,
         above: Annotated[float, Field(gt=0, description="[m] over the place on the way there and back")] = 0.1,
@@ -42,7 +43,7 @@ class Unplug(SkillSequence):
         place = Place(env, **arm, target=target, speed=speed, above=above, retreat=above, tolerance=tolerance)
         pull = PullOut(env, **arm, tip=tip, mouth=mouth, clear=clear, speed=pull_speed, lead=lead)
         pull.foresee(place)
-        grasp = Grasp(env, pull, **arm, offset=offset, hover=hover, lift=0.0, speed=speed)
+        grasp = Grasp(env, pull, **arm, force=force, offset=offset, hover=hover, lift=0.0, speed=speed)
         members = {"grasp": grasp, "pull out": pull, "place": place}
         slipped = (Outcome.UNSTABLE_GRASP, Outcome.LOST)
         again = {(where, why): "grasp" for where in ("pull out", "place") for why in slipped}

@@ -8,7 +8,7 @@ from anysim.skills.base import Outcome
 from anysim.skills.sequence import SkillSequence
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
-from anysim_skills.grasping.grasp import Grasp, Metres, Offset, Speed
+from anysim_skills.grasping.grasp import Force, Grasp, Metres, Offset, Speed
 from anysim_skills.moving.slide import Slide
 
 
@@ -28,11 +28,12 @@ class Drag(SkillSequence):
         hover: Metres = 0.1,
         tolerance: Metres = 0.01,
         speed: Speed = 0.4,
+        force: Force = None,
         slide_speed: Speed = 0.12,
         max_attempts: Annotated[int, Field(ge=1)] = 3,
     ) -> None:
         arm = {"robot": robot, "object": object, "tool": tool, "solver": solver, "speed": speed}
         slide = Slide(env, **arm, goal=goal, tolerance=tolerance, slide_speed=slide_speed)
-        members = {"grasp": Grasp(env, slide, **arm, offset=offset, hover=hover, lift=0.0), "slide": slide}
+        members = {"grasp": Grasp(env, slide, **arm, force=force, offset=offset, hover=hover, lift=0.0), "slide": slide}
         again = {("slide", why): "grasp" for why in (Outcome.UNSTABLE_GRASP, Outcome.LOST)}
         super().__init__(env, members, back=again, max_attempts=max_attempts)

@@ -14,7 +14,7 @@ from anysim.skills.sequence import SkillSequence
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.arm import Arm
-from anysim_skills.grasping.grasp import Grasp, Metres, Offset, Speed
+from anysim_skills.grasping.grasp import Force, Grasp, Metres, Offset, Speed
 from anysim_skills.moving.push import astray, level_way
 from anysim_skills.moving.reach import STUCK
 from anysim_skills.object_shapes import ObjectShapes
@@ -174,6 +174,7 @@ class PullWithTool(SkillSequence):
         hover: Metres = 0.1,
         tolerance: Metres = 0.03,
         speed: Speed = 0.3,
+        force: Force = None,
         pull_speed: Speed = 0.12,
         max_attempts: Annotated[int, Field(ge=1)] = 3,
     ) -> None:
@@ -181,7 +182,7 @@ class PullWithTool(SkillSequence):
         pull = Pull(
             env, **arm, hook=hook, inner=inner, object=object, goal=goal, tolerance=tolerance, pull_speed=pull_speed
         )
-        grasp = Grasp(env, pull, **arm, object=hook, offset=offset, part_only=True, hover=hover, lift=0.05)
+        grasp = Grasp(env, pull, **arm, object=hook, force=force, offset=offset, part_only=True, hover=hover, lift=0.05)
         again = {("pull", why): "grasp" for why in (Outcome.UNSTABLE_GRASP,)}
         super().__init__(env, {"grasp": grasp, "pull": pull}, back=again, max_attempts=max_attempts)
 

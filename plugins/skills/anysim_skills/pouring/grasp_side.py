@@ -14,7 +14,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.choice import Choice
-from anysim_skills.grasping.grasp import CLOSING_STEPS, ROOM, Metres, Offset, Speed, closed
+from anysim_skills.grasping.grasp import CLOSING_STEPS, ROOM, Force, Metres, Offset, Speed, closed
 from anysim_skills.look_ahead import LookAhead
 from anysim_skills.object_shapes import ObjectShapes
 
@@ -41,9 +41,11 @@ class GraspSide(PhasedSkill):
         clear: Metres = 0.1,
         lift: Metres = 0.1,
         speed: Speed = 0.3,
+        force: Force = None,
         steps: Annotated[int, Field(ge=1, description="control steps that a move may take")] = 200,
     ) -> None:
         self.arm = Arm.of(env, robot, tool=tool, solver=solver)
+        self._press = self.arm.share_of(force)
         self._object, self._offset = object, np.array(offset)
         self._clear, self._lift, self._speed, self._late = clear, lift, speed, steps
         self._shapes = ObjectShapes(env.scene, object)
@@ -125,7 +127,7 @@ class GraspSide(PhasedSkill):
 
     def _close(self, ids: Array, at: Array) -> None:
         del at
-        self.arm.closed[ids] = True
+        self.arm.closed[ids], self.arm.press[ids] = True, self._press
         self.arm.stay(ids)
 
     def _closing(self, ids: Array, at: Array) -> Array:
