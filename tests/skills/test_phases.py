@@ -36,6 +36,21 @@ class Scripted(PhasedSkill):
 
         return [phase(n, a) for n, a in enumerate(self._answers)]
 
+    def make_recovery(self) -> list[Phase]:
+        """Two phases, of which the second takes two control steps more."""
+        if Rung.RECOVER not in self._rungs:
+            return []
+
+        def home(ids: Array, at: Array) -> Array:
+            self.log.append(f"home {ids.tolist()}")
+            return np.where(self.steps[ids] >= 2, GO_ON, STAY)
+
+        return [Phase("let go", None, lambda ids, at: np.full(len(ids), GO_ON), 1), Phase("home", None, home, 5)]
+
+    def anew(self, env: int) -> int:
+        self.log.append(f"anew {env}")
+        return 0
+
     def retry(self, rung: Rung, env: int) -> int | None:
         del env
         return 0 if rung in self._rungs else None
@@ -108,6 +123,33 @@ def test_the_ladder_begins_where_the_failure_says_and_never_goes_down() -> None:
         run(skill, 20)
         tried = [rung for _, rung in skill.climbs[0]]
         assert tried == ["candidate"] * 4 + ["resample"] * 2 + ["back_off", "recover", "give up"]
+
+
+def test_a_skill_that_recovers_goes_through_phases_of_its_own_and_starts_anew() -> None:
+    with blocks(2) as env:
+        env.reset(seed=0)
+        jammed = OUTCOMES.index(Outcome.JAMMED)
+        skill = Scripted(env, [after(0), lambda i, step: jammed if i == 0 else GO_ON], [Rung.RECOVER])
+        skill.begin(np.arange(2))
+        seen = []
+        for _ in range(5):
+            skill.act(np.arange(2), np.zeros((2, 0)))
+            seen.append(skill.describe(0)["phase"])
+        assert seen == ["home", "home", "p0", "p1", "p1"]
+        assert skill.log.count("anew 0") == 1
+        assert "anew 1" not in skill.log
+        assert not any(said.startswith("home") and "1" in said for said in skill.log), "ordinary progress"
+        assert skill.climbs == [(("jammed", "recover"), ("jammed", "give up")), ()]
+        assert [OUTCOMES[o] for o in skill.outcome] == [Outcome.JAMMED, Outcome.OK]
+
+
+def test_what_cannot_recover_from_a_failure_gives_up() -> None:
+    with blocks(1) as env:
+        env.reset(seed=0)
+        skill = Scripted(env, [failing(Outcome.LOST)], [Rung.RECOVER])
+        skill.recovers = lambda env, failure: failure is not Outcome.LOST  # type: ignore[method-assign]
+        run(skill, 5)
+        assert skill.climbs == [(("lost", "give up"),)]
 
 
 def test_an_adverse_state_is_not_retried() -> None:

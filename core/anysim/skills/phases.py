@@ -30,7 +30,7 @@ class Rung(StrEnum):
     CANDIDATE = "candidate"  # the next one of the goal set
     RESAMPLE = "resample"  # another goal set
     BACK_OFF = "back_off"  # away from the scene, look again, start anew
-    RECOVER = "recover"  # to the home posture, then start anew
+    RECOVER = "recover"  # through phases of its own, such as to the home posture, then start anew
 
 
 RUNGS = tuple(Rung)
@@ -161,6 +161,8 @@ class PhasedSkill(MovingSkill):
     """A skill that is a table of phases.
 
     Attributes:
+        table: the phases, and after them those that only the rung RECOVER enters.
+        last: the number of the last one that ordinary progress comes to.
         budgets: how often it may use each rung of the ladder in one env.
         steps: (N,) control steps in the present phase.
         used: (N, rungs) how often each rung of the ladder was used since `begin`.
@@ -172,7 +174,9 @@ class PhasedSkill(MovingSkill):
     def __init__(self, env: TaskEnv, movers: Sequence[Mover] = ()) -> None:
         super().__init__(env)
         self.movers = tuple(movers)
-        self.table: Sequence[Phase] = self.make_phases()
+        ordinary = tuple(self.make_phases())
+        self.last = len(ordinary) - 1
+        self.table: Sequence[Phase] = (*ordinary, *self.make_recovery())
         self.phases = tuple(phase.name for phase in self.table)
         self.budgets: Sequence[int] = BUDGETS
         self.steps = np.zeros(env.num_envs, dtype=np.int64)
@@ -183,8 +187,29 @@ class PhasedSkill(MovingSkill):
     def make_phases(self) -> Sequence[Phase]:
         """The table, first phase first. Called by the constructor: a subclass sets what it needs before."""
 
+    def make_recovery(self) -> Sequence[Phase]:
+        """The phases of the rung RECOVER; none where the skill has no such rung. Called after `make_phases`.
+
+        They go on as far as they get: one that fails climbs the ladder, where this rung is used up.
+        """
+        return ()
+
+    def recovers(self, env: int, failure: Outcome) -> bool:
+        """Whether the phases of RECOVER can be of use to an env after a failure."""
+        del env, failure
+        return True
+
+    def anew(self, env: int) -> int:
+        """Forget what was given up in an env that has recovered; the phase that it starts anew with."""
+        del env
+        return 0
+
     def retry(self, rung: Rung, env: int) -> int | None:
-        """Prepare another try of an env on a rung; the phase to go on with, None where the skill has no such rung."""
+        """Prepare another try of an env on a rung below RECOVER, whose phases do that.
+
+        Returns:
+            the phase to go on with; None where the skill has no such rung.
+        """
         del env
         return 0 if rung in (Rung.REPLAN, Rung.BACK_OFF) else None
 
@@ -222,8 +247,10 @@ class PhasedSkill(MovingSkill):
         return self.climbs[env]
 
     def _leave(self, number: int, ids: Array, at: Array) -> None:
-        if number + 1 < len(self.table):
-            self._go(ids, number + 1)
+        if number != self.last:
+            recovered = number + 1 == len(self.table)
+            for env in ids.tolist():
+                self._go(np.array([env]), self.anew(env) if recovered else number + 1)
             return
         said = self.succeeded(ids, at)
         done = said == GO_ON
@@ -234,6 +261,10 @@ class PhasedSkill(MovingSkill):
     def _go(self, ids: Array, phase: int) -> None:
         self.phase[ids], self.steps[ids] = phase, 0
 
+    def _recovery(self, env: int, failure: Outcome) -> int | None:
+        first = self.last + 1
+        return first if first < len(self.table) and self.recovers(env, failure) else None
+
     def _climb(self, env: int, failure: Outcome) -> None:
         """Try the first rung that is left for a failure, or end the skill with it."""
         first = self.first_rungs.get(failure)
@@ -241,7 +272,7 @@ class PhasedSkill(MovingSkill):
             number = RUNGS.index(rung)
             if self.used[env, number] >= self.budgets[number]:
                 continue
-            phase = self.retry(rung, env)
+            phase = self._recovery(env, failure) if rung is Rung.RECOVER else self.retry(rung, env)
             if phase is None:
                 continue
             self.used[env, number] += 1

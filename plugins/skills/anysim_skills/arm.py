@@ -182,6 +182,19 @@ class Arm(Mover):
         self._leave_plans(ids)
         self.target[ids], self.speed[ids], self.lead[ids] = target, speed, lead
 
+    def turn_to(self, ids: Array, joints: Array) -> None:
+        """Move joint by joint to positions (n, K), whatever is in the way; then the tool is told to be there."""
+        if self.plans is not None:
+            self.plans.drop(ids)
+        if self._sag is not None:
+            self._sag.forget(ids)  # on such a way the tool is far from where it is told to be
+        self._way[ids], self._detour[ids], self._stalled[ids] = joints, True, 0
+        self.target[ids] = self.command[ids] = self.chain.tool_pose(self._base(ids), joints)
+
+    def home(self, ids: Array) -> Array:
+        """(n, 7) where the tool is in the posture that the arm began in, as its base stands now."""
+        return self.chain.tool_pose(self._base(ids), np.broadcast_to(self.chain.initial, (len(ids), len(self.chain))))
+
     def stay(self, ids: Array) -> None:
         """Hold the commanded pose."""
         self._leave_plans(ids)

@@ -28,6 +28,10 @@ class PerEnv(Generic[K, V]):
             kept[key] = make()
         return kept[key]
 
+    def known(self, env: TaskEnv) -> dict[K, V]:
+        """Those of an env that have been made."""
+        return dict(self._kept.get(env, {}))
+
     @hookimpl
     def on_close(self, env: TaskEnv) -> None:
         """Give up what was kept for it."""

@@ -62,7 +62,7 @@ def test_a_cube_out_of_reach_is_no_ik() -> None:
         rollout(env, policy, 300)
         assert OUTCOMES[policy.skill.outcome[0]] is Outcome.NO_IK
         assert policy.describe(0)["outcome"] == "no_ik"
-        assert policy.describe(0)["ladder"] == ["no_ik -> back_off", "no_ik -> give up"]
+        assert policy.describe(0)["ladder"] == ["no_ik -> back_off", "no_ik -> recover", "no_ik -> give up"]
 
 
 def test_a_cube_that_is_taken_away_is_tried_again_and_given_up() -> None:

@@ -56,7 +56,7 @@ def test_a_turn_is_made_of_equal_strokes_each_with_a_grasp_of_its_own() -> None:
 def test_one_that_is_stuck_is_jammed() -> None:
     outcomes, said = given_up("screw_jar", "world.objects.jar.source.params.friction=500.0")
     assert outcomes == [Outcome.JAMMED] * 2
-    assert said["ladder"] == ["jammed -> back_off", "jammed -> give up"]
+    assert said["ladder"] == ["jammed -> back_off", "jammed -> recover", "jammed -> give up"]
 
 
 def test_what_slides_is_not_screwed() -> None:

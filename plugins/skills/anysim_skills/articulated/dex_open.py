@@ -1,5 +1,6 @@
 """DexOpen: pull a part open with fingers that are hooked behind the bar of its handle."""
 
+from collections.abc import Sequence
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -8,7 +9,7 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.skills.base import OUTCOMES, Outcome
-from anysim.skills.phases import GO_ON, STAY
+from anysim.skills.phases import GO_ON, STAY, Phase
 from anysim.task.env import TaskEnv
 from anysim.task.scene import RobotView
 from anysim_skills.articulated.bar_grasps import hooks
@@ -16,6 +17,7 @@ from anysim_skills.articulated.handle import CLEAR, AtHandle, Share, in_world
 from anysim_skills.articulated.open import OVERSHOOT, Pulls
 from anysim_skills.grasping.dex_grasp import STEEPEST
 from anysim_skills.grasping.hand import Hand
+from anysim_skills.recovery.homing import Homing
 
 LEVEL = 0.02
 """[m] along the fingers, within which they pass the bar."""
@@ -66,6 +68,9 @@ class DexOpen(Pulls):
         self.arm.go(ids, target, self.speed)
         return np.where((short >= -LEVEL) & self.arm.arrived(ids, at), GO_ON, STAY)
 
+    def make_recovery(self) -> Sequence[Phase]:
+        return Homing(self, self.arm, hand=self.hand, onto=self.onto).phases()
+
     def leave_handle(self, ids: Array, at: Array) -> None:
         self.hand.open(ids)
         AtHandle.leave_handle(self, ids, at)
@@ -77,7 +82,7 @@ class DexOpen(Pulls):
     def closing(self, ids: Array, at: Array) -> Array:
         del at
         still = self.hand.closed(ids) & (self.arm.finger_speed(ids) < 0.3)
-        return np.where(still | (self.steps[ids] >= self.closing_steps), GO_ON, STAY)
+        return self.fingers.judged(ids, still | (self.steps[ids] >= self.closing_steps), GO_ON)
 
     def succeeded(self, env_ids: Array, at: Array) -> Array:
         del env_ids

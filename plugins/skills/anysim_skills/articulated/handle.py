@@ -22,7 +22,9 @@ from anysim_skills.grasping.bank_files import refuse_counts
 from anysim_skills.grasping.banked import BankedGrasps
 from anysim_skills.grasping.grasp import CLOSING_STEPS, ROOM, Speed, closed
 from anysim_skills.grasping.hand_room import has_room
+from anysim_skills.grasping.in_fingers import InFingers
 from anysim_skills.planning import LATENCY, Latency, PlannerName
+from anysim_skills.recovery.homing import Homing
 
 STATIONS = 5
 """Points of the part's way at which a grasp must be reachable."""
@@ -87,6 +89,7 @@ class AtHandle(PhasedSkill):
         self._plans = bool(planner)
         self.part = Part(env.scene, part)
         self.handle = self.part.handle()
+        self.fingers = InFingers(self.arm, self.part.owner)
         self.speed, self.part_speed, self.lead, self.late = speed, part_speed, lead, steps
         refuse_counts(bank, living, pinned)
         self._bank: BankedGrasps | None = None
@@ -114,6 +117,16 @@ class AtHandle(PhasedSkill):
         if self._bank is not None:
             self._bank.start(env_ids)
         self.phase[env_ids] = 1
+
+    def make_recovery(self) -> Sequence[Phase]:
+        return Homing(self, self.arm, onto=self.onto, ways=self._all_ways).phases()
+
+    def anew(self, env: int) -> int:
+        self._choice.again(env)
+        if self._bank is not None:
+            self._bank.start(np.array([env]))
+            self._bank.again(env)
+        return 1
 
     def retry(self, rung: Rung, env: int) -> int | None:
         phase = self._choice.retry(rung, env) if self._bank is None else self._next_of_bank(self._bank, rung, env)
@@ -175,11 +188,23 @@ class AtHandle(PhasedSkill):
         if self._bank is not None:
             self._choose_of_bank(self._bank, ids, at)
             return
+        grasps = self._of_bar(ids, at)
+        ways = self._ways(at, grasps)
+        self._turn[ids] = self.turns[self._choice.least_motion(self.arm, ids, ways, self.excluded(grasps))]
+
+    def _of_bar(self, ids: Array, at: Array) -> Array:
+        """(n, G, 7) tool poses at the bar."""
         handle = self.handle.pose[at]
         grasps = bar_grasps(handle, self.turns)
         grasps[..., :3] += (self.depth(ids)[:, None] * _into(handle))[:, None] - in_world(grasps, self.place)
-        ways = self._ways(at, grasps)
-        self._turn[ids] = self.turns[self._choice.least_motion(self.arm, ids, ways, self.excluded(grasps))]
+        return grasps
+
+    def _all_ways(self, ids: Array, at: Array) -> Array:
+        """(n, g, S + 1, 7) with all candidates."""
+        if self._bank is None:
+            return self._ways(at, self._of_bar(ids, at))
+        goals, _ = self._bank.goals(ids, self.part.pose(at), CLEAR, self.part.owner.root.pose[at])
+        return self._ways(at, np.concatenate(self._bank.both_ways(ids, goals)[0], axis=1))
 
     def _choose_of_bank(self, bank: BankedGrasps, ids: Array, at: Array) -> None:
         """The best candidate, either way round, with which the arm goes the whole way in one posture, and off the part.
@@ -268,7 +293,7 @@ class AtHandle(PhasedSkill):
     def closing(self, ids: Array, at: Array) -> Array:
         """Until they are."""
         del at
-        return closed(ids, self.steps[ids], self.arm)
+        return self.fingers.judged(ids, closed(ids, self.steps[ids], self.arm) == GO_ON, GO_ON)
 
     # ------------------------------------------------------------------ with the part
 

@@ -91,7 +91,7 @@ class Screw(AtHandle):
 
     def _leave(self, number: int, ids: Array, at: Array) -> None:
         """After the last phase comes the next stroke, as long as something is left of the whole way."""
-        if number == len(self.table) - 1:
+        if number == self.last:
             more = np.abs(super().to_go(at)) > LEFT
             self._choice.again(ids[more])
             self._go(ids[more], _CHOOSE)

@@ -19,6 +19,7 @@ from anysim_skills.arm import Arm
 from anysim_skills.articulated.part import JointedPart
 from anysim_skills.choice import Choice, turns_against
 from anysim_skills.grasping.grasp import Metres, Speed
+from anysim_skills.recovery.homing import Homing
 
 YAWS = 8
 """Turns of the hand about the axis that are tried; the hand keeps its turn while it goes round."""
@@ -96,6 +97,13 @@ class Turn(PhasedSkill):
         self._choice.again(env_ids)
         self._goal[env_ids] = np.nan
         self.phase[env_ids] = 1
+
+    def make_recovery(self) -> Sequence[Phase]:
+        return Homing(self, self.arm, opens=False).phases()
+
+    def anew(self, env: int) -> int:
+        self._choice.again(env)
+        return 1
 
     def retry(self, rung: Rung, env: int) -> int | None:
         return self._choice.retry(rung, env)

@@ -19,6 +19,7 @@ from anysim_skills.grasping.candidates import DOWN, TOP_DOWN, across, from_above
 from anysim_skills.grasping.grasp import CLOSING_STEPS, ROOM, Metres, Speed, closed
 from anysim_skills.object_shapes import ObjectShapes
 from anysim_skills.planning import LATENCY, Latency, PlannerName
+from anysim_skills.recovery.homing import Homing
 
 BEHIND = 0.03
 """[m] while the command of one arm is further ahead of its tool than this, both wait."""
@@ -100,6 +101,14 @@ class BiLift(PhasedSkill):
         super().start(env_ids)
         self._choice.again(env_ids)
         self.phase[env_ids] = CHOOSE
+
+    def make_recovery(self) -> Sequence[Phase]:
+        """Off the object first, in the direction in which the hands came to it."""
+        return (Phase("back off", self._open, self._backing_off, self._late), *Homing(self, *self.arms).phases())
+
+    def anew(self, env: int) -> int:
+        self._choice.again(env)
+        return CHOOSE
 
     def retry(self, rung: Rung, env: int) -> int | None:
         """Another plan; the next pair where one is left; else away from the object, and all of them again."""

@@ -18,6 +18,7 @@ from anysim_skills.grasping.held import RAISED, turned_about
 from anysim_skills.look_ahead import LookAhead
 from anysim_skills.planned_moves import PLANNED_STEPS
 from anysim_skills.planning import LATENCY, Latency, PlannerName
+from anysim_skills.recovery.homing import Homing, still_held
 
 STILL = 0.05
 """[m/s] an object that moves slower has come to rest in the air."""
@@ -59,6 +60,12 @@ class Bring(PhasedSkill):
             Phase("plan", self._plan, self._planned, PLANNED_STEPS),
             carry,
         )
+
+    def make_recovery(self) -> Sequence[Phase]:
+        return Homing(self, self.arm, opens=False, held=self._object).phases()
+
+    def recovers(self, env: int, failure: Outcome) -> bool:
+        return still_held(self.arm, env, failure)
 
     def retry(self, rung: Rung, env: int) -> int | None:
         """Another plan; None: what is not held any more has to be grasped again."""

@@ -19,8 +19,10 @@ from anysim_skills.grasping.banked import BankedGrasps, BankFile, CountsFolder, 
 from anysim_skills.grasping.banked_hand import OfHand, synergies
 from anysim_skills.grasping.grasp import Metres, Offset, Speed
 from anysim_skills.grasping.hand import Hand
+from anysim_skills.grasping.in_fingers import InFingers
 from anysim_skills.look_ahead import LookAhead
 from anysim_skills.object_shapes import ObjectShapes
+from anysim_skills.recovery.homing import Homing
 
 ANGLES = 16
 """Directions of approach about the object's long axis; in each the hand may point either way."""
@@ -75,7 +77,7 @@ class DexGrasp(PhasedSkill):
         self._tilt, self._least = tilt, least
         self._hover, self._lift, self._links = hover, lift, links
         self._speed, self._late = speed, phase_steps
-        self._shapes = ObjectShapes(env.scene, object)
+        self._shapes, self._fingers = ObjectShapes(env.scene, object), InFingers(self.arm, object)
         n = env.num_envs
         refuse_counts(bank, living, pinned)
         self._bank: BankedGrasps | None = None
@@ -109,6 +111,16 @@ class DexGrasp(PhasedSkill):
         if self._bank is not None:
             self._bank.start(env_ids)
         self.phase[env_ids] = 1
+
+    def make_recovery(self) -> Sequence[Phase]:
+        return Homing(self, self.arm, hand=self.hand).phases()
+
+    def anew(self, env: int) -> int:
+        self._choice.again(env)
+        if self._bank is not None:
+            self._bank.start(np.array([env]))
+            self._bank.again(env)
+        return 1
 
     def retry(self, rung: Rung, env: int) -> int | None:
         """The next candidate where one is left; else away from the object, and all of them again."""
@@ -216,7 +228,7 @@ class DexGrasp(PhasedSkill):
         if not done.any():
             return np.full(len(ids), STAY)
         around = self.hand.touches(ids)[1] >= self._links
-        return np.where(done, np.where(around, GO_ON, _MISSED), STAY)
+        return np.where(done & ~around, _MISSED, self._fingers.judged(ids, done & around, GO_ON))
 
     # ------------------------------------------------------------------ up
 
@@ -227,7 +239,8 @@ class DexGrasp(PhasedSkill):
         self.arm.go(ids, self.arm.command[ids] + up, self._speed / 3)
 
     def _held(self, ids: Array, at: Array, said: Array) -> Array:
-        return np.where(self.arm.holds(ids, at, self._object.root), said, _UNSTABLE)
+        held = self.arm.holds(ids, at, self._object.root)
+        return np.where(held, said, self._fingers.judged(ids, ~held, _UNSTABLE))
 
     def _lifting(self, ids: Array, at: Array) -> Array:
         return self._held(ids, at, np.where(self.arm.arrived(ids, at, 0.01, 0.1), GO_ON, STAY))

@@ -18,9 +18,11 @@ from anysim_skills.grasping.bank_files import refuse_counts
 from anysim_skills.grasping.banked import BankedGrasps, BankFile, CountsFolder, Pinned, before
 from anysim_skills.grasping.candidates import DOWN, TOP_DOWN, across, from_above
 from anysim_skills.grasping.hand_room import beyond_tool
+from anysim_skills.grasping.in_fingers import InFingers
 from anysim_skills.look_ahead import LookAhead, TakesOver
 from anysim_skills.object_shapes import ObjectShapes
 from anysim_skills.planning import LATENCY, Latency, PlannerName
+from anysim_skills.recovery.homing import Homing
 
 ROOM = 0.004
 """[m] the gripper must open wider than the object by this."""
@@ -90,7 +92,7 @@ class Grasp(PhasedSkill):
         self._bank = None if bank is None else BankedGrasps(env, self.arm, object, bank, living, pinned)
         self._choice = Choice(n, TOP_DOWN if self._bank is None else self._bank.goal_count)
         self._rest = np.zeros(n)
-        self._shapes = ObjectShapes(env.scene, object)
+        self._shapes, self._fingers = ObjectShapes(env.scene, object), InFingers(self.arm, object)
         self._tips = beyond_tool(self.arm)
         """[m] from the tool to the finger tips, which stay above what the object lies on."""
         super().__init__(env, [self.arm])
@@ -118,6 +120,16 @@ class Grasp(PhasedSkill):
         if self._bank is not None:
             self._bank.start(env_ids)
         self.phase[env_ids] = CHOOSE
+
+    def make_recovery(self) -> Sequence[Phase]:
+        return Homing(self, self.arm, ways=self._ways).phases()
+
+    def anew(self, env: int) -> int:
+        self._choice.again(env)
+        if self._bank is not None:
+            self._bank.start(np.array([env]))
+            self._bank.again(env)
+        return CHOOSE
 
     def retry(self, rung: Rung, env: int) -> int | None:
         """Another plan; the next candidate where one is left; else away from the object, and all of them again."""
@@ -166,6 +178,11 @@ class Grasp(PhasedSkill):
         self.turn[ids] = grasps[np.arange(n), chosen, 3:]
         if self._bank is not None:
             self._bank.choose(ids, chosen, ~self._choice.none_left(ids))
+
+    def _ways(self, ids: Array, at: Array) -> Array:
+        """(n, g, 2, 7) before each candidate and there."""
+        grasps, _ = self._candidates(ids, at)
+        return np.stack([self._before(grasps), grasps], axis=2)
 
     def _candidates(self, ids: Array, at: Array) -> tuple[Array, Array]:
         """Tool poses (n, g, 7), and what the fingers have to span in them (n, g) [m]."""
@@ -222,7 +239,7 @@ class Grasp(PhasedSkill):
         settled = steps >= 5
         if settled.any():
             done[settled] |= self.arm.finger_speed(ids[settled]) < SETTLED
-        return np.where(done, GO_ON, STAY)
+        return self._fingers.judged(ids, done, GO_ON)
 
     def _note_height(self, ids: Array, at: Array) -> None:
         self._rest[ids] = self._object.root.position[at, 2]
@@ -231,13 +248,14 @@ class Grasp(PhasedSkill):
 
     def _lifting(self, ids: Array, at: Array) -> Array:
         held = self.arm.holds(ids, at, self._object.root)
-        return np.where(~held, _UNSTABLE, np.where(self.arm.arrived(ids, at), GO_ON, STAY))
+        lost = self._fingers.judged(ids, ~held, _UNSTABLE)
+        return np.where(~held, lost, np.where(self.arm.arrived(ids, at), GO_ON, STAY))
 
     def succeeded(self, env_ids: Array, at: Array) -> Array:
         if not self._lift:
             return super().succeeded(env_ids, at)
         risen = self._object.root.position[at, 2] - self._rest[env_ids] > 0.5 * self._lift
-        return np.where(risen, GO_ON, _MISSED)
+        return np.where(risen, GO_ON, self._fingers.judged(env_ids, ~risen, _MISSED))
 
 
 _NO_IK, _ABSENT = OUTCOMES.index(Outcome.NO_IK), OUTCOMES.index(Outcome.ADVERSE_STATE)

@@ -1,5 +1,6 @@
 """Skills that end with a held object out of the hand: how it is kept in sight, and let go of."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import ObjectView
 from anysim_skills.arm import Arm
 from anysim_skills.grasping.release import OPENING_STEPS
+from anysim_skills.recovery.homing import Homing, still_held
 
 RAISED = np.array([0.0, 0.0, 0.03, 0.0, 0.0, 0.0, 0.0])
 """[m] up from what it stands on an object is brought before its way is planned."""
@@ -51,6 +53,12 @@ class PutsDown(PhasedSkill):
         self._up = np.array([0.0, 0.0, moves.retreat, 0.0, 0.0, 0.0, 0.0])
         self._away = np.zeros((env.num_envs, 7))
         super().__init__(env, [arm])
+
+    def make_recovery(self) -> Sequence[Phase]:
+        return Homing(self, self.arm, opens=False, held=self.object).phases()
+
+    def recovers(self, env: int, failure: Outcome) -> bool:
+        return still_held(self.arm, env, failure)
 
     def take(self, ids: Array, at: Array) -> None:
         """The object is held as it is now."""

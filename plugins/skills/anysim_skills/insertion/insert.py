@@ -99,6 +99,13 @@ class Insert(PutsDown):
         if self._bank is not None:
             self._bank.start(env_ids)
 
+    def anew(self, env: int) -> int:
+        self._choice.again(env)
+        if self._bank is not None:
+            self._bank.start(np.array([env]))
+            self._bank.again(env)
+        return 0
+
     def retry(self, rung: Rung, env: int) -> int | None:
         """From above again where it jammed, of a bank with the next turn; else it has to be grasped again."""
         if self._bank is None:

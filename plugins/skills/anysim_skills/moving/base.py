@@ -82,6 +82,11 @@ class Base(Mover):
         made = _BASES.of(env, (robot.name, channel, link), lambda: cls(env, robot, channel, link))
         return made  # pyright: ignore[reportReturnType]
 
+    @staticmethod
+    def driven(env: TaskEnv, robot: RobotView) -> "Base | None":
+        """The base of a robot that a skill of the env drives, if there is one."""
+        return next((base for (name, *_), base in _BASES.known(env).items() if name == robot.name), None)
+
     def renew(self, ids: Array) -> None:
         """These envs have just been reset."""
         self._fresh[ids] = True

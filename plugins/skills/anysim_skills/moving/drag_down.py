@@ -18,6 +18,7 @@ from anysim_skills.grasping.candidates import TOP_DOWN, from_above
 from anysim_skills.grasping.grasp import CLOSING_STEPS, Metres, Speed
 from anysim_skills.moving.push import level_way
 from anysim_skills.object_shapes import ObjectShapes
+from anysim_skills.recovery.homing import Homing
 
 AHEAD = 0.01
 """[m] that the command is before the object at most."""
@@ -76,6 +77,13 @@ class DragDown(PhasedSkill):
         super().start(env_ids)
         self._choice.again(env_ids)
         self.phase[env_ids] = 1
+
+    def make_recovery(self) -> Sequence[Phase]:
+        return Homing(self, self.arm, opens=False).phases()
+
+    def anew(self, env: int) -> int:
+        self._choice.again(env)
+        return 1
 
     def retry(self, rung: Rung, env: int) -> int | None:
         return self._choice.retry(rung, env, same=(Rung.RESAMPLE, Rung.BACK_OFF))

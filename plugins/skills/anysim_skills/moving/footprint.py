@@ -64,6 +64,13 @@ class Footprint:
             own.append(mine)
         self._boxes, self._bodies, self._entities = np.array(boxes), np.array(bodies), np.array(entities)
         self._own = np.array(own, dtype=bool)
+        begun, at = world.initial_body_pose, env.engine.index.frame(frame.name)
+        offset = np.array([*at.position, *at.quaternion])
+        height = P.compose(begun[at.body], offset)[2]
+        mine = begun[self._bodies[self._own]][:, None]
+        corners = mine[..., :3] + P.rotate(np.broadcast_to(mine[..., 3:], (len(mine), 8, 4)), self._boxes[self._own])
+        self._lowest = corners[..., 2].min() - height
+        """[m] of the base, above the frame, as it begins: later on the boxes of wheels are turned."""
 
     def look(self, ids: Array, at: Array) -> Around:
         """Where base and boxes are in these envs; `at` are their rows in the scene."""
@@ -73,7 +80,7 @@ class Footprint:
         in_frame = P.rotate_inverse(here[:, None, 3:], base - here[:, None, :3])
         low, high = in_frame[..., :2].min(axis=1) - CLEAR, in_frame[..., :2].max(axis=1) + CLEAR  # (n, 2)
         things = points[:, ~self._own]
-        bottom, top = base[..., 2].min(axis=1) + LOW, base[..., 2].max(axis=1)
+        bottom, top = here[:, 2] + self._lowest + LOW, base[..., 2].max(axis=1)
         there = self._env.scene.presence[ids][:, self._entities[~self._own]] | (self._entities[~self._own] < 0)
         there &= (things[..., 2].max(axis=2) > bottom[:, None]) & (things[..., 2].min(axis=2) < top[:, None])
         return Around(low, high, things[..., :2], there)

@@ -14,6 +14,7 @@ from anysim_skills.arm import Arm
 from anysim_skills.grasping.grasp import Metres, Speed
 from anysim_skills.moving.base import Base, yaw_of
 from anysim_skills.moving.mobile import MobileLimits, MobileMoveL
+from anysim_skills.recovery.homing import Homing
 
 
 class MobileReach(PhasedSkill):
@@ -47,6 +48,10 @@ class MobileReach(PhasedSkill):
 
     def make_phases(self) -> Sequence[Phase]:
         return (Phase("move", self._enter, self.move.step, self._late),)
+
+    def make_recovery(self) -> Sequence[Phase]:
+        """The arm goes home on the base, which stays: from there it is another line."""
+        return Homing(self, self.arm, opens=False).phases()
 
     def retry(self, rung: Rung, env: int) -> int | None:
         """None: from off the line there is no way back onto it."""

@@ -16,6 +16,7 @@ from anysim.task.scene import Frame, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.grasping.grasp import Metres
 from anysim_skills.moving.base import Base, Pace, yaw_of
+from anysim_skills.recovery.way_around import WayAround
 
 HELD_UP = 75
 """Control steps in which a base that is not at its goal has neither come nearer nor turned: something holds it."""
@@ -28,8 +29,8 @@ STOPPED = 0.02
 class DriveTo(PhasedSkill):
     """A skill that drives a base straight to a pose on the ground, and stops there.
 
-    A base that is held up fails with `controller`; it backs off once and tries again. Arms that are told where to go in
-    the world would stay behind: those named in `carried` keep their place on the base.
+    A base that is held up fails with `controller`; it backs off once and tries again, and then by a place aside. Arms
+    that are told where to go in the world would stay behind: those named in `carried` keep their place on the base.
     """
 
     def __init__(
@@ -54,6 +55,7 @@ class DriveTo(PhasedSkill):
         self._arms = [Arm.of(env, robot, tool=tool, solver=solver) for tool in carried]
         self._tools = np.zeros((env.num_envs, len(carried), 7))
         """(N, T, 7) where their commands stand in the frame of the base."""
+        self._way_around = WayAround(env, robot, self.base, channel)
         self._back = back_off
         self._tolerance, self._angle, self._late = tolerance, angle, steps
         self._pace = Pace(speed, rate)
@@ -62,7 +64,11 @@ class DriveTo(PhasedSkill):
         super().__init__(env, [self.base, *self._arms])
 
     def make_phases(self) -> Sequence[Phase]:
-        return (Phase("back off", self._away, self._backing, 150), Phase("drive", self._enter, self._drive, self._late))
+        return (self.stepping_back(), Phase("drive", self._enter, self._drive, self._late))
+
+    def stepping_back(self) -> Phase:
+        """Back from what holds the base."""
+        return Phase("back off", self._away, self._backing, 150)
 
     def start(self, env_ids: Array) -> None:
         super().start(env_ids)
@@ -72,6 +78,25 @@ class DriveTo(PhasedSkill):
         """Back from what holds the base, once."""
         del env
         return 0 if rung is Rung.BACK_OFF else None
+
+    def make_recovery(self) -> Sequence[Phase]:
+        """Back, and to a place aside from which the straight way is free."""
+        around = Phase("go around", self._look_aside, self._going_around, self._late + 1)
+        return (self.stepping_back(), self.stepping_back(), around)  # twice, for room to turn
+
+    def anew(self, env: int) -> int:
+        del env
+        return 1
+
+    def _look_aside(self, ids: Array, at: Array) -> None:
+        aside, found = self._way_around.find(ids, at, self.wanted_stand(ids, at))
+        self.base.go(ids, np.where(found[:, None], aside, self.base.pose(at)))
+        self._best[ids], self._nearest[ids] = np.inf, 0
+
+    def _going_around(self, ids: Array, at: Array) -> Array:
+        distance, turn = self.base.left(ids, at)
+        there = (distance < 2 * self._tolerance) & (turn < 2 * self._angle)
+        return np.where(there | self._held_up(ids, at) | (self.steps[ids] >= self._late), GO_ON, STAY)
 
     def _away(self, ids: Array, at: Array) -> None:
         now = self.base.pose(at)
@@ -102,12 +127,15 @@ class DriveTo(PhasedSkill):
         distance, turn = self.base.left(ids, at)
         speed, rate = self.base.speed(at)
         there = (distance < self._tolerance) & (turn < self._angle) & (speed < STOPPED) & (rate < STOPPED)
-        # a base that turns on the spot is on its way as well
+        return np.where(there, GO_ON, np.where(self._held_up(ids, at), _CONTROLLER, STAY))
+
+    def _held_up(self, ids: Array, at: Array) -> Array:
+        """(n,) bool: it has not got on for a while; one that turns on the spot is on its way as well."""
+        distance, (speed, rate) = self.base.left(ids, at)[0], self.base.speed(at)
         moved = (distance < self._best[ids] - NEARER) | (rate > NEARER * 5) | (speed > NEARER * 5)
         self._best[ids] = np.where(moved, np.minimum(distance, self._best[ids]), self._best[ids])
         self._nearest[ids] = np.where(moved, self.steps[ids], self._nearest[ids])
-        held = self.steps[ids] - self._nearest[ids] > HELD_UP
-        return np.where(there, GO_ON, np.where(held, _CONTROLLER, STAY))
+        return self.steps[ids] - self._nearest[ids] > HELD_UP
 
 
 class Navigate(DriveTo):

@@ -17,6 +17,7 @@ from anysim.task.scene import Frame, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.choice import Choice
 from anysim_skills.grasping.grasp import Metres, Speed
+from anysim_skills.recovery.homing import Homing
 
 MIDDLES, ROLLS = 8, 8
 """Directions about the target of the middle of the arc, and turns of the picture, that are tried."""
@@ -80,6 +81,13 @@ class Orbit(PhasedSkill):
     def start(self, env_ids: Array) -> None:
         super().start(env_ids)
         self._choice.again(env_ids)
+
+    def make_recovery(self) -> Sequence[Phase]:
+        return Homing(self, self.arm, opens=False).phases()
+
+    def anew(self, env: int) -> int:
+        self._choice.again(env)
+        return 0
 
     def retry(self, rung: Rung, env: int) -> int | None:
         return self._choice.retry(rung, env, same=())

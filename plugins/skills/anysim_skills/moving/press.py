@@ -17,6 +17,7 @@ from anysim_skills.arm import Arm
 from anysim_skills.choice import Choice, turns_against
 from anysim_skills.grasping.grasp import Speed
 from anysim_skills.planning import LATENCY, Latency, PlannerName
+from anysim_skills.recovery.homing import Homing
 
 TURNS = 8
 """Orientations of the hand about the normal that are tried."""
@@ -65,6 +66,13 @@ class Press(PhasedSkill):
     def start(self, env_ids: Array) -> None:
         super().start(env_ids)
         self._choice.again(env_ids)
+
+    def make_recovery(self) -> Sequence[Phase]:
+        return Homing(self, self.arm, opens=False).phases()
+
+    def anew(self, env: int) -> int:
+        self._choice.again(env)
+        return 0
 
     def retry(self, rung: Rung, env: int) -> int | None:
         return self._choice.retry(rung, env, same=(Rung.BACK_OFF,))

@@ -18,6 +18,7 @@ from anysim_skills.grasping.grasp import Force, Grasp, Metres, Offset, Speed
 from anysim_skills.moving.push import astray, level_way
 from anysim_skills.moving.reach import STUCK
 from anysim_skills.object_shapes import ObjectShapes
+from anysim_skills.recovery.homing import Homing, still_held
 
 AHEAD = 0.03
 """[m] the hook is told to be at most this far ahead of where it touches the object."""
@@ -83,6 +84,12 @@ class Pull(PhasedSkill):
         over = behind + np.array([0.0, 0.0, self._rise])
         ends = over, behind, self._behind(ids, at, 0.0, line) + way
         return np.stack([_tools_for(self._inner.pose[at], grasps, line, place) for place in ends], axis=2)
+
+    def make_recovery(self) -> Sequence[Phase]:
+        return Homing(self, self.arm, opens=False, held=self._hook).phases()
+
+    def recovers(self, env: int, failure: Outcome) -> bool:
+        return still_held(self.arm, env, failure)
 
     def _raise(self, ids: Array, at: Array) -> None:
         self.arm.take(ids, at, self._hook.root)

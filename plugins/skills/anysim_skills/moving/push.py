@@ -18,6 +18,7 @@ from anysim_skills.moving.push_mpc import StrokePlanner
 from anysim_skills.object_shapes import ObjectShapes
 from anysim_skills.planned_moves import PLANNED_STEPS
 from anysim_skills.planning import LATENCY, Latency, PlannerName
+from anysim_skills.recovery.homing import Homing
 
 ASTRAY = np.deg2rad(35.0)
 """[rad] an object has left its way when its goal lies further to the side of that than this."""
@@ -92,10 +93,13 @@ class Push(PhasedSkill):
             Phase("retreat", self._rise, self._rising, 100),
         )
 
+    def make_recovery(self) -> Sequence[Phase]:
+        return Homing(self, self.arm, opens=False).phases()
+
     def retry(self, rung: Rung, env: int) -> int | None:
         """From behind the object again, where it is now."""
-        del env
-        return 0 if rung is not Rung.RECOVER else None
+        del rung, env
+        return 0
 
     def _rise(self, ids: Array, at: Array) -> None:
         pose = self.arm.tool.pose[at]

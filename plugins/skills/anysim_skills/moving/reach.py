@@ -15,6 +15,7 @@ from anysim.task.scene import Frame, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.grasping.grasp import Metres, Speed
 from anysim_skills.planning import LATENCY, Latency, PlannerName
+from anysim_skills.recovery.homing import Homing
 
 STUCK = 25
 """Control steps without inverse kinematics after which a goal counts as out of reach."""
@@ -50,6 +51,9 @@ class Reach(PhasedSkill):
     def make_phases(self) -> Sequence[Phase]:
         move = Phase("move", self._enter, self._move, self._late)
         return (self.arm.planned_phase(self._plan), move) if self._plans else (move,)
+
+    def make_recovery(self) -> Sequence[Phase]:
+        return Homing(self, self.arm, opens=False).phases()
 
     def _plan(self, ids: Array, at: Array) -> None:
         self._enter(ids, at)

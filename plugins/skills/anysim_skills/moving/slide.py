@@ -61,6 +61,10 @@ class Slide(PutsDown):
     def make_phases(self) -> Sequence[Phase]:
         return (Phase("slide", self._begin, self._slide, self.moves.steps), *self.let_go())
 
+    def make_recovery(self) -> Sequence[Phase]:
+        """None: home is above the support on which it slides."""
+        return ()
+
     def retry(self, rung: Rung, env: int) -> int | None:
         """None: what is not held any more has to be grasped again."""
         del rung, env

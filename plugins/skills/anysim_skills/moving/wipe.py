@@ -16,6 +16,7 @@ from anysim_skills.arm import LEAD, SLIPPED, Arm
 from anysim_skills.choice import Choice, turns_against
 from anysim_skills.grasping.grasp import Metres, Speed
 from anysim_skills.moving.raster import Coverage, Raster
+from anysim_skills.recovery.homing import Homing, still_held
 
 TURNS = 8
 """Orientations of the hand about the normal that are tried."""
@@ -100,6 +101,16 @@ class Wipe(PhasedSkill):
         self._choice.again(env_ids)
         self._coverage.clear(env_ids)
         self.phase[env_ids] = 1
+
+    def make_recovery(self) -> Sequence[Phase]:
+        return Homing(self, self.arm, opens=False).phases()
+
+    def recovers(self, env: int, failure: Outcome) -> bool:
+        return still_held(self.arm, env, failure)
+
+    def anew(self, env: int) -> int:
+        self._choice.again(env)
+        return 1
 
     def retry(self, rung: Rung, env: int) -> int | None:
         """Once more over it with what is covered; the next turn of the hand where the way was at fault."""

@@ -15,8 +15,10 @@ from anysim.task.scene import ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.choice import Choice
 from anysim_skills.grasping.grasp import CLOSING_STEPS, ROOM, Force, Metres, Offset, Speed, closed
+from anysim_skills.grasping.in_fingers import InFingers
 from anysim_skills.look_ahead import LookAhead
 from anysim_skills.object_shapes import ObjectShapes
+from anysim_skills.recovery.homing import Homing
 
 SIDES = 4
 """The hand comes along the vessel's x or y, either way."""
@@ -48,7 +50,7 @@ class GraspSide(PhasedSkill):
         self._press = self.arm.share_of(force)
         self._object, self._offset = object, np.array(offset)
         self._clear, self._lift, self._speed, self._late = clear, lift, speed, steps
-        self._shapes = ObjectShapes(env.scene, object)
+        self._shapes, self._fingers = ObjectShapes(env.scene, object), InFingers(self.arm, object)
         n = env.num_envs
         self._choice, self._turn, self._rest = Choice(n, SIDES * len(SLOPES)), np.zeros((n, 4)), np.zeros(n)
         self._ahead = LookAhead(self.arm)
@@ -71,6 +73,13 @@ class GraspSide(PhasedSkill):
         super().start(env_ids)
         self._choice.again(env_ids)
         self.phase[env_ids] = 1
+
+    def make_recovery(self) -> Sequence[Phase]:
+        return Homing(self, self.arm).phases()
+
+    def anew(self, env: int) -> int:
+        self._choice.again(env)
+        return 1
 
     def retry(self, rung: Rung, env: int) -> int | None:
         return self._choice.retry(rung, env)
@@ -132,7 +141,7 @@ class GraspSide(PhasedSkill):
 
     def _closing(self, ids: Array, at: Array) -> Array:
         del at
-        return closed(ids, self.steps[ids], self.arm)
+        return self._fingers.judged(ids, closed(ids, self.steps[ids], self.arm) == GO_ON, GO_ON)
 
     def _raise(self, ids: Array, at: Array) -> None:
         self._rest[ids] = self._object.root.position[at, 2]
@@ -142,7 +151,8 @@ class GraspSide(PhasedSkill):
 
     def _rising(self, ids: Array, at: Array) -> Array:
         held = self.arm.holds(ids, at, self._object.root)
-        return np.where(~held, _UNSTABLE, np.where(self.arm.arrived(ids, at), GO_ON, STAY))
+        lost = self._fingers.judged(ids, ~held, _UNSTABLE)
+        return np.where(~held, lost, np.where(self.arm.arrived(ids, at), GO_ON, STAY))
 
     def succeeded(self, env_ids: Array, at: Array) -> Array:
         risen = self._object.root.position[at, 2] - self._rest[env_ids] > 0.5 * self._lift
