@@ -248,9 +248,10 @@ class PhasedSkill(MovingSkill):
 
     def _leave(self, number: int, ids: Array, at: Array) -> None:
         if number != self.last:
-            recovered = number + 1 == len(self.table)
-            for env in ids.tolist():
-                self._go(np.array([env]), self.anew(env) if recovered else number + 1)
+            if number + 1 < len(self.table):
+                self._go(ids, number + 1)
+            else:
+                self._go(ids, np.array([self.anew(env) for env in ids.tolist()]))
             return
         said = self.succeeded(ids, at)
         done = said == GO_ON
@@ -258,7 +259,7 @@ class PhasedSkill(MovingSkill):
         for env, code in zip(ids[~done].tolist(), said[~done].tolist(), strict=True):
             self._climb(env, OUTCOMES[code])
 
-    def _go(self, ids: Array, phase: int) -> None:
+    def _go(self, ids: Array, phase: int | Array) -> None:
         self.phase[ids], self.steps[ids] = phase, 0
 
     def _recovery(self, env: int, failure: Outcome) -> int | None:

@@ -6,13 +6,14 @@ from typing import Literal
 from anysim.assets.model import ImportedModel
 from anysim.model.world import JointType
 from anysim_assets.assembly import Assembly
-from anysim_assets.handles import add_handle
+from anysim_assets.handles import add_handle, add_lever
 from anysim_assets.parameters import Angle, Handle, Size
 from anysim_schemas.base import Color, NonNegative, Positive
 from anysim_schemas.errors import KeyFault
 
 _ANGLE = radians(110)
-_LEVER = Handle(radius=0.01, length=0.12, standoff=0.06, direction="horizontal")
+_BAR = Handle(radius=0.01, length=0.12, standoff=0.06, direction="horizontal")
+_BACKSET = 0.06  # [m] of a lever's axis from the leaf's edge
 
 
 def door(
@@ -24,8 +25,9 @@ def door(
     angle: Angle = _ANGLE,
     friction: NonNegative = 2.0,
     damping: NonNegative = 0.5,
-    handle: Handle = _LEVER,
+    handle: Handle = _BAR,
     handle_height: Positive = 1.0,
+    lever: Angle | None = None,
     density: Positive = 300.0,
     color: Color = (0.80, 0.78, 0.74),
     leaf_color: Color = (0.55, 0.38, 0.24),
@@ -35,8 +37,12 @@ def door(
 
     The frame's x goes through the opening. The link and joint `leaf` is closed at zero and positive is open; its hinge
     is upright at the left edge, seen along x. `out` swings to the side of +x, where the handle is, `in` to the other.
-    The leaf stays where its friction holds it; the event `tasks.latch` makes a latch. The frame `leaf.handle` is as on
-    a cabinet, x away from the leaf.
+    The leaf stays where its friction holds it. The frame `leaf.handle` is as on a cabinet, x away from the leaf.
+
+    With `lever` the handle is a link and joint of that name on the leaf: a bar that is level at zero and points to the
+    hinge, and positive is pressed down. The frame `lever.handle` is on it, two thirds of its length from its axis, and
+    `leaf.handle` is where that is at zero. A joint has neither spring nor latch: the events `tasks.spring` and
+    `tasks.latch` make them.
 
     Args:
         size: thickness, width and height of the leaf [m].
@@ -47,7 +53,8 @@ def door(
         friction: dry friction of the hinge [N m].
         damping: [N m s/rad].
         handle: on the side of +x, near the edge away from the hinge; a fixed bar.
-        handle_height: of its middle above the ground [m].
+        handle_height: of its middle, or of the lever's axis, above the ground [m].
+        lever: how far the bar of the handle turns about the leaf's normal [rad]; without it the bar is fixed.
         density: of the leaf [kg/m^3].
         color: of the posts and the lintel.
         leaf_color: of the leaf.
@@ -80,6 +87,10 @@ def door(
         damping=damping,
     )
     body.board(leaf, "board", (-x, -y, gap), (x, y, top), density, leaf_color, origin)
+    if lever is not None:
+        at = (x, _BACKSET - width, handle_height)
+        add_lever(body, leaf, handle, at, width - _BACKSET, lever, handle_color, link="leaf")
+        return body.model()
     margin = handle.length / 2 + 2 * handle.radius + 0.03
     at = (x, -width + margin, handle_height)
     space = (2 * margin, 2 * min(handle_height - gap, top - handle_height))

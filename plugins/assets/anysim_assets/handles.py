@@ -1,11 +1,11 @@
-"""Handles on fronts and lids."""
+"""Handles on fronts and lids, and levers on doors."""
 
 from math import pi
 
 from anysim.model.affordances import Affordance, AffordanceKind
-from anysim.model.world import Capsule, Cylinder, Vec3
+from anysim.model.world import Capsule, Cylinder, JointType, Vec3
 from anysim_assets.assembly import Assembly, Colour, turned
-from anysim_assets.parameters import Handle
+from anysim_assets.parameters import Angle, Handle
 from anysim_schemas.errors import KeyFault
 
 _ALONG_X = turned((0.0, 1.0, 0.0), pi / 2)
@@ -13,6 +13,8 @@ _ALONG_Y = turned((1.0, 0.0, 0.0), -pi / 2)
 _POST = 0.6  # radius of a post or stem, in radii of the bar
 _TILT = 0.7  # [rad] of a hand about a bar, to each side
 _KNOB = 2.0  # radius of a knob's disc, in radii of the handle
+_HELD = 2 / 3  # of a lever, from its axis to where it is held
+_FRICTION, _DAMPING = 0.1, 0.05  # of a lever [N m], [N m s/rad]: it bears its own weight
 
 
 def add_handle(
@@ -104,3 +106,37 @@ def add_handle(
             link,
         )
     )
+
+
+def add_lever(
+    assembly: Assembly, body: int, handle: Handle, at: Vec3, room: float, range: Angle, color: Colour, *, link: str
+) -> None:
+    """A bar at one end of which is an axis along the link's +x, on a face whose outward normal that is.
+
+    The new link and joint `lever` has its axis at the point `at` of the link; at zero the bar points to the link's +y,
+    and positive is down. The affordance `lever.handle` is taken hold of from the front; the frame has x away from the
+    face and z along the bar. Of the link, `LINK.handle` is where that is at zero.
+
+    Raises:
+        KeyFault: it is no bar, or longer than the room along the link's +y [m].
+    """
+    if handle.style != "bar":
+        raise KeyFault(f"a lever is a bar, not `{handle.style}`; leave `lever` out", "handle", "style")
+    if handle.length + handle.radius > room:
+        raise KeyFault(f"a lever of {handle.length:g} m is longer than the {room:g} m for it", "handle", "length")
+    stem = handle.standoff - handle.radius
+    if stem <= 0:
+        raise KeyFault(f"a lever of radius {handle.radius:g} m needs a larger standoff", "handle", "standoff")
+    x, y, z = at
+    held = (handle.standoff, _HELD * handle.length, 0.0)
+    assembly.site(body, f"{link}.handle", (x + held[0], y + held[1], z), _ALONG_Y)
+    down, resistance = (-1.0, 0.0, 0.0), {"friction": _FRICTION, "damping": _DAMPING}
+    lever = assembly.link("lever", at, JointType.REVOLUTE, down, lower=0.0, upper=range, parent=body, **resistance)
+    stem_shape, bar = Cylinder(handle.radius, stem / 2), Capsule(handle.radius, handle.length / 2)
+    assembly.solid(lever, "stem", stem_shape, (stem / 2, 0.0, 0.0), handle.density, color, _ALONG_X)
+    middle = (handle.standoff, handle.length / 2, 0.0)
+    assembly.solid(lever, "bar", bar, middle, handle.density, color, _ALONG_Y)
+    assembly.site(lever, "lever.handle", held, _ALONG_Y)
+    name, approach = "lever.handle", (-1.0, 0.0, 0.0)
+    kind, roll = AffordanceKind.LEVER, (-_TILT, _TILT)
+    assembly.afford(Affordance(name, kind, name, ("lever.bar",), ("turn", "open"), (approach,), roll, "lever"))

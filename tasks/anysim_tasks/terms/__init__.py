@@ -1,7 +1,8 @@
-"""Terms for whole families of tasks: `tasks.velocity`, `tasks.coverage`, `tasks.latch` and what belongs to them."""
+"""Terms for whole families of tasks: `tasks.velocity`, `tasks.coverage`, `tasks.latch`, `tasks.spring`."""
 
 from anysim_tasks.terms.coverage import Coverage, CoverageGain
 from anysim_tasks.terms.latch import Latch
+from anysim_tasks.terms.spring import Spring
 from anysim_tasks.terms.velocity import Velocity, at_velocity, goal_velocity, velocity_match
 
 TERMS = {
@@ -9,5 +10,5 @@ TERMS = {
     "reward": {"coverage_gain": CoverageGain, "velocity_match": velocity_match},
     "predicate": {"at_velocity": at_velocity, "coverage": Coverage},
     "command": {"velocity": Velocity},
-    "event": {"latch": Latch},
+    "event": {"latch": Latch, "spring": Spring},
 }

@@ -23,6 +23,7 @@ OBJECTS = {
     "chest": {"source": {"procedural": "hinge_box", "scale": 2.0}, "fixed": True},
     "valve": {"source": "procedural:valve", "fixed": True},
     "tap": {"source": {"procedural": "valve", "params": {"style": "lever"}}, "fixed": True},
+    "door": {"source": {"procedural": "door", "params": {"lever": 0.8}}, "fixed": True},
     "ball": {"source": {"sphere": 0.03}},
     "post": {"source": {"cylinder": [0.03, 0.2]}, "fixed": True},
 }
@@ -41,6 +42,7 @@ def world() -> World:
         ("chest", AffordanceKind.HANDLE, "chest.lid"),
         ("valve.wheel.handle", AffordanceKind.RIM, "valve.wheel"),
         ("tap.wheel.handle", AffordanceKind.LEVER, "tap.wheel"),
+        ("door.lever.handle", AffordanceKind.LEVER, "door.lever"),
     ],
 )
 def test_builders_declare_what_is_taken_hold_of(world: World, name: str, kind: AffordanceKind, joint: str) -> None:
@@ -119,6 +121,19 @@ def test_the_frame_of_a_bar_has_its_z_along_it(world: World) -> None:
     assert isinstance(world.geoms[bar].shape, Capsule)
     np.testing.assert_allclose(world.geoms[bar].position, found.frame.position)
     np.testing.assert_allclose(np.abs(np.dot(world.geoms[bar].quaternion, found.frame.quaternion)), 1.0)
+
+
+def test_a_lever_is_pressed_down_and_held_where_the_handle_of_the_leaf_is(world: World) -> None:
+    held, leaf = find_affordance(world, "door.lever.handle"), find_frame(world, "door.leaf.handle")
+    lever = world.joints[held.joint]
+    assert (lever.lower, lever.upper) == (0.0, 0.8)
+    place = np.array(world.bodies[lever.body].position) + held.frame.position
+    np.testing.assert_allclose(place, leaf.position)
+    np.testing.assert_allclose(held.frame.quaternion, leaf.quaternion)
+    by = P.from_axis_angle(np.array(lever.axis), np.array(lever.upper))
+    assert P.rotate(by, np.array(held.frame.position))[2] == pytest.approx(-0.08 * np.sin(0.8))
+    out = P.rotate(np.array(held.frame.quaternion), np.array(held.spec.approach[0]))
+    np.testing.assert_allclose(out, [-1.0, 0.0, 0.0], atol=1e-12)  # from the front, as the leaf's x is out of it
 
 
 def test_plain_free_shapes_are_taken_hold_of_as_a_whole(world: World) -> None:

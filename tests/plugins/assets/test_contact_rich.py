@@ -97,6 +97,9 @@ def test_a_slot_has_the_clearance_on_each_side(prongs: int, prong: tuple[float, 
 @pytest.mark.parametrize(
     ("name", "params", "key"),
     [
+        ("door", {"lever": 0.8, "handle": {"style": "knob"}}, "handle.style"),
+        ("door", {"lever": 0.8, "handle": {"length": 0.8}}, "handle.length"),
+        ("door", {"lever": 0.8, "handle": {"standoff": 0.008}}, "handle.standoff"),
         ("faucet", {"height": 0.05}, "height"),
         ("faucet", {"base": 0.03}, "base"),
         ("faucet", {"lever": 0.04}, "lever"),

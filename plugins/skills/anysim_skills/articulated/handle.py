@@ -88,13 +88,14 @@ class AtHandle(PhasedSkill):
         self._press = self.arm.share_of(self.force)
         self._plans = bool(planner)
         self.part = Part(env.scene, part)
-        self.handle = self.part.handle()
+        self.held = self.held_part()
+        self.handle = self.held.handle()
         self.fingers = InFingers(self.arm, self.part.owner)
         self.speed, self.part_speed, self.lead, self.late = speed, part_speed, lead, steps
         refuse_counts(bank, living, pinned)
         self._bank: BankedGrasps | None = None
         if bank is not None:
-            self._bank = BankedGrasps(env, self.arm, self.part.owner, bank, living, pinned, self.part.body)
+            self._bank = BankedGrasps(env, self.arm, self.part.owner, bank, living, pinned, self.held.body)
         n = env.num_envs
         frame = env.engine.index.frame(self.handle.name)
         grasps = bar_grasps(np.array([[*frame.position, *frame.quaternion]]), self.turns)[0]
@@ -104,9 +105,9 @@ class AtHandle(PhasedSkill):
         self._turn = np.zeros((n, 4))
         """The chosen orientation in the handle's frame, where it is of no bank."""
         self._local = np.zeros((n, 7))
-        """The chosen tool pose in the part's frame, where it is of a bank."""
+        """The chosen tool pose in the held part's frame, where it is of a bank."""
         self._grip = np.zeros((n, 7))
-        """The tool in the part's frame when the part begins to move."""
+        """The tool in the frame of what is moved when that begins to move."""
         self._left, self._since = np.zeros(n), np.zeros(n, dtype=np.int64)
         """What was left of the way at the last progress, and the control steps since then."""
         super().__init__(env, [self.arm])
@@ -157,6 +158,10 @@ class AtHandle(PhasedSkill):
     def depth(self, ids: Array) -> Array:
         """(n,) [m] how far beyond the handle's middle the tool goes."""
         return np.zeros(len(ids))
+
+    def held_part(self) -> Part:
+        """What is taken hold of by its handle: the part itself, or what is on it."""
+        return self.part
 
     def excluded(self, grasps: Array) -> Array | None:
         """(n, G) bool of tool poses (n, G, 7): those that are not to be chosen.
@@ -212,7 +217,7 @@ class AtHandle(PhasedSkill):
         Then those with which it does not get off, those with which it changes its posture under way, and last those at
         which the hand touches more than the handle.
         """
-        part, rows = self.part.pose(at), np.arange(len(ids))
+        part, rows = self.held.pose(at), np.arange(len(ids))
         goals, widths = bank.goals(ids, part, CLEAR, self.part.owner.root.pose[at])
         grasps, room = bank.both_ways(ids, goals)
         rank, effort = np.zeros(room.shape), np.zeros(room.shape)
@@ -230,7 +235,7 @@ class AtHandle(PhasedSkill):
 
     def _ways(self, at: Array, grasps: Array) -> Array:
         """(n, G, S + 1, 7) tools at (n, G, 7) from where they come on, to where the part is to go."""
-        return np.concatenate([self._short_of(grasps, CLEAR)[:, :, None], self._stations(at, grasps)], axis=2)
+        return np.concatenate([self._short_of(grasps, CLEAR)[:, :, None], self.stations(at, grasps)], axis=2)
 
     def _there_and_away(self, at: Array, grasps: Array) -> Array:
         """(n, G, S + 2, 7) the same, and off the part in the end."""
@@ -241,11 +246,9 @@ class AtHandle(PhasedSkill):
         back = np.concatenate([in_world(grasps, self.onto), np.zeros((*grasps.shape[:2], 4))], axis=-1)
         return grasps - distance * back
 
-    def _stations(self, at: Array, grasps: Array) -> Array:
+    def stations(self, at: Array, grasps: Array) -> Array:
         """(n, G, S, 7) where tools at (n, G, 7) are on the way of the part."""
-        shares = np.linspace(0.0, 1.0, STATIONS)
-        by = np.repeat((shares * self.to_go(at)[:, None])[:, None], grasps.shape[1], axis=1)
-        return np.stack([self.part.moved(at, grasps, by[..., s]) for s in range(STATIONS)], axis=2)
+        return along(self.part, at, grasps, self.to_go(at))
 
     def _chosen(self, ids: Array, at: Array) -> Array:
         del at
@@ -254,7 +257,7 @@ class AtHandle(PhasedSkill):
     def at_handle(self, ids: Array, at: Array, short_of: float) -> Array:
         """Tool poses (n, 7) at the handle, or short of it on the hand's way [m]."""
         if self._bank is not None:
-            grasp = P.compose(self.part.pose(at), self._local[ids])
+            grasp = P.compose(self.held.pose(at), self._local[ids])
             grasp[:, :3] -= short_of * in_world(grasp, self.onto)
             return grasp
         handle = self.handle.pose[at]
@@ -265,7 +268,7 @@ class AtHandle(PhasedSkill):
 
     def _plan(self, ids: Array, at: Array) -> None:
         """To before the handle, in a posture from which the arm can go the whole way of the part."""
-        way = self._stations(at, self.at_handle(ids, at, 0.0)[:, None])[:, 0]
+        way = self.stations(at, self.at_handle(ids, at, 0.0)[:, None])[:, 0]
         self.arm.plan(ids, self.at_handle(ids, at, CLEAR)[:, None], then=way, touched=self.part.owner)
 
     def approach(self, ids: Array, at: Array) -> Array:
@@ -299,23 +302,28 @@ class AtHandle(PhasedSkill):
 
     def take(self, ids: Array, at: Array) -> None:
         """From here on the hand goes where the part takes it."""
-        self._grip[ids] = P.compose(P.inverse(self.part.pose(at)), self.arm.tool.pose[at])
+        self.go_with(self.part, ids, at)
+
+    def go_with(self, part: Part, ids: Array, at: Array) -> None:
+        """The same of another one that is in the hand."""
+        self._grip[ids] = P.compose(P.inverse(part.pose(at)), self.arm.tool.pose[at])
         self._left[ids], self._since[ids] = np.inf, 0
 
-    def follow(self, ids: Array, at: Array) -> Array:
-        """Move the part on by its handle; (n,) [m] how far the hand has slipped from it."""
-        here = self.part.position(at)
-        goal = self.part.closed + self.share * self.part.span
-        tool = P.compose(self.part.pose(at), self._grip[ids])
-        reach = np.maximum(self.part.reach(tool[:, :3], at), 1e-3)
+    def follow(self, ids: Array, at: Array, part: Part | None = None, share: float | None = None) -> Array:
+        """Move the part on by its handle, or another one to a share; (n,) [m] how far the hand has slipped from it."""
+        part, share = part or self.part, self.share if share is None else share
+        here = part.position(at)
+        goal = part.closed + share * part.span
+        tool = P.compose(part.pose(at), self._grip[ids])
+        reach = np.maximum(part.reach(tool[:, :3], at), 1e-3)
         ahead = np.clip(goal - here, -self.lead / reach, self.lead / reach)
-        target = self.part.moved(at, tool[:, None], ahead[:, None])[:, 0]
+        target = part.moved(at, tool[:, None], ahead[:, None])[:, 0]
         self.arm.go(ids, target, self.part_speed, self.lead)
         return P.norm(self.arm.tool.position[at] - tool[:, :3])
 
-    def jammed(self, ids: Array, at: Array) -> Array:
-        """(n,) bool: the part has not got on for a while."""
-        left = np.abs(self.part.joint.opening[at] - self.share)
+    def jammed(self, ids: Array, at: Array, part: Part | None = None, share: float | None = None) -> Array:
+        """(n,) bool: the part has not got on for a while, or another one on its way to a share."""
+        left = np.abs((part or self.part).joint.opening[at] - (self.share if share is None else share))
         on = left < self._left[ids] - PROGRESS
         self._left[ids] = np.where(on, left, self._left[ids])
         self._since[ids] = np.where(on, 0, self._since[ids] + 1)
@@ -329,6 +337,12 @@ class AtHandle(PhasedSkill):
 def _into(handle: Array) -> Array:
     """(n, 3) from handles (n, 7) into their fronts."""
     return P.rotate(handle[:, 3:], np.broadcast_to(np.array([-1.0, 0.0, 0.0]), (len(handle), 3)))
+
+
+def along(part: Part, at: Array, grasps: Array, to_go: Array) -> Array:
+    """(n, G, S, 7) where tools at (n, G, 7) are while a part goes so far (n,) [m, rad]."""
+    by = np.repeat((np.linspace(0.0, 1.0, STATIONS) * to_go[:, None])[:, None], grasps.shape[1], axis=1)
+    return np.stack([part.moved(at, grasps, by[..., s]) for s in range(STATIONS)], axis=2)
 
 
 def in_world(tools: Array, vector: Sequence[float]) -> Array:
