@@ -16,8 +16,8 @@ from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
 from anysim_skills.arm import Arm
-from anysim_skills.arm_pair import ArmPair
 from anysim_skills.planning import WORKERS_VARIABLE
+from anysim_skills.two_hands.arm_pair import ArmPair
 from tests.plugins.skills.test_pick import rollout
 
 WORLD = Path(__file__).parent / "worlds/bi_lift.yaml"

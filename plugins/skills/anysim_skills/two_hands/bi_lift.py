@@ -13,13 +13,13 @@ from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import ObjectView, RobotView
 from anysim_skills.arm import LEAD, Arm
-from anysim_skills.arm_pair import ArmPair
 from anysim_skills.choice import Choice
 from anysim_skills.grasping.candidates import DOWN, TOP_DOWN, across, from_above
 from anysim_skills.grasping.grasp import CLOSING_STEPS, ROOM, Metres, Speed, closed
 from anysim_skills.object_shapes import ObjectShapes
 from anysim_skills.planning import LATENCY, Latency, PlannerName
 from anysim_skills.recovery.homing import Homing
+from anysim_skills.two_hands.arm_pair import ArmPair
 
 BEHIND = 0.03
 """[m] while the command of one arm is further ahead of its tool than this, both wait."""

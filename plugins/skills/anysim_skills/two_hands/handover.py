@@ -12,9 +12,9 @@ from anysim.task.scene import Frame, ObjectView, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.grasping.bring import Bring
 from anysim_skills.grasping.grasp import Force, Grasp, Metres, Offset, Speed
-from anysim_skills.grasping.hold_out import HoldOut
 from anysim_skills.grasping.release import Release
 from anysim_skills.planning import LATENCY, Latency, PlannerName
+from anysim_skills.two_hands.hold_out import HoldOut
 
 
 class Handover(SkillSequence):

@@ -11,8 +11,8 @@ from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.phases import GO_ON, STAY
 from anysim.task.env import TaskEnv
 from anysim_skills.arm import LEAD
-from anysim_skills.grasping.bi_lift import BiLift
 from anysim_skills.grasping.grasp import Metres
+from anysim_skills.two_hands.bi_lift import BiLift
 
 Palms = Annotated[
     tuple[float, float],

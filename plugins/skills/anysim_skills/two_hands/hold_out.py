@@ -8,12 +8,12 @@ from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.env import TaskEnv
 from anysim_skills.arm import Arm
-from anysim_skills.arm_pair import ArmPair
 from anysim_skills.grasping.bring import Bring
 from anysim_skills.grasping.candidates import DOWN, across, from_above
 from anysim_skills.grasping.grasp import ROOM, Offset
 from anysim_skills.grasping.held import turned_about
 from anysim_skills.object_shapes import ObjectShapes
+from anysim_skills.two_hands.arm_pair import ArmPair
 
 
 class HoldOut(Bring):

@@ -13,9 +13,9 @@ from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import ObjectView, RobotView
 from anysim_skills.arm import LEAD, Arm
-from anysim_skills.grasping.bi_squeeze import Palms, along_palm
 from anysim_skills.grasping.grasp import Metres, Speed
 from anysim_skills.object_shapes import ObjectShapes
+from anysim_skills.two_hands.bi_squeeze import Palms, along_palm
 
 DOWN = 0.002
 """[m] above the support at which the object counts as put down."""

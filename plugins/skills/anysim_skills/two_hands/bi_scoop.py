@@ -9,9 +9,9 @@ from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.env import TaskEnv
 from anysim.task.scene import RobotView
-from anysim_skills.grasping.bi_lift import BiLift
 from anysim_skills.grasping.candidates import TOP_DOWN
 from anysim_skills.grasping.hand import Hand
+from anysim_skills.two_hands.bi_lift import BiLift
 
 
 class BiScoop(BiLift):

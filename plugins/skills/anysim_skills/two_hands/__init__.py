@@ -1,0 +1,1 @@
+"""Skills of two arms: lift, place, scoop and squeeze together, hand over."""
