@@ -141,7 +141,12 @@ class SceneGeometry:
             threads: how many share the envs; the readings do not depend on it.
         """
         start, along = _sets(origins, len(frames)), _sets(directions, len(frames))
-        return Hits(*self._asked(self._cast, posed, frames, (start, along), seen, reach, normals, threads))
+        if start.shape != along.shape:
+            raise AnysimError(f"rays need as many origins as directions, got {start.shape} and {along.shape}")
+        try:
+            return Hits(*self._asked(self._cast, posed, frames, (start, along), seen, reach, normals, threads))
+        except ZeroDivisionError:
+            raise AnysimError("a ray needs a direction that is not zero") from None
 
     def distances(
         self,

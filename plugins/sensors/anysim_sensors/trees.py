@@ -4,6 +4,7 @@ import numpy as np
 
 from anysim import cache
 from anysim.conventions import Array
+from anysim.errors import AnysimError
 from anysim.model.world import HeightField
 
 LEAF = 4
@@ -40,6 +41,10 @@ def _make(vertices: Array, faces: Array) -> dict[str, Array]:
 
     joined, number = np.unique(vertices, axis=0, return_inverse=True)
     faces = number.reshape(-1)[faces]
+    # a triangle with a corner twice is an edge of others
+    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+    if not len(faces):
+        raise AnysimError("a mesh without any triangle has no surface to meet; give it at least one")
     corners = joined[faces]
     count = len(faces)
     order = np.arange(count, dtype=np.int32)

@@ -101,6 +101,15 @@ def test_rays_see_what_stands_on_the_ground_and_not_the_robot() -> None:
     assert np.isnan(scanned_heights(scene, posed, frame, points, reach=1.4, seen=own)[0, 0])
 
 
+def test_a_place_that_is_no_number_has_no_height() -> None:
+    frames = np.full((2, 7), np.nan)
+    frames[1] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+    for world in (ground.hills(as_mesh=False), World(geoms=(Geom("terrain", WORLD, Plane()),))):
+        found = GroundHeights(world).at(frames, np.zeros((1, 2)))
+        assert np.isnan(found[0])
+        assert np.isfinite(found[1])
+
+
 def test_upright_keeps_the_heading() -> None:
     rng = np.random.default_rng(2)
     frames = frames_over(rng, 50)

@@ -11,6 +11,8 @@ from anysim.model.world import Box, Capsule, Cylinder, Mesh, MeshShape, Shape, S
 from anysim.testing.sketch import Sketch
 from anysim.testing.varying import having, random_presence, with_slots
 from anysim_sensors import scene as module
+from anysim_sensors.camera import RayCamera
+from anysim_sensors.occupancy import Grid, occupancy
 from anysim_sensors.scene import SceneGeometry
 from tests.plugins.sensors import worlds
 from tests.plugins.sensors.worlds import HERE
@@ -233,6 +235,42 @@ def test_rays_and_frames_of_another_number_are_refused() -> None:
         scene.rays(posed, np.repeat(HERE[None], 2, axis=0), np.zeros((3, 1, 3)), np.ones((3, 1, 3)))
     with pytest.raises(AnysimError, match=r"shape \(envs, 0, 7\), got \(2, 3, 7\)"):
         scene.posed(np.zeros((2, 3, 7)))
+
+
+def test_rays_without_a_direction_or_an_origin_are_refused() -> None:
+    scene = SceneGeometry(one(Sphere(0.1)))
+    posed = scene.posed(scene.world.initial_body_pose[None])
+    with pytest.raises(AnysimError, match="direction that is not zero"):
+        scene.rays(posed, HERE[None], np.zeros((2, 3)), np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]))
+    with pytest.raises(AnysimError, match=r"as many origins as directions, got \(1, 2, 3\) and \(1, 1, 3\)"):
+        scene.rays(posed, HERE[None], np.zeros((2, 3)), np.ones((1, 3)))
+
+
+@pytest.mark.parametrize("count", [40, 200])
+def test_an_env_whose_poses_are_no_numbers_costs_the_others_nothing(count: int) -> None:
+    rng = np.random.default_rng(count)
+    world = worlds.crowd(rng, count)
+    scene = SceneGeometry(world)
+    poses = np.repeat(world.initial_body_pose[None], 3, axis=0)
+    poses[1, ::2] = np.nan
+    poses[1, 1, 0] = np.inf
+    frames = np.repeat(HERE[None], 3, axis=0)
+    frames[1, 3:] = np.nan
+    origins, directions = rng.uniform([-4, -4, 0.05], [4, 4, 3], (500, 3)), rng.normal(size=(500, 3))
+    posed = scene.posed(poses)
+    hits, near = scene.rays(posed, frames, origins, directions), scene.distances(posed, frames, origins)
+    images = RayCamera(16, 16, 60.0).images(scene, posed, frames, normals=True, whole=True)
+    states = occupancy(scene, posed, frames, Grid())
+    assert np.isinf(hits.distance[1]).all()
+    assert (images.geom[1] == -1).all()
+    alone = scene.posed(poses[:1])
+    for found, other in (
+        (hits.distance, scene.rays(alone, HERE[None], origins, directions).distance),
+        (near.distance, scene.distances(alone, HERE[None], origins).distance),
+        (images.depth, RayCamera(16, 16, 60.0).images(scene, alone, HERE[None]).depth),
+        (states, occupancy(scene, alone, HERE[None], Grid())),
+    ):
+        assert found[0].tobytes() == found[2].tobytes() == other[0].tobytes()
 
 
 def test_a_world_without_shapes_is_empty() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from anysim.cache import CACHE_ENV
+from anysim.errors import AnysimError
 from anysim.model.ground import FieldGround
 from anysim.model.world import HeightField
 from anysim_sensors import trees
@@ -57,6 +58,14 @@ def test_each_triangle_is_in_one_leaf_and_in_the_boxes_above_it(count: int) -> N
     key = np.sort(whole.reshape(count, 9), axis=1)
     given = np.sort(vertices[faces].reshape(count, 9), axis=1)
     assert np.allclose(key[np.lexsort(key.T)], given[np.lexsort(given.T)], atol=1e-12)
+
+
+def test_triangles_with_a_corner_twice_are_left_out() -> None:
+    vertices = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+    tree = trees._make(vertices, np.array([[0, 1, 3], [0, 1, 2], [2, 2, 2]]))
+    assert len(tree["corner"]) == 1
+    with pytest.raises(AnysimError, match="without any triangle"):
+        trees._make(vertices, np.array([[0, 1, 3]]))
 
 
 def test_items_in_one_place_are_halved() -> None:

@@ -181,8 +181,12 @@ def pose_geoms(geoms: Geoms, body_pose: Array, presence: Array, posed: GeomPoses
         count = 0
         for g in range(posed.frame.shape[1]):
             body, entity = geoms.body[g], geoms.entity[g]
-            posed.there[e, g] = entity < 0 or presence[e, entity]
             _pose_geom(geoms.frame[g], world if body < 0 else body_pose[e, body], posed.frame[e, g])
+            nothing = 0.0
+            for k in range(12):
+                nothing += 0.0 * posed.frame[e, g, k]
+            # what is at a place that is no number is nowhere: an env that has failed costs the others nothing
+            posed.there[e, g] = nothing == 0.0 and (entity < 0 or presence[e, entity])
             _bound(geoms, g, posed.frame[e, g], posed.low[e, g], posed.high[e, g])
             if posed.there[e, g]:
                 posed.order[e, count] = g

@@ -39,7 +39,9 @@ def sample(
             for f in range(start.shape[0]):
                 rows, cols = shape[f, 0], shape[f, 1]
                 u, v = (px - place[f, 0]) * place[f, 2], (py - place[f, 1]) * place[f, 3]
-                if u < -1e-9 or v < -1e-9 or u > cols - 1 + 1e-9 or v > rows - 1 + 1e-9:
+                if not (
+                    -1e-9 <= u <= cols - 1 + 1e-9 and -1e-9 <= v <= rows - 1 + 1e-9
+                ):  # also where they are no numbers
                     continue
                 u, v = min(max(u, 0.0), cols - 1.0), min(max(v, 0.0), rows - 1.0)
                 j, i = min(int(u), cols - 2), min(int(v), rows - 2)
@@ -53,4 +55,4 @@ def sample(
                     m = heights[at + cols]
                     height = a + q * (m - a) + t * (b - m)
                 best = max(best, height + place[f, 4])
-            out[e, r] = best if best > -np.inf else np.nan
+            out[e, r] = best if best > -np.inf and px == px and py == py else np.nan
