@@ -1,13 +1,15 @@
 """The state machine of phased skills: gates, typed failures, the ladder and its budgets, and sequences."""
 
 from collections.abc import Callable, Sequence
+from typing import cast
 
 import numpy as np
 import pytest
 
 from anysim.conventions import Array
+from anysim.planning.service import PlannerService
 from anysim.skills.base import OUTCOMES, Outcome
-from anysim.skills.phases import BUDGETS, GO_ON, RUNGS, STAY, Phase, PhasedSkill, Rung
+from anysim.skills.phases import BUDGETS, GO_ON, RUNGS, STAY, Mover, Phase, PhasedSkill, Rung
 from anysim.skills.sequence import SkillSequence
 from anysim.task.env import TaskEnv
 from tests.task.helpers import blocks
@@ -56,7 +58,7 @@ class Scripted(PhasedSkill):
         return 0 if rung in self._rungs else None
 
 
-class Hand:
+class Hand(Mover):
     """A mover that writes down what it is asked."""
 
     def __init__(self, log: list[str]) -> None:
@@ -73,6 +75,28 @@ class Hand:
 
     def describe(self, env: int) -> dict[str, object]:
         return {}
+
+
+class Asking(Hand):
+    """A mover with a planner that is asked something in every control step."""
+
+    def __init__(self, log: list[str], service: "Flushed") -> None:
+        super().__init__(log)
+        self._service = service
+
+    @property
+    def planners(self) -> tuple[PlannerService, ...]:
+        return (cast(PlannerService, self._service),)
+
+
+class Flushed:
+    """A planner service of which only that counts."""
+
+    def __init__(self, log: list[str]) -> None:
+        self._log = log
+
+    def flush(self) -> None:
+        self._log.append("flush")
 
 
 def after(steps: int, then: int = GO_ON) -> Answer:
@@ -200,3 +224,16 @@ def run_on(skill: SkillSequence, steps: int) -> None:
     ids = np.arange(skill.env.num_envs)
     for _ in range(steps):
         skill.act(ids, np.zeros((len(ids), 0)))
+
+
+def test_planners_are_flushed_once_a_step_after_all_movers_have_asked() -> None:
+    log: list[str] = []
+    service = Flushed(log)
+    with blocks(2) as env:
+        env.reset(seed=0)
+        skill = Scripted(env, [after(9)])
+        skill.movers = (Asking(log, service), Asking(log, service))
+        skill.begin(np.arange(2))
+        log.clear()
+        skill.act(np.arange(2), np.zeros((2, 0)))
+    assert log == ["move [0, 1]", "move [0, 1]", "flush"]
