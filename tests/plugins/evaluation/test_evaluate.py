@@ -219,7 +219,7 @@ def test_what_successes_took() -> None:
 
 def test_the_expert_tells_its_retries_and_commands() -> None:
     far = ["world.layout.cube.x=0.75", "world.layout.cube.y=0.6"]
-    assert {(e.retries, e.done, e.required) for e in run("pick_cube", "expert", 5, *far)} == {(1, None, None)}
+    assert {(e.retries, e.done, e.required) for e in run("pick_cube", "expert", 5, *far)} == {(2, None, None)}
     assert {e.retries for e in run("pick_cube", "expert:retries=off", 5, *far)} == {0}
     short = run("put_away", "expert", 5, "task.horizon=300")
     assert {(e.status, e.retries, e.done, e.required, e.sim_s) for e in short} == {("truncated", 0, 1, 3, 6.0)}

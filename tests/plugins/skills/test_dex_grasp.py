@@ -96,3 +96,23 @@ def test_a_gripper_without_fingers_is_refused() -> None:
         pytest.raises(TaskError, match=r"channel 'eef' of 'robot' has no fingers in the catalogue"),
     ):
         SkillPolicy(env)
+
+
+def test_a_hand_around_another_bottle_holds_the_wrong_one() -> None:
+    other = (
+        "world.objects.other={source: {cylinder: [0.03, 0.26]}, mass: 0.2, friction: 0.9}",
+        "world.layout.other={on: terrain, x: 0.5, y: 0.5}",
+    )
+    with lifting("mujoco", 1, "task.horizon=3000", *other) as env:
+        env.reset(seed=11)
+        policy, one = SkillPolicy(env), np.array([0])
+        policy.begin(one)
+        bodies = [env.engine.index.entity(name).root for name in ("bottle", "other")]
+        left = 1
+        while env.running[0] and not policy.skill.outcome[0]:
+            env.step(policy.act(one))
+            if left and policy.skill.phase[0] == CLOSE and policy.skill.steps[0] == 1:
+                left -= 1
+                here = env.engine.get_state().body_pose[:, bodies].copy()
+                env.engine.set_body_state(here[:, ::-1], np.zeros((1, 2, 6)), None, bodies)
+        assert policy.skill.history(0)[0] == ("wrong_object", "back_off")

@@ -48,7 +48,7 @@ def test_the_fingers_come_from_above_and_open_the_drawer() -> None:
 
 
 def test_a_drawer_that_is_stuck_ends_with_a_type() -> None:
-    stuck = [*QUIET, "world.objects.cabinet.joints.drawer_1.friction=2000.0"]
+    stuck = [*QUIET, "task.horizon=3000", "world.objects.cabinet.joints.drawer_1.friction=2000.0"]
     with anysim.make("dex_open_drawer", engine="mujoco", num_envs=1, overrides=stuck) as env:
         env.reset(seed=3)
         policy = SkillPolicy(env)

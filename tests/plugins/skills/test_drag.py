@@ -46,5 +46,5 @@ def test_a_plate_that_no_gripper_spans_is_dragged_by_fingers_pressed_onto_it(eng
 
 def test_fingers_that_slip_on_a_plate_have_lost_it() -> None:
     """Its support holds the plate better than the fingers do."""
-    outcomes, _ = given_up("drag_down", "world.objects.table.friction=4.0")
+    outcomes, _ = given_up("drag_down", "world.objects.table.friction=4.0", "task.horizon=2000")
     assert set(outcomes) == {Outcome.LOST}

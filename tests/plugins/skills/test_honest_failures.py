@@ -32,7 +32,7 @@ def given_up(world: str, *overrides: str, engine: str = "mujoco") -> tuple[list[
     with make(WORLDS / f"{world}.yaml", engine=engine, num_envs=2, overrides=overrides) as env:
         env.reset(seed=11)
         policy = SkillPolicy(env)
-        rollout(env, policy, STEPS)
+        rollout(env, policy, 2 * STEPS)
         assert policy.gave_up(np.arange(2)).all()
         return [OUTCOMES[o] for o in policy.skill.outcome], policy.describe(0)
 

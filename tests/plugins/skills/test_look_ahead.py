@@ -37,7 +37,7 @@ def test_what_cannot_be_used_next_is_not_grasped(task: str) -> None:
         policy = SkillPolicy(env)
         body = env.engine.index.body(thing)
         begin = env.engine.get_state().body_pose[0, body, :3].copy()
-        rollout(env, policy, 100)
+        rollout(env, policy, 300)
         assert OUTCOMES[policy.skill.outcome[0]] is Outcome.NO_IK
         assert policy.describe(0)["phase"] == "grasp: choose"
         assert np.abs(env.engine.get_state().body_pose[0, body, :3] - begin).max() < 0.01
@@ -50,7 +50,7 @@ def test_a_command_looks_ahead_at_the_next_one(target: str) -> None:
     with make("place_on_pad", engine="mujoco", overrides=[*OUT_OF_REACH["place_on_pad"][1], collect]) as env:
         env.reset(seed=2)
         policy = SkillPolicy(env)
-        rollout(env, policy, 100)
+        rollout(env, policy, 300)
         assert OUTCOMES[policy.skill.outcome[0]] is Outcome.NO_IK
         assert policy.describe(0)["phase"] == "1 grasp: choose"
 

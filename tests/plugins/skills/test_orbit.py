@@ -31,7 +31,7 @@ def carried(engine: str, num_envs: int, *overrides: str) -> tuple[list[Outcome],
             env.scene.look(None)
             way = eye[:, :3] - env.scene.frame("cube").position
             along = P.rotate(eye[:, 3:], np.tile([0.0, 0.0, 1.0], (num_envs, 1)))
-            for i in everyone[policy.skill.phase > 0]:
+            for i in everyone[(policy.skill.phase > 0) & (policy.skill.phase <= VIEWS)]:
                 ways[policy.skill.phase[i] - 1, i] = way[i]
                 angles[policy.skill.phase[i] - 1, i] = np.arccos(min(1.0, -along[i] @ way[i] / np.linalg.norm(way[i])))
         return [OUTCOMES[o] for o in policy.skill.outcome], ways, angles
