@@ -30,7 +30,7 @@ def commands() -> dict[str, type[MovingSkill]]:
 def reference() -> str:
     """A list of the parameters that many commands have, then a table of the commands."""
     known = commands()
-    often = Counter(described(*given) for made in known.values() for given in parameters(made).items())
+    often = Counter(described(*given) for made in dict.fromkeys(known.values()) for given in parameters(made).items())
     shared: dict[str, str] = {}
     for words, count in often.most_common():
         if count >= SHARED:
@@ -38,7 +38,12 @@ def reference() -> str:
     lines = ["These parameters are the same in many commands, whose rows only name them:", ""]
     lines += [f"- {shared[key]}" for key in sorted(shared)]
     lines += ["", "| command | what it does | parameters |", "|---|---|---|"]
-    lines += [row(name, made, only_named=shared.values()) for name, made in sorted(known.items())]
+    own = {
+        made: next(name for name in known if name.replace("_", "") == made.__name__.lower()) for made in known.values()
+    }
+    for name, made in sorted(known.items()):
+        same = own[made] != name
+        lines.append(f"| `{name}` | The same as `{own[made]}`. |  |" if same else row(name, made, shared.values()))
     return "\n".join(lines)
 
 

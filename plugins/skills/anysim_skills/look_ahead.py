@@ -54,3 +54,7 @@ class LookAhead:
             left, poses = np.isfinite(cost).reshape(n, g * c), ways[:, :, :, station].reshape(n, g * c, 7)
             cost = np.maximum(cost, self._arm.reach(ids, poses, where=left)[1].reshape(cost.shape))
         return np.maximum(effort, cost.min(axis=2))
+
+    def passed(self, ids: Array, at: Array, grasps: Array, effort: Array) -> Array:
+        """The efforts (n, g) as they are; infinite where what comes next is out of reach."""
+        return np.where(np.isinf(self.effort(ids, at, grasps, effort)), np.inf, effort)

@@ -171,7 +171,7 @@ class DexGrasp(PhasedSkill):
         turn = grasps[..., 3:]
         out, fingers = (P.rotate(turn, np.broadcast_to(np.eye(3)[k], (n, g, 3)))[..., 2] for k in (2, 1))
         bad = (out > STEEPEST) | (fingers > STEEPEST) | (grasps[..., 2] < lowest[:, None] + self._least)
-        effort = self._ahead.effort(ids, at, grasps, np.where(bad, np.inf, effort))
+        effort = self._ahead.passed(ids, at, grasps, np.where(bad, np.inf, effort))
         self._goal[ids] = grasps[np.arange(n), self._choice.choose(ids, effort)]
 
     def _choose_of_bank(self, bank: BankedGrasps, ids: Array, at: Array) -> None:
@@ -185,7 +185,7 @@ class DexGrasp(PhasedSkill):
         effort = self.arm.reach(ids, ways.reshape(len(ids), -1, 7))[1].reshape(ways.shape[:3]).max(axis=2)
         bad = (P.rotate(grasps[..., 3:], np.broadcast_to(np.eye(3)[2], (*grasps.shape[:2], 3)))[..., 2]) > STEEPEST
         fit = np.isfinite(effort) & np.isfinite(widths) & ~bad
-        effort = self._ahead.effort(ids, at, grasps, np.where(fit, effort, np.inf))
+        effort = self._ahead.passed(ids, at, grasps, np.where(fit, effort, np.inf))
         fit = np.isfinite(effort)
         chosen = self._choice.choose(ids, np.where(bank.alike(ids, fit), effort, np.inf))
         bank.choose(ids, chosen, ~self._choice.none_left(ids))

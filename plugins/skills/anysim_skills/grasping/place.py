@@ -47,7 +47,8 @@ class Place(PutsDown):
         latency: Latency = LATENCY,
     ) -> None:
         self._target, self._above, self._align, self._tolerance = target, above, align, tolerance
-        self._height = np.zeros(env.num_envs)
+        self._height, self.deep = np.zeros((2, env.num_envs))
+        """(N,) [m] of the object's origin above the target's when it rests there; how far below that it may come."""
         self._shapes = ObjectShapes(env.scene, object)
         self._support = env.scene.entity_shape(target.name.partition(".")[0]) if _is_entity(env, target) else None
         self._plans = bool(planner)
@@ -61,7 +62,7 @@ class Place(PutsDown):
         )
         return (
             *(planned if self._plans else ()),
-            Phase("transport", self._measure, self._transport, self.moves.steps),
+            Phase("transport", self.measure, self._transport, self.moves.steps),
             Phase("align", None, self._aligning, 60),
             Phase("lower", None, self._lowering, self.moves.steps),
             *self.let_go(),
@@ -84,7 +85,7 @@ class Place(PutsDown):
 
     def _raise(self, ids: Array, at: Array) -> None:
         """Off what it stands on, so that nothing is touched where the plan begins."""
-        self._measure(ids, at)
+        self.measure(ids, at)
         self.arm.go(ids, self.arm.command[ids] + RAISED, self.moves.speed / 2)
 
     def _raising(self, ids: Array, at: Array) -> Array:
@@ -99,7 +100,7 @@ class Place(PutsDown):
     def _planned(self, ids: Array, at: Array) -> Array:
         return self.held(ids, at, self.arm.planned(ids))
 
-    def _measure(self, ids: Array, at: Array) -> None:
+    def measure(self, ids: Array, at: Array) -> None:
         """How high the object's origin is to be above the target's when it rests there."""
         self.take(ids, at)
         pose = self.object.root.pose[at]
@@ -110,7 +111,7 @@ class Place(PutsDown):
             on = self._support.bounds(target)[1][..., 2] - target[:, 2]
         self._height[ids] = below + on
 
-    def _goal(self, ids: Array, at: Array, above: float) -> Array:
+    def _goal(self, ids: Array, at: Array, above: float | Array) -> Array:
         """Tool poses (n, 7) at which the object is over the target, with the loop closed on where it is."""
         thing, target = self.object.root.position[at], self._target.position[at]
         place = target + (self.arm.tool.position[at] - thing)
@@ -138,9 +139,11 @@ class Place(PutsDown):
         return self.held(ids, at, np.where(ready | (self.steps[ids] >= 50), GO_ON, STAY))
 
     def _lowering(self, ids: Array, at: Array) -> Array:
-        goal = self._goal(ids, at, -2 * GENTLE)  # beyond contact, which is what ends it
+        goal = self._goal(ids, at, -2 * GENTLE - self.deep[ids])  # beyond contact, which is what ends it
         self.arm.go(ids, goal, self.moves.lower_speed, GENTLE)
-        low = self.object.root.position[at, 2] - self._target.position[at, 2] - self._height[ids] < 0.001
+        low = (
+            self.object.root.position[at, 2] - self._target.position[at, 2] - self._height[ids] + self.deep[ids] < 0.001
+        )
         down = (self.steps[ids] >= 5) & (self.arm.touching(ids, at) | low)
         return self.held(ids, at, np.where(down, GO_ON, STAY))
 

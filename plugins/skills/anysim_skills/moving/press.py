@@ -107,9 +107,13 @@ class Press(PhasedSkill):
 
     def _press(self, ids: Array, at: Array) -> Array:
         self.arm.go(ids, self._at(at, self._turn[ids], -self._beyond), self._press_speed, 0.04)
-        self._held[ids] = (self._held[ids] + 1) * (self._part.opening[at] >= self._fraction)
+        self._held[ids] = (self._held[ids] + 1) * self.pressed(at)
         missed = (self.steps[ids] >= 20) & self.arm.arrived(ids, at)
         return np.where(self._held[ids] >= self._hold, GO_ON, np.where(missed, _MISSED, STAY))
+
+    def pressed(self, at: Array) -> Array:
+        """(n,) bool: the part has moved far enough."""
+        return self._part.opening[at] >= self._fraction
 
     def _retreat(self, ids: Array, at: Array) -> Array:
         self.arm.go(ids, self._at(at, self._turn[ids], self._clear), self._speed)

@@ -111,7 +111,7 @@ class GraspSide(PhasedSkill):
         deep = np.concatenate([-low[:, :2], high[:, :2]], axis=1) > FINGER  # towards a hand that comes along +x, ...
         misfits = np.repeat(wide | deep, len(SLOPES), axis=1)
         effort = self.arm.reach(ids, targets.reshape(len(ids), -1, 7))[1].reshape(targets.shape[:3]).max(axis=2)
-        effort = self._ahead.effort(ids, at, grasps, np.where(misfits, np.inf, effort))
+        effort = self._ahead.passed(ids, at, grasps, np.where(misfits, np.inf, effort))
         self._turn[ids] = turns[np.arange(len(ids)), self._choice.choose(ids, effort)]
 
     def _chosen(self, ids: Array, at: Array) -> Array:
