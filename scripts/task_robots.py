@@ -4,9 +4,9 @@
     python scripts/task_robots.py --measure [TASK …]
 
 `--measure` evaluates the expert with each alternate that is new or has changed, one at a time, short tasks first: on
-MuJoCo, and those of `EVERYWHERE` on all engines. It goes on where it was cut off: finished ones are in the JSON file, the
-episodes of the one at hand in runs/robots. Alternates whose files are not installed keep what was measured elsewhere.
-`--check` writes nothing and exits with 1 if the page has drifted.
+MuJoCo, and those of `EVERYWHERE` on all engines. It goes on where it was cut off: finished ones are in the JSON file,
+the episodes of the one at hand in runs/robots. Alternates whose files are not installed keep what was measured
+elsewhere. `--check` writes nothing and exits with 1 if the page has drifted.
 """
 
 import json
