@@ -103,6 +103,7 @@ check-tables:
 	$(BIN)/python scripts/benchmark_table.py --check
 	$(BIN)/python scripts/task_gallery.py --check
 	$(BIN)/python scripts/task_pages.py --check
+	$(BIN)/python scripts/task_robots.py --check
 	$(BIN)/python scripts/install_sizes.py --check
 check-types:
 	$(BIN)/pyright

@@ -122,7 +122,7 @@ def evaluated(cell: Cell, spec: str) -> list[int]:
     """What `anysim evaluate` says of it."""
     folder, count = RUNS / cell.task / spec[:12] / cell.policy, EPISODES[cell.policy]
     words = ["evaluate", cell.task, "--policy", cell.policy, "--engine", cell.engine, "--split", SPLIT]
-    _anysim(*words, "--episodes", str(count), "--out", str(folder))
+    run_anysim(*words, "--episodes", str(count), "--out", str(folder))
     told: Figures = json.loads((folder / "evaluation.json").read_text("utf-8"))
     found = told["engines"][cell.engine]
     return [found["successes"], found["attempts"], found["faults"]]
@@ -135,11 +135,12 @@ def draw(name: str, path: Path) -> None:
         words = ["picture", name, "--engines", ",".join(ENGINES), "-n", "1", "--seed", "1"]
         on_table = {"cabinet", "table"} <= set(load(name).spec.world.objects)
         view = ["-o", f"world.cameras.front={ABOVE}"] if on_table else []
-        _anysim(*words, *view, "--size", str(WIDTH), str(HEIGHT), "--out", str(whole))
+        run_anysim(*words, *view, "--size", str(WIDTH), str(HEIGHT), "--out", str(whole))
         Image.open(whole).convert("RGB").save(path, quality=75, optimize=True)
 
 
-def _anysim(*words: str) -> None:
+def run_anysim(*words: str) -> None:
+    """A command of anysim, quietly."""
     subprocess.run([str(Path(sys.executable).with_name("anysim")), *words], check=True, stdout=subprocess.DEVNULL)
 
 
@@ -158,7 +159,7 @@ def page() -> str:
         expert = f"`{task.expert.skill}`" if task.expert else f"{len(commands)} commands" if commands else "none"
         robots = ", ".join(dict.fromkeys(one.robot for one in spec.world.robots.values()))
         figures = known.get(name, {})
-        solved = [_rate(figures.get("expert", {}).get(engine)) for engine in ENGINES]
+        solved = [rate(figures.get("expert", {}).get(engine)) for engine in ENGINES]
         chance = _chance(figures.get("random", {}))
         rows.append([f"[`{name}`](#{name})", difficulty(name), robots, str(task.horizon), expert, *solved, chance])
         if folder.parent.name != family:
@@ -171,7 +172,7 @@ def page() -> str:
     return "\n\n".join([table(columns, rows), *parts])
 
 
-def _rate(found: list[int] | None) -> str:
+def rate(found: list[int] | None) -> str:
     """A count with Wilson's interval in percent."""
     if found is None:
         return "-"
@@ -182,7 +183,7 @@ def _rate(found: list[int] | None) -> str:
 
 def _chance(found: dict[str, list[int]]) -> str:
     if len({found[engine][1] for engine in found}) != 1:
-        return " / ".join(_rate(found.get(engine)) for engine in ENGINES)
+        return " / ".join(rate(found.get(engine)) for engine in ENGINES)
     counts = (str(found[engine][0]) if engine in found else "-" for engine in ENGINES)
     return f"{' / '.join(counts)} of {next(iter(found.values()))[1]}"
 

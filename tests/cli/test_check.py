@@ -104,3 +104,12 @@ def test_success_that_is_worth_less_than_going_on_is_warned_of() -> None:
     assert "`reward: 390` or more" in warning
     endless = report_on("pick_cube", None, False, ["task.success.at_goal.reward=10", "task.on_success=continue"])
     assert not any("task.success" in w for w in (*endless.warnings, *report_on("pick_cube", None, False, []).warnings))
+
+
+def test_the_alternates_of_a_file_are_checked_and_not_those_of_what_it_extends(tmp_path: Path) -> None:
+    path = tmp_path / "a.yaml"
+    path.write_text("extends: task:pick_cube\nworld: {contact_sensors: {left: {body: panda.panda_leftfinger}}}\n")
+    assert report_on(str(path), None, False, []).faults == []
+    path.write_text(path.read_text() + "alternates: {ur5_gripper: {}}\n")
+    (fault,) = report_on(str(path), None, False, []).faults
+    assert "'panda' has no link or tool 'panda_leftfinger'" in fault

@@ -226,6 +226,7 @@ def test_list_tasks_says_what_each_is() -> None:
     assert (cube["family"], cube["horizon"], cube["expert"]) == ("tabletop", 400, "pick")
     assert cube["robots"] == ["franka_panda"]
     assert cube["levels"] == ["L0", "L1", "L2"]
+    assert cube["alternates"] == ["ur5_gripper", "xarm7_gripper", "z1", "so101"]
     assert rows["put_away"]["expert"] == "commands"
     assert rows["turn_faucet"]["family"] == "contact_rich"
     assert Path(cube["picture"]).is_file()

@@ -148,15 +148,22 @@ def _report_on(
     faults = [*map(str, past), *(refused if len(refused) == len(answers) else [])]
     spec = loaded.spec
     choices = [f"level={level}" for level in spec.levels] if spec.level is None else []
-    choices += [] if spec.robot else [f"robot={robot}" for robot in spec.alternates if _is_here(robot)]
+    choices += [] if spec.robot else [f"robot={robot}" for robot in spec.alternates if _is_own(robot, loaded)]
     return Report(faults, () if past else answers, warnings, world), tuple(choices)
 
 
-def _is_here(robot: str) -> bool:
-    """Whether the files of an alternate are installed; what is no robot at all is to be told."""
+def _is_own(robot: str, loaded: "LoadedRun") -> bool:
+    """Whether an alternate is the file's own, and installed; what is no robot at all is to be told.
+
+    One of a file that is extended is for that file: this one may have made it a task of a single robot.
+    """
+    from anysim.api import place_of
     from anysim.assets.catalogue import load_robot, missing_source
     from anysim.errors import AnysimError
 
+    file = Path(place_of(loaded, f"alternates.{robot}").rsplit(":", 2)[0])
+    if not loaded.files or file.resolve() != loaded.files[-1].resolve():
+        return False
     try:
         return not missing_source(load_robot(robot))
     except AnysimError:
