@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.geometry.tessellate import convex_hull
+from anysim.geometry.triangles import convex_hull
 from anysim.math import pose as P
 from anysim.model.world import (
     Body,

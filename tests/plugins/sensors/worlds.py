@@ -3,7 +3,7 @@
 import numpy as np
 
 from anysim.conventions import Array
-from anysim.geometry.tessellate import convex_hull
+from anysim.geometry.triangles import convex_hull
 from anysim.math import pose as P
 from anysim.model.world import Box, Capsule, Cylinder, Mesh, MeshShape, Quat, Shape, Sphere, Vec3, World
 from anysim.testing.sketch import Sketch, inertial
