@@ -42,7 +42,7 @@ WORDS = {
     "pybullet": "the engine PyBullet",
     "robots": "the robot catalogue with its files, `anysim robot`, `anysim gallery`",
     "sapien": "the engine SAPIEN",
-    "sensors": "IMUs, forces, wrist sensors, tracked frames; LiDARs, height scans, depth, occupancy, equal on every engine",
+    "sensors": "IMUs, forces, tracked frames; LiDARs, height scans, depth, occupancy, equal on every engine",
     "sharded": "worker processes: `engine: {name: pybullet, shards: 2}`",
     "skills": "scripted solutions: grasp, place, push, press, open, close, insert, hand over",
     "tasks": "tasks on tables, with tight fits, hands, mobile bases and legs, with their experts",

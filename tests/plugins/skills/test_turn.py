@@ -1,5 +1,7 @@
 """The skill turn on real engines: a lever, a wheel more than half round, and one that is stuck."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -53,5 +55,32 @@ def test_what_slides_is_not_turned() -> None:
     with (
         make(WORLDS / "open_drawer.yaml", engine="mujoco", overrides=["task.expert=null", expert]) as env,
         pytest.raises(TaskError, match=r"'cabinet\.drawer_1' does not turn, it is a prismatic joint"),
+    ):
+        SkillPolicy(env)
+
+
+def test_a_wheel_is_turned_to_a_position_and_back() -> None:
+    """Whichever way that is: there counterclockwise, back clockwise."""
+    there, back = ({"do": "turn_to", "robot": "panda", "part": "valve.wheel", "position": p} for p in (1.2, 0.4))
+    commands = f"collect={json.dumps({'commands': [there, back]})}"
+    words = [*WHEEL[:2], f"{VALVE}.limits=null", "task.success=null", "task.expert=null", commands]
+    with make(WORLDS / "turn_valve.yaml", engine="mujoco", num_envs=2, overrides=words) as env:
+        wheel = [joint.name for joint in env.engine.world.joints].index("valve.wheel")
+        env.reset(seed=4)
+        policy = SkillPolicy(env)
+        policy.begin(np.arange(2))
+        most = np.zeros(2)
+        for _ in range(650):
+            env.step(policy.act(np.arange(2)))
+            most = np.maximum(most, env.engine.get_state().joint_pos[:, wheel])
+        assert most == pytest.approx([1.2, 1.2], abs=0.15)
+        assert env.engine.get_state().joint_pos[:, wheel] == pytest.approx([0.4, 0.4], abs=0.15)
+
+
+def test_a_position_beyond_the_limits_is_refused() -> None:
+    expert = "task.expert={skill: turn_to, robot: panda, part: valve.wheel, position: 2.5}"
+    with (
+        make(WORLDS / "turn_valve.yaml", engine="mujoco", overrides=["task.expert=null", expert]) as env,
+        pytest.raises(TaskError, match=r"'valve\.wheel' turns from 0 to 2 rad, not to 2\.5"),
     ):
         SkillPolicy(env)

@@ -1,5 +1,6 @@
-"""Turn: push a lever, a valve or a tap round its axis with the closed fingers."""
+"""Turn and TurnTo: push a lever, a valve or a tap round its axis with the closed fingers."""
 
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Annotated, ClassVar
 
@@ -31,8 +32,8 @@ PROGRESS = 0.03
 """[rad]"""
 
 
-class Turn(PhasedSkill):
-    """Turn `part` by `angle` with the closed fingers of `robot`, which push at its frame `<part>.handle`.
+class TurnsPart(PhasedSkill):
+    """Turns `part` with the closed fingers of `robot`, which push at its frame `<part>.handle`.
 
     That frame's z is along the axis, away from what the part is mounted on, and its x points away from the axis. The
     fingers go in beside the lever or spoke that ends there, and round with it, however far: the hand does not turn. A
@@ -47,9 +48,6 @@ class Turn(PhasedSkill):
         *,
         robot: RobotView,
         part: JointView,
-        angle: Annotated[
-            float, Field(description="[rad] from where the part is; negative is clockwise about the axis")
-        ],
         tool: str = "tool",
         solver: str = "numba_ik",
         inset: Annotated[
@@ -68,20 +66,29 @@ class Turn(PhasedSkill):
                 f"'{part.name}' does not turn, it is a {part.found[0].type.value} joint; `open` moves a slide"
             )
         self.arm = Arm.of(env, robot, tool=tool, solver=solver)
-        self.part = JointedPart(env.scene, part)
+        self.part, self.joint = JointedPart(env.scene, part), part.found[0]
         self.handle = self.part.handle()
-        self._angle, self._way = angle, float(np.sign(angle))
         self._inset, self._beside, self._clear = inset, beside, clear
         self._speed, self._part_speed, self._lead = speed, part_speed, lead
         self._tolerance, self._late = tolerance, steps
         n = env.num_envs
         self._choice, self._turn, self._goal = Choice(n, YAWS), np.zeros((n, 4)), np.zeros(n)
+        self._way = np.ones(n)
+        """Where the goal is from where the part was: 1 counterclockwise about the axis, -1 clockwise."""
         self._left, self._since = np.zeros(n), np.zeros(n, dtype=np.int64)
         """What was left of the angle at the last progress, and the control steps since then."""
         super().__init__(env, [self.arm])
 
+    @abstractmethod
+    def furthest(self) -> float:
+        """[rad] that the part has to be turned at most."""
+
+    @abstractmethod
+    def aim(self, at: Array) -> Array:
+        """(n,) [rad] where the part is to be, in envs in which that is not yet known."""
+
     def make_phases(self) -> Sequence[Phase]:
-        arc = int(self._late + abs(self._angle) * 100)
+        arc = int(self._late + self.furthest() * 100)
         return (
             Phase("rise", self._withdraw, self._withdrawing, self._late),
             Phase("choose", self._choose, self._chosen, 1),
@@ -120,9 +127,9 @@ class Turn(PhasedSkill):
         places = self.part.moved(at, np.repeat(push[:, None], turns.shape[1], axis=1), ahead)[..., :3]
         return np.concatenate([places, turns], axis=-1)
 
-    def _back(self, at: Array) -> Array:
+    def _back(self, ids: Array, at: Array) -> Array:
         """(n,) [rad] of the part that are as far as the fingers keep from it."""
-        return -self._way * self._beside / self._radius(at)
+        return -self._way[ids] * self._beside / self._radius(at)
 
     def _radius(self, at: Array) -> Array:
         """(n,) [m] from the axis to where is pushed."""
@@ -147,10 +154,11 @@ class Turn(PhasedSkill):
     def _choose(self, ids: Array, at: Array) -> None:
         self.arm.closed[ids] = True
         new = np.isnan(self._goal[ids])  # a retry goes on to the same goal
-        self._goal[ids[new]] = self.part.position(at[new]) + self._angle
+        self._goal[ids[new]] = self.aim(at[new])
         to_go = self._goal[ids] - self.part.position(at)
+        self._way[ids[new]] = np.where(to_go[new] < 0.0, -1.0, 1.0)
         turns = turns_against(self.handle.quaternion[at], YAWS)
-        back = self._back(at)
+        back = self._back(ids, at)
         stations = [self._beside_it(at, turns, np.repeat(back[:, None], YAWS, axis=1), self._clear)]
         for share in np.linspace(0.0, 1.0, STATIONS):
             stations.append(self._beside_it(at, turns, np.repeat((share * to_go)[:, None], YAWS, axis=1), 0.0))
@@ -162,11 +170,11 @@ class Turn(PhasedSkill):
         return np.where(self._choice.none_left(ids), _NO_IK, GO_ON)
 
     def _approach(self, ids: Array, at: Array) -> Array:
-        self.arm.go(ids, self._one(ids, at, self._back(at), self._clear), self._speed)
+        self.arm.go(ids, self._one(ids, at, self._back(ids, at), self._clear), self._speed)
         return np.where(self.arm.arrived(ids, at), GO_ON, STAY)
 
     def _descend(self, ids: Array, at: Array) -> Array:
-        self.arm.go(ids, self._one(ids, at, self._back(at)), self._speed / 2)
+        self.arm.go(ids, self._one(ids, at, self._back(ids, at)), self._speed / 2)
         there = self.arm.arrived(ids, at, 0.008, 0.06)
         held_up = (self.steps[ids] >= 10) & self.arm.touching(ids, at)
         return np.where(there, GO_ON, np.where(held_up, _COLLISION, STAY))
@@ -177,8 +185,8 @@ class Turn(PhasedSkill):
 
     def _turning(self, ids: Array, at: Array) -> Array:
         """Along the arc, ahead of where the part is by as much as the lead allows."""
-        to_go = self._way * (self._goal[ids] - self.part.position(at))
-        ahead = self._way * np.clip(to_go + 0.1, 0.0, self._lead / self._radius(at))
+        to_go = self._way[ids] * (self._goal[ids] - self.part.position(at))
+        ahead = self._way[ids] * np.clip(to_go + 0.1, 0.0, self._lead / self._radius(at))
         self.arm.go(ids, self._one(ids, at, ahead), self._part_speed, self._lead)
         on = to_go < self._left[ids] - PROGRESS
         self._left[ids] = np.where(on, to_go, self._left[ids])
@@ -187,12 +195,55 @@ class Turn(PhasedSkill):
 
     def _step_back(self, ids: Array, at: Array) -> Array:
         """Off the lever, so that it stays where it is when the hand leaves."""
-        self.arm.go(ids, self._one(ids, at, self._back(at)), self._speed / 2)
+        self.arm.go(ids, self._one(ids, at, self._back(ids, at)), self._speed / 2)
         return np.where(self.arm.arrived(ids, at, 0.01, 0.1) | (self.steps[ids] >= 50), GO_ON, STAY)
 
     def succeeded(self, env_ids: Array, at: Array) -> Array:
-        missing = self._way * (self._goal[env_ids] - self.part.position(at))
+        missing = self._way[env_ids] * (self._goal[env_ids] - self.part.position(at))
         return np.where(missing <= self._tolerance, GO_ON, _LOST)
+
+
+class Turn(TurnsPart):
+    """Turn `part` by `angle` with the closed fingers of `robot`, which push at its frame `<part>.handle`."""
+
+    def __init__(
+        self,
+        env: TaskEnv,
+        *,
+        angle: Annotated[
+            float, Field(description="[rad] from where the part is; negative is clockwise about the axis")
+        ],
+        **options: object,
+    ) -> None:
+        self._angle = angle
+        super().__init__(env, **options)  # pyright: ignore[reportArgumentType]
+
+    def furthest(self) -> float:
+        return abs(self._angle)
+
+    def aim(self, at: Array) -> Array:
+        return self.part.position(at) + self._angle
+
+
+class TurnTo(TurnsPart):
+    """Turn `part` to `position` with the closed fingers of `robot`, whichever way that is."""
+
+    def __init__(
+        self, env: TaskEnv, *, position: Annotated[float, Field(description="[rad] of the joint")], **options: object
+    ) -> None:
+        self._position = position
+        super().__init__(env, **options)  # pyright: ignore[reportArgumentType]
+        low, high = self.joint.lower, self.joint.upper
+        if not low <= position <= high:
+            raise TaskError(f"'{self.joint.name}' turns from {low:.4g} to {high:.4g} rad, not to {position:.4g}")
+
+    def furthest(self) -> float:
+        """Where the joint has no limits, a turn more than to there from zero."""
+        ends = np.array([self.joint.lower, self.joint.upper])
+        return float(np.where(np.isfinite(ends), abs(ends - self._position), abs(self._position) + 2 * np.pi).max())
+
+    def aim(self, at: Array) -> Array:
+        return np.full(len(at), self._position)
 
 
 _NO_IK, _COLLISION = OUTCOMES.index(Outcome.NO_IK), OUTCOMES.index(Outcome.COLLISION)
