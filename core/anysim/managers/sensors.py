@@ -32,7 +32,7 @@ class _Channel:
     def __init__(self, name: str, spec: SensorSpec, sensor: Sensor, every: int, streams: Streams, who: str) -> None:
         self.sensor, self.every = sensor, every
         self._name, self._spec, self._streams = name, spec, streams
-        self._blame = registry.Blame(who, registry.origin(sensor), prefix=True)
+        self.blame = registry.Blame(who, registry.origin(sensor), prefix=True)
         self.fields = {**sensor.fields, **EVERY_SENSOR}
         stops = np.cumsum([prod(field.shape) for field in self.fields.values()]).tolist()
         self.columns = dict(zip(self.fields, map(slice, [0, *stops], stops), strict=False))
@@ -60,20 +60,15 @@ class _Channel:
         for noise in self._noise.values():
             noise.reset(env_ids)
 
-    def begin(self, env_ids: Array) -> None:
-        """The scene has settled, and the first reading is next."""
-        with self._blame:
-            self.sensor.reset(env_ids)
-
     def take(self, env_ids: Array, ticks: Array, time: Array) -> None:
         """A reading of these envs, at their control steps (n,) and times (n,) [s]."""
-        with self._blame:
+        with self.blame:
             values = self.sensor.read(env_ids)
         fields = self.sensor.fields
         found = {key: np.shape(value) for key, value in values.items()}
         if found != {key: (len(env_ids), *field.shape) for key, field in fields.items()}:
             expected = {key: field.shape for key, field in fields.items()}
-            raise TaskError(f"{self._blame.who} reads {found} of {len(env_ids)} envs; of one its fields are {expected}")
+            raise TaskError(f"{self.blame.who} reads {found} of {len(env_ids)} envs; of one its fields are {expected}")
         rows = np.empty((len(env_ids), self.latest.shape[1]))
         for key, field in fields.items():
             value = np.asarray(values[key], dtype=np.float64).reshape(len(env_ids), -1)
@@ -132,15 +127,12 @@ class SensorManager(Manager):
     def attach(
         self, make: Callable[[str, Mapping[str, object], str], Sensor], look: Callable[[Array | None], None]
     ) -> None:
-        """Have the sensors made, and read each once to see that it does.
+        """Have the sensors made (of a kind, with parameters, at a path of the spec), and read each once as a trial.
 
-        Args:
-            make: takes the kind of a sensor, its parameters, and its path in the spec.
-            look: turns the scene to some envs, or to all.
+        `look` turns the scene to some envs, or to all.
 
         Raises:
             SpecError: at their keys, what is wrong with parameters and noise.
-            TaskError: a reading is not of the fields that the sensor declares.
         """
         self._look, issues = look, list[SpecIssue]()
         for name, spec in self._specs.items():
@@ -173,7 +165,8 @@ class SensorManager(Manager):
     def begin(self, env_ids: Array) -> None:
         """The first readings of episodes, of the settled scene, which looks at these envs."""
         for channel in self._channels.values():
-            channel.begin(env_ids)
+            with channel.blame:
+                channel.sensor.reset(env_ids)
         self.sample(env_ids)
 
     def sample(self, env_ids: Array) -> None:
