@@ -49,7 +49,12 @@ def test_help_loads_no_more_than_typer_and_the_commands(words: list[str]) -> Non
     assert not sorted(found & (NEVER | unwanted))
     plugins = {name for name in found if name.startswith("anysim_") and "." in name}
     assert plugins, "the plugins' commands are there"
-    assert {name.split(".")[1] for name in plugins} <= {"commands", "cli", "errors"}
+    assert {name.split(".")[1] for name in plugins} <= {
+        "commands",
+        "cli",
+        "errors",
+        "mixture",
+    }  # of an option's choices
 
 
 def test_a_version_searches_nothing() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import anysim
-from anysim.cli.check import check_one
+from anysim.cli.check import report_on
 from anysim.errors import AnysimError, SnapshotError
 from anysim.record.collector import Collector
 from anysim.record.reader import open_trajectory
@@ -265,7 +265,7 @@ world:
 def test_a_wrong_declaration_is_told_with_its_place(text: str, place: str, words: str, tmp_path: Path) -> None:
     path = tmp_path / "world.yaml"
     path.write_text(WORLD % text)
-    faults = check_one(str(path), engine=None, all_engines=False, overrides=[])
+    faults = report_on(str(path), engine=None, all_engines=False, overrides=[]).faults
     assert any(f"world.yaml:{place}: " in fault and words in fault for fault in faults), faults
 
 

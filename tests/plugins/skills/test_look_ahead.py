@@ -103,7 +103,7 @@ def test_what_leads_nowhere_is_not_begun(phase: str) -> None:
     with make(source, engine="mujoco", overrides=["record.cameras=[]", *overrides]) as env:
         env.reset(seed=2)
         policy = SkillPolicy(env)
-        rollout(env, policy, 400)
+        rollout(env, policy, 1200)
         assert OUTCOMES[policy.skill.outcome[0]] is Outcome.NO_IK, why
         assert policy.describe(0)["phase"] == (phase if phase == "choose" else f"{phase}: choose"), why
 

@@ -55,7 +55,7 @@ def test_what_is_held_is_kept_where_it_cannot_be_put(engine: str) -> None:
         env.reset(seed=3)
         policy, homes = SkillPolicy(env), []
         # the cube is grasped without a look ahead at where it goes
-        policy.skill.members[0]._then = None  # type: ignore[attr-defined]
+        policy.skill.members[0]._ahead.then = None  # type: ignore[attr-defined]
 
         def look(phase: str) -> None:
             if phase == "place: go home":
