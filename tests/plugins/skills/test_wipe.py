@@ -25,7 +25,7 @@ def wiped(engine: str, num_envs: int, *overrides: str) -> tuple[list[Outcome], A
         policy, ids = SkillPolicy(env), np.arange(num_envs)
         policy.begin(ids)
         patch, sponge = env.scene.goals["patch"][:, :2], env.engine.index.body("sponge")
-        for _ in range(1200):
+        for _ in range(3000):
             if (policy.skill.outcome != 0).all():
                 break
             env.step(policy.act(ids))
@@ -57,6 +57,6 @@ def test_a_patch_is_wiped_on_the_other_engines(engine: str) -> None:
 
 @pytest.mark.slow
 def test_a_patch_in_the_air_is_not_wiped() -> None:
-    outcomes, covered, _ = wiped("mujoco", 1, "task.command.patch.height=0.15")
+    outcomes, covered, _ = wiped("mujoco", 1, "task.command.patch.height=0.15", "task.horizon=3000")
     assert outcomes == [Outcome.MISSED_CONTACT]
     assert covered.max() == 0.0
