@@ -117,6 +117,7 @@ def test_straight_lines_and_separate_plans_make_them_collide() -> None:
         assert driven(env, arms, STEPS)[1].any()
 
 
+@pytest.mark.slow
 def test_neither_workers_nor_other_envs_change_what_they_do(monkeypatch: pytest.MonkeyPatch) -> None:
     seen = []
     for num_envs, workers in ((4, "1"), (4, "2"), (16, "2")):
