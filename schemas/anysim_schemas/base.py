@@ -80,6 +80,8 @@ Integer = Annotated[int, Strict()]
 Flag = Annotated[bool, Strict()]
 
 Whole = Annotated[int, Strict(), Field(ge=0)]
+Delay = Annotated[int, Strict(), Field(ge=0, le=10_000)]
+"""Control steps, each of which keeps what is late in every env."""
 Degrees = Annotated[float, Strict(), Field(gt=1, lt=170)]
 """A field of view."""
 Positive = Annotated[float, Strict(), Field(gt=0)]

@@ -7,7 +7,7 @@ from pydantic import Field, field_validator
 from anysim_schemas.base import Flag, Spec
 from anysim_schemas.dynamics import RobotDynamicsSpec
 from anysim_schemas.plugin import PluginSlot
-from anysim_schemas.values import FloatValue, NonNegativeValue, Vec3Value, WholeValue, unshared
+from anysim_schemas.values import DelayValue, FloatValue, NonNegativeValue, Vec3Value, unshared
 
 
 class ActionSpec(Spec):
@@ -25,7 +25,7 @@ class ActionSpec(Spec):
         default=None,
         description="drawn anew at each control step and added to each component of the action, within its bounds",
     )
-    delay: WholeValue = Field(
+    delay: DelayValue = Field(
         default=0, description="control steps from an action to its effect; until the first one the robot holds still"
     )
 

@@ -6,7 +6,7 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from anysim_schemas.base import Fraction, Name, NonNegative, Positive, Reference, Spec
 from anysim_schemas.errors import KeyFault
-from anysim_schemas.values import FloatValue, WholeValue, unshared
+from anysim_schemas.values import DelayValue, FloatValue, unshared
 
 
 class SensorNoiseSpec(Spec):
@@ -56,7 +56,7 @@ class SensorSpec(Spec):
     rate: Positive | None = Field(
         default=None, description="readings per second, each of whole control steps; each control step if not given"
     )
-    delay: WholeValue = Field(
+    delay: DelayValue = Field(
         default=0, description="control steps by which readings are late; the first stands in until then"
     )
     dropout: Fraction = Field(

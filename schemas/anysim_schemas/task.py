@@ -7,7 +7,7 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 from anysim_schemas.base import Flag, Fraction, Integer, Name, NamedByKey, Number, Positive, Spec
 from anysim_schemas.cameras import Channel
 from anysim_schemas.errors import KeyFault
-from anysim_schemas.values import FloatValue, WholeValue, unshared
+from anysim_schemas.values import DelayValue, FloatValue, unshared
 
 
 class TermSpec(Spec):
@@ -43,7 +43,7 @@ class ObservationTermSpec(TermSpec):
     bias: FloatValue | None = Field(
         default=None, description="drawn once an episode for each number of the term, and added to it"
     )
-    delay: WholeValue = Field(
+    delay: DelayValue = Field(
         default=0, description="control steps by which the term is late; the first observation stands in until then"
     )
 

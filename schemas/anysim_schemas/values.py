@@ -13,6 +13,7 @@ from anysim_schemas.base import (
     Bounce,
     Color,
     Degrees,
+    Delay,
     Density,
     Flag,
     Fraction,
@@ -25,7 +26,6 @@ from anysim_schemas.base import (
     Scale,
     Spec,
     Vec3,
-    Whole,
 )
 from anysim_schemas.errors import KeyFault
 
@@ -57,7 +57,7 @@ def _check_order(low: object, high: object, what: str) -> None:
 _LABELS: tuple[tuple[Any, str], ...] = (
     (Number, "number"), (Positive, "positive"), (NonNegative, "non_negative"), (Fraction, "fraction"),
     (Bounce, "bounce"), (Scale, "scale"), (Mass, "mass"), (Density, "density"),
-    (Vec3, "vector"), (Color, "color"), (Whole, "whole"), (Flag, "flag"), (Degrees, "degrees"), (Word, "word"),
+    (Vec3, "vector"), (Color, "color"), (Delay, "delay"), (Flag, "flag"), (Degrees, "degrees"), (Word, "word"),
 )  # fmt: skip
 
 
@@ -224,7 +224,7 @@ BounceValue = Value[Bounce]
 ScaleValue = Value[Scale]
 MassValue = Value[Mass]
 DensityValue = Value[Density]
-WholeValue = Value[Whole]
+DelayValue = Value[Delay]
 
 if TYPE_CHECKING:
     FlagValue = bool | Choice[bool]
