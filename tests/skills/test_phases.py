@@ -49,9 +49,9 @@ class Scripted(PhasedSkill):
 
         return [Phase("let go", None, lambda ids, at: np.full(len(ids), GO_ON), 1), Phase("home", None, home, 5)]
 
-    def anew(self, env: int) -> int:
-        self.log.append(f"anew {env}")
-        return 0
+    def anew(self, env_ids: Array) -> None:
+        super().anew(env_ids)
+        self.log.extend(f"anew {env}" for env in env_ids.tolist())
 
     def retry(self, rung: Rung, env: int) -> int | None:
         del env

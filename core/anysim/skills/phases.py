@@ -170,6 +170,8 @@ class PhasedSkill(MovingSkill):
     """
 
     first_rungs: ClassVar[Mapping[Outcome, Rung]] = FIRST_RUNGS
+    first: ClassVar[int] = 0
+    """The phase that it begins with; those before are on the way back from a failure."""
 
     def __init__(self, env: TaskEnv, movers: Sequence[Mover] = ()) -> None:
         super().__init__(env)
@@ -199,10 +201,12 @@ class PhasedSkill(MovingSkill):
         del env, failure
         return True
 
-    def anew(self, env: int) -> int:
-        """Forget what was given up in an env that has recovered; the phase that it starts anew with."""
-        del env
-        return 0
+    def forget(self, env_ids: Array) -> None:
+        """Nothing has been given up in these envs, where it begins, or starts anew."""
+
+    def anew(self, env_ids: Array) -> None:
+        """These envs have recovered, and start anew."""
+        self.forget(env_ids)
 
     def retry(self, rung: Rung, env: int) -> int | None:
         """Prepare another try of an env on a rung below RECOVER, whose phases do that.
@@ -223,7 +227,8 @@ class PhasedSkill(MovingSkill):
         self.used[env_ids] = 0
         for i in env_ids.tolist():
             self.climbs[i] = ()
-        self._go(env_ids, 0)
+        self.forget(env_ids)
+        self._go(env_ids, self.first)
 
     def decide(self, ids: Array, at: Array) -> None:
         for number, phase in enumerate(self.table):
@@ -251,7 +256,8 @@ class PhasedSkill(MovingSkill):
             if number + 1 < len(self.table):
                 self._go(ids, number + 1)
             else:
-                self._go(ids, np.array([self.anew(env) for env in ids.tolist()]))
+                self.anew(ids)
+                self._go(ids, self.first)
             return
         said = self.succeeded(ids, at)
         done = said == GO_ON
@@ -259,7 +265,7 @@ class PhasedSkill(MovingSkill):
         for env, code in zip(ids[~done].tolist(), said[~done].tolist(), strict=True):
             self._climb(env, OUTCOMES[code])
 
-    def _go(self, ids: Array, phase: int | Array) -> None:
+    def _go(self, ids: Array, phase: int) -> None:
         self.phase[ids], self.steps[ids] = phase, 0
 
     def _recovery(self, env: int, failure: Outcome) -> int | None:

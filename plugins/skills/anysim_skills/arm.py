@@ -339,6 +339,10 @@ class Arm(Mover):
         moved[reached] = np.abs(joints[reached] - seeds[reached]).max(axis=1)
         return joints.reshape(n, g, -1), moved.reshape(n, g)
 
+    def effort(self, ids: Array, ways: Array) -> Array:
+        """(n, ...) the largest joint motion to a pose of each of ways (n, ..., m, 7), as of `reach`."""
+        return self.reach(ids, ways.reshape(len(ids), -1, 7))[1].reshape(ways.shape[:-1]).max(axis=-1)
+
     def _base(self, ids: Array) -> Array:
         return self.env.scene.state.body_pose[ids, self.chain.root]
 

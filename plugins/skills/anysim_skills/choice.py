@@ -41,7 +41,7 @@ class Choice:
 
         `excluded` (n, count) bool are not to be chosen. A way counts as much as the pose of it that is furthest off.
         """
-        effort = arm.reach(ids, ways.reshape(len(ids), -1, 7))[1].reshape(ways.shape[:3]).max(axis=2)
+        effort = arm.effort(ids, ways)
         return self.choose(ids, effort if excluded is None else np.where(excluded, np.inf, effort))
 
     def retry(self, rung: Rung, env: int, same: tuple[Rung, ...] = (Rung.RESAMPLE, Rung.BACK_OFF)) -> int | None:

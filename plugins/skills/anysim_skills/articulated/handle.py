@@ -1,6 +1,7 @@
 """A hand at a handle: what opening and closing have in common."""
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, ClassVar
 
@@ -51,6 +52,7 @@ class AtHandle(PhasedSkill):
     least motion; of those of a bank the best that reaches them.
     """
 
+    first = 1
     first_rungs: ClassVar[Mapping[Outcome, Rung]] = {**FIRST_RUNGS, Outcome.JAMMED: Rung.BACK_OFF}
     share: float
     """Where the part is to go."""
@@ -97,10 +99,6 @@ class AtHandle(PhasedSkill):
         if bank is not None:
             self._bank = BankedGrasps(env, self.arm, self.part.owner, bank, living, pinned, self.held.body)
         n = env.num_envs
-        frame = env.engine.index.frame(self.handle.name)
-        grasps = bar_grasps(np.array([[*frame.position, *frame.quaternion]]), self.turns)[0]
-        self._cramped = ~has_room(self.arm, self.part.owner.entities[0], frame.body, grasps, SHORT)
-        """(G,) bool: something is in the way of the open hand, further than it may stop short."""
         self._choice = Choice(n, len(self.turns) if self._bank is None else self._bank.goal_count)
         self._turn = np.zeros((n, 4))
         """The chosen orientation in the handle's frame, where it is of no bank."""
@@ -112,22 +110,18 @@ class AtHandle(PhasedSkill):
         """What was left of the way at the last progress, and the control steps since then."""
         super().__init__(env, [self.arm])
 
-    def start(self, env_ids: Array) -> None:
-        super().start(env_ids)
+    def forget(self, env_ids: Array) -> None:
         self._choice.again(env_ids)
         if self._bank is not None:
             self._bank.start(env_ids)
-        self.phase[env_ids] = 1
 
     def make_recovery(self) -> Sequence[Phase]:
         return Homing(self, self.arm, onto=self.onto, ways=self._all_ways).phases()
 
-    def anew(self, env: int) -> int:
-        self._choice.again(env)
+    def anew(self, env_ids: Array) -> None:
+        super().anew(env_ids)
         if self._bank is not None:
-            self._bank.start(np.array([env]))
-            self._bank.again(env)
-        return 1
+            self._bank.again(env_ids)
 
     def retry(self, rung: Rung, env: int) -> int | None:
         phase = self._choice.retry(rung, env) if self._bank is None else self._next_of_bank(self._bank, rung, env)
@@ -162,6 +156,13 @@ class AtHandle(PhasedSkill):
     def held_part(self) -> Part:
         """What is taken hold of by its handle: the part itself, or what is on it."""
         return self.part
+
+    @cached_property
+    def _cramped(self) -> Array:
+        """(G,) bool: something is in the way of the open hand, further than it may stop short."""
+        frame = self.env.engine.index.frame(self.handle.name)
+        grasps = bar_grasps(np.array([[*frame.position, *frame.quaternion]]), self.turns)[0]
+        return ~has_room(self.arm, self.part.owner.entities[0], frame.body, grasps, SHORT)
 
     def excluded(self, grasps: Array) -> Array | None:
         """(n, G) bool of tool poses (n, G, 7): those that are not to be chosen.
@@ -224,8 +225,7 @@ class AtHandle(PhasedSkill):
         for number, way in enumerate(grasps):
             motion = motion_along(self.arm, ids, at, self._there_and_away(at, way))
             rank[number] = 1.0 * np.isinf(motion[..., -2]) + np.isinf(motion[..., -1]) + 3.0 * ~room[number]
-            stations = self._ways(at, way).reshape(len(ids), -1, 7)
-            effort[number] = self.arm.reach(ids, stations)[1].reshape(*way.shape[:2], -1).max(axis=2)
+            effort[number] = self.arm.effort(ids, self._ways(at, way))
         rank[np.isinf(effort) | (widths > self.arm.aperture - ROOM)] = np.inf
         count = bank.goal_count
         chosen = self._choice.choose(ids, np.arange(count) + count * rank.min(axis=0))

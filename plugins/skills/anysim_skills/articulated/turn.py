@@ -40,6 +40,7 @@ class TurnsPart(PhasedSkill):
     wheel must leave them room between its hub and its rim.
     """
 
+    first = 1
     first_rungs: ClassVar[Mapping[Outcome, Rung]] = {**FIRST_RUNGS, Outcome.JAMMED: Rung.BACK_OFF}
 
     def __init__(
@@ -101,16 +102,13 @@ class TurnsPart(PhasedSkill):
 
     def start(self, env_ids: Array) -> None:
         super().start(env_ids)
-        self._choice.again(env_ids)
         self._goal[env_ids] = np.nan
-        self.phase[env_ids] = 1
+
+    def forget(self, env_ids: Array) -> None:
+        self._choice.again(env_ids)
 
     def make_recovery(self) -> Sequence[Phase]:
         return Homing(self, self.arm, opens=False).phases()
-
-    def anew(self, env: int) -> int:
-        self._choice.again(env)
-        return 1
 
     def retry(self, rung: Rung, env: int) -> int | None:
         return self._choice.retry(rung, env)

@@ -73,9 +73,9 @@ class BankedChoice:
         self._failed(np.array([env])[self._closed[env : env + 1] >= 0])
         return bool(self._left[env] > len(tried))
 
-    def again(self, env: int) -> None:
-        """All candidates of an env may be chosen again."""
-        self._given_up[env] = False
+    def again(self, ids: Array | int) -> None:
+        """All candidates may be chosen again in these envs."""
+        self._given_up[ids] = False
 
     def about(self, env: int) -> dict[str, object]:
         """Which candidate of which bank this is, for records."""

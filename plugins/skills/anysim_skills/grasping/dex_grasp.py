@@ -44,6 +44,8 @@ class DexGrasp(PhasedSkill):
     Those of a bank say where the hand is and by which synergy it closes.
     """
 
+    first = 1
+
     def __init__(
         self,
         env: TaskEnv,
@@ -105,22 +107,18 @@ class DexGrasp(PhasedSkill):
     def foresee(self, following: MovingSkill) -> None:
         self._ahead.foresee(following)
 
-    def start(self, env_ids: Array) -> None:
-        super().start(env_ids)
+    def forget(self, env_ids: Array) -> None:
         self._choice.again(env_ids)
         if self._bank is not None:
             self._bank.start(env_ids)
-        self.phase[env_ids] = 1
 
     def make_recovery(self) -> Sequence[Phase]:
         return Homing(self, self.arm, hand=self.hand).phases()
 
-    def anew(self, env: int) -> int:
-        self._choice.again(env)
+    def anew(self, env_ids: Array) -> None:
+        super().anew(env_ids)
         if self._bank is not None:
-            self._bank.start(np.array([env]))
-            self._bank.again(env)
-        return 1
+            self._bank.again(env_ids)
 
     def retry(self, rung: Rung, env: int) -> int | None:
         """The next candidate where one is left; else away from the object, and all of them again."""
@@ -165,8 +163,8 @@ class DexGrasp(PhasedSkill):
         grasps = self._candidates(ids, at)
         up = np.array([0.0, 0.0, self._lift, 0.0, 0.0, 0.0, 0.0])
         ways = np.stack([_along(grasps, -self._hover), grasps, grasps + up], axis=2)
-        n, g, m = ways.shape[:3]
-        effort = self.arm.reach(ids, ways.reshape(n, g * m, 7))[1].reshape(n, g, m).max(axis=2)
+        n, g = ways.shape[:2]
+        effort = self.arm.effort(ids, ways)
         lowest = self._object.root.position[at, 2] - self._shapes.below(ids, self._object.root.pose[at])
         turn = grasps[..., 3:]
         out, fingers = (P.rotate(turn, np.broadcast_to(np.eye(3)[k], (n, g, 3)))[..., 2] for k in (2, 1))
@@ -182,7 +180,7 @@ class DexGrasp(PhasedSkill):
         grasps, widths = bank.goals(ids, self._object.root.pose[at], self._hover)
         up = np.array([0.0, 0.0, self._lift, 0.0, 0.0, 0.0, 0.0])
         ways = np.stack([_along(grasps, -self._hover), grasps, grasps + up], axis=2)
-        effort = self.arm.reach(ids, ways.reshape(len(ids), -1, 7))[1].reshape(ways.shape[:3]).max(axis=2)
+        effort = self.arm.effort(ids, ways)
         bad = (P.rotate(grasps[..., 3:], np.broadcast_to(np.eye(3)[2], (*grasps.shape[:2], 3)))[..., 2]) > STEEPEST
         fit = np.isfinite(effort) & np.isfinite(widths) & ~bad
         effort = self._ahead.passed(ids, at, grasps, np.where(fit, effort, np.inf))
@@ -239,8 +237,7 @@ class DexGrasp(PhasedSkill):
         self.arm.go(ids, self.arm.command[ids] + up, self._speed / 3)
 
     def _held(self, ids: Array, at: Array, said: Array) -> Array:
-        held = self.arm.holds(ids, at, self._object.root)
-        return np.where(held, said, self._fingers.judged(ids, ~held, _UNSTABLE))
+        return self._fingers.kept(ids, self.arm.holds(ids, at, self._object.root), said)
 
     def _lifting(self, ids: Array, at: Array) -> Array:
         return self._held(ids, at, np.where(self.arm.arrived(ids, at, 0.01, 0.1), GO_ON, STAY))

@@ -52,6 +52,8 @@ def closed(ids: Array, steps: Array, *arms: Arm) -> Array:
 class Grasp(PhasedSkill):
     """Grasp `object` with `robot`, of the candidates the one that needs the least motion; then lift it."""
 
+    first = CHOOSE
+
     def __init__(
         self,
         env: TaskEnv,
@@ -114,22 +116,18 @@ class Grasp(PhasedSkill):
     def foresee(self, following: MovingSkill) -> None:
         self._ahead.foresee(following)
 
-    def start(self, env_ids: Array) -> None:
-        super().start(env_ids)
+    def forget(self, env_ids: Array) -> None:
         self._choice.again(env_ids)
         if self._bank is not None:
             self._bank.start(env_ids)
-        self.phase[env_ids] = CHOOSE
 
     def make_recovery(self) -> Sequence[Phase]:
         return Homing(self, self.arm, ways=self._ways).phases()
 
-    def anew(self, env: int) -> int:
-        self._choice.again(env)
+    def anew(self, env_ids: Array) -> None:
+        super().anew(env_ids)
         if self._bank is not None:
-            self._bank.start(np.array([env]))
-            self._bank.again(env)
-        return CHOOSE
+            self._bank.again(env_ids)
 
     def retry(self, rung: Rung, env: int) -> int | None:
         """Another plan; the next candidate where one is left; else away from the object, and all of them again."""
@@ -165,8 +163,8 @@ class Grasp(PhasedSkill):
         self.arm.closed[ids] = False
         grasps, widths = self._candidates(ids, at)
         targets = np.stack([self._before(grasps), grasps], axis=2)
-        n, g, m = targets.shape[:3]
-        effort = self.arm.reach(ids, targets.reshape(n, g * m, 7))[1].reshape(n, g, m).max(axis=2)
+        n, g = targets.shape[:2]
+        effort = self.arm.effort(ids, targets)
         effort[widths > self.arm.aperture - ROOM] = np.inf
         if self._lift:
             raised = grasps + np.array([0.0, 0.0, self._lift, 0.0, 0.0, 0.0, 0.0])
@@ -247,9 +245,8 @@ class Grasp(PhasedSkill):
         self.arm.go(ids, self.arm.command[ids] + np.array([0, 0, self._lift, 0, 0, 0, 0.0]), self._descend_speed)
 
     def _lifting(self, ids: Array, at: Array) -> Array:
-        held = self.arm.holds(ids, at, self._object.root)
-        lost = self._fingers.judged(ids, ~held, _UNSTABLE)
-        return np.where(~held, lost, np.where(self.arm.arrived(ids, at), GO_ON, STAY))
+        held, there = self.arm.holds(ids, at, self._object.root), self.arm.arrived(ids, at)
+        return self._fingers.kept(ids, held, np.where(there, GO_ON, STAY))
 
     def succeeded(self, env_ids: Array, at: Array) -> Array:
         if not self._lift:

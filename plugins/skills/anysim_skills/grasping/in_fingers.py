@@ -40,6 +40,10 @@ class InFingers:
             said[np.flatnonzero(ended)[self.others(ids[ended])]] = _WRONG
         return said
 
+    def kept(self, ids: Array, held: Array, said: Array) -> Array:
+        """(n,) `said` (n,) where the thing is held (n,) bool, else UNSTABLE_GRASP, or WRONG_OBJECT as of `judged`."""
+        return np.where(held, said, self.judged(ids, ~held, _UNSTABLE))
+
     def others(self, ids: Array) -> Array:
         """(n,) bool: two links of the hand press against each other on another entity, and none touches the thing."""
         found = np.zeros(len(ids), dtype=bool)
@@ -66,4 +70,4 @@ def _held(links: Array, forces: Array) -> bool:
     return bool((firm @ firm.T < AGAINST).any())
 
 
-_WRONG = OUTCOMES.index(Outcome.WRONG_OBJECT)
+_WRONG, _UNSTABLE = OUTCOMES.index(Outcome.WRONG_OBJECT), OUTCOMES.index(Outcome.UNSTABLE_GRASP)

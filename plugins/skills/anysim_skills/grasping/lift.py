@@ -50,8 +50,7 @@ class Lift(Grasp):
 
     def _holding(self, ids: Array, at: Array) -> Array:
         held = self.arm.holds(ids, at, self._object.root)
-        lost = self._fingers.judged(ids, ~held, _UNSTABLE)
-        return np.where(~held, lost, np.where(self.steps[ids] >= self._hold, GO_ON, STAY))
+        return self._fingers.kept(ids, held, np.where(self.steps[ids] >= self._hold, GO_ON, STAY))
 
 
 _UNSTABLE = OUTCOMES.index(Outcome.UNSTABLE_GRASP)

@@ -93,18 +93,15 @@ class Insert(PutsDown):
             *self.let_go(),
         )
 
-    def start(self, env_ids: Array) -> None:
-        super().start(env_ids)
+    def forget(self, env_ids: Array) -> None:
         self._choice.again(env_ids)
         if self._bank is not None:
             self._bank.start(env_ids)
 
-    def anew(self, env: int) -> int:
-        self._choice.again(env)
+    def anew(self, env_ids: Array) -> None:
+        super().anew(env_ids)
         if self._bank is not None:
-            self._bank.start(np.array([env]))
-            self._bank.again(env)
-        return 0
+            self._bank.again(env_ids)
 
     def retry(self, rung: Rung, env: int) -> int | None:
         """From above again where it jammed, of a bank with the next turn; else it has to be grasped again."""

@@ -59,8 +59,10 @@ class Approach(DriveTo):
 
     def start(self, env_ids: Array) -> None:
         super().start(env_ids)
-        self._choice.again(env_ids)
         self._known[env_ids] = self._driven[env_ids] = self._tried[env_ids] = False
+
+    def forget(self, env_ids: Array) -> None:
+        self._choice.again(env_ids)
 
     def make_recovery(self) -> Sequence[Phase]:
         """Back, to look around from there: the next stand is in another direction than those that were tried."""
@@ -69,12 +71,12 @@ class Approach(DriveTo):
     def recovers(self, env: int, failure: Outcome) -> bool:
         return bool(self._driven[env].any())
 
-    def anew(self, env: int) -> int:
-        vain = self._ring.direction[self._driven[env]]
-        self._tried[env] = np.isin(self._ring.direction, vain)
-        self._known[env] = self._driven[env] = False
-        self._choice.again(env)
-        return 1
+    def anew(self, env_ids: Array) -> None:
+        super().anew(env_ids)
+        for env in env_ids.tolist():
+            vain = self._ring.direction[self._driven[env]]
+            self._tried[env] = np.isin(self._ring.direction, vain)
+        self._known[env_ids] = self._driven[env_ids] = False
 
     def retry(self, rung: Rung, env: int) -> int | None:
         if not self._known[env] or not self._choice.next(env):

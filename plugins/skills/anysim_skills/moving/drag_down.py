@@ -35,6 +35,8 @@ class DragDown(PhasedSkill):
     more the less they press: where they slip, the skill ends with `lost`.
     """
 
+    first = 1
+
     def __init__(
         self,
         env: TaskEnv,
@@ -73,17 +75,11 @@ class DragDown(PhasedSkill):
             Phase("retreat", self._rise, self._rising, self._late),
         )
 
-    def start(self, env_ids: Array) -> None:
-        super().start(env_ids)
+    def forget(self, env_ids: Array) -> None:
         self._choice.again(env_ids)
-        self.phase[env_ids] = 1
 
     def make_recovery(self) -> Sequence[Phase]:
         return Homing(self, self.arm, opens=False).phases()
-
-    def anew(self, env: int) -> int:
-        self._choice.again(env)
-        return 1
 
     def retry(self, rung: Rung, env: int) -> int | None:
         return self._choice.retry(rung, env, same=(Rung.RESAMPLE, Rung.BACK_OFF))

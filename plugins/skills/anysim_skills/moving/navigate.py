@@ -33,6 +33,8 @@ class DriveTo(PhasedSkill):
     that are told where to go in the world would stay behind: those named in `carried` keep their place on the base.
     """
 
+    first = 1
+
     def __init__(
         self,
         env: TaskEnv,
@@ -70,10 +72,6 @@ class DriveTo(PhasedSkill):
         """Back from what holds the base."""
         return Phase("back off", self._away, self._backing, 150)
 
-    def start(self, env_ids: Array) -> None:
-        super().start(env_ids)
-        self.phase[env_ids] = 1
-
     def retry(self, rung: Rung, env: int) -> int | None:
         """Back from what holds the base, once."""
         del env
@@ -83,10 +81,6 @@ class DriveTo(PhasedSkill):
         """Back, and to a place aside from which the straight way is free."""
         around = Phase("go around", self._look_aside, self._going_around, self._late + 1)
         return (self.stepping_back(), self.stepping_back(), around)  # twice, for room to turn
-
-    def anew(self, env: int) -> int:
-        del env
-        return 1
 
     def _look_aside(self, ids: Array, at: Array) -> None:
         aside, found = self._way_around.find(ids, at, self.wanted_stand(ids, at))

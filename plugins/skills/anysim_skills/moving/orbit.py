@@ -78,16 +78,11 @@ class Orbit(PhasedSkill):
         moves = [Phase(f"view {k + 1}", self._forget, partial(self._view, number=k), self._late) for k in range(views)]
         return (Phase("choose", self._choose, self._found, 1), *moves)
 
-    def start(self, env_ids: Array) -> None:
-        super().start(env_ids)
+    def forget(self, env_ids: Array) -> None:
         self._choice.again(env_ids)
 
     def make_recovery(self) -> Sequence[Phase]:
         return Homing(self, self.arm, opens=False).phases()
-
-    def anew(self, env: int) -> int:
-        self._choice.again(env)
-        return 0
 
     def retry(self, rung: Rung, env: int) -> int | None:
         return self._choice.retry(rung, env, same=())

@@ -63,16 +63,11 @@ class Press(PhasedSkill):
             Phase("retreat", None, self._retreat, 100),
         )
 
-    def start(self, env_ids: Array) -> None:
-        super().start(env_ids)
+    def forget(self, env_ids: Array) -> None:
         self._choice.again(env_ids)
 
     def make_recovery(self) -> Sequence[Phase]:
         return Homing(self, self.arm, opens=False).phases()
-
-    def anew(self, env: int) -> int:
-        self._choice.again(env)
-        return 0
 
     def retry(self, rung: Rung, env: int) -> int | None:
         return self._choice.retry(rung, env, same=(Rung.BACK_OFF,))

@@ -49,6 +49,8 @@ class Wipe(PhasedSkill):
     on, and are `jammed`; let them hold something that slides.
     """
 
+    first = 1
+
     def __init__(
         self,
         env: TaskEnv,
@@ -98,19 +100,16 @@ class Wipe(PhasedSkill):
 
     def start(self, env_ids: Array) -> None:
         super().start(env_ids)
-        self._choice.again(env_ids)
         self._coverage.clear(env_ids)
-        self.phase[env_ids] = 1
+
+    def forget(self, env_ids: Array) -> None:
+        self._choice.again(env_ids)
 
     def make_recovery(self) -> Sequence[Phase]:
         return Homing(self, self.arm, opens=False).phases()
 
     def recovers(self, env: int, failure: Outcome) -> bool:
         return still_held(self.arm, env, failure)
-
-    def anew(self, env: int) -> int:
-        self._choice.again(env)
-        return 1
 
     def retry(self, rung: Rung, env: int) -> int | None:
         """Once more over it with what is covered; the next turn of the hand where the way was at fault."""

@@ -31,6 +31,8 @@ FINGER = 0.045
 class GraspSide(PhasedSkill):
     """Grasp the standing `object` with `robot` from one of four sides, at `offset` from its origin, and lift it."""
 
+    first = 1
+
     def __init__(
         self,
         env: TaskEnv,
@@ -69,17 +71,11 @@ class GraspSide(PhasedSkill):
     def foresee(self, following: MovingSkill) -> None:
         self._ahead.foresee(following)
 
-    def start(self, env_ids: Array) -> None:
-        super().start(env_ids)
+    def forget(self, env_ids: Array) -> None:
         self._choice.again(env_ids)
-        self.phase[env_ids] = 1
 
     def make_recovery(self) -> Sequence[Phase]:
         return Homing(self, self.arm).phases()
-
-    def anew(self, env: int) -> int:
-        self._choice.again(env)
-        return 1
 
     def retry(self, rung: Rung, env: int) -> int | None:
         return self._choice.retry(rung, env)
@@ -110,8 +106,7 @@ class GraspSide(PhasedSkill):
         wide = (high - low)[:, [1, 0, 1, 0]] > self.arm.aperture - ROOM
         deep = np.concatenate([-low[:, :2], high[:, :2]], axis=1) > FINGER  # towards a hand that comes along +x, ...
         misfits = np.repeat(wide | deep, len(SLOPES), axis=1)
-        effort = self.arm.reach(ids, targets.reshape(len(ids), -1, 7))[1].reshape(targets.shape[:3]).max(axis=2)
-        effort = self._ahead.passed(ids, at, grasps, np.where(misfits, np.inf, effort))
+        effort = self._ahead.passed(ids, at, grasps, np.where(misfits, np.inf, self.arm.effort(ids, targets)))
         self._turn[ids] = turns[np.arange(len(ids)), self._choice.choose(ids, effort)]
 
     def _chosen(self, ids: Array, at: Array) -> Array:
@@ -150,9 +145,8 @@ class GraspSide(PhasedSkill):
         self.arm.go(ids, self.arm.command[ids] + up, self._speed / 2)
 
     def _rising(self, ids: Array, at: Array) -> Array:
-        held = self.arm.holds(ids, at, self._object.root)
-        lost = self._fingers.judged(ids, ~held, _UNSTABLE)
-        return np.where(~held, lost, np.where(self.arm.arrived(ids, at), GO_ON, STAY))
+        held, there = self.arm.holds(ids, at, self._object.root), self.arm.arrived(ids, at)
+        return self._fingers.kept(ids, held, np.where(there, GO_ON, STAY))
 
     def succeeded(self, env_ids: Array, at: Array) -> Array:
         risen = self._object.root.position[at, 2] - self._rest[env_ids] > 0.5 * self._lift

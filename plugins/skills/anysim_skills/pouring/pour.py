@@ -83,8 +83,7 @@ class Pour(PhasedSkill):
             Phase("upright", None, self._righting, tilting),
         )
 
-    def start(self, env_ids: Array) -> None:
-        super().start(env_ids)
+    def forget(self, env_ids: Array) -> None:
         self._choice.again(env_ids)
 
     def retry(self, rung: Rung, env: int) -> int | None:
@@ -159,7 +158,7 @@ class Pour(PhasedSkill):
         headings, lips = np.broadcast_to(heading, (n, g)), np.broadcast_to(lip, (n, g))
         targets = [self._tools(ids, at, headings, lips, np.full((n, g), tilt)) for tilt in self._tilts()]
         targets = np.stack(targets, axis=2)
-        effort = self.arm.reach(ids, targets.reshape(n, -1, 7))[1].reshape(n, g, STATIONS).max(axis=2)
+        effort = self.arm.effort(ids, targets)
         effort[self._over_hand(at, self.arm.tool.quaternion[at][:, None])[:, 0]] = np.inf
         number = self._choice.choose(ids, effort)
         self._heading[ids], self._lip[ids] = heading[number], lip[number]

@@ -41,6 +41,7 @@ class BiLift(PhasedSkill):
         closing_steps: control steps that closing may take.
     """
 
+    first = CHOOSE
     closing_steps = CLOSING_STEPS + 1
 
     def __init__(
@@ -97,18 +98,12 @@ class BiLift(PhasedSkill):
             Phase("lift", self._take, self._lifting, self._late + int(self._lift / (self._lift_speed * self._dt))),
         )
 
-    def start(self, env_ids: Array) -> None:
-        super().start(env_ids)
+    def forget(self, env_ids: Array) -> None:
         self._choice.again(env_ids)
-        self.phase[env_ids] = CHOOSE
 
     def make_recovery(self) -> Sequence[Phase]:
         """Off the object first, in the direction in which the hands came to it."""
         return (Phase("back off", self._open, self._backing_off, self._late), *Homing(self, *self.arms).phases())
-
-    def anew(self, env: int) -> int:
-        self._choice.again(env)
-        return CHOOSE
 
     def retry(self, rung: Rung, env: int) -> int | None:
         """Another plan; the next pair where one is left; else away from the object, and all of them again."""
@@ -160,8 +155,7 @@ class BiLift(PhasedSkill):
             grasps = self.grasps(at, number)
             ways = np.stack([self.before(grasps, number), grasps, grasps + up], axis=3)
             arm.closed[ids] = False
-            effort = arm.reach(ids, ways.reshape(n, -1, 7))[1].reshape(n, 2, TOP_DOWN, 3).max(axis=3)
-            efforts.append(np.where((widths > arm.aperture - ROOM)[:, None], np.inf, effort))
+            efforts.append(np.where((widths > arm.aperture - ROOM)[:, None], np.inf, arm.effort(ids, ways)))
         first, second = efforts
         straight = np.maximum(first[:, 0, :, None], second[:, 1, None, :])
         crossed = np.maximum(first[:, 1, :, None], second[:, 0, None, :])
