@@ -10,6 +10,15 @@ from anysim_sensors.states import FREE, OCCUPIED, UNKNOWN
 
 
 @compiled
+def _lines(place: float, cell: int, along: float) -> tuple[float, float]:
+    """How far it is along a beam from one line of the grid to the next, and to the first, from a place in a cell."""
+    if along == 0.0:
+        return np.inf, np.inf
+    apart = 1 / abs(along)
+    return apart, ((cell + 1 - place) if along > 0 else (place - cell)) * apart
+
+
+@compiled
 def look(solid: Array, start: Array, reach: float, beams: int, grid: Array) -> None:
     """Follow lines from a point until something solid; what they cross is free, and where they end is occupied.
 
@@ -28,10 +37,8 @@ def look(solid: Array, start: Array, reach: float, beams: int, grid: Array) -> N
             dx, dy = math.cos(angle), math.sin(angle)
             x, y = start[e, 0], start[e, 1]
             j, i = math.floor(x), math.floor(y)
-            across = 1 / abs(dx) if dx != 0.0 else np.inf
-            down = 1 / abs(dy) if dy != 0.0 else np.inf
-            next_x = ((j + 1 - x) if dx > 0 else (x - j)) * across if dx != 0.0 else np.inf
-            next_y = ((i + 1 - y) if dy > 0 else (y - i)) * down if dy != 0.0 else np.inf
+            across, next_x = _lines(x, j, dx)
+            down, next_y = _lines(y, i, dy)
             gone = 0.0
             while gone <= reach and 0 <= i < rows and 0 <= j < columns:
                 if solid[e, i, j]:
@@ -58,10 +65,8 @@ def mark(distance: Array, azimuth: Array, reach: float, cell: float, start: Arra
             x, y = start[e, 0], start[e, 1]
             length = min(distance[e, r], reach) / cell
             j, i = math.floor(x), math.floor(y)
-            across = 1 / abs(dx) if dx != 0.0 else np.inf
-            down = 1 / abs(dy) if dy != 0.0 else np.inf
-            next_x = ((j + 1 - x) if dx > 0 else (x - j)) * across if dx != 0.0 else np.inf
-            next_y = ((i + 1 - y) if dy > 0 else (y - i)) * down if dy != 0.0 else np.inf
+            across, next_x = _lines(x, j, dx)
+            down, next_y = _lines(y, i, dy)
             while 0 <= i < rows and 0 <= j < columns:
                 if min(next_x, next_y) > length:  # it ends here
                     if distance[e, r] <= reach:

@@ -7,12 +7,12 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.engine.capability import Capability
-from anysim.engine.parameters import nominal
 from anysim.errors import NameLookupError
 from anysim.math import pose as P
 from anysim.model.world import World
 from anysim.sensors.base import Sensor, SensorField
 from anysim.task.scene import BodyFrame, Frame, SceneView
+from anysim_sensors.motion.parameters import gravity, parameter
 
 
 def beyond(world: World, body: int) -> Array:
@@ -59,15 +59,8 @@ class ForceTorque(Sensor):
 
     def reset(self, env_ids: Array) -> None:
         for key, kept in self._own.items():
-            kept[env_ids] = self._parameter(f"body.{key}", env_ids, self._bodies)
+            kept[env_ids] = parameter(self._scene.engine, f"body.{key}", env_ids, self._bodies)
         self._momentum[env_ids] = self._moving(env_ids)
-
-    def _parameter(self, name: str, env_ids: Array, which: Array) -> Array:
-        engine = self._scene.engine
-        if name in engine.parameters:
-            return engine.get_parameters(name, env_ids, which)
-        rows = nominal(name, engine.world)[which]
-        return np.broadcast_to(rows, (len(env_ids), *rows.shape))
 
     def _centres(self, env_ids: Array) -> tuple[Array, Array]:
         """From the world's origin to the centres of mass, and from the bodies' frames to them (n, K, 3) [m]."""
@@ -88,8 +81,7 @@ class ForceTorque(Sensor):
     def read(self, env_ids: Array) -> Mapping[str, Array]:
         after, before = self._moving(env_ids), self._momentum[env_ids]
         self._momentum[env_ids] = after
-        gravity = self._parameter("world.gravity", env_ids, np.array([0]))
-        weight = self._own["mass"][env_ids, :, None] * gravity
+        weight = self._own["mass"][env_ids, :, None] * gravity(self._scene.engine, env_ids)[:, None]
         centre, _ = self._centres(env_ids)
         passed = np.concatenate([weight.sum(1), P.cross(centre, weight).sum(1)], axis=1)
         passed += self._touching(env_ids) - (after - before) / self.period

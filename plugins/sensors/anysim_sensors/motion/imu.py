@@ -8,6 +8,7 @@ from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.sensors.base import Sensor, SensorField
 from anysim.task.scene import Frame, SceneView
+from anysim_sensors.motion.parameters import gravity
 
 
 class Imu(Sensor):
@@ -43,13 +44,6 @@ class Imu(Sensor):
         midway = P.multiply(before, P.from_rotation_vector(0.5 * turned))
         first = self._scene.elapsed[env_ids, None] == 0
         return {
-            "acceleration": P.rotate_inverse(midway, gained / self.period - self._gravity(env_ids)),
+            "acceleration": P.rotate_inverse(midway, gained / self.period - gravity(self._scene.engine, env_ids)),
             "angular_velocity": np.where(first, P.rotate_inverse(turn, twist[:, 3:]), turned / self.period),
         }
-
-    def _gravity(self, env_ids: Array) -> Array:
-        """(n, 3) [m/s^2], which may differ between envs."""
-        engine = self._scene.engine
-        if "world.gravity" in engine.parameters:
-            return engine.get_parameters("world.gravity", env_ids)[:, 0]
-        return np.broadcast_to(np.array(engine.world.physics.gravity), (len(env_ids), 3))
