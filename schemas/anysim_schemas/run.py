@@ -13,6 +13,7 @@ from anysim_schemas.engine import EngineSpec, PhysicsSpec
 from anysim_schemas.errors import KeyFault
 from anysim_schemas.layout import LayoutSourceSpec, PlacementSpec
 from anysim_schemas.lights import LightSpec, ScenerySpec
+from anysim_schemas.messages import listing
 from anysim_schemas.objects import ObjectSpec
 from anysim_schemas.record import RecordSpec
 from anysim_schemas.regions import RegionSpec
@@ -103,6 +104,6 @@ class RunSpec(Spec):
                 raise KeyFault(str(fault), "world", "sensors", name, *fault.path) from None
         for place, name in enumerate(self.record.sensors or ()):
             if name not in sensors:
-                known = ", ".join(sensors) or "none"
-                raise KeyFault(f"there is no sensor '{name}' (sensors: {known})", "record", "sensors", str(place))
+                words = f"there is no sensor '{name}' (sensors: {listing(list(sensors))})"
+                raise KeyFault(words, "record", "sensors", str(place))
         return self
