@@ -121,6 +121,14 @@ class World:
             table[joint.body] = index
         return tuple(table)
 
+    def carried_by(self, body: int) -> tuple[int, ...]:
+        """The bodies that a body carries by joints, itself first."""
+        found = [body]
+        for number in range(body + 1, len(self.bodies)):  # parents stand before their children
+            if self.bodies[number].parent in found:
+                found.append(number)
+        return tuple(found)
+
     @cached_property
     def body_entity(self) -> tuple[int, ...]:
         """For each body the entity it belongs to."""

@@ -67,7 +67,7 @@ def hand(name: str, tool: str = "tool", channel: str = "eef") -> Hand:
             "fingers: `groups`, and the postures `opened` and `synergies`"
         )
     frame, drives = find_frame(world, f"{ROBOT}.{tool}"), robot.channels[channel]
-    bodies = _below(world, frame.body)
+    bodies = list(world.carried_by(frame.body))
     number = {body: i for i, body in enumerate(bodies)}
     joints = [j for j, joint in enumerate(world.joints) if joint.body in number and joint.body != frame.body]
     if missing := [world.joints[j].name for j in drives.joints if j not in joints]:
@@ -112,14 +112,6 @@ def hand(name: str, tool: str = "tool", channel: str = "eef") -> Hand:
 
 def _named(part: Any) -> Any:
     return replace(part, name=part.name.removeprefix(f"{ROBOT}").removeprefix("."))
-
-
-def _below(world: World, body: int) -> list[int]:
-    found = [body]
-    for number in range(body + 1, len(world.bodies)):
-        if world.bodies[number].parent in found:
-            found.append(number)
-    return found
 
 
 def _fingers(world: World, bodies: list[int], finger: dict[int, int]) -> Array:

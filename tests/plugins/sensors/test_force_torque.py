@@ -9,7 +9,6 @@ import anysim
 from anysim.math import pose as P
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
-from anysim_sensors.motion.force_torque import beyond
 from tests.plugins.sensors.test_imu import ENGINES, TURNING, G
 
 HOLDING = {"robot": "franka_panda", "actions": {"arm": "joint_delta_position", "eef": "gripper_binary"}}
@@ -33,7 +32,7 @@ def weight(env: TaskEnv, link: str) -> tuple[np.ndarray, np.ndarray]:
     world, body = env.engine.world, env.engine.index.body(link)
     pose = env.engine.get_state().body_pose[0]
     force, torque = np.zeros(3), np.zeros(3)
-    for one in beyond(world, body):
+    for one in world.carried_by(body):
         own = world.bodies[one].inertial
         pull = np.array([0, 0, -G * own.mass])
         centre = pose[one, :3] + P.rotate(pose[one, 3:], np.array(own.com))

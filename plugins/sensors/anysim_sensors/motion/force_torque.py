@@ -9,19 +9,9 @@ from anysim.conventions import Array
 from anysim.engine.capability import Capability
 from anysim.errors import NameLookupError
 from anysim.math import pose as P
-from anysim.model.world import World
 from anysim.sensors.base import Sensor, SensorField
 from anysim.task.scene import BodyFrame, Frame, SceneView
 from anysim_sensors.motion.parameters import gravity, parameter
-
-
-def beyond(world: World, body: int) -> Array:
-    """The bodies that a link carries, itself first."""
-    carried = [body]
-    for index, other in enumerate(world.bodies):
-        if other.parent in carried:
-            carried.append(index)
-    return np.array(carried)
 
 
 class ForceTorque(Sensor):
@@ -45,7 +35,7 @@ class ForceTorque(Sensor):
                 f"'{frame.name}' is on nothing that a joint carries; a force and torque sensor sits on a link"
             )
         self._scene, self._frame = scene, frame
-        self._bodies = beyond(world, frame.index.body)
+        self._bodies = np.array(world.carried_by(frame.index.body))
         self._inside = np.zeros(len(world.bodies) + 1, dtype=bool)  # the last is the world, -1
         self._inside[self._bodies] = True
         count = len(self._bodies)

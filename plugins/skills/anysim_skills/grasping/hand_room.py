@@ -19,12 +19,9 @@ def hand_geoms(arm: Arm) -> Iterator[tuple[Geom, Array]]:
     """What collides of a hand as it begins, with the poses (7,) of its bodies in the tool's frame."""
     world, frame = arm.env.engine.world, arm.env.engine.index.frame(arm.tool.name)
     tool = P.compose(world.initial_body_pose[frame.body], np.array([*frame.position, *frame.quaternion]))
-    bodies: list[int] = []
-    for number, body in enumerate(world.bodies):
-        if number == frame.body or body.parent in bodies:
-            bodies.append(number)
-            to_tool = P.compose(P.inverse(tool), world.initial_body_pose[number])
-            yield from ((world.geoms[i], to_tool) for i in world.body_geoms[number] if world.geoms[i].collides)
+    for number in world.carried_by(frame.body):
+        to_tool = P.compose(P.inverse(tool), world.initial_body_pose[number])
+        yield from ((world.geoms[i], to_tool) for i in world.body_geoms[number] if world.geoms[i].collides)
 
 
 def beyond_tool(arm: Arm) -> float:

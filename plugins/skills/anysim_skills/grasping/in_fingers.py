@@ -24,11 +24,7 @@ class InFingers:
         self._engine = arm.env.engine
         self._sensed = Capability.CONTACT_POINTS in self._engine.capabilities
         wrist = world.joints[arm.chain.joints[-1]].body
-        hand: list[int] = []
-        for number, body in enumerate(world.bodies):
-            if number == wrist or body.parent in hand:
-                hand.append(number)
-        self._hand = np.isin(np.arange(len(world.bodies) + 1), hand)
+        self._hand = np.isin(np.arange(len(world.bodies) + 1), world.carried_by(wrist))
         """(B + 1,) bool; the last is the world, as the contacts' -1."""
         self._owner = np.array([*world.body_entity, -1])
         self._robot, self._asked = world.entity_numbers[arm.robot.name], np.array(thing.slot.entities)
