@@ -40,7 +40,7 @@ POSTURES = 1_000
 """Requests for joint positions alone, one candidate each."""
 ROUNDS = 3
 """Turns of all sides on the requests."""
-BLOCKS, STEPS = 4, 100
+BLOCKS, STEPS = 8, 200
 """Turns of an idle and a busy loop, and the steps of each."""
 
 
