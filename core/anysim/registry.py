@@ -38,6 +38,7 @@ KINDS: Mapping[str, str] = {
     "rooms": "builders of rooms",
     "terrains": "builders of generated ground",
     "textures": "patterns of procedural textures",
+    "vocabularies": "words for things and deeds (a package with NAME.yaml)",
 }
 """The kinds that anysim looks up, and what each is."""
 
@@ -63,6 +64,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     },
     "anysim-film": {"commands": "render"},
     "anysim-inspect": {"commands": "audit doctor explain replay snapshot verify"},
+    "anysim-language": {"commands": "describe", "vocabularies": "english"},
     "anysim-learning": {"commands": "train", "learners": "clone rsl-rl sb3-ppo"},
     "anysim-maniskill": {"benchmarks": "maniskill", "commands": "verdicts"},
     "anysim-mcap": {"readers": "mcap", "writers": "mcap"},

@@ -1,0 +1,1 @@
+"""Words for what a world holds and what happened in it: descriptions, and questions with answers that are verified."""

@@ -1,0 +1,221 @@
+"""Episodes to speak of: one that a task would begin, or a recorded one, with what was drawn and where things are."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from anysim.api import blind_env, compile_world, load, watched
+from anysim.conventions import Array
+from anysim.errors import RecordError
+from anysim.model.world import World
+from anysim.randomization.streams import episode_seed
+from anysim.record.manifest import Manifest
+from anysim.record.reader import TrajectoryReader, open_trajectory
+from anysim.record.replay import begin
+from anysim.task.env import TaskEnv
+from anysim_language.moment import Moment, Viewer, viewer_of
+from anysim_language.things import Thing, things_of
+from anysim_language.vocabulary import Vocabulary, vocabulary
+from anysim_schemas.collect import ChooseSpec, RepeatSpec
+from anysim_schemas.load import LoadedRun
+
+
+@dataclass(frozen=True)
+class Deed:
+    """A skill that the task names, with the parameters of this episode."""
+
+    skill: str
+    params: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Episode:
+    """One episode as language sees it.
+
+    Attributes:
+        name: of the task.
+        seed: the episode seed.
+        world: neutral.
+        things: what is there.
+        viewer: who sees left and right.
+        instruction: the task's own words.
+        deeds: the task's commands, or its expert, in order.
+        goals: poses (7,) by the names of the task's goals.
+        goal_frames: the frame that a goal is beside or in, by the goal's name, where it is at one.
+        body_pose: (K, B, 7) at steps 0 to K - 1.
+        joint_pos: (K, J).
+        annotations: K - 1 of them: what the policy said at each control step.
+        cameras: names of the world's cameras.
+        lights: how many lights the world declares.
+        status: how it ended; empty for one that has only begun.
+        vocabulary: the words.
+        reader: of the recording; None where there is none.
+    """
+
+    name: str
+    seed: int
+    world: World
+    things: tuple[Thing, ...]
+    viewer: Viewer
+    instruction: str
+    deeds: tuple[Deed, ...]
+    goals: Mapping[str, Array]
+    goal_frames: Mapping[str, str]
+    body_pose: Array
+    joint_pos: Array
+    annotations: tuple[Mapping[str, Any], ...]
+    cameras: tuple[str, ...]
+    lights: int
+    status: str
+    vocabulary: Vocabulary
+    reader: TrajectoryReader | None = None
+
+    def moment(self, step: int) -> Moment:
+        """The things at a control step; 0 is right after the reset, and -1 the last one."""
+        step %= len(self.body_pose)
+        return Moment(self.world, self.things, self.viewer, self.body_pose[step], step)
+
+    @cached_property
+    def first(self) -> Moment:
+        """The things right after the reset."""
+        return self.moment(0)
+
+
+def begun(source: str | Path | LoadedRun, seed: int | None = None, overrides: Sequence[str] = ()) -> Episode:
+    """The first episode of a task or world under a global seed, as it begins; no engine is needed."""
+    (episode,) = begun_many(source, [seed], overrides)
+    return episode
+
+
+def begun_many(
+    source: str | Path | LoadedRun, seeds: Sequence[int | None], overrides: Sequence[str] = ()
+) -> Iterator[Episode]:
+    """The first episodes under several global seeds, one after the other; the world is compiled once."""
+    loaded = watched(load(source, overrides=overrides) if isinstance(source, str | Path) else source)
+    name = loaded.spec.world.name
+    with blind_env(loaded, compile_world(loaded), name) as env:
+        for seed in seeds:
+            chosen = episode_seed(loaded.spec.seed if seed is None else seed, 0, 0)
+            env.reset(episode_seeds=[chosen])
+            state = env.engine.get_state()
+            yield _episode(env, loaded, name, chosen, np.array(state.body_pose), np.array(state.joint_pos))
+
+
+def recorded(trajectory: Path, base: Path | None = None) -> Episode:
+    """A recorded episode: its world is compiled anew, and its draws are made again from its seed.
+
+    Args:
+        trajectory: the directory of a committed one.
+        base: the folder of the recorded file, where its world has assets with relative paths.
+
+    Raises:
+        RecordError: it does not hold poses, or its world cannot be made as it was.
+    """
+    reader = open_trajectory(trajectory)
+    manifest = reader.manifest
+    for field in ("body_pose", "joint_pos"):
+        if field not in manifest.layout.state or not reader.initial_state:
+            raise RecordError(f"{trajectory} does not hold {field} from its reset on, which its description is made of")
+    loaded = load(dict(manifest.spec) | {"num_envs": 1})
+    with blind_env(loaded, compile_world(loaded, base=base), manifest.task) as env:
+        begin(env, manifest)
+        poses = _rows(manifest, reader, "body_pose", [b.name for b in env.engine.world.bodies], manifest.layout.bodies)
+        joints = _rows(manifest, reader, "joint_pos", [j.name for j in env.engine.world.joints], manifest.layout.joints)
+        return _episode(env, loaded, manifest.task, manifest.episode_seed, poses, joints, reader)
+
+
+def _rows(manifest: Manifest, reader: TrajectoryReader, field: str, here: Sequence[str], there: Sequence[str]) -> Array:
+    """A state array with the reset's row first, by the names of the world at hand."""
+    lost = sorted(set(here) - set(there))
+    if lost:
+        raise RecordError(f"{reader.directory} does not hold '{lost[0]}', which the world of {manifest.task} has now")
+    columns = [list(there).index(name) for name in here]
+    rows = np.concatenate([np.asarray(reader.initial_state[field])[None], np.asarray(reader.states[field])])
+    return rows[:, columns]
+
+
+def _episode(
+    env: TaskEnv,
+    loaded: LoadedRun,
+    name: str,
+    seed: int,
+    poses: Array,
+    joints: Array,
+    reader: TrajectoryReader | None = None,
+) -> Episode:
+    world, words = env.engine.world, vocabulary()
+    things = things_of(env.engine, words.words)
+    return Episode(
+        name=name,
+        seed=seed,
+        world=world,
+        things=things,
+        viewer=viewer_of(world, things, poses[0]),
+        instruction=reader.manifest.instruction if reader is not None else env.instruction(0),
+        deeds=tuple(_deeds(env, loaded)),
+        goals={name: goal[0].copy() for name, goal in env.scene.poses.items()},
+        goal_frames=_goal_frames(loaded),
+        body_pose=poses,
+        joint_pos=joints,
+        annotations=() if reader is None else reader.annotations,
+        cameras=tuple(loaded.spec.world.cameras),
+        lights=len(world.lights),
+        status="" if reader is None else reader.manifest.status,
+        vocabulary=words,
+        reader=reader,
+    )
+
+
+def _goal_frames(loaded: LoadedRun) -> dict[str, str]:
+    """What the goals of a task are at: things that they are beside, and insides that they are in."""
+    command = loaded.spec.task.command if loaded.spec.task is not None else {}
+    found: dict[str, str] = {}
+    for name, term in command.items():
+        frame = term.params.get("frame")
+        if isinstance(frame, str) and (term.term == "goal_beside" or frame.endswith(".inside")):
+            found[name] = frame
+    return found
+
+
+def _deeds(env: TaskEnv, loaded: LoadedRun) -> list[Deed]:
+    """The commands that this episode has, written out; a repeated one once."""
+    task, collect = loaded.spec.task, loaded.spec.collect
+    if collect is None:
+        expert = task.expert if task is not None else None
+        return [] if expert is None else [Deed(expert.skill, _bound(env, dict(expert.params)))]
+    found: list[Deed] = []
+
+    def lay(entries: Any, path: str) -> None:
+        if isinstance(entries, tuple):
+            for number, entry in enumerate(entries):
+                lay_one(entry, f"{path}.{number}")
+        else:
+            lay_one(entries, path)
+
+    def lay_one(entry: Any, here: str) -> None:
+        if isinstance(entry, ChooseSpec):
+            number = int(env.bindings.index[here][0])
+            lay(entry.choose[number], f"{here}.choose.{number}")
+        elif isinstance(entry, RepeatSpec):
+            lay(entry.body, f"{here}.body")
+        else:
+            found.append(Deed(entry.do, _bound(env, dict(entry.params))))
+
+    lay(collect.commands, "collect.commands")
+    return found
+
+
+def _bound(env: TaskEnv, params: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters with what was drawn for this episode in place of `$name`."""
+    return {
+        key: env.bindings.said(value, 0)
+        if isinstance(value, str)
+        else [env.bindings.said(one, 0) if isinstance(one, str) else one for one in value]
+        if isinstance(value, list | tuple)
+        else value
+        for key, value in params.items()
+    }

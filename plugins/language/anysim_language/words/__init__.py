@@ -1,0 +1,1 @@
+"""The vocabulary that comes with anysim: `english.yaml`, data alone."""

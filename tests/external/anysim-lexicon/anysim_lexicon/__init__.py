@@ -1,0 +1,1 @@
+"""Words of a kitchen: `kitchen.yaml`."""
