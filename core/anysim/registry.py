@@ -38,10 +38,16 @@ KINDS: Mapping[str, str] = {
     "rooms": "builders of rooms",
     "terrains": "builders of generated ground",
     "textures": "patterns of procedural textures",
+    "annotators": "annotators, which label what cameras see",
+    "renderings": "what `anysim render` makes besides videos",
 }
 """The kinds that anysim looks up, and what each is."""
 
 _OFFERS: Mapping[str, Mapping[str, str]] = {
+    "anysim-annotation": {
+        "annotators": "boxes_2d boxes_3d camera depth flow instance normals point_cloud semantic",
+        "renderings": "annotations",
+    },
     "anysim-assets": {
         "assets": "cabinet hinge_box mug parallel_gripper valve",
         "rooms": "furnished",
