@@ -45,7 +45,8 @@ KINDS: Mapping[str, str] = {
 
 _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-annotation": {
-        "annotators": "boxes_2d boxes_3d camera depth flow instance normals point_cloud semantic",
+        "annotators": "affordance boxes_2d boxes_3d camera depth eef_waypoint flow instance nav_point normals obj_bbox"
+        " point_cloud semantic skeleton",
         "renderings": "annotations",
     },
     "anysim-assets": {

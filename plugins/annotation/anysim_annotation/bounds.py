@@ -1,5 +1,6 @@
 """Boxes around things in the axes of their roots, links where they are now: from shapes and poses, not from pixels."""
 
+from collections.abc import Collection
 from functools import cached_property
 
 import numpy as np
@@ -30,13 +31,18 @@ class ThingBounds:
             found.append([g for g in own if world.geoms[g].visible] or own)
         return found
 
-    def box(self, entity: int, body_pose: Array) -> tuple[Array, Array] | None:
-        """Pose (7,) and size (3,) [m] of the box with bodies at poses (B, 7), world frame; None without shapes."""
+    def box(self, entity: int, body_pose: Array, bodies: Collection[int] | None = None) -> tuple[Array, Array] | None:
+        """Pose (7,) and size (3,) [m] of the box with bodies at poses (B, 7), world frame; None without shapes.
+
+        `bodies` are those that count, all of the entity if not given; the axes are those of its root.
+        """
         world = self._world
         root = body_pose[world.entities[entity].root]
         lows, highs = list[Array](), list[Array]()
         for number in self._shapes[entity]:
             geom = world.geoms[number]
+            if bodies is not None and geom.body not in bodies:
+                continue
             own = P.compose(P.inverse(root), body_pose[geom.body]) if geom.body >= 0 else P.inverse(root)
             place = P.compose(own, P.pose(geom.position, geom.quaternion))
             low, high = shape_bounds(geom.shape, place, self._meshes)
