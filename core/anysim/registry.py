@@ -26,6 +26,8 @@ KINDS: Mapping[str, str] = {
     "terms": "libraries of observation, reward, predicate, command and event terms",
     "skills": "skills",
     "sensors": "sensors",
+    "annotators": "annotators, which label what cameras see",
+    "renderings": "what `anysim render` makes besides videos",
     "planners": "planners",
     "executors": "executors, which step the envs of an engine elsewhere",
     "devices": "input devices, with which people drive robots",
@@ -43,6 +45,11 @@ KINDS: Mapping[str, str] = {
 """The kinds that anysim looks up, and what each is."""
 
 _OFFERS: Mapping[str, Mapping[str, str]] = {
+    "anysim-annotation": {
+        "annotators": "affordance boxes_2d boxes_3d camera depth eef_waypoint flow instance nav_point normals obj_bbox"
+        " point_cloud semantic skeleton",
+        "renderings": "annotations",
+    },
     "anysim-assets": {
         "assets": "cabinet hinge_box mug parallel_gripper valve",
         "rooms": "furnished",

@@ -1,14 +1,17 @@
 """`anysim render`: videos of recorded episodes, drawn from their recorded states."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from anysim.cli.options import AsJson, Overrides
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from anysim_film.filmer import Filmed
+    from anysim_film.stage import FilmOrder
 
 
 def render(
@@ -34,6 +37,17 @@ def render(
         Path | None, typer.Option(help="Folder of the recorded file, where its world has assets with relative paths.")
     ] = None,
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Processes that draw.")] = 1,
+    annotate: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Write annotations in place of videos: boxes_2d,normals, or {point_cloud: {stride: 2}}.",
+        ),
+    ] = None,
+    source: Annotated[
+        Literal["engine", "geometry"],
+        typer.Option(help="What annotations see: the engine's drawing, or rays on the world's geometry."),
+    ] = "engine",
     json: AsJson = False,
 ) -> None:
     """Draw recorded episodes from their recorded states; nothing is simulated.
@@ -42,17 +56,24 @@ def render(
     would have had. With other sizes, looks, lights, cameras or another engine they go into another directory, --out.
     What is there already is passed over, so the same command goes on where an interrupted one stopped.
 
+    With --annotate it writes what cameras see as data, beside each trajectory (`anysim list annotators`).
+
     Examples:
       anysim run pick_cube -k 64 -o record.cameras=[] --out runs/a && anysim render runs/a -c front
       anysim render runs/a --size 1280 720 -e sapien -o world.scenery.shadows=true --out films/a
+      anysim render runs/a --annotate boxes_2d,normals,flow
     """
     from anysim.cli.output import counting, print_json
     from anysim.record.names import find_trajectories
-    from anysim_film.filmer import FilmOrder, film_targets
+    from anysim_film.filmer import film_targets
     from anysim_film.jobs import film_all
+    from anysim_film.stage import FilmOrder
 
     order = FilmOrder(tuple(camera or ()), engine, tuple(override or ()), size, fps, base)
     work = film_targets(find_trajectories(directories), out)
+    if annotate is not None:
+        _annotate(work, order, annotate, source, quiet=json)
+        return
     films: list[Filmed] = []
     with counting("episodes", len(work), quiet=json) as show:
         for film in film_all(work, order, jobs):
@@ -76,6 +97,34 @@ def render(
         typer.echo(f"recorded with {recorded}, drawn with {drawn}: not the pixels that a recording would have had")
     new = sum(bool(film.cameras) for film in films)
     typer.echo(f"{new} of {len(films)} episodes filmed, {sum(f.frames for f in films)} images; the others were there")
+
+
+def _annotate(
+    work: "Sequence[tuple[Path, Path | None]]", order: "FilmOrder", names: str, source: str, *, quiet: bool
+) -> None:
+    """Make annotations, which another distribution knows how to."""
+    from anysim import registry
+    from anysim.cli.output import counting, print_json
+
+    make = registry.load("renderings", "annotations")
+    done = list[Any]()
+    with counting("episodes", len(work), quiet=quiet) as show:
+        for one in make(work, order, names, source):
+            done.append(one)
+            what = (
+                f"{', '.join(one.made)} -> {one.directory}" if one.made else f"{', '.join(one.present)} there already"
+            )
+            show(f"{one.trajectory.name}: {what}", f"{sum(d.frames for d in done)} images")
+    new, images = sum(bool(one.made) for one in done), sum(one.frames for one in done)
+    if quiet:
+        rows = [{key: _shown(value) for key, value in vars(one).items()} for one in done]
+        print_json({"annotated": new, "images": images, "trajectories": rows})
+    else:
+        typer.echo(f"{new} of {len(done)} episodes annotated, {images} images; the others were there")
+
+
+def _shown(value: object) -> object:
+    return str(value) if isinstance(value, Path) else list(value) if isinstance(value, tuple) else value
 
 
 def _line(film: "Filmed") -> str:

@@ -1,53 +1,24 @@
 """Filming recorded trajectories: their videos, made afterwards, as they would have been or otherwise."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Self
 
-import numpy as np
-
 from anysim.errors import RecordError, listing, suggest
-from anysim.record.commit import describe
 from anysim.record.json import plain
 from anysim.record.manifest import Manifest, read_manifest
 from anysim.record.names import MANIFEST_FILE
-from anysim.record.reader import TrajectoryReader, open_trajectory
+from anysim.record.reader import open_trajectory
 from anysim.record.replay import begin
 from anysim.record.writer import make_writer
 from anysim.task.env import TaskEnv
 from anysim_film.commit import add_videos, workspace
-from anysim_film.episode import Moments, film_episode, moments_for
+from anysim_film.episode import film_episode, moments_for
 from anysim_film.sheet import FILM_FILE, FilmSheet, read_sheet
+from anysim_film.stage import FilmOrder, Stage, recorded_moments, refuse_damage
 from anysim_schemas.load import LoadedRun
-
-
-@dataclass(frozen=True)
-class FilmOrder:
-    """What to film, of each trajectory.
-
-    Attributes:
-        cameras: of its world; none: those that its run records, or else all that give colours.
-        engine: another one than it was recorded on.
-        overrides: of the recorded spec, such as `world.objects.cube.color=red`.
-        size: width and height of the images [px], in place of the cameras' own.
-        fps: images per second, in place of the recorded spec's.
-        base: folder of the recorded file, where its world has assets with relative paths.
-    """
-
-    cameras: tuple[str, ...] = ()
-    engine: str | None = None
-    overrides: tuple[str, ...] = ()
-    size: tuple[int, int] | None = None
-    fps: float | None = None
-    base: Path | None = None
-
-    def as_recorded(self, manifest: Manifest) -> bool:
-        """Whether these are the images that a live recording would have taken."""
-        changed = bool(self.overrides) or self.size is not None or self.fps is not None
-        return not changed and self.engine in (None, manifest.engine)
 
 
 @dataclass(frozen=True)
@@ -78,10 +49,7 @@ class Filmer:
     """Films trajectories one after the other. The env of one is kept for the next one of the same run."""
 
     def __init__(self, order: FilmOrder) -> None:
-        self.order = order
-        self._text = ""
-        self._loaded: LoadedRun | None = None
-        self._env: TaskEnv | None = None
+        self.order, self._stage = order, Stage(order)
 
     def film(self, trajectory: Path, directory: Path | None = None) -> Filmed:
         """Film a trajectory: what is not there yet of what was ordered.
@@ -102,7 +70,7 @@ class Filmer:
                 f"{trajectory} holds what was recorded, and other cameras' sizes, looks or engines are not: pass --out "
                 "DIR for videos beside it"
             )
-        loaded = self._load(manifest)
+        loaded = self._stage.load(manifest)
         cameras = self._cameras(loaded)
         where = trajectory if directory is None else directory
         present = self._present(manifest, loaded, directory)
@@ -120,9 +88,7 @@ class Filmer:
 
     def close(self) -> None:
         """Free the engine."""
-        if self._env is not None:
-            self._env.close()
-            self._env = None
+        self._stage.close()
 
     def __enter__(self) -> Self:
         return self
@@ -131,31 +97,6 @@ class Filmer:
         self.close()
 
     # ------------------------------------------------------------------ what and where
-
-    def _load(self, manifest: Manifest) -> LoadedRun:
-        """The spec to draw with; the last one again where the trajectories are of one run."""
-        from anysim.api import load
-
-        text = json.dumps(plain(manifest.spec))
-        if self._loaded is None or text != self._text:
-            self.close()
-            spec = dict(manifest.spec) | {"num_envs": 1}
-            first = load(spec, overrides=self._changes(load(spec)))
-            self._loaded, self._text = first, text
-        return self._loaded
-
-    def _changes(self, recorded: LoadedRun) -> list[str]:
-        """The overrides of the recorded spec."""
-        order, changes = self.order, ["engine.shards=1"]
-        if order.engine is not None and order.engine != recorded.spec.engine.name:
-            changes.append(f"engine={json.dumps(order.engine)}")
-        changes += order.overrides
-        if order.fps is not None:
-            changes.append(f"record.fps={order.fps}")
-        if order.size is not None:
-            cameras = order.cameras or recorded.spec.record.cameras or tuple(recorded.spec.world.cameras)
-            changes += [f"world.cameras.{name}.size={list(order.size)}" for name in cameras]
-        return changes
 
     def _cameras(self, loaded: LoadedRun) -> tuple[str, ...]:
         there = loaded.spec.world.cameras
@@ -195,8 +136,8 @@ class Filmer:
         where = trajectory if directory is None else directory
         if not missing:
             return Filmed(trajectory, where, (), tuple(cameras))
-        _refuse_damage(trajectory, manifest)
-        env = self._stage(loaded)
+        refuse_damage(trajectory, manifest)
+        env = self._stage.env(loaded)
         engine = env.engine
         if directory is None and engine.world.hash != manifest.world_hash:
             raise RecordError(
@@ -209,7 +150,7 @@ class Filmer:
         if directory is not None:
             sheet = read_sheet(directory) or _sheet(manifest, env, plain(loaded.spec.to_dict()), still)
         begin(env, manifest)
-        moments = moments_for(env, recorded, *_columns(open_trajectory(trajectory)))
+        moments = moments_for(env, recorded, *recorded_moments(open_trajectory(trajectory)))
         record = loaded.spec.record
         found = film_episode(env, manifest, moments, missing, aside, make_writer(record.writer, record.options))
         drawn, before = f"{engine.name} {engine.version}", f"{manifest.engine} {manifest.engine_version}"
@@ -222,14 +163,6 @@ class Filmer:
         frames = sum(entry.frames for entry in found.values())
         others = tuple(camera for camera in cameras if camera in present)
         return Filmed(trajectory, where, missing, others, frames, drawn, before, still)
-
-    def _stage(self, loaded: LoadedRun) -> TaskEnv:
-        """The env to draw in."""
-        from anysim.api import make
-
-        if self._env is None:
-            self._env = make(loaded, base=self.order.base)
-        return self._env
 
 
 def film_targets(trajectories: Sequence[Path], out: Path | None) -> list[tuple[Path, Path | None]]:
@@ -245,27 +178,6 @@ def film_targets(trajectories: Sequence[Path], out: Path | None) -> list[tuple[P
         if len(set(places)) == len(places):
             return list(zip(trajectories, places, strict=True))
     raise RecordError("runs of the same name were given together; film them one by one, each into its own --out")
-
-
-def _columns(reader: TrajectoryReader) -> Moments:
-    """All recorded moments, in the order of the recording's bodies."""
-    if "body_pose" not in reader.manifest.layout.state:
-        raise RecordError(f"{reader.directory} does not hold body_pose, which its images are drawn from")
-    poses = reader.states["body_pose"]
-    steps = np.arange(1, len(poses) + 1)
-    if not reader.initial_state:
-        return Moments(steps, np.asarray(poses))
-    first = reader.initial_state["body_pose"]
-    return Moments(np.append(0, steps), np.concatenate([first[None], poses]))
-
-
-def _refuse_damage(trajectory: Path, manifest: Manifest) -> None:
-    """The videos that are there do not matter here."""
-    videos = {camera.file for camera in manifest.cameras.values()}
-    for name, entry in manifest.files.items():
-        file = trajectory / name
-        if name not in videos and (not file.is_file() or describe(file) != entry):
-            raise RecordError(f"{file} is not what was committed, so nothing is drawn from it; record it again")
 
 
 def _sheet(manifest: Manifest, env: TaskEnv, spec: Mapping[str, Any], still: tuple[str, ...]) -> FilmSheet:

@@ -10,7 +10,8 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from anysim.errors import AnysimError, RecordError
-from anysim_film.filmer import Filmed, Filmer, FilmOrder
+from anysim_film.filmer import Filmed, Filmer
+from anysim_film.stage import FilmOrder
 
 WATCH_S = 1.0
 """How often a worker looks whether its parent is there [s]."""

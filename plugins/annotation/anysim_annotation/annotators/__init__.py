@@ -1,0 +1,1 @@
+"""The annotators of this distribution, one file each."""

@@ -1,0 +1,88 @@
+"""annotations.json: what a directory of annotations holds, of which trajectory, and how it was made."""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationError
+
+from anysim.errors import RecordError
+from anysim.record.header import Count, Label
+from anysim.record.json import load_json
+from anysim.record.manifest import Digest, FileEntry
+from anysim_schemas.base import Name, Spec
+
+SHEET_FILE = "annotations.json"
+SUFFIX = ".annotations"
+"""What the directory of a trajectory's annotations is called after its name."""
+
+
+class FieldEntry(Spec):
+    """An array, or a key of records: shape with letters for what differs, unit, number type, and what it is."""
+
+    shape: tuple[int | str, ...] = ()
+    unit: Label = "1"
+    dtype: Label = ""
+    words: Label = ""
+
+
+class AnnotatorEntry(Spec):
+    """An annotator of a camera: its parameters, what it made, and the files in which that is, by array or `records`."""
+
+    parameters: dict[str, Any] = Field(default_factory=dict)
+    arrays: dict[str, FieldEntry] = Field(default_factory=dict)
+    records: dict[str, FieldEntry] = Field(default_factory=dict)
+    files: dict[str, Label] = Field(default_factory=dict)
+    frames: Count = 0
+
+
+class CameraSheet(Spec):
+    """A camera: the size of its images, and its annotators by name."""
+
+    width: Count
+    height: Count
+    annotators: dict[Name, AnnotatorEntry] = Field(default_factory=dict)
+
+
+class AnnotationSheet(Spec):
+    """The content of annotations.json. Equal commands give equal sheets, but for the key `clock`.
+
+    `final_digest` says which episode it is: that of its last state. `steps` are the control steps that were labelled.
+    """
+
+    format: Literal["anysim-annotations-1"] = "anysim-annotations-1"
+    task: Label
+    env: Count
+    episode: Count
+    episode_seed: Annotated[int, Field(ge=0)]
+    final_digest: Digest
+    source: Literal["engine", "geometry"]
+    engine: Label
+    engine_version: Label
+    world_hash: Label
+    spec: dict[str, Any]
+    still: tuple[Label, ...] = ()
+    steps: tuple[Count, ...] = ()
+    legend: dict[str, Any] = Field(default_factory=dict)
+    cameras: dict[Name, CameraSheet] = Field(default_factory=dict)
+    files: dict[str, FileEntry] = Field(default_factory=dict)
+    clock: dict[str, Any] = Field(default_factory=dict, description="all that differs between equal ones")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, None included."""
+        return self.model_dump(mode="json")
+
+
+def read_annotations(directory: Path) -> AnnotationSheet | None:
+    """The sheet of a directory of annotations; None where nothing was annotated yet.
+
+    Raises:
+        RecordError: it is damaged, or of another format.
+    """
+    path = directory / SHEET_FILE
+    if not path.exists():
+        return None
+    try:
+        return AnnotationSheet.model_validate(load_json(path))
+    except ValidationError as error:
+        faults = "; ".join(f"{'.'.join(map(str, e['loc'])) or 'file'}: {e['msg']}" for e in error.errors()[:3])
+        raise RecordError(f"{path} is damaged or is no sheet of annotations: {faults}") from error

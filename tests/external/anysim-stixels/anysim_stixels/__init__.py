@@ -1,0 +1,1 @@
+"""Stixels for anysim."""
