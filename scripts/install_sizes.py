@@ -47,6 +47,7 @@ WORDS = {
     "sensors": "IMUs, forces, tracked frames; LiDARs, height scans, depth, occupancy, equal on every engine",
     "sharded": "worker processes: `engine: {name: pybullet, shards: 2}`",
     "skills": "scripted solutions: grasp, place, push, press, open, close, insert, hand over",
+    "tactile": "touch: taxels whose forces add up to the engine's, and images of a gel",
     "tasks": "tasks on tables, with tight fits, hands, mobile bases and legs, with their experts",
     "teleop": "`anysim teleop`: demonstrations, driven by an input device",
     "urdf": "URDF files",

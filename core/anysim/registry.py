@@ -85,6 +85,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-sensors": {"sensors": "contact force_torque imu joints tracking"},
     "anysim-sharded": {"executors": "processes"},
     "anysim-skills": {"skills": "pick"},
+    "anysim-tactile": {"sensors": "tactile_fingertip tactile_pad tactile_probe"},
     "anysim-teleop": {"commands": "teleop", "devices": "browser keyboard script"},
     "anysim-urdf": {"importers": "urdf"},
 }

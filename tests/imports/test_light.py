@@ -32,7 +32,7 @@ PACKAGES = (
     "anysim_evaluation", "anysim_film", "anysim_inspect", "anysim_language", "anysim_learning", "anysim_legged",
     "anysim_maniskill",
     "anysim_mcap", "anysim_parity", "anysim_planning", "anysim_policy", "anysim_robots", "anysim_sharded",
-    "anysim_skills", "anysim_tasks", "anysim_teleop", "anysim_urdf",
+    "anysim_skills", "anysim_tactile", "anysim_tasks", "anysim_teleop", "anysim_urdf",
 )  # fmt: skip
 
 

@@ -210,6 +210,8 @@ class SensorManager(Manager):
             known = f"{suggest(field, list(fields))} (fields: {listing(fields)})"
             raise NameLookupError(f"the sensor '{name}' has no field '{field}'{known}")
         rows, kind = self._channels[name].seen[env_ids, self._channels[name].columns[field]], fields[field]
+        if kind.dtype == "uint8":
+            rows = np.clip(np.rint(rows), 0, 255)  # of an image that noise was added to
         return rows.reshape(len(rows), *kind.shape).astype(kind.dtype)
 
     def recorded(self, env_ids: Array) -> dict[str, Array]:
