@@ -82,7 +82,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-pybullet": {"engines": "pybullet"},
     "anysim-robots": {"commands": "gallery robot"},
     "anysim-sapien": {"engines": "sapien"},
-    "anysim-sensors": {"sensors": "contact force_torque imu joints tracking"},
+    "anysim-sensors": {"sensors": "contact depth force_torque heights imu joints lidar occupancy tracking"},
     "anysim-sharded": {"executors": "processes"},
     "anysim-skills": {"skills": "pick"},
     "anysim-tactile": {"sensors": "tactile_fingertip tactile_pad tactile_probe"},

@@ -91,6 +91,9 @@ class SensorPlaceSpec(Spec):
     roll_pitch_yaw: Vec3 = Field(
         default=(0.0, 0.0, 0.0), description="orientation in the link's frame [rad]; a camera looks along z, y down"
     )
+    params: dict[str, Any] = Field(
+        default_factory=dict, description="of the sensor, as `preset: vlp_16` of a LiDAR; a world may say otherwise"
+    )
     noise: dict[Name, SensorNoiseSpec] = Field(
         default_factory=dict, description="noise by field of the sensor, as its data sheet has it; a world may say more"
     )

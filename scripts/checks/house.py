@@ -22,6 +22,7 @@ LARGE_PLUGINS = {
     "assets": 4_040,  # builders of one kind (things, rooms, ground) that share their shapes and their parameters
     "control": 3_600,  # controllers of tools, vehicles and cameras: one kind of entry points, with an extra a solver
     "parity": 3_660,  # one comparison: its layers and probes are read together, and its page shows all of them
+    "sensors": 3_900,  # one geometry and every sensor that asks it: kernels, tables, and what worlds declare
     "skills": 10_050,  # one library of arms and phases that every group of skills builds on, a folder a group
 }
 """Plugins that stay whole although they are larger, with what they may have: it rises with what they newly do alone."""

@@ -42,6 +42,8 @@ class _Channel:
             if key not in sensor.fields:
                 known = f"{suggest(key, list(sensor.fields))} (fields: {listing(sensor.fields)})"
                 raise SpecError([SpecIssue("", path, f"the sensor has no such field{known}")])
+            if not self.fields[key].dtype.startswith("float"):
+                raise SpecError([SpecIssue("", path, "the field holds whole numbers, which no noise is added to")])
             numbers = 3 if self.fields[key].unit == "xyzw" else prod(self.fields[key].shape)
             self._noise[key] = FieldNoise(noise, f"sensor/{name}/{key}", path, streams, numbers, sensor.period)
         longest = longest_delay(spec.delay)
@@ -255,5 +257,5 @@ def _settled(world: World, spec: SensorSpec, path: str) -> SensorSpec:
         registry.entry("sensors", place.kind)
     except PluginError as error:
         raise SpecError([SpecIssue("", path, f"it is a place for a {place.kind}: {error}")]) from None
-    given = {"frame": spec.place, **spec.params, "noise": {**place.noise, **spec.noise}}
+    given = {"frame": spec.place, **place.params, **spec.params, "noise": {**place.noise, **spec.noise}}
     return spec.model_copy(update={"sensor": place.kind, "place": None, **given})

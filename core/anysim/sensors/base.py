@@ -26,7 +26,7 @@ class SensorField(NamedTuple):
     shape: tuple[int, ...]
     unit: str
     axes: str = ""
-    dtype: Literal["float64", "float32", "int32", "uint8", "bool"] = "float64"
+    dtype: Literal["float64", "float32", "int32", "int8", "uint8", "bool"] = "float64"
 
 
 class Sensor(ABC):

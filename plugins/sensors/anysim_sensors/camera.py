@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from anysim.conventions import Array
 from anysim.errors import AnysimError
+from anysim.math import pose as P
 from anysim_sensors.scene import SceneGeometry
 from anysim_sensors.tables import GeomPoses
 
@@ -156,6 +157,44 @@ class RayCamera:
             number, points, scene.row, posed, before, frames_before, focal, self.width, self.height, flow
         )
         return flow.reshape(*images.depth.shape, 2)
+
+    def appeared(
+        self,
+        scene: SceneGeometry,
+        images: Images,
+        frames: Array,
+        posed: GeomPoses,
+        frames_before: Array,
+        before: GeomPoses,
+        *,
+        seen: Array | None = None,
+    ) -> Array:
+        """(N, H, W) bool where what is seen was not seen before: it was out of the image, or something hid it.
+
+        Arguments are as of `flow`, and `seen` as of `images`. Rays from where the camera was decide it, so it is exact
+        but for surfaces that are nearer to each other than a tenth of a millimetre.
+        """
+        distance, number = self._flat(images)
+        points = np.empty((*distance.shape, 3))
+        self._kernels.locate(distance, number, self.directions, frames, points)
+        there = number >= 0
+        row = np.where(there, scene.row[number], 0)[..., None]
+        now, then = (np.take_along_axis(one.frame, row, axis=1) for one in (posed, before))
+        turn, turned = (one[..., :9].reshape(*number.shape, 3, 3) for one in (now, then))
+        local = np.einsum("nrji,nrj->nri", turn, points - now[..., 9:])
+        place = np.einsum("nrij,nrj->nri", turned, local) + then[..., 9:]
+        to = P.rotate_inverse(frames_before[:, None, 3:], place - frames_before[:, None, :3])
+        length = np.linalg.norm(to, axis=-1)
+        there &= (length > 0) & np.isfinite(length)
+        to = np.where(there[..., None], to, [0.0, 0.0, 1.0])
+        hits = scene.rays(before, frames_before, np.zeros_like(to), to, reach=self._reach, seen=seen)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            focal = np.broadcast_to(self.focal, len(to))[:, None]
+            across, down = (np.abs(to[..., k] / to[..., 2]) * focal for k in (0, 1))
+        inside = (to[..., 2] >= self.near) & (to[..., 2] <= self.far)
+        inside &= (across <= self.width / 2) & (down <= self.height / 2)
+        new = there & ~(inside & (hits.distance >= length - 1e-4))
+        return new.reshape(images.depth.shape)
 
     def entities(self, images: Images) -> EntityPixels:
         """Boxes around what is seen of each entity, and how much of it is hidden, of images with `whole` areas.

@@ -14,13 +14,22 @@ class Scan(NamedTuple):
 
     Attributes:
         distance: (N, R) [m], inf where nothing is met between near and far.
-        points: (N, R, 3) [m] in the sensor's frame, NaN there.
+        geom: (N, R) int32, index among the World's geoms, -1 there.
         segmentation: (N, R) int32, ids of entities; 0 for the ground, and where nothing is met.
+        normal: (N, R, 3) as in `Hits`; no rows if it was not asked for.
+        directions: (R, 3) or (N, R, 3) unit, of the rays in the sensor's frame.
     """
 
     distance: Array
-    points: Array
+    geom: Array
     segmentation: Array
+    normal: Array
+    directions: Array
+
+    @property
+    def points(self) -> Array:
+        """(N, R, 3) [m] in the sensor's frame, NaN where nothing is met."""
+        return np.where(np.isfinite(self.distance), self.distance, np.nan)[..., None] * self.directions
 
 
 def lidar(
@@ -32,16 +41,16 @@ def lidar(
     near: float = 0.0,
     far: float = 100.0,
     seen: Array | None = None,
+    normals: bool = False,
     threads: int = 1,
 ) -> Scan:
-    """A scan with unit directions (R, 3) in the sensor's frame, the sensor at poses (N, 7).
+    """A scan with unit directions (R, 3) or (N, R, 3) in the sensor's frame, the sensor at poses (N, 7).
 
     What is nearer than `near` hides what is behind it. All rays of a scan see the same moment. `seen` is as in
     `SceneGeometry.rays`: leave the sensor's own body out with `scene.without`.
     """
-    hits = scene.rays(posed, frames, np.zeros_like(directions), directions, reach=far, seen=seen, threads=threads)
+    start = np.zeros_like(directions)
+    hits = scene.rays(posed, frames, start, directions, reach=far, seen=seen, normals=normals, threads=threads)
     close = hits.distance < near
-    distance = np.where(close, np.inf, hits.distance)
-    with np.errstate(invalid="ignore"):
-        points = np.where(np.isfinite(distance), distance, np.nan)[..., None] * directions
-    return Scan(distance, points, scene.segmentation[np.where(close, -1, hits.geom)])
+    geom = np.where(close, np.int32(-1), hits.geom)
+    return Scan(np.where(close, np.inf, hits.distance), geom, scene.segmentation[geom], hits.normal, directions)

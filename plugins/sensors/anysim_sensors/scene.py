@@ -95,7 +95,7 @@ class SceneGeometry:
 
         `presence` (N, E) bool, as `Presence.entities`, says what is there; the nominal population if not given.
         """
-        poses = np.ascontiguousarray(body_pose, dtype=float)
+        poses = np.array(body_pose, dtype=float, order="C")  # writable, as all are: kernels are compiled once
         bodies = len(self.world.bodies)
         if poses.ndim != 3 or poses.shape[1:] != (bodies, 7):
             raise AnysimError(
@@ -103,7 +103,8 @@ class SceneGeometry:
             )
         envs, count = len(poses), len(self.geoms.kind)
         there = self.world.initial_presence if presence is None else presence
-        rows = np.broadcast_to(np.asarray(there, dtype=bool), (envs, len(self.world.entities)))
+        rows = np.empty((envs, len(self.world.entities)), dtype=bool)
+        rows[:] = there
         nodes = 2 * count if count > TREE_FROM else 0
         posed = GeomPoses(
             np.empty((envs, count, 12)),
@@ -114,7 +115,7 @@ class SceneGeometry:
             np.empty((envs, nodes, 2), dtype=np.int32),
             np.empty((envs, count), dtype=np.int32),
         )
-        self._pose_geoms(self.geoms, poses, np.ascontiguousarray(rows), posed)
+        self._pose_geoms(self.geoms, poses, rows, posed)
         return posed
 
     def rays(

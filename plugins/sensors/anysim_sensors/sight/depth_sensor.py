@@ -1,0 +1,99 @@
+"""A depth camera that a world declares: depth from rays, and what else is asked for of each pixel."""
+
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from anysim.conventions import Array
+from anysim.errors import AnysimError
+from anysim.model.world import ORIGIN
+from anysim.sensors.base import Sensor, SensorField
+from anysim.task.scene import Frame, SceneView
+from anysim_schemas.base import Degrees, NonNegative, Positive, Vec3
+from anysim_sensors.camera import RayCamera
+from anysim_sensors.presets import CAMERAS, camera_preset
+from anysim_sensors.sight.eye import Eye, LeftOut, Shapes
+from anysim_sensors.sight.identities import Identities
+
+Side = Annotated[int, Field(ge=1, le=4096)]
+Channel = Literal["depth", "normals", "instance_id", "class_id", "motion"]
+
+
+class Depth(Sensor):
+    """A pinhole camera in the optical frame (x right, y down, z ahead): images (height, width, …) of what is asked for.
+
+    `depth` along z [m], `far` where nothing is seen; `normals` in the world, outward; `instance_id` and `class_id`;
+    `motion`, the pixels (columns, rows) by which what is seen has moved since the last reading, exact and zero in the
+    first, with `appeared` where it was not in sight then. What is not seen has zeros. It differs from a rendered depth
+    image in silhouettes alone, and is the same on every engine.
+    """
+
+    def __init__(
+        self,
+        scene: SceneView,
+        *,
+        frame: Frame,
+        preset: Annotated[str | None, Field(description=f"a device: {', '.join(CAMERAS)}")] = None,
+        size: Annotated[tuple[Side, Side] | None, Field(description="width and height [pixels]")] = None,
+        fov: Annotated[Degrees | None, Field(description="vertical field of view [degrees]")] = None,
+        near: Annotated[NonNegative | None, Field(description="what is nearer is not seen, and hides [m]")] = None,
+        far: Annotated[Positive | None, Field(description="what is farther is not seen [m]")] = None,
+        channels: Annotated[tuple[Channel, ...], Field(min_length=1)] = ("depth",),
+        shapes: Shapes = "collision",
+        leave_out: Annotated[LeftOut, Field(description="what carries it, and is not seen")] = "body",
+        position: Annotated[Vec3, Field(description="in the frame [m]")] = ORIGIN,
+        roll_pitch_yaw: Annotated[Vec3, Field(description="in the frame [rad]; it looks along z, y down")] = ORIGIN,
+    ) -> None:
+        super().__init__(scene.engine.num_envs)
+        device = None if preset is None else camera_preset(preset)
+        default = (128, 128, 60.0, 0.05, 10.0)
+        if device is not None:
+            default = (device.width, device.height, device.fov, device.near, device.far)
+        width, height = default[:2] if size is None else size
+        given = zip((fov, near, far), default[2:], strict=True)
+        angle, near, far = (float(value if own is None else own) for own, value in given)
+        if near >= far:
+            raise AnysimError(f"`near` ({near:g} m) is less than `far` ({far:g} m)")
+        self._scene, self._channels = scene, frozenset(channels)
+        self._camera = RayCamera(width, height, angle, near, far)
+        self._eye = Eye(scene, frame, shapes, leave_out, position, roll_pitch_yaw)
+        self._named = Identities.of(scene.engine.world)
+        image = (height, width)
+        every = {
+            "depth": SensorField(image, "m", dtype="float32"),
+            "normals": SensorField((*image, 3), "1", "world", "float32"),
+            "instance_id": SensorField(image, "1", dtype="int32"),
+            "class_id": SensorField(image, "1", dtype="int32"),
+            "motion": SensorField((*image, 2), "pixel", dtype="float32"),
+        }
+        self.fields = {name: every[name] for name in dict.fromkeys(channels)}
+        if "motion" in self._channels:
+            self.fields |= {"appeared": SensorField(image, "1", dtype="uint8")}
+            self._bodies = self.remember("bodies", len(scene.engine.world.bodies), 7)
+            self._stood = self.remember("stood", 7)
+
+    def reset(self, env_ids: Array) -> None:
+        if "motion" in self._channels:
+            self._keep(env_ids)
+
+    def _keep(self, env_ids: Array) -> None:
+        self._bodies[env_ids], self._stood[env_ids] = self._scene.state.body_pose[env_ids], self._eye.poses
+
+    def read(self, env_ids: Array) -> Mapping[str, Array]:
+        eye, shown, camera, asked = self._eye, self._eye.poses, self._camera, self._channels
+        images = camera.images(eye.geometry, eye.posed, shown, seen=eye.seen, normals="normals" in asked)
+        values: dict[str, Array] = {"depth": np.where(images.geom < 0, camera.far, images.depth)}
+        if "normals" in asked:
+            values["normals"] = images.normal * (images.geom >= 0)[..., None]
+        values["instance_id"] = self._named.instance[images.segmentation]
+        values["class_id"] = self._named.class_[images.segmentation]
+        if "motion" in asked:
+            stood = self._stood[env_ids]
+            before = eye.geometry.posed(self._bodies[env_ids], self._scene.presence[env_ids])
+            flow = camera.flow(eye.geometry, images, shown, eye.posed, stood, before)
+            values["motion"] = np.nan_to_num(flow)
+            values["appeared"] = camera.appeared(eye.geometry, images, shown, eye.posed, stood, before, seen=eye.seen)
+            self._keep(env_ids)
+        return {name: values[name] for name in self.fields}
