@@ -33,7 +33,9 @@ class TactileFingertip(Gel):
         image: Annotated[Grid | None, Field(description="its rows and columns; none if not given")] = None,
         **options: object,
     ) -> None:
-        def curved(shape: tuple[int, int]) -> Surface:
-            return spherical(radius, angles, shape) if length is None else cylindrical(radius, angles[0], length, shape)
+        def curved(shape: tuple[int, int], *, pixels: bool = False) -> Surface:
+            if length is None:
+                return spherical(radius, angles, shape, pixels=pixels)
+            return cylindrical(radius, angles[0], length, shape, pixels=pixels)
 
-        super().__init__(scene, curved(grid), curved(image) if image else None, **options)  # pyright: ignore[reportArgumentType]
+        super().__init__(scene, curved(grid), curved(image, pixels=True) if image else None, **options)  # pyright: ignore[reportArgumentType]

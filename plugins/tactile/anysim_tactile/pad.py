@@ -21,4 +21,4 @@ class TactilePad(Gel):
         image: Annotated[Grid | None, Field(description="its rows and columns; none if not given")] = None,
         **options: object,
     ) -> None:
-        super().__init__(scene, flat(size, grid), flat(size, image) if image else None, **options)  # pyright: ignore[reportArgumentType]
+        super().__init__(scene, flat(size, grid), flat(size, image, pixels=True) if image else None, **options)  # pyright: ignore[reportArgumentType]

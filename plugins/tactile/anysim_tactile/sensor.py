@@ -36,7 +36,7 @@ class Touch(NamedTuple):
 
     Attributes:
         frames: (n, 7) of the sensor. points: the contacts. posed: where geoms are; None where contacts alone count.
-        gap: (n, T) [m]. short: (n,) bool, where it was too little, and contact points counted as well.
+        gap: (n, T) [m]. short: (n,) bool, where it was too little, and contact points helped.
         carried: by the taxels.
     """
 
@@ -109,20 +109,22 @@ class Tactile(Sensor):
             posed = self._geometry.posed(self._scene.state.body_pose[env_ids], engine.presence[env_ids])
         gap = self._gap(frames, posed, points, self._surface)
         carried = self._skin.carry(gap, points.pushes, points.wrench)
-        short = self._short(points, carried)
+        missed = self._missed(points, carried)
+        short = missed > EXACT
         if short.any():
-            some = points._replace(wrench=points.wrench[short], pushes=points.pushes[short])
-            close = np.minimum(gap, bumps(points, self._surface, self._blunt))[short]
-            again = self._skin.carry(close, some.pushes, some.wrench)
+            close = np.minimum(gap, bumps(points, self._surface, self._blunt))
+            again = self._skin.carry(close, points.pushes, points.wrench)
+            short &= self._missed(points, again) < 0.5 * missed
             for before, after in zip(carried, again, strict=True):
-                before[short] = after
+                before[short] = after[short]
         return Touch(frames, points, posed, gap, short, carried)
 
-    def _short(self, points: Felt, carried: Load) -> Array:
-        """(n,) bool: where those taxels that geometry has something over cannot carry what the contacts do."""
+    def _missed(self, points: Felt, carried: Load) -> Array:
+        """(n,) which part of the contacts' moment taxels do not carry; inf where a force presses none of them."""
         moment = P.norm(points.wrench[:, 3:] - carried.total[:, 3:])
-        allowed = EXACT * (P.norm(points.wrench[:, 3:]) + self._surface.pitch * P.norm(points.wrench[:, :3]))
-        return (moment > allowed) | (points.wrench.any(axis=1) & (carried.deep.max(axis=1) <= 0))
+        size = P.norm(points.wrench[:, 3:]) + self._surface.pitch * P.norm(points.wrench[:, :3])
+        part = np.divide(moment, size, out=np.zeros_like(moment), where=size > 0)
+        return np.where((size > 0) & (carried.deep.max(axis=1) <= 0), np.inf, part)
 
     def _gap(self, frames: Array, posed: GeomPoses | None, points: Felt, surface: Surface) -> Array:
         """(n, T) [m] between taxels and what is over them, negative where they are in it, inf where it is far."""

@@ -1,6 +1,5 @@
 """Surfaces of taxels: points of an undeformed skin with outward normals, in a frame of the sensor."""
 
-from math import prod
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -57,45 +56,55 @@ def scattered(points: ArrayLike, normals: ArrayLike, area: float) -> Surface:
     return Surface((len(at),), at, out, _right(out), np.full(len(at), area), pitch)
 
 
-def flat(size: tuple[float, float], grid: tuple[int, int]) -> Surface:
-    """A rectangle of width and height [m] about the origin, z outward, of (rows, columns); rows from the lowest y."""
-    rows, columns = grid
-    x, y = _middles(size[0], columns), _middles(size[1], rows)
-    points = np.stack([*np.meshgrid(x, y), np.zeros((rows, columns))], axis=-1).reshape(-1, 3)
+def flat(size: tuple[float, float], grid: tuple[int, int], *, pixels: bool = False) -> Surface:
+    """A rectangle of width and height [m] about the origin, z outward, of (rows, columns); rows from the lowest y.
+
+    Taxels stand from edge to edge, so that they carry a force on the edge; pixels in the middles of equal cells.
+    """
+    x, dx = _along(size[0], grid[1], pixels)
+    y, dy = _along(size[1], grid[0], pixels)
+    points = np.stack([*np.meshgrid(x, y), np.zeros(grid)], axis=-1).reshape(-1, 3)
     normals = np.broadcast_to([0.0, 0.0, 1.0], points.shape).copy()
-    area = np.full(len(points), prod(size) / len(points))
-    return Surface((rows, columns), points, normals, _right(normals), area, max(size[0] / columns, size[1] / rows))
+    return Surface(grid, points, normals, _right(normals), np.outer(dy, dx).ravel(), float(max(dx.max(), dy.max())))
 
 
-def spherical(radius: float, angles: tuple[float, float], grid: tuple[int, int]) -> Surface:
+def spherical(radius: float, angles: tuple[float, float], grid: tuple[int, int], *, pixels: bool = False) -> Surface:
     """A cap of a sphere about the origin, +-angles [rad] about y (columns) and x (rows) from its middle on z."""
-    rows, columns = grid
-    u, v = np.meshgrid(np.tan(_middles(2 * angles[0], columns)), np.tan(_middles(2 * angles[1], rows)))
+    x, dx = _along(2 * angles[0], grid[1], pixels)
+    y, dy = _along(2 * angles[1], grid[0], pixels)
+    u, v = np.meshgrid(np.tan(x), np.tan(y))
     along = np.stack([u, v, np.ones_like(u)], axis=-1).reshape(-1, 3)
     length = np.linalg.norm(along, axis=1)
     normals = along / length[:, None]
-    du, dv = 2 * angles[0] / columns, 2 * angles[1] / rows  # of the angles; a tangent of them grows by 1 + its square
-    spread = (1 + along[:, 0] ** 2) * du * (1 + along[:, 1] ** 2) * dv
+    spread = (
+        np.outer(dy, dx).ravel() * (1 + along[:, 0] ** 2) * (1 + along[:, 1] ** 2)
+    )  # a tangent grows by 1 + its square
     right = np.array([1.0, 0.0, 0.0]) - normals[:, :1] * normals
     right /= np.linalg.norm(right, axis=1, keepdims=True)
-    area = radius**2 * spread / length**3
-    return Surface((rows, columns), radius * normals, normals, right, area, radius * max(du, dv))
+    pitch = radius * float(max(dx.max(), dy.max()))
+    return Surface(grid, radius * normals, normals, right, radius**2 * spread / length**3, pitch)
 
 
-def cylindrical(radius: float, angle: float, length: float, grid: tuple[int, int]) -> Surface:
+def cylindrical(radius: float, angle: float, length: float, grid: tuple[int, int], *, pixels: bool = False) -> Surface:
     """A strip of a cylinder about y, +-angle [rad] from its middle on z (columns) and of a length [m] (rows)."""
-    rows, columns = grid
-    u, v = np.meshgrid(_middles(2 * angle, columns), _middles(length, rows))
-    normals = np.stack([np.sin(u), np.zeros_like(u), np.cos(u)], axis=-1).reshape(-1, 3)
-    right = np.stack([np.cos(u), np.zeros_like(u), -np.sin(u)], axis=-1).reshape(-1, 3)
-    points = radius * normals + np.stack([np.zeros_like(v), v, np.zeros_like(v)], axis=-1).reshape(-1, 3)
-    step = radius * 2 * angle / columns, length / rows
-    return Surface((rows, columns), points, normals, right, np.full(len(points), prod(step)), max(step))
+    x, dx = _along(2 * angle, grid[1], pixels)
+    y, dy = _along(length, grid[0], pixels)
+    u, v = (values.ravel() for values in np.meshgrid(x, y))
+    normals = np.stack([np.sin(u), np.zeros_like(u), np.cos(u)], axis=-1)
+    right = np.stack([np.cos(u), np.zeros_like(u), -np.sin(u)], axis=-1)
+    points = radius * normals + np.stack([np.zeros_like(v), v, np.zeros_like(v)], axis=-1)
+    pitch = float(max(radius * dx.max(), dy.max()))
+    return Surface(grid, points, normals, right, radius * np.outer(dy, dx).ravel(), pitch)
 
 
-def _middles(length: float, count: int) -> Array:
-    """(count,) the middles of equal parts of a length about 0."""
-    return (np.arange(count) + 0.5 - count / 2) * (length / count)
+def _along(length: float, count: int, pixels: bool) -> tuple[Array, Array]:
+    """(count,) places about 0 along a length, and (count,) the lengths that they stand for."""
+    if pixels or count == 1:
+        return (np.arange(count) + 0.5 - count / 2) * (length / count), np.full(count, length / count)
+    step = length / (count - 1)
+    share = np.full(count, step)
+    share[[0, -1]] = step / 2
+    return (np.arange(count) - (count - 1) / 2) * step, share
 
 
 def _right(normals: Array) -> Array:

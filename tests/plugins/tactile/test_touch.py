@@ -16,6 +16,7 @@ from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
 from anysim.testing.kinematic import NullEngine
 from anysim.testing.sensors import check_sensor
+from anysim_tactile.surfaces import flat
 
 ENGINES = ("mujoco", "pybullet", "sapien")
 TOP = 0.02
@@ -110,8 +111,8 @@ def test_sums_are_the_engines_force_and_moment(engine: str, thing: dict[str, Any
             assert reading["moment"] == pytest.approx(expected[3:], abs=1e-9)
             assert reading["moment_error"] < 1e-9
             assert reading["pressure"].min() >= 0.0
-            area = 8e-5 if name == "probe" else 0.03 * 0.024 / 480
-            assert reading["pressure"].sum() * area == pytest.approx(-expected[2], abs=1e-9)
+            area = 8e-5 if name == "probe" else flat((0.03, 0.024), (20, 24)).area.reshape(20, 24)
+            assert (reading["pressure"] * area).sum() == pytest.approx(-expected[2], abs=1e-9)
             assert reading["shear"].reshape(-1, 2).sum(axis=0) == pytest.approx(expected[:2], abs=1e-9)
             if thing is BOX:  # also on SAPIEN, whose library reports no friction
                 assert np.linalg.norm(reading["shear"].reshape(-1, 2).sum(axis=0)) == pytest.approx(0.36, rel=0.05)
