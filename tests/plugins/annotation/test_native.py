@@ -1,4 +1,4 @@
-"""What skills meant: segments, targets, points and trails of recorded episodes, against their states."""
+"""Segments, targets, points and trails of recorded episodes, against their states."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -61,9 +61,8 @@ def test_each_skill_segment_has_the_box_that_its_target_had_when_it_began(pick) 
 
 def test_an_affordance_is_on_the_target_where_the_tool_was_sent(pick) -> None:
     reader, said = pick
-    assert [r["phase"] for r in said["affordance"]] == [
-        "grasp: approach", "grasp: descend", "grasp: close", "bring: carry",
-    ]  # fmt: skip
+    phases = ["grasp: approach", "grasp: descend", "grasp: close", "bring: carry"]
+    assert [r["phase"] for r in said["affordance"]] == phases
     [camera] = [r for r in said["camera"] if r["step"] == 0]
     for one in said["affordance"]:
         assert one["commanded"]
