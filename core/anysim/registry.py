@@ -48,7 +48,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-annotation": {
         "annotators": "affordance boxes_2d boxes_3d camera depth eef_waypoint flow instance nav_point normals obj_bbox"
         " point_cloud semantic skeleton",
-        "renderings": "annotations",
+        "renderings": "annotations stills",
     },
     "anysim-assets": {
         "assets": "cabinet hinge_box mug parallel_gripper valve",

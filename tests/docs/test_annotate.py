@@ -3,6 +3,7 @@
 import json
 import re
 import shlex
+import shutil
 import sys
 from pathlib import Path
 
@@ -14,10 +15,10 @@ from anysim.cli.main import app, main
 from anysim.testing.engines import require_drawing
 from anysim_annotation.files import read_records
 
-PAGE = (Path(__file__).parents[2] / "docs" / "annotate.md").read_text()
-SAID = [
-    line for block in re.findall(r"^```sh\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL) for line in block.splitlines()
-]
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "annotate.md").read_text()
+WORLDS = ROOT / "tests" / "plugins" / "annotation" / "worlds"
+SAID = re.findall(r"^    (anysim .*)$", PAGE, re.MULTILINE)
 
 
 def test_the_commands_of_the_page_make_what_it_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -25,6 +26,9 @@ def test_the_commands_of_the_page_make_what_it_says(tmp_path: Path, monkeypatch:
     if not any(command.name == "render" for command in app.registered_commands):
         hooks.add_commands(app)
     monkeypatch.chdir(tmp_path)
+    for name in ("desk.yaml", "job.yaml"):
+        shutil.copy(WORLDS / name, tmp_path)
+    assert len(SAID) == 4
     for line in SAID:
         monkeypatch.setattr(sys, "argv", shlex.split(line))
         with pytest.raises(SystemExit) as ended:
@@ -39,3 +43,7 @@ def test_the_commands_of_the_page_make_what_it_says(tmp_path: Path, monkeypatch:
         assert sheet["cameras"]["front"]["width"] == 160
         with np.load(out / "front.normals.npz") as archive:
             assert archive[f"{sheet['steps'][1]:06d}"].shape == (120, 160, 3)
+    coco = json.loads((tmp_path / "stills" / "desk" / "coco.json").read_text())
+    assert len(coco["images"]) == 12
+    assert [kind["name"] for kind in coco["categories"]] == ["block", "toy"]
+    assert len(list((tmp_path / "stills" / "desk" / "kitti" / "label_2").iterdir())) == 12

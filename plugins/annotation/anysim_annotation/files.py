@@ -82,7 +82,7 @@ def read_array(directory: Path, name: str, step: int) -> Array:
 
 def json_line(record: Mapping[str, Any]) -> str:
     """A record as one line: floats rounded to `_DIGITS`, NaN as null."""
-    return json.dumps(_tidy(plain(record, "record")), ensure_ascii=False, allow_nan=False) + "\n"
+    return json.dumps(tidied(plain(record, "record")), ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def lines_of(step: int, records: Sequence[Record]) -> str:
@@ -95,13 +95,14 @@ def read_records(path: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in path.read_text("utf-8").splitlines()]
 
 
-def _tidy(value: Any) -> Any:
+def tidied(value: Any) -> Any:
+    """Plain data with floats rounded to `_DIGITS`, and None in place of what is no number."""
     if isinstance(value, float):
         return round(value, _DIGITS) + 0.0
     if value in ("nan", "inf", "-inf"):
         return None
     if isinstance(value, list):
-        return [_tidy(item) for item in value]
+        return [tidied(item) for item in value]
     if isinstance(value, dict):
-        return {key: _tidy(item) for key, item in value.items()}
+        return {key: tidied(item) for key, item in value.items()}
     return value

@@ -15,7 +15,10 @@ if TYPE_CHECKING:
 
 
 def render(
-    directories: Annotated[list[Path], typer.Argument(metavar="DIR…", help="Trajectories, or runs with many of them.")],
+    directories: Annotated[
+        list[Path],
+        typer.Argument(metavar="DIR…", help="Trajectories, or runs with many of them; or one job of stills."),
+    ],
     camera: Annotated[
         list[str] | None,
         typer.Option(
@@ -56,12 +59,14 @@ def render(
     would have had. With other sizes, looks, lights, cameras or another engine they go into another directory, --out.
     What is there already is passed over, so the same command goes on where an interrupted one stopped.
 
-    With --annotate it writes what cameras see as data, beside each trajectory (`anysim list annotators`).
+    With --annotate it writes what cameras see as data, beside each trajectory (`anysim list annotators`). With a
+    job in YAML it makes still images of a world that is drawn anew for each, with labels for detectors.
 
     Examples:
       anysim run pick_cube -k 64 -o record.cameras=[] --out runs/a && anysim render runs/a -c front
       anysim render runs/a --size 1280 720 -e sapien -o world.scenery.shadows=true --out films/a
       anysim render runs/a --annotate boxes_2d,normals,flow
+      anysim render desk_images.yaml --out stills/desk
     """
     from anysim.cli.output import counting, print_json
     from anysim.record.names import find_trajectories
@@ -69,6 +74,9 @@ def render(
     from anysim_film.jobs import film_all
     from anysim_film.stage import FilmOrder
 
+    if len(directories) == 1 and directories[0].suffix in (".yaml", ".yml"):
+        _stills(directories[0], out, engine, override or (), quiet=json)
+        return
     order = FilmOrder(tuple(camera or ()), engine, tuple(override or ()), size, fps, base)
     work = film_targets(find_trajectories(directories), out)
     if annotate is not None:
@@ -121,6 +129,22 @@ def _annotate(
         print_json({"annotated": new, "images": images, "trajectories": rows})
     else:
         typer.echo(f"{new} of {len(done)} episodes annotated, {images} images; the others were there")
+
+
+def _stills(job: Path, out: Path | None, engine: str | None, overrides: "Sequence[str]", *, quiet: bool) -> None:
+    """Make still images, which another distribution knows how to."""
+    from anysim import registry
+    from anysim.cli.output import counting, print_json
+
+    steps = registry.load("renderings", "stills")(job, out, engine, overrides)
+    last = next(steps)
+    with counting("images", last.of - last.done, quiet=quiet) as show:
+        for last in steps:
+            show(f"{last.done} of {last.of} images", "")
+    if quiet:
+        print_json(last._asdict())
+    else:
+        typer.echo(f"{last.new} images made, {last.done} of {last.of} there")
 
 
 def _shown(value: object) -> object:

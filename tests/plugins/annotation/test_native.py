@@ -1,4 +1,4 @@
-"""Annotators of what skills meant: trails, targets, affordances and points of bases, in recorded episodes."""
+"""Segments, targets, points and trails of recorded episodes, against their states."""
 
 from dataclasses import replace
 from itertools import pairwise
