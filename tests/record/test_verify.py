@@ -1,6 +1,7 @@
 import json
 import os
 
+import numpy as np
 import pytest
 
 from anysim import registry
@@ -17,9 +18,11 @@ class ContentReader:
     """Finds what the test tells it to."""
 
     found: list[str] = []  # noqa: RUF012  replaced by tests
+    late = 0.0
 
     def __init__(self, directory, manifest):
-        self.directory = directory
+        self.directory, self.manifest = directory, manifest
+        self.times = self.late + manifest.control_dt * np.arange(1, manifest.steps + 1)
 
     def faults(self):
         return self.found
@@ -80,6 +83,13 @@ def test_another_name(committed):
 def test_faults_of_the_content_are_reported(committed, monkeypatch):
     monkeypatch.setattr(ContentReader, "found", ["front.mp4 has 3 frames"])
     assert verify(committed) == ["front.mp4 has 3 frames"]
+
+
+def test_times_that_are_not_those_of_control_steps(committed, monkeypatch):
+    monkeypatch.setattr(ContentReader, "late", 0.001)
+    assert verify(committed) == [
+        f"{committed}: step 1 is at 0.021 s; with control steps of 0.02 s it should be at 0.02 s"
+    ]
 
 
 def test_a_missing_reader_is_no_damage(committed, monkeypatch):

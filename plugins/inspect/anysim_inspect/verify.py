@@ -2,11 +2,16 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from anysim.errors import PluginError, RecordError, listing
 from anysim.record.commit import describe
 from anysim.record.manifest import Manifest, read_manifest
 from anysim.record.names import EPISODES, MANIFEST_FILE, parse_trajectory, trajectories
-from anysim.record.reader import open_trajectory
+from anysim.record.reader import TrajectoryReader, open_trajectory
+
+LATE = 1e-3
+"""How far a time may be from that of its control step, in control steps: sums of physics steps are rounded."""
 
 
 def verify(directory: str | Path) -> list[str]:
@@ -30,7 +35,7 @@ def verify(directory: str | Path) -> list[str]:
         return faults
     try:
         reader = open_trajectory(path)
-        return reader.faults() or reader.nonsense()
+        return reader.faults() or reader.nonsense() or _clock(reader)
     except RecordError as error:
         return [str(error)]
     except ImportError as error:  # of a library that a reader imports when it reads: nothing is known of the content
@@ -51,6 +56,19 @@ def verify_run(out: str | Path) -> dict[str, list[str]]:
     if not (run / EPISODES).is_dir():
         raise RecordError(f"{run} holds no trajectories; the directory of a run has {EPISODES}/ in it")
     return {path.name: verify(path) for path in trajectories(run)}
+
+
+def _clock(reader: TrajectoryReader) -> list[str]:
+    """Times that are not those of their control steps."""
+    dt = reader.manifest.control_dt
+    late = np.abs(reader.times / dt - np.arange(1, len(reader.times) + 1)) > LATE
+    if not late.any():
+        return []
+    step = 1 + int(np.argmax(late))
+    return [
+        f"{reader.directory}: step {step} is at {reader.times[step - 1]:g} s; "
+        f"with control steps of {dt:g} s it should be at {step * dt:g} s"
+    ]
 
 
 def _names(path: Path, manifest: Manifest) -> list[str]:
