@@ -14,7 +14,7 @@ def sensors(
     rounds: Annotated[int, typer.Option(min=1, help="Rounds; the best of each counts.")] = 30,
     json: AsJson = False,
 ) -> None:
-    """What readings of sensors cost in processor time of one core, with no engine at all.
+    """What readings of sensors cost in processor time of one core: by themselves, and in a control step of 16 envs.
 
     A goal is what is good enough; one that is missed is marked and changes nothing else. The first run of a machine
     compiles the kernels, which takes a minute.
@@ -24,8 +24,9 @@ def sensors(
     """
     from anysim.cli.output import print_json, print_table
     from anysim_sensors.bench import sensor_costs
+    from anysim_sensors.step_bench import step_costs
 
-    costs = sensor_costs(geoms, rounds)
+    costs = sensor_costs(geoms, rounds) + step_costs(min(rounds, 5))
     if json:
         print_json([cost._asdict() | {"missed": cost.missed} for cost in costs])
         return

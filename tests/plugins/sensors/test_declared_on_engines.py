@@ -169,3 +169,38 @@ def test_a_snapshot_in_the_air_goes_on_with_the_same_bits() -> None:
         env.reset(seed=9)
         env.reset_to(snapshot)
         assert go(6) == expected
+
+
+def test_a_legged_robot_observes_the_ground_around_it() -> None:
+    """A height scan over waves, and a LiDAR on the trunk, as the observation of a policy that commands the legs."""
+    require_engine("mujoco")
+    spec = {
+        "engine": "mujoco",
+        "world": {
+            "terrain": {"kind": "waves", "amplitude": 0.1, "size": [6, 6], "platform": 0.8, "seed": 1},
+            "robots": {"go2": {"robot": "unitree_go2", "position": [0.0, 0.0, 0.05]}},
+            "sensors": {
+                "ground": {"sensor": "heights", "frame": "go2"},
+                "scan": {
+                    "sensor": "lidar",
+                    "frame": "go2",
+                    "pattern": {"kind": "spinning", "elevations": [-0.5, -0.3], "columns": 30},
+                    "far": 5.0,
+                    "leave_out": "entity",
+                    "rate": 10,
+                },
+            },
+        },
+        "task": {"observations": {"policy": [{"term": "sensor", "of": n} for n in ("ground.height", "scan.range")]}},
+    }
+    with anysim.make(spec, num_envs=2) as env:
+        env.reset(seed=0)
+        for _ in range(5):
+            env.step(np.zeros((2, env.action_dim)))
+        seen, trunk = env.obs["policy"], env.engine.get_state().body_pose[:, env.engine.index.frame("go2").body]
+        ground = env.engine.world.ground
+    assert seen.shape == (2, 187 + 60)
+    assert np.ptp(seen[:, :187]) > 0.05
+    under = ground.heights_at(trunk[:, None, :2])[:, 0] - trunk[:, 2]
+    assert seen[:, 93] == pytest.approx(under, abs=1e-5)  # the middle of 11 x 17 points
+    assert 0.3 < seen[:, 187:].min() < 2.0
