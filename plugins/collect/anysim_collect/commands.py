@@ -10,8 +10,9 @@ if TYPE_CHECKING:
 
 @hookimpl
 def add_cli(app: "typer.Typer") -> None:
-    """`anysim run` and `anysim report`."""
-    from anysim_collect import cli
+    """`anysim run`, `anysim report` and `anysim counterfactual`."""
+    from anysim_collect import cli, pairs_cli
 
     app.command("run")(cli.run)
     app.command("report")(cli.report)
+    app.command("counterfactual")(pairs_cli.counterfactual)
