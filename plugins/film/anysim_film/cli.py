@@ -69,6 +69,7 @@ def render(
       anysim render desk_images.yaml --out stills/desk
     """
     from anysim.cli.output import counting, print_json
+    from anysim.errors import RecordError
     from anysim.record.names import find_trajectories
     from anysim_film.filmer import film_targets
     from anysim_film.jobs import film_all
@@ -80,6 +81,8 @@ def render(
     order = FilmOrder(tuple(camera or ()), engine, tuple(override or ()), size, fps, base)
     work = film_targets(find_trajectories(directories), out)
     if annotate is not None:
+        if jobs > 1:
+            raise RecordError("annotations are made by one process; leave out --jobs, or start several on other runs")
         _annotate(work, order, annotate, source, quiet=json)
         return
     films: list[Filmed] = []

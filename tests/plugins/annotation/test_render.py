@@ -178,3 +178,5 @@ def test_the_command_says_what_it_made(command: CliRunner, run: list[Path]) -> N
     assert {box["name"] for box in boxes} <= {"panda", "table", "cube"}
     again = command.invoke(app, words)
     assert "0 of 1 episodes annotated" in again.stdout
+    refused = command.invoke(app, [*words, "--jobs", "2"])
+    assert "annotations are made by one process; leave out --jobs" in str(refused.exception)
