@@ -32,7 +32,7 @@ WORDS = {
     "film": "`anysim render`: videos of recorded episodes, with other sizes, looks or engines",
     "inspect": "`anysim doctor`, `audit`, `explain`, `replay`, `snapshot`: what is here, was built, drawn, recorded",
     "kinematics": "mechanics of robots (Pinocchio), for controllers of your own",
-    "language": "`anysim describe`: scenes, tasks and recorded episodes in words",
+    "language": "`anysim describe`, `anysim vqa`: scenes and episodes in words, questions with verified answers",
     "learning": "`anysim train`, tasks for gymnasium, views for learners; torch is `anysim-learning[sb3]` or `[rsl]`",
     "legged": "a trot, balance and walking",
     "maniskill": "`anysim verdicts`: peers judge our states; with them `anysim-maniskill[maniskill]`",

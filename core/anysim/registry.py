@@ -71,7 +71,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     },
     "anysim-film": {"commands": "render"},
     "anysim-inspect": {"commands": "audit doctor explain replay snapshot verify"},
-    "anysim-language": {"commands": "describe", "vocabularies": "english"},
+    "anysim-language": {"commands": "describe vqa", "vocabularies": "english"},
     "anysim-learning": {"commands": "train", "learners": "clone rsl-rl sb3-ppo"},
     "anysim-maniskill": {"benchmarks": "maniskill", "commands": "verdicts"},
     "anysim-mcap": {"readers": "mcap", "writers": "mcap"},

@@ -35,6 +35,8 @@ def test_the_commands_about_a_run_say_what_happened(tmp_path: Path, monkeypatch:
     for line in OF_RUNS:
         result = CliRunner().invoke(main.app, shlex.split(line)[1:])
         assert result.exit_code == 0, result.exception
+        if "vqa" in line:
+            assert (tmp_path / "vqa" / "stack_cube" / "questions.jsonl").read_text().count("\n") >= 40
         if "--json" in line and "describe" in line:
             (said,) = json.loads(result.stdout)
             kinds = [sentence["kind"] for sentence in said["narration"]]

@@ -10,7 +10,8 @@ if TYPE_CHECKING:
 
 @hookimpl
 def add_cli(app: "typer.Typer") -> None:
-    """`anysim describe`."""
-    from anysim_language.cli import describe
+    """`anysim describe` and `anysim vqa`."""
+    from anysim_language.cli import describe, vqa
 
     app.command("describe")(describe.describe)
+    app.command("vqa")(vqa.vqa)

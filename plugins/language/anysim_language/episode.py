@@ -33,6 +33,18 @@ class Deed:
 
 
 @dataclass(frozen=True)
+class View:
+    """A camera: its optical frame (7,) in that of a body, or in the world's where `body` is -1; `fov` is in degrees."""
+
+    name: str
+    body: int
+    pose: Array
+    fov: float
+    width: int
+    height: int
+
+
+@dataclass(frozen=True)
 class Episode:
     """One episode as language sees it.
 
@@ -49,7 +61,7 @@ class Episode:
         body_pose: (K, B, 7) at steps 0 to K - 1.
         joint_pos: (K, J).
         annotations: K - 1 of them: what the policy said at each control step.
-        cameras: names of the world's cameras.
+        views: the world's cameras as they are mounted in this episode.
         lights: how many lights the world declares.
         status: how it ended; empty for one that has only begun.
         vocabulary: the words.
@@ -68,7 +80,7 @@ class Episode:
     body_pose: Array
     joint_pos: Array
     annotations: tuple[Mapping[str, Any], ...]
-    cameras: tuple[str, ...]
+    views: tuple["View", ...]
     lights: int
     status: str
     vocabulary: Vocabulary
@@ -162,12 +174,19 @@ def _episode(
         body_pose=poses,
         joint_pos=joints,
         annotations=() if reader is None else reader.annotations,
-        cameras=tuple(loaded.spec.world.cameras),
+        views=tuple(_view(env, camera.name) for camera in world.cameras),
         lights=len(world.lights),
         status="" if reader is None else reader.manifest.status,
         vocabulary=words,
         reader=reader,
     )
+
+
+def _view(env: TaskEnv, name: str) -> View:
+    engine = env.engine
+    camera = engine.world.cameras[engine.index.camera(name)]
+    pose, fov = engine.camera_mounts(name, [0])[0], float(engine.camera_fov(name, [0])[0])
+    return View(name, camera.body, np.array(pose, dtype=float), fov, camera.width, camera.height)
 
 
 def _goal_frames(loaded: LoadedRun) -> dict[str, str]:

@@ -91,7 +91,7 @@ class Moment:
 
     def __init__(self, world: World, things: tuple[Thing, ...], viewer: Viewer, poses: Array, step: int) -> None:
         self.world, self.things, self.viewer, self.poses, self.step = world, things, viewer, poses, step
-        self._meshes = {mesh.name: mesh for mesh in world.meshes}
+        self.meshes = {mesh.name: mesh for mesh in world.meshes}
         self._extents: dict[str, Extent] = {}
         self._pieces: dict[int, list[Piece]] = {}
 
@@ -131,7 +131,7 @@ class Moment:
         found = self._pieces.setdefault(body, [])
         for geom in [g for g in solid if g.collides] or solid:
             pose = P.compose(self.poses[body], P.pose(geom.position, geom.quaternion))
-            low, high = shape_bounds(geom.shape, pose, self._meshes)
+            low, high = shape_bounds(geom.shape, pose, self.meshes)
             found.append(Piece(Extent(millimetres(low), millimetres(high)), geom.shape, pose))
         return found
 

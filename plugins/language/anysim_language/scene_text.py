@@ -58,8 +58,8 @@ def _sentences(episode: Episode, moment: Moment, naming: Naming, say: Say) -> li
     for thing in moment.objects:
         if thing.words.about:
             found.append(say("about", thing.name, thing=naming.the(thing.name), about=thing.words.about))
-    if episode.cameras:
-        names = [indefinite(f"{name.replace('_', ' ')} camera") for name in episode.cameras]
+    if episode.views:
+        names = [indefinite(f"{view.name.replace('_', ' ')} camera") for view in episode.views]
         found.append(say("camera", cameras=names, single=len(names) == 1))
     if episode.lights:
         found.append(say("light", count=f"{counted(episode.lights)} light{'s' if episode.lights > 1 else ''}"))

@@ -29,6 +29,7 @@ class Thing:
         words: its noun with its plural, and more.
         colour: the name of most of its surface; empty where it has several, or a texture.
         colour_clear: whether all of it has that colour, far from any other name.
+        paint: red, green, blue in [0, 1] of each shape that is seen; empty where a texture is.
         material: an adjective; empty where nothing is known.
         shape: such as `cube`; `object` for what is of several pieces.
         size: its extent along its own axes [mm], at its joints' initial positions.
@@ -44,6 +45,7 @@ class Thing:
     words: ThingWords
     colour: str
     colour_clear: bool
+    paint: tuple[tuple[float, float, float], ...]
     material: str
     shape: str
     size: tuple[int, int, int]
@@ -86,6 +88,9 @@ def _thing(world: World, name: str, number: int, looks: Mapping[str, Array], wor
         words=kind,
         colour=colour,
         colour_clear=clear,
+        paint=()
+        if robot or any(looks["texture"][g] >= 0 for g in shown)
+        else tuple(_rgb(looks["color"][g]) for g in shown),
         material=words.materials.get(preset, ""),
         shape=shape,
         size=size,
@@ -94,6 +99,10 @@ def _thing(world: World, name: str, number: int, looks: Mapping[str, Array], wor
         count=entity.body_stop - entity.body_start if entity.family == "rigid_instancer" else 1,
         fixed=all(world.bodies[b].kind == "static" for b in range(entity.body_start, entity.body_stop)),
     )
+
+
+def _rgb(color: Array) -> tuple[float, float, float]:
+    return float(color[0]), float(color[1]), float(color[2])
 
 
 def _object_words(entity: Entity, shape: str, words: VocabularySpec) -> ThingWords:

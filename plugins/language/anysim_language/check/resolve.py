@@ -74,7 +74,7 @@ def _placed(place: str, alike: Sequence[Thing], scene: RawScene, origin: Array, 
         assert ordinal is not None, place
         direction = ordinal["direction"]
         number = int(ordinal["number"]) - 1 if ordinal["number"] else _WORDS.index(ordinal["word"])
-    at = {t.name: scene.middle(scene.world.entities[t.entity].name, t.robot) - origin for t in alike}
+    at = {t.name: scene.middle(t.entity, t.robot) - origin for t in alike}
     right = np.array([forward[1], -forward[0], 0.0])
     keys: Mapping[str, Array] = {
         "from the left": right,

@@ -1,7 +1,6 @@
 """A moment as raw numbers: vertices of everything in metres, by SciPy's rotations. Shares no code with `moment`."""
 
 import colorsys
-from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -9,72 +8,72 @@ from scipy.spatial.transform import Rotation
 from anysim.conventions import Array
 from anysim.geometry.triangles import triangles
 from anysim.model.shapes import MeshShape, is_ground
-from anysim.model.world import World
+from anysim.model.world import Geom, World
 
 
 class RawScene:
-    """Vertices and triangles of each entity of a World with its bodies at `poses` (B, 7)."""
+    """Vertices and triangles of each body of a World at `poses` (B, 7)."""
 
     def __init__(self, world: World, poses: Array) -> None:
         self.world, self.poses = world, poses
-        self._made: dict[tuple[str, bool], tuple[Array, Array]] = {}
+        self._made: dict[int, tuple[Array, Array]] = {}
+        self.splats: dict[tuple[str, int], Array] = {}
+        """What `check.sight` has drawn of a body, by camera."""
 
-    @cached_property
-    def _numbers(self) -> dict[str, int]:
-        return {entity.name: k for k, entity in enumerate(self.world.entities)}
+    def bodies(self, entity: int, base_only: bool = False) -> list[int]:
+        """The bodies of an entity by its number; the first alone where only its base counts."""
+        one = self.world.entities[entity]
+        return [one.body_start] if base_only else list(range(one.body_start, one.body_stop))
 
-    def triangles(self, entity: str, base_only: bool = False) -> tuple[Array, Array]:
-        """(V, 3) vertices [m] and (F, 3) faces of what an entity collides with, else of what is seen of it."""
-        key = (entity, base_only)
-        if key not in self._made:
-            one = self.world.entities[self._numbers[entity]]
-            bodies = [one.body_start] if base_only else list(range(one.body_start, one.body_stop))
-            points: list[Array] = []
-            faces: list[Array] = []
-            total = 0
-            for body in bodies:
-                own = [g for g in self.world.geoms if g.body == body and not is_ground(g.shape)]
-                for geom in [g for g in own if g.collides] or own:
-                    if isinstance(geom.shape, MeshShape):
-                        mesh = next(m for m in self.world.meshes if m.name == getattr(geom.shape, "mesh", ""))
-                        vertices, corners = np.array(mesh.vertices), np.array(mesh.faces)
-                    else:
-                        made = triangles(geom.shape)
-                        if made is None:
-                            continue
-                        vertices, corners = made
-                    local = Rotation.from_quat(np.array(geom.quaternion)).apply(vertices) + np.array(geom.position)
-                    turned = Rotation.from_quat(np.array(self.poses[body, 3:])).apply(local) + self.poses[body, :3]
-                    points.append(turned)
-                    faces.append(corners + total)
-                    total += len(turned)
-            if not points:
-                points, faces = [self.poses[one.body_start, None, :3]], [np.zeros((0, 3), dtype=int)]
-            self._made[key] = np.concatenate(points), np.concatenate(faces)
-        return self._made[key]
+    def triangles(self, body: int) -> tuple[Array, Array]:
+        """(V, 3) vertices [m] and (F, 3) faces of what a body collides with, else of what is seen of it."""
+        if body not in self._made:
+            own = [g for g in self.world.geoms if g.body == body and not is_ground(g.shape)]
+            parts = [self._geom(geom, body) for geom in [g for g in own if g.collides] or own]
+            points = [part[0] for part in parts]
+            starts = np.cumsum([0, *(len(part) for part in points)])
+            faces = [part[1] + start for part, start in zip(parts, starts, strict=False)]
+            self._made[body] = (
+                np.concatenate([np.empty((0, 3)), *points]),
+                np.concatenate([np.empty((0, 3), dtype=int), *faces]),
+            )
+        return self._made[body]
 
-    def bounds(self, entity: str, base_only: bool = False) -> tuple[Array, Array]:
+    def _geom(self, geom: Geom, body: int) -> tuple[Array, Array]:
+        if isinstance(geom.shape, MeshShape):
+            name = geom.shape.mesh
+            mesh = next(m for m in self.world.meshes if m.name == name)
+            vertices, corners = np.array(mesh.vertices), np.array(mesh.faces)
+        else:
+            made = triangles(geom.shape)
+            assert made is not None
+            vertices, corners = made
+        local = Rotation.from_quat(np.array(geom.quaternion)).apply(vertices) + np.array(geom.position)
+        return Rotation.from_quat(np.array(self.poses[body, 3:])).apply(local) + self.poses[body, :3], corners
+
+    def bounds(self, entity: int, base_only: bool = False) -> tuple[Array, Array]:
         """Lowest and highest corner (3,) [m]."""
-        points = self.triangles(entity, base_only)[0]
+        points = np.concatenate([self.triangles(body)[0] for body in self.bodies(entity, base_only)])
+        if not len(points):
+            points = self.poses[self.world.entities[entity].body_start, None, :3]
         return points.min(axis=0), points.max(axis=0)
 
-    def middle(self, entity: str, base_only: bool = False) -> Array:
+    def middle(self, entity: int, base_only: bool = False) -> Array:
         """Of the box around an entity (3,) [m]."""
         low, high = self.bounds(entity, base_only)
         return (low + high) / 2.0
 
-    def hits(self, entity: str, start: Array, towards: Array) -> Array:
-        """Distances along a ray at which it meets an entity's triangles, sorted; in lengths of `towards`."""
-        points, faces = self.triangles(entity)
+    def hits(self, body: int, start: Array, towards: Array) -> Array:
+        """Distances along a ray at which it meets a body's triangles, sorted; in lengths of `towards`."""
+        points, faces = self.triangles(body)
         if not len(faces):
             return np.empty(0)
         a, b, c = points[faces[:, 0]], points[faces[:, 1]], points[faces[:, 2]]
         normal = np.cross(b - a, c - a)
         along = normal @ towards
         with np.errstate(divide="ignore", invalid="ignore"):
-            t = np.einsum("ij,ij->i", normal, a - start) / along
-        t = np.where(np.abs(along) > 1e-15, t, np.nan)
-        at = start + t[:, None] * towards
+            t = np.where(np.abs(along) > 1e-15, np.einsum("ij,ij->i", normal, a - start) / along, np.nan)
+        at = start + np.nan_to_num(t, nan=-1.0)[:, None] * towards
         inside = np.isfinite(t) & (t >= 0.0)
         for first, second in ((a, b), (b, c), (c, a)):
             inside &= np.einsum("ij,ij->i", np.cross(second - first, at - first), normal) >= -1e-12
