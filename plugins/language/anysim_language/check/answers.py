@@ -205,7 +205,7 @@ def _changed(checker: Checker, question: Question, program: Mapping[str, Any]) -
     moved = [
         t.name
         for t in checker.objects()
-        if np.linalg.norm(first.middle(t.entity) - checker.scene(question.step).middle(t.entity)) > 0.03
+        if np.linalg.norm(first.middle(t.entity, True) - checker.scene(question.step).middle(t.entity, True)) > 0.03
     ]
     told = all(any(p in question.answer for p, name in question.refers.items() if name == m) for m in moved)
     return moved == list(program["moved"]) and told and (question.answer == "nothing") == (not moved)

@@ -6,6 +6,7 @@ from itertools import combinations
 from anysim.conventions import Array
 from anysim_language.changes import OPEN, SHUT
 from anysim_language.episode import Episode
+from anysim_language.moment import millimetres
 from anysim_language.questions.past import PHRASES
 from anysim_language.questions.question import Asker, Question
 from anysim_language.sentences import listed
@@ -46,7 +47,9 @@ def _changed(asker: Asker) -> Iterator[Question]:
         return
     moved: list[str] = []
     for thing in now.objects:
-        far = max(abs(a - b) for a, b in zip(before.at(thing.name), now.at(thing.name), strict=True))
+        root = now.world.entities[thing.entity].root  # a drawer that opens does not move its cabinet
+        places = (millimetres(moment.poses[root, :3]) for moment in (before, now))
+        far = max(abs(a - b) for a, b in zip(*places, strict=True))
         if HAS_STAYED < far < HAS_MOVED:
             return
         if far >= HAS_MOVED:
