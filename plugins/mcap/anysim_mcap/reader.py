@@ -100,6 +100,7 @@ class McapReader(TrajectoryReader):
                 found.append(f"{self._path}: the last state is not the one that the manifest describes")
             if self._skip and state_digest(self.initial_state) != self.manifest.initial_digest:
                 found.append(f"{self._path}: the initial state is not the one that the manifest describes")
+            found += self._contradictions()
         except RecordError as error:
             found.append(str(error))
         for entry in self.manifest.cameras.values():
@@ -111,6 +112,14 @@ class McapReader(TrajectoryReader):
         return found
 
     # ------------------------------------------------------------------ inside
+
+    def _contradictions(self) -> list[str]:
+        """What the file says of itself otherwise than the manifest, and messages that were logged at another time."""
+        facts = self._facts.get("anysim/trajectory", {})
+        names = ("task", "seed", "env", "episode", "episode_seed", "engine", "engine_version", "world_hash")
+        differing = [name for name in names if name in facts and facts[name] != str(getattr(self.manifest, name))]
+        found = [f"{self._path} says another {listing(differing)} than the manifest"] if differing else []
+        return found + ([f"{self._path}: {self._untimely[0]}"] if self._untimely else [])
 
     def _camera(self, name: str) -> CameraEntry:
         entry = self.manifest.cameras.get(name)
@@ -186,9 +195,11 @@ class McapReader(TrajectoryReader):
         """(topic, decoded message) of the topics that a reader looks at."""
         from google.protobuf.message import DecodeError
         from mcap.exceptions import McapError
-        from mcap.records import Channel, Message, Schema
+        from mcap.records import Channel, Message, Metadata, Schema
         from mcap_protobuf.decoder import DecoderFactory
 
+        self._facts: dict[str, Mapping[str, str]] = {}
+        self._untimely: list[str] = []
         factory = DecoderFactory()
         schemas: dict[int, Any] = {}
         channels: dict[int, tuple[str, Any]] = {}
@@ -207,6 +218,13 @@ class McapReader(TrajectoryReader):
                         channels[record.id] = record.topic, decoder
                 elif isinstance(record, Message) and record.channel_id in channels:
                     topic, decode = channels[record.channel_id]
-                    yield topic, decode(record.data)
+                    message = decode(record.data)
+                    stamp = record.sequence, float(record.log_time)
+                    if topic in _SCHEMAS and stamp != (message.step, float(np.rint(message.time * 1e9))):
+                        text = f"step {message.step} of {topic}, at {message.time} s, is logged at {record.log_time} ns"
+                        self._untimely = self._untimely or [text]
+                    yield topic, message
+                elif isinstance(record, Metadata):
+                    self._facts[record.name] = record.metadata
             except (McapError, DecodeError, ValueError, TypeError, KeyError, RecursionError) as error:
                 raise RecordError(f"{self._path} is damaged: {error}") from error

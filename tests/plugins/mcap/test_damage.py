@@ -225,3 +225,23 @@ def test_nonsense_in_a_file_that_can_be_read(trajectory, sample, tmp_path, chang
     sealed(trajectory)
     (fault,) = verify(trajectory)
     assert says in fault
+
+
+def test_the_file_names_the_run_that_the_manifest_names(trajectory):
+    change = {"world_hash": "cd" * 32, "episode_seed": 5}
+    manifest = trajectory / "manifest.json"
+    manifest.write_text(json.dumps(json.loads(manifest.read_text()) | change))
+    [fault] = verify(trajectory)
+    assert fault == f"{trajectory / 'trajectory.mcap'} says another episode_seed, world_hash than the manifest"
+
+
+def test_a_message_that_is_logged_at_another_time(trajectory, monkeypatch):
+    def late(path):
+        for record in records(path):
+            if getattr(record, "sequence", None) == 3:
+                record.log_time += 1
+            yield record
+
+    monkeypatch.setattr("anysim_mcap.reader.records", late)
+    [fault] = verify(trajectory)
+    assert fault.endswith("step 3 of /action, at 0.06 s, is logged at 60000001 ns")
