@@ -22,7 +22,7 @@ SENSORS: Mapping[str, Mapping[str, Any]] = {
     "depth of 64 x 48, all channels": {
         "sensor": "depth",
         "size": [64, 48],
-        "channels": ["depth", "normals", "instance_id", "class_id", "motion"],
+        "channels": ["depth", "normals", "instance_id", "class_id", "motion", "appeared"],
     },
     "occupancy of 60 x 60": {"sensor": "occupancy", "cell": 0.1},
     "imu": {"sensor": "imu"},

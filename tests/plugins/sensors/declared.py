@@ -32,7 +32,7 @@ SENSORS: dict[str, Any] = {
         "far": 6.0,
         "position": [0.3, 0.0, 0.1],
         "roll_pitch_yaw": [-pi / 2, 0.0, -pi / 2],
-        "channels": ["depth", "normals", "instance_id", "class_id", "motion"],
+        "channels": ["depth", "normals", "instance_id", "class_id", "motion", "appeared"],
     },
     "map": {"sensor": "occupancy", "frame": "rover", "low": 0.05, "high": 0.5, "cell": 0.2, "delay": 1},
 }

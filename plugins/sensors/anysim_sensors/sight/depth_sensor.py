@@ -18,7 +18,7 @@ from anysim_sensors.sight.eye import Eye, LeftOut, Shapes
 from anysim_sensors.sight.identities import Identities
 
 Side = Annotated[int, Field(ge=1, le=4096)]
-Channel = Literal["depth", "normals", "instance_id", "class_id", "motion"]
+Channel = Literal["depth", "normals", "instance_id", "class_id", "motion", "appeared"]
 
 
 class Depth(Sensor):
@@ -26,8 +26,8 @@ class Depth(Sensor):
 
     `depth` along z [m], `far` where nothing is seen; `normals` in the world, outward; `instance_id` and `class_id`;
     `motion`, the pixels (columns, rows) by which what is seen has moved since the last reading, exact and zero in the
-    first, with `appeared` where it was not in sight then. What is not seen has zeros. It differs from a rendered depth
-    image in silhouettes alone, and is the same on every engine.
+    first; `appeared` where it was not in sight then, by one more ray a pixel. What is not seen has zeros. It differs
+    from a rendered depth image in silhouettes alone, and is the same on every engine.
     """
 
     def __init__(
@@ -67,15 +67,16 @@ class Depth(Sensor):
             "instance_id": SensorField(image, "1", dtype="int32"),
             "class_id": SensorField(image, "1", dtype="int32"),
             "motion": SensorField((*image, 2), "pixel", dtype="float32"),
+            "appeared": SensorField(image, "1", dtype="uint8"),
         }
         self.fields = {name: every[name] for name in dict.fromkeys(channels)}
-        if "motion" in self._channels:
-            self.fields |= {"appeared": SensorField(image, "1", dtype="uint8")}
+        self._moves = not self._channels.isdisjoint(("motion", "appeared"))
+        if self._moves:
             self._bodies = self.remember("bodies", len(scene.engine.world.bodies), 7)
             self._stood = self.remember("stood", 7)
 
     def reset(self, env_ids: Array) -> None:
-        if "motion" in self._channels:
+        if self._moves:
             self._keep(env_ids)
 
     def _keep(self, env_ids: Array) -> None:
@@ -89,11 +90,12 @@ class Depth(Sensor):
             values["normals"] = images.normal * (images.geom >= 0)[..., None]
         values["instance_id"] = self._named.instance[images.segmentation]
         values["class_id"] = self._named.class_[images.segmentation]
-        if "motion" in asked:
-            stood = self._stood[env_ids]
+        if self._moves:
             before = eye.geometry.posed(self._bodies[env_ids], self._scene.presence[env_ids])
-            flow = camera.flow(eye.geometry, images, shown, eye.posed, stood, before)
-            values["motion"] = np.nan_to_num(flow)
-            values["appeared"] = camera.appeared(eye.geometry, images, shown, eye.posed, stood, before, seen=eye.seen)
+            moments = eye.geometry, images, shown, eye.posed, self._stood[env_ids], before
+            if "motion" in asked:
+                values["motion"] = np.nan_to_num(camera.flow(*moments))
+            if "appeared" in asked:
+                values["appeared"] = camera.appeared(*moments, seen=eye.seen)
             self._keep(env_ids)
         return {name: values[name] for name in self.fields}
