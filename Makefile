@@ -10,6 +10,7 @@ CHECK := .venv/with-check
 SITE  := .venv/with-site
 TORCH := .venv-torch/installed
 PEERS := .venv-peers/installed
+LEROBOT := .venv-lerobot/installed
 
 # The demo: a scripted robot picks cubes in four worlds at once, records it, and a picture shows what happened. Then
 # every installed engine gets the same world, and a page shows how far they agree.
@@ -21,7 +22,7 @@ ARGS ?=
 PYTEST = $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist loadgroup
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test test-slow test-full test-learning test-maniskill check format lock schema docs site bench wheels clean
+.PHONY: help venv demo test test-slow test-full test-learning test-maniskill test-lerobot check format lock schema docs site bench wheels clean
 
 help:  ## list the targets
 	@echo "make TARGET, where TARGET is one of"
@@ -77,6 +78,21 @@ $(PEERS): $(TEST) plugins/maniskill/pyproject.toml plugins/evaluation/pyproject.
 	  $$($(BIN)/python scripts/extra_requirements.py plugins/evaluation gymnasium-robotics)
 	.venv-peers/bin/python -m pip install --quiet --no-deps robosuite==1.5.2
 	.venv-peers/bin/python -m pip install --quiet termcolor opencv-python-headless
+	@touch $@
+
+test-lerobot: $(LEROBOT)  ## run the checks against LeRobot's own loader, in an environment with torch
+	.venv-lerobot/bin/python -m pytest -n 0 -s tests/plugins/export/test_lerobot_loader.py $(ARGS)
+
+# lerobot without its dependencies: they pin an older torch, numpy and PyAV, bring viewers, and its loader does without.
+# torchvision is the last one whose reader of videos lerobot 0.4 finds.
+$(LEROBOT): $(TEST) plugins/export/pyproject.toml
+	$(BIN)/python -m venv .venv-lerobot
+	$(BIN)/python -c 'import sysconfig; print("import site; site.addsitedir(%r)" % sysconfig.get_path("purelib"))' \
+	  > .venv-lerobot/lib/$$($(BIN)/python -c 'import sys; print("python%d.%d" % sys.version_info[:2])')/site-packages/anysim.pth
+	.venv-lerobot/bin/python -m pip install --quiet torch==2.13.0
+	.venv-lerobot/bin/python -m pip install --quiet --no-deps lerobot==0.4.4 torchvision==0.25.0
+	.venv-lerobot/bin/python -m pip install --quiet "datasets>=4,<5" "huggingface-hub<0.36" "diffusers<0.36" accelerate einops \
+	  jsonlines deepdiff draccus==0.10.0 termcolor imageio pyserial opencv-python-headless safetensors
 	@touch $@
 
 CHECKS := check-lint check-format check-style check-layers check-schema check-tables check-types check-site
@@ -144,5 +160,5 @@ wheels: $(STAMP)  ## build the wheels of all packages into dist/ (docs/install.m
 	@ls dist
 
 clean:  ## remove .venv, caches, wheels and the demo's output; other recordings stay
-	rm -rf .venv .venv-tools .venv-torch .cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache build dist runs/demo
+	rm -rf .venv .venv-tools .venv-torch .venv-lerobot .cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache build dist runs/demo
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

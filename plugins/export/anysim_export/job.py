@@ -1,0 +1,214 @@
+"""An export: episodes written aside, each whole or not at all, then one data set, visible by one rename."""
+
+import importlib
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from anysim import registry
+from anysim.errors import PluginError, RecordError, listing
+from anysim.plugin_parameters import checked, options_model, parameters
+from anysim.record.commit import describe, fsync, publish, write_durably
+from anysim.record.incoming import FileLock
+from anysim.record.json import load_json, plain
+from anysim.record.manifest import Manifest, read_manifest
+from anysim.record.names import find_trajectories
+from anysim.record.reader import open_trajectory
+from anysim_export.api import DataSet, Episode, Exporter
+from anysim_export.sheet import SHEET_FILE, ExportSheet, make_sheet, read_sheet
+
+PARTS, WHOLE = "parts", "whole"
+
+Told = Callable[[str, str], None]
+"""Called once for each finished episode, with a line about it and what has come so far."""
+
+
+class Exported(NamedTuple):
+    """What came of an export.
+
+    Attributes:
+        directory: of the data set.
+        episodes, frames: in it.
+        resumed: episodes that an interrupted export had written already.
+        left_out: trajectories that did not succeed.
+        present: the same data set was there already.
+    """
+
+    directory: Path
+    episodes: int
+    frames: int
+    resumed: int
+    left_out: int
+    present: bool
+
+
+def export(
+    runs: Sequence[Path],
+    to: str,
+    out: Path,
+    options: Mapping[str, Any] | None = None,
+    *,
+    failed_too: bool = False,
+    tell: Callable[[int], Told] | None = None,
+) -> Exported:
+    """Write committed trajectories as a data set.
+
+    An export that was interrupted goes on where it stopped, and gives the bytes that it would have given.
+
+    Args:
+        runs: runs, or trajectories.
+        to: the exporter's name.
+        out: directory of the data set, which must not exist, or be the same export.
+        options: the exporter's.
+        failed_too: export episodes too that did not succeed.
+        tell: asked for a `Told` with the number of episodes to write.
+
+    Raises:
+        RecordError: nothing to export, damage, trajectories that do not belong together, something else in `out`.
+        PluginError: no such exporter, or what it needs is not installed.
+        SpecError: at `options.KEY`, an option that it does not have.
+    """
+    exporter, said = _exporter(to, options or {})
+    paths, left_out = _chosen(runs, failed_too)
+    data = DataSet([manifest for _, manifest in paths], said)
+    _check_alike(paths)
+    with registry.using("exporters", to):
+        exporter.check(data)
+    sheet = make_sheet(to, registry.distribution("exporters", to), said, data.manifests)
+    done = Exported(out, len(paths), sum(one.steps for one in data.manifests), 0, left_out, False)
+    if _is_there(out, sheet):
+        return done._replace(present=True)
+    aside = out.absolute().with_name(f".{out.absolute().name}.export")
+    try:
+        aside.parent.mkdir(parents=True, exist_ok=True)
+        lock = FileLock.take(aside.with_name(f"{aside.name}.lock"))
+        if lock is None:
+            raise RecordError(f"another process exports into {out}; wait for it, or choose another --out")
+        with lock:
+            resumed = _begin(aside, sheet)
+            told = (lambda line, standing: None) if tell is None else tell(len(paths))
+            with registry.using("exporters", to, (OSError,)):
+                parts = [_part(aside, i, path, exporter, data, told) for i, (path, _) in enumerate(paths)]
+                whole = aside / WHOLE
+                shutil.rmtree(whole, ignore_errors=True)
+                whole.mkdir()
+                exporter.assemble(whole, parts, data)
+            write_durably(whole / SHEET_FILE, sheet.encode())
+            _sync(whole)
+            publish(whole, out.absolute())
+            shutil.rmtree(aside)
+    except OSError as error:
+        raise RecordError(
+            f"cannot export into {out}: {error.strerror or error} ({error.filename or out}). Episodes that were "
+            f"written wait in {aside}; make room, and run the same command again, which goes on from there"
+        ) from error
+    return done._replace(resumed=resumed)
+
+
+def _exporter(name: str, options: Mapping[str, Any]) -> tuple[Exporter, dict[str, Any]]:
+    """The exporter with its options, and these as plain data, defaults included."""
+    made: type[Exporter] = registry.load("exporters", name)
+    given = checked(options_model(made), options, "options")
+    for module, extra in made.needs.items():
+        try:
+            importlib.import_module(module)
+        except ImportError as error:
+            raise PluginError(f"the exporter '{name}' needs {module}: pip install '{extra}' ({error})") from error
+    with registry.using("exporters", name):
+        return made(**{key: getattr(given, key) for key in parameters(made)}), plain(given.model_dump(mode="json"))
+
+
+def _chosen(runs: Sequence[Path], failed_too: bool) -> tuple[list[tuple[Path, Manifest]], int]:
+    """The trajectories to export, and how many are left out."""
+    found = [(path, read_manifest(path)) for path in find_trajectories(runs)]
+    kept = [(path, manifest) for path, manifest in found if failed_too or manifest.status == "success"]
+    if not kept:
+        statuses = sorted({manifest.status for _, manifest in found})
+        raise RecordError(
+            f"{listing(map(str, runs))}: none of {len(found)} committed trajectories succeeded ({listing(statuses)}); "
+            "record others, or export these with --failed-too"
+        )
+    return kept, len(found) - len(kept)
+
+
+def _check_alike(paths: Sequence[tuple[Path, Manifest]]) -> None:
+    """See that trajectories can be one data set, and hold what was observed before each action."""
+    first, one = paths[0]
+    for path, other in paths:
+        if not other.has_initial_frame or not other.steps:
+            raise RecordError(f"{path} does not hold how it began, so nothing was observed before its first action")
+        differing = [
+            what
+            for what, ours, theirs in (
+                ("observations", one.layout.obs, other.layout.obs),
+                ("actions", one.layout.action, other.layout.action),
+                ("states", one.layout.state, other.layout.state),
+                ("control steps", one.control_dt, other.control_dt),
+                ("cameras", _sizes(one), _sizes(other)),
+            )
+            if ours != theirs
+        ]
+        if differing:
+            raise RecordError(f"{first} and {path} have other {listing(differing)}; export them one by one")
+
+
+def _sizes(manifest: Manifest) -> dict[str, tuple[int, int]]:
+    return {name: (camera.width, camera.height) for name, camera in manifest.cameras.items()}
+
+
+def _is_there(out: Path, sheet: ExportSheet) -> bool:
+    """Whether this very export is there; raises where anything else is."""
+    if not out.exists() and not out.is_symlink():
+        return False
+    there = read_sheet(out) if out.is_dir() else None
+    if there == sheet:
+        return True
+    if there is None:
+        held = "is no data set of `anysim export`"
+    else:
+        names = ("exporter", "package", "options", "task", "specs", "episodes")
+        others = [name for name in names if getattr(there, name) != getattr(sheet, name)]
+        held = f"holds another export ('{there.exporter}', {len(there.episodes)} episodes; other {listing(others)})"
+    raise RecordError(f"{out} is there and {held}; nothing is overwritten: choose another --out, or remove it")
+
+
+def _begin(aside: Path, sheet: ExportSheet) -> int:
+    """The folder of this export's work; what another export has left there is removed. Returns the episodes in it."""
+    path = aside / SHEET_FILE
+    try:
+        same = path.exists() and ExportSheet.model_validate(load_json(path)) == sheet
+    except (RecordError, ValueError):
+        same = False
+    if not same:
+        shutil.rmtree(aside, ignore_errors=True)
+        (aside / PARTS).mkdir(parents=True)
+        write_durably(path, sheet.encode())
+    return sum(1 for part in (aside / PARTS).iterdir() if part.suffix == "")
+
+
+def _part(aside: Path, index: int, path: Path, exporter: Exporter, data: DataSet, told: Told) -> Path:
+    """The folder of an episode, written now unless it is there."""
+    final = aside / PARTS / f"{index:06d}"
+    if not final.exists():
+        incoming = final.with_suffix(".new")
+        shutil.rmtree(incoming, ignore_errors=True)
+        incoming.mkdir()
+        _check_whole(path, data.manifests[index])
+        exporter.write_episode(incoming, Episode(index, open_trajectory(path)), data)
+        _sync(incoming)
+        publish(incoming, final)
+    told(f"{path.name}: {data.manifests[index].steps} steps", f"{index + 1} of {len(data.manifests)}")
+    return final
+
+
+def _check_whole(path: Path, manifest: Manifest) -> None:
+    """See that a trajectory's files are those that were committed."""
+    for name, entry in manifest.files.items():
+        if not (path / name).is_file() or describe(path / name) != entry:
+            raise RecordError(f"{path / name} is not the file that was committed; `anysim verify {path}` says more")
+
+
+def _sync(folder: Path) -> None:
+    for path in sorted(folder.rglob("*")):
+        fsync(path)
