@@ -9,8 +9,6 @@ import typer
 
 from anysim.cli.options import AsJson, Engine, Overrides, Robot, Seed, Task, with_robot
 from anysim.errors import RecordError, TaskError, listing
-from anysim_schemas.nodes import Fault
-from anysim_schemas.yaml import parse
 
 if TYPE_CHECKING:
     from anysim.task.env import TaskEnv
@@ -96,6 +94,9 @@ def parse_factors(texts: Sequence[str]) -> dict[str, Any]:
     Raises:
         TaskError: one is not of this form, or a path is there twice.
     """
+    from anysim_schemas.nodes import Fault
+    from anysim_schemas.yaml import parse
+
     found: dict[str, Any] = {}
     for one in texts:
         path, equals, value = (part.strip() for part in one.partition("="))
