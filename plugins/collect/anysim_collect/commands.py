@@ -11,8 +11,8 @@ if TYPE_CHECKING:
 @hookimpl
 def add_cli(app: "typer.Typer") -> None:
     """`anysim run`, `anysim report` and `anysim counterfactual`."""
-    from anysim_collect import cli, pairs_cli
+    from anysim_collect.cli import counterfactual, run
 
-    app.command("run")(cli.run)
-    app.command("report")(cli.report)
-    app.command("counterfactual")(pairs_cli.counterfactual)
+    app.command("run")(run.run)
+    app.command("report")(run.report)
+    app.command("counterfactual")(counterfactual.counterfactual)

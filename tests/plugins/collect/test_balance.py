@@ -11,8 +11,9 @@ from typer.testing import CliRunner
 
 from anysim import registry
 from anysim.errors import TaskError
-from anysim_collect import balance as balances, cli
+from anysim_collect import balance as balances
 from anysim_collect.balance import LEAST_SHARE, Cost, balanced, costs_of
+from anysim_collect.cli import run as cli
 from anysim_collect.mixture import Balance, Part, mixture
 from anysim_collect.report import read_report
 

@@ -14,7 +14,8 @@ from typer.testing import CliRunner
 from anysim.errors import RecordError, TaskError
 from anysim.planning.service import ServiceCounts
 from anysim.record.collector import EpisodeResult
-from anysim_collect import cli, mixture as mixtures
+from anysim_collect import mixture as mixtures
+from anysim_collect.cli import run as cli
 from anysim_collect.mixture import Limits, Part, mixture, parse_bytes, shared_out
 from anysim_collect.page import page
 from anysim_collect.report import read_report, report_of, write_report

@@ -6,7 +6,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from anysim_collect.cli import run
+from anysim_collect.cli.run import run
 from anysim_collect.report import read_report
 from tests.plugins.skills.test_honest_failures import CASES
 from tests.plugins.skills.test_manipulation import WORLDS

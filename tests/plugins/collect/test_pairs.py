@@ -15,7 +15,7 @@ from anysim.record.manifest import read_manifest
 from anysim.record.reader import open_trajectory
 from anysim.record.replay import replay
 from anysim_collect import commands
-from anysim_collect.pairs_cli import parse_factors
+from anysim_collect.cli.counterfactual import parse_factors
 from anysim_inspect.verify_runs import verify_all
 
 app = typer.Typer()

@@ -16,7 +16,7 @@ from anysim.record.names import EPISODES, trajectory_name
 from anysim.record.replay import replay
 from anysim.skills.runner import SkillPolicy
 from anysim.testing.engines import require_engine
-from anysim_collect.cli import run
+from anysim_collect.cli.run import run
 from anysim_skills.planning import WORKERS_VARIABLE
 
 WALL = Path(__file__).parent / "worlds/behind_wall.yaml"
