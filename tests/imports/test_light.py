@@ -29,9 +29,9 @@ def loaded_by(module: str, watched: tuple[str, ...]) -> list[str]:
 PACKAGES = (
     "anysim_schemas", "anysim", "anysim_mechanics", "anysim_mujoco", "anysim_pybullet", "anysim_sapien",
     "anysim_assets", "anysim_banks", "anysim_bench", "anysim_collect", "anysim_control", "anysim_evaluation",
-    "anysim_export", "anysim_film", "anysim_inspect", "anysim_learning", "anysim_legged", "anysim_maniskill", "anysim_mcap",
-    "anysim_parity", "anysim_planning", "anysim_policy", "anysim_robots", "anysim_sharded", "anysim_skills",
-    "anysim_tasks", "anysim_teleop", "anysim_urdf",
+    "anysim_export", "anysim_film", "anysim_inspect", "anysim_learning", "anysim_legged", "anysim_maniskill",
+    "anysim_mcap", "anysim_parity", "anysim_planning", "anysim_policy", "anysim_robots", "anysim_sharded",
+    "anysim_skills", "anysim_tasks", "anysim_teleop", "anysim_urdf",
 )  # fmt: skip
 
 
