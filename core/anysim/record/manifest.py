@@ -102,7 +102,7 @@ def read_manifest(directory: Path) -> Manifest:
     Raises:
         RecordError: it is missing, of another format, or inconsistent.
     """
-    return _read(directory / MANIFEST_FILE, TRAJECTORY_FORMAT, Manifest)
+    return read_format(directory / MANIFEST_FILE, TRAJECTORY_FORMAT, Manifest)
 
 
 def read_run(out: Path) -> RunRecord:
@@ -111,10 +111,15 @@ def read_run(out: Path) -> RunRecord:
     Raises:
         RecordError: it is missing, of another format, or inconsistent.
     """
-    return _read(out / RUN_FILE, RUN_FORMAT, RunRecord)
+    return read_format(out / RUN_FILE, RUN_FORMAT, RunRecord)
 
 
-def _read(path: Path, known: str, model: type[S]) -> S:
+def read_format(path: Path, known: str, model: type[S]) -> S:
+    """A JSON file that says by `format` what it is.
+
+    Raises:
+        RecordError: it is missing, of another format, or inconsistent.
+    """
     data = load_json(path)
     found = data.get("format") if isinstance(data, Mapping) else None
     if found != known:

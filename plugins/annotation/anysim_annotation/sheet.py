@@ -3,15 +3,13 @@
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from anysim.errors import RecordError
 from anysim.record.header import Count, Label
-from anysim.record.json import load_json
-from anysim.record.manifest import Digest, FileEntry
+from anysim.record.manifest import Digest, FileEntry, read_format
 from anysim_schemas.base import Name, Spec
 
-SHEET_FILE = "annotations.json"
+SHEET_FILE, SHEET_FORMAT = "annotations.json", "anysim-annotations-1"
 SUFFIX = ".annotations"
 """What the directory of a trajectory's annotations is called after its name."""
 
@@ -49,7 +47,7 @@ class AnnotationSheet(Spec):
     `final_digest` says which episode it is: that of its last state. `steps` are the control steps that were labelled.
     """
 
-    format: Literal["anysim-annotations-1"] = "anysim-annotations-1"
+    format: Literal["anysim-annotations-1"] = SHEET_FORMAT
     task: Label
     env: Count
     episode: Count
@@ -79,10 +77,4 @@ def read_annotations(directory: Path) -> AnnotationSheet | None:
         RecordError: it is damaged, or of another format.
     """
     path = directory / SHEET_FILE
-    if not path.exists():
-        return None
-    try:
-        return AnnotationSheet.model_validate(load_json(path))
-    except ValidationError as error:
-        faults = "; ".join(f"{'.'.join(map(str, e['loc'])) or 'file'}: {e['msg']}" for e in error.errors()[:3])
-        raise RecordError(f"{path} is damaged or is no sheet of annotations: {faults}") from error
+    return read_format(path, SHEET_FORMAT, AnnotationSheet) if path.exists() else None

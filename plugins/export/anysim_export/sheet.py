@@ -5,12 +5,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from anysim.errors import RecordError
 from anysim.record.header import Count, Label
-from anysim.record.json import dump_json, load_json
-from anysim.record.manifest import Digest, Manifest
+from anysim.record.json import dump_json
+from anysim.record.manifest import Digest, Manifest, read_format
 from anysim_schemas.base import Spec
 
 SHEET_FILE = "anysim.json"
@@ -78,10 +77,4 @@ def read_sheet(directory: Path) -> ExportSheet | None:
         RecordError: it is damaged, or of another format.
     """
     path = directory / SHEET_FILE
-    if not path.exists():
-        return None
-    try:
-        return ExportSheet.model_validate(load_json(path))
-    except ValidationError as error:
-        faults = "; ".join(f"{'.'.join(map(str, e['loc'])) or 'file'}: {e['msg']}" for e in error.errors()[:3])
-        raise RecordError(f"{path} is damaged or is no sheet of an export: {faults}") from error
+    return read_format(path, SHEET_FORMAT, ExportSheet) if path.exists() else None

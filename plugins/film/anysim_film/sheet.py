@@ -3,12 +3,10 @@
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from anysim.errors import RecordError
 from anysim.record.header import Count, Label
-from anysim.record.json import load_json
-from anysim.record.manifest import CameraEntry, Digest, FileEntry
+from anysim.record.manifest import CameraEntry, Digest, FileEntry, read_format
 from anysim_schemas.base import Name, Spec
 
 FILM_FILE = "film.json"
@@ -49,10 +47,4 @@ def read_sheet(directory: Path) -> FilmSheet | None:
         RecordError: it is damaged, or of another format.
     """
     path = directory / FILM_FILE
-    if not path.exists():
-        return None
-    try:
-        return FilmSheet.model_validate(load_json(path))
-    except ValidationError as error:
-        faults = "; ".join(f"{'.'.join(map(str, e['loc'])) or 'file'}: {e['msg']}" for e in error.errors()[:3])
-        raise RecordError(f"{path} is damaged or is no film sheet: {faults}") from error
+    return read_format(path, FILM_FORMAT, FilmSheet) if path.exists() else None
