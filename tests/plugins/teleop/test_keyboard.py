@@ -157,7 +157,7 @@ def test_a_session_in_a_terminal(tmp_path: Path) -> None:
         typist.wait_for("episode 3/3 . waiting")
         typist.wait_for(r"\| +(0\.[2-9]|[1-9])", b"w")
         os.write(typist.master, b"\x03")
-        typist.process.wait(120)  # its commit waits for a disk that others may be writing to
+        typist.process.wait(20)
         time.sleep(0.1)
         after = termios.tcgetattr(typist.slave)
     finally:
