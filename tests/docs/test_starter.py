@@ -11,7 +11,7 @@ import pytest
 from anysim import registry
 from tests.external_packages import EXTERNAL, FOUND, install, offered, run
 
-OTHER_GUIDES = ("evaluate.md", "teleop.md")
+OTHER_GUIDES = ("evaluate.md", "export.md", "language.md", "teleop.md")
 """Pages that say what a user does and, at their ends, how others add to it."""
 PAGES = sorted((Path(__file__).parents[2] / "docs").rglob("*.md"))
 

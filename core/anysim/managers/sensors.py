@@ -42,7 +42,7 @@ class _Channel:
             if key not in sensor.fields:
                 known = f"{suggest(key, list(sensor.fields))} (fields: {listing(sensor.fields)})"
                 raise SpecError([SpecIssue("", path, f"the sensor has no such field{known}")])
-            if not self.fields[key].dtype.startswith("float"):
+            if not self.fields[key].dtype.startswith(("float", "uint8")):  # images are bytes
                 raise SpecError([SpecIssue("", path, "the field holds whole numbers, which no noise is added to")])
             numbers = 3 if self.fields[key].unit == "xyzw" else prod(self.fields[key].shape)
             self._noise[key] = FieldNoise(noise, f"sensor/{name}/{key}", path, streams, numbers, sensor.period)

@@ -17,6 +17,7 @@ from anysim.errors import AnysimError
 from anysim.model.world import World
 from anysim.planning.motion import Budget, PlanAnswer, PlanStatus, Scene, motion_planner
 from anysim_planning import queued
+from anysim_planning.planner_process import NICENESS
 from anysim_planning.processes import ProcessService
 from tests.plugins.planning.conftest import across, down, reach
 from tests.plugins.planning.scripted import DIES, HANGS, RAISES, SCENE, SLEEPS, Scripted, Together, asked
@@ -104,7 +105,7 @@ def test_processes_yield_to_the_control_loop_and_have_no_pools() -> None:
     with ProcessService(World(), Scripted) as plans:
         plans.submit(asked(1), SCENE).result()
         (pid,) = plans.pids
-        assert os.getpriority(os.PRIO_PROCESS, pid) == min(os.getpriority(os.PRIO_PROCESS, 0) + 10, 19)
+        assert os.getpriority(os.PRIO_PROCESS, pid) == min(os.getpriority(os.PRIO_PROCESS, 0) + NICENESS, 19)
         environment = Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
         assert b"NUMBA_NUM_THREADS=1" in environment
         assert alive(pid)
