@@ -80,6 +80,8 @@ class _Channel:
                 value = P.multiply(value, P.from_rotation_vector(turn))
             elif noise is not None:
                 value = noise.added(value, env_ids, ticks)
+                if field.dtype == "uint8":
+                    value = np.clip(np.rint(value), 0, 255)
             rows[:, self.columns[key]] = value
         rows[:, -2], rows[:, -1] = np.maximum(time - self.sensor.age, 0.0), 1.0
         lost = self._lost(env_ids, ticks)
@@ -212,8 +214,6 @@ class SensorManager(Manager):
             known = f"{suggest(field, list(fields))} (fields: {listing(fields)})"
             raise NameLookupError(f"the sensor '{name}' has no field '{field}'{known}")
         rows, kind = self._channels[name].seen[env_ids, self._channels[name].columns[field]], fields[field]
-        if kind.dtype == "uint8":
-            rows = np.clip(np.rint(rows), 0, 255)  # of an image that noise was added to
         return rows.reshape(len(rows), *kind.shape).astype(kind.dtype)
 
     def recorded(self, env_ids: Array) -> dict[str, Array]:

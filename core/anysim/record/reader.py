@@ -76,6 +76,14 @@ class TrajectoryReader(ABC):
     def language(self) -> tuple[str, ...]:
         """T of them: the instruction in force at each step."""
 
+    def states_from_reset(self, name: str) -> Array:
+        """(T+1, …) a state array, the row of the reset first."""
+        return np.concatenate([self.initial_state[name][None], self.states[name]])
+
+    def obs_from_reset(self, name: str) -> Array:
+        """(T+1, …) an observation group, the row of the reset first: all but the last is what actions followed."""
+        return np.concatenate([self.initial_obs[name][None], self.obs[name]])
+
     @abstractmethod
     def images(self, camera: str) -> Iterator[tuple[int, Array]]:
         """(control step, (H, W, 3) uint8) of a camera, in order, decoded one at a time."""

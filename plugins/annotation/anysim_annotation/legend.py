@@ -8,6 +8,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.model.world import World
+from anysim_sensors.sight.identities import Identities
 
 
 class Thing(NamedTuple):
@@ -38,19 +39,14 @@ class Legend:
     """
 
     def __init__(self, world: World) -> None:
-        slots = list(world.logical_objects.values())
-        first = [world.entities[slot.entities[0]] for slot in slots]
-        words = [entity.label or slot.category for entity, slot in zip(first, slots, strict=True)]
-        self.labels: tuple[str, ...] = tuple(sorted(set(words)))
+        numbers = Identities.of(world)
+        self.labels: tuple[str, ...] = tuple(numbers.classes)
+        self.instance, self.semantic = numbers.instance.astype(np.uint16), numbers.class_.astype(np.uint16)
         self.things: tuple[Thing, ...] = tuple(
-            Thing(number, slot.name, word, self.labels.index(word) + 1, slot.entities)
-            for number, (slot, word) in enumerate(zip(slots, words, strict=True), 1)
+            Thing(numbers.instances[slot.name], slot.name, self.labels[label - 1], label, slot.entities)
+            for slot in world.logical_objects.values()
+            for label in [int(numbers.class_[slot.entities[0] + 1])]
         )
-        self.instance = np.zeros(len(world.entities) + 1, dtype=np.uint16)
-        self.semantic = np.zeros(len(world.entities) + 1, dtype=np.uint16)
-        for thing in self.things:
-            for entity in thing.entities:
-                self.instance[entity + 1], self.semantic[entity + 1] = thing.id, thing.label_id
 
     @cached_property
     def of_entity(self) -> Sequence[Thing]:

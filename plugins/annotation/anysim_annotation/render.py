@@ -1,27 +1,23 @@
 """Annotations of recorded trajectories, made afterwards from their states and committed whole beside them."""
 
-import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Self
 
-from anysim.errors import RecordError, listing, suggest
-from anysim.record.commit import fsync, seal, write_durably
+from anysim.errors import RecordError
+from anysim.record.commit import seal
 from anysim.record.json import dump_json, plain
 from anysim.record.manifest import Manifest, read_manifest
-from anysim.record.reader import open_trajectory
-from anysim.record.replay import begin
 from anysim.task.env import TaskEnv
 from anysim_annotation.capture import Capture
 from anysim_annotation.orders import Orders, read_orders
 from anysim_annotation.recorded import EpisodeFiles
 from anysim_annotation.sheet import SHEET_FILE, SUFFIX, AnnotationSheet, CameraSheet, read_annotations
 from anysim_annotation.view import Source
-from anysim_film.commit import workspace
-from anysim_film.episode import moments_for
-from anysim_film.stage import FilmOrder, Stage, recorded_moments, refuse_damage
+from anysim_film.commit import move_in, workspace
+from anysim_film.stage import FilmOrder, Stage, facts_of, refuse_damage, refuse_unknown_cameras
 from anysim_schemas.load import LoadedRun
 
 
@@ -101,11 +97,7 @@ class AnnotationMaker:
     def _cameras(self, loaded: LoadedRun) -> tuple[str, ...]:
         there = loaded.spec.world.cameras
         chosen = self._order.cameras or loaded.spec.record.cameras or tuple(there)
-        for name in chosen:
-            if name not in there:
-                raise RecordError(
-                    f"there is no camera '{name}'{suggest(name, list(there))} (cameras: {listing(there)})"
-                )
+        refuse_unknown_cameras(chosen, there)
         if not chosen:
             raise RecordError("the recorded world has no camera; add one, as in -o world.cameras.eye={...}")
         return chosen
@@ -142,35 +134,20 @@ class AnnotationMaker:
         if not missing:
             return Annotated(trajectory, where, (), _names(every_one))
         refuse_damage(trajectory, manifest)
-        env = self._stage.env(loaded)
-        engine, reader = env.engine, open_trajectory(trajectory)
-        still = tuple(body.name for body in engine.world.bodies if body.name not in manifest.layout.bodies)
-        begin(env, manifest)
-        moments = moments_for(env, manifest.layout.bodies, *recorded_moments(reader))
-        files = EpisodeFiles(self._captured(env, missing), missing, aside)
-        assert env.capture is not None
-        steps = files.draw(env, reader, moments, env.capture.every)
+        staged = self._stage.begin(trajectory, loaded)
+        capture = self._captured(staged.env, missing)
+        files = EpisodeFiles(capture, missing, aside)
+        assert staged.env.capture is not None
+        steps = files.draw(staged.env, staged.reader, staged.moments, staged.env.capture.every)
         found, members = files.finish(steps)
-        legend = self._captured(env, missing).scene(next(iter(missing))).legend.to_dict()
+        legend = capture.scene(next(iter(missing))).legend.to_dict()
         sheet = read_annotations(where) or AnnotationSheet(
-            task=manifest.task,
-            env=manifest.env,
-            episode=manifest.episode,
-            episode_seed=manifest.episode_seed,
-            final_digest=manifest.final_digest,
-            source=self._source,
-            engine=engine.name,
-            engine_version=engine.version,
-            world_hash=engine.world.hash,
-            spec=plain(loaded.spec.to_dict()),
-            still=still,
-            steps=tuple(steps),
-            legend=legend,
+            **facts_of(staged, loaded), source=self._source, steps=tuple(steps), legend=legend
         )
         _add(aside, where, sheet, found, members)
-        drawn, before = f"{engine.name} {engine.version}", f"{manifest.engine} {manifest.engine_version}"
         present = tuple(name for name in _names(every_one) if name not in _names(missing))
-        return Annotated(trajectory, where, _names(missing), present, len(steps) * len(missing), drawn, before, still)
+        frames = len(steps) * len(missing)
+        return Annotated(trajectory, where, _names(missing), present, frames, *staged.engines, staged.still)
 
     def _captured(self, env: TaskEnv, orders: Mapping[str, Orders]) -> Capture:
         """The annotators; the last ones again where the same are asked for."""
@@ -208,13 +185,4 @@ def _add(
     said = {f"{camera}.{name}": at for camera, one in cameras.items() for name in one.annotators}
     more = {"cameras": grown, "files": {**sheet.files, **entries}, "clock": {**sheet.clock, **said}}
     whole: dict[str, Any] = {**dict(sheet), **more}
-    write_durably(aside / SHEET_FILE, dump_json(AnnotationSheet(**whole).to_dict(), "annotations"))
-    for top in dict.fromkeys(name.partition("/")[0] for name in members):
-        if (where / top).is_dir():
-            shutil.rmtree(where / top)
-        if (aside / top).is_dir():
-            fsync(aside / top)
-        (aside / top).replace(where / top)
-    fsync(where)
-    (aside / SHEET_FILE).replace(where / SHEET_FILE)
-    fsync(where)
+    move_in(aside, where, members, SHEET_FILE, dump_json(AnnotationSheet(**whole).to_dict(), "annotations"))

@@ -1,12 +1,13 @@
 """annotations.json: what a directory of annotations holds, of which trajectory, and how it was made."""
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 from pydantic import Field
 
 from anysim.record.header import Count, Label
-from anysim.record.manifest import Digest, FileEntry, read_format
+from anysim.record.manifest import read_format
+from anysim_film.sheet import DrawnSheet
 from anysim_schemas.base import Name, Spec
 
 SHEET_FILE, SHEET_FORMAT = "annotations.json", "anysim-annotations-1"
@@ -41,33 +42,14 @@ class CameraSheet(Spec):
     annotators: dict[Name, AnnotatorEntry] = Field(default_factory=dict)
 
 
-class AnnotationSheet(Spec):
-    """The content of annotations.json. Equal commands give equal sheets, but for the key `clock`.
-
-    `final_digest` says which episode it is: that of its last state. `steps` are the control steps that were labelled.
-    """
+class AnnotationSheet(DrawnSheet):
+    """The content of annotations.json. `steps` are the control steps that were labelled."""
 
     format: Literal["anysim-annotations-1"] = SHEET_FORMAT
-    task: Label
-    env: Count
-    episode: Count
-    episode_seed: Annotated[int, Field(ge=0)]
-    final_digest: Digest
     source: Literal["engine", "geometry"]
-    engine: Label
-    engine_version: Label
-    world_hash: Label
-    spec: dict[str, Any]
-    still: tuple[Label, ...] = ()
     steps: tuple[Count, ...] = ()
     legend: dict[str, Any] = Field(default_factory=dict)
     cameras: dict[Name, CameraSheet] = Field(default_factory=dict)
-    files: dict[str, FileEntry] = Field(default_factory=dict)
-    clock: dict[str, Any] = Field(default_factory=dict, description="all that differs between equal ones")
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data, None included."""
-        return self.model_dump(mode="json")
 
 
 def read_annotations(directory: Path) -> AnnotationSheet | None:

@@ -42,7 +42,7 @@ def pair_entry(episode: int, first: Path, second: Path, tolerance: float) -> dic
 
 def _gaps(a: TrajectoryReader, b: TrajectoryReader, name: str) -> Array:
     """(F,) the largest absolute difference of an array at each control step that both have, step 0 first."""
-    first, second = (np.concatenate([r.initial_state[name][None], r.states[name]]) for r in (a, b))
+    first, second = (reader.states_from_reset(name) for reader in (a, b))
     count = min(len(first), len(second))
     first, second = first[:count], second[:count]
     if name == "body_pose":  # q and -q are one rotation

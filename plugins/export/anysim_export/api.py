@@ -11,8 +11,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import ClassVar, NamedTuple
 
-import numpy as np
-
 from anysim.conventions import Array
 from anysim.errors import RecordError
 from anysim.record.manifest import Manifest
@@ -56,10 +54,8 @@ class Episode:
             RecordError: the trajectory is damaged.
         """
         self.index, self.manifest, self._reader = index, reader.manifest, reader
-        self.obs = {name: np.concatenate([reader.initial_obs[name][None], rows]) for name, rows in reader.obs.items()}
-        self.states = {
-            name: np.concatenate([reader.initial_state[name][None], rows]) for name, rows in reader.states.items()
-        }
+        self.obs = {name: reader.obs_from_reset(name) for name in reader.obs}
+        self.states = {name: reader.states_from_reset(name) for name in reader.states}
         self.actions, self.rewards = reader.actions, reader.rewards
         said = [words or reader.manifest.instruction or reader.manifest.task for words in reader.language]
         self.tasks = tuple(said)

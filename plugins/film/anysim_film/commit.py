@@ -1,7 +1,7 @@
 """Videos that are added to a directory which others may read: whole, and then named in its manifest, or not at all."""
 
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
@@ -67,10 +67,27 @@ def add_videos(
         "clock": {**listing.clock, "filmed": {**listing.clock.get("filmed", {}), **clock}},
     }  # fmt: skip
     grown = type(listing)(**{**dict(listing), **more})
-    write_durably(aside / manifest, dump_json(grown.to_dict(), "manifest"))
-    for name in entries:
-        (aside / name).replace(directory / name)
-    fsync(directory)
-    (aside / manifest).replace(directory / manifest)
-    fsync(directory)
+    move_in(aside, directory, list(entries), manifest, dump_json(grown.to_dict(), "manifest"))
     return grown
+
+
+def move_in(aside: Path, directory: Path, names: Sequence[str], sheet: str, content: bytes) -> None:
+    """Move finished files and folders of files into a directory, and then its sheet, which names them, in one step.
+
+    Args:
+        aside: on the file system of `directory`.
+        directory: where a folder of the same name is replaced.
+        names: of the files, relative.
+        sheet: the name of the sheet.
+        content: of the sheet.
+    """
+    write_durably(aside / sheet, content)
+    for top in dict.fromkeys(name.partition("/")[0] for name in names):
+        if (directory / top).is_dir():
+            shutil.rmtree(directory / top)
+        if (aside / top).is_dir():
+            fsync(aside / top)
+        (aside / top).replace(directory / top)
+    fsync(directory)
+    (aside / sheet).replace(directory / sheet)
+    fsync(directory)

@@ -1,23 +1,20 @@
 """Filming recorded trajectories: their videos, made afterwards, as they would have been or otherwise."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
-from anysim.errors import RecordError, listing, suggest
+from anysim.errors import RecordError
 from anysim.record.json import plain
 from anysim.record.manifest import Manifest, read_manifest
 from anysim.record.names import MANIFEST_FILE
-from anysim.record.reader import open_trajectory
-from anysim.record.replay import begin
 from anysim.record.writer import make_writer
-from anysim.task.env import TaskEnv
 from anysim_film.commit import add_videos, workspace
-from anysim_film.episode import film_episode, moments_for
+from anysim_film.episode import film_episode
 from anysim_film.sheet import FILM_FILE, FilmSheet, read_sheet
-from anysim_film.stage import FilmOrder, Stage, recorded_moments, refuse_damage
+from anysim_film.stage import FilmOrder, Stage, facts_of, refuse_damage, refuse_unknown_cameras
 from anysim_schemas.load import LoadedRun
 
 
@@ -102,11 +99,8 @@ class Filmer:
         there = loaded.spec.world.cameras
         seeing = tuple(name for name, camera in there.items() if "rgb" in camera.channels)
         chosen = self.order.cameras or loaded.spec.record.cameras or seeing
+        refuse_unknown_cameras(chosen, there)
         for name in chosen:
-            if name not in there:
-                raise RecordError(
-                    f"there is no camera '{name}'{suggest(name, list(there))} (cameras: {listing(there)})"
-                )
             if name not in seeing:
                 raise RecordError(f"the camera '{name}' gives no colours; add -o world.cameras.{name}.channels=[rgb]")
         if not chosen:
@@ -137,23 +131,19 @@ class Filmer:
         if not missing:
             return Filmed(trajectory, where, (), tuple(cameras))
         refuse_damage(trajectory, manifest)
-        env = self._stage.env(loaded)
-        engine = env.engine
+        engine = self._stage.env(loaded).engine
         if directory is None and engine.world.hash != manifest.world_hash:
             raise RecordError(
                 f"the world of {trajectory} cannot be rebuilt as it was (its hash differs), so these would not be its "
                 "images; pass --out DIR for videos beside it"
             )
-        recorded = manifest.layout.bodies
-        still = tuple(body.name for body in engine.world.bodies if body.name not in recorded)
+        staged, record = self._stage.begin(trajectory, loaded), loaded.spec.record
         sheet: FilmSheet | None = None
         if directory is not None:
-            sheet = read_sheet(directory) or _sheet(manifest, env, plain(loaded.spec.to_dict()), still)
-        begin(env, manifest)
-        moments = moments_for(env, recorded, *recorded_moments(open_trajectory(trajectory)))
-        record = loaded.spec.record
-        found = film_episode(env, manifest, moments, missing, aside, make_writer(record.writer, record.options))
-        drawn, before = f"{engine.name} {engine.version}", f"{manifest.engine} {manifest.engine_version}"
+            sheet = read_sheet(directory) or FilmSheet(**facts_of(staged, loaded))
+        writer = make_writer(record.writer, record.options)
+        found = film_episode(staged.env, manifest, staged.moments, missing, aside, writer)
+        drawn, before = staged.engines
         said = {"at": datetime.now(UTC).isoformat(), "engine": drawn, "renderer": engine.renderer_name()}
         clock = dict.fromkeys(found, said)
         if directory is None or sheet is None:
@@ -162,7 +152,7 @@ class Filmer:
             add_videos(aside, directory, FILM_FILE, sheet, found, clock)
         frames = sum(entry.frames for entry in found.values())
         others = tuple(camera for camera in cameras if camera in present)
-        return Filmed(trajectory, where, missing, others, frames, drawn, before, still)
+        return Filmed(trajectory, where, missing, others, frames, drawn, before, staged.still)
 
 
 def film_targets(trajectories: Sequence[Path], out: Path | None) -> list[tuple[Path, Path | None]]:
@@ -178,18 +168,3 @@ def film_targets(trajectories: Sequence[Path], out: Path | None) -> list[tuple[P
         if len(set(places)) == len(places):
             return list(zip(trajectories, places, strict=True))
     raise RecordError("runs of the same name were given together; film them one by one, each into its own --out")
-
-
-def _sheet(manifest: Manifest, env: TaskEnv, spec: Mapping[str, Any], still: tuple[str, ...]) -> FilmSheet:
-    return FilmSheet(
-        task=manifest.task,
-        env=manifest.env,
-        episode=manifest.episode,
-        episode_seed=manifest.episode_seed,
-        final_digest=manifest.final_digest,
-        engine=env.engine.name,
-        engine_version=env.engine.version,
-        world_hash=env.engine.world.hash,
-        spec=dict(spec),
-        still=still,
-    )

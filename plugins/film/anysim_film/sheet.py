@@ -13,14 +13,14 @@ FILM_FILE = "film.json"
 FILM_FORMAT = "anysim-film-1"
 
 
-class FilmSheet(Spec):
-    """The content of film.json. Equal commands give equal sheets, but for the key `clock`.
+class DrawnSheet(Spec):
+    """What was drawn from a trajectory, and with what. Equal commands give equal sheets, but for the key `clock`.
 
     `final_digest` says which episode it is: that of its last state. `engine`, `world_hash` and `spec` are those that it
     was drawn with, and `still` names the bodies that were not recorded and stand where a reset puts them.
     """
 
-    format: Literal["anysim-film-1"] = FILM_FORMAT
+    format: str
     task: Label
     env: Count
     episode: Count
@@ -31,13 +31,20 @@ class FilmSheet(Spec):
     world_hash: Label
     spec: dict[str, Any]
     still: tuple[Label, ...] = ()
-    cameras: dict[Name, CameraEntry] = Field(default_factory=dict)
+    cameras: dict[Name, Any] = Field(default_factory=dict)
     files: dict[str, FileEntry] = Field(default_factory=dict)
-    clock: dict[str, Any] = Field(default_factory=dict, description="all that differs between equal films")
+    clock: dict[str, Any] = Field(default_factory=dict, description="all that differs between equal sheets")
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data, None included."""
         return self.model_dump(mode="json")
+
+
+class FilmSheet(DrawnSheet):
+    """The content of film.json."""
+
+    format: Literal["anysim-film-1"] = FILM_FORMAT
+    cameras: dict[Name, CameraEntry] = Field(default_factory=dict)
 
 
 def read_sheet(directory: Path) -> FilmSheet | None:

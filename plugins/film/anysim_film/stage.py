@@ -1,19 +1,21 @@
 """Stages: envs in which recorded episodes are set up to be looked at again, with what was ordered otherwise."""
 
 import json
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from anysim.errors import RecordError
+from anysim.errors import RecordError, listing, suggest
 from anysim.record.commit import describe
 from anysim.record.json import plain
 from anysim.record.manifest import Manifest
-from anysim.record.reader import TrajectoryReader
+from anysim.record.reader import TrajectoryReader, open_trajectory
+from anysim.record.replay import begin
 from anysim.task.env import TaskEnv
-from anysim_film.episode import Moments
+from anysim_film.episode import Moments, moments_for
 from anysim_schemas.load import LoadedRun
 
 
@@ -41,6 +43,27 @@ class FilmOrder:
         """Whether these are the images that a live recording would have taken."""
         changed = bool(self.overrides) or self.size is not None or self.fps is not None
         return not changed and self.engine in (None, manifest.engine)
+
+
+class Staged(NamedTuple):
+    """A recorded episode that env 0 of an env has begun.
+
+    Attributes:
+        env, reader: of it.
+        moments: all that were recorded, for the env's bodies.
+        still: bodies that the recording does not have, and that stand where the reset put them.
+    """
+
+    env: TaskEnv
+    reader: TrajectoryReader
+    moments: Moments
+    still: tuple[str, ...]
+
+    @property
+    def engines(self) -> tuple[str, str]:
+        """What draws, and what recorded, with versions."""
+        engine, manifest = self.env.engine, self.reader.manifest
+        return f"{engine.name} {engine.version}", f"{manifest.engine} {manifest.engine_version}"
 
 
 class Stage:
@@ -85,6 +108,18 @@ class Stage:
             self._env = make(loaded, base=self.order.base)
         return self._env
 
+    def begin(self, trajectory: Path, loaded: LoadedRun) -> Staged:
+        """Begin the episode of a trajectory.
+
+        Raises:
+            RecordError: it does not hold poses.
+        """
+        env, reader = self.env(loaded), open_trajectory(trajectory)
+        bodies = reader.manifest.layout.bodies
+        still = tuple(body.name for body in env.engine.world.bodies if body.name not in bodies)
+        begin(env, reader.manifest)
+        return Staged(env, reader, moments_for(env, bodies, *recorded_moments(reader)), still)
+
     def close(self) -> None:
         """Free the engine."""
         if self._env is not None:
@@ -98,16 +133,21 @@ class Stage:
         self.close()
 
 
+def refuse_unknown_cameras(chosen: Sequence[str], there: Collection[str]) -> None:
+    """Raise RecordError for a camera that a world does not have."""
+    for name in chosen:
+        if name not in there:
+            raise RecordError(f"there is no camera '{name}'{suggest(name, list(there))} (cameras: {listing(there)})")
+
+
 def recorded_moments(reader: TrajectoryReader) -> Moments:
     """All recorded moments, in the order of the recording's bodies."""
     if "body_pose" not in reader.manifest.layout.state:
         raise RecordError(f"{reader.directory} does not hold body_pose, which its images are drawn from")
-    poses = reader.states["body_pose"]
-    steps = np.arange(1, len(poses) + 1)
+    steps = np.arange(reader.manifest.steps + 1)
     if not reader.initial_state:
-        return Moments(steps, np.asarray(poses))
-    first = reader.initial_state["body_pose"]
-    return Moments(np.append(0, steps), np.concatenate([first[None], poses]))
+        return Moments(steps[1:], np.asarray(reader.states["body_pose"]))
+    return Moments(steps, reader.states_from_reset("body_pose"))
 
 
 def refuse_damage(trajectory: Path, manifest: Manifest) -> None:
@@ -117,3 +157,11 @@ def refuse_damage(trajectory: Path, manifest: Manifest) -> None:
         file = trajectory / name
         if name not in videos and (not file.is_file() or describe(file) != entry):
             raise RecordError(f"{file} is not what was committed, so nothing is drawn from it; record it again")
+
+
+def facts_of(staged: Staged, loaded: LoadedRun) -> dict[str, Any]:
+    """What a sheet says of an episode, and of what it is drawn with: see `DrawnSheet`."""
+    manifest, engine = staged.reader.manifest, staged.env.engine
+    recorded = {name: getattr(manifest, name) for name in ("task", "env", "episode", "episode_seed", "final_digest")}
+    drawn = {"engine": engine.name, "engine_version": engine.version, "world_hash": engine.world.hash}
+    return {**recorded, **drawn, "spec": plain(loaded.spec.to_dict()), "still": staged.still}

@@ -146,8 +146,7 @@ def _rows(manifest: Manifest, reader: TrajectoryReader, field: str, here: Sequen
     if lost:
         raise RecordError(f"{reader.directory} does not hold '{lost[0]}', which the world of {manifest.task} has now")
     columns = [list(there).index(name) for name in here]
-    rows = np.concatenate([np.asarray(reader.initial_state[field])[None], np.asarray(reader.states[field])])
-    return rows[:, columns]
+    return reader.states_from_reset(field)[:, columns]
 
 
 def _episode(

@@ -117,12 +117,7 @@ def _read(
     lacking = [group for group in groups if group not in reader.obs or group not in reader.initial_obs]
     if lacking:
         raise TaskError(f"{path} was recorded without the observations {', '.join(lacking)}; record it anew")
-    obs = {
-        group: np.nan_to_num(np.concatenate([reader.initial_obs[group][None], reader.obs[group][:-1]])).astype(
-            np.float32
-        )
-        for group in groups
-    }
+    obs = {group: np.nan_to_num(reader.obs_from_reset(group)[:-1]).astype(np.float32) for group in groups}
     pictures: dict[str, Array] = {}
     shown: dict[str, Array] = {}
     for name in images:

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from anysim.errors import RecordError, listing, suggest
+from anysim.errors import RecordError
 from anysim.randomization.streams import episode_seed
 from anysim.record.commit import write_whole
 from anysim.record.incoming import FileLock
@@ -16,6 +16,7 @@ from anysim_annotation.capture import Capture
 from anysim_annotation.files import tidied, write_png
 from anysim_annotation.stills.labels import ANNOTATORS, kitti_camera, kitti_line, objects
 from anysim_annotation.stills.spec import StillsSpec
+from anysim_film.stage import refuse_unknown_cameras
 from anysim_schemas.load import LoadedRun
 
 JOB_FILE, COCO_FILE = "job.json", "coco.json"
@@ -100,9 +101,7 @@ def _loaded(job: StillsSpec, folder: Path) -> LoadedRun:
 def _cameras(job: StillsSpec, loaded: LoadedRun) -> list[str]:
     there = loaded.spec.world.cameras
     chosen = job.cameras or tuple(name for name, camera in there.items() if "rgb" in camera.channels)
-    for name in chosen:
-        if name not in there:
-            raise RecordError(f"there is no camera '{name}'{suggest(name, list(there))} (cameras: {listing(there)})")
+    refuse_unknown_cameras(chosen, there)
     if not chosen:
         raise RecordError(f"the world of '{job.source}' has no camera that gives colours; add one, or override it")
     return list(chosen)
