@@ -2,13 +2,14 @@
 
 import os
 import sys
+from collections.abc import Sequence
 from json import dumps
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
-from anysim.errors import PluginError
+from anysim.errors import PluginError, TaskError
 from anysim.registry import INSTALL_HINTS
 
 Task = Annotated[str, typer.Argument(metavar="TASK", help="An installed task (`anysim list tasks`) or a YAML file.")]
@@ -42,6 +43,28 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document fo
 def with_robot(overrides: list[str] | None, robot: str | None) -> list[str]:
     """The overrides of a command, and the robot that it names."""
     return [*(overrides or ()), *([] if robot is None else [f"robot={dumps(robot)}"])]
+
+
+def option_values(pairs: Sequence[str] | None, example: str) -> dict[str, Any]:
+    """The values of `--option KEY=VALUE` by key, as YAML reads them.
+
+    Raises:
+        TaskError: one is of another form, cannot be read, or has a key that another has.
+    """
+    from anysim_schemas.nodes import Fault
+    from anysim_schemas.yaml import parse
+
+    values: dict[str, Any] = {}
+    for pair in pairs or ():
+        key, equals, value = pair.partition("=")
+        if not equals or not key.isidentifier() or key in values:
+            raise TaskError(f"--option {pair}: expected KEY=VALUE, each key once, as in --option {example}")
+        faults: list[Fault] = []
+        node = parse(value, f"--option {pair}", faults)
+        if node is None or faults:
+            raise TaskError(f"--option {pair}: the value cannot be read: {faults[0].message}")
+        values[key] = node.plain()
+    return values
 
 
 UNWRAPPED = "\b\n"

@@ -1,12 +1,11 @@
 """`anysim export`: recorded runs as data sets; `anysim tape`: the actions of a data set played again."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from anysim.cli.options import AsJson
+from anysim.cli.options import AsJson, option_values
 
 if TYPE_CHECKING:
     from anysim_export.job import Told
@@ -39,7 +38,7 @@ def export(
     from anysim_export.job import export as write
 
     with _Bar(lambda total: counting("episodes", total, quiet=json)) as bar:
-        done = write(directories, to, out, options_of(option or ()), failed_too=failed_too, tell=bar.begin)
+        done = write(directories, to, out, option_values(option, "images=false"), failed_too=failed_too, tell=bar.begin)
     if json:
         print_json({**done._asdict(), "directory": str(done.directory)})
         return
@@ -92,23 +91,6 @@ def _won(one: Any) -> bool:
 
 def _same(one: Any) -> bool:
     return one.status == one.recorded
-
-
-def options_of(pairs: Sequence[str]) -> dict[str, Any]:
-    """KEY=VALUE, each value as YAML reads it.
-
-    Raises:
-        typer.BadParameter: one is of another form.
-    """
-    import yaml
-
-    found: dict[str, Any] = {}
-    for pair in pairs:
-        key, equals, value = pair.partition("=")
-        if not equals or not key.isidentifier() or key in found:
-            raise typer.BadParameter(f"--option {pair}: expected KEY=VALUE, each key once")
-        found[key] = yaml.safe_load(value)
-    return found
 
 
 class _Bar:

@@ -206,7 +206,8 @@ def _strange(episodes: Path) -> list[str]:
     return sorted(
         entry.name
         for entry in episodes.iterdir()
-        if parse_trajectory(entry.name) is None and not (entry.name.startswith(".") and entry.name.endswith(ours))
+        if parse_trajectory(entry.name.removesuffix(".annotations")) is None
+        and not (entry.name.startswith(".") and entry.name.endswith(ours))
     )
 
 

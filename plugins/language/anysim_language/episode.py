@@ -16,11 +16,12 @@ from anysim.randomization.streams import episode_seed
 from anysim.record.manifest import Manifest
 from anysim.record.reader import TrajectoryReader, open_trajectory
 from anysim.record.replay import begin
+from anysim.task.bindings import Bindings
 from anysim.task.env import TaskEnv
 from anysim_language.moment import Moment, Viewer, viewer_of
 from anysim_language.things import Thing, things_of
 from anysim_language.vocabulary import Vocabulary, vocabulary
-from anysim_schemas.collect import ChooseSpec, RepeatSpec
+from anysim_schemas.collect import ChooseSpec, CommandSpec, RepeatSpec
 from anysim_schemas.load import LoadedRun
 
 
@@ -199,41 +200,31 @@ def _goal_frames(loaded: LoadedRun) -> dict[str, str]:
     return found
 
 
-def _deeds(env: TaskEnv, loaded: LoadedRun) -> list[Deed]:
+def _deeds(env: TaskEnv, loaded: LoadedRun) -> Iterator[Deed]:
     """The commands that this episode has, written out; a repeated one once."""
     task, collect = loaded.spec.task, loaded.spec.collect
-    if collect is None:
-        expert = task.expert if task is not None else None
-        return [] if expert is None else [Deed(expert.skill, _bound(env, dict(expert.params)))]
-    found: list[Deed] = []
-
-    def lay(entries: Any, path: str) -> None:
-        if isinstance(entries, tuple):
-            for number, entry in enumerate(entries):
-                lay_one(entry, f"{path}.{number}")
-        else:
-            lay_one(entries, path)
-
-    def lay_one(entry: Any, here: str) -> None:
-        if isinstance(entry, ChooseSpec):
-            number = int(env.bindings.index[here][0])
-            lay(entry.choose[number], f"{here}.choose.{number}")
-        elif isinstance(entry, RepeatSpec):
-            lay(entry.body, f"{here}.body")
-        else:
-            found.append(Deed(entry.do, _bound(env, dict(entry.params))))
-
-    lay(collect.commands, "collect.commands")
-    return found
+    if collect is not None:
+        for spec, path in _drawn(collect.commands, "collect.commands", env.bindings):
+            yield Deed(spec.do, _bound(env.bindings, spec.params, path))
+    elif task is not None and task.expert is not None:
+        yield Deed(task.expert.skill, _bound(env.bindings, task.expert.params, "task.expert.params"))
 
 
-def _bound(env: TaskEnv, params: Mapping[str, Any]) -> dict[str, Any]:
+def _drawn(entries: Any, path: str, bindings: Bindings) -> Iterator[tuple[CommandSpec, str]]:
+    """The commands of a file on the branches that were drawn, with their paths."""
+    if isinstance(entries, tuple):
+        for number, entry in enumerate(entries):
+            yield from _drawn(entry, f"{path}.{number}", bindings)
+    elif isinstance(entries, ChooseSpec):
+        number = int(bindings.index[path][0])
+        yield from _drawn(entries.choose[number], f"{path}.choose.{number}", bindings)
+    elif isinstance(entries, RepeatSpec):
+        yield from _drawn(entries.body, f"{path}.body", bindings)
+    else:
+        yield entries, path
+
+
+def _bound(bindings: Bindings, params: Mapping[str, Any], path: str) -> Mapping[str, Any]:
     """Parameters with what was drawn for this episode in place of `$name`."""
-    return {
-        key: env.bindings.said(value, 0)
-        if isinstance(value, str)
-        else [env.bindings.said(one, 0) if isinstance(one, str) else one for one in value]
-        if isinstance(value, list | tuple)
-        else value
-        for key, value in params.items()
-    }
+    names, variants = bindings.variants(params, path)
+    return variants[int(bindings.which(names, np.array([0]))[0])]

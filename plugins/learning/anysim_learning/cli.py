@@ -1,6 +1,5 @@
 """`anysim train`: a policy learns a task."""
 
-import re
 from collections.abc import Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -9,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from anysim.cli.options import AsJson, Engine, Overrides, Task
+from anysim.cli.options import AsJson, Engine, Overrides, Task, option_values
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -76,7 +75,7 @@ def train(
     if missing := [name for name in getattr(made, "needs", ()) if find_spec(name) is None]:
         remedy = f"pip install 'anysim-learning[{_EXTRAS.get(learner, 'torch')}]', best in an environment of its own"
         raise PluginError(f"the learner '{learner}' needs {listing(missing)}, which is not installed: {remedy}")
-    given = checked(options_model(made), _options(option or ()), "option")
+    given = checked(options_model(made), option_values(option, "gamma=0.99"), "option")
     with (
         claim(folder),
         make(task, engine=engine, num_envs=num_envs, overrides=overrides, curriculum=True) as env,
@@ -104,24 +103,6 @@ def train(
 
 _EXTRAS = {"sb3-ppo": "sb3", "rsl-rl": "rsl", "clone": "torch"}
 _EXAMINED = 64
-
-
-def _options(pairs: Sequence[str]) -> dict[str, Any]:
-    from anysim.errors import TaskError
-    from anysim_schemas.nodes import Fault
-    from anysim_schemas.yaml import parse
-
-    options: dict[str, Any] = {}
-    for pair in pairs:
-        key, equals, value = pair.partition("=")
-        if not equals or not re.fullmatch(r"\w+", key) or key in options:
-            raise TaskError(f"--option {pair}: expected KEY=VALUE, each key once, as in --option gamma=0.99")
-        faults: list[Fault] = []
-        node = parse(value, f"--option {pair}", faults)
-        if node is None or faults:
-            raise TaskError(f"--option {pair}: the value cannot be read: {faults[0].message}")
-        options[key] = node.plain()
-    return options
 
 
 def _about(

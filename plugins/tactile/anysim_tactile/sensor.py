@@ -12,7 +12,7 @@ from anysim.errors import NameLookupError
 from anysim.math import pose as P
 from anysim.sensors.base import Sensor, SensorField
 from anysim.task.scene import BodyFrame, Frame, SceneView
-from anysim_sensors.scene import SceneGeometry
+from anysim_sensors.sight.eye import Eye
 from anysim_sensors.tables import GeomPoses
 from anysim_tactile.felt import Felt, bumps, felt
 from anysim_tactile.skin import Load, Skin
@@ -79,14 +79,12 @@ class Tactile(Sensor):
         super().__init__(scene.engine.num_envs)
         if not isinstance(frame, BodyFrame) or frame.index.body < 0:
             raise NameLookupError(f"'{frame.name}' is on no body that moves or stands; taxels are on one")
-        self._scene, self._frame, self._body = scene, frame, frame.index.body
-        self._place = P.pose(at, P.from_roll_pitch_yaw(np.array(turn)))
+        self._scene, self._body = scene, frame.index.body
+        self._eye = Eye(scene, frame, "collision", "body", at, turn)
         self._source, self._thickness = source, thickness
         self._reach = max(0.002, 1.5 * surface.pitch) if reach is None else reach
         self._blunt = max(BLUNT, 2 * surface.pitch)
         self._skin, self._surface = Skin(surface, stiffness), surface
-        self._geometry = SceneGeometry(scene.engine.world)
-        self._others = self._geometry.without([self._body])
         axes = frame.name if at == turn == (0.0, 0.0, 0.0) else f"{frame.name}, at {at} turned by {turn}"
         shape = surface.shape
         self.fields: dict[str, SensorField] = {
@@ -102,11 +100,9 @@ class Tactile(Sensor):
         return self._told(self._touched(env_ids))
 
     def _touched(self, env_ids: Array) -> Touch:
-        engine, frames = self._scene.engine, P.compose(self._frame.pose, self._place)
-        points = felt(engine, env_ids, self._body, frames, self._surface, self._reach)
-        posed = None
-        if self._source != "contacts":
-            posed = self._geometry.posed(self._scene.state.body_pose[env_ids], engine.presence[env_ids])
+        frames = self._eye.poses
+        points = felt(self._scene.engine, env_ids, self._body, frames, self._surface, self._reach)
+        posed = None if self._source == "contacts" else self._eye.posed
         gap = self._gap(frames, posed, points, self._surface)
         carried = self._skin.carry(gap, points.pushes, points.wrench)
         missed = self._missed(points, carried)
@@ -130,12 +126,12 @@ class Tactile(Sensor):
         """(n, T) [m] between taxels and what is over them, negative where they are in it, inf where it is far."""
         if posed is None:
             return bumps(points, surface, self._blunt)
-        far = max(self._thickness, self._reach)
+        eye, far = self._eye, max(self._thickness, self._reach)
         if self._source == "distance":
-            return self._geometry.distances(posed, frames, surface.points, reach=far, seen=self._others).distance
+            return eye.geometry.distances(posed, frames, surface.points, reach=far, seen=eye.seen).distance
         back = surface.points - self._thickness * surface.normals
         reach = self._thickness + far
-        met = self._geometry.rays(posed, frames, back, surface.normals, reach=reach, seen=self._others)
+        met = eye.geometry.rays(posed, frames, back, surface.normals, reach=reach, seen=eye.seen)
         return met.distance - self._thickness
 
     def _told(self, touch: Touch) -> dict[str, Array]:

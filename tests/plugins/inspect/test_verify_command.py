@@ -52,6 +52,7 @@ def test_what_was_left_half_written_is_listed_and_no_damage(run: Path) -> None:
     (run / ".incoming" / "env_0000_episode_0007.99-0").mkdir(parents=True)
     (run / ".incoming" / "env_0001_episode_0007.98-0").mkdir()
     (run / "episodes" / ".env_0000_episode_0000.film").mkdir()
+    (run / "episodes" / "env_0000_episode_0000.annotations").mkdir()  # those of `anysim render` are none
     (run / "episodes" / "copy of one").mkdir()
     with FileLock.take(run / ".incoming" / "98-0.lock") or pytest.fail("locked"):  # that one is being written
         code, found = verified(run)

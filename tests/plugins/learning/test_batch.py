@@ -9,6 +9,7 @@ import typer
 from typer.testing import CliRunner
 
 import anysim
+from anysim.cli.options import option_values
 from anysim.errors import PluginError, RecordError, TaskError
 from anysim.record.collector import Collector
 from anysim.record.reader import open_trajectory
@@ -97,10 +98,10 @@ def test_without_torch_the_remedy_is_said(learner: str, tmp_path: Path) -> None:
 
 
 def test_a_hyperparameter_is_yaml_and_what_is_none_is_a_sentence() -> None:
-    assert cli._options(["a=1e-3", "b=64", "c=mlp"]) == {"a": 1e-3, "b": 64, "c": "mlp"}
+    assert option_values(["a=1e-3", "b=64", "c=mlp"], "gamma=0.99") == {"a": 1e-3, "b": 64, "c": "mlp"}
     for wrong, message in (("a", "expected KEY=VALUE"), ("a=[1", r"--option a=\[1: the value cannot be read")):
         with pytest.raises(TaskError, match=message):
-            cli._options([wrong])
+            option_values([wrong], "gamma=0.99")
 
 
 def test_a_checkpoint_comes_back_as_it_was(tmp_path: Path) -> None:
