@@ -21,6 +21,7 @@ WORLDS = ROOT / "tests" / "plugins" / "annotation" / "worlds"
 SAID = re.findall(r"^    (anysim .*)$", PAGE, re.MULTILINE)
 
 
+@pytest.mark.slow
 def test_the_commands_of_the_page_make_what_it_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     require_drawing("mujoco")
     if not any(command.name == "render" for command in app.registered_commands):

@@ -81,6 +81,7 @@ def test_a_peg_comes_to_its_end_unless_it_is_askew_or_lands_on_the_rim(engine: s
         assert trial.lasting(turned(method, 0, 45)).tolist() == [True, False]
 
 
+@pytest.mark.slow
 def test_verdicts_do_not_depend_on_order_and_number_of_envs() -> None:
     method = of({"section": "round", "width": 0.0345}, {"section": "round", "pieces": 12})
     some = turned(method, *range(0, 60, 6))
@@ -103,6 +104,7 @@ def test_what_does_not_fit_says_so() -> None:
         made(of({"width": 0.04}), "mujoco", Order(90, 8), print)
 
 
+@pytest.mark.slow
 def test_a_task_has_banks_of_its_holes_and_goes_on_where_it_stopped(tmp_path: Path) -> None:
     line = ["build", "peg_in_hole", "--raw", "90", "--keep", "6", "--out", str(tmp_path), "--json"]
     result = CliRunner().invoke(app, line)

@@ -269,6 +269,7 @@ def test_unknown_names_are_told_with_those_that_exist(world: World, planner: Rrt
         motion_planner(world, "numba_ik")
 
 
+@pytest.mark.slow
 def test_two_robots_keep_the_padding_from_each_other() -> None:
     """Where they are nearer to each other than to anything else, by arithmetic of the suite."""
     room, rng, seen = rooms.two_arms(), np.random.default_rng(5), 0

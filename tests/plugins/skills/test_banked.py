@@ -196,6 +196,7 @@ def test_envs_do_not_disturb_each_other(tmp_path: Path) -> None:
     assert (finals[0] == finals[1]).all()
 
 
+@pytest.mark.slow
 def test_what_the_own_hand_has_no_room_for_comes_last(monkeypatch: pytest.MonkeyPatch) -> None:
     """Grasps of a mug's rim that are as deep as the bank's gripper are held up by the hand of a Panda."""
     slipped: list[bool] = []
