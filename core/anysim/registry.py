@@ -143,6 +143,7 @@ def _one(kind: str) -> str:
 def refresh() -> None:
     """Forget what was found; the next look-up reads the installed distributions again."""
     participants.cache_clear()
+    _home.cache_clear()
     _entries.cache_clear()
     _scan.cache_clear()
 
@@ -237,6 +238,7 @@ def culprit(error: BaseException) -> str:
     return found
 
 
+@cache  # the name of a distribution is read from a file each time
 def _home(module: str) -> str:
     top = module.partition(".")[0]
     for entries in _scan().values():
