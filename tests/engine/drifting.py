@@ -9,12 +9,12 @@ from numpy.typing import ArrayLike
 from anysim.conventions import Array
 from anysim.engine.capability import Capabilities, Capability
 from anysim.engine.control import Control
-from anysim.engine.one_world.base import EnvWorlds, OneWorldPerEnv
-from anysim.engine.one_world.last_substep import LastSubstep
 from anysim.engine.parameters import ParameterTable
 from anysim.engine.state import Availability, SnapshotLevel
 from anysim.math import pose as P
 from anysim.model.world import World
+from anysim_mechanics.one_world.base import EnvWorlds, OneWorldPerEnv
+from anysim_mechanics.one_world.last_substep import LastSubstep
 
 
 class Drift:

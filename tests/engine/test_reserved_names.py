@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 from anysim.engine.base import SimEngine
-from anysim.engine.one_world.base import OneWorldPerEnv
 from anysim.engine.reserved_names import reserved
 from anysim.errors import EngineError
 from anysim.testing import worlds
 from anysim.testing.kinematic import NullEngine
+from anysim_mechanics.one_world.base import OneWorldPerEnv
 
 GUIDE = Path(__file__).parents[2] / "docs" / "write_an_engine.md"
 

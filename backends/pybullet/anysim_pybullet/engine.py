@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from anysim.conventions import Array
 from anysim.engine.availability import Finding, Health
 from anysim.engine.capability import Allowance, Capabilities
-from anysim.engine.one_world.base import OneWorldPerEnv
 from anysim.engine.presence import Lifecycle
 from anysim.engine.requirements import crowded
 from anysim.engine.snapshots.row_checks import refuse_range
 from anysim.engine.state import SnapshotLevel
 from anysim.model.world import World
+from anysim_mechanics.one_world.base import OneWorldPerEnv
 from anysim_pybullet import declared
 from anysim_pybullet.options import PybulletOptions
 

@@ -8,12 +8,12 @@ from numpy.typing import ArrayLike
 from anysim.c_output import quiet
 from anysim.conventions import Array
 from anysim.engine.control import Control
-from anysim.engine.one_world.base import EnvWorlds, Painter
-from anysim.engine.one_world.last_substep import LastSubstep
 from anysim.engine.state import SnapshotLevel
 from anysim.errors import EngineError
 from anysim.math import pose as P
 from anysim.model.world import BodyKind, World
+from anysim_mechanics.one_world.base import EnvWorlds, Painter
+from anysim_mechanics.one_world.last_substep import LastSubstep
 from anysim_pybullet import contacts
 from anysim_pybullet.audit import handles, read_back
 from anysim_pybullet.bullet import bullet

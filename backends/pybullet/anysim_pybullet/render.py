@@ -82,7 +82,7 @@ class Painter:
     def draw(
         self, view: CameraView, ids: Array, skins: tuple[Array, ...], there: Array, channels: tuple[str, ...]
     ) -> dict[str, Array]:
-        """See `anysim.engine.one_world.base.Painter`."""
+        """See `anysim_mechanics.one_world.base.Painter`."""
         images = view.blank(channels)
         for row, index in enumerate(ids.tolist()):
             color, texture, _ = (part[row, self._geoms] for part in skins)

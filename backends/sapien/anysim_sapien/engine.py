@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from anysim.conventions import Array
 from anysim.engine.availability import Finding
 from anysim.engine.capability import Allowance, Capabilities
-from anysim.engine.one_world.base import OneWorldPerEnv
 from anysim.engine.presence import Lifecycle
 from anysim.engine.requirements import crowded
 from anysim.engine.state import SnapshotLevel
 from anysim.model.world import World
 from anysim_mechanics.journal_checks import refuse_pasts
 from anysim_mechanics.meeting import refusals
+from anysim_mechanics.one_world.base import OneWorldPerEnv
 from anysim_sapien import declared
 from anysim_sapien.options import SapienOptions
 

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 
 from anysim.conventions import WORLD, Array
 from anysim.engine.control import Control
-from anysim.engine.one_world.base import EnvWorlds, Painter
-from anysim.engine.one_world.last_substep import LastSubstep
 from anysim.engine.state import SnapshotLevel
 from anysim.model.world import World
 from anysim_mechanics.contact_friction import contact_points, sensor_forces
+from anysim_mechanics.one_world.base import EnvWorlds, Painter
+from anysim_mechanics.one_world.last_substep import LastSubstep
 from anysim_sapien.audit import geom_volumes, joint_limits
 from anysim_sapien.contacts import pairs_of
 from anysim_sapien.drives import drives_of

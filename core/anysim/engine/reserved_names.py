@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 from anysim.engine.primitives import Primitives
 from anysim.errors import EngineError
 
-_PACKAGE = "anysim.engine."
+_PACKAGES = ("anysim.engine.", "anysim_mechanics.")  # of the base classes
 _STORE = bytes([dis.opmap["STORE_ATTR"]])
 
 
@@ -23,7 +23,7 @@ def check_class(engine: type) -> None:
     Raises:
         EngineError: it does; the message names it, the class and the base that owns it.
     """
-    if engine.__module__.startswith(_PACKAGE):
+    if engine.__module__.startswith(_PACKAGES):
         return
     taken = reserved(engine)
     for name, value in vars(engine).items():
@@ -40,7 +40,7 @@ def check_instance(engine: object, kept: Mapping[str, object]) -> None:
     Raises:
         EngineError: it has, or it hides a method of theirs.
     """
-    taken = {} if type(engine).__module__.startswith(_PACKAGE) else reserved(type(engine))
+    taken = {} if type(engine).__module__.startswith(_PACKAGES) else reserved(type(engine))
     for name, value in vars(engine).items():
         replaced = kept.get(name, value) is not value
         hides = name not in kept and hasattr(type(engine), name)
@@ -56,7 +56,7 @@ def reserved(engine: type) -> dict[str, str]:
     """
     names: dict[str, str] = {}
     for base in reversed(engine.__mro__):
-        ours = base.__module__.startswith(_PACKAGE) and base is not Primitives
+        ours = base.__module__.startswith(_PACKAGES) and base is not Primitives
         if ours and not isinstance(vars(base).get("name"), str):
             names |= dict.fromkeys(_own(base) - names.keys(), base.__name__)
     return names

@@ -15,10 +15,10 @@ from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.engine.cameras import CameraView
 from anysim.engine.control import Control
-from anysim.engine.one_world.last_substep import CarriedSubstep, LastSubstep
 from anysim.engine.parameters import APPEARANCE, ParameterTable
 from anysim.engine.state import ContactPoints, RayHits, SnapshotLevel, joined_rows
 from anysim.model.world import World
+from anysim_mechanics.one_world.last_substep import CarriedSubstep, LastSubstep
 
 
 class Painter(Protocol):
