@@ -1,5 +1,6 @@
 """Episodes of several commands, as `anysim run` collects them."""
 
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
@@ -97,6 +98,30 @@ else:
 
 ChooseSpec.model_rebuild()
 RepeatSpec.model_rebuild()
+
+
+def written_out(
+    entries: "Commands", path: str, *, drawn: Callable[[str], int] | None = None, repeated: bool = True
+) -> Iterator[tuple[CommandSpec, str]]:
+    """Commands in a row, each with its path in the file.
+
+    Args:
+        path: of the entries.
+        drawn: which branch a choice takes, by its path; all of them, one after the other, where not given.
+        repeated: whether what is repeated comes as often, or once.
+    """
+    if isinstance(entries, tuple):
+        for number, entry in enumerate(entries):
+            yield from written_out(entry, f"{path}.{number}", drawn=drawn, repeated=repeated)
+    elif isinstance(entries, ChooseSpec):
+        for number in range(len(entries.choose)) if drawn is None else (drawn(path),):
+            branch = entries.choose[number]
+            yield from written_out(branch, f"{path}.choose.{number}", drawn=drawn, repeated=repeated)
+    elif isinstance(entries, RepeatSpec):
+        for _ in range(entries.repeat if repeated else 1):
+            yield from written_out(entries.body, f"{path}.body", drawn=drawn, repeated=repeated)
+    else:
+        yield entries, path
 
 
 class BoundRange(Spec):

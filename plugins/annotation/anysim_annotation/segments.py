@@ -9,7 +9,7 @@ from anysim.task.bindings import Variants
 from anysim.task.env import TaskEnv
 from anysim_annotation.api import Record, SegmentAnnotator
 from anysim_annotation.view import NOTHING, Segment, View
-from anysim_schemas.collect import ChooseSpec, CommandSpec, RepeatSpec
+from anysim_schemas.collect import written_out
 
 Kind = Literal["skill", "phase"]
 SEGMENT_KEYS = ("skill", "phase", "command", "attempt", "first_step", "last_step")
@@ -24,7 +24,7 @@ class Intentions:
         self._env = env
         self._variants: list[Variants] = []
         if collect is not None:
-            found = _in_order(collect.commands, "collect.commands")
+            found = written_out(collect.commands, "collect.commands")
             self._variants = [env.bindings.variants(spec.params, path) for spec, path in found]
         self._expert: Mapping[str, Any] = task.expert.params if task is not None and task.expert is not None else {}
         self._commands = collect is not None
@@ -38,21 +38,6 @@ class Intentions:
             return NOTHING
         names, params = self._variants[number]
         return params[int(self._env.bindings.which(names, np.array([env]))[0])]
-
-
-def _in_order(entries: Any, path: str) -> Iterator[tuple[CommandSpec, str]]:
-    """The commands of a file, repetitions and branches written out, as `CommandSequence` numbers them."""
-    if isinstance(entries, tuple):
-        for number, entry in enumerate(entries):
-            yield from _in_order(entry, f"{path}.{number}")
-    elif isinstance(entries, ChooseSpec):
-        for number, branch in enumerate(entries.choose):
-            yield from _in_order(branch, f"{path}.choose.{number}")
-    elif isinstance(entries, RepeatSpec):
-        for _ in range(entries.repeat):
-            yield from _in_order(entries.body, f"{path}.body")
-    else:
-        yield entries, path
 
 
 def skill_of(said: Mapping[str, Any]) -> str:

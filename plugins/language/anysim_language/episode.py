@@ -21,7 +21,7 @@ from anysim.task.env import TaskEnv
 from anysim_language.moment import Moment, Viewer, viewer_of
 from anysim_language.things import Thing, things_of
 from anysim_language.vocabulary import Vocabulary, vocabulary
-from anysim_schemas.collect import ChooseSpec, CommandSpec, RepeatSpec
+from anysim_schemas.collect import written_out
 from anysim_schemas.load import LoadedRun
 
 
@@ -204,24 +204,14 @@ def _deeds(env: TaskEnv, loaded: LoadedRun) -> Iterator[Deed]:
     """The commands that this episode has, written out; a repeated one once."""
     task, collect = loaded.spec.task, loaded.spec.collect
     if collect is not None:
-        for spec, path in _drawn(collect.commands, "collect.commands", env.bindings):
+        index = env.bindings.index
+        drawn = written_out(
+            collect.commands, "collect.commands", drawn=lambda path: int(index[path][0]), repeated=False
+        )
+        for spec, path in drawn:
             yield Deed(spec.do, _bound(env.bindings, spec.params, path))
     elif task is not None and task.expert is not None:
         yield Deed(task.expert.skill, _bound(env.bindings, task.expert.params, "task.expert.params"))
-
-
-def _drawn(entries: Any, path: str, bindings: Bindings) -> Iterator[tuple[CommandSpec, str]]:
-    """The commands of a file on the branches that were drawn, with their paths."""
-    if isinstance(entries, tuple):
-        for number, entry in enumerate(entries):
-            yield from _drawn(entry, f"{path}.{number}", bindings)
-    elif isinstance(entries, ChooseSpec):
-        number = int(bindings.index[path][0])
-        yield from _drawn(entries.choose[number], f"{path}.choose.{number}", bindings)
-    elif isinstance(entries, RepeatSpec):
-        yield from _drawn(entries.body, f"{path}.body", bindings)
-    else:
-        yield entries, path
 
 
 def _bound(bindings: Bindings, params: Mapping[str, Any], path: str) -> Mapping[str, Any]:
