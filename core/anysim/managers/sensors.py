@@ -217,10 +217,10 @@ class SensorManager(Manager):
         return rows.reshape(len(rows), *kind.shape).astype(kind.dtype)
 
     def recorded(self, env_ids: Array) -> dict[str, Array]:
-        """What is recorded of these envs, `sensor_NAME_FIELD` (n, …) float64."""
+        """What is recorded of these envs, `sensor_NAME_FIELD` (n, …), in the types of the fields."""
         wanted = self._channels if self.spec.record.sensors is None else self.spec.record.sensors
         return {
-            f"sensor_{name}_{key}": self.reading(name, key, env_ids).astype(np.float64)
+            f"sensor_{name}_{key}": self.reading(name, key, env_ids)
             for name in wanted
             for key in self.fields(name)
         }

@@ -41,7 +41,7 @@ class EpisodeColumns:
         first_step: 0 where the initial frame was recorded, else 1.
         time: (F,) simulated time since the reset [s], never decreasing.
         action: (F, A) float64; the row of step 0 is zero and means nothing.
-        state: (F, …) float64 by the names of the layout.
+        state: (F, …) by the names of the layout, in its types.
         reward: (F,) float64.
         obs: (F, …) by the names of the layout, in its types.
         status: what the task said, at the rows where it changed; the first is at row 0.
@@ -89,7 +89,7 @@ def fields_of(layout: StateLayout) -> dict[Field, tuple[tuple[int, ...], np.dtyp
         REWARD: ((), double),
         ACTION: ((len(layout.action),), double),
     }
-    fields |= {("state", name): (layout.state[name], double) for name in sorted(layout.state)}
+    fields |= {("state", name): (layout.state[name], np.dtype(layout.dtype(name))) for name in sorted(layout.state)}
     fields |= {("obs", name): (layout.obs[name].shape, np.dtype(layout.obs[name].dtype)) for name in sorted(layout.obs)}
     return fields
 

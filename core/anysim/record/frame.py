@@ -25,7 +25,7 @@ class RecordedFrame(NamedTuple):
         step: control step, from 0 or 1.
         time: simulated time since the reset [s].
         action: (A,), or None at step 0.
-        state: arrays of one env by the names and shapes of the layout, float64.
+        state: arrays of one env by the names, shapes and types of the layout.
         reward: of this step.
         status: `running`, `success`, `failed`, `truncated`, as the task says after this step.
         obs: groups of one env, as in the layout; `images/…` are ignored.
@@ -94,7 +94,7 @@ def state_rows(state: State, env: int, fields: Sequence[str], control: Control |
 
 
 def state_digest(state: Mapping[str, Array]) -> str:
-    """SHA-256 over names, shapes and the bits of the float64 values, whatever the order of the names."""
+    """SHA-256 over names, shapes and the bits of the values as float64, whatever the order of the names."""
     digest = hashlib.sha256(b"anysim-state-1")
     for name in sorted(state):
         values = np.ascontiguousarray(state[name], dtype="<f8")

@@ -6,6 +6,7 @@ from functools import cache
 from importlib import metadata
 from typing import Annotated, Any, Literal, NamedTuple
 
+import numpy as np
 from pydantic import Field, field_validator
 
 from anysim import registry
@@ -22,6 +23,9 @@ Label = Annotated[str, Field(max_length=1024)]
 Pose7 = tuple[float, float, float, float, float, float, float]
 
 
+NumberType = Literal["float64", "float32", "int32", "int8", "uint8", "bool"]
+
+
 class ArrayLayout(Spec):
     """Shape and number type of an array of one env."""
 
@@ -32,8 +36,8 @@ class ArrayLayout(Spec):
 class StateLayout(Spec):
     """The meaning of a frame's arrays, by name, so that a reader needs no engine and no world.
 
-    `action` names the components of an action; `state` gives the shape of each state array (always float64); `obs` the
-    observation groups.
+    `action` names the components of an action; `state` gives the shape of each state array, `dtypes` the number type of
+    those that are not float64; `obs` the observation groups.
     """
 
     bodies: tuple[Label, ...] = ()
@@ -41,6 +45,7 @@ class StateLayout(Spec):
     actuators: tuple[Label, ...] = ()
     action: tuple[Label, ...] = ()
     state: dict[Name, tuple[Size, ...]] = Field(default_factory=dict)
+    dtypes: dict[Name, NumberType] = Field(default_factory=dict)
     obs: dict[Name, ArrayLayout] = Field(default_factory=dict)
 
     @field_validator("state")
@@ -50,6 +55,10 @@ class StateLayout(Spec):
         if taken:
             raise ValueError(f"{taken[0]} is recorded by itself and cannot be a state array; choose another name")
         return state
+
+    def dtype(self, name: str) -> str:
+        """The number type of a state array."""
+        return self.dtypes.get(name, "float64")
 
 
 class CameraInfo(Spec):
@@ -139,6 +148,9 @@ def state_layout(
         actuators=tuple(a.name for a in world.actuators),
         action=tuple(action),
         state={name: shapes[name] for name in fields} | {name: a.shape[1:] for name, a in (sensors or {}).items()},
+        dtypes=StateLayout.model_validate(
+            {"dtypes": {name: str(a.dtype) for name, a in (sensors or {}).items() if a.dtype != np.float64}}
+        ).dtypes,
         obs={k: ArrayLayout.model_validate({"shape": v.shape, "dtype": str(v.dtype)}) for k, v in groups.items()},
     )
 

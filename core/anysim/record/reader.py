@@ -39,12 +39,12 @@ class TrajectoryReader(ABC):
     @property
     @abstractmethod
     def states(self) -> Mapping[str, Array]:
-        """(T, …) float64, after each step."""
+        """(T, …) in the types of the layout, after each step."""
 
     @property
     @abstractmethod
     def initial_state(self) -> Mapping[str, Array]:
-        """(…) float64, right after the reset; empty if it was not recorded."""
+        """(…) in the types of the layout, right after the reset; empty if it was not recorded."""
 
     @property
     @abstractmethod

@@ -102,7 +102,7 @@ def summarise(drifts: Mapping[str, Drift]) -> list[FieldSummary]:
 
 
 def compare_states(recorded: Mapping[str, Array], replayed: Mapping[str, Array]) -> Drift:
-    """Compare (T, …) float64 arrays by name; row t is the state after control step t + 1.
+    """Compare (T, …) arrays by name; row t is the state after control step t + 1.
 
     Raises:
         RecordError: names or shapes differ, so that the two are not of one world.

@@ -162,7 +162,8 @@ class BlockEncoder:
         row.begin(self._channels.state)
         row.start(key.step)
         for i, name in enumerate(sorted(layout.state)):
-            row.packed(f"state.{name}", m.FIRST_ARRAY + i, 8 * math.prod(layout.state[name]))
+            size = np.dtype(layout.dtype(name)).itemsize * math.prod(layout.state[name])
+            row.packed(f"state.{name}", m.FIRST_ARRAY + i, size)
         row.end()
         row.begin(self._channels.collect)
         row.start(key.step)

@@ -3,7 +3,8 @@
 | topic | schema | content |
 |---|---|---|
 | /action | anysim.Action | values: float64 |
-| /state | anysim.State | one `repeated double` per state array, flattened in row-major order |
+| /state | anysim.State | one repeated field per state array, of its number type, flattened in row-major order; \
+  `bytes` where a number has one byte |
 | /collect | anysim.Collect | reward, status, and `obs_<group>` |
 | /tf | foxglove.FrameTransforms | the bodies in the world |
 | /tf_static | foxglove.FrameTransforms | the cameras' optical frames, once |
@@ -62,7 +63,10 @@ def file_descriptor_set(name: str, layout: StateLayout) -> bytes:
     if name == ACTION:
         fields.append(("values", FIRST_ARRAY, F.TYPE_DOUBLE, many))
     elif name == STATE:
-        fields += [(key, FIRST_ARRAY + i, F.TYPE_DOUBLE, many) for i, key in enumerate(sorted(layout.state))]
+        kinds = {"float64": F.TYPE_DOUBLE, "float32": F.TYPE_FLOAT, "int32": F.TYPE_SFIXED32, "bool": F.TYPE_BOOL}
+        for i, key in enumerate(sorted(layout.state)):
+            kind = kinds.get(layout.dtype(key))
+            fields.append((key, FIRST_ARRAY + i, F.TYPE_BYTES if kind is None else kind, one if kind is None else many))
     else:
         fields += [("reward", 3, F.TYPE_DOUBLE, one), ("status", 4, F.TYPE_STRING, one)]
         for i, key in enumerate(sorted(layout.obs)):

@@ -149,7 +149,8 @@ class McapReader(TrajectoryReader):
                 self._in_order(topic, message.step, len(rows.time) + 1 - self._skip)
                 rows.time.append(message.time)
                 for name, arrays in rows.state.items():
-                    arrays.append(self._array(name, getattr(message, name, ()), layout.state[name], np.float64))
+                    dtype = np.dtype(layout.dtype(name))
+                    arrays.append(self._array(name, getattr(message, name, ()), layout.state[name], dtype))
             elif topic == "/collect":
                 self._in_order(topic, message.step, len(rows.reward) + 1 - self._skip)
                 rows.reward.append(message.reward)
@@ -177,6 +178,8 @@ class McapReader(TrajectoryReader):
             )
 
     def _array(self, name: str, values: Any, shape: tuple[int, ...], dtype: Any) -> Array:
+        if isinstance(values, bytes):
+            values = np.frombuffer(values, dtype)
         if len(values) != math.prod(shape):
             raise RecordError(
                 f"{self._path} is inconsistent: {name} has {len(values)} numbers; the manifest says {shape}"

@@ -15,7 +15,16 @@ from tests.plugins.mcap.frame_by_frame import write_slowly
 LAYOUT = StateLayout(
     bodies=("cube", "panda.link0", "a.body.with.a.name.that.takes.a.length.of.two.bytes." * 3),
     action=("a", "b"),
-    state={"joint_pos": (2,), "body_pose": (3, 7), "nothing": (0, 3), "number": ()},
+    state={
+        "joint_pos": (2,),
+        "body_pose": (3, 7),
+        "nothing": (0, 3),
+        "number": (),
+        "hit": (5,),
+        "cell": (3,),
+        "ids": (4,),
+    },
+    dtypes={"hit": "bool", "cell": "int8", "ids": "int32", "number": "float32"},
     obs={"policy": ArrayLayout(shape=(3,), dtype="float32"), "privileged": ArrayLayout(shape=(2, 2))},
 )
 BARE = StateLayout(state={"x": (1,)})
@@ -41,7 +50,10 @@ def columns(frames: int, first: int, dt: float, layout: StateLayout = LAYOUT, **
         time=dt * (first + np.arange(frames)),
         action=noise.normal(size=(frames, len(layout.action))),
         reward=noise.normal(size=frames),
-        state={name: noise.normal(size=(frames, *shape)) for name, shape in layout.state.items()},
+        state={
+            name: (5 * noise.normal(size=(frames, *shape))).astype(layout.dtype(name))
+            for name, shape in layout.state.items()
+        },
         obs={n: noise.normal(size=(frames, *a.shape)).astype(a.dtype) for n, a in layout.obs.items()},
         status=words.pop("status", (Change(0, "running"),)),
         first_image={},

@@ -66,6 +66,24 @@ def test_a_robot_without_channels_has_empty_actions(tmp_path):
     assert reader.actions.shape == (3, 0)
 
 
+def test_number_types_come_back(tmp_path):
+    types = {"bit": "bool", "byte": "uint8", "cell": "int8", "id": "int32", "single": "float32", "double": "float64"}
+    layout = StateLayout.model_validate({"state": {name: (2, 2) for name in types}, "dtypes": types})
+    run = RunHeader(task="t", seed=0, engine="e", engine_version="1", world_hash="w", control_dt=0.01, layout=layout)
+    values = np.array([[0, 1], [120, 255]])
+    state = {name: values.astype(kind) for name, kind in types.items()}
+    with Recorder(tmp_path, make_writer("mcap", {}), run) as recorder:
+        recorder.start(EpisodeHeader(env=0, episode=0, episode_seed=1))
+        for step in (0, 1, 2):
+            recorder.append(0, RecordedFrame(step, 0.01 * step, np.zeros(0) if step else None, state))
+        path = recorder.commit(0, "success").wait()
+    reader = open_trajectory(path)
+    assert verify(path) == []
+    for name, array in state.items():
+        assert same_bits(reader.states[name], np.stack([array, array]))
+        assert same_bits(reader.initial_state[name], array)
+
+
 finite = hnp.arrays(np.float64, (6, 5), elements=st.floats(allow_nan=False, allow_infinity=False, allow_subnormal=True))
 loose = hnp.arrays(np.float32, (6, 2), elements=st.floats(width=32, allow_nan=False))
 
