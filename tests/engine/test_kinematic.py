@@ -78,9 +78,9 @@ def test_a_free_body_turns_at_its_rate():
 
 
 def test_a_camera_view_keeps_poses_of_its_own():
-    engine = NullEngine().create_world(worlds.scene(cameras=True))
+    engine = NullEngine().create_world(worlds.scene())
     given = engine.get_state().body_pose.copy()
-    view = engine.camera_view(engine.world.cameras[0].name, body_pose=given)
+    view = engine.camera_view("default", body_pose=given)
     kept = view.body_pose.copy()
     given[:] = np.nan
     assert np.array_equal(view.body_pose, kept)
