@@ -75,3 +75,12 @@ def test_a_free_body_turns_at_its_rate():
     engine.set_body_state(twist=[0, 0, 0, 0, 0, np.pi / 2])
     engine.step(500)
     assert np.allclose(engine.get_state().body_pose[0, 0, 3:], [0, 0, np.sin(np.pi / 4), np.cos(np.pi / 4)])
+
+
+def test_a_camera_view_keeps_poses_of_its_own():
+    engine = NullEngine().create_world(worlds.scene())
+    given = engine.get_state().body_pose.copy()
+    view = engine.camera_view("default", body_pose=given)
+    kept = view.body_pose.copy()
+    given[:] = np.nan
+    assert np.array_equal(view.body_pose, kept)

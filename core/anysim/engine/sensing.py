@@ -66,7 +66,7 @@ class EngineSensing(EngineLifecycle):
         """Poses as they were given, to the bit: no quaternion is normalised, so that the same pixels come of them."""
         shape = (len(ids), len(self.world.bodies), 7)
         arguments.poses("body_pose", body_pose, shape)
-        return arguments.rows("body_pose", body_pose, shape)
+        return arguments.rows("body_pose", body_pose, shape).copy()  # the view keeps it
 
     def camera_poses(self, camera_name: str, env_ids: EnvIds = None) -> Array:
         """World poses (E, 7) of a camera's optical frame now."""

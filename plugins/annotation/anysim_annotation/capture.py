@@ -152,7 +152,7 @@ class Capture:
         if moment.said and len(moment.said) != len(moment.env_ids):
             raise AnysimError(f"{len(moment.said)} descriptions for {len(moment.env_ids)} envs; give one of each")
         ids, camera = moment.env_ids, eye.scene.camera
-        drawn = self.engine.camera_view(camera, ids, np.array(moment.body_pose))  # kept for the next view
+        drawn = self.engine.camera_view(camera, ids, moment.body_pose)
         before = None
         if eye.before is not None:
             place = {env: row for row, env in enumerate(eye.before.env_ids.tolist()) if env >= 0}

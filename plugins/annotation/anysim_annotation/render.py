@@ -1,8 +1,10 @@
 """Annotations of recorded trajectories, made afterwards from their states and committed whole beside them."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
@@ -17,6 +19,7 @@ from anysim_annotation.recorded import EpisodeFiles
 from anysim_annotation.sheet import SHEET_FILE, SUFFIX, AnnotationSheet, CameraSheet, read_annotations
 from anysim_annotation.view import Source
 from anysim_film.commit import move_in, workspace
+from anysim_film.jobs import treat_all
 from anysim_film.stage import FilmOrder, Stage, facts_of, refuse_damage, refuse_unknown_cameras
 from anysim_schemas.load import LoadedRun
 
@@ -157,12 +160,19 @@ class AnnotationMaker:
 
 
 def annotate(
-    work: Sequence[tuple[Path, Path | None]], order: FilmOrder, text: str, source: Source
+    work: Sequence[tuple[Path, Path | None]], order: FilmOrder, text: str, source: Source, jobs: int = 1
 ) -> Iterator[Annotated]:
-    """Annotate trajectories, each into its directory, as `anysim render --annotate` does; yields each when done."""
-    with AnnotationMaker(order, read_orders(text), source) as maker:
-        for trajectory, directory in work:
-            yield maker.annotate(trajectory, directory)
+    """Annotate trajectories, each into its directory, as `anysim render --annotate` does; yields each when done.
+
+    With more than one process (`jobs`) they come in any order, with the same labels.
+    """
+    return treat_all(work, partial(_annotating, order, read_orders(text), source), jobs)
+
+
+@contextmanager
+def _annotating(order: FilmOrder, orders: Orders, source: Source) -> Iterator[Callable[[Path, Path | None], Annotated]]:
+    with AnnotationMaker(order, orders, source) as maker:
+        yield maker.annotate
 
 
 def _names(orders: Mapping[str, Orders]) -> tuple[str, ...]:

@@ -69,7 +69,6 @@ def render(
       anysim render desk_images.yaml --out stills/desk
     """
     from anysim.cli.output import counting, print_json
-    from anysim.errors import RecordError
     from anysim.record.names import find_trajectories
     from anysim_film.filmer import film_targets
     from anysim_film.jobs import film_all
@@ -81,9 +80,7 @@ def render(
     order = FilmOrder(tuple(camera or ()), engine, tuple(override or ()), size, fps, base)
     work = film_targets(find_trajectories(directories), out)
     if annotate is not None:
-        if jobs > 1:
-            raise RecordError("annotations are made by one process; leave out --jobs, or start several on other runs")
-        _annotate(work, order, annotate, source, quiet=json)
+        _annotate(work, order, annotate, source, jobs, quiet=json)
         return
     films: list[Filmed] = []
     with counting("episodes", len(work), quiet=json) as show:
@@ -111,7 +108,7 @@ def render(
 
 
 def _annotate(
-    work: "Sequence[tuple[Path, Path | None]]", order: "FilmOrder", names: str, source: str, *, quiet: bool
+    work: "Sequence[tuple[Path, Path | None]]", order: "FilmOrder", names: str, source: str, jobs: int, *, quiet: bool
 ) -> None:
     """Make annotations, which another distribution knows how to."""
     from anysim import registry
@@ -120,7 +117,7 @@ def _annotate(
     make = registry.load("renderings", "annotations")
     done = list[Any]()
     with counting("episodes", len(work), quiet=quiet) as show:
-        for one in make(work, order, names, source):
+        for one in make(work, order, names, source, jobs):
             done.append(one)
             what = (
                 f"{', '.join(one.made)} -> {one.directory}" if one.made else f"{', '.join(one.present)} there already"

@@ -1,13 +1,16 @@
-"""Filming in several processes, each with an engine of its own."""
+"""Work on trajectories in several processes, each with an engine of its own."""
 
 import os
 import signal
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import AbstractContextManager, contextmanager
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any, TypeVar
 
 from anysim.errors import AnysimError, RecordError
 from anysim_film.filmer import Filmed, Filmer
@@ -15,51 +18,65 @@ from anysim_film.stage import FilmOrder
 
 WATCH_S = 1.0
 """How often a worker looks whether its parent is there [s]."""
+T = TypeVar("T")
+Treat = Callable[[Path, Path | None], T]
+"""What is done with a trajectory and the directory for what comes of it."""
+Work = Sequence[tuple[Path, Path | None]]
 
 
-def film_all(work: Sequence[tuple[Path, Path | None]], order: FilmOrder, jobs: int = 1) -> Iterator[Filmed]:
-    """Film trajectories, each into its directory (`Filmer.film`), in up to `jobs` processes; yields each when done.
+def film_all(work: Work, order: FilmOrder, jobs: int = 1) -> Iterator[Filmed]:
+    """Film trajectories, each into its directory (`Filmer.film`), in up to `jobs` processes; yields each when done."""
+    return treat_all(work, partial(_filming, order), jobs)
+
+
+def treat_all(work: Work, open_: Callable[[], AbstractContextManager[Treat[T]]], jobs: int = 1) -> Iterator[T]:
+    """Do something with trajectories in up to `jobs` processes, each of which opens what does it once.
 
     What is complete stays, whatever is raised. With more than one process they come in any order, and a program that
-    calls this guards its main module (`if __name__ == "__main__"`), which each process imports.
+    calls this guards its main module (`if __name__ == "__main__"`), which each process imports. `open_` is pickled.
     """
     if jobs == 1 or len(work) < 2:
-        with Filmer(order) as filmer:
+        with open_() as treat:
             for trajectory, directory in work:
-                yield filmer.film(trajectory, directory)
+                yield treat(trajectory, directory)
         return
     with ProcessPoolExecutor(
-        min(jobs, len(work)), mp_context=get_context("spawn"), initializer=_begin, initargs=(order, os.getpid())
+        min(jobs, len(work)), mp_context=get_context("spawn"), initializer=_begin, initargs=(open_, os.getpid())
     ) as pool:
-        futures = [pool.submit(_film, *item) for item in work]
+        futures = [pool.submit(_treated, *item) for item in work]
         try:
             for future in as_completed(futures):
                 yield future.result()
         except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
+            pool.shutdown(cancel_futures=True)
             raise
 
 
-_filmer: Filmer | None = None
-"""That of a worker."""
+@contextmanager
+def _filming(order: FilmOrder) -> Iterator[Treat[Filmed]]:
+    with Filmer(order) as filmer:
+        yield filmer.film
 
 
-def _begin(order: FilmOrder, parent: int) -> None:
-    global _filmer
+_opened: list[tuple[AbstractContextManager[Treat[Any]], Treat[Any]]] = []
+"""That of a worker, open until the process ends."""
+
+
+def _begin(open_: Callable[[], AbstractContextManager[Treat[Any]]], parent: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # it reaches the parent, which lets what is begun come to its end
-    _filmer = Filmer(order)
+    context = open_()
+    _opened.append((context, context.__enter__()))
 
     def watch() -> None:
         while os.getppid() == parent:
             time.sleep(WATCH_S)
-        os._exit(1)  # half a video is left aside, where the next process removes it
+        os._exit(1)  # half a result is left aside, where the next process removes it
 
     threading.Thread(target=watch, name="anysim-film-parent", daemon=True).start()
 
 
-def _film(trajectory: Path, directory: Path | None) -> Filmed:
-    assert _filmer is not None
+def _treated(trajectory: Path, directory: Path | None) -> Any:
     try:
-        return _filmer.film(trajectory, directory)
+        return _opened[0][1](trajectory, directory)
     except AnysimError as error:
         raise RecordError(str(error)) from None  # errors that hold more than words do not survive the way back

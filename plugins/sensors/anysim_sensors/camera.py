@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from anysim.conventions import Array
 from anysim.errors import AnysimError
-from anysim.math import pose as P
 from anysim_sensors.scene import SceneGeometry
 from anysim_sensors.tables import GeomPoses
 
@@ -37,6 +36,19 @@ class Images(NamedTuple):
     distance: Array
     normal: Array
     whole: Array
+
+
+class Motion(NamedTuple):
+    """How pixels of N envs have moved since an earlier moment.
+
+    Attributes:
+        flow: (N, H, W, 2) float32 [pixels] columns and rows; NaN where nothing is seen; no rows if not asked for.
+        appeared: (N, H, W) bool where what is seen was not seen before: it was out of the image, or something hid it;
+            no rows if it was not asked for.
+    """
+
+    flow: Array
+    appeared: Array
 
 
 class EntityPixels(NamedTuple):
@@ -66,9 +78,9 @@ class RayCamera:
 
     def __init__(self, width: int, height: int, fov: ArrayLike, near: float = 0.01, far: float = inf) -> None:
         """`fov` is the vertical field of view [degrees], one for all envs or (N,)."""
-        from anysim_sensors.kernels import images, rays
+        from anysim_sensors.kernels import images, motion, rays
 
-        self._kernels, self._view = images, rays.view
+        self._kernels, self._view, self._follow = images, rays.view, motion.follow
         self.width, self.height, self.near, self.far = width, height, near, far
         self.focal = height / (2 * np.tan(np.radians(np.atleast_1d(np.asarray(fov, dtype=float))) / 2))
         x, y = np.meshgrid(np.arange(width) + 0.5 - width / 2, np.arange(height) + 0.5 - height / 2)
@@ -136,29 +148,7 @@ class RayCamera:
         self._kernels.locate(distance, number, self.directions, frames, points.reshape(len(points), -1, 3))
         return points
 
-    def flow(
-        self,
-        scene: SceneGeometry,
-        images: Images,
-        frames: Array,
-        posed: GeomPoses,
-        frames_before: Array,
-        before: GeomPoses,
-    ) -> Array:
-        """(N, H, W, 2) float32 [pixels] how far what is seen has moved in the image since before, columns and rows.
-
-        It follows each geom and the camera, and is exact: no image is compared. NaN where nothing is seen.
-        """
-        distance, number = self._flat(images)
-        points, flow = np.empty((*distance.shape, 3)), np.empty((*distance.shape, 2), dtype=np.float32)
-        self._kernels.locate(distance, number, self.directions, frames, points)
-        focal = np.broadcast_to(self.focal, len(frames))
-        self._kernels.move(
-            number, points, scene.row, posed, before, frames_before, focal, self.width, self.height, flow
-        )
-        return flow.reshape(*images.depth.shape, 2)
-
-    def appeared(
+    def motion(
         self,
         scene: SceneGeometry,
         images: Images,
@@ -168,33 +158,37 @@ class RayCamera:
         before: GeomPoses,
         *,
         seen: Array | None = None,
-    ) -> Array:
-        """(N, H, W) bool where what is seen was not seen before: it was out of the image, or something hid it.
+        flow: bool = True,
+        appeared: bool = True,
+    ) -> Motion:
+        """How what is seen has moved in the image since before; `seen` is as of `images`.
 
-        Arguments are as of `flow`, and `seen` as of `images`. Rays from where the camera was decide it, so it is exact
-        but for surfaces that are nearer to each other than a tenth of a millimetre.
+        It follows each geom and the camera, and is exact: no image is compared. Rays from where the camera was decide
+        what has appeared, exact but for surfaces that are nearer to each other than a tenth of a millimetre.
         """
-        distance, number = self._flat(images)
-        points = np.empty((*distance.shape, 3))
-        self._kernels.locate(distance, number, self.directions, frames, points)
-        there = number >= 0
-        row = np.where(there, scene.row[number], 0)[..., None]
-        now, then = (np.take_along_axis(one.frame, row, axis=1) for one in (posed, before))
-        turn, turned = (one[..., :9].reshape(*number.shape, 3, 3) for one in (now, then))
-        local = np.einsum("nrji,nrj->nri", turn, points - now[..., 9:])
-        place = np.einsum("nrij,nrj->nri", turned, local) + then[..., 9:]
-        to = P.rotate_inverse(frames_before[:, None, 3:], place - frames_before[:, None, :3])
-        length = np.linalg.norm(to, axis=-1)
-        there &= (length > 0) & np.isfinite(length)
-        to = np.where(there[..., None], to, [0.0, 0.0, 1.0])
-        hits = scene.rays(before, frames_before, np.zeros_like(to), to, reach=self._reach, seen=seen)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            focal = np.broadcast_to(self.focal, len(to))[:, None]
-            across, down = (np.abs(to[..., k] / to[..., 2]) * focal for k in (0, 1))
-        inside = (to[..., 2] >= self.near) & (to[..., 2] <= self.far)
-        inside &= (across <= self.width / 2) & (down <= self.height / 2)
-        new = there & ~(inside & (hits.distance >= length - 1e-4))
-        return new.reshape(images.depth.shape)
+        envs, rows = len(frames), self.directions.shape[1]
+        moved = np.empty((envs if flow else 0, rows, 2), dtype=np.float32)
+        new = np.empty((envs if appeared else 0, rows), dtype=bool)
+        self._follow(
+            scene.geoms,
+            scene.triangles,
+            posed,
+            before,
+            scene.all if seen is None else seen,
+            scene.row,
+            *(np.ascontiguousarray(places, dtype=float) for places in (frames, frames_before)),
+            self.directions,
+            images.distance.reshape(envs, -1),
+            images.geom.reshape(envs, -1),
+            self.focal,
+            self.width,
+            float(self.near),
+            float(self.far),
+            moved,
+            new,
+        )
+        shape = images.depth.shape[1:]
+        return Motion(moved.reshape(-1, *shape, 2), new.reshape(-1, *shape))
 
     def entities(self, images: Images) -> EntityPixels:
         """Boxes around what is seen of each entity, and how much of it is hidden, of images with `whole` areas.

@@ -19,7 +19,7 @@ from anysim.skills.runner import SkillPolicy
 from anysim_annotation.capture import Capture
 from anysim_annotation.files import json_line, read_array, read_records
 from anysim_annotation.orders import read_orders
-from anysim_annotation.render import AnnotationMaker
+from anysim_annotation.render import AnnotationMaker, annotate
 from anysim_annotation.sheet import SHEET_FILE, read_annotations
 from anysim_film.stage import FilmOrder
 from anysim_inspect.verify import verify
@@ -178,5 +178,21 @@ def test_the_command_says_what_it_made(command: CliRunner, run: list[Path]) -> N
     assert {box["name"] for box in boxes} <= {"panda", "table", "cube"}
     again = command.invoke(app, words)
     assert "0 of 1 episodes annotated" in again.stdout
-    refused = command.invoke(app, [*words, "--jobs", "2"])
-    assert "annotations are made by one process; leave out --jobs" in str(refused.exception)
+
+
+@pytest.mark.slow
+def test_several_processes_make_the_same_labels(run: list[Path], tmp_path: Path) -> None:
+    assert len(run) > 1
+    found = {
+        jobs: {
+            one.trajectory.name: contents(one.directory)
+            for one in annotate(
+                [(path, tmp_path / str(jobs) / path.name) for path in run], SMALL, NAMES, "engine", jobs
+            )
+        }
+        for jobs in (1, 2)
+    }
+    assert found[1] == found[2]
+    assert set(found[1]) == {path.name for path in run}
+    with pytest.raises(RecordError, match="there is no camera 'frond'"):
+        list(annotate([(path, None) for path in run], FilmOrder(("frond",)), NAMES, "engine", 2))

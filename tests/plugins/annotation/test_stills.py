@@ -2,17 +2,20 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pycocotools.mask as coco_mask
 import pytest
 from PIL import Image
+from pycocotools.coco import COCO
 
 from anysim.errors import RecordError, SpecError
 from anysim.testing.engines import require_drawing
 from anysim_annotation.stills import job as jobs
 from anysim_annotation.stills.job import render_job
 from anysim_annotation.stills.labels import kitti_line
-from anysim_annotation.stills.masks import encoded, run_lengths
+from anysim_annotation.stills.masks import encoded, outlines, run_lengths
 
 WORLD = """
 world:
@@ -75,6 +78,50 @@ def test_masks_come_back() -> None:
         blob[5:30, 7:40] = True
         for one in (mask, blob, ~blob):
             assert (decoded(encoded(run_lengths(one)), [37, 53]) == one).all()
+
+
+def test_outlines_have_the_pixels_of_a_mask_unless_it_has_a_hole() -> None:
+    disc = np.hypot(*np.mgrid[-20:21, -25:26]) < 15.5
+    two = disc.copy()
+    two[:18, :24] = two[18:, 24:] = False  # two parts that touch in a corner
+    for mask, parts in ((disc, 1), (two, 2), (np.zeros_like(disc), 0), (np.ones_like(disc), 1)):
+        lines = outlines(mask)
+        assert lines is not None
+        assert len(lines) == parts
+        assert (drawn(lines, mask.shape) == mask).all()
+    ring = disc & (np.hypot(*np.mgrid[-20:21, -25:26]) > 6)
+    assert outlines(ring) is None
+
+
+def drawn(lines: list[list[int]], shape: tuple[int, int]) -> np.ndarray:
+    """Pixels whose centres a ray from the left enters an odd number of times."""
+    inside = np.zeros(shape, dtype=bool)
+    for line in lines:
+        corners = np.array(line).reshape(-1, 2)
+        for (x, y), (to, down) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+            if x == to:
+                inside[min(y, down) : max(y, down), x:] ^= True
+    return inside
+
+
+@pytest.mark.filterwarnings("ignore:__array__ implementation")  # of pycocotools with NumPy 2
+@pytest.mark.parametrize("masks", ["rle", "polygons"])
+def test_cocos_own_reader_finds_the_masks(job: Path, tmp_path: Path, masks: str) -> None:
+    made(job, tmp_path / "out", masks=masks)
+    read: Any = COCO(str(tmp_path / "out" / "coco.json"))
+    kinds = set()
+    for number in read.getAnnIds():
+        [one] = read.loadAnns([number])
+        mask = read.annToMask(one).astype(bool)
+        [kind] = read.loadCats([one["category_id"]])
+        [image] = read.loadImgs([one["image_id"]])
+        said = json.loads((tmp_path / "out" / "labels" / f"{one['image_id'] - 1:07d}.json").read_text())
+        thing = next(t for t in said["objects"] if t["name"] == one["name"])
+        assert (image["file_name"], kind["name"]) == (said["file"], thing["label"])
+        assert mask.sum() == one["area"] == thing["area"]
+        assert coco_mask.toBbox(read.annToRLE(one)).tolist() == thing["bbox"]
+        kinds.add(type(one["segmentation"]))
+    assert kinds == ({dict} if masks == "rle" else {list})
 
 
 def test_images_are_those_of_the_seed_whatever_the_batch(job: Path, tmp_path: Path) -> None:

@@ -96,7 +96,7 @@ def test_flow_is_where_points_have_come_from() -> None:
     camera = RayCamera(W, H, FOV)
     old, new = scene.posed(before[None]), scene.posed(after[None])
     images = camera.images(scene, new, eyes[1][None])
-    flow = camera.flow(scene, images, eyes[1][None], new, eyes[0][None], old)[0]
+    flow = camera.motion(scene, images, eyes[1][None], new, eyes[0][None], old).flow[0]
     points = camera.points(images, eyes[1][None])[0].astype(float)
     view = CameraView("eye", eyes[0][None], np.array([FOV]), before[None], W, H, 0.01, 100.0)
     u, v = np.meshgrid(np.arange(W), np.arange(H))
@@ -166,3 +166,36 @@ def test_presets_are_cameras(name: str) -> None:
     across = 2 * np.degrees(np.arctan(preset.width / 2 / (camera.focal[0] * 8)))
     assert 65 < across < 90
     assert preset.source
+
+
+@pytest.mark.parametrize("count", [30, 170])
+def test_what_appeared_is_what_rays_from_where_the_camera_was_do_not_reach(count: int) -> None:
+    """Everything moves and the camera too; each point is asked for alone, in the scene as it was."""
+    rng = np.random.default_rng(5)
+    world = worlds.crowd(rng, count)
+    scene = SceneGeometry(world)
+    after = world.initial_body_pose.copy()
+    before = P.compose(
+        after, P.pose(rng.normal(0, 0.1, (len(after), 3)), P.normalize(np.tile([0, 0.1, 0, 1.0], (len(after), 1))))
+    )
+    frames, stood = (looking(eye, (0.0, 0.0, 1.0))[None] for eye in ((5.0, -4.0, 2.5), (4.8, -3.9, 2.4)))
+    new, old = scene.posed(after[None]), scene.posed(before[None])
+    camera, seen = RayCamera(W, H, FOV, near=0.5, far=9.0), scene.without([3, 4])
+    images = camera.images(scene, new, frames, seen=seen)
+    moved = camera.motion(scene, images, frames, new, stood, old, seen=seen)
+    there = images.geom[0] >= 0
+    body = scene.body[images.geom[0]][there]
+    point = P.compose(frames, with_turn(images.distance[0][there][:, None] * camera.directions[0][there.ravel()]))
+    was = P.compose(before[body], P.compose(P.inverse(after[body]), point))
+    was[body < 0] = point[body < 0]
+    local = P.rotate_inverse(np.broadcast_to(stood[0, 3:], (len(was), 4)), was[:, :3] - stood[0, :3])
+    length = np.linalg.norm(local, axis=1)
+    hits = scene.rays(old, stood, np.zeros_like(local), local, seen=seen).distance[0]
+    across = np.abs(local[:, :2] / local[:, 2:]) * camera.focal
+    inside = (local[:, 2] >= 0.5) & (local[:, 2] <= 9.0) & (across <= (W / 2, H / 2)).all(axis=1)
+    answer = ~(inside & (hits >= length - 1e-4))
+    assert (moved.appeared[0][there] == answer).all()
+    assert not moved.appeared[0][~there].any()
+    assert 0.02 < (answer & inside).mean() < 0.5, "some were hidden"
+    assert (~inside).any(), "and some out of the image"
+    assert len(camera.motion(scene, images, frames, new, stood, old, appeared=False).appeared) == 0

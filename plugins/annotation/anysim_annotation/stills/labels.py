@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim_annotation.api import Labels
-from anysim_annotation.stills.masks import encoded, run_lengths
+from anysim_annotation.stills.masks import encoded, outlines, run_lengths
 from anysim_annotation.stills.spec import StillsSpec
 
 ANNOTATORS = ("boxes_2d", "boxes_3d", "camera", "instance")
@@ -32,12 +33,17 @@ def objects(labels: Mapping[str, Labels], row: int, job: StillsSpec) -> list[dic
             "bbox": [left, top, right - left, bottom - top],
             "area": box["visible"],
             "occlusion": box["occlusion"],
-            "mask": {"size": list(mask.shape), "counts": encoded(run_lengths(mask))},
+            "mask": _kept(mask, job.masks),
         }
         if box["id"] in spaces:
             one |= _in_space(spaces[box["id"]], camera)
         found.append(one)
     return found
+
+
+def _kept(mask: Array, masks: str) -> dict[str, Any] | list[list[int]]:
+    lines = outlines(mask) if masks == "polygons" else None
+    return {"size": list(mask.shape), "counts": encoded(run_lengths(mask))} if lines is None else lines
 
 
 def _in_space(box: Mapping[str, Any], camera: Mapping[str, Any]) -> dict[str, Any]:

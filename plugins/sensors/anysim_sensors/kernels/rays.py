@@ -80,7 +80,7 @@ def _slab(x: float, d: float, half: float) -> tuple[float, float]:
 
 
 @compiled
-def _convex(
+def cross_convex(
     kind: int, s0: float, s1: float, s2: float, x: float, y: float, z: float, dx: float, dy: float, dz: float
 ) -> float:
     """Distance at which a ray in its frame crosses the surface of a convex shape; inf if it does not."""
@@ -132,7 +132,7 @@ def _triangle(c: Array, i: int, x: float, y: float, z: float, dx: float, dy: flo
 
 
 @compiled
-def _mesh(
+def cross_mesh(
     box: Array,
     link: Array,
     corner: Array,
@@ -233,14 +233,26 @@ def place_rays(frame: Array, origins: Array, directions: Array, rays: Array) -> 
 
 
 @compiled
-def _swept(rays: Array, reach: float, box: Array) -> None:
-    """The box (6,) around rays of some length."""
-    box[:3], box[3:] = np.inf, -np.inf
+def _span(low: float, high: float, a: float) -> tuple[float, float]:
+    return a if a < low else low, a if a > high else high
+
+
+@compiled
+def _swept(rays: Array, reach: float, start: Array, reached: Array) -> None:
+    """The boxes (6,) around the origins of rays, and around all that they reach."""
+    ax, ay, az, bx, by, bz = np.inf, np.inf, np.inf, -np.inf, -np.inf, -np.inf
+    cx, cy, cz, dx, dy, dz = np.inf, np.inf, np.inf, -np.inf, -np.inf, -np.inf
     for r in range(rays.shape[0]):
-        for k in range(3):
-            a = rays[r, k]
-            b = a + reach * rays[r, 3 + k]
-            box[k], box[3 + k] = min(box[k], a, b), max(box[3 + k], a, b)
+        x, y, z = rays[r, 0], rays[r, 1], rays[r, 2]
+        ax, bx = _span(ax, bx, x)
+        ay, by = _span(ay, by, y)
+        az, bz = _span(az, bz, z)
+        cx, dx = _span(cx, dx, x + reach * rays[r, 3])
+        cy, dy = _span(cy, dy, y + reach * rays[r, 4])
+        cz, dz = _span(cz, dz, z + reach * rays[r, 5])
+    start[0], start[1], start[2], start[3], start[4], start[5] = ax, ay, az, bx, by, bz
+    reached[0], reached[1], reached[2] = min(ax, cx), min(ay, cy), min(az, cz)
+    reached[3], reached[4], reached[5] = max(bx, dx), max(by, dy), max(bz, dz)
 
 
 @compiled
@@ -250,9 +262,8 @@ def choose(posed: GeomPoses, e: int, seen: Array, rays: Array, reach: float, can
     `away` is the least distance of each from the origin of any ray.
     """
     reached, start = np.empty(6), np.empty(6)
-    _swept(rays, 0.0, start)
     endless = not reach < np.inf
-    _swept(rays, 0.0 if endless else reach, reached)
+    _swept(rays, 0.0 if endless else reach, start, reached)
     count = 0
     for g in range(seen.shape[0]):
         if not (seen[g] and posed.there[e, g]):
@@ -289,7 +300,7 @@ def gather(posed: GeomPoses, e: int, geoms: Geoms, candidates: Array, count: int
 
 
 @compiled
-def _turned(f: Array, k: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+def turned(f: Array, k: int, x: float, y: float, z: float) -> tuple[float, float, float]:
     """A vector of the world in the axes of candidate k, whose rows of shapes are f."""
     return (
         f[k, 0] * x + f[k, 3] * y + f[k, 6] * z,
@@ -303,10 +314,12 @@ def _write_normal(
     kind: int, corner: Array, triangle: int, f: Array, k: int, x: float, y: float, z: float, out: Array, r: int
 ) -> None:
     """The outward unit normal, world frame, of candidate k at a point of the world."""
-    a, b, c = _turned(f, k, x - f[k, 9], y - f[k, 10], z - f[k, 11])
+    a, b, c = turned(f, k, x - f[k, 9], y - f[k, 10], z - f[k, 11])
     a, b, c = _outward(kind, f[k, 12], f[k, 13], f[k, 14], a, b, c) if triangle < 0 else _flat(corner, triangle)
-    length = math.sqrt(a * a + b * b + c * c)
-    scale = 1.0 / length if length > 0.0 else 0.0
+    scale = 1.0
+    if kind > BOX:  # of the others it is a unit vector
+        length = math.sqrt(a * a + b * b + c * c)
+        scale = 1.0 / length if length > 0.0 else 0.0
     for j in range(3):
         out[r, j] = (f[k, 3 * j] * a + f[k, 3 * j + 1] * b + f[k, 3 * j + 2] * c) * scale
 
@@ -361,6 +374,8 @@ def cast(
             i, top = 0, 0
             if tree:
                 geom_stack[0], geom_near[0], top = 0, 0.0, 1
+            elif count == 1:  # as of taxels: it is met or not
+                entry[0] = 0.0
             else:
                 for j in range(count):
                     entry[j] = _enter(boxes, j, ox, oy, oz, ix, iy, iz)
@@ -397,14 +412,14 @@ def cast(
                     k = i
                     i += 1
                 g = candidates[k]
-                a, b, c = _turned(shapes, k, ox - shapes[k, 9], oy - shapes[k, 10], oz - shapes[k, 11])
-                u, v, w = _turned(shapes, k, dx, dy, dz)
+                a, b, c = turned(shapes, k, ox - shapes[k, 9], oy - shapes[k, 10], oz - shapes[k, 11])
+                u, v, w = turned(shapes, k, dx, dy, dz)
                 triangle = -1
                 if geoms.kind[g] > CYLINDER:
                     root = triangles.root[geoms.mesh[g]]
-                    t, triangle = _mesh(box, link, corner, root, a, b, c, u, v, w, best, stack, near)
+                    t, triangle = cross_mesh(box, link, corner, root, a, b, c, u, v, w, best, stack, near)
                 else:
-                    t = _convex(geoms.kind[g], shapes[k, 12], shapes[k, 13], shapes[k, 14], a, b, c, u, v, w)
+                    t = cross_convex(geoms.kind[g], shapes[k, 12], shapes[k, 13], shapes[k, 14], a, b, c, u, v, w)
                 if t < best or (t == best and t < np.inf and (chosen < 0 or g < candidates[chosen])):
                     best, chosen, which = t, k, triangle
             distance[e, r] = best if chosen >= 0 else np.inf
@@ -415,7 +430,9 @@ def cast(
 
 
 @compiled
-def _window(posed: GeomPoses, e: int, g: int, camera: Array, width: int, height: int, focal: float, out: Array) -> None:
+def find_window(
+    posed: GeomPoses, e: int, g: int, camera: Array, width: int, height: int, focal: float, out: Array
+) -> None:
     """The columns and rows, first and after the last, in which a geom may be seen, as far as its box tells."""
     out[0], out[1], out[2], out[3] = width, 0, height, 0
     x, y, z, w = camera[3], camera[4], camera[5], camera[6]
@@ -471,7 +488,7 @@ def view(
     most, size = seen.shape[0], directions.shape[1]
     rays, origins = np.empty((size, 9)), np.zeros((size, 3))
     candidates, keys = np.empty(most, np.int32), np.empty(most, np.int64)
-    away, window = np.empty(most), np.empty(4, np.int64)
+    window = np.empty(4, np.int64)
     boxes, shapes = np.empty((most, 6)), np.empty((most, 15))
     chosen, which, last = np.empty(size, np.int32), np.empty(size, np.int32), np.empty(size, np.int32)
     stack, near = np.empty(128, np.int32), np.empty(128)
@@ -480,11 +497,16 @@ def view(
     for e in range(frames.shape[0]):
         p = e if directions.shape[0] > 1 else 0
         place_rays(frames[e], origins, directions[p], rays)
-        count = choose(posed, e, seen, rays, reach, candidates, away)
-        for k in range(
-            count
-        ):  # those of an entity next to each other, so that one mark a pixel tells that it was counted
-            keys[k] = (geoms.entity[candidates[k]] + 1) * most + candidates[k]
+        ox, oy, oz = frames[e, 0], frames[e, 1], frames[e, 2]
+        count = 0
+        for g in range(most):  # those of an entity next to each other, so that one mark a pixel tells that it counts
+            if seen[g] and posed.there[e, g]:
+                x = max(posed.low[e, g, 0] - ox, ox - posed.high[e, g, 0], 0.0)
+                y = max(posed.low[e, g, 1] - oy, oy - posed.high[e, g, 1], 0.0)
+                z = max(posed.low[e, g, 2] - oz, oz - posed.high[e, g, 2], 0.0)
+                if x * x + y * y + z * z <= reach * reach:
+                    keys[count] = (geoms.entity[g] + 1) * most + g
+                    count += 1
         keys[:count].sort()
         for k in range(count):
             candidates[k] = keys[k] % most
@@ -497,21 +519,21 @@ def view(
             g = candidates[k]
             kind, entity = geoms.kind[g], geoms.entity[g]
             root = triangles.root[geoms.mesh[g]] if geoms.mesh[g] >= 0 else 0
-            _window(posed, e, g, frames[e], width, size // width, focal[p], window)
+            find_window(posed, e, g, frames[e], width, size // width, focal[p], window)
+            a, b, c = turned(shapes, k, ox - shapes[k, 9], oy - shapes[k, 10], oz - shapes[k, 11])
             for row in range(window[2], window[3]):
                 for r in range(row * width + window[0], row * width + window[1]):
                     best = min(distance[e, r], reach)
-                    ox, oy, oz, dx, dy, dz = rays[r, 0], rays[r, 1], rays[r, 2], rays[r, 3], rays[r, 4], rays[r, 5]
-                    enter = _enter(boxes, k, ox, oy, oz, rays[r, 6], rays[r, 7], rays[r, 8])
-                    if enter > (reach if whole else best) or enter == np.inf:
-                        continue
-                    a, b, c = _turned(shapes, k, ox - shapes[k, 9], oy - shapes[k, 10], oz - shapes[k, 11])
-                    u, v, w = _turned(shapes, k, dx, dy, dz)
+                    if kind != PLANE:  # all of the image is its window, and what is cheap to cross needs no box
+                        enter = _enter(boxes, k, ox, oy, oz, rays[r, 6], rays[r, 7], rays[r, 8])
+                        if enter > (reach if whole else best) or enter == np.inf:
+                            continue
+                    u, v, w = turned(shapes, k, rays[r, 3], rays[r, 4], rays[r, 5])
                     triangle, limit = -1, reach if whole else best
                     if kind > CYLINDER:
-                        t, triangle = _mesh(box, link, corner, root, a, b, c, u, v, w, limit, stack, near)
+                        t, triangle = cross_mesh(box, link, corner, root, a, b, c, u, v, w, limit, stack, near)
                     else:
-                        t = _convex(kind, shapes[k, 12], shapes[k, 13], shapes[k, 14], a, b, c, u, v, w)
+                        t = cross_convex(kind, shapes[k, 12], shapes[k, 13], shapes[k, 14], a, b, c, u, v, w)
                     if t < best or (t == best and t < np.inf and (chosen[r] < 0 or g < candidates[chosen[r]])):
                         distance[e, r], chosen[r], which[r] = t, k, triangle
                     if whole and t < np.inf and t * directions[p, r, 2] <= far and last[r] != entity:
@@ -522,5 +544,5 @@ def view(
             number[e, r] = geoms.number[candidates[k]] if k >= 0 else -1
             if normal.shape[0] > 0 and k >= 0:
                 t = distance[e, r]
-                x, y, z = rays[r, 0] + t * rays[r, 3], rays[r, 1] + t * rays[r, 4], rays[r, 2] + t * rays[r, 5]
+                x, y, z = ox + t * rays[r, 3], oy + t * rays[r, 4], oz + t * rays[r, 5]
                 _write_normal(geoms.kind[candidates[k]], corner, which[r], shapes, k, x, y, z, normal[e], r)

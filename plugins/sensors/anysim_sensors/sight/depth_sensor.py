@@ -93,9 +93,8 @@ class Depth(Sensor):
         if self._moves:
             before = eye.geometry.posed(self._bodies[env_ids], self._scene.presence[env_ids])
             moments = eye.geometry, images, shown, eye.posed, self._stood[env_ids], before
-            if "motion" in asked:
-                values["motion"] = np.nan_to_num(camera.flow(*moments))
-            if "appeared" in asked:
-                values["appeared"] = camera.appeared(*moments, seen=eye.seen)
+            flow, appeared = ("motion" in asked, "appeared" in asked)
+            moved = camera.motion(*moments, seen=eye.seen, flow=flow, appeared=appeared)
+            values |= {"motion": np.nan_to_num(moved.flow), "appeared": moved.appeared}
             self._keep(env_ids)
         return {name: values[name] for name in self.fields}

@@ -68,6 +68,20 @@ def _depths(gap: Array, lever: Array, at: Array, deep: Array) -> None:
 
 
 @compiled
+def _dot(x: Array, y: Array) -> float:
+    """The sum of products of two rows; in eight parts, which processors add at once."""
+    a, b, c, d, e, f, g, h = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    whole = x.shape[0] // 8 * 8
+    for i in range(0, whole, 8):
+        a, b, c, d = a + x[i] * y[i], b + x[i + 1] * y[i + 1], c + x[i + 2] * y[i + 2], d + x[i + 3] * y[i + 3]
+        e, f, g = e + x[i + 4] * y[i + 4], f + x[i + 5] * y[i + 5], g + x[i + 6] * y[i + 6]
+        h += x[i + 7] * y[i + 7]
+    for i in range(whole, x.shape[0]):
+        a += x[i] * y[i]
+    return ((a + e) + (b + f)) + ((c + g) + (d + h))
+
+
+@compiled
 def _pushed(
     gap: Array,
     lever: Array,
@@ -79,6 +93,7 @@ def _pushed(
     deep: Array,
     slope: Array,
     matrix: Array,
+    work: Array,
 ) -> float:
     """The function, its slope (q,) and its matrix of second derivatives (q, q) at a motion.
 
@@ -94,15 +109,20 @@ def _pushed(
             matrix[a, b] = 0.0
         matrix[a, a] = pull
     _depths(gap, lever, at, deep)
-    for i in range(gap.shape[0]):
-        if deep[i] > 0.0:
-            push = stiffness[i] * deep[i]
-            value += 0.5 * push * deep[i]
-            for a in range(q):
-                slope[a] += push * lever[a, i]
-                share = stiffness[i] * lever[a, i]
-                for b in range(a + 1):
-                    matrix[a, b] += share * lever[b, i]
+    taxels = gap.shape[0]
+    stiff, push = work[q], work[q + 1]
+    for i in range(taxels):
+        depth = deep[i] if deep[i] > 0.0 else 0.0
+        stiff[i] = stiffness[i] if depth > 0.0 else 0.0
+        push[i] = stiffness[i] * depth
+        deep[i] = depth
+    value += 0.5 * _dot(push, deep)
+    for a in range(q):
+        slope[a] += _dot(push, lever[a])
+        for i in range(taxels):
+            work[a, i] = stiff[i] * lever[a, i]
+        for b in range(a + 1):
+            matrix[a, b] += _dot(work[a], lever[b])
     for a in range(q):
         for b in range(a):
             matrix[b, a] = matrix[a, b]
@@ -150,10 +170,11 @@ def _balance(
     q = lever.shape[0]
     slope, other, step, trial, right = np.empty(q), np.empty(q), np.empty(q), np.empty(q), np.empty(q)
     matrix, new_matrix, step_matrix = np.empty((q, q)), np.empty((q, q)), np.empty((q, q))
+    work = np.empty((q + 2, gap.shape[0]))
     size, damping = 0.0, 0.0
     for a in range(q):
         size += wanted[a] ** 2
-    value = _pushed(gap, lever, stiffness, wanted, home, pull, at, deep, slope, matrix)
+    value = _pushed(gap, lever, stiffness, wanted, home, pull, at, deep, slope, matrix, work)
     for _ in range(STEPS):
         steep = 0.0
         for a in range(q):
@@ -170,7 +191,7 @@ def _balance(
             trial[a] = at[a] + step[a]
             down += slope[a] * step[a]
         if down < -0.5 * steep / (largest + pull + damping):  # as a step does that solves all equations
-            lower = _pushed(gap, lever, stiffness, wanted, home, pull, trial, deep, other, new_matrix)
+            lower = _pushed(gap, lever, stiffness, wanted, home, pull, trial, deep, other, new_matrix, work)
             flatter = 0.0
             for a in range(q):
                 flatter += other[a] ** 2
@@ -240,66 +261,59 @@ def share(push: Array, points: Array, normals: Array, wrench: Array, force: Arra
         for k in range(3):
             wide = max(wide, (points[i, k] - points[0, k]) ** 2)
     for e in range(push.shape[0]):
-        strong = 0.0
-        middle, lack, moment = np.zeros(3), wrench[e, :3].copy(), wrench[e, 3:].copy()
+        strong, m0, m1, m2 = 0.0, 0.0, 0.0, 0.0
+        l0, l1, l2, t0, t1, t2 = wrench[e, 0], wrench[e, 1], wrench[e, 2], wrench[e, 3], wrench[e, 4], wrench[e, 5]
         for i in range(points.shape[0]):
             p = push[e, i]
             strong += p
-            x, y, z = points[i]
+            x, y, z = points[i, 0], points[i, 1], points[i, 2]
             a, b, c = -p * normals[i, 0], -p * normals[i, 1], -p * normals[i, 2]
             force[e, i, 0], force[e, i, 1], force[e, i, 2] = a, b, c
-            for k in range(3):
-                middle[k] += p * points[i, k]
-                lack[k] -= force[e, i, k]
-            moment[0] -= y * c - z * b
-            moment[1] -= z * a - x * c
-            moment[2] -= x * b - y * a
+            m0, m1, m2 = m0 + p * x, m1 + p * y, m2 + p * z
+            l0, l1, l2 = l0 - a, l1 - b, l2 - c
+            t0, t1, t2 = t0 - (y * c - z * b), t1 - (z * a - x * c), t2 - (x * b - y * a)
         total[e] = 0.0
         if not strong > 0.0:
             continue
-        for k in range(3):
-            middle[k] /= strong
-            lack[k] /= strong
-        moment[0] -= (middle[1] * lack[2] - middle[2] * lack[1]) * strong
-        moment[1] -= (middle[2] * lack[0] - middle[0] * lack[2]) * strong
-        moment[2] -= (middle[0] * lack[1] - middle[1] * lack[0]) * strong
-        inertia[:] = 0.0
+        m0, m1, m2, l0, l1, l2 = m0 / strong, m1 / strong, m2 / strong, l0 / strong, l1 / strong, l2 / strong
+        right[0] = t0 - (m1 * l2 - m2 * l1) * strong
+        right[1] = t1 - (m2 * l0 - m0 * l2) * strong
+        right[2] = t2 - (m0 * l1 - m1 * l0) * strong
+        xx, yy, zz, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(points.shape[0]):
             p = push[e, i]
             if p > 0.0:
-                x, y, z = points[i, 0] - middle[0], points[i, 1] - middle[1], points[i, 2] - middle[2]
-                inertia[0, 0] += p * (y * y + z * z)
-                inertia[1, 1] += p * (x * x + z * z)
-                inertia[2, 2] += p * (x * x + y * y)
-                inertia[0, 1] -= p * x * y
-                inertia[0, 2] -= p * x * z
-                inertia[1, 2] -= p * y * z
-        inertia[1, 0], inertia[2, 0], inertia[2, 1] = inertia[0, 1], inertia[0, 2], inertia[1, 2]
-        right[:] = moment
+                x, y, z = points[i, 0] - m0, points[i, 1] - m1, points[i, 2] - m2
+                xx, yy, zz = xx + p * (y * y + z * z), yy + p * (x * x + z * z), zz + p * (x * x + y * y)
+                xy, xz, yz = xy - p * x * y, xz - p * x * z, yz - p * y * z
+        inertia[0, 0], inertia[1, 1], inertia[2, 2] = xx, yy, zz
+        inertia[0, 1], inertia[1, 0] = xy, xy
+        inertia[0, 2], inertia[2, 0] = xz, xz
+        inertia[1, 2], inertia[2, 1] = yz, yz
         _solve(inertia, right, NOTHING * wide * strong, turn)
+        w0, w1, w2 = turn[0], turn[1], turn[2]
         part = 1.0
         for i in range(points.shape[0]):
             if push[e, i] > 0.0:
-                x, y, z = points[i, 0] - middle[0], points[i, 1] - middle[1], points[i, 2] - middle[2]
-                pull = normals[i, 0] * (turn[1] * z - turn[2] * y)
-                pull += normals[i, 1] * (turn[2] * x - turn[0] * z)
-                pull += normals[i, 2] * (turn[0] * y - turn[1] * x)
-                left = 1.0 - normals[i, 0] * lack[0] - normals[i, 1] * lack[1] - normals[i, 2] * lack[2]
+                x, y, z = points[i, 0] - m0, points[i, 1] - m1, points[i, 2] - m2
+                pull = normals[i, 0] * (w1 * z - w2 * y)
+                pull += normals[i, 1] * (w2 * x - w0 * z)
+                pull += normals[i, 2] * (w0 * y - w1 * x)
+                left = 1.0 - normals[i, 0] * l0 - normals[i, 1] * l1 - normals[i, 2] * l2
                 if part * pull > left:
                     part = max(left, 0.0) / pull
-        turn *= part
+        w0, w1, w2 = w0 * part, w1 * part, w2 * part
+        f0, f1, f2, t0, t1, t2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(points.shape[0]):
             p = push[e, i]
             if p > 0.0:
-                x, y, z = points[i, 0] - middle[0], points[i, 1] - middle[1], points[i, 2] - middle[2]
-                force[e, i, 0] += p * (lack[0] + turn[1] * z - turn[2] * y)
-                force[e, i, 1] += p * (lack[1] + turn[2] * x - turn[0] * z)
-                force[e, i, 2] += p * (lack[2] + turn[0] * y - turn[1] * x)
-                a, b, c = force[e, i, 0], force[e, i, 1], force[e, i, 2]
-                x, y, z = points[i]
-                total[e, 0] += a
-                total[e, 1] += b
-                total[e, 2] += c
-                total[e, 3] += y * c - z * b
-                total[e, 4] += z * a - x * c
-                total[e, 5] += x * b - y * a
+                x, y, z = points[i, 0] - m0, points[i, 1] - m1, points[i, 2] - m2
+                a = force[e, i, 0] + p * (l0 + w1 * z - w2 * y)
+                b = force[e, i, 1] + p * (l1 + w2 * x - w0 * z)
+                c = force[e, i, 2] + p * (l2 + w0 * y - w1 * x)
+                force[e, i, 0], force[e, i, 1], force[e, i, 2] = a, b, c
+                x, y, z = points[i, 0], points[i, 1], points[i, 2]
+                f0, f1, f2 = f0 + a, f1 + b, f2 + c
+                t0, t1, t2 = t0 + (y * c - z * b), t1 + (z * a - x * c), t2 + (x * b - y * a)
+        total[e, 0], total[e, 1], total[e, 2] = f0, f1, f2
+        total[e, 3], total[e, 4], total[e, 5] = t0, t1, t2
