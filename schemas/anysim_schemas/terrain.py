@@ -11,15 +11,16 @@ from anysim_schemas.values import ColorValue
 Span = NonNegative | tuple[NonNegative, NonNegative]
 """A parameter of generated ground: one number, or what it is at difficulty 0 and at difficulty 1."""
 
-Generated = Literal["rough", "waves", "slopes", "stairs", "stepping_stones", "gaps", "obstacles"]
+Generated = Literal["rough", "waves", "slopes", "stairs", "stepping_stones", "gaps", "obstacles", "pits"]
 GENERATED: dict[str, dict[str, Any]] = {
     "rough": {"amplitude": (0.02, 0.12), "grain": 0.3},
     "waves": {"amplitude": (0.04, 0.3), "wavelength": 2.0},
-    "slopes": {"slope": (0.05, 0.5), "down": False},
+    "slopes": {"slope": (0.05, 0.5), "down": False, "amplitude": 0.0, "grain": 0.3},
     "stairs": {"rise": (0.05, 0.22), "tread": 0.4, "down": False},
     "stepping_stones": {"stone": (1.0, 0.4), "gap": (0.2, 0.5), "depth": 1.0},
     "gaps": {"gap": (0.2, 1.0), "depth": 1.0},
-    "obstacles": {"rise": (0.05, 0.3), "block": (0.4, 1.2), "density": 0.4},
+    "obstacles": {"rise": (0.05, 0.3), "block": (0.4, 1.2), "density": 0.4, "down": False},
+    "pits": {"depth": (0.05, 0.4)},
 }
 """The kinds of generated ground, and what their parameters are where a file does not say."""
 
@@ -30,16 +31,22 @@ class ReliefSpec(Spec):
     Those that may be a pair grow (or shrink) with the difficulty: `[at difficulty 0, at difficulty 1]`.
     """
 
-    amplitude: Span | None = Field(default=None, description="rough, waves: largest height and depth [m]")
-    grain: Positive | None = Field(default=None, description="rough: distance of neighbouring bumps [m]")
+    amplitude: Span | None = Field(
+        default=None, description="rough, waves: largest height and depth; slopes: that of bumps on them [m]"
+    )
+    grain: Positive | None = Field(default=None, description="rough, slopes: distance of neighbouring bumps [m]")
     wavelength: Positive | None = Field(default=None, description="waves: from crest to crest [m]")
     slope: Span | None = Field(default=None, description="slopes: rise over run of the pyramid's sides")
     rise: Span | None = Field(default=None, description="stairs: height of a step; obstacles: of the highest one [m]")
     tread: Positive | None = Field(default=None, description="stairs: depth of a step [m]")
-    down: Flag | None = Field(default=None, description="slopes, stairs: the middle is a pit, not a hill")
+    down: Flag | None = Field(
+        default=None, description="slopes, stairs: the middle is a pit, not a hill; obstacles: holes, not blocks"
+    )
     stone: Span | None = Field(default=None, description="stepping_stones: edge of a stone [m]")
     gap: Span | None = Field(default=None, description="stepping_stones, gaps: distance to cross [m]")
-    depth: Positive | None = Field(default=None, description="stepping_stones, gaps: how far down it goes [m]")
+    depth: Span | None = Field(
+        default=None, description="stepping_stones, gaps: how far down it goes; pits: how far it is to climb out [m]"
+    )
     block: tuple[Positive, Positive] | None = Field(
         default=None, description="obstacles: shortest and longest edge of a block [m]"
     )
@@ -143,6 +150,7 @@ class TerrainSpec(ReliefSpec):
         "stepping_stones",
         "gaps",
         "obstacles",
+        "pits",
     ] = Field(default="plane", description="what the ground is")
     friction: Number = Field(default=0.8, ge=0, description="sliding friction coefficient")
     restitution: Number = Field(default=0.0, ge=0, lt=1, description="ratio of speeds after and before a bounce")

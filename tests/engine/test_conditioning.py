@@ -36,6 +36,22 @@ def test_what_is_doubted(world: World, told: list[str]) -> None:
     assert all(part in sentence for part, sentence in zip(told, found, strict=True))
 
 
+def walked(cell: float, robot: str = "unitree_go1") -> World:
+    ground = {"kind": "rough", "cell": cell, "size": [4, 4], "platform": 1.0}
+    return compile_world({"world": {"terrain": ground, "robots": {"dog": {"robot": robot}}}})
+
+
+def test_ground_is_sampled_no_finer_than_feet_need() -> None:
+    """A Go1 has feet of 4 cm, a B1 of 8; a G1 has soles."""
+    assert not list(doubts(walked(0.08)))
+    (found,) = doubts(walked(0.05))
+    assert found.path == "world.terrain"
+    assert "a height every 5 cm, and 'dog' has ball feet of 4 cm" in found.sentence
+    assert "cells be 8 cm or larger" in found.sentence
+    assert len(list(doubts(walked(0.1, "unitree_b1")))) == 1
+    assert not list(doubts(walked(0.05, "unitree_g1")))
+
+
 def test_a_build_warns_once() -> None:
     with pytest.warns(PhysicsWarning, match="begins above") as caught:
         NullEngine().create_world(stacked(100.0), 2).destroy()

@@ -20,6 +20,9 @@ from anysim_schemas.terrain import GENERATED, TerrainSpec
 BUILDER = "generated"
 """The name of the entry point of the group `anysim.terrains` that makes pieces of the kinds `GENERATED`, and tiles."""
 
+FIELD_SOFTNESS = 0.01
+"""[s] of height fields: a ball foot that touches several of their prisms at once trips over contacts of twice that."""
+
 _GREY: Rgb = (0.45, 0.47, 0.5)
 
 
@@ -93,6 +96,7 @@ def _add_field(
 
 
 def _add(builder: WorldBuilder, spec: TerrainSpec, shape: Shape, issues: Issues, position: Vec3 = ORIGIN) -> None:
-    touch = Surface(friction=spec.friction, restitution=spec.restitution)
+    softness = FIELD_SOFTNESS if isinstance(shape, HeightFieldShape) else 0.0
+    touch = Surface(friction=spec.friction, restitution=spec.restitution, softness=softness)
     color = (*nominal_rgb(spec.color, _GREY, issues), 1.0)
     builder.geoms.append(Geom(GROUND, WORLD, shape, position, color=color, surface=touch))

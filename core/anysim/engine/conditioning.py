@@ -20,6 +20,8 @@ SINKING = 10.0
 """Half the size of a thing over what it falls from rest in a step: below, it sinks into the ground or jumps on it."""
 MASS_RATIO = 300.0
 """A box sinks a third into a lighter one below it at this ratio (MuJoCo, PyBullet), and falls through at 1,000."""
+FOOT_DIAMETERS = 2.0
+"""Cells of a height field over the diameter of a ball foot: on finer ones MuJoCo has a trot fall that others walk."""
 LOOKED_AT = 1000
 """Of so many bodies, the heaviest, it is asked what is below them."""
 
@@ -48,6 +50,7 @@ def doubts(world: World) -> Iterator[Doubt]:
     boxes = _boxes(world)
     yield from _steps(world, boxes)
     yield from _masses(world, boxes)
+    yield from _cells(world)
     if world.physics.actuation is Actuation.EXPLICIT_PD and (ratio := damping_ratio(world)) > 1:
         sentence = (
             f"explicit drives of '{world.name}' are too stiff for dt = {world.physics.dt:g} s: the largest eigenvalue "
@@ -125,6 +128,19 @@ def _masses(world: World, boxes: Mapping[int, _Box]) -> Iterator[Doubt]:
             f"{ratio:,.0f} times as much: what lies on a body that is over {MASS_RATIO:g} times lighter sinks into it "
             f"or falls through; keep them apart, or choose masses that are closer",
         )
+
+
+def _cells(world: World) -> Iterator[Doubt]:
+    balls = [(leg.radius, r.name) for r in world.robots if r.entry is not None for leg in r.entry.legs.values()]
+    radius, robot = max(balls, default=(0.0, ""))
+    for field in world.heightfields:
+        cell = min(size / (count - 1) for size, count in zip(field.size, field.heights.shape[::-1], strict=True))
+        if cell < (least := FOOT_DIAMETERS * 2 * radius) - 1e-9:
+            yield Doubt(
+                "world.terrain",
+                f"the ground has a height every {100 * cell:.3g} cm, and '{robot}' has ball feet of {200 * radius:.3g} "
+                f"cm: contacts with the sides of small cells may trip it; let cells be {100 * least:.3g} cm or larger",
+            )
 
 
 def damping_ratio(world: World) -> float:

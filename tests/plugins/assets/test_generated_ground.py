@@ -75,12 +75,23 @@ def test_parameters_are_physical() -> None:
     blocks = heights("obstacles", 1.0, rise=0.25)
     assert 0.2 < blocks.max() <= 0.25
     assert blocks.min() == 0
+    assert (heights("obstacles", 1.0, rise=0.25, down=True) == -blocks).all()
+    row = heights("pits", 0.5, depth=[0.1, 0.3], platform=1.6)[40]
+    assert row == pytest.approx([0.0] * 32 + [-0.2] * 17 + [0.0] * 32)
+    bare, bumpy = (heights("slopes", 1.0, slope=0.2, amplitude=a, grain=0.4) for a in (0.0, [0.0, 0.05]))
+    assert bare[40, 40] == pytest.approx(0.2 * 2.9)
+    assert 0.03 < np.abs(bumpy - bare).max() <= 0.05
+    shallow = heights("gaps", 0.5, gap=0.4, depth=[0.0, 0.6])
+    assert set(np.unique(shallow)) == {-0.3, 0.0}
 
 
 @pytest.mark.parametrize(
     ("terrain", "message"),
     [
-        ({"kind": "stairs", "amplitude": 0.1}, "`amplitude` is a parameter of rough, waves; stairs has rise, tread"),
+        (
+            {"kind": "stairs", "amplitude": 0.1},
+            "`amplitude` is a parameter of rough, waves, slopes; stairs has rise, tread",
+        ),
         ({"kind": "plane", "rise": 0.1}, "kind plane is not generated"),
         ({"kind": "trimesh"}, "needs a `file`"),
         ({"kind": "heightfield"}, "needs `heights`, or a `file`"),
@@ -125,6 +136,12 @@ def test_the_platform_is_at_the_origin(kind: str) -> None:
     world = made({"kind": kind, "difficulty": 1.0}, objects={"cube": {"source": {"box": [0.1, 0.1, 0.1]}}})
     assert world.ground.heights_at(np.array([[0.0, 0.0], [0.9, -0.9]])) == pytest.approx([0.0, 0.0], abs=1e-9)
     assert world.bodies[0].position == pytest.approx((0, 0, 0.05))
+
+
+def test_height_fields_are_stiffer_than_a_plane_and_rub_alike() -> None:
+    field, plane = (made({"kind": kind, "friction": 0.6}).geoms[0].surface for kind in ("rough", "plane"))
+    assert (field.softness, plane.softness) == (0.01, 0.0)
+    assert field.friction == plane.friction == 0.6
 
 
 # ---------------------------------------------------------------------- tiles

@@ -51,15 +51,8 @@ def _tiles(spec: TerrainSpec, tiles: TilesSpec, issues: Issues) -> GeneratedGrou
             heights[b + k * n : b + (k + 1) * n + 1, b + row * n : b + (row + 1) * n + 1] = piece.heights
     first = pieces[0, 0].top
     made = tuple(
-        Tile(
-            row,
-            k,
-            tiles.columns[k].kind,
-            difficulty_of(tiles, row),
-            (row * tiles.size, k * tiles.size, pieces[row, k].top - first),
-        )
-        for row in range(rows)
-        for k in range(columns)
+        Tile(row, k, tiles.columns[k].kind, difficulty_of(tiles, row), (row * tiles.size, k * tiles.size, top - first))
+        for (row, k), (_, top) in sorted(pieces.items())
     )
     extent = ((rows * n + 2 * b) * cell, (columns * n + 2 * b) * cell)
     middle = ((rows - 1) * tiles.size / 2, (columns - 1) * tiles.size / 2, -first)

@@ -60,9 +60,8 @@ def lattice(size: tuple[float, float], cell: float) -> Lattice:
 
 def at(span: float | tuple[float, float], difficulty: float) -> float:
     """A parameter at a difficulty: a pair is what it is at 0 and at 1."""
-    if isinstance(span, tuple):
-        return float(span[0] + (span[1] - span[0]) * difficulty)
-    return float(span)
+    low, high = span if isinstance(span, tuple) else (span, span)
+    return float(low + (high - low) * difficulty)
 
 
 def generate(
@@ -82,7 +81,8 @@ def generate(
     """
     grid = lattice(size, cell)
     rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed)))
-    heights = np.round(GENERATORS[kind](grid, parameters, difficulty, rng), 6) + 0.0
+    sign = -1.0 if parameters.get("down") else 1.0
+    heights = np.round(sign * GENERATORS[kind](grid, parameters, difficulty, rng), 6) + 0.0
     return HeightPatch(heights, float(heights[heights.shape[0] // 2, heights.shape[1] // 2]))
 
 
@@ -131,21 +131,20 @@ def _waves(grid: Lattice, p: Parameters, difficulty: float, rng: np.random.Gener
 
 
 def _slopes(grid: Lattice, p: Parameters, difficulty: float, rng: np.random.Generator) -> Array:
-    """A pyramid whose top is cut off by the platform, or a pit of that form."""
+    """A pyramid whose top is cut off by the platform; with bumps on it where they have a height."""
     width = _room_around(grid, p["platform"], grid.cell, "a slope")
     away = grid.from_platform - p["platform"] / 2  # from the platform outwards
-    sign = -1.0 if p["down"] else 1.0
-    return sign * at(p["slope"], difficulty) * np.clip(width - np.maximum(away, 0.0), 0.0, width)
+    smooth = at(p["slope"], difficulty) * np.clip(width - np.maximum(away, 0.0), 0.0, width)
+    return smooth + _rough(grid, p, difficulty, rng) if at(p["amplitude"], difficulty) else smooth
 
 
 def _stairs(grid: Lattice, p: Parameters, difficulty: float, rng: np.random.Generator) -> Array:
-    """Square rings of equal steps up to the platform, or down to it. A riser is one cell wide."""
+    """Square rings of equal steps up to the platform. A riser is one cell wide."""
     tread, platform = p["tread"], p["platform"]
     _resolved(tread, grid, 2, "tread")
     steps = int(_room_around(grid, platform, tread, f"a step of {tread:g} m") / tread + 1e-9)
     outwards = np.ceil((grid.from_platform - platform / 2) / tread - 1e-9)
-    sign = -1.0 if p["down"] else 1.0
-    return sign * at(p["rise"], difficulty) * np.clip(steps - np.maximum(outwards, 0.0), 0.0, steps)
+    return at(p["rise"], difficulty) * np.clip(steps - np.maximum(outwards, 0.0), 0.0, steps)
 
 
 def _stepping_stones(grid: Lattice, p: Parameters, difficulty: float, rng: np.random.Generator) -> Array:
@@ -161,7 +160,7 @@ def _stepping_stones(grid: Lattice, p: Parameters, difficulty: float, rng: np.ra
     across = (grid.y + grid.half[1]) % pitch
     tops = (along <= stone + 1e-9) & (across <= stone + 1e-9)
     solid = tops | (grid.from_platform <= p["platform"] / 2 + 1e-9) | (grid.from_edge <= grid.cell + 1e-9)
-    return np.where(solid, 0.0, -p["depth"])
+    return np.where(solid, 0.0, -at(p["depth"], difficulty))
 
 
 def _gaps(grid: Lattice, p: Parameters, difficulty: float, rng: np.random.Generator) -> Array:
@@ -170,7 +169,12 @@ def _gaps(grid: Lattice, p: Parameters, difficulty: float, rng: np.random.Genera
     _resolved(gap, grid, 2, "gap")
     _room_around(grid, p["platform"], gap, f"a gap of {gap:g} m")
     away = grid.from_platform - p["platform"] / 2
-    return np.where((away > 1e-9) & (away < gap - 1e-9), -p["depth"], 0.0)
+    return np.where((away > 1e-9) & (away < gap - 1e-9), -at(p["depth"], difficulty), 0.0)
+
+
+def _pits(grid: Lattice, p: Parameters, difficulty: float, rng: np.random.Generator) -> Array:
+    """The platform is the floor of a pit, and its walls are to be climbed."""
+    return np.where(grid.from_platform <= p["platform"] / 2 + 1e-9, -at(p["depth"], difficulty), 0.0)
 
 
 def _obstacles(grid: Lattice, p: Parameters, difficulty: float, rng: np.random.Generator) -> Array:
@@ -190,6 +194,6 @@ def _obstacles(grid: Lattice, p: Parameters, difficulty: float, rng: np.random.G
 
 GENERATORS: Mapping[str, Callable[[Lattice, Parameters, float, np.random.Generator], Array]] = {
     "rough": _rough, "waves": _waves, "slopes": _slopes, "stairs": _stairs, "stepping_stones": _stepping_stones,
-    "gaps": _gaps, "obstacles": _obstacles,
+    "gaps": _gaps, "obstacles": _obstacles, "pits": _pits,
 }  # fmt: skip
 """By the name of the kind."""
