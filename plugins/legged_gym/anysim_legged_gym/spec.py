@@ -28,7 +28,7 @@ ByName = NonNegative | dict[str, NonNegative]
 class SimSpec(Spec):
     """Time and gravity."""
 
-    dt: Positive = Field(default=0.004, description="physics time step [s]")
+    dt: Positive = Field(default=0.002, description="physics time step [s]")
     gravity: Vec3 = Field(default=(0.0, 0.0, -9.81), description="[m/s^2]")
 
 
@@ -67,7 +67,7 @@ class ControlSpec(Spec):
     armature: NonNegative | None = Field(default=None, description="[kg m^2]; the catalogue's where not given")
     action_scale: Positive = Field(default=0.25, description="[rad], [rad/s] or [N m] for an action of one")
     clip_actions: Positive = Field(default=100.0, description="largest size of an action")
-    decimation: Integer = Field(default=5, gt=0, description="physics steps for one action")
+    decimation: Integer = Field(default=10, gt=0, description="physics steps for one action")
 
 
 class GroundSpec(Spec):

@@ -12,5 +12,5 @@ SOFT: Mapping[str, Any] = {"stiffness": 40.0, "damping": 1.0}
 
 def simulator(engine: str, num_envs: int = 2, **sections: Any) -> LeggedSimulator:
     require_engine(engine)
-    control = {**SOFT, **sections.pop("control", {})}
-    return LeggedSimulator({"control": control, **sections}, engine, num_envs=num_envs)
+    control = {**SOFT, "decimation": 5, **sections.pop("control", {})}
+    return LeggedSimulator({"sim": {"dt": 0.004}, "control": control, **sections}, engine, num_envs=num_envs)
