@@ -36,6 +36,7 @@ WORDS = {
     "language": "`anysim describe`, `anysim vqa`: scenes and episodes in words, questions with verified answers",
     "learning": "`anysim train`, tasks for gymnasium, views for learners; torch is `anysim-learning[sb3]` or `[rsl]`",
     "legged": "a trot, balance and walking",
+    "legged-gym": "the simulator interface of legged-gym training code, on any engine",
     "maniskill": "`anysim verdicts`: peers judge our states; with them `anysim-maniskill[maniskill]`",
     "mcap": "recordings: MCAP files and videos",
     "mujoco": "the engine MuJoCo, and MJCF files",
@@ -113,7 +114,7 @@ def main() -> int:
     head, _, rest = text.partition(BEGIN)
     old, _, tail = rest.partition(END)
     if parser.parse_args().check:
-        listed = [extra or "" for extra in re.findall(r"^\| `anysim(?:\[(\w+)\])?`", old, re.MULTILINE)]
+        listed = [extra or "" for extra in re.findall(r"^\| `anysim(?:\[([\w-]+)\])?`", old, re.MULTILINE)]
         if listed == extras() and set(WORDS) == set(listed):
             return 0
         sys.stderr.write(f"docs/install.md: rows {listed}, extras {extras()}; run python scripts/install_sizes.py\n")

@@ -1,0 +1,16 @@
+"""Simulators for tests: a Go1 with soft legs."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from anysim.testing.engines import require_engine
+from anysim_legged_gym.simulator import LeggedSimulator
+
+ENGINES = ("mujoco", "pybullet", "sapien")
+SOFT: Mapping[str, Any] = {"stiffness": 40.0, "damping": 1.0}
+
+
+def simulator(engine: str, num_envs: int = 2, **sections: Any) -> LeggedSimulator:
+    require_engine(engine)
+    control = {**SOFT, "decimation": 5, **sections.pop("control", {})}
+    return LeggedSimulator({"sim": {"dt": 0.004}, "control": control, **sections}, engine, num_envs=num_envs)
