@@ -73,10 +73,14 @@ def test_what_is_drawn_is_in_the_engine(engine: str) -> None:
         near(read("actuator.kp", indices=drives), sim.dr_kp_scale * sim.p_gains)
         near(read("actuator.kd", indices=drives), sim.dr_kd_scale * sim.d_gains)
         spans = {
-            "friction_values": "friction", "restitution_values": "restitution", "added_base_mass": "added_base_mass",
-            "base_com_bias": "base_com_bias", "joint_armature": "joint_armature", "kp_scale": "kp_scale",
+            "friction_values": "friction",
+            "restitution_values": "restitution",
+            "added_base_mass": "added_base_mass",
+            "base_com_bias": "base_com_bias",
+            "joint_armature": "joint_armature",
+            "kp_scale": "kp_scale",
             "kd_scale": "kd_scale",
-        }  # fmt: skip
+        }
         for name, key in spans.items():
             values, (least, most) = getattr(sim, f"dr_{name}"), EVERYTHING[key]
             assert least <= values.min() < values.max() <= most
