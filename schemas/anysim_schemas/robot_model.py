@@ -85,7 +85,9 @@ class LegSpec(Spec):
 class SensorPlaceSpec(Spec):
     """A place for a sensor on the robot: `cameras: {wrist: {mount: panda.camera}}`, `sensors: {imu: go2.body_imu}`."""
 
-    kind: Literal["camera", "imu", "force_torque", "lidar", "tactile"] = Field(description="what belongs there")
+    kind: Literal["camera", "depth", "imu", "force_torque", "lidar", "tactile"] = Field(
+        description="what belongs there"
+    )
     link: str = Field(description="the link that carries it")
     position: Vec3 = Field(default=(0.0, 0.0, 0.0), description="place in the link's frame [m]")
     roll_pitch_yaw: Vec3 = Field(

@@ -1,5 +1,6 @@
 """Divergence of the two members of a pair: from which control step on their states differ."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ def pair_entry(episode: int, first: Path, second: Path, tolerance: float) -> dic
     """
     same, changed = open_trajectory(first), open_trajectory(second)
     gaps = {name: _gaps(same, changed, name) for name in FIELDS}
-    worst = np.max([gap for gap in gaps.values()], axis=0)
+    worst = _worst(gaps)
     steps = min(len(same.actions), len(changed.actions))
     apart = (same.actions[:steps] != changed.actions[:steps]).any(axis=1)
     manifests = (same.manifest, changed.manifest)
@@ -38,6 +39,16 @@ def pair_entry(episode: int, first: Path, second: Path, tolerance: float) -> dic
         "acts_apart": None if not apart.any() else 1 + int(np.argmax(apart)),
         "largest": {name: float(gap.max()) for name, gap in gaps.items()},
     }
+
+
+def gap_of(first: Path, second: Path) -> Array:
+    """(F,) the largest difference of the motion of two trajectories at each control step that both have."""
+    same, changed = open_trajectory(first), open_trajectory(second)
+    return _worst({name: _gaps(same, changed, name) for name in FIELDS})
+
+
+def _worst(gaps: Mapping[str, Array]) -> Array:
+    return np.max([gap for gap in gaps.values()], axis=0)
 
 
 def _gaps(a: TrajectoryReader, b: TrajectoryReader, name: str) -> Array:

@@ -1,7 +1,8 @@
 """Matched pairs: the same episode twice, with one factor or a few changed in the second, as trajectories of one run.
 
-Env 0 runs the episodes as they are, env 1 with the factors; both from the same seeds, so every other draw is the
-same, noise of sensors and cameras included. The first names the factors too, with the values that it has: some engines
+Of two envs the first runs episodes as they are, the second with the factors; both from the same seeds, so every other
+draw is the same, noise of sensors and cameras included. Several such twos may run side by side: pair `p` is of the two
+`p % K` of K, whose episode `p // K` it is. The first names the factors too, with the values that it has: some engines
 build a scene anew where a value is written, and both do so then.
 """
 
@@ -20,7 +21,7 @@ from anysim.record.reader import open_trajectory
 from anysim.task.env import TaskEnv
 
 SAME, CHANGED = 0, 1
-"""The envs of a pair."""
+"""The members of a pair: env 2k and 2k + 1."""
 Actions = Literal["policy", "same"]
 
 
@@ -37,22 +38,23 @@ class PairCollector(Collector):
         factors: Mapping[str, Any],
         members: tuple[int, ...] = (SAME, CHANGED),
     ) -> None:
-        """`env` has two envs; `factors` are values by path."""
+        """`env` has two envs for each pair that is run at once; `factors` are values by path."""
         super().__init__(env, policy, out, 2 * pairs, seed)
-        self._factors = factors
-        self._share = np.array([pairs if member in members else 0 for member in (SAME, CHANGED)])
+        self._factors, self._twos = factors, env.num_envs // 2
+        counts = [len(range(two, pairs, self._twos)) for two in range(self._twos)]
+        self._share = np.array([counts[i // 2] if i % 2 in members else 0 for i in range(env.num_envs)])
 
     def _reset(self, begin: Array, again: Array) -> None:
         """Begin the episodes that these envs have come to, each from the seed that both of its pair have."""
         del again  # the seed of an episode that is begun anew is what it was
         self._again.clear()
         ids = np.flatnonzero(begin)
-        seeds = [episode_seed(self.seed, 0, int(self._episode[i])) for i in ids]
-        if begin[SAME]:  # what it has is known when it has been drawn
-            first = np.arange(2) == SAME
-            self.env.reset(mask=first, episode_seeds=[episode_seed(self.seed, 0, int(self._episode[SAME]))])
-        plan = [self._factors if i == CHANGED else present_values(self.env, SAME, self._factors) for i in ids]
-        self.env.reset(mask=begin, episode_seeds=seeds, overrides=plan)
+        seeds = {int(i): episode_seed(self.seed, 0, int(self._episode[i]) * self._twos + int(i) // 2) for i in ids}
+        first = begin & (np.arange(len(begin)) % 2 == SAME)
+        if first.any():  # what they have is known when it has been drawn
+            self.env.reset(mask=first, episode_seeds=[seeds[int(i)] for i in np.flatnonzero(first)])
+        plan = [self._factors if i % 2 == CHANGED else present_values(self.env, int(i), self._factors) for i in ids]
+        self.env.reset(mask=begin, episode_seeds=list(seeds.values()), overrides=plan)
 
 
 def present_values(env: TaskEnv, index: int, factors: Mapping[str, Any]) -> dict[str, Any]:
@@ -69,37 +71,40 @@ def present_values(env: TaskEnv, index: int, factors: Mapping[str, Any]) -> dict
 
 
 class Tape:
-    """A policy that gives the changed member the actions of the other, as they are recorded."""
+    """A policy that gives the changed members the actions of the others, as they are recorded."""
 
     name = "tape"
 
     def __init__(self, env: TaskEnv, out: Path) -> None:
         self._env, self._out = env, out
         self._seeds: dict[int, Path] = {}
-        for path in sorted((out / EPISODES).glob(f"env_{SAME:04d}_episode_*/{MANIFEST_FILE}")):
-            self._seeds[open_trajectory(path.parent).manifest.episode_seed] = path.parent
-        self._actions = np.zeros((0, env.action_dim))
-        self._step = 0
+        for path in sorted((out / EPISODES).glob(f"env_*_episode_*/{MANIFEST_FILE}")):
+            manifest = open_trajectory(path.parent).manifest
+            if manifest.env % 2 == SAME:
+                self._seeds[manifest.episode_seed] = path.parent
+        self._actions = [np.zeros((0, env.action_dim))] * env.num_envs
+        self._step = np.zeros(env.num_envs, dtype=int)
 
     def begin(self, env_ids: Array) -> None:
-        """Take up the tape of the episode that has begun; that of one which was not kept is empty."""
-        del env_ids
-        path = self._seeds.get(int(self._env.streams.episode_seed[CHANGED]))
-        self._actions = np.zeros((0, self._env.action_dim)) if path is None else open_trajectory(path).actions
-        self._step = 0
+        """Take up the tapes of the episodes that have begun; that of one which was not kept is empty."""
+        for i in env_ids.tolist():
+            path = self._seeds.get(int(self._env.streams.episode_seed[i]))
+            empty = np.zeros((0, self._env.action_dim))
+            self._actions[i] = empty if path is None else open_trajectory(path).actions
+            self._step[i] = 0
 
     def act(self, env_ids: Array) -> Array:
-        """(2, A)."""
-        del env_ids
-        action = np.clip(np.zeros((2, self._env.action_dim)), *self._env.action_bounds)
-        if self._step < len(self._actions):
-            action[CHANGED] = self._actions[self._step]
-        self._step += 1
+        """(N, A)."""
+        action = np.clip(np.zeros((self._env.num_envs, self._env.action_dim)), *self._env.action_bounds)
+        for i in env_ids.tolist():
+            if self._step[i] < len(self._actions[i]):
+                action[i] = self._actions[i][self._step[i]]
+            self._step[i] += 1
         return action
 
     def gave_up(self, env_ids: Array) -> Array:
         """(n,) bool: the tape is at its end."""
-        return np.full(len(env_ids), self._step >= len(self._actions))
+        return np.array([self._step[i] >= len(self._actions[i]) for i in env_ids.tolist()], dtype=bool)
 
     def solved(self, env_ids: Array) -> Array:
         """(n,) bool: never by itself; the task says."""
@@ -112,9 +117,10 @@ class Tape:
 
     def ended(self, env: int, success: bool) -> dict[str, Any]:
         """How the tape ended."""
+        del env
         return {"skill": "tape", "outcome": "ok" if success else "tape_ended"}
 
 
-def member(out: Path, which: int, episode: int) -> Path:
+def member(out: Path, which: int, pair: int, at_once: int) -> Path:
     """The trajectory of a member of a pair, whether it is there or not."""
-    return out / EPISODES / trajectory_name(which, episode)
+    return out / EPISODES / trajectory_name(2 * (pair % at_once) + which, pair // at_once)

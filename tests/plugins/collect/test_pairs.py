@@ -4,6 +4,7 @@ import json
 import shutil
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -14,8 +15,10 @@ from anysim.errors import TaskError
 from anysim.record.manifest import read_manifest
 from anysim.record.reader import open_trajectory
 from anysim.record.replay import replay
+from anysim.testing.engines import require_engine
 from anysim_collect import commands
 from anysim_collect.cli.counterfactual import parse_factors
+from anysim_collect.divergence_plot import Gap, divergence_picture
 from anysim_inspect.verify_runs import verify_all
 
 app = typer.Typer()
@@ -27,10 +30,10 @@ NOISY = (
 )
 
 
-def called(*words: str | Path, sets: tuple[str, ...] = (), code: int = 0) -> Any:
+def called(*words: str | Path, sets: tuple[str, ...] = (), code: int = 0, engine: str = "mujoco") -> Any:
     overrides = [word for one in (*BLIND, *sets) for word in ("-o", one)]
     done = CliRunner().invoke(
-        app, ["counterfactual", "pick_cube", "-e", "mujoco", *map(str, words), *overrides, "--json"]
+        app, ["counterfactual", "pick_cube", "-e", engine, *map(str, words), *overrides, "--json"]
     )
     assert done.exit_code == code, done.output
     return json.loads(done.stdout) if code == 0 else done.exception
@@ -119,6 +122,58 @@ def test_a_colour_changes_no_bit_of_states_and_of_noisy_readings_though_the_expe
     assert all(a.states[name].tobytes() == b.states[name].tobytes() for name in a.states)
     error = a.states["sensor_tool_position"] - a.states["joint_pos"][:, : a.states["sensor_tool_position"].shape[1]]
     assert np.abs(error).max() > 0.01, "it is noisy"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["mujoco", "pybullet", "sapien"])
+def test_pairs_side_by_side_are_those_alone_on_every_engine(engine: str, tmp_path: Path) -> None:
+    require_engine(engine)
+    words = ("--factor", "objects.cube.mass=0.9", "-k", "3", "--actions", "same")
+    told = [
+        called(*words, "--at-once", at_once, "--out", tmp_path / at_once, sets=(NOISY,), engine=engine)
+        for at_once in ("1", "2")
+    ]
+    assert [len(one["pairs"]) for one in told] == [3, 3]
+    for alone, beside in zip(*(one["pairs"] for one in told), strict=True):
+        names = ("same", "changed")
+        assert {k: v for k, v in alone.items() if k not in names} == {k: v for k, v in beside.items() if k not in names}
+        assert alone["diverges"] > 0
+        for key in names:
+            a, b = (open_trajectory(tmp_path / n / "episodes" / pair[key]) for n, pair in (("1", alone), ("2", beside)))
+            assert set(a.states) == set(b.states)
+            assert all(a.states[name].tobytes() == b.states[name].tobytes() for name in a.states)
+            assert a.actions.tobytes() == b.actions.tobytes()
+    assert [pair["same"] for pair in told[1]["pairs"]] == [
+        "env_0000_episode_0000",
+        "env_0002_episode_0000",
+        "env_0000_episode_0001",
+    ]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["pybullet", "sapien"])
+def test_noise_of_sensors_carries_over_to_the_bit_on_other_engines(engine: str, tmp_path: Path) -> None:
+    require_engine(engine)
+    words = ("--factor", "objects.cube.color=yellow", "--out", tmp_path / "run")
+    [pair] = called(*words, sets=(NOISY,), engine=engine)["pairs"]
+    assert (pair["diverges"], pair["differs"], pair["acts_apart"]) == (None, None, None)
+    a, b = (open_trajectory(tmp_path / "run" / "episodes" / pair[key]) for key in ("same", "changed"))
+    assert all(a.states[name].tobytes() == b.states[name].tobytes() for name in a.states)
+    assert np.ptp(a.states["sensor_tool_position"] - a.states["joint_pos"][:, :9]) > 0.01
+
+
+def test_the_picture_marks_the_diverging_step() -> None:
+    gap = np.array([0.0, 1e-9, 1e-7, 1e-4, 0.5])
+    picture = ElementTree.fromstring(divergence_picture("a < b", [Gap(0, gap, 3), Gap(1, 0 * gap, None)], 1e-6))
+    lines = [one for one in picture.iter() if one.tag.endswith("polyline")]
+    [mark] = [one for one in picture.iter() if one.tag.endswith("circle")]
+    points = [tuple(map(float, point.split(","))) for point in lines[0].get("points", "").split()]
+    assert (float(mark.get("cx", "")), float(mark.get("cy", ""))) == points[3]
+    heights = [height for _, height in points]
+    assert heights == sorted(heights, reverse=True)
+    assert len({point.split(",")[1] for point in lines[1].get("points", "").split()}) == 1
+    words = [one.text for one in picture.iter() if one.tag.endswith("text")]
+    assert {"a < b", "0: step 3", "1: never"} <= set(words)
 
 
 def test_an_unknown_path_lists_what_there_is(tmp_path: Path) -> None:

@@ -69,7 +69,7 @@ def test_one_file_gives_equal_readings_on_three_engines() -> None:
 
 
 def test_none_of_five_thousand_rays_is_a_millimetre_off_mujocos() -> None:
-    """One LiDAR by two sources, on nothing that collides, over a crowd of shapes."""
+    """A LiDAR and a depth camera by two sources, on nothing that collides, over a crowd of shapes."""
     require_engine("mujoco")
     rng = np.random.default_rng(7)
     sources = [{"box": [0.3, 0.5, 0.4]}, {"sphere": 0.3}, {"capsule": [0.15, 0.5]}, {"cylinder": [0.2, 0.6]}]
@@ -88,31 +88,51 @@ def test_none_of_five_thousand_rays_is_a_millimetre_off_mujocos() -> None:
         "channels": ["range", "instance_id", "class_id"],
         "leave_out": "nothing",
     }
+    eye = {
+        **{key: both[key] for key in ("frame", "position", "leave_out")},
+        "far": 3.0,  # along the axis: 8 m in a corner
+        "sensor": "depth",
+        "roll_pitch_yaw": [-pi / 2 - 0.4, 0.0, -pi / 2],
+        "size": [100, 50],
+        "fov": 100.0,
+        "channels": ["depth", "instance_id", "class_id"],
+    }
     spec = {
         "engine": "mujoco",
         "world": {
             "objects": objects,
             "layout": layout,
-            "sensors": {"ours": both, "theirs": both | {"source": "engine"}},
+            "sensors": {
+                f"{name}_{source}": sensor | {"source": source}
+                for name, sensor in (("scan", both), ("eye", eye))
+                for source in ("geometry", "engine")
+            },
         },
         "task": {"observations": {"policy": ["last_action"]}},
     }
     with anysim.make(spec) as env:
         env.reset(seed=0)
         assert env.sensors is not None
-        one, two = ({key: env.sensors.reading(name, key)[0] for key in both["channels"]} for name in ("ours", "theirs"))
-    assert one["range"].shape == (5000,)
-    assert 500 < (one["range"] < 6.0).sum() < 4900
-    assert len(np.unique(one["instance_id"])) > 10
-    assert (np.abs(one["range"] - two["range"]) > 1e-3).sum() == 0
-    assert (one["instance_id"] == two["instance_id"]).mean() > 0.999
-    assert (one["class_id"] == two["class_id"]).mean() > 0.999
+        for name, far, most in (("scan", "range", 6.0), ("eye", "depth", 3.0)):
+            one, two = (
+                {
+                    key: env.sensors.reading(f"{name}_{source}", key)[0].ravel()
+                    for key in (far, "instance_id", "class_id")
+                }
+                for source in ("geometry", "engine")
+            )
+            assert one[far].shape == (5000,)
+            assert 500 < (one[far] < most).sum() < 4900
+            assert len(np.unique(one["instance_id"])) > (10 if name == "scan" else 3)
+            assert (np.abs(one[far] - two[far]) > 1e-3).sum() == 0
+            assert (one["instance_id"] == two["instance_id"]).mean() > 0.999
+            assert (one["class_id"] == two["class_id"]).mean() > 0.999
 
 
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        ({"channels": ["range", "intensity"], "leave_out": "nothing"}, "no normals, so no 'intensity'"),
+        ({"channels": ["range", "intensity"], "leave_out": "nothing"}, "distances and things, so no 'intensity'"),
         ({}, "say so with `leave_out: nothing`"),
         ({"leave_out": "nothing", "shapes": "visual"}, "meet what collides"),
     ],

@@ -1,8 +1,11 @@
 """LiDARs: patterns with the angles of their data sheets, and scans of a room that is known."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import anysim
 from anysim.errors import AnysimError
 from anysim.math import pose as P
 from anysim.model.frames import FixedFrame
@@ -10,7 +13,7 @@ from anysim.model.world import Box, Sphere
 from anysim.testing.sketch import Sketch
 from anysim_sensors.lidar import lidar
 from anysim_sensors.patterns import planar, rosette, spinning, wound
-from anysim_sensors.presets import LIDARS, lidar_preset
+from anysim_sensors.presets import CAMERAS, LIDARS, lidar_preset
 from anysim_sensors.scene import SceneGeometry, mounted
 
 
@@ -92,3 +95,39 @@ def test_a_scan_of_a_room_has_its_distances() -> None:
 def test_an_unknown_preset_names_those_that_exist() -> None:
     with pytest.raises(AnysimError, match=r"no preset of a LiDAR 'vlp16'; did you mean 'vlp_16'.*mid_360"):
         lidar_preset("vlp16")
+
+
+def test_the_table_of_presets_says_what_they_are() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "concepts" / "sensing.md").read_text()
+    rays = {name: len(one.pattern(0).directions) for name, one in LIDARS.items()}
+    rays |= {name: one.width * one.height for name, one in CAMERAS.items()}
+    for name, one in {**LIDARS, **CAMERAS}.items():
+        cells = next(line for line in page.splitlines() if line.startswith(f"| `{name}` |")).split(" | ")
+        assert cells[2:] == [f"{rays[name]:,}", f"{one.near:g} to {one.far:g}", f"{one.rate:g} |"]
+
+
+@pytest.mark.parametrize("robot", ["differential_base", "holonomic_base"])
+def test_bases_of_the_catalogue_bring_a_scanner_and_a_depth_camera(robot: str) -> None:
+    """A wall stands two metres ahead; the scanner is 1 cm off at a time, and neither sees the base."""
+    spec = {
+        "engine": "null",
+        "world": {
+            "robots": {"rover": {"robot": robot, "actions": {}}},
+            "objects": {"wall": {"source": {"box": [0.2, 8.0, 2.0]}, "fixed": True}},
+            "layout": {"wall": {"position": [2.1, 0.0, 1.0]}},
+            "sensors": {"scan": "rover.scan", "eye": {"place": "rover.eye", "size": [33, 25]}},
+        },
+        "task": {"observations": {"policy": [{"term": "sensor", "of": "scan.range"}]}},
+    }
+    with anysim.make(spec) as env:
+        env.reset(seed=0)
+        assert env.sensors is not None
+        ranges, depth = env.sensors.reading("scan", "range")[0], env.sensors.reading("eye", "depth")[0]
+        place = {site.name: site.position[0] for site in env.engine.world.sites}
+    assert ranges.shape == (1081,)
+    assert depth[12, 16] == pytest.approx(2.0 - place["rover.eye"], abs=1e-5)
+    azimuth = np.radians(np.linspace(-135, 135, 1081))
+    front = np.abs(azimuth) < 0.8
+    error = ranges[front] - (2.0 - place["rover.scan"]) / np.cos(azimuth[front])
+    assert 0.007 < error.std() < 0.013
+    assert abs(error.mean()) < 0.003

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from anysim.task.env import TaskEnv
     from anysim_collect.pairs import Actions
 
-PAIRS_FILE, FORMAT = "pairs.json", "anysim-pairs-1"
+PAIRS_FILE, PICTURE, FORMAT = "pairs.json", "pairs.svg", "anysim-pairs-1"
 
 
 def counterfactual(
@@ -36,6 +36,9 @@ def counterfactual(
     tolerance: Annotated[
         float, typer.Option(min=0.0, help="By how much states must differ, to be apart [m, rad, m/s, rad/s].")
     ] = 1e-6,
+    at_once: Annotated[
+        int, typer.Option(min=1, help="Pairs that run side by side, two envs each; what comes of each is the same.")
+    ] = 1,
     seed: Seed = None,
     robot: Robot = None,
     override: Overrides = None,
@@ -46,9 +49,9 @@ def counterfactual(
 ) -> None:
     """Collect matched pairs: the same episode twice, with one factor changed and every other draw the same.
 
-    Both are kept, however they end, as trajectories of one run: env 0 as it is, env 1 changed. `pairs.json` says from
-    which control step on the states of a pair are apart. Running the same command again goes on where it stopped. A
-    path that nothing has is answered with all that can be changed.
+    Both are kept, however they end, as trajectories of one run: even envs as they are, odd ones changed. `pairs.json`
+    says from which control step on the states of a pair are apart, and `pairs.svg` shows it. Running the same command
+    again goes on where it stopped. A path that nothing has is answered with all that can be changed.
 
     Examples:
       anysim counterfactual pick_cube --factor objects.cube.friction=0.2 -k 8 --out runs/slippery
@@ -63,8 +66,8 @@ def counterfactual(
     if actions not in ("policy", "same"):
         raise TaskError(f"--actions is '{actions}'; policy or same expected")
     overrides = [*with_robot(override, robot), "record.keep=all"]
-    with make(task, engine=engine, num_envs=2, overrides=overrides) as env:
-        env.counterfactuals.checked(wanted, 2, midway=False)
+    with make(task, engine=engine, num_envs=2 * at_once, overrides=overrides) as env:
+        env.counterfactuals.checked(wanted, 2 * at_once, midway=False)
         begin = env.spec.seed if seed is None else seed
         plan = {
             "format": FORMAT,
@@ -74,6 +77,7 @@ def counterfactual(
             "factors": wanted,
             "actions": actions,
             "tolerance": tolerance,
+            "at_once": at_once,
         }
         name = hashlib.sha256(text.dumps(plan).encode()).hexdigest()[:8]
         directory = (
@@ -156,7 +160,8 @@ def _collect(env: "TaskEnv", out: Path, count: int, plan: dict[str, Any], quiet:
     from anysim.cli.output import counting
     from anysim.record.commit import write_whole
     from anysim.skills.runner import SkillPolicy
-    from anysim_collect.divergence import pair_entry
+    from anysim_collect.divergence import gap_of, pair_entry
+    from anysim_collect.divergence_plot import Gap, divergence_picture
     from anysim_collect.mixture import size_of
     from anysim_collect.pairs import CHANGED, SAME, PairCollector, Tape, member
     from anysim_collect.report import report_of, write_report
@@ -176,15 +181,19 @@ def _collect(env: "TaskEnv", out: Path, count: int, plan: dict[str, Any], quiet:
                 parts[part] = parts.get(part, 0.0) + seconds
     found: list[dict[str, Any]] = []
     incomplete: list[int] = []
+    gaps: list[Gap] = []
     for episode in range(count):
-        first, second = member(out, SAME, episode), member(out, CHANGED, episode)
+        first, second = (member(out, which, episode, plan["at_once"]) for which in (SAME, CHANGED))
         if first.is_dir() and second.is_dir():
             found.append(pair_entry(episode, first, second, plan["tolerance"]))
+            gaps.append(Gap(episode, gap_of(first, second), found[-1]["diverges"]))
         else:
             incomplete.append(episode)
     told = plan | {"pairs": found, "incomplete": incomplete}
-    write_whole(out, {PAIRS_FILE: text.dumps(told, indent=2, default=str) + "\n"})
-    what = {"task": env.name, "engine": env.engine.name, "num_envs": 2, "seed": plan["seed"]}
+    factors = ", ".join(f"{path}={value}" for path, value in plan["factors"].items())
+    picture = divergence_picture(f"{env.name} on {env.engine.name}: {factors}", gaps, plan["tolerance"])
+    write_whole(out, {PICTURE: picture, PAIRS_FILE: text.dumps(told, indent=2, default=str) + "\n"})
+    what = {"task": env.name, "engine": env.engine.name, "num_envs": env.num_envs, "seed": plan["seed"]}
     what |= {"engine_version": f"{env.engine.name} {env.engine.version}"}
     write_report(out, report_of(what, tally, parts, 0.0))
     return told

@@ -14,6 +14,7 @@ from anysim.task.scene import Frame, SceneView
 from anysim_schemas.base import Degrees, NonNegative, Positive, Vec3
 from anysim_sensors.camera import RayCamera
 from anysim_sensors.presets import CAMERAS, camera_preset
+from anysim_sensors.sight.engine_rays import Source, engine_rays, identified, refuse_engine
 from anysim_sensors.sight.eye import Eye, LeftOut, Shapes
 from anysim_sensors.sight.identities import Identities
 
@@ -41,6 +42,7 @@ class Depth(Sensor):
         near: Annotated[NonNegative | None, Field(description="what is nearer is not seen, and hides [m]")] = None,
         far: Annotated[Positive | None, Field(description="what is farther is not seen [m]")] = None,
         channels: Annotated[tuple[Channel, ...], Field(min_length=1)] = ("depth",),
+        source: Annotated[Source, Field(description="`engine`: its own rays")] = "geometry",
         shapes: Shapes = "collision",
         leave_out: Annotated[LeftOut, Field(description="what carries it, and is not seen")] = "body",
         position: Annotated[Vec3, Field(description="in the frame [m]")] = ORIGIN,
@@ -56,7 +58,9 @@ class Depth(Sensor):
         angle, near, far = (float(value if own is None else own) for own, value in given)
         if near >= far:
             raise AnysimError(f"`near` ({near:g} m) is less than `far` ({far:g} m)")
-        self._scene, self._channels = scene, frozenset(channels)
+        self._scene, self._channels, self._engine = scene, frozenset(channels), source == "engine"
+        if self._engine:
+            refuse_engine(scene, channels, leave_out, shapes)
         self._camera = RayCamera(width, height, angle, near, far)
         self._eye = Eye(scene, frame, shapes, leave_out, position, roll_pitch_yaw)
         self._named = Identities.of(scene.engine.world)
@@ -84,6 +88,8 @@ class Depth(Sensor):
 
     def read(self, env_ids: Array) -> Mapping[str, Array]:
         eye, shown, camera, asked = self._eye, self._eye.poses, self._camera, self._channels
+        if self._engine:
+            return self._asked(env_ids, shown)
         images = camera.images(eye.geometry, eye.posed, shown, seen=eye.seen, normals="normals" in asked)
         values: dict[str, Array] = {"depth": np.where(images.geom < 0, camera.far, images.depth)}
         if "normals" in asked:
@@ -98,3 +104,12 @@ class Depth(Sensor):
             values |= {"motion": np.nan_to_num(moved.flow), "appeared": moved.appeared}
             self._keep(env_ids)
         return {name: values[name] for name in self.fields}
+
+    def _asked(self, env_ids: Array, shown: Array) -> Mapping[str, Array]:
+        """The same of the engine."""
+        camera = self._camera
+        distance, entity = engine_rays(self._scene, shown, camera.directions, env_ids)
+        along = distance * camera.directions[..., 2]
+        seen = (along >= camera.near) & (along <= camera.far)
+        values = {"depth": np.where(seen, along, camera.far), **identified(self._named, seen, entity)}
+        return {name: values[name].reshape(len(env_ids), camera.height, camera.width) for name in self.fields}

@@ -8,8 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from anysim.conventions import Array
-from anysim.engine.capability import Capability
-from anysim.errors import AnysimError, CapabilityError, listing
+from anysim.errors import AnysimError
 from anysim.math import pose as P
 from anysim.model.world import ORIGIN
 from anysim.sensors.base import Sensor, SensorField
@@ -18,6 +17,7 @@ from anysim_schemas.base import NonNegative, Positive, Vec3
 from anysim_sensors.lidar import lidar
 from anysim_sensors.motion.parameters import parameter
 from anysim_sensors.presets import LIDARS, lidar_preset
+from anysim_sensors.sight.engine_rays import Source, engine_rays, identified, refuse_engine
 from anysim_sensors.sight.eye import Eye, LeftOut, Shapes
 from anysim_sensors.sight.identities import Identities
 from anysim_sensors.sight.lidar_patterns import PatternSpec
@@ -51,7 +51,7 @@ class Lidar(Sensor):
         near: Annotated[NonNegative | None, Field(description="what is nearer is not measured, and hides [m]")] = None,
         far: Annotated[Positive | None, Field(description="what is farther is not measured [m]")] = None,
         channels: Annotated[tuple[Channel, ...], Field(min_length=1)] = ("range",),
-        source: Annotated[Literal["geometry", "engine"], Field(description="`engine`: its own rays")] = "geometry",
+        source: Annotated[Source, Field(description="`engine`: its own rays")] = "geometry",
         shapes: Shapes = "collision",
         leave_out: Annotated[LeftOut, Field(description="what carries it, and is not seen")] = "body",
         position: Annotated[Vec3, Field(description="in the frame [m]")] = ORIGIN,
@@ -70,7 +70,7 @@ class Lidar(Sensor):
             raise AnysimError(f"`near` ({self._near:g} m) is less than `far` ({self._far:g} m)")
         self._scene, self._channels, self._engine = scene, tuple(dict.fromkeys(channels)), source == "engine"
         if self._engine:
-            _refuse_engine(scene, self._channels, leave_out, shapes)
+            refuse_engine(scene, self._channels, leave_out, shapes)
         self._eye = Eye(scene, frame, shapes, leave_out, position, roll_pitch_yaw)
         self._named = Identities.of(scene.engine.world)
         first, second = self._directions(0), self._directions(1)
@@ -89,30 +89,22 @@ class Lidar(Sensor):
         found = lidar(
             eye.geometry, eye.posed, shown, directions, near=self._near, far=self._far, seen=eye.seen, normals=bright
         )
-        values = self._identified(found.distance, found.segmentation)
+        values = self._values(found.distance, found.segmentation)
         if bright:
             along = P.rotate(shown[:, None, 3:], np.broadcast_to(directions, found.normal.shape))
             facing = np.abs((along * found.normal).sum(axis=-1))
             values["intensity"] = np.where(found.geom < 0, 0.0, facing * self._brightness(env_ids, found.geom))
         return {name: values[name] for name in self._channels}
 
-    def _identified(self, distance: Array, entity: Array) -> dict[str, Array]:
-        nothing = ~np.isfinite(distance)
-        entity = np.where(nothing, 0, entity)
-        return {
-            "range": np.where(nothing, self._far, distance),
-            "instance_id": self._named.instance[entity],
-            "class_id": self._named.class_[entity],
-        }
+    def _values(self, distance: Array, entity: Array) -> dict[str, Array]:
+        met = np.isfinite(distance)
+        return {"range": np.where(met, distance, self._far), **identified(self._named, met, entity)}
 
     def _asked(self, env_ids: Array, directions: Array) -> Mapping[str, Array]:
         """The same of the engine."""
-        shown = self._eye.poses
-        rows = np.broadcast_to(directions, (len(env_ids), *directions.shape[-2:]))
-        origins = np.broadcast_to(shown[:, None, :3], rows.shape)
-        hits = self._scene.engine.raycast(origins, P.rotate(shown[:, None, 3:], rows), env_ids)
-        measured = (hits.distance >= self._near) & (hits.distance <= self._far)
-        values = self._identified(np.where(measured, hits.distance, np.inf), np.maximum(hits.entity, 0))
+        distance, entity = engine_rays(self._scene, self._eye.poses, directions, env_ids)
+        measured = (distance >= self._near) & (distance <= self._far)
+        values = self._values(np.where(measured, distance, np.inf), entity)
         return {name: values[name] for name in self._channels}
 
     def _brightness(self, env_ids: Array, geom: Array) -> Array:
@@ -124,25 +116,3 @@ class Lidar(Sensor):
 def _by_scan(made: Callable[[int], Array]) -> Callable[[int], Array]:
     """The same, each made once: envs whose episodes are of one age look along the same rays."""
     return lru_cache(maxsize=64)(made)
-
-
-def _refuse_engine(scene: SceneView, channels: tuple[str, ...], leave_out: LeftOut, shapes: Shapes) -> None:
-    """What rays of engines cannot do is refused.
-
-    Raises:
-        CapabilityError: the engine has no rays.
-        AnysimError: something else is asked of it.
-    """
-    engine = scene.engine
-    if Capability.RAYCAST not in engine.capabilities:
-        raise CapabilityError(
-            f"{engine.name} does not have '{Capability.RAYCAST}', which `source: engine` needs; leave `source` out, "
-            f"and the shapes of the world are asked"
-        )
-    if "intensity" in channels:
-        known = listing([name for name in FIELDS if name != "intensity"])
-        raise AnysimError(f"rays of an engine tell no normals, so no 'intensity' (channels: {known})")
-    if leave_out != "nothing":
-        raise AnysimError("rays of an engine meet everything; say so with `leave_out: nothing`, and mount it outside")
-    if shapes != "collision":
-        raise AnysimError("rays of an engine meet what collides; leave `shapes` out")
