@@ -11,6 +11,9 @@ SITE  := .venv/with-site
 TORCH := .venv-torch/installed
 PEERS := .venv-peers/installed
 LEROBOT := .venv-lerobot/installed
+ROBOMIMIC := .venv-lerobot/with-robomimic
+RLDS := .venv-rlds/installed
+RERUN := .venv-rerun/installed
 
 # The demo: a scripted robot picks cubes in four worlds at once, records it, and a picture shows what happened. Then
 # every installed engine gets the same world, and a page shows how far they agree.
@@ -21,8 +24,15 @@ ARGS ?=
 # A worker for each core, each with engines of its own and up to 3 GB. One process: make test ARGS="-n 0"
 PYTEST = $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist loadgroup
 
+# An environment of its own, in which the packages of .venv are too.
+define beside
+$(BIN)/python -m venv $(1)
+$(BIN)/python -c 'import sysconfig; print("import site; site.addsitedir(%r)" % sysconfig.get_path("purelib"))' \
+  > $(1)/lib/$$($(BIN)/python -c 'import sys; print("python%d.%d" % sys.version_info[:2])')/site-packages/anysim.pth
+endef
+
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test test-slow test-full test-learning test-maniskill test-lerobot check format lock schema docs site bench wheels clean
+.PHONY: help venv demo test test-slow test-full test-learning test-maniskill test-lerobot test-robomimic test-rlds test-rerun check format lock schema docs site bench wheels clean
 
 help:  ## list the targets
 	@echo "make TARGET, where TARGET is one of"
@@ -58,9 +68,7 @@ test-learning: $(TORCH)  ## run the tests of the learners and their example, in 
 
 # The packages of .venv, and what the learners need beside them.
 $(TORCH): $(TEST) plugins/learning/pyproject.toml
-	$(BIN)/python -m venv .venv-torch
-	$(BIN)/python -c 'import sysconfig; print("import site; site.addsitedir(%r)" % sysconfig.get_path("purelib"))' \
-	  > .venv-torch/lib/$$($(BIN)/python -c 'import sys; print("python%d.%d" % sys.version_info[:2])')/site-packages/anysim.pth
+	$(call beside,.venv-torch)
 	.venv-torch/bin/python -m pip install --quiet torch
 	.venv-torch/bin/python -m pip install --quiet $$($(BIN)/python scripts/extra_requirements.py plugins/learning torch sb3 rsl)
 	@touch $@
@@ -70,9 +78,7 @@ test-maniskill: $(PEERS)  ## run the checks against ManiSkill and robosuite, in 
 
 # robosuite without its dependencies: it pins a package that needs an older numpy, and its verdicts do not use it.
 $(PEERS): $(TEST) plugins/maniskill/pyproject.toml plugins/evaluation/pyproject.toml
-	$(BIN)/python -m venv .venv-peers
-	$(BIN)/python -c 'import sysconfig; print("import site; site.addsitedir(%r)" % sysconfig.get_path("purelib"))' \
-	  > .venv-peers/lib/$$($(BIN)/python -c 'import sys; print("python%d.%d" % sys.version_info[:2])')/site-packages/anysim.pth
+	$(call beside,.venv-peers)
 	.venv-peers/bin/python -m pip install --quiet torch
 	.venv-peers/bin/python -m pip install --quiet $$($(BIN)/python scripts/extra_requirements.py plugins/maniskill torch maniskill) \
 	  $$($(BIN)/python scripts/extra_requirements.py plugins/evaluation gymnasium-robotics)
@@ -86,13 +92,36 @@ test-lerobot: $(LEROBOT)  ## run the checks against LeRobot's own loader, in an 
 # lerobot without its dependencies: they pin an older torch, numpy and PyAV, bring viewers, and its loader does without.
 # torchvision is the last one whose reader of videos lerobot 0.4 finds.
 $(LEROBOT): $(TEST) plugins/export/pyproject.toml
-	$(BIN)/python -m venv .venv-lerobot
-	$(BIN)/python -c 'import sysconfig; print("import site; site.addsitedir(%r)" % sysconfig.get_path("purelib"))' \
-	  > .venv-lerobot/lib/$$($(BIN)/python -c 'import sys; print("python%d.%d" % sys.version_info[:2])')/site-packages/anysim.pth
+	$(call beside,.venv-lerobot)
 	.venv-lerobot/bin/python -m pip install --quiet torch==2.13.0
 	.venv-lerobot/bin/python -m pip install --quiet --no-deps lerobot==0.4.4 torchvision==0.25.0
 	.venv-lerobot/bin/python -m pip install --quiet "datasets>=4,<5" "huggingface-hub<0.36" "diffusers<0.36" accelerate einops \
 	  jsonlines deepdiff draccus==0.10.0 termcolor imageio pyserial opencv-python-headless safetensors
+	@touch $@
+
+test-robomimic: $(ROBOMIMIC)  ## run the checks against robomimic's own loader, in the environment of test-lerobot
+	.venv-lerobot/bin/python -m pytest -n 0 -s tests/plugins/export/test_robomimic_loader.py $(ARGS)
+
+# robomimic without its dependencies: its loader and algorithms need few of them, and egl_probe is compiled from source.
+$(ROBOMIMIC): $(LEROBOT)
+	.venv-lerobot/bin/python -m pip install --quiet --no-deps robomimic==0.3.0
+	.venv-lerobot/bin/python -m pip install --quiet termcolor tqdm psutil
+	@touch $@
+
+test-rlds: $(RLDS)  ## run the checks against TFDS's own builder and reader, in an environment with TensorFlow
+	.venv-rlds/bin/python -m pytest -n 0 -s tests/plugins/export/test_rlds.py $(ARGS)
+
+$(RLDS): $(TEST)
+	$(call beside,.venv-rlds)
+	.venv-rlds/bin/python -m pip install --quiet tensorflow-cpu tensorflow-datasets
+	@touch $@
+
+test-rerun: $(RERUN)  ## run the checks with Rerun's own reader, in an environment with rerun-sdk
+	.venv-rerun/bin/python -m pytest -n 0 -s tests/plugins/export/test_rerun.py $(ARGS)
+
+$(RERUN): $(TEST) plugins/export/pyproject.toml
+	$(call beside,.venv-rerun)
+	.venv-rerun/bin/python -m pip install --quiet $$($(BIN)/python scripts/extra_requirements.py plugins/export rerun)
 	@touch $@
 
 CHECKS := check-lint check-format check-style check-layers check-schema check-tables check-types check-site
@@ -160,5 +189,5 @@ wheels: $(STAMP)  ## build the wheels of all packages into dist/ (docs/install.m
 	@ls dist
 
 clean:  ## remove .venv, caches, wheels and the demo's output; other recordings stay
-	rm -rf .venv .venv-tools .venv-torch .venv-lerobot .cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache build dist runs/demo
+	rm -rf .venv .venv-tools .venv-torch .venv-lerobot .venv-rlds .venv-rerun .cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache build dist runs/demo
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -29,7 +29,7 @@ WORDS = {
     "collect": "`anysim run`: episodes by scripted solutions, and reports of them",
     "control": "tools by inverse kinematics and operational space, vehicles, hands, cameras",
     "evaluation": "`anysim evaluate`, `anysim benchmark`: how often policies solve tasks, and whether engines agree",
-    "export": "`anysim export`: recorded runs as data sets of LeRobot, robomimic and webdataset; `anysim tape`",
+    "export": "`anysim export`: recorded runs as data sets of LeRobot, robomimic, RLDS and webdataset; `anysim tape`",
     "film": "`anysim render`: videos of recorded episodes, with other sizes, looks or engines",
     "inspect": "`anysim doctor`, `audit`, `explain`, `replay`, `snapshot`: what is here, was built, drawn, recorded",
     "kinematics": "mechanics of robots (Pinocchio), for controllers of your own",

@@ -30,4 +30,6 @@ def test_the_commands_of_the_page_work(tmp_path: Path) -> None:
     data = tmp_path / "data"
     assert (data / "lerobot" / "meta" / "info.json").exists()
     assert (data / "robomimic" / "demo.hdf5").exists()
+    assert (data / "rlds" / "episodes" / "000002" / "steps.npz").exists()
+    assert (data / "coco" / "coco.json").exists()
     assert (data / "shards" / "shard-000000.tar").exists()

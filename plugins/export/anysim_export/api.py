@@ -6,6 +6,9 @@ its arguments alone, byte for byte: no clock, no draws, no paths. Then an export
 episodes that are whole, and gives the same bytes.
 """
 
+import io
+import os
+import shutil
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -32,6 +35,11 @@ class DataSet(NamedTuple):
     def first(self) -> Manifest:
         """What is equal in all of them."""
         return self.manifests[0]
+
+    @property
+    def robot(self) -> str:
+        """The robots that act, by name; empty where none does."""
+        return ", ".join(dict.fromkeys(name.partition(".")[0] for name in self.first.layout.action))
 
 
 class Episode:
@@ -60,6 +68,11 @@ class Episode:
         said = [words or reader.manifest.instruction or reader.manifest.task for words in reader.language]
         self.tasks = tuple(said)
         self.segments = tuple(_segment(held) for held in reader.annotations)
+
+    @property
+    def directory(self) -> Path:
+        """Of the trajectory, for exporters that draw or compute from it anew; no path belongs into a data set."""
+        return self._reader.directory
 
     @property
     def steps(self) -> int:
@@ -103,3 +116,33 @@ class Exporter(ABC):
     @abstractmethod
     def assemble(self, folder: Path, parts: Sequence[Path], data: DataSet) -> None:
         """Make the data set in an empty folder, of the folders of all episodes in order, which stay as they are."""
+
+    def close(self) -> None:
+        """Free what was held from one episode to the next; called once, whatever came."""
+        return
+
+
+def write_image(path: Path, image: Array) -> None:
+    """An image (H, W, 3) or (H, W), uint8 or uint16, as a PNG without a time."""
+    path.write_bytes(png(image))
+
+
+def png(image: Array) -> bytes:
+    """The bytes of an image (H, W, 3) or (H, W), uint8 or uint16, as a PNG without a time."""
+    from PIL import Image
+
+    packed = io.BytesIO()
+    Image.fromarray(image).save(packed, "png", compress_level=1)
+    return packed.getvalue()
+
+
+def take_over(part: Path, folder: Path) -> None:
+    """The files of an episode in a folder of the data set, without a second copy where the disk can do so."""
+    shutil.copytree(part, folder, copy_function=_link, dirs_exist_ok=True)
+
+
+def _link(source: str, target: str) -> None:
+    try:
+        os.link(source, target)
+    except OSError:  # a file system without links, or a full disk: then copying says so
+        shutil.copyfile(source, target)

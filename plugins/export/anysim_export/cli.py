@@ -15,7 +15,9 @@ def export(
     directories: Annotated[
         list[Path], typer.Argument(metavar="RUN…", help="Runs of one task and robot, or trajectories of them.")
     ],
-    to: Annotated[str, typer.Option("--to", help="lerobot, robomimic, webdataset, or another installed exporter.")],
+    to: Annotated[
+        str, typer.Option("--to", help="lerobot, robomimic, rlds-ready, coco, webdataset, rerun, or another one.")
+    ],
     out: Annotated[Path, typer.Option(help="Directory of the data set; nothing in it is ever overwritten.")],
     option: Annotated[
         list[str] | None, typer.Option("--option", help="An option of the exporter, KEY=VALUE; may be repeated.")

@@ -3,6 +3,7 @@
 import importlib
 import shutil
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -70,6 +71,19 @@ def export(
         SpecError: at `options.KEY`, an option that it does not have.
     """
     exporter, said = _exporter(to, options or {})
+    with closing(exporter):
+        return _export(exporter, said, runs, to, out, failed_too, tell)
+
+
+def _export(
+    exporter: Exporter,
+    said: dict[str, Any],
+    runs: Sequence[Path],
+    to: str,
+    out: Path,
+    failed_too: bool,
+    tell: Callable[[int], Told] | None,
+) -> Exported:
     paths, left_out = _chosen(runs, failed_too)
     data = DataSet([manifest for _, manifest in paths], said)
     _check_alike(paths)

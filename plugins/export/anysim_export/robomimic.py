@@ -20,7 +20,8 @@ class RobomimicExporter(Exporter):
     """`demo.hdf5`: `data/demo_0`, … with actions, dones, rewards, states, obs and next_obs; `mask/train`, `mask/valid`.
 
     An observation group is a key of `obs`, a camera `front` the key `front_image`. `states` are the recorded arrays one
-    after another, before each action; the attribute `state_layout` names them.
+    after another, before each action; the attribute `state_layout` names them. `instructions` and `sub_tasks` are the
+    words of each step, in UTF-8.
     """
 
     needs: ClassVar[Mapping[str, str]] = {"h5py": "anysim-export[robomimic]"}
@@ -47,6 +48,7 @@ class RobomimicExporter(Exporter):
             dones[-1] = 1
             rows: dict[str, Array] = {"actions": episode.actions, "rewards": episode.rewards, "dones": dones}
             rows["states"] = _flat(episode.states, episode.steps)
+            rows["instructions"], rows["sub_tasks"] = _words(episode.tasks), _words(episode.segments)
             for name, values in rows.items():
                 demo.create_dataset(name, data=values)
             for name, values in episode.obs.items():
@@ -91,6 +93,12 @@ class RobomimicExporter(Exporter):
             for mask, chosen in (("train", names[:split]), ("valid", names[split:])):
                 if chosen:
                     file.create_dataset(f"mask/{mask}", data=np.array(chosen, dtype="S"))
+
+
+def _words(words: Sequence[str]) -> Array:
+    """(T,) bytes of the longest one's width, at least 1: HDF5 has no strings of none."""
+    coded = [one.encode() for one in words]
+    return np.array(coded, dtype=f"S{max(1, *map(len, coded))}")
 
 
 def _flat(states: Mapping[str, Array], steps: int) -> Array:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from anysim.conventions import Array
 from anysim.errors import PluginError, RecordError
 from anysim.record.json import load_json
 from anysim.task.env import TaskEnv
+from anysim_export.envs import env_of
 from anysim_export.lerobot.exporter import VERSION
 from anysim_export.sheet import ExportSheet, read_sheet
 
@@ -116,15 +117,12 @@ def play(tape: Tape, *, engine: str | None = None, task: str | None = None, seed
 
 def _env(tape: Tape, run: int, engine: str | None, task: str | None) -> TaskEnv:
     """An env of its own for the episodes of a run; of `task`, where that is given."""
-    from anysim.api import make
-
     if task is not None:
+        from anysim.api import make
+
         return make(task, engine=engine, num_envs=1)
     assert tape.sheet is not None
-    spec: dict[str, Any] = {**tape.sheet.specs[run], "num_envs": 1}
-    if engine is not None and engine != spec["engine"]["name"]:
-        spec["engine"] = {"name": engine}
-    return make(spec, curriculum=True)
+    return env_of(tape.sheet.specs[run], engine)
 
 
 def _close(opened: dict[int, TaskEnv]) -> None:

@@ -10,9 +10,8 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from anysim.conventions import Array
 from anysim.record.json import dump_json
-from anysim_export.api import DataSet, Episode, Exporter
+from anysim_export.api import DataSet, Episode, Exporter, png
 
 PART_FILE = "episode.tar"
 
@@ -55,7 +54,7 @@ class WebDatasetExporter(Exporter):
                 np.savez(packed, allow_pickle=False, **arrays)
                 _add(tar, f"{sample}.npz", packed.getvalue())
                 for camera in cameras:
-                    _add(tar, f"{sample}.{camera}.png", _png(next(pictures[camera])))
+                    _add(tar, f"{sample}.{camera}.png", png(next(pictures[camera])))
 
     def assemble(self, folder: Path, parts: Sequence[Path], data: DataSet) -> None:
         """Whole episodes, as many as a shard holds."""
@@ -88,11 +87,3 @@ def _members(path: Path) -> Iterator[tuple[str, bytes]]:
             file = tar.extractfile(entry)
             assert file is not None
             yield entry.name, file.read()
-
-
-def _png(image: Array) -> bytes:
-    from PIL import Image
-
-    packed = io.BytesIO()
-    Image.fromarray(image).save(packed, "png", compress_level=1)
-    return packed.getvalue()

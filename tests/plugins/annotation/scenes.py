@@ -40,3 +40,21 @@ def label(engine: SimEngine, *names: str, source: str = "geometry") -> dict[str,
 def moment(poses: np.ndarray, step: int = 0) -> Moment:
     """One env with its bodies at poses (B, 7)."""
     return Moment(np.array([0]), np.array([step]), poses[None])
+
+
+def decoded(text: str, size: list[int]) -> np.ndarray:
+    """The mask (H, W) of COCO's text, as its C reader takes it apart: another program than that which wrote it."""
+    counts: list[int] = []
+    at = 0
+    while at < len(text):
+        x, shift, more = 0, 0, True
+        while more:
+            c = ord(text[at]) - 48
+            x |= (c & 0x1F) << (5 * shift)
+            more = bool(c & 0x20)
+            at, shift = at + 1, shift + 1
+            if not more and c & 0x10:
+                x |= -1 << (5 * shift)
+        counts.append(x + counts[-2] if len(counts) > 2 else x)
+    flat = np.repeat(np.arange(len(counts)) % 2, counts)
+    return flat.reshape(size, order="F").astype(bool)

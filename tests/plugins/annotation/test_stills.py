@@ -16,6 +16,7 @@ from anysim_annotation.stills import job as jobs
 from anysim_annotation.stills.job import render_job
 from anysim_annotation.stills.labels import kitti_line
 from anysim_annotation.stills.masks import encoded, outlines, run_lengths
+from tests.plugins.annotation.scenes import decoded
 
 WORLD = """
 world:
@@ -50,24 +51,6 @@ def made(path: Path, out: Path, *overrides: str, **changed: object) -> dict[str,
         path.write_text(path.read_text().replace("}", f", {key}: {value}}}"))
     list(render_job(path, out, overrides=overrides))
     return {str(f.relative_to(out)): f.read_bytes() for f in out.rglob("*") if f.is_file() and f.name != ".lock"}
-
-
-def decoded(text: str, size: list[int]) -> np.ndarray:
-    """The mask (H, W) of COCO's text, as its C reader takes it apart: another program than that which wrote it."""
-    counts: list[int] = []
-    at = 0
-    while at < len(text):
-        x, shift, more = 0, 0, True
-        while more:
-            c = ord(text[at]) - 48
-            x |= (c & 0x1F) << (5 * shift)
-            more = bool(c & 0x20)
-            at, shift = at + 1, shift + 1
-            if not more and c & 0x10:
-                x |= -1 << (5 * shift)
-        counts.append(x + counts[-2] if len(counts) > 2 else x)
-    flat = np.repeat(np.arange(len(counts)) % 2, counts)
-    return flat.reshape(size, order="F").astype(bool)
 
 
 def test_masks_come_back() -> None:

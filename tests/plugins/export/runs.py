@@ -1,5 +1,9 @@
 """A short recorded run with two small cameras, and its trajectories."""
 
+import importlib.util
+import re
+import subprocess
+import sys
 from pathlib import Path
 
 import anysim
@@ -23,3 +27,15 @@ def record(out: Path, episodes: int = 3, *more: str) -> Path:
 def committed(run: Path) -> list[Path]:
     """The trajectories that succeeded."""
     return [path for path in trajectories(run) if open_trajectory(path).manifest.status == "success"]
+
+
+def import_torchvision() -> None:
+    """Give a torch for processors alone the names of torchvision's operators, where those do not fit: none is used."""
+    import torch  # pyright: ignore[reportMissingImports]
+
+    if subprocess.run([sys.executable, "-c", "import torchvision"], capture_output=True, check=False).returncode:
+        found = importlib.util.find_spec("torchvision")
+        assert found is not None
+        text = (Path(str(found.origin)).parent / "_meta_registrations.py").read_text()
+        for name in sorted(set(re.findall(r'(?:register_meta\(|torchvision::)"?(\w+)"', text))):
+            torch.library.define(f"torchvision::{name}", "() -> ()")

@@ -23,9 +23,9 @@ from anysim_export.lerobot.stats import ImageStats, sampled, stats_of, together
 from anysim_export.lerobot.tables import file_name, filled
 from anysim_export.tape import play, read_tape
 from tests.external_packages import EXTERNAL, FOUND, install, offered, run as run_python
-from tests.plugins.export.runs import committed, record
+from tests.plugins.export.runs import committed
 
-pytestmark = pytest.mark.xdist_group("export")  # one recording for all of them
+pytestmark = pytest.mark.xdist_group("export")  # one recording for all tests of exports
 
 MAIN = "from anysim.cli.main import main; main()"
 FORMS = ("lerobot", "robomimic", "webdataset")
@@ -52,12 +52,6 @@ setattr(made, moment, killed)
 export([Path(run)], to, Path(out))
 """
 """A program that is killed while it writes the second episode, or all of them together: what it wrote is cut short."""
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Three episodes, two cameras."""
-    return record(tmp_path_factory.mktemp("recorded") / "run")
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +103,10 @@ def test_robomimic(exported: dict[str, Path], episodes: list[Episode]) -> None:
         for i, one in enumerate(episodes):
             demo = data[f"demo_{i}"]
             assert demo.attrs["num_samples"] == one.steps
-            assert {"actions", "rewards", "dones", "states", "obs", "next_obs"} == set(demo)
+            words = {"instructions": one.tasks, "sub_tasks": one.segments}
+            assert {"actions", "rewards", "dones", "states", "obs", "next_obs", *words} == set(demo)
+            for name, said in words.items():
+                assert [row.decode() for row in demo[name][:]] == list(said)
             assert set(demo["obs"]) == set(demo["next_obs"]) == {"policy", "privileged", "front_image", "wrist_image"}
             assert all(len(rows) == one.steps for group in ("obs", "next_obs") for rows in demo[group].values())
             np.testing.assert_array_equal(demo["actions"], one.actions)

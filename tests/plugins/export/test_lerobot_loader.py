@@ -1,14 +1,11 @@
 """LeRobot's own loader reads an exported data set, agrees about its statistics, and trains on it.
 
 `make test-lerobot` runs these, in an environment with lerobot; ANYSIM_EXPORT_RUN names a recorded run with two cameras
-to take in place of a short one.
+to take in place of one of fifty episodes.
 """
 
 import importlib.util
 import os
-import re
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -19,7 +16,8 @@ import pytest
 from anysim.record.reader import open_trajectory
 from anysim_export.api import Episode
 from anysim_export.job import export
-from tests.plugins.export.runs import committed, record
+from anysim_export.lerobot.video import padded
+from tests.plugins.export.runs import committed, import_torchvision, record
 
 pytestmark = [
     pytest.mark.skipif(importlib.util.find_spec("lerobot") is None, reason="needs lerobot: make test-lerobot"),
@@ -29,23 +27,11 @@ CAMERAS = ("observation.images.front", "observation.images.wrist")
 REWARD = "next.reward"
 
 
-def import_torchvision() -> None:
-    """Give a torch for processors alone the names of torchvision's operators, where those do not fit: none is used."""
-    import torch  # pyright: ignore[reportMissingImports]
-
-    if subprocess.run([sys.executable, "-c", "import torchvision"], capture_output=True, check=False).returncode:
-        found = importlib.util.find_spec("torchvision")
-        assert found is not None
-        text = (Path(str(found.origin)).parent / "_meta_registrations.py").read_text()
-        for name in sorted(set(re.findall(r'(?:register_meta\(|torchvision::)"?(\w+)"', text))):
-            torch.library.define(f"torchvision::{name}", "() -> ()")
-
-
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A recorded run."""
     given = os.environ.get("ANYSIM_EXPORT_RUN")
-    return Path(given) if given else record(tmp_path_factory.mktemp("lerobot") / "run")
+    return Path(given) if given else record(tmp_path_factory.mktemp("lerobot") / "run", 50)
 
 
 @pytest.fixture(scope="module")
@@ -67,11 +53,18 @@ def episodes(run: Path) -> list[Episode]:
     return [Episode(i, open_trajectory(path)) for i, path in enumerate(committed(run))]
 
 
+def shown(one: Episode, name: str) -> list[Any]:
+    """The images that its video is of: one for each action, with even sides."""
+    return [padded(image) for image in one.images(name.rpartition(".")[2])][: one.steps]
+
+
 def test_it_reads_every_number_and_image(run: Path, loaded: Any) -> None:
+    recorded = episodes(run)
+    assert (loaded.num_episodes, len(loaded)) == (len(recorded), sum(one.steps for one in recorded))
     first = 0
     worst = 0.0
-    for one in episodes(run)[:5]:
-        shown = {name: list(one.images(name.rpartition(".")[2])) for name in CAMERAS}
+    for one in recorded[:5]:
+        images = {name: shown(one, name) for name in CAMERAS}
         for t in range(0, one.steps, 7):
             frame = loaded[first + t]
             np.testing.assert_array_equal(frame["action"].numpy(), one.actions[t].astype(np.float32))
@@ -81,7 +74,7 @@ def test_it_reads_every_number_and_image(run: Path, loaded: Any) -> None:
             assert (int(frame["episode_index"]), int(frame["frame_index"])) == (one.index, t)
             for name in CAMERAS:
                 there = frame[name].numpy().transpose(1, 2, 0) * 255.0
-                worst = max(worst, float(np.abs(there - shown[name][t]).mean()))
+                worst = max(worst, float(np.abs(there - images[name][t]).mean()))
         first += one.steps
     assert worst < 5.0, "images differ by more than a lossy video explains"
     print(
@@ -106,8 +99,8 @@ def test_its_statistics_are_the_same(run: Path, loaded: Any) -> None:
             for name, values in rows.items()
         }
         for name in CAMERAS:
-            shown = list(one.images(name.rpartition(".")[2]))[: one.steps]
-            chosen = [auto_downsample_height_width(shown[t].transpose(2, 0, 1)) for t in sample_indices(one.steps)]
+            images = shown(one, name)
+            chosen = [auto_downsample_height_width(images[t].transpose(2, 0, 1)) for t in sample_indices(one.steps)]
             stats = get_feature_stats(np.stack(chosen).astype(np.float64), axis=(0, 2, 3), keepdims=True)
             found[name] = {k: v if k == "count" else np.squeeze(v / 255.0, axis=0) for k, v in stats.items()}
         per_episode.append(found)

@@ -14,7 +14,7 @@ from anysim.record.json import dump_json, load_json, plain
 from anysim.task.env import TaskEnv
 from anysim_annotation.capture import Capture
 from anysim_annotation.files import tidied, write_png
-from anysim_annotation.stills.labels import ANNOTATORS, kitti_camera, kitti_line, objects
+from anysim_annotation.stills.labels import ANNOTATORS, coco, kitti_camera, kitti_line, objects
 from anysim_annotation.stills.spec import StillsSpec
 from anysim_film.stage import refuse_unknown_cameras
 from anysim_schemas.load import LoadedRun
@@ -150,7 +150,7 @@ def _draw(
             write_png(where / IMAGES / f"{_stem(number)}.png", colours[row])
             said: dict[str, Any] = {"image": number, "file": f"{_stem(number)}.png", "scene": scene, "seed": seeds[row]}
             said |= {"camera_name": camera, "camera": labels[camera]["camera"].records[row][0]}
-            said["objects"] = objects(labels[camera], row, job)
+            said["objects"] = objects(labels[camera], row, job.least_pixels, job.ignore, job.masks)
             write_whole(where / LABELS, {f"{_stem(number)}.json": dump_json(tidied(plain(said)), "labels")})
             yield number
 
@@ -162,7 +162,7 @@ def _summarise(job: StillsSpec, where: Path) -> None:
     """Write what other programs read, from the labels alone."""
     said = [load_json(where / LABELS / f"{_stem(number)}.json") for number in range(job.images)]
     if "coco" in job.formats:
-        write_whole(where, {COCO_FILE: dump_json(_coco(said), "coco")})
+        write_whole(where, {COCO_FILE: dump_json(coco(said, ("scene", "seed", "camera_name")), "coco")})
     if "kitti" in job.formats:
         for name in ("label_2", "calib"):
             (where / "kitti" / name).mkdir(parents=True, exist_ok=True)
@@ -171,20 +171,3 @@ def _summarise(job: StillsSpec, where: Path) -> None:
             lines = "".join(kitti_line(thing) for thing in one["objects"])
             write_whole(where / "kitti" / "label_2", {f"{stem}.txt": lines})
             write_whole(where / "kitti" / "calib", {f"{stem}.txt": kitti_camera(one["camera"])})
-
-
-def _coco(said: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    kinds = sorted({thing["label"] for one in said for thing in one["objects"]})
-    images, annotations = list[dict[str, Any]](), list[dict[str, Any]]()
-    for one in said:
-        lens = one["camera"]
-        images.append(
-            {"id": one["image"] + 1, "file_name": one["file"], "width": lens["width"], "height": lens["height"]}
-            | {key: one[key] for key in ("scene", "seed", "camera_name")}
-        )
-        for thing in one["objects"]:
-            about = {"id": len(annotations) + 1, "image_id": one["image"] + 1, "iscrowd": 0}
-            about |= {"category_id": kinds.index(thing["label"]) + 1, "segmentation": thing["mask"]}
-            annotations.append(about | {key: thing[key] for key in ("bbox", "area", "name", "occlusion")})
-    categories = [{"id": number, "name": kind} for number, kind in enumerate(kinds, 1)]
-    return {"images": images, "annotations": annotations, "categories": categories}

@@ -1,6 +1,6 @@
 """Labels of one still image, as plain data: what it shows, where, and what it was drawn from."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,21 +9,23 @@ from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim_annotation.api import Labels
 from anysim_annotation.stills.masks import encoded, outlines, run_lengths
-from anysim_annotation.stills.spec import StillsSpec
+from anysim_annotation.stills.spec import Masks
 
 ANNOTATORS = ("boxes_2d", "boxes_3d", "camera", "instance")
 OCCLUDED = (0.1, 0.5)
 """Shares that are hidden from which on KITTI's field `occluded` is 1 and 2."""
 
 
-def objects(labels: Mapping[str, Labels], row: int, job: StillsSpec) -> list[dict[str, Any]]:
-    """The objects of an image, each with its mask."""
+def objects(
+    labels: Mapping[str, Labels], row: int, least_pixels: int, ignore: Sequence[str] = (), masks: Masks = "rle"
+) -> list[dict[str, Any]]:
+    """The objects of an image, each with its mask; those of fewer pixels, or to be ignored, are none."""
     ids = labels["instance"].arrays["instance"][row]
     spaces = {box["id"]: box for box in labels["boxes_3d"].records[row]}
     camera = labels["camera"].records[row][0]
     found: list[dict[str, Any]] = []
     for box in labels["boxes_2d"].records[row]:
-        if box["visible"] < job.least_pixels or {box["name"], box["label"]} & set(job.ignore):
+        if box["visible"] < least_pixels or {box["name"], box["label"]} & set(ignore):
             continue
         mask = ids == box["id"]
         left, top, right, bottom = box["box"]
@@ -33,7 +35,7 @@ def objects(labels: Mapping[str, Labels], row: int, job: StillsSpec) -> list[dic
             "bbox": [left, top, right - left, bottom - top],
             "area": box["visible"],
             "occlusion": box["occlusion"],
-            "mask": _kept(mask, job.masks),
+            "mask": _kept(mask, masks),
         }
         if box["id"] in spaces:
             one |= _in_space(spaces[box["id"]], camera)
@@ -41,7 +43,7 @@ def objects(labels: Mapping[str, Labels], row: int, job: StillsSpec) -> list[dic
     return found
 
 
-def _kept(mask: Array, masks: str) -> dict[str, Any] | list[list[int]]:
+def _kept(mask: Array, masks: Masks) -> dict[str, Any] | list[list[int]]:
     lines = outlines(mask) if masks == "polygons" else None
     return {"size": list(mask.shape), "counts": encoded(run_lengths(mask))} if lines is None else lines
 
@@ -87,3 +89,21 @@ def kitti_camera(camera: Mapping[str, Any]) -> str:
     """The camera as a calibration file of KITTI's, with P2 alone."""
     rows = [value for row in np.array(camera["intrinsics"]) for value in (*row, 0.0)]
     return f"P2: {' '.join(f'{value:.9g}' for value in rows)}\n"
+
+
+def coco(said: Sequence[Mapping[str, Any]], about: Sequence[str]) -> dict[str, Any]:
+    """Images with objects, as COCO's file of instances has them; `about` are keys of an image that it takes along."""
+    kinds = sorted({thing["label"] for one in said for thing in one["objects"]})
+    images, annotations = list[dict[str, Any]](), list[dict[str, Any]]()
+    for number, one in enumerate(said, 1):
+        lens = one["camera"]
+        images.append(
+            {"id": number, "file_name": one["file"], "width": lens["width"], "height": lens["height"]}
+            | {key: one[key] for key in about}
+        )
+        for thing in one["objects"]:
+            label = {"id": len(annotations) + 1, "image_id": number, "iscrowd": 0}
+            label |= {"category_id": kinds.index(thing["label"]) + 1, "segmentation": thing["mask"]}
+            annotations.append(label | {key: thing[key] for key in ("bbox", "area", "name", "occlusion")})
+    categories = [{"id": number, "name": kind} for number, kind in enumerate(kinds, 1)]
+    return {"images": images, "annotations": annotations, "categories": categories}

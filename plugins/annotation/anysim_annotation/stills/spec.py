@@ -7,6 +7,7 @@ from pydantic import Field
 from anysim_schemas.base import Name, Spec
 
 Format = Literal["coco", "kitti"]
+Masks = Literal["rle", "polygons"]
 
 
 class StillsSpec(Spec):
@@ -24,9 +25,7 @@ class StillsSpec(Spec):
     labels: Literal["engine", "geometry"] = Field(
         default="engine", description="where masks and boxes come from: the engine's drawing, or rays"
     )
-    masks: Literal["rle", "polygons"] = Field(
-        default="rle", description="of COCO: run lengths, or outlines where an object shows no hole"
-    )
+    masks: Masks = Field(default="rle", description="of COCO: run lengths, or outlines where an object shows no hole")
     least_pixels: Annotated[int, Field(ge=1)] = Field(default=16, description="a thing that shows fewer is left out")
     ignore: tuple[str, ...] = Field(default=(), description="things, or labels, that are no object of interest")
     batch: Annotated[int, Field(ge=1, le=1024)] = Field(

@@ -198,7 +198,7 @@ class LeRobotExporter(Exporter):
             features[IMAGES + camera] = shown
         return {
             "codebase_version": VERSION,
-            "robot_type": ", ".join(dict.fromkeys(name.partition(".")[0] for name in layout.action)) or None,
+            "robot_type": data.robot or None,
             "total_episodes": len(data.manifests),
             "total_frames": sum(one.steps for one in data.manifests),
             "total_tasks": tasks,

@@ -1,0 +1,194 @@
+"""The exporter `rerun`: a file of each episode, to be looked at with the viewer of Rerun."""
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from anysim.conventions import Array
+from anysim.engine.base import SimEngine
+from anysim.errors import RecordError
+from anysim.record.replay import begin
+from anysim.task.contract import Status
+from anysim.task.env import TaskEnv
+from anysim_export.api import DataSet, Episode, Exporter, take_over
+from anysim_export.envs import env_of
+from anysim_export.rerun.shapes import drawn
+
+RECORDING = "episode.rrd"
+
+
+class RerunExporter(Exporter):
+    """`episodes/000000/episode.rrd`: a world that moves, cameras with their images, curves, and what was said.
+
+    Bodies are at `world/BODY` with their visible shapes in the colours of the episode, cameras at `world/cameras/NAME`,
+    numbers at `reward`, `success`, `action/NAME`, `joint_pos/NAME`, words at `instruction` and `sub_task`. The
+    timelines are `step` and `time`. Rerun gives chunks ids of its own, so equal exports have equal content and not
+    equal bytes.
+    """
+
+    needs: ClassVar[dict[str, str]] = {"rerun": "anysim-export[rerun]"}
+
+    def __init__(
+        self,
+        *,
+        images: Annotated[bool, Field(description="whether the images of cameras are in it")] = True,
+        quality: Annotated[int, Field(ge=1, le=100, description="of the images, as JPEG has it")] = 90,
+        engine: Annotated[str | None, Field(description="that tells where cameras are; None: the recording's")] = None,
+    ) -> None:
+        self._images, self._quality, self._engine = images, quality, engine
+        self._env: tuple[dict[str, Any], TaskEnv] | None = None
+
+    def check(self, data: DataSet) -> None:
+        """Refuse recordings without poses."""
+        if "body_pose" not in data.first.layout.state:
+            raise RecordError("these trajectories do not hold body_pose, and nothing could be seen of them in Rerun")
+
+    def write_episode(self, folder: Path, episode: Episode, data: DataSet) -> None:
+        """The recording of an episode, put together in memory: Rerun does not say where a disk is full."""
+        import rerun as rr  # pyright: ignore[reportMissingImports]
+
+        manifest = episode.manifest
+        engine = self._begun(episode).engine
+        identity = f"{manifest.task}-{manifest.episode_seed}"
+        with rr.RecordingStream("anysim", recording_id=identity, send_properties=False) as stream:
+            sink = stream.binary_stream()
+            stream.send_recording_name(f"{manifest.task}, episode {episode.index}: {manifest.status}")
+            _Log(stream, episode, data.first.control_dt).all(engine, self._quality if self._images else None)
+            content = sink.read(flush=True)
+        stream.disconnect()
+        assert content is not None
+        (folder / RECORDING).write_bytes(content)
+
+    def assemble(self, folder: Path, parts: Sequence[Path], data: DataSet) -> None:
+        """All recordings, side by side."""
+        for i, part in enumerate(parts):
+            take_over(part, folder / "episodes" / f"{i:06d}")
+
+    def close(self) -> None:
+        """Free the engine."""
+        if self._env is not None:
+            self._env[1].close()
+            self._env = None
+
+    def _begun(self, episode: Episode) -> TaskEnv:
+        """An env in which the episode has begun; the last one again where the run is the same."""
+        spec = episode.manifest.spec
+        if self._env is None or self._env[0] != spec:
+            self.close()
+            self._env = spec, env_of(spec, self._engine)
+        begin(self._env[1], episode.manifest)
+        return self._env[1]
+
+
+class _Log:
+    """What is logged of an episode, to one stream."""
+
+    def __init__(self, stream: Any, episode: Episode, control_dt: float) -> None:
+        import rerun as rr  # pyright: ignore[reportMissingImports]
+
+        self._rr, self._stream, self._episode, self._dt = rr, stream, episode, control_dt
+
+    def all(self, engine: SimEngine, quality: int | None) -> None:
+        """Everything; images where their quality is given."""
+        self._stream.log("world", self._rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        self._bodies(engine)
+        for camera in self._episode.manifest.cameras if quality is not None else ():
+            self._camera(engine, camera, quality or 0)
+        self._numbers()
+        self._words("instruction", self._episode.tasks)
+        self._words("sub_task", self._episode.segments)
+
+    def _at(self, steps: Array) -> list[Any]:
+        times = self._rr.TimeColumn("time", duration=steps * self._dt)
+        return [self._rr.TimeColumn("step", sequence=steps), times]
+
+    def _poses(self, path: Any, poses: Array) -> None:
+        """Poses (T+1, 7) of an entity."""
+        columns = self._rr.Transform3D.columns(translation=poses[:, :3], quaternion=poses[:, 3:])
+        self._stream.send_columns(path, indexes=self._at(np.arange(len(poses))), columns=columns)
+
+    def _bodies(self, engine: SimEngine) -> None:
+        world, names = engine.world, self._episode.manifest.layout.bodies
+        colors, present = engine.get_parameters("geom.color")[0], engine.presence[0]
+        for name, poses in zip(names, np.moveaxis(self._episode.states["body_pose"], 1, 0), strict=True):
+            self._poses(_path("world", name), poses)
+        for geom, color in zip(world.geoms, colors, strict=True):
+            body = world.bodies[geom.body].name if geom.body >= 0 else ""
+            if not geom.visible or (body and (not present[world.body_entity[geom.body]] or body not in names)):
+                continue
+            path = _path("world", *([body] if body else []), geom.name)
+            place = self._rr.Transform3D(translation=geom.position, quaternion=geom.quaternion)
+            self._stream.log(path, place, drawn(world, geom.shape, color), static=True)
+
+    def _camera(self, engine: SimEngine, camera: str, quality: int) -> None:
+        """Where it is, its lens, and each of its images when it was taken."""
+        path, bodies = _path("world", "cameras", camera), self._episode.states["body_pose"]
+        views = [engine.camera_view(camera, [0], _in_order(engine, self._episode, row)[None]) for row in bodies]
+        first = views[0]
+        focal = float(first.height / (2 * np.tan(np.radians(first.fov[0]) / 2)))
+        lens = self._rr.Pinhole(
+            focal_length=focal, width=first.width, height=first.height, camera_xyz=self._rr.ViewCoordinates.RDF
+        )
+        self._stream.log(path, lens, static=True)
+        self._poses(path, np.concatenate([view.pose for view in views]))
+        steps, shown = list[int](), list[bytes]()
+        last: Array | None = None
+        for step, image in enumerate(self._episode.images(camera)):
+            if image is not last:
+                steps.append(step)
+                shown.append(_jpeg(image, quality))
+            last = image
+        columns = self._rr.EncodedImage.columns(blob=shown, media_type=["image/jpeg"] * len(shown))
+        self._stream.send_columns(f"{path}/image", indexes=self._at(np.array(steps)), columns=columns)
+
+    def _numbers(self) -> None:
+        """An action is at the step at which it was taken, its reward and what came of it at the next one."""
+        episode, manifest = self._episode, self._episode.manifest
+        taken = np.arange(episode.steps)
+        won = np.where(taken == episode.steps - 1, manifest.status == Status.SUCCESS, False)
+        self._curve("reward", taken + 1, episode.rewards)
+        self._curve("success", taken + 1, won.astype(float))
+        for name, values in zip(manifest.layout.action, episode.actions.T, strict=True):
+            self._curve(_path("action", name), taken, values)
+        if "joint_pos" in episode.states:
+            for name, values in zip(manifest.layout.joints, episode.states["joint_pos"].T, strict=True):
+                self._curve(_path("joint_pos", name), np.arange(episode.steps + 1), values)
+
+    def _curve(self, path: str, steps: Array, values: Array) -> None:
+        columns = self._rr.Scalars.columns(scalars=values)
+        self._stream.send_columns(path, indexes=self._at(steps), columns=columns)
+
+    def _words(self, path: str, said: Sequence[str]) -> None:
+        """Words at the steps from which on they held."""
+        steps = [t for t, one in enumerate(said) if t == 0 or one != said[t - 1]]
+        columns = self._rr.TextLog.columns(text=[said[t] for t in steps])
+        self._stream.send_columns(path, indexes=self._at(np.array(steps)), columns=columns)
+
+
+def _path(*parts: str) -> str:
+    """A path of entities; what is no letter in a name is escaped."""
+    import rerun as rr  # pyright: ignore[reportMissingImports]
+
+    return rr.new_entity_path(list(parts))
+
+
+def _in_order(engine: SimEngine, episode: Episode, poses: Array) -> Array:
+    """Recorded poses (R, 7) for the bodies of an engine's world; one that was not recorded stands where it is now."""
+    names = episode.manifest.layout.bodies
+    rows = engine.get_state().body_pose[0].copy()
+    for i, body in enumerate(engine.world.bodies):
+        if body.name in names:
+            rows[i] = poses[names.index(body.name)]
+    return rows
+
+
+def _jpeg(image: Array, quality: int) -> bytes:
+    from PIL import Image
+
+    packed = io.BytesIO()
+    Image.fromarray(image).save(packed, "jpeg", quality=quality)
+    return packed.getvalue()
