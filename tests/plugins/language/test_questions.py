@@ -23,8 +23,19 @@ from anysim_language.questions.past import Past
 from anysim_language.questions.question import Question
 
 CLUTTER = Path(__file__).with_name("clutter.yaml")
-OF_SCENES = {"count", "exist", "colour", "support", "supported", "spatial", "nearest", "superlative", "visibility"}
-OF_RECORDINGS = {"order", "changed", "opened", "next"}
+OF_SCENES = {
+    "count",
+    "exist",
+    "colour",
+    "support",
+    "supported",
+    "spatial",
+    "nearest",
+    "superlative",
+    "visibility",
+    "reachability",
+}
+OF_RECORDINGS = {"order", "changed", "opened", "next", "counterfactual"}
 
 
 def counted(episodes: list, steps: list[int]) -> tuple[Counter[str], list[Question]]:
