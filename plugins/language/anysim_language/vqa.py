@@ -91,13 +91,14 @@ def write_questions(
     Raises:
         RecordError: two trajectories would have one name, or `out` is no directory.
     """
-    names = {f"{path.resolve().parent.parent.name}-{path.resolve().name}": path for path in trajectories}
-    if len(names) < len(trajectories):
-        twice = next(path for path in trajectories if path not in names.values())
-        raise RecordError(
-            f"the questions about {twice} would have the names of those about another trajectory, of a run that is "
-            "called the same; rename one of the two runs, or ask about them into two directories"
-        )
+    names: dict[str, Path] = {}
+    for path in trajectories:
+        name = f"{path.resolve().parent.parent.name}-{path.resolve().name}"
+        if names.setdefault(name, path).resolve() != path.resolve():
+            raise RecordError(
+                f"{path} and {names[name]} are of runs that are called the same, as their questions would be; "
+                "rename one of the two runs, or ask about them into two directories"
+            )
     if out.exists() and not out.is_dir():
         raise RecordError(f"{out} is no directory; --out is the directory that questions and images are written to")
     (out / PARTS).mkdir(parents=True, exist_ok=True)

@@ -3,12 +3,11 @@
 from collections.abc import Iterator, Mapping
 from contextlib import closing
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from anysim.cli import main
 from anysim.errors import RecordError
 from anysim.model.world import World
 from anysim_language.check.answers import Checker
@@ -26,13 +25,8 @@ IN_HAND = 130
 
 
 @pytest.fixture(scope="module")
-def stacking(tmp_path_factory: pytest.TempPathFactory) -> Episode:
-    """A recorded episode in which a cube is put on another one."""
-    out = tmp_path_factory.mktemp("runs") / "stack"
-    main._join_commands()
-    words = ["run", "stack_cube", "-k", "1", "-s", "1", "-o", "record.cameras=[]", "--out", str(out)]
-    assert CliRunner().invoke(main.app, words).exit_code == 0
-    return recorded(next((out / "episodes").iterdir()))
+def stacking(stacked: Path) -> Episode:
+    return recorded(stacked)
 
 
 @pytest.fixture(scope="module")
