@@ -67,6 +67,7 @@ class Episode:
         status: how it ended; empty for one that has only begun.
         vocabulary: the words.
         reader: of the recording; None where there is none.
+        base: the folder of the recorded file, where its world has assets with relative paths.
     """
 
     name: str
@@ -86,6 +87,7 @@ class Episode:
     status: str
     vocabulary: Vocabulary
     reader: TrajectoryReader | None = None
+    base: Path | None = None
 
     def moment(self, step: int) -> Moment:
         """The things at a control step; 0 is right after the reset, and -1 the last one."""
@@ -138,7 +140,7 @@ def recorded(trajectory: Path, base: Path | None = None) -> Episode:
         begin(env, manifest)
         poses = _rows(manifest, reader, "body_pose", [b.name for b in env.engine.world.bodies], manifest.layout.bodies)
         joints = _rows(manifest, reader, "joint_pos", [j.name for j in env.engine.world.joints], manifest.layout.joints)
-        return _episode(env, loaded, manifest.task, manifest.episode_seed, poses, joints, reader)
+        return _episode(env, loaded, manifest.task, manifest.episode_seed, poses, joints, reader, base)
 
 
 def _rows(manifest: Manifest, reader: TrajectoryReader, field: str, here: Sequence[str], there: Sequence[str]) -> Array:
@@ -158,6 +160,7 @@ def _episode(
     poses: Array,
     joints: Array,
     reader: TrajectoryReader | None = None,
+    base: Path | None = None,
 ) -> Episode:
     world, words = env.engine.world, vocabulary()
     things = things_of(env.engine, words.words)
@@ -179,6 +182,7 @@ def _episode(
         status="" if reader is None else reader.manifest.status,
         vocabulary=words,
         reader=reader,
+        base=base,
     )
 
 

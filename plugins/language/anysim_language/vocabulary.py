@@ -58,6 +58,8 @@ class VocabularySpec(Spec):
     scene: dict[str, Phrasings] = Field(default_factory=dict, description="sentences about a scene")
     events: dict[str, Phrasings] = Field(default_factory=dict, description="sentences about what happens")
     questions: dict[str, Phrasings] = Field(default_factory=dict, description="questions by family")
+    changes: dict[str, Phrasings] = Field(default_factory=dict, description="clauses about what may be done otherwise")
+    outcomes: dict[str, Word] = Field(default_factory=dict, description="clauses about what would come of it")
 
 
 class Vocabulary(NamedTuple):

@@ -8,6 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from anysim.conventions import Array
+from anysim_language.check.forks import ForkedAgain
+from anysim_language.check.reach import reaches
 from anysim_language.check.resolve import resolve
 from anysim_language.check.scene import RawScene, colour_of
 from anysim_language.check.sight import seen_share
@@ -27,6 +29,7 @@ class Checker:
     def __init__(self, episode: Episode) -> None:
         self.episode = episode
         self._scenes: dict[int, RawScene] = {}
+        self._forks: ForkedAgain | None = None
         self._under: dict[tuple[int, str], tuple[str, str] | None] = {}
         viewer = next((thing for thing in episode.things if thing.robot), None)
         self.origin, self.forward = np.zeros(3), np.array([1.0, 0.0, 0.0])
@@ -44,10 +47,25 @@ class Checker:
                 return False
         return _FAMILIES[question.family](self, question, question.program)
 
+    @property
+    def forks(self) -> ForkedAgain:
+        """The engine of the recording, begun anew; made where it is first needed."""
+        self._forks = self._forks or ForkedAgain(self.episode)
+        return self._forks
+
+    def close(self) -> None:
+        """Free the engine."""
+        if self._forks is not None:
+            self._forks.close()
+            self._forks = None
+
     def scene(self, step: int) -> RawScene:
         """The raw numbers of a control step."""
         if step not in self._scenes:
-            self._scenes = {step: RawScene(self.episode.world, self.episode.body_pose[step])}
+            scene = RawScene(self.episode.world, self.episode.body_pose[step])
+            for before in self._scenes.values():
+                scene.take_over(before)
+            self._scenes = {step: scene}
         return self._scenes[step]
 
     def thing(self, name: str) -> Thing:
@@ -190,6 +208,12 @@ def _visibility(checker: Checker, question: Question, program: Mapping[str, Any]
     return question.answer == ("yes" if share > 0.15 else "no")
 
 
+def _reachability(checker: Checker, question: Question, program: Mapping[str, Any]) -> bool:
+    robot = next(robot for robot in checker.episode.world.robots if robot.name == program["robot"])
+    place = checker.middle(question.step, program["thing"])
+    return question.answer == ("yes" if reaches(checker.episode, question.step, robot, place) else "no")
+
+
 def _order(checker: Checker, question: Question, program: Mapping[str, Any]) -> bool:
     steps = [first_step(checker.episode, *program[key]) for key in "ab"]
     if any(step is None for step in steps):
@@ -236,6 +260,11 @@ def _next(checker: Checker, question: Question, program: Mapping[str, Any]) -> b
     return next_doing(checker.episode, question.step) == (program["step"], program["kind"], program["what"])
 
 
+def _counterfactual(checker: Checker, question: Question, program: Mapping[str, Any]) -> bool:
+    outcome = checker.forks.outcome(question.step, program)
+    return outcome == program["outcome"] and question.answer == checker.episode.vocabulary.words.outcomes[outcome]
+
+
 _FAMILIES: Mapping[str, Callable[[Checker, Question, Mapping[str, Any]], bool]] = {
     "count": _count,
     "exist": _exist,
@@ -247,8 +276,10 @@ _FAMILIES: Mapping[str, Callable[[Checker, Question, Mapping[str, Any]], bool]] 
     "nearest": _nearest,
     "superlative": _superlative,
     "visibility": _visibility,
+    "reachability": _reachability,
     "order": _order,
     "changed": _changed,
     "opened": _opened,
     "next": _next,
+    "counterfactual": _counterfactual,
 }

@@ -16,9 +16,16 @@ class RawScene:
 
     def __init__(self, world: World, poses: Array) -> None:
         self.world, self.poses = world, poses
-        self._made: dict[int, tuple[Array, Array]] = {}
+        self.made: dict[int, tuple[Array, Array]] = {}
+        """Vertices and faces by body."""
         self.splats: dict[tuple[str, int], Array] = {}
-        """What `check.sight` has drawn of a body, by camera."""
+        """What `check.sight` has drawn of a body, by camera that stands still."""
+
+    def take_over(self, other: "RawScene") -> None:
+        """What another scene has made of the bodies that stand where they stand there."""
+        same = (self.poses == other.poses).all(axis=1)
+        self.made |= {body: made for body, made in other.made.items() if same[body]}
+        self.splats |= {key: drawn for key, drawn in other.splats.items() if same[key[1]]}
 
     def bodies(self, entity: int, base_only: bool = False) -> list[int]:
         """The bodies of an entity by its number; the first alone where only its base counts."""
@@ -27,17 +34,17 @@ class RawScene:
 
     def triangles(self, body: int) -> tuple[Array, Array]:
         """(V, 3) vertices [m] and (F, 3) faces of what a body collides with, else of what is seen of it."""
-        if body not in self._made:
+        if body not in self.made:
             own = [g for g in self.world.geoms if g.body == body and not is_ground(g.shape)]
             parts = [self._geom(geom, body) for geom in [g for g in own if g.collides] or own]
             points = [part[0] for part in parts]
             starts = np.cumsum([0, *(len(part) for part in points)])
             faces = [part[1] + start for part, start in zip(parts, starts, strict=False)]
-            self._made[body] = (
+            self.made[body] = (
                 np.concatenate([np.empty((0, 3)), *points]),
                 np.concatenate([np.empty((0, 3), dtype=int), *faces]),
             )
-        return self._made[body]
+        return self.made[body]
 
     def _geom(self, geom: Geom, body: int) -> tuple[Array, Array]:
         if isinstance(geom.shape, MeshShape):
@@ -64,7 +71,7 @@ class RawScene:
         return (low + high) / 2.0
 
     def hits(self, body: int, start: Array, towards: Array) -> Array:
-        """Distances along a ray at which it meets a body's triangles, sorted; in lengths of `towards`."""
+        """Distances along a ray at which it meets a body's triangles from outside, sorted; in lengths of `towards`."""
         points, faces = self.triangles(body)
         if not len(faces):
             return np.empty(0)
@@ -74,7 +81,7 @@ class RawScene:
         with np.errstate(divide="ignore", invalid="ignore"):
             t = np.where(np.abs(along) > 1e-15, np.einsum("ij,ij->i", normal, a - start) / along, np.nan)
         at = start + np.nan_to_num(t, nan=-1.0)[:, None] * towards
-        inside = np.isfinite(t) & (t >= 0.0)
+        inside = np.isfinite(t) & (t >= 0.0) & (along < 0.0)
         for first, second in ((a, b), (b, c), (c, a)):
             inside &= np.einsum("ij,ij->i", np.cross(second - first, at - first), normal) >= -1e-12
         return np.sort(t[inside])

@@ -1,19 +1,23 @@
 """All questions about an episode, each verified before it is given out."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing
 from typing import NamedTuple
 
 from anysim_language.check.answers import Checker
 from anysim_language.choice import number
 from anysim_language.episode import Episode
+from anysim_language.questions.forks import Fork
+from anysim_language.questions.otherwise import about_forks
 from anysim_language.questions.past import Past
 from anysim_language.questions.places import about_places
 from anysim_language.questions.question import Asker, Question
+from anysim_language.questions.reach import about_reach
 from anysim_language.questions.sight import about_sight
 from anysim_language.questions.things import about_things
 from anysim_language.questions.times import about_time
 
-FAMILIES = (about_things, about_places, about_sight, about_time)
+FAMILIES = (about_things, about_places, about_sight, about_reach, about_time, about_forks)
 
 
 class Verdict(NamedTuple):
@@ -30,12 +34,15 @@ def questions_at(past: Past, step: int) -> Iterator[Question]:
         yield from family(asker)
 
 
-def verified(episode: Episode, steps: Sequence[int], seed: int = 0) -> Iterator[Verdict]:
-    """All questions about some control steps, each with the checker's verdict."""
-    checker, past = Checker(episode), Past(episode, seed)
-    for step in steps:
-        for question in questions_at(past, step):
-            yield Verdict(question, checker.verify(question))
+def verified(
+    episode: Episode, steps: Sequence[int], seed: int = 0, forks: Mapping[int, Sequence[Fork]] | None = None
+) -> Iterator[Verdict]:
+    """All questions about some control steps, each with the checker's verdict; `forks` are those of `forked`."""
+    past = Past(episode, seed, forks)
+    with closing(Checker(episode)) as checker:
+        for step in steps:
+            for question in questions_at(past, step):
+                yield Verdict(question, checker.verify(question))
 
 
 def chosen(found: Sequence[Question], most: int, seed: int = 0) -> list[Question]:

@@ -1,20 +1,25 @@
 """The past of an episode: what happened in it, found once for all of its moments."""
 
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 from anysim_language.changes import Change, changes
 from anysim_language.episode import Episode
 from anysim_language.narration import Sentence, narration
+from anysim_language.questions.forks import Fork
 
 PHRASES = {"lifted": "{} is lifted", "opened": "{} is opened", "closed": "{} is closed"}
 """Kinds of changes that may be asked about, as clauses."""
 
 
 class Past:
-    """The changes and deeds of an episode; `seed` chooses among phrasings."""
+    """The changes and deeds of an episode; `seed` chooses among phrasings.
 
-    def __init__(self, episode: Episode, seed: int) -> None:
-        self.episode, self.seed = episode, seed
+    `forks` are those of control steps at which it may be asked what would be otherwise.
+    """
+
+    def __init__(self, episode: Episode, seed: int, forks: Mapping[int, Sequence[Fork]] | None = None) -> None:
+        self.episode, self.seed, self.forks = episode, seed, forks or {}
 
     @cached_property
     def firsts(self) -> tuple[Change, ...]:
