@@ -309,7 +309,8 @@ def make(
         base: the folder that relative asset paths are relative to; that of the file where there is one.
         proposals: poses of objects that come from outside: a mapping, a JSON file, or a callable that takes a
             `anysim.placement.proposals.Request` and gives one; wins over `world.layout_source` of the file.
-        curriculum: whether `task.curriculum` is followed, as learners do; otherwise all spreads are whole.
+        curriculum: whether `task.curriculum` and that of tiles are followed, as learners do; otherwise all spreads are
+            whole, and each episode draws its tile.
         strict_observers: an observer that raises ends the run; otherwise it is told once and counted.
 
     Raises:
@@ -341,9 +342,8 @@ def make(
         others.append(f"engine={_as_text(engine)}")
     if others:
         loaded = _loaded(source, [*more, *others])
-    if loaded.spec.task is not None and not curriculum:
-        whole_spread = loaded.spec.task.model_copy(update={"curriculum": None})
-        loaded = replace(loaded, spec=loaded.spec.model_copy(update={"task": whole_spread}))
+    if not curriculum:
+        loaded = replace(loaded, spec=loaded.spec.without_curricula())
     spec = loaded.spec
     if spec.task is None:  # before the world is built
         raise TaskError(f"{loaded.files[-1]}: {NO_TASK}" if loaded.files else NO_TASK)

@@ -107,3 +107,14 @@ class RunSpec(Spec):
                 words = f"there is no sensor '{name}' (sensors: {listing(list(sensors))})"
                 raise KeyFault(words, "record", "sensors", str(place))
         return self
+
+    def without_curricula(self) -> Self:
+        """The same for who learns nothing: values are drawn from their whole spread, and tiles of all levels."""
+        task = None if self.task is None else self.task.model_copy(update={"curriculum": None})
+        terrain = self.world.terrain
+        if terrain.tiling.choose == "draw":
+            return self.model_copy(update={"task": task})
+        drawn = terrain.model_copy(
+            update={"tiles": terrain.tiling.model_copy(update={"choose": "draw", "start": None})}
+        )
+        return self.model_copy(update={"task": task, "world": self.world.model_copy(update={"terrain": drawn})})

@@ -31,7 +31,7 @@ CURRICULUM = "world.terrain.tiles.choose=curriculum"
 
 
 def env_of(num_envs: int, *overrides: str, **more: Any) -> TaskEnv:
-    return anysim.make(TILES, num_envs=num_envs, overrides=overrides, **more)
+    return anysim.make(TILES, num_envs=num_envs, overrides=overrides, **{"curriculum": True, **more})
 
 
 def terrain(env: TaskEnv) -> TerrainManager:
@@ -87,6 +87,57 @@ def test_levels_are_kept_promoted_demoted_and_drawn_anew_at_the_top() -> None:
         env.reset()
         assert len(np.unique(manager.level)) == 4, "an env that has mastered the last level gets any"
         assert all("terrain/level" in draws for draws in env.streams.draws)
+
+
+def test_an_env_of_a_curriculum_keeps_its_kind_of_ground() -> None:
+    """So that its level is one of that kind; columns come by their weights over envs."""
+    with env_of(
+        200, CURRICULUM, "world.robots={}", "task.observations.policy=[last_action]", "world.cameras={}"
+    ) as env:
+        env.reset(seed=1)
+        manager = terrain(env)
+        column = manager.column.copy()
+        assert 0.65 < (column == 1).mean() < 0.85
+        for _ in range(3):
+            manager.promote(np.arange(200), 3)  # most of them past the last level
+            env.reset()
+            assert (manager.column == column).all()
+        assert [d["terrain/kind"] for d in env.streams.draws] == [("slopes", "stairs")[c] for c in column]
+        assert [(d["terrain/level"], d["terrain/column"]) for d in env.streams.draws] == list(
+            zip(manager.level.tolist(), column.tolist(), strict=True)
+        )
+        tile = manager.tile(7)
+        assert (tile.row, tile.column) == (manager.level[7], column[7])
+        assert tile.origin == tuple(env.scene.origin[7])
+
+
+def test_who_does_not_learn_meets_all_levels_and_climbs_none() -> None:
+    """An episode of an evaluation depends on its seed alone, not on the episodes of its env before."""
+    event = "task.events.climb={frame: panda, promote: 0.0, demote: 0.0, term: climb_levels, when: step}"
+    with env_of(40, CURRICULUM, "world.terrain.tiles.start=0", event, curriculum=False) as env:
+        env.reset(seed=1)
+        manager = terrain(env)
+        assert set(manager.level) == {0, 1, 2, 3}
+        seeds, origin = env.streams.episode_seed.copy(), env.scene.origin.copy()
+        env.step(np.zeros((40, env.action_dim)))
+        env.reset()
+        env.reset(episode_seeds=seeds[::-1])
+        assert (env.scene.origin == origin[::-1]).all()
+        with pytest.raises(TaskError, match="curriculum=True"):
+            manager.promote(np.array([0]))
+        tiles = env.spec.world.terrain.tiling
+        assert (tiles.choose, tiles.start) == ("draw", None)
+
+
+def test_robots_start_on_the_platform_of_their_tile_with_a_spread() -> None:
+    spread = "world.robots.panda.position={range: [[-0.8, -0.8, 0.0], [0.8, 0.8, 0.0]]}"
+    with env_of(30, spread, "world.terrain.tiles.columns=[pits]") as env:
+        env.reset(seed=0)
+        base = env.engine.get_state().body_pose[:, env.engine.index.body("panda"), :3]
+        assert base[:, 2] == pytest.approx(env.engine.world.ground.heights_at(base), abs=1e-6)
+        away = (base - env.scene.origin)[:, :2]
+        assert np.abs(away).max() <= 0.8
+        assert (away.std(axis=0) > 0.3).all()
 
 
 def test_snapshots_hold_level_and_origin() -> None:
@@ -206,13 +257,14 @@ def test_the_look_of_a_room_is_drawn_and_its_form_is_not() -> None:
 def test_a_replay_stands_on_the_level_that_the_record_says() -> None:
     """By the record's draws alone: another env, which has climbed nothing."""
     with env_of(1, CURRICULUM, "world.terrain.tiles.start=0") as env, env_of(1, CURRICULUM) as other:
-        env.reset(seed=0)
+        env.reset(seed=5)
         terrain(env).promote(np.array([0]), 2)
         env.reset()
         drawn, seed = dict(env.streams.draws[0]), env.streams.episode_seed.copy()
         assert terrain(env).level.tolist() == [2]
         assert drawn["terrain/level"] == 2.0
         other.reset(seed=1)
+        assert terrain(other).column != terrain(env).column
         for manager in other.managers:
             manager.recall(0, drawn)
         other.reset(episode_seeds=seed)

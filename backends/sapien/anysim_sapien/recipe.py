@@ -15,6 +15,7 @@ from anysim.model.world import BodyKind, Joint, World
 from anysim_mechanics.collision_groups import Copy
 from anysim_mechanics.layout import Layout
 from anysim_mechanics.meeting import Meeting
+from anysim_sapien.large_ground import ground_files
 from anysim_sapien.options import SapienOptions
 from anysim_sapien.packing import Packing
 from anysim_sapien.shapes import to_pose
@@ -52,6 +53,7 @@ class Recipes:
         self._made = lru_cache(maxsize=_KEPT)(self._make)
         self.copies = lru_cache(maxsize=_KEPT + num_envs)(_copies)
         """Shapes for (a `Meeting`, friction, restitution), the latter two as bytes."""
+        self.ground_files = ground_files(world)
         _check(world)
 
     def of(self, present: Array) -> "Recipe":

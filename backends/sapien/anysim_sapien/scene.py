@@ -89,9 +89,8 @@ class EnvScene(SceneParts):
         recipe = self.recipe
         for index in recipe.geoms_on.get(body, ()):
             for copy in self.copies[index]:
-                shape = make_shape(
-                    recipe.world, recipe.world.geoms[index], copy, recipe.groups.get(body, Group()), recipe.options
-                )
+                geom, group = recipe.world.geoms[index], recipe.groups.get(body, Group())
+                shape = make_shape(recipe.world, geom, copy, group, recipe.options, recipe.common.ground_files)
                 component.attach(shape)
                 self.shapes[index].append(shape)
         entity = sapien.Entity()

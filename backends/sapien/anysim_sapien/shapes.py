@@ -1,5 +1,6 @@
 """Geoms as PhysX shapes. Every shape has a material of its own: SAPIEN's default one is shared by all bodies."""
 
+from collections.abc import Mapping
 from math import sqrt
 from typing import Any
 
@@ -17,6 +18,7 @@ from anysim.model.world import (
     HeightFieldShape,
     MeshShape,
     Plane,
+    Shape,
     Sphere,
     World,
 )
@@ -44,8 +46,10 @@ def to_pose(pose: Array) -> Any:
     return sapien.Pose(pose[:3], wxyz_from_xyzw(pose[3:]))
 
 
-def make_shape(world: World, geom: Geom, copy: Copy, group: Group, options: SapienOptions) -> Any:
-    """One PhysX shape of a geom.
+def make_shape(
+    world: World, geom: Geom, copy: Copy, group: Group, options: SapienOptions, files: Mapping[str, str]
+) -> Any:
+    """One PhysX shape of a geom; of large ground from its file, by the geom's name.
 
     Raises:
         EngineError: PhysX cannot make it.
@@ -53,7 +57,7 @@ def make_shape(world: World, geom: Geom, copy: Copy, group: Group, options: Sapi
     friction, restitution = copy.touch
     material = physx.PhysxMaterial(friction, friction, restitution)
     try:
-        shape = _shape(world, geom, material)
+        shape = _shape(world, geom, material, files)
     except RuntimeError as error:
         raise EngineError(f"PhysX cannot make the shape of geom '{geom.name}': {error}") from error
     turn = np.asarray(geom.quaternion, dtype=float)
@@ -71,7 +75,12 @@ def make_shape(world: World, geom: Geom, copy: Copy, group: Group, options: Sapi
     return shape
 
 
-def _shape(world: World, geom: Geom, material: Any) -> Any:
+def _shape(world: World, geom: Geom, material: Any, files: Mapping[str, str]) -> Any:
+    if geom.name in files:
+        return physx.PhysxCollisionShapeTriangleMesh(files[geom.name], UNIT_SCALE, material)
+    ground = ground_triangles(world, geom.shape)
+    if ground is not None:
+        return physx.PhysxCollisionShapeTriangleMesh(*ground, UNIT_SCALE, material)
     match geom.shape:
         case Plane():
             return physx.PhysxCollisionShapePlane(material)
@@ -83,17 +92,22 @@ def _shape(world: World, geom: Geom, material: Any) -> Any:
             return physx.PhysxCollisionShapeCapsule(radius, half_length, material)
         case Cylinder(radius, half_length):
             return physx.PhysxCollisionShapeCylinder(radius, half_length, material)
-        case MeshShape(name, concave):
+        case MeshShape(name):
+            return convex(next(mesh for mesh in world.meshes if mesh.name == name), material)
+        case HeightFieldShape():
+            raise AssertionError("a height field is ground")
+
+
+def ground_triangles(world: World, shape: Shape) -> tuple[Array, Array] | None:
+    """Vertices (V, 3) float32 and triangles (T, 3) uint32 of a concave mesh or a height field; None of other shapes."""
+    match shape:
+        case MeshShape(name, concave=True):
             mesh = next(mesh for mesh in world.meshes if mesh.name == name)
-            if concave:
-                triangles = np.asarray(mesh.faces, dtype=np.uint32)
-                vertices = np.asarray(mesh.vertices, dtype=np.float32)
-                return physx.PhysxCollisionShapeTriangleMesh(vertices, triangles, UNIT_SCALE, material)
-            return convex(mesh, material)
+            return np.asarray(mesh.vertices, dtype=np.float32), np.asarray(mesh.faces, dtype=np.uint32)
         case HeightFieldShape(name):
-            field = next(field for field in world.heightfields if field.name == name)
-            vertices, triangles = relief(field)
-            return physx.PhysxCollisionShapeTriangleMesh(vertices, triangles, UNIT_SCALE, material)
+            return relief(next(field for field in world.heightfields if field.name == name))
+        case _:
+            return None
 
 
 def relief(field: HeightField) -> tuple[Array, Array]:

@@ -1,8 +1,8 @@
 """TerrainManager: on which piece of ground an env stands, and what ground and room look like in this episode.
 
-With `choose: curriculum` each env keeps its level over episodes. What judges progress calls `promote` or `demote`;
-that takes effect at the env's next reset. An env that has mastered the last level gets one of all levels, by its
-streams, so that it does not forget the easy ones.
+With `choose: curriculum` each env keeps its column for good, and its level until what judges progress calls `promote`
+or `demote`; that takes effect at the env's next reset. An env that has mastered the last level gets one of all levels,
+by its streams, so that it does not forget the easy ones.
 """
 
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from anysim.engine.snapshots.row_checks import refuse_range
 from anysim.errors import TaskError
 from anysim.managers.base import Manager
 from anysim.model.appearance import rgb
-from anysim.model.world import World
+from anysim.model.world import Tile, World
 from anysim.randomization.draw import draw, is_random
 from anysim.randomization.streams import Origin
 from anysim_schemas.rooms import furniture_names
@@ -61,8 +61,8 @@ def _looks(spec: WorldSpec, world: World) -> list[DrawnColor]:
     return [DrawnColor(c, s, p, np.array(g)) for c, s, p, g in parts if is_random(c) and g]
 
 
-LEVEL = "terrain/level"
-"""The stream of a tile's row, and the name under which recordings keep it."""
+LEVEL, COLUMN, KIND = "terrain/level", "terrain/column", "terrain/kind"
+"""The streams of a tile's row and column, and the names under which recordings keep them and what the column is."""
 
 
 class TerrainManager(Manager):
@@ -84,7 +84,7 @@ class TerrainManager(Manager):
         self.column = np.zeros(n, dtype=int)
         """(N,) the column of each env's tile."""
         self._change = np.zeros(n, dtype=int)
-        self._recalled: dict[int, int] = {}
+        self._recalled: dict[int, tuple[int, int]] = {}
         self._looks = _looks(self.spec.world, world)
 
     def bind(self, engine: SimEngine) -> None:
@@ -95,6 +95,15 @@ class TerrainManager(Manager):
 
     # ------------------------------------------------------------------ curriculum
 
+    @property
+    def climbs(self) -> bool:
+        """Whether envs have levels of their own; otherwise each episode draws one, if there are tiles."""
+        return self.tiled and self._spec.tiling.choose == "curriculum"
+
+    def tile(self, env: int) -> Tile:
+        """The tile on which an env stands."""
+        return self.engine.world.tiles[self.level[env] * self.columns + self.column[env]]
+
     def promote(self, env_ids: Array, by: int | Array = 1) -> None:
         """From their next reset on, these envs stand on ground that is `by` levels harder (one number, or one each).
 
@@ -103,9 +112,10 @@ class TerrainManager(Manager):
         Raises:
             TaskError: the terrain has no curriculum.
         """
-        if not (self.tiled and self._tiling.choose == "curriculum"):
+        if not self.climbs:
             raise TaskError(
-                "the ground has no levels to climb; world.terrain needs `kind: tiles` and `tiles: {choose: curriculum}`"
+                "the ground has no levels to climb; world.terrain needs `kind: tiles` and `tiles: {choose: "
+                "curriculum}`, and anysim.make `curriculum=True`"
             )
         self._change[env_ids] = by
 
@@ -114,9 +124,9 @@ class TerrainManager(Manager):
         self.promote(env_ids, -by)
 
     def recall(self, env: int, drawn: Mapping[str, Any]) -> None:
-        """A level of a curriculum follows from earlier episodes; the record of this one says it."""
-        if self.tiled and LEVEL in drawn:
-            self._recalled[env] = min(int(drawn[LEVEL]), self.rows - 1)
+        """A tile of a curriculum follows from earlier episodes; the record of this one says it."""
+        if self.climbs and LEVEL in drawn:
+            self._recalled[env] = min(int(drawn[LEVEL]), self.rows - 1), min(int(drawn[COLUMN]), self.columns - 1)
 
     # ------------------------------------------------------------------ lifecycle
 
@@ -131,25 +141,24 @@ class TerrainManager(Manager):
             self.engine.set_parameters("geom.color", np.repeat(rows, len(look.geoms), axis=1), env_ids, look.geoms)
 
     def _choose(self, env: int) -> None:
-        path = "world.terrain.tiles"
-        self.column[env] = draw(self._columns, "terrain/column", self.streams, env, source=f"{path}.columns")
-        wanted = self.level[env] + self._change[env]
-        recalled = self._recalled.pop(env, None)
-        if self._tiling.choose == "curriculum" and recalled is not None:
-            self.level[env] = self._kept_level(env, recalled)
-        elif self._tiling.choose == "draw" or wanted >= self.rows:
-            self.level[env] = self._drawn_level(env, self.rows - 1, f"{path}.rows")
-        elif self.level[env] == NEVER:
-            top = self.rows - 1 if self._tiling.start is None else self._tiling.start
-            self.level[env] = self._drawn_level(env, top, f"{path}.start")
+        path, first = "world.terrain.tiles", self.level[env] == NEVER or not self.climbs
+        wanted, self._change[env] = self.level[env] + self._change[env], 0
+        if env in self._recalled:
+            self.level[env], self.column[env] = self._recalled.pop(env)
         else:
-            self.level[env] = self._kept_level(env, max(0, wanted))
-        self._change[env] = 0
-
-    def _kept_level(self, env: int, level: int) -> int:
-        """A level that is not drawn, noted like one that is."""
-        self.streams.note(env, LEVEL, float(level), Origin("", "world.terrain.tiles.choose"))
-        return level
+            if first:
+                self.column[env] = draw(self._columns, COLUMN, self.streams, env, source=f"{path}.columns")
+            if self.climbs and first:
+                top = self.rows - 1 if self._tiling.start is None else self._tiling.start
+                self.level[env] = self._drawn_level(env, top, f"{path}.start")
+            elif first or wanted >= self.rows:
+                self.level[env] = self._drawn_level(env, self.rows - 1, f"{path}.rows")
+            else:
+                self.level[env] = max(0, wanted)
+        for name, kept in ((LEVEL, float(self.level[env])), (COLUMN, float(self.column[env]))):
+            if name not in self.streams.draws[env]:
+                self.streams.note(env, name, kept, Origin("", f"{path}.choose"))
+        self.streams.note(env, KIND, self.tile(env).kind, Origin("", f"{path}.columns"))
 
     def _drawn_level(self, env: int, top: int, source: str) -> int:
         levels: Any = Choice[float](choice=tuple(map(float, range(top + 1))))

@@ -36,18 +36,20 @@ class FieldGround:
 
     def heights_at(self, points: Array) -> Array:
         """See `Relief`."""
-        at = (points + self._half) / self._step
-        inside = ((at >= -1e-9) & (at <= self._last + 1e-9)).all(axis=-1)
-        return np.where(inside, self._height(np.clip(at, 0, self._last)), -np.inf)
+        u, v = ((points[..., k] + self._half[k]) / self._step[k] for k in (0, 1))
+        right, back = self._last
+        inside = (u >= -1e-9) & (u <= right + 1e-9) & (v >= -1e-9) & (v <= back + 1e-9)
+        return np.where(inside, self._height(np.clip(u, 0, right), np.clip(v, 0, back)), -np.inf)
 
-    def _height(self, at: Array) -> Array:
-        """Heights at places (..., 2) counted in cells."""
-        j = np.minimum(at[..., 0].astype(int), self._last[0] - 1)
-        i = np.minimum(at[..., 1].astype(int), self._last[1] - 1)
-        t, s = at[..., 0] - j, at[..., 1] - i
-        h = self._h
-        a, c = h[i, j], h[i + 1, j + 1]
-        middle = np.where(t >= s, h[i, j + 1], h[i + 1, j])  # the corner off the common edge
+    def _height(self, u: Array, v: Array) -> Array:
+        """Heights at places along x and y, counted in cells."""
+        j = np.minimum(u.astype(int), self._last[0] - 1)
+        i = np.minimum(v.astype(int), self._last[1] - 1)
+        t, s = u - j, v - i
+        h, stride = self._h.reshape(-1), self._h.shape[1]
+        corner = i * stride + j
+        a, c = h.take(corner), h.take(corner + stride + 1)
+        middle = h.take(corner + np.where(t >= s, 1, stride))  # the corner off the common edge
         far, near = np.maximum(t, s), np.minimum(t, s)
         return a + far * (middle - a) + near * (c - middle)
 
@@ -64,7 +66,7 @@ class FieldGround:
         for y in (a[1], b[1]):
             x = y + np.arange(np.ceil(a[0] - y), np.floor(b[0] - y) + 1)
             places.append(np.stack([x, np.full_like(x, y)], axis=-1))
-        return float(self._height(np.clip(np.concatenate(places), 0, self._last)).max())
+        return float(self._height(*np.clip(np.concatenate(places), 0, self._last).T).max())
 
 
 class MeshGround:

@@ -1,5 +1,6 @@
-"""Terms for whole families of tasks: `tasks.velocity`, `tasks.coverage`, `tasks.latch`, `tasks.spring`."""
+"""Terms for whole families of tasks: `tasks.velocity`, `tasks.coverage`, `tasks.latch`, `tasks.spring` and others."""
 
+from anysim_tasks.terms.climb import Climb
 from anysim_tasks.terms.coverage import Coverage, CoverageGain
 from anysim_tasks.terms.latch import Latch
 from anysim_tasks.terms.spring import Spring
@@ -10,5 +11,5 @@ TERMS = {
     "reward": {"coverage_gain": CoverageGain, "velocity_match": velocity_match},
     "predicate": {"at_velocity": at_velocity, "coverage": Coverage},
     "command": {"velocity": Velocity},
-    "event": {"latch": Latch, "spring": Spring},
+    "event": {"climb": Climb, "latch": Latch, "spring": Spring},
 }
