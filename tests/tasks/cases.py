@@ -64,6 +64,27 @@ def _opening(joint: str, first: float, last: float) -> Callable[[TaskEnv, float]
     return lambda env, share: set_opening(env, joint, first + share * (last - first))
 
 
+def _tracking(env: TaskEnv, share: float) -> None:
+    """A whole episode at a share of the commanded velocity, but for its last step, which is the one to be judged."""
+    speed, goal = np.zeros((env.num_envs, 1, 6)), env.scene.goals["walk"]
+    goal[(goal == 0.0).all(axis=1), 0] = 0.5  # to stand is no way
+    speed[:, 0, :2], speed[:, 0, 5] = share * goal[:, :2], share * goal[:, 2]
+    env.engine.set_body_state(None, speed, None, [env.engine.index.entity("dog").root])
+    for memory in env.scene.memories:
+        memory.forget(np.arange(env.num_envs))
+    assert env.spec.task is not None
+    for step in range(1, env.spec.task.horizon + 1):
+        env.scene.elapsed[:] = step
+        env.scene.look(None)
+        if step < env.spec.task.horizon:
+            env.mdp.judge()
+
+
+def _short(env: TaskEnv) -> None:
+    """A step before the end."""
+    env.scene.elapsed[:] -= 1
+
+
 def _reach(env: TaskEnv, share: float) -> None:
     tool = seen(env, "panda.tool")
     env.scene.goals["goal"][:] = offset(tool, x=0.3 * (1.0 - share))
@@ -471,6 +492,7 @@ CASES: dict[str, Case] = {
         [_shifted("dog", x=0.27), _turned("dog", 0.4), _moving("dog")],
         (),
     ),
+    "go1_velocity": Case(_tracking, [_moving("dog", 9.0), _short], ()),
     "stand_still": Case(
         _rising("dog", 0.3, 0.6), [_shifted("dog", z=-0.11), _tilted("dog", 0.36)], unheld=(), lasting=True
     ),

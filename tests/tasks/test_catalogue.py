@@ -21,6 +21,8 @@ VARIANTS = {"peg_in_hole_2mm", "insert_round_peg", "nut_on_peg", "usb_insert", "
 """Those that differ from another task in sizes alone, or share its world or its way."""
 SETTLING = "robot.hand_", "partner.hand_", "hand.", "dog.", "walker."
 """Joints of a hand, which an action of zero sends to the middle of their ranges, and of legs that take up a weight."""
+SOFT = "go1_velocity"
+"""A task whose drives hold no weight at once."""
 SHIPPED = ["stand_still"]
 """Those that come with a trained policy."""
 DEEPEST, REPLAYED = 2e-3, 50
@@ -88,7 +90,9 @@ def test_nothing_random_solves_a_task_or_falls_at_once(task: str) -> None:
         held = [number for number, joint in enumerate(env.engine.world.joints) if not joint.name.startswith(SETTLING)]
         stands, everyone = CASES[task].lasting, np.arange(16)
         env.step(SkillPolicy(env).act(everyone) if stands else np.zeros((16, env.action_dim)))
-        fall = 3e-3 if stands else 2e-3  # feet that are put above the ground, each as its joints are, come down first
+        # Feet that are put above the ground, each as its joints are, come down first; soft legs give in as they take a
+        # weight up: what falls freely for 20 ms falls by 2.4 mm.
+        fall = 3e-3 if stands or task in SOFT else 2e-3
         for name, pose in placed(env).items():
             assert np.allclose(pose[:, :3], before[name][:, :3], atol=fall), name
         assert np.allclose(env.engine.get_state().joint_pos[:, held], joints[:, held], atol=2e-3)

@@ -47,6 +47,7 @@ TASKS = [
     "loco_reach",
     "loco_room_nav",
     "stand_still",
+    "go1_velocity",
     "stand_on_two_legs",
     "mobile_grasp",
     "mobile_pick_place",

@@ -44,7 +44,8 @@ class Moment(NamedTuple):
         obs: observations by group (N, D) float32; of envs whose episode has ended, the first ones of the next.
         reward: (N,) float32; 0 where the simulation gave up on an env.
         done: (N,) bool, episodes that have ended, for whatever reason.
-        truncated: (N,) bool, those of them that only ran out of time, or whose simulation gave up.
+        truncated: (N,) bool, those of them that only ran out of time, or whose simulation gave up. Success in the last
+            step that there is ended nothing either: such a task goes on for as long as it may.
         ended: these episodes.
     """
 
@@ -94,6 +95,7 @@ class Batch:
         self.middle, self.half = action_range(env)
         self.recent: deque[EpisodeEnd] = deque(maxlen=RECENT)
         self._total = np.zeros(env.num_envs)
+        self._horizon = np.inf if env.spec.task is None else env.spec.task.horizon
 
     def averages(self) -> dict[str, float]:
         """`reward`, `steps_per_episode` and `success` of recent episodes; nothing before the first has ended."""
@@ -120,7 +122,8 @@ class Batch:
         reward = np.where(fault, 0.0, result.reward)
         self._total += reward
         done = result.status != Status.RUNNING
-        truncated = done & ((result.status == Status.TRUNCATED) | fault)
+        last_step = env.scene.elapsed >= self._horizon
+        truncated = done & ((result.status == Status.TRUNCATED) | fault | last_step & (result.status == Status.SUCCESS))
         ended: tuple[EpisodeEnd, ...] = ()
         if done.any():
             last = self._obs()

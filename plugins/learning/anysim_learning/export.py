@@ -1,15 +1,19 @@
 """Networks as ONNX files that say what they observe and command; `anysim evaluate --policy FILE.onnx` runs them."""
 
+import hashlib
 import warnings
 from collections.abc import Sequence
 from json import dumps
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import torch  # pyright: ignore[reportMissingImports]
 
 from anysim.record.commit import write_whole
 from anysim.task.env import TaskEnv
-from anysim_schemas.policy_file import FORMAT, METADATA, PolicyFileSpec
+from anysim_schemas.policy_file import FORMAT, METADATA, PolicyFileSpec, PolicyRobotSpec
+from anysim_schemas.task import ObservationTermSpec
 
 
 def described(env: TaskEnv, groups: Sequence[str], chunk: int = 1, images: Sequence[str] = ()) -> PolicyFileSpec:
@@ -20,10 +24,40 @@ def described(env: TaskEnv, groups: Sequence[str], chunk: int = 1, images: Seque
         world=env.engine.world.hash,
         engine=f"{env.engine.name} {env.engine.version}",
         control_dt=env.engine.world.physics.control_dt,
+        dt=env.engine.world.physics.dt,
+        actuation=env.spec.physics.actuation,
+        robots={name: _robot(env, name) for name in env.spec.world.robots},
+        terms={} if env.spec.task is None else {g: _terms(env.spec.task.observations[g]) for g in groups},
         observations={group: env.observation_sizes[group] for group in groups},
         images={name: env.image_shapes[name] for name in images},
         actions=env.action_dim,
         chunk=chunk,
+    )
+
+
+def _terms(specs: Sequence[ObservationTermSpec]) -> tuple[dict[str, Any], ...]:
+    return tuple(spec.model_dump(mode="json", exclude_defaults=True) for spec in specs)
+
+
+def _robot(env: TaskEnv, name: str) -> PolicyRobotSpec:
+    """A robot, nominally: what is drawn in episodes is about these values."""
+    world = env.engine.world
+    robot, entity = env.engine.index.robot(name), env.engine.index.entity(name)
+    drives = [one for one in world.actuators if entity.joint_start <= one.joint < entity.joint_stop]
+    entry = "" if robot.entry is None else dumps(robot.entry.model_dump(mode="json"), sort_keys=True)
+    return PolicyRobotSpec(
+        model=robot.model,
+        hash=hashlib.sha256(entry.encode()).hexdigest(),
+        drives=tuple(one.name.removeprefix(f"{name}.") for one in drives),
+        home=tuple(world.joints[one.joint].initial for one in drives),
+        kp=tuple(one.kp for one in drives),
+        kd=tuple(one.kd for one in drives),
+        effort_limit=tuple(one.effort_limit if np.isfinite(one.effort_limit) else None for one in drives),
+        armature=tuple(world.joints[one.joint].armature for one in drives),
+        actions={
+            key: action.model_dump(mode="json", exclude_defaults=True)
+            for key, action in env.spec.world.robots[name].actions.items()
+        },
     )
 
 

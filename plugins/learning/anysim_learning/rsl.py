@@ -39,6 +39,9 @@ class RslPpo:
         desired_kl: Positive = 0.01,
         width: Width = 256,
         noise: Noise = 0.6,
+        reach: Annotated[
+            float, Field(gt=0, le=1, description="the share of an action's half range that an output of 1 means")
+        ] = 1.0,
     ) -> None:
         import torch  # pyright: ignore[reportMissingImports]
         from rsl_rl.runners import OnPolicyRunner  # pyright: ignore[reportMissingImports]
@@ -48,7 +51,8 @@ class RslPpo:
         torch.manual_seed(lesson.seed)
         # Its critic moves by 0.2 in an update at most, whatever the rewards add up to.
         self._scale = ReturnScale(lesson.env.num_envs, gamma)
-        self._lesson, self._view = lesson, RslVecEnv(lesson.env, lesson.seed, self._scale)
+        self._lesson, self._view = lesson, RslVecEnv(lesson.env, lesson.seed, self._scale, reach)
+        self._reach = reach
         self._stretch = n_steps * lesson.env.num_envs
         self.steps = 0
         network = {
@@ -61,7 +65,7 @@ class RslPpo:
             "num_steps_per_env": n_steps,
             "save_interval": 10**9,
             "obs_groups": {"actor": list(lesson.groups), "critic": list(lesson.env.observation_sizes)},
-            "actor": network | {"distribution_cfg": {"class_name": "GaussianDistribution", "init_std": noise}},
+            "actor": network | {"distribution_cfg": {"class_name": "GaussianDistribution", "init_std": noise / reach}},
             "critic": dict(network),
             "algorithm": {
                 "class_name": "PPO",
@@ -82,7 +86,7 @@ class RslPpo:
         with redirect_stdout(io.StringIO()):
             self._runner.learn(1)
         self.steps += self._stretch
-        noise = float(self._runner.alg.get_policy().output_std.mean().item())
+        noise = float(self._runner.alg.get_policy().output_std.mean().item()) * self._reach
         return {"noise": noise, **self._view.batch.averages()}
 
     def state(self) -> dict[str, Any]:
@@ -107,4 +111,4 @@ class RslPpo:
         """The mean action, in the units of the env."""
         from anysim_learning.rsl_env import Actor
 
-        return Actor(self._runner.alg.get_policy(), self._lesson.env)
+        return Actor(self._runner.alg.get_policy(), self._lesson.env, self._reach)

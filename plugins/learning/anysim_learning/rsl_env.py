@@ -17,9 +17,12 @@ from anysim_learning.tensors import InUnits
 class RslVecEnv(VecEnv):
     """All envs with all their observation groups; which model sees which is said in the runner's `obs_groups`."""
 
-    def __init__(self, env: TaskEnv, seed: int = 0, scale: ReturnScale | None = None) -> None:
-        """With `scale`, rewards are in deviations of the return; else they are the task's."""
-        self.batch, self.scale = Batch(env, tuple(env.observation_sizes)), scale
+    def __init__(self, env: TaskEnv, seed: int = 0, scale: ReturnScale | None = None, reach: float = 1.0) -> None:
+        """With `scale`, rewards are in deviations of the return; else they are the task's.
+
+        An action of 1 is the share `reach` of the half range.
+        """
+        self.batch, self.scale, self._reach = Batch(env, tuple(env.observation_sizes)), scale, reach
         assert env.spec.task is not None
         self.num_envs, self.num_actions, self.device = env.num_envs, env.action_dim, "cpu"
         self.max_episode_length = env.spec.task.horizon
@@ -33,7 +36,7 @@ class RslVecEnv(VecEnv):
 
     def step(self, actions: torch.Tensor) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict[str, Any]]:
         """One control step; episodes that only ran out of time are `time_outs`."""
-        moment = self.batch.step(actions.detach().numpy())
+        moment = self.batch.step(self._reach * actions.detach().numpy())
         self._obs = moment.obs
         self.episode_length_buf = torch.from_numpy(self.batch.env.scene.elapsed.astype(np.int64))
         reward = moment.reward if self.scale is None else self.scale(moment.reward, moment.done)
@@ -50,12 +53,12 @@ class RslVecEnv(VecEnv):
 class Actor(torch.nn.Module):
     """rsl_rl's actor without its TensorDict, and the range of the actions."""
 
-    def __init__(self, actor: Any, env: TaskEnv) -> None:
+    def __init__(self, actor: Any, env: TaskEnv, reach: float = 1.0) -> None:
         super().__init__()
-        self.inner, self.in_units = actor.as_onnx(verbose=False), InUnits(env)
+        self.inner, self.in_units, self._reach = actor.as_onnx(verbose=False), InUnits(env), reach
 
     def forward(self, *groups: Any) -> Any:
-        return self.in_units(self.inner(torch.cat(groups, dim=1)))
+        return self.in_units(self._reach * self.inner(torch.cat(groups, dim=1)))
 
 
 def _tensor(rows: Array) -> torch.Tensor:

@@ -60,7 +60,8 @@ def train(
             rows.append(numbers)
             checkpoint.save(out / CHECKPOINT, learner.state())
             if passed >= best:
-                export(network, about, out / POLICY)
+                told = about.model_copy(update={"seed": lesson.seed, "steps": learner.steps})
+                export(network, told, out / POLICY)
             write_whole(out, {CURVE: "".join(json.dumps(row) + "\n" for row in rows)})
     return numbers
 

@@ -17,6 +17,7 @@ from anysim.skills.runner import SkillPolicy
 from anysim_learning import checkpoint, cli
 from anysim_learning.batch import Batch
 from anysim_learning.demonstrations import Demonstrations
+from tests.tasks.states import blinding
 
 QUIET = ["record.cameras=[]"]
 app = typer.Typer()
@@ -51,6 +52,19 @@ def test_a_batch_is_the_env_with_actions_of_unit_range() -> None:
             assert np.array_equal(one.obs["policy"], result.obs["policy"][one.env])
         same.reset()
         assert np.array_equal(moment.obs["policy"], same.obs["policy"]), "the next episodes have begun"
+
+
+def test_success_in_the_last_step_ends_no_more_than_the_time_does() -> None:
+    lasting = "task.success={up: {term: not, of: {low: {term: below, frame: dog, height: 0.1}}}}"
+    for horizon, hold, out_of_time in ((3, 3, True), (4, 3, False)):
+        overrides = [*blinding("stand_still"), lasting, f"task.hold={hold}", f"task.horizon={horizon}"]
+        with anysim.make("stand_still", engine="null", num_envs=2, overrides=overrides) as env:
+            batch = Batch(env)
+            batch.reset(0)
+            for _ in range(3):
+                moment = batch.step(np.zeros((2, env.action_dim)))
+            assert [one.status for one in moment.ended] == ["success"] * 2
+            assert moment.truncated.tolist() == [out_of_time] * 2
 
 
 def test_a_batch_has_the_groups_that_are_asked_for() -> None:

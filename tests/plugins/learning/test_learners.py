@@ -70,6 +70,33 @@ def test_what_is_exported_does_what_the_network_does(name: str, runs: Path, tmp_
         assert (np.abs(given) <= 1.0 + 1e-6).all(), "within the bounds of the env"
 
 
+def test_a_file_says_what_its_robot_was_and_what_it_was_shown() -> None:
+    import json
+
+    from anysim_learning.export import described
+
+    with anysim.make("reach", engine="mujoco", num_envs=1, overrides=QUIET) as env:
+        told = json.loads(json.dumps(described(env, ("policy",)).model_dump()))
+        robot, world = told["robots"]["panda"], env.engine.world
+        assert robot["model"] == "franka_panda"
+        assert len(robot["hash"]) == 64
+        assert robot["kp"] == [drive.kp for drive in world.actuators]
+        assert robot["armature"] == [world.joints[drive.joint].armature for drive in world.actuators]
+        assert set(robot["actions"]) == {"arm", "eef"}
+        assert [term["term"] for term in told["terms"]["policy"]][:2] == ["joint_pos", "joint_vel"]
+        assert told["dt"] == world.physics.dt
+
+
+def test_an_output_can_reach_a_share_of_the_range() -> None:
+    from anysim_learning.rsl_env import RslVecEnv
+
+    with anysim.make("reach", engine="mujoco", num_envs=2, overrides=QUIET) as env:
+        view = RslVecEnv(env, 0, None, 0.25)
+        view.step(torch.ones(2, env.action_dim))
+        _, high = env.action_bounds
+        assert np.allclose(env.scene.last_action, 0.25 * high)
+
+
 @pytest.mark.parametrize("name", LEARNERS)
 def test_a_learner_goes_on_where_it_was_put_away(name: str, runs: Path, tmp_path: Path) -> None:
     from anysim_learning import checkpoint
