@@ -220,9 +220,7 @@ class SensorManager(Manager):
         """What is recorded of these envs, `sensor_NAME_FIELD` (n, …), in the types of the fields."""
         wanted = self._channels if self.spec.record.sensors is None else self.spec.record.sensors
         return {
-            f"sensor_{name}_{key}": self.reading(name, key, env_ids)
-            for name in wanted
-            for key in self.fields(name)
+            f"sensor_{name}_{key}": self.reading(name, key, env_ids) for name in wanted for key in self.fields(name)
         }
 
     # ------------------------------------------------------------------ snapshots
