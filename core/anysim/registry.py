@@ -33,6 +33,7 @@ KINDS: Mapping[str, str] = {
     "executors": "executors, which step the envs of an engine elsewhere",
     "devices": "input devices, with which people drive robots",
     "writers": "record writers",
+    "streams": "streams of records, which `record.streams` asks for",
     "readers": "record readers, by the writer's name",
     "importers": "asset importers, by file format",
     "oracles": "independent readers of robots that importers are held against, by file format",
@@ -50,6 +51,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
         "annotators": "affordance boxes_2d boxes_3d camera depth eef_waypoint flow instance nav_point normals obj_bbox"
         " point_cloud semantic skeleton",
         "renderings": "annotations stills",
+        "streams": "annotations",
     },
     "anysim-assets": {
         "assets": "cabinet hinge_box mug parallel_gripper valve",
@@ -73,10 +75,10 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-export": {"commands": "export tape", "exporters": "lerobot robomimic webdataset"},
     "anysim-film": {"commands": "render"},
     "anysim-inspect": {"commands": "audit doctor explain replay snapshot verify"},
-    "anysim-language": {"commands": "describe vqa", "vocabularies": "english"},
+    "anysim-language": {"commands": "describe vqa", "streams": "language", "vocabularies": "english"},
     "anysim-learning": {"commands": "train", "learners": "clone rsl-rl sb3-ppo"},
     "anysim-maniskill": {"benchmarks": "maniskill", "commands": "verdicts"},
-    "anysim-mcap": {"readers": "mcap", "writers": "mcap"},
+    "anysim-mcap": {"readers": "mcap", "streams": "cameras", "writers": "mcap"},
     "anysim-mujoco": {"engines": "mujoco", "importers": "mjcf", "oracles": "mjcf"},
     "anysim-parity": {"commands": "compare picture"},
     "anysim-policy": {"controllers": "policy", "env_policies": "file lerobot openpi"},

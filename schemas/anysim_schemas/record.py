@@ -16,6 +16,14 @@ class RecordSpec(Spec):
         default_factory=dict, description="options owned by the writer"
     )
     cameras: tuple[Name, ...] = Field(default=(), description="cameras of the world whose images become videos")
+    channels: dict[Name, tuple[Literal["depth", "segmentation"], ...]] | None = Field(
+        default=None, description="further images of cameras of the world, by camera, recorded without loss"
+    )
+    streams: dict[Name, dict[str, Any] | None] | None = Field(
+        default=None,
+        description="further streams and their options, by an installed name, as in `anysim list streams`: annotations "
+        "of cameras, language",
+    )
     sensors: tuple[Name, ...] | None = Field(
         default=None, description="sensors of the world whose readings are recorded; all of them if not given"
     )

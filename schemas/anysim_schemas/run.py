@@ -102,6 +102,13 @@ class RunSpec(Spec):
                 sensor.steps(self.physics.control_dt)
             except KeyFault as fault:
                 raise KeyFault(str(fault), "world", "sensors", name, *fault.path) from None
+        for name, channels in (self.record.channels or {}).items():
+            if (camera := self.world.cameras.get(name)) is None:
+                words = f"there is no camera '{name}' (cameras: {listing(list(self.world.cameras))})"
+                raise KeyFault(words, "record", "channels", name)
+            if lacking := sorted(set(channels) - set(camera.channels)):
+                words = f"the camera gives no {' and no '.join(lacking)}; add it to world.cameras.{name}.channels"
+                raise KeyFault(words, "record", "channels", name)
         for place, name in enumerate(self.record.sensors or ()):
             if name not in sensors:
                 words = f"there is no sensor '{name}' (sensors: {listing(list(sensors))})"

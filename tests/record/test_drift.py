@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from anysim.errors import RecordError
-from anysim.record.replay import compare_states, summarise
+from anysim.record.replay import compare_states
+from anysim_inspect.replay_summary import summarise
 
 
 def states(steps=5):

@@ -25,6 +25,7 @@ from anysim.record.frame import NOTHING, FrameBatch, state_batch
 from anysim.record.header import EpisodeHeader, RunHeader, package_versions, state_layout
 from anysim.record.incoming import claim
 from anysim.record.recorder import Recorder
+from anysim.record.streams import make_sources
 from anysim.record.trajectory_files import PendingCommit
 from anysim.record.writer import make_writer
 from anysim.task.contract import Status
@@ -143,7 +144,8 @@ class Collector:
             raise disk_trouble(f"cannot record into {out}", error, out) from error
         self._release = weakref.finalize(self, lock.release)
         try:
-            self.recorder = Recorder(out, writer, run_header(env, seed), horizon=task.horizon)
+            sources = make_sources(env)
+            self.recorder = Recorder(out, writer, run_header(env, seed), horizon=task.horizon, sources=sources)
         except BaseException:
             self._release()
             raise

@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from anysim import registry
 from anysim.conventions import Array
@@ -19,7 +20,7 @@ from anysim.record.commit import disk_trouble, taken
 from anysim.record.header import RunHeader
 from anysim.record.names import EPISODES
 from anysim.record.trajectory_files import Ending, ManifestText, PendingCommit, TrajectoryFiles
-from anysim.record.writer import TrajectoryWriter
+from anysim.record.writer import PartWriter, TrajectoryWriter
 
 QUEUE_BYTES = 64 << 20
 """What waits for the thread may hold as much memory; who hands over more waits."""
@@ -123,14 +124,20 @@ class Committer:
         if final.exists() or any(c.path == final and not c.done for c in self._pending):
             raise RecordError(taken(final))
 
-    def open_images(self, files: TrajectoryFiles) -> None:
-        """Begin a trajectory that has images."""
-        self._thread.put(lambda: self._prepared(files, files.open_images))
+    def open_part(self, files: TrajectoryFiles, kind: str, call: Callable[[Path], PartWriter]) -> None:
+        """Begin the `images` or `streams` of a trajectory."""
+        self._thread.put(lambda: self._prepared(files, partial(files.open_part, kind, call)))
 
     def append_images(self, files: TrajectoryFiles, step: int, images: Mapping[str, Array]) -> None:
         """Write the images of a control step; the arrays are the committer's from here on."""
         size = sum(image.nbytes for image in images.values())
-        self._thread.put(partial(files.append_images, step, images), size)
+        self.append_to(files, "images", f"step {step}", lambda writer: writer.append(images), size)
+
+    def append_to(
+        self, files: TrajectoryFiles, kind: str, what: str, call: Callable[[Any], None], nbytes: int = 0
+    ) -> None:
+        """Call the writer of a part of a trajectory, which holds so much memory until then."""
+        self._thread.put(partial(files.append_to, kind, what, call), nbytes)
 
     def abort(self, files: TrajectoryFiles) -> None:
         """Remove what was written of a trajectory."""

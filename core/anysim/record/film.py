@@ -87,13 +87,18 @@ def draw_recorded(
     Raises:
         RecordError: what is seen was changed after the reset.
     """
+    refuse_changed(env, index, since)
+    poses = columns.state["body_pose"][step - columns.first_step]
+    return {camera: capture_of(env).image_then(camera, index, step, poses) for camera in cameras}
+
+
+def refuse_changed(env: TaskEnv, index: int, since: int) -> None:
+    """Raise RecordError where what is seen in an env was changed after `appearance_changes` was `since`."""
     if int(env.engine.appearance_changes[index]) != since:
         raise RecordError(
             f"env {index} cannot be filmed: its colours, lights, cameras or what is there were changed after the "
-            "reset, which is not recorded; record with `record.film: live`"
+            "reset, which is not recorded; record with `record.film: live`, without record.channels and annotations"
         )
-    poses = columns.state["body_pose"][step - columns.first_step]
-    return {camera: capture_of(env).image_then(camera, index, step, poses) for camera in cameras}
 
 
 def capture_of(env: TaskEnv) -> CaptureManager:

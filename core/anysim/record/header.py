@@ -23,7 +23,7 @@ Label = Annotated[str, Field(max_length=1024)]
 Pose7 = tuple[float, float, float, float, float, float, float]
 
 
-NumberType = Literal["float64", "float32", "int32", "int8", "uint8", "bool"]
+NumberType = Literal["float64", "float32", "int32", "uint16", "int8", "uint8", "bool"]
 
 
 class ArrayLayout(Spec):
@@ -74,6 +74,23 @@ class CameraInfo(Spec):
     fov: Annotated[float, Field(gt=0, lt=180)] = 60.0
     parent: Label = "world"
     pose: Pose7 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+class StreamInfo(Spec):
+    """What the rows of a stream are.
+
+    An `image` is an array (H, W) of float32, uint16 or uint8, or (H, W, 3) of uint8, `points` one (K, 3) of float32,
+    `data` plain data. A size of None differs from row to row. `frame` is what images and points are in, `about` what
+    else is to be known once: a legend, parameters.
+    """
+
+    kind: Literal["array", "image", "points", "text", "data"]
+    shape: tuple[Size | None, ...] = ()
+    dtype: NumberType = "float64"
+    unit: Label = "1"
+    words: Label = ""
+    frame: Label = "world"
+    about: dict[str, Any] = Field(default_factory=dict)
 
 
 class RunHeader(Spec):

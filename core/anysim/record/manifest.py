@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import Field, ValidationError, model_validator
 
 from anysim.errors import RecordError
-from anysim.record.header import CameraInfo, Count, EpisodeHeader, Header, Label, RunHeader
+from anysim.record.header import CameraInfo, Count, EpisodeHeader, Header, Label, RunHeader, StreamInfo
 from anysim.record.json import load_json
 from anysim.record.names import MANIFEST_FILE, RUN_FILE, checked_file_name
 from anysim_schemas.base import Name, Spec
@@ -38,6 +38,13 @@ class CameraEntry(CameraInfo):
     fps: Annotated[float, Field(gt=0)]
 
 
+class StreamEntry(StreamInfo):
+    """A stream: its file, and how many rows it has there."""
+
+    file: str
+    rows: Count
+
+
 class Manifest(RunHeader):
     """Everything about a committed trajectory but its arrays and images."""
 
@@ -56,6 +63,7 @@ class Manifest(RunHeader):
     final_digest: Digest
     outcome: dict[str, Any] = Field(default_factory=dict, description="what the collector says about it")
     cameras: dict[Name, CameraEntry] = Field(default_factory=dict, description="those that took an image")
+    streams: dict[Label, StreamEntry] = Field(default_factory=dict)
     files: dict[str, FileEntry]
     clock: dict[str, Any] = Field(default_factory=dict, description="all that differs between equal runs")
 
@@ -66,9 +74,10 @@ class Manifest(RunHeader):
                 checked_file_name(name)
         except RecordError as error:
             raise ValueError(str(error)) from error
-        for name, camera in self.cameras.items():
-            if camera.file not in self.files:
-                raise ValueError(f"the video of camera {name}, {camera.file!r}, is not among the files")
+        for what, entries in (("video of camera", self.cameras), ("file of the stream", self.streams)):
+            for name, entry in entries.items():
+                if entry.file not in self.files:
+                    raise ValueError(f"the {what} {name}, {entry.file!r}, is not among the files")
         return self
 
     def to_dict(self) -> dict[str, Any]:

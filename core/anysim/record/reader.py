@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,8 +11,17 @@ from anysim import registry
 from anysim.conventions import Array
 from anysim.engine.control import Control
 from anysim.engine.snapshots.world_state import WorldState
-from anysim.errors import RecordError, listing
+from anysim.errors import RecordError, listing, suggest
 from anysim.record.manifest import Manifest, read_manifest
+from anysim.record.streams import StreamRow
+
+
+class StreamRows(NamedTuple):
+    """Rows of a stream: control steps (K,), times (K,) [s], and values: (K, …), or K of them where sizes differ."""
+
+    steps: Array
+    times: Array
+    values: Any
 
 
 class TrajectoryReader(ABC):
@@ -87,6 +96,45 @@ class TrajectoryReader(ABC):
     @abstractmethod
     def images(self, camera: str) -> Iterator[tuple[int, Array]]:
         """(control step, (H, W, 3) uint8) of a camera, in order, decoded one at a time."""
+
+    def columns(self) -> dict[str, Any]:
+        """What every trajectory holds, by names of streams: from step 1 on, or from the reset where that is known."""
+        found: dict[str, Any] = {"action": self.actions, "annotation": self.annotations, "language": self.language}
+        found |= {"collect/reward": self.rewards, "collect/status": self.statuses}
+        whole, seen = self.initial_state, self.initial_obs
+        found |= {f"state/{k}": self.states_from_reset(k) if k in whole else rows for k, rows in self.states.items()}
+        return found | {f"observation/{k}": self.obs_from_reset(k) if k in seen else v for k, v in self.obs.items()}
+
+    def names(self) -> tuple[str, ...]:
+        """The streams that `stream` gives."""
+        return (*self.columns(), *(f"camera/{name}" for name in self.manifest.cameras), *self.manifest.streams)
+
+    def stream(self, name: str) -> StreamRows:
+        """A stream by its name, whole.
+
+        Raises:
+            RecordError: there is no such stream, or it is damaged.
+        """
+        values, names = self.columns().get(name), self.names()
+        if name not in names:
+            raise RecordError(f"{self.directory} has no stream '{name}'{suggest(name, names)} ({listing(names)})")
+        steps = np.arange(self.manifest.steps + 1 - (0 if values is None else len(values)), self.manifest.steps + 1)
+        if values is None:
+            rows, entry = list(self.rows(name)), self.manifest.streams.get(name)
+            steps, values = np.array([row.step for row in rows], dtype=np.int64), [row.value for row in rows]
+            if rows and (entry is None or (entry.kind not in ("text", "data") and None not in entry.shape)):
+                values = np.stack(values)
+        return StreamRows(steps, self.times_from_reset[steps], values)
+
+    def rows(self, name: str) -> Iterator[StreamRow]:
+        """The rows of `camera/NAME` or of a stream of the manifest, one at a time."""
+        for step, image in self.images(name.removeprefix("camera/")):
+            yield StreamRow(name, step, image, float(self.times_from_reset[step]))
+
+    @property
+    def times_from_reset(self) -> Array:
+        """(T+1,) simulated time after each step [s], 0 at the reset."""
+        return np.concatenate([[0.0], self.times])
 
     @abstractmethod
     def faults(self) -> list[str]:

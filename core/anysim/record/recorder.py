@@ -10,12 +10,14 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Self
 
 import numpy as np
 
+from anysim import registry
 from anysim.conventions import Array
 from anysim.errors import RecordError, listing
 from anysim.math.matrix import blas_kernel
@@ -28,14 +30,21 @@ from anysim.record.header import EpisodeHeader, Header, RunHeader
 from anysim.record.incoming import Incoming
 from anysim.record.json import plain
 from anysim.record.names import EPISODES, parse_trajectory, trajectories, trajectory_name
+from anysim.record.streams import StreamPart, StreamSource, blame
 from anysim.record.trajectory_files import Ending, PendingCommit, TrajectoryFiles
-from anysim.record.writer import TrajectoryWriter
+from anysim.record.writer import StreamWriter, TrajectoryWriter
+
+
+def _write_part(part: StreamPart, blamed: registry.Blame, writer: StreamWriter) -> None:
+    with blamed:
+        rows = list(part.make())
+    writer.append(rows)
 
 
 class _Attempt:
     def __init__(self, episode: OpenEpisode, files: TrajectoryFiles) -> None:
         self.episode, self.files = episode, files
-        self.has_images = False
+        self.has_parts = False
         self.began = time.monotonic()
 
 
@@ -55,6 +64,7 @@ class Recorder:
         run: RunHeader,
         now: Callable[[], datetime] = lambda: datetime.now(UTC),
         horizon: int = 512,
+        sources: Mapping[str, StreamSource] = MappingProxyType({}),
     ) -> None:
         """Join the run in `out`, or begin it. Removes what recorders that died have left unfinished.
 
@@ -64,6 +74,7 @@ class Recorder:
             run: what is run. An existing directory must hold the same.
             now: the clock of `clock.created_at`.
             horizon: control steps for which room is made; longer episodes get more when they need it.
+            sources: make streams of each episode that is committed, by name; closed with the recorder.
 
         Raises:
             RecordError: the directory holds another run, or cannot be written.
@@ -76,6 +87,8 @@ class Recorder:
         self._checks = BatchChecks(run.layout)
         self._writer = writer
         self._committer = Committer(self.out, writer, self.run)
+        self._sources = sources
+        self._streams = {name: info for source in sources.values() for name, info in source.streams.items()}
         self._closed = False
         try:
             self._incoming = Incoming(self.out)
@@ -140,10 +153,13 @@ class Recorder:
         self._committer.refuse_taken(self._final(episode))
         values = {name: plain(getattr(episode, name), name) for name in ("drawn", "overridden")}
         header = Header(self.run, EpisodeHeader.model_validate({**dict(episode), **values}))
-        files = TrajectoryFiles(self._incoming, self._writer, header, self.out)
+        files = TrajectoryFiles(self._incoming, self._writer, header, self.out, self._streams)
         attempt = self._attempts[env] = _Attempt(OpenEpisode(header, self._store.open(), film), files)
         if header.episode.cameras and film is None:
             self._open_images(attempt)
+        for name, source in self._sources.items():
+            with blame(name, source):
+                source.begin(env)
 
     def cameras_due(self, env: int, step: int) -> tuple[str, ...]:
         """The cameras whose images belong to a control step of the env."""
@@ -221,6 +237,8 @@ class Recorder:
             check_columns(columns)
             if attempt.episode.film is not None:
                 columns = self._filmed(attempt, columns, attempt.episode.film)
+            if self._sources:
+                self._follow(attempt, columns, status)
             now = {"created_at": self._now().isoformat(), "wall_s": round(time.monotonic() - attempt.began, 6)}
             here = {"linear_algebra": self._linear_algebra, **now}
             ending = Ending(status, plain(outcome or {}, "outcome"), {**plain(clock or {}, "clock"), **here})
@@ -236,7 +254,7 @@ class Recorder:
         if attempt is None:
             return
         self._forget(env)
-        if attempt.has_images:
+        if attempt.has_parts:
             self._committer.abort(attempt.files)
 
     def flush(self) -> None:
@@ -258,6 +276,9 @@ class Recorder:
         finally:
             self._committer.stop()
             self._incoming.close()
+            for name, source in self._sources.items():
+                with blame(name, source):
+                    source.close()
         self._committer.raise_untold()
 
     def __enter__(self) -> Self:
@@ -273,8 +294,10 @@ class Recorder:
     # ------------------------------------------------------------------ inside
 
     def _open_images(self, attempt: _Attempt) -> None:
-        attempt.has_images = True
-        self._committer.open_images(attempt.files)
+        attempt.has_parts, header = True, attempt.episode.header
+        self._committer.open_part(
+            attempt.files, "images", lambda directory: self._writer.open_images(directory, header)
+        )
 
     def _append_images(self, attempt: _Attempt, step: int, images: Mapping[str, Array]) -> None:
         copies = {name: np.array(image) for name, image in images.items()}
@@ -295,6 +318,20 @@ class Recorder:
             episode.note_images(step, images)
             self._append_images(attempt, step, images)
         return replace(columns, first_image=dict(episode.first_image))
+
+    def _follow(self, attempt: _Attempt, columns: EpisodeColumns, status: str) -> None:
+        """Hand over the streams of an episode that has ended, part by part: their rows are made on the other thread."""
+        attempt.has_parts, files = True, attempt.files
+        self._committer.open_part(
+            files, "streams", lambda directory: self._writer.open_streams(directory, columns, self._streams)
+        )
+        for name, source in self._sources.items():
+            with blame(name, source):
+                for part in source.parts(columns.header.episode.env, columns, status):
+                    if files.trouble is not None:
+                        raise files.trouble
+                    call = partial(_write_part, part, blame(name, source))
+                    self._committer.append_to(files, "streams", f"the streams '{name}'", call, part.nbytes)
 
     def _forget(self, env: int) -> None:
         self._store.release(self._attempts.pop(env).episode.slot)

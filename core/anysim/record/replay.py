@@ -11,6 +11,7 @@ from anysim.conventions import Array
 from anysim.errors import RecordError, listing
 from anysim.math.matrix import blas_kernel
 from anysim.record.frame import state_digest, state_rows
+from anysim.record.header import EpisodeHeader
 from anysim.record.manifest import Manifest
 from anysim.record.reader import TrajectoryReader, open_trajectory
 from anysim.task.env import TaskEnv
@@ -64,41 +65,6 @@ class Drift(NamedTuple):
                     f"  {name}: from step {field.first_step}, at most {field.max_abs:.3g} (at step {field.max_step})"
                 )
         return "\n".join(lines)
-
-
-class FieldSummary(NamedTuple):
-    """One state array over several replays: the largest difference of each, and which replay has the largest of all.
-
-    `identical` counts the replays without any; `first_step` is the earliest control step that differs in a bit.
-    """
-
-    name: str
-    identical: int
-    first_step: int | None
-    median: float
-    worst: float
-    worst_replay: str
-
-
-def summarise(drifts: Mapping[str, Drift]) -> list[FieldSummary]:
-    """Field by field over replays by name."""
-    names = dict.fromkeys(name for drift in drifts.values() for name in drift.fields)
-    rows: list[FieldSummary] = []
-    for name in names:
-        fields = {replay: drift.fields[name] for replay, drift in drifts.items() if name in drift.fields}
-        worst = max(fields, key=lambda replay: fields[replay].max_abs)
-        steps = [field.first_step for field in fields.values() if field.first_step is not None]
-        rows.append(
-            FieldSummary(
-                name,
-                sum(field.identical for field in fields.values()),
-                min(steps, default=None),
-                float(np.median([field.max_abs for field in fields.values()])),
-                fields[worst].max_abs,
-                worst,
-            )
-        )
-    return rows
 
 
 def compare_states(recorded: Mapping[str, Array], replayed: Mapping[str, Array]) -> Drift:
@@ -231,7 +197,7 @@ def replay(directory: str | Path, engine: str | None = None, base: Path | None =
         )
 
 
-def begin(env: TaskEnv, manifest: Manifest) -> None:
+def begin(env: TaskEnv, manifest: Manifest | EpisodeHeader) -> None:
     """Begin the recorded episode: drawn from its seed, with what was overridden for it."""
     for manager in env.managers:
         manager.recall(0, manifest.drawn)

@@ -6,17 +6,16 @@ from pathlib import Path
 from threading import Event
 from typing import Any, NamedTuple, NoReturn
 
-from anysim.conventions import Array
 from anysim.record import commit as protocol
 from anysim.record.columns import EpisodeColumns, where
 from anysim.record.commit import disk_trouble
 from anysim.record.frame import state_digest
-from anysim.record.header import Header, RunHeader
+from anysim.record.header import Header, RunHeader, StreamInfo
 from anysim.record.incoming import Incoming, remove
 from anysim.record.json import dump_json
-from anysim.record.manifest import CameraEntry, Manifest
+from anysim.record.manifest import CameraEntry, Manifest, StreamEntry
 from anysim.record.names import MANIFEST_FILE, checked_file_name
-from anysim.record.writer import ImageWriter, TrajectoryWriter, WrittenFile
+from anysim.record.writer import PartWriter, TrajectoryWriter, WrittenFile
 from anysim.registry import blame, origin
 
 
@@ -78,11 +77,11 @@ class ManifestText:
         self._same = frozenset(RunHeader.model_fields)
         self._head = dump_json(run.model_dump(mode="json"), "manifest").removesuffix(b"\n}\n")
 
-    def encode(self, columns: EpisodeColumns, ending: Ending, files: Mapping[str, Any], cameras: Any) -> bytes:
-        """The bytes of manifest.json."""
+    def encode(self, columns: EpisodeColumns, ending: Ending, files: Mapping[str, Any], **others: Any) -> bytes:
+        """The bytes of manifest.json; `others` are its `cameras` and `streams`."""
         whole = Manifest(
             **dict(self._run),
-            **{**dict(columns.header.episode), "cameras": cameras},
+            **{**dict(columns.header.episode), **others},
             writer=self._writer,
             status=ending.status,
             steps=columns.steps,
@@ -100,9 +99,11 @@ class ManifestText:
 class TrajectoryFiles:
     """The directory of one attempt. `trouble` is why its images could not be written, if so."""
 
-    def __init__(self, incoming: Incoming, writer: TrajectoryWriter, header: Header, out: Path) -> None:
-        self._incoming, self._writer, self._header, self._out = incoming, writer, header, out
-        self._images: ImageWriter | None = None
+    def __init__(
+        self, incoming: Incoming, writer: TrajectoryWriter, header: Header, out: Path, streams: Mapping[str, StreamInfo]
+    ) -> None:
+        self._streams, self._incoming, self._writer, self._header, self._out = streams, incoming, writer, header, out
+        self._parts: dict[str, PartWriter] = {}
         self.directory: Path | None = None
         self.trouble: BaseException | None = None
 
@@ -111,17 +112,18 @@ class TrajectoryFiles:
         """`env 3, episode 2`, for messages."""
         return where(self._header)
 
-    def open_images(self) -> None:
-        """Begin the trajectory's directory for the images to come."""
-        what = f"cannot begin {self.where}"
-        self._guarded(what, lambda: self._writer.open_images(self._made(), self._header), keep=True)
+    def open_part(self, kind: str, call: Callable[[Path], PartWriter]) -> None:
+        """Begin the trajectory's directory for the `images` or `streams` to come."""
 
-    def append_images(self, step: int, images: Mapping[str, Array]) -> None:
-        """Write the images of a control step."""
-        writer = self._images
-        if self.trouble is None and writer is not None:
-            what = f"cannot write step {step} of {self.where}"
-            self._guarded(what, lambda: writer.append(images))
+        def begin() -> None:
+            self._parts[kind] = call(self._made())
+
+        self._guarded(f"cannot begin {self.where}", begin)
+
+    def append_to(self, kind: str, what: str, call: Callable[[Any], None]) -> None:
+        """Hand something to the writer of a part."""
+        if self.trouble is None and kind in self._parts:
+            self._guarded(f"cannot write {what} of {self.where}", lambda: call(self._parts[kind]))
 
     def write(self, columns: EpisodeColumns, ending: Ending, text: ManifestText) -> Path:
         """Write everything aside and bring it to the disk. Returns the directory, ready to be renamed.
@@ -134,12 +136,17 @@ class TrajectoryFiles:
         try:
             directory = self._made()
             written = self._writer.write(directory, columns, ending.status)
-            if self._images is not None:
-                written += self._images.finish()
-                self._images = None
+            for kind in tuple(self._parts):
+                written += self._parts[kind].finish()
+                del self._parts[kind]
             entries = protocol.seal(directory, [checked_file_name(file.name) for file in written])
             cameras = camera_entries(columns.header, columns.first_image, written)
-            manifest = text.encode(columns, ending, entries, cameras)
+            streams = {
+                name: StreamEntry(**dict(self._streams[name]), file=file.name, rows=count)
+                for file in written
+                for name, count in file.streams.items()
+            }
+            manifest = text.encode(columns, ending, entries, cameras=cameras, streams=streams)
             protocol.write_durably(directory / MANIFEST_FILE, manifest)
         except OSError as error:
             raise disk_trouble(f"cannot commit {self.where}", error, self._out) from error
@@ -149,10 +156,10 @@ class TrajectoryFiles:
 
     def abort(self) -> None:
         """Remove everything; what cannot be removed now is an orphan, which the next recorder sweeps."""
-        images, self._images = self._images, None
+        parts, self._parts = self._parts, {}
         try:
-            if images is not None:
-                images.abort()
+            for part in parts.values():
+                part.abort()
         finally:
             if self.directory is not None:
                 with suppress(OSError):
@@ -164,11 +171,9 @@ class TrajectoryFiles:
             self.directory = self._incoming.attempt(episode.env, episode.episode)
         return self.directory
 
-    def _guarded(self, what: str, call: Callable[[], Any], keep: bool = False) -> None:
+    def _guarded(self, what: str, call: Callable[[], None]) -> None:
         try:
-            made = call()
-            if keep:
-                self._images = made
+            call()
         except OSError as error:
             self.trouble = disk_trouble(what, error, self._out)
             self.trouble.__cause__ = error

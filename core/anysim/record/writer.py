@@ -11,31 +11,37 @@ A writer of numbers alone is one method:
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from types import MappingProxyType
+from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from anysim import registry
 from anysim.conventions import Array
 from anysim.errors import RecordError
 from anysim.record.columns import EpisodeColumns
-from anysim.record.header import Header, RunHeader
+from anysim.record.header import Header, RunHeader, StreamInfo
+from anysim.record.streams import StreamRow
 
 
 class WrittenFile(NamedTuple):
-    """A file that a writer made in its directory. `camera`, `frames`: of a video."""
+    """A file that a writer made in its directory. `camera`, `frames`: of a video; `streams`: how many rows of each."""
 
     name: str
     camera: str | None = None
     frames: int = 0
+    streams: Mapping[str, int] = MappingProxyType({})
 
 
-class ImageWriter(ABC):
-    """Writes the images of one trajectory as they come: `append`…, then `finish` or `abort`. Used once."""
+Content = TypeVar("Content")
+
+
+class PartWriter(ABC, Generic[Content]):
+    """Writes something of one trajectory as it comes: `append`…, then `finish` or `abort`. Used once."""
 
     @abstractmethod
-    def append(self, images: Mapping[str, Array]) -> None:
-        """Write the images (H, W, 3) uint8 of the cameras that are due at a control step; steps come in order."""
+    def append(self, content: Content, /) -> None:
+        """Write what comes next; steps come in order."""
 
     @abstractmethod
     def finish(self) -> tuple[WrittenFile, ...]:
@@ -44,6 +50,12 @@ class ImageWriter(ABC):
     @abstractmethod
     def abort(self) -> None:
         """Close whatever is open, in whatever state, without raising an OSError. May be called after any failure."""
+
+
+ImageWriter = PartWriter[Mapping[str, Array]]
+"""Writes the images (H, W, 3) uint8 of the cameras that are due at a control step."""
+StreamWriter = PartWriter[Sequence[StreamRow]]
+"""Checks and writes rows of streams; within a family steps come in order."""
 
 
 class TrajectoryWriter(ABC):
@@ -78,6 +90,16 @@ class TrajectoryWriter(ABC):
         raise RecordError(
             f"the writer '{self.name}' writes no images of {', '.join(header.episode.cameras)}; "
             "set record.cameras=[], or choose another record.writer"
+        )
+
+    def open_streams(self, directory: Path, columns: EpisodeColumns, streams: Mapping[str, StreamInfo]) -> StreamWriter:
+        """What writes the streams of one trajectory, whose numbers are given; called where there are any.
+
+        Raises:
+            RecordError: this writer takes no streams.
+        """
+        raise RecordError(
+            f"the writer '{self.name}' writes no streams ({', '.join(streams)}); leave them out of record"
         )
 
 

@@ -57,6 +57,8 @@ class _Eye:
         self.log = SegmentLog(segments, intentions) if segments else None
         self.wanted = frozenset(channel for one in self.annotators.values() for channel in one.needs)
         self.before: View | None = None
+        self.gone: set[int] = set()
+        """Envs whose episodes have begun after `before` was seen."""
 
 
 class Capture:
@@ -94,14 +96,24 @@ class Capture:
 
     def begin(self, env_ids: Sequence[int] | Array | None = None) -> None:
         """Episodes begin in these envs, in all if not given: what was seen there before is forgotten."""
+        self.follow_from(env_ids)
+        self.forget(env_ids)
+
+    def follow_from(self, env_ids: Sequence[int] | Array | None = None) -> None:
+        """The half of `begin` that concerns `look` and `follow`."""
+        ids = np.arange(self.engine.num_envs) if env_ids is None else np.asarray(env_ids, dtype=np.int64)
+        for eye in self._eyes.values():
+            if eye.log is not None:
+                eye.log.forget(ids.tolist())
+            if eye.before is not None:
+                eye.gone |= set(ids.tolist())
+
+    def forget(self, env_ids: Sequence[int] | Array | None = None) -> None:
+        """The half of `begin` that concerns `label`."""
         ids = np.arange(self.engine.num_envs) if env_ids is None else np.asarray(env_ids, dtype=np.int64)
         for eye in self._eyes.values():
             for annotator in eye.annotators.values():
                 annotator.reset(ids)
-            if eye.log is not None:
-                eye.log.forget(ids.tolist())
-            if eye.before is not None:
-                eye.before.env_ids = np.where(np.isin(eye.before.env_ids, ids), -1, eye.before.env_ids)
 
     def now(self, env_ids: Sequence[int] | Array | None = None, said: Sequence[Mapping[str, Any]] = ()) -> Moment:
         """The envs as they are; `said` is what `SkillPolicy.describe` says of each."""
@@ -113,20 +125,29 @@ class Capture:
 
     def take(self, moment: Moment | None = None) -> dict[str, dict[str, Labels]]:
         """Labels of a moment, of now if not given, by camera and annotator; row by row its envs."""
-        moment = self.now() if moment is None else moment
-        found: dict[str, dict[str, Labels]] = {}
+        return self.label(self.look(self.now() if moment is None else moment))
+
+    def look(self, moment: Moment) -> dict[str, View]:
+        """What the cameras see of a moment, by camera: all that needs the engine is drawn."""
+        found: dict[str, View] = {}
         for camera, eye in self._eyes.items():
-            view = self._view(eye, moment, eye.wanted)
+            view = found[camera] = self._view(eye, moment, eye.wanted)
             view.draw()
+            eye.before, eye.gone = (view if eye.wanted & {"flow", "occluded"} else None), set()
+        return found
+
+    def label(self, seen: Mapping[str, View]) -> dict[str, dict[str, Labels]]:
+        """Labels of what was looked at, by camera and annotator: in the order in which it was, in any one thread."""
+        found: dict[str, dict[str, Labels]] = {}
+        for camera, view in seen.items():
             found[camera] = {}
-            for name, annotator in eye.annotators.items():
+            for name, annotator in self._eyes[camera].annotators.items():
                 view.granted = annotator.needs
                 with registry.using("annotators", name):
                     labels = annotator.annotate(view)
                 check_labels(name, annotator, labels, view)
                 found[camera][name] = labels
             view.before, view.granted = None, ()
-            eye.before = view if "flow" in eye.wanted or "occluded" in eye.wanted else None
         return found
 
     def follow(self, moment: Moment) -> list[SegmentLabels]:
@@ -155,7 +176,7 @@ class Capture:
         drawn = self.engine.camera_view(camera, ids, moment.body_pose)
         before = None
         if eye.before is not None:
-            place = {env: row for row, env in enumerate(eye.before.env_ids.tolist()) if env >= 0}
+            place = {env: row for row, env in enumerate(eye.before.env_ids.tolist()) if env not in eye.gone}
             before = eye.before, np.array([place.get(env, -1) for env in ids.tolist()])
         return View(
             eye.scene,

@@ -125,7 +125,9 @@ class View:
                 raise AnysimError(f"there is no channel '{name}'; see anysim_annotation.api.Channel")
 
     def draw(self) -> None:
-        """See now what is wanted: an engine cannot do so later."""
+        """See now what is wanted of the engine, which cannot do so later; rays can."""
+        if self.scene.source == "geometry" and "rgb" not in self.wanted:
+            return
         if self.wanted & {"depth", "segmentation", "points", "flow", "occluded", "normals", "rgb"}:
             _ = self._drawn
 

@@ -1,8 +1,9 @@
 """Episodes to speak of: one that a task would begin, or a recorded one, with what was drawn and where things are."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from anysim.conventions import Array
 from anysim.errors import RecordError
 from anysim.model.world import World
 from anysim.randomization.streams import episode_seed
+from anysim.record.columns import EpisodeColumns
 from anysim.record.manifest import Manifest
 from anysim.record.reader import TrajectoryReader, open_trajectory
 from anysim.record.replay import begin
@@ -141,6 +143,17 @@ def recorded(trajectory: Path, base: Path | None = None) -> Episode:
         poses = _rows(manifest, reader, "body_pose", [b.name for b in env.engine.world.bodies], manifest.layout.bodies)
         joints = _rows(manifest, reader, "joint_pos", [j.name for j in env.engine.world.joints], manifest.layout.joints)
         return _episode(env, loaded, manifest.task, manifest.episode_seed, poses, joints, reader, base)
+
+
+def ended(env: TaskEnv, loaded: LoadedRun, columns: EpisodeColumns, status: str) -> Episode:
+    """An episode that has just ended, by its columns with their reset, in a blind env of its world."""
+    header = columns.header.episode
+    begin(env, header)
+    poses, joints = columns.state["body_pose"], columns.state["joint_pos"]
+    found = _episode(env, loaded, columns.header.run.task, header.episode_seed, poses, joints)
+    said = dict(columns.annotations)
+    held = list(accumulate(range(len(columns)), lambda last, row: said.get(row, last), initial={}))
+    return replace(found, instruction=header.instruction, annotations=tuple(held[2:]), status=status)
 
 
 def _rows(manifest: Manifest, reader: TrajectoryReader, field: str, here: Sequence[str], there: Sequence[str]) -> Array:

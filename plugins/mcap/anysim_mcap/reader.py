@@ -14,8 +14,10 @@ from anysim.errors import RecordError, listing, suggest
 from anysim.record.frame import state_digest
 from anysim.record.manifest import CameraEntry
 from anysim.record.reader import TrajectoryReader
+from anysim.record.streams import StreamRow
 from anysim_mcap import messages as m, video
 from anysim_mcap.chunks import records
+from anysim_mcap.streams import read_rows, stream_faults
 from anysim_mcap.writer import TRAJECTORY_FILE
 
 _SCHEMAS = {"/action": m.ACTION, "/state": m.STATE, "/collect": m.COLLECT}
@@ -92,6 +94,14 @@ class McapReader(TrajectoryReader):
         for number, image in enumerate(video.images(self.directory / entry.file, entry.width, entry.height)):
             yield entry.first_step + number * entry.every, image
 
+    def rows(self, name: str) -> Iterator[StreamRow]:
+        if name not in self.manifest.streams:
+            yield from super().rows(name)
+            return
+        entry = self.manifest.streams[name]
+        for row in read_rows(self.directory / entry.file, {name: entry}, self.manifest.steps):
+            yield row._replace(time=float(self.times_from_reset[row.step]))
+
     def faults(self) -> list[str]:
         found: list[str] = []
         try:
@@ -103,6 +113,8 @@ class McapReader(TrajectoryReader):
             found += self._contradictions()
         except RecordError as error:
             found.append(str(error))
+        if not found:
+            found += stream_faults(self.directory, self.manifest.streams, self.times_from_reset)
         for entry in self.manifest.cameras.values():
             path = self.directory / entry.file
             try:

@@ -1,4 +1,4 @@
-"""The writer `mcap`: trajectory.mcap with all numbers and words, and one MP4 per camera."""
+"""The writer `mcap`: trajectory.mcap with all numbers and words, an MP4 a camera, an MCAP file a family of streams."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -10,12 +10,13 @@ import anysim_mcap
 from anysim.conventions import Array
 from anysim.errors import RecordError
 from anysim.record.columns import EpisodeColumns
-from anysim.record.header import CameraInfo, Header, RunHeader
+from anysim.record.header import CameraInfo, Header, RunHeader, StreamInfo
 from anysim.record.json import dump_json
-from anysim.record.writer import ImageWriter, TrajectoryWriter, WrittenFile
+from anysim.record.writer import ImageWriter, StreamWriter, TrajectoryWriter, WrittenFile
 from anysim_mcap import messages as m
 from anysim_mcap.blocks import BlockEncoder, Channels
 from anysim_mcap.mcap_file import McapFile, one_message
+from anysim_mcap.streams import StreamFiles
 from anysim_mcap.video import VideoWriter, frame_rate
 from anysim_schemas.base import Spec
 
@@ -82,6 +83,9 @@ class McapWriter(TrajectoryWriter):
 
     def open_images(self, directory: Path, header: Header) -> ImageWriter:
         return VideoFiles(directory, header, self.options)
+
+    def open_streams(self, directory: Path, columns: EpisodeColumns, streams: Mapping[str, StreamInfo]) -> StreamWriter:
+        return StreamFiles(directory, columns, streams, self.options.chunk_size, self._zstd)
 
     # ------------------------------------------------------------------ what is said once
 

@@ -8,7 +8,8 @@ import typer
 from anysim.cli.options import AsJson
 
 if TYPE_CHECKING:
-    from anysim.record.replay import FieldSummary, ReplayResult
+    from anysim.record.replay import ReplayResult
+    from anysim_inspect.replay_summary import FieldSummary
 
 
 def replay(
@@ -73,7 +74,7 @@ def _same_outcome(result: "ReplayResult") -> bool:
 
 
 def _summary(results: "dict[str, ReplayResult]") -> "list[FieldSummary]":
-    from anysim.record.replay import summarise
+    from anysim_inspect.replay_summary import summarise
 
     return summarise({Path(path).name: result.drift for path, result in results.items()})
 
