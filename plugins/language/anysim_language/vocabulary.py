@@ -54,6 +54,9 @@ class VocabularySpec(Spec):
     materials: dict[str, Word] = Field(default_factory=dict, description="adjectives by material")
     parts: dict[str, Word] = Field(default_factory=dict, description="parts by the end of their name, of any thing")
     skills: dict[str, SkillWords] = Field(default_factory=dict, description="by name of the skill")
+    tasks: dict[str, Phrasings] = Field(
+        default_factory=dict, description="instructions by name of the task, where its skills' words do not make one"
+    )
     phases: dict[str, str] = Field(default_factory=dict, description="what a robot does in a phase, by its name")
     scene: dict[str, Phrasings] = Field(default_factory=dict, description="sentences about a scene")
     events: dict[str, Phrasings] = Field(default_factory=dict, description="sentences about what happens")
