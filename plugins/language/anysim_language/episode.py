@@ -2,13 +2,13 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from anysim.api import blind_env, compile_world, load, watched
+from anysim.api import blind_env, compile_world, load, place_of, watched
 from anysim.conventions import Array
 from anysim.errors import RecordError
 from anysim.model.world import World
@@ -163,7 +163,8 @@ def _episode(
     base: Path | None = None,
 ) -> Episode:
     world, words = env.engine.world, vocabulary()
-    things, deeds = things_of(env.engine, words.words), tuple(_deeds(env, loaded))
+    folder = partial(_folder, loaded, base)
+    things, deeds = things_of(env.engine, words.words, folder=folder), tuple(_deeds(env, loaded))
     return Episode(
         name=name,
         seed=seed,
@@ -184,6 +185,12 @@ def _episode(
         reader=reader,
         base=base,
     )
+
+
+def _folder(loaded: LoadedRun, base: Path | None, category: str) -> Path | None:
+    """The folder of the file that says where the asset of an object is; `base` where that is not known."""
+    place = place_of(loaded, f"world.objects.{category}.source").rsplit(":", 2)[0]
+    return base or (Path(place).parent if Path(place).is_file() else None)
 
 
 def _view(env: TaskEnv, name: str) -> View:

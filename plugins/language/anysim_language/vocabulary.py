@@ -28,6 +28,8 @@ class ThingWords(Spec):
     plural: Word | None = Field(default=None, description="the noun with an s where not given")
     about: str = Field(default="", description="one clause about what can be done with it")
     parts: dict[str, Word] = Field(default_factory=dict, description="its links, joints and affordances by local name")
+    colour: Word | None = Field(default=None, description="where its looks tell none, as a texture does")
+    material: Word | None = Field(default=None, description="an adjective, where the world tells no material")
     container: Flag = Field(default=False, description="whether things lie in it rather than on it")
 
     @property
