@@ -1,15 +1,15 @@
 """Episodes to speak of: one that a task would begin, or a recorded one, with what was drawn and where things are."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from anysim.api import blind_env, compile_world, load, watched
+from anysim.api import blind_env, compile_world, load, place_of, watched
 from anysim.conventions import Array
 from anysim.errors import RecordError
 from anysim.model.world import World
@@ -176,7 +176,8 @@ def _episode(
     base: Path | None = None,
 ) -> Episode:
     world, words = env.engine.world, vocabulary()
-    things = things_of(env.engine, words.words)
+    folder = partial(_folder, loaded, base)
+    things, deeds = things_of(env.engine, words.words, folder=folder), tuple(_deeds(env, loaded))
     return Episode(
         name=name,
         seed=seed,
@@ -184,9 +185,9 @@ def _episode(
         things=things,
         viewer=viewer_of(world, things, poses[0]),
         instruction=reader.manifest.instruction if reader is not None else env.instruction(0),
-        deeds=tuple(_deeds(env, loaded)),
+        deeds=deeds,
         goals={name: goal[0].copy() for name, goal in env.scene.poses.items()},
-        goal_frames=_goal_frames(loaded),
+        goal_frames=_goal_frames(loaded, deeds, {thing.name for thing in things if thing.robot}),
         body_pose=poses,
         joint_pos=joints,
         annotations=() if reader is None else reader.annotations,
@@ -199,6 +200,12 @@ def _episode(
     )
 
 
+def _folder(loaded: LoadedRun, base: Path | None, category: str) -> Path | None:
+    """The folder of the file that says where the asset of an object is; `base` where that is not known."""
+    place = place_of(loaded, f"world.objects.{category}.source").rsplit(":", 2)[0]
+    return base or (Path(place).parent if Path(place).is_file() else None)
+
+
 def _view(env: TaskEnv, name: str) -> View:
     engine = env.engine
     camera = engine.world.cameras[engine.index.camera(name)]
@@ -206,14 +213,20 @@ def _view(env: TaskEnv, name: str) -> View:
     return View(name, camera.body, np.array(pose, dtype=float), fov, camera.width, camera.height)
 
 
-def _goal_frames(loaded: LoadedRun) -> dict[str, str]:
-    """What the goals of a task are at: things that they are beside, and insides that they are in."""
+def _goal_frames(loaded: LoadedRun, deeds: Sequence[Deed], robots: Collection[str]) -> dict[str, str]:
+    """What the goals of a task are at: things that they are beside, and insides that they are in.
+
+    A goal that is stated from where a robot, or what is brought to it, begins is at none of them.
+    """
+    brought = {(deed.params.get("goal"), deed.params.get("object")) for deed in deeds}
     command = loaded.spec.task.command if loaded.spec.task is not None else {}
     found: dict[str, str] = {}
     for name, term in command.items():
         frame = term.params.get("frame")
         if isinstance(frame, str) and (term.term == "goal_beside" or frame.endswith(".inside")):
-            found[name] = frame
+            owner = frame.partition(".")[0]
+            if owner not in robots and (name, owner) not in brought:
+                found[name] = frame
     return found
 
 

@@ -2,6 +2,10 @@
 
 from collections.abc import Callable
 
+import numpy as np
+
+from anysim.model.affordance_lookup import affordances_of
+from anysim_language.changes import OPEN
 from anysim_language.choice import choose
 from anysim_language.episode import Episode
 from anysim_language.moment import Moment
@@ -41,15 +45,17 @@ def _sentences(episode: Episode, moment: Moment, naming: Naming, say: Say) -> li
     groups = _groups(moment)
     found: list[str] = []
     if groups:
-        robot = listed([naming.an(name) for name in robots]) if robots else "nobody"
-        one = len(robots) <= 1
+        one = len(robots) == 1
         things = [_group_phrase(moment, naming, names) for names in groups]
         number = sum(map(len, groups))
         verbs = {"stands": "stands" if one else "stand", "act": "is" if one else "are"}
+        kind = "opening" if robots else "things_alone"
         amount = f"{counted(number)} thing{'s' if number != 1 else ''}"
-        found.append(say("opening", robot=robot, things=things, amount=amount, **verbs))
+        found.append(say(kind, robot=_robots(naming, robots), things=things, amount=amount, **verbs))
     else:
-        found.append(say("robots_alone", robots=[naming.an(name) for name in robots]))
+        found.append(
+            say("robots_alone", robots=_robots(naming, robots), stands="stands" if len(robots) == 1 else "stand")
+        )
     found += _supports(moment, naming, groups, say)
     pairs = _pairs(moment, naming, [names[0] for names in groups if len(names) == 1], say)
     found += pairs[:MOST_PAIRS]
@@ -57,12 +63,43 @@ def _sentences(episode: Episode, moment: Moment, naming: Naming, say: Say) -> li
         found.append(say("viewpoint", viewer=naming.the(moment.viewer.name)))
     for thing in moment.objects:
         if thing.words.about:
-            found.append(say("about", thing.name, thing=naming.the(thing.name), about=thing.words.about))
+            found.append(say("about", thing.name, about=_about(naming.the(thing.name), thing.words.about)))
+    found += [say("joint", part, part=naming.the(part)) for part in _open_parts(episode, moment)]
     if episode.views:
         names = [indefinite(f"{view.name.replace('_', ' ')} camera") for view in episode.views]
         found.append(say("camera", cameras=names, single=len(names) == 1))
     if episode.lights:
         found.append(say("light", count=f"{counted(episode.lights)} light{'s' if episode.lights > 1 else ''}"))
+    return found
+
+
+def _robots(naming: Naming, robots: list[str]) -> str:
+    """`a Panda arm`, `two Panda arms`, or one by one."""
+    words = {naming.moment.by_name[name].words.several for name in robots}
+    if len(robots) > 1 and len(words) == 1:
+        return f"{counted(len(robots))} {words.pop()}"
+    return listed([naming.an(name) for name in robots])
+
+
+def _about(the: str, about: str) -> str:
+    """A clause such as `it can be pushed` or `its cap can be pressed` with its thing in place of the pronoun."""
+    for pronoun, phrase in (("it ", f"{the} "), ("its ", f"{the}'s ")):
+        if about.startswith(pronoun):
+            return phrase + about.removeprefix(pronoun)
+    return f"of {the}: {about}"
+
+
+def _open_parts(episode: Episode, moment: Moment) -> list[str]:
+    """Parts that an asset offers to be opened, that are closed at the lower end of their range, and that stand open."""
+    world, found = episode.world, list[str]()
+    for thing in moment.objects:
+        entity = world.entities[thing.entity]
+        named = {f"{entity.name}.{one.joint}" for one in affordances_of(world, thing.entity) if "open" in one.use}
+        for j in range(entity.joint_start, entity.joint_stop):
+            joint = world.joints[j]
+            if joint.name in named and joint.lower >= 0.0 and np.isfinite(joint.upper):
+                if episode.joint_pos[moment.step, j] >= joint.lower + OPEN * (joint.upper - joint.lower):
+                    found.append(f"{thing.name}{world.bodies[joint.body].name.removeprefix(entity.name)}")
     return found
 
 

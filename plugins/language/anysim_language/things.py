@@ -1,7 +1,8 @@
 """Semantics of things: the noun, colour, material, shape, size and parts of every object and robot of a World."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from anysim.geometry.bounds import EntityShape
 from anysim.model.affordance_lookup import affordances_of
 from anysim.model.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from anysim.model.world import Entity, EntityKind, World
+from anysim_language.beside import robot_words, thing_words
 from anysim_language.colours import bytes_of, colour_name, is_clear
 from anysim_language.vocabulary import ThingWords, VocabularySpec
 
@@ -55,8 +57,13 @@ class Thing:
     fixed: bool
 
 
-def things_of(engine: SimEngine, words: VocabularySpec, env: int = 0) -> tuple[Thing, ...]:
-    """The logical objects that are there in an env, in the World's order, with what was drawn of their looks."""
+def things_of(
+    engine: SimEngine, words: VocabularySpec, env: int = 0, folder: Callable[[str], Path | None] = lambda category: None
+) -> tuple[Thing, ...]:
+    """The logical objects that are there in an env, in the World's order, with what was drawn of their looks.
+
+    `folder` gives what paths of the assets of a category are relative to.
+    """
     world, present = engine.world, engine.presence[env]
     looks = {
         name: engine.get_parameters(f"geom.{name}", np.array([env]))[0] for name in ("color", "texture", "material")
@@ -65,11 +72,13 @@ def things_of(engine: SimEngine, words: VocabularySpec, env: int = 0) -> tuple[T
     for slot in world.logical_objects.values():
         for number in slot.entities:
             if present[number]:
-                found.append(_thing(world, slot.name, number, looks, words))
+                found.append(_thing(world, slot.name, number, looks, words, folder(slot.category)))
     return tuple(found)
 
 
-def _thing(world: World, name: str, number: int, looks: Mapping[str, Array], words: VocabularySpec) -> Thing:
+def _thing(
+    world: World, name: str, number: int, looks: Mapping[str, Array], words: VocabularySpec, folder: Path | None
+) -> Thing:
     entity = world.entities[number]
     robot = entity.kind is EntityKind.ROBOT
     own = [g for body in range(entity.body_start, entity.body_stop) for g in world.body_geoms[body]]
@@ -80,18 +89,18 @@ def _thing(world: World, name: str, number: int, looks: Mapping[str, Array], wor
     preset = world.materials[material.pop()].name.partition("-")[0] if len(material) == 1 and min(material) >= 0 else ""
     local = [b.name.removeprefix(f"{entity.name}.") for b in world.bodies[entity.body_start + 1 : entity.body_stop]]
     declared = affordances_of(world, number)
-    kind = _robot_words(world, name, words) if robot else _object_words(entity, shape, words)
+    kind = _robot_words(world, name, words) if robot else _object_words(entity, shape, words, folder)
     return Thing(
         name=name,
         entity=number,
         robot=robot,
         words=kind,
-        colour=colour,
+        colour=colour or kind.colour or "",
         colour_clear=clear,
         paint=()
         if robot or any(looks["texture"][g] >= 0 for g in shown)
         else tuple(_rgb(looks["color"][g]) for g in shown),
-        material=words.materials.get(preset, ""),
+        material=words.materials.get(preset, "") or kind.material or "",
         shape=shape,
         size=size,
         parts=tuple(local),
@@ -105,20 +114,24 @@ def _rgb(color: Array) -> tuple[float, float, float]:
     return float(color[0]), float(color[1]), float(color[2])
 
 
-def _object_words(entity: Entity, shape: str, words: VocabularySpec) -> ThingWords:
-    """By label, by the label's last part, by source, by shape, and at last the label itself."""
+def _object_words(entity: Entity, shape: str, words: VocabularySpec, folder: Path | None) -> ThingWords:
+    """By label, by the label's last part, by source, as beside its asset, by shape, and at last the label itself."""
     label = entity.label or entity.category or entity.name
     last = label.rpartition("_")[2]
-    for key in (label, last, entity.source, f"shape:{shape}"):
-        if key in words.things and key != "shape:object":
+    for key in (label, last, entity.source):
+        if key in words.things:
             return words.things[key]
+    if beside := thing_words(entity.source, folder):
+        return beside
+    if shape != "object" and f"shape:{shape}" in words.things:
+        return words.things[f"shape:{shape}"]
     readable = label.replace("_", " ").strip()
     return ThingWords(noun=readable) if readable else words.things["shape:object"]
 
 
 def _robot_words(world: World, name: str, words: VocabularySpec) -> ThingWords:
     model = next((robot.model for robot in world.robots if robot.name == name), name)
-    known = words.robots.get(model.rpartition(":")[2])
+    known = words.robots.get(model.rpartition(":")[2]) or robot_words(model)
     return known or ThingWords(
         noun=f"{model.rpartition(':')[2].rpartition('/')[2].partition('.')[0]} robot".replace("_", " ")
     )

@@ -28,6 +28,8 @@ class ThingWords(Spec):
     plural: Word | None = Field(default=None, description="the noun with an s where not given")
     about: str = Field(default="", description="one clause about what can be done with it")
     parts: dict[str, Word] = Field(default_factory=dict, description="its links, joints and affordances by local name")
+    colour: Word | None = Field(default=None, description="where its looks tell none, as a texture does")
+    material: Word | None = Field(default=None, description="an adjective, where the world tells no material")
     container: Flag = Field(default=False, description="whether things lie in it rather than on it")
 
     @property
@@ -54,6 +56,9 @@ class VocabularySpec(Spec):
     materials: dict[str, Word] = Field(default_factory=dict, description="adjectives by material")
     parts: dict[str, Word] = Field(default_factory=dict, description="parts by the end of their name, of any thing")
     skills: dict[str, SkillWords] = Field(default_factory=dict, description="by name of the skill")
+    tasks: dict[str, Phrasings] = Field(
+        default_factory=dict, description="instructions by name of the task, where its skills' words do not make one"
+    )
     phases: dict[str, str] = Field(default_factory=dict, description="what a robot does in a phase, by its name")
     scene: dict[str, Phrasings] = Field(default_factory=dict, description="sentences about a scene")
     events: dict[str, Phrasings] = Field(default_factory=dict, description="sentences about what happens")
