@@ -18,6 +18,9 @@ from anysim_sensors.scene import SceneGeometry
 Source = Literal["engine", "geometry"]
 """Where depth and segmentation come from: the engine's drawing, or rays on the World's geometry."""
 NOTHING: Mapping[str, Any] = {}
+FROM_DEPTH = frozenset({"depth", "points", "normals", "flow", "occluded"})
+FROM_IDS = frozenset({"segmentation", "normals", "flow", "occluded"})
+"""Channels that are made of the depth that an engine draws, and of its segmentation."""
 
 
 class Scene:
@@ -128,7 +131,7 @@ class View:
         """See now what is wanted of the engine, which cannot do so later; rays can."""
         if self.scene.source == "geometry" and "rgb" not in self.wanted:
             return
-        if self.wanted & {"depth", "segmentation", "points", "flow", "occluded", "normals", "rgb"}:
+        if self.wanted & (FROM_DEPTH | FROM_IDS | {"rgb"}):
             _ = self._drawn
 
     @property
@@ -186,8 +189,9 @@ class View:
             traced = self.traced
             found = {"depth": traced.depth, "segmentation": traced.segmentation}
         asked = ["rgb"] if "rgb" in self.wanted else []
-        if scene.source == "engine" and self.wanted != {"rgb"}:
-            asked += ["depth", "segmentation"]
+        if scene.source == "engine":
+            parts = {"depth": FROM_DEPTH, "segmentation": FROM_IDS}
+            asked += [name for name, channels in parts.items() if self.wanted & channels]
         if asked:
             found |= scene.engine.render(scene.camera, env_ids=self.env_ids, channels=asked, body_pose=self.body_pose)
         return found

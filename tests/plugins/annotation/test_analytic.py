@@ -1,13 +1,19 @@
 """Annotations of boxes before a camera, whose numbers follow from a sketch on paper."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
+from anysim.conventions import Array
+from anysim.engine.base import SimEngine
 from anysim.errors import AnysimError, PluginError, SpecError
 from anysim.math import pose as P
-from anysim_annotation import lens
+from anysim_annotation import channels, lens
 from anysim_annotation.capture import Capture
 from anysim_annotation.orders import read_orders
+from anysim_annotation.view import Source
+from anysim_sensors.camera import Images, RayCamera
 from tests.plugins.annotation.scenes import AHEAD, EYE, FOCAL, FOV, H, W, boxes, label, looking_at, moment
 
 FACE = 1.8
@@ -133,6 +139,55 @@ def test_nothing_is_drawn_that_no_annotator_needs(monkeypatch: pytest.MonkeyPatc
     capture = Capture(engine, {"eye": ["boxes_3d", "camera"]}, "engine")
     monkeypatch.setattr("anysim_sensors.camera.RayCamera.images", lambda *_, **__: pytest.fail("rays were cast"))
     assert len(capture.take()["eye"]["boxes_3d"].records[0]) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "drawn", "made"),
+    [
+        ("camera", (), set()),
+        ("boxes_3d", (), set()),
+        ("depth", ("depth",), set()),
+        ("instance", ("segmentation",), set()),
+        ("semantic", ("segmentation",), set()),
+        ("boxes_2d", ("segmentation",), {"rays", "whole"}),
+        ("point_cloud", ("depth", "segmentation"), {"points"}),
+        ("normals", ("depth", "segmentation"), {"normals"}),
+        ("flow", ("depth", "segmentation"), {"moved", "rays", "bodies"}),
+    ],
+)
+@pytest.mark.parametrize("source", ["engine", "geometry"])
+def test_an_annotator_costs_what_it_needs_and_no_more(
+    name: str, drawn: tuple[str, ...], made: set[str], source: Source, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the engine is asked to draw, which rays are cast and which channels are computed, in two steps."""
+    engine = looking_at(boxes(WIDE))
+    found, asked = set[str](), list[tuple[str, ...]]()
+    real = {part: getattr(channels, part) for part in ("normals", "points", "moved", "bodies")}
+    for part, make in real.items():
+        monkeypatch.setattr(channels, part, lambda view, part=part, make=make: found.add(part) or make(view))
+    images = RayCamera.images
+
+    def cast(self: RayCamera, *args: Any, normals: bool = False, whole: bool = False, **more: Any) -> Images:
+        found.update(["rays", *["exact normals"] * normals, *["whole"] * whole])
+        return images(self, *args, normals=normals, whole=whole, **more)
+
+    def draw(_: SimEngine, __: str, channels: tuple[str, ...], **___: Any) -> dict[str, Array]:
+        asked.append(tuple(channels))
+        kinds = {"depth": np.float32, "segmentation": np.int32}
+        return {channel: np.ones((1, H, W), dtype=kinds[channel]) for channel in channels}
+
+    monkeypatch.setattr(RayCamera, "images", cast)
+    monkeypatch.setattr(type(engine), "render", draw)
+    capture = Capture(engine, {"eye": [name]}, source)
+    for _ in range(2):
+        capture.take()
+    if source == "engine":
+        assert asked == [drawn] * 2 * bool(drawn)
+        assert found == made
+    else:
+        assert asked == []
+        rays = {"rays"} if drawn else set[str]()
+        assert found == made | rays | ({"exact normals"} if name == "normals" else set[str]())
 
 
 def test_what_several_need_is_computed_once(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -51,25 +51,25 @@ def test_an_engines_channels_are_those_of_rays(seen, camera: str) -> None:
         {n: {k: a[0] for k, a in lab.arrays.items()} for n, lab in part[camera].items()} for part in seen[:2]
     )
     same = ours["instance"]["instance"] == theirs["instance"]["instance"]
-    assert same.mean() > 0.99
-    assert (ours["semantic"]["semantic"] == theirs["semantic"]["semantic"]).mean() > 0.99
+    assert same.mean() > 0.999
+    assert (ours["semantic"]["semantic"] == theirs["semantic"]["semantic"]).mean() > 0.999
     depth, answer = ours["depth"]["depth"], theirs["depth"]["depth"]
     both = same & np.isfinite(depth) & np.isfinite(answer)
     off = np.abs(depth[both] - answer[both])
-    assert np.median(off) < 1e-3
+    assert np.median(off) < 5e-4
     assert np.percentile(off, 95) < 5e-3
     turned = (ours["normals"]["normals"] * theirs["normals"]["normals"]).sum(axis=-1)
     known = both & np.isfinite(turned)
     degrees = np.degrees(np.arccos(np.clip(turned[known], -1, 1)))
     assert known.sum() > 0.98 * both.sum()
-    assert np.median(degrees) < 0.5
+    assert np.median(degrees) < 0.05
     assert np.percentile(degrees, 90) < 10
     flow = np.linalg.norm(ours["flow"]["flow"] - theirs["flow"]["flow"], axis=-1)
     known = both & np.isfinite(flow)
     assert known.sum() > 0.98 * both.sum()
     assert np.median(flow[known]) < 0.01
-    assert np.percentile(flow[known], 98) < 0.2
-    assert (ours["flow"]["occluded"] == theirs["flow"]["occluded"])[both].mean() > 0.97
+    assert np.percentile(flow[known], 98) < 0.01
+    assert (ours["flow"]["occluded"] == theirs["flow"]["occluded"])[both].mean() > 0.99
     assert (~ours["flow"]["occluded"])[both].mean() > 0.8
 
 
