@@ -1,6 +1,7 @@
 """Draw the pictures of ground and rooms: `python scripts/ground_pictures.py [FOLDER]`, docs/images where none is said.
 
-`terrains.png` has the generators at three difficulties, `rooms.png` sixteen rooms of four styles, both drawn by MuJoCo.
+`terrains.png` has the generators at three difficulties, `tiles.jpg` tiles of ten kinds and four levels, `rooms.png`
+sixteen rooms of four styles, all drawn by MuJoCo.
 """
 
 import argparse
@@ -17,6 +18,9 @@ from anysim_schemas.terrain import GENERATED
 
 DIFFICULTIES = (0.1, 0.5, 1.0)
 SIZE, CELL = [8.0, 8.0], 0.05
+COLUMNS: list[Any] = ["rough", {"kind": "slopes", "amplitude": 0.04}, {"kind": "slopes", "down": True}, "stairs"]
+COLUMNS += [{"kind": "stairs", "down": True}, "waves", "obstacles", "stepping_stones", "gaps", "pits"]
+TILE = 6.0
 ROOMS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("living_room", {"size": [5.0, 4.2], "furniture": {"nightstand": 0}}),
     ("bedroom", {"size": [4.8, 4.2]}),
@@ -58,6 +62,32 @@ def terrains(path: Path) -> None:
     figure.savefig(path, dpi=90)
 
 
+def tiles(path: Path) -> None:
+    """A column a kind, a row a level; the hardest row is at the back."""
+    from PIL import Image
+
+    grid = {"rows": 4, "size": TILE, "border": 1.0, "columns": COLUMNS, "difficulty": [0.1, 1.0]}
+    ground = {"kind": "tiles", "color": [0.66, 0.58, 0.46], "seed": 1, "tiles": grid}
+    height = {
+        (t.row, t.column): t.origin[2] for t in compile_world(WorldSpec.model_validate({"terrain": ground})).tiles
+    }
+    middle, seen = 0.5 * TILE * (len(COLUMNS) - 1), {"size": [1280, 430], "far": 200.0}
+    spec = {
+        "terrain": ground,
+        "robots": {
+            f"dog{k}": {"robot": "unitree_b1", "position": [TILE * (row := k * 3 % 4), TILE * k, height[row, k]]}
+            for k in range(len(COLUMNS))
+        },
+        "cameras": {"above": {"from": [-47.0, middle, 38.0], "look_at": [7.2, middle, 0.0], "fov": 20.5} | seen},
+        "lights": {
+            "low": {"direction": [0.5, 0.7, -0.45], "intensity": 0.75},
+            "sky": {"direction": [-0.2, 0.3, -1.0], "intensity": 0.3},
+        },
+    }
+    with create_simulation("mujoco").create_world(compile_world(WorldSpec.model_validate(spec))) as engine:
+        Image.fromarray(engine.render("above")["rgb"][0]).save(path, quality=72, optimize=True)
+
+
 def room(style: str, more: dict[str, Any], seed: int) -> Array:
     """An image (H, W, 3) of a room from above, at an angle."""
     walls = [1, 2, 4] if "plan" in more else ["east", "north", "west"]
@@ -90,11 +120,12 @@ def rooms(path: Path) -> None:
 
 
 def main() -> None:
-    """Draw both."""
+    """Draw all."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path, nargs="?", default=Path("docs") / "images")
     folder: Path = parser.parse_args().folder
     terrains(folder / "terrains.png")
+    tiles(folder / "tiles.jpg")
     rooms(folder / "rooms.png")
 
 

@@ -64,18 +64,21 @@ def test_what_is_told_to_stand_is_not_put_back_for_standing() -> None:
         assert moved_by(env, [0.0, 2.05]) == [1, 2]
 
 
-def test_the_way_is_that_of_the_commands_so_far() -> None:
-    go = "task.command.go={term: tasks.velocity, forward: {range: [-0.8, 0.8]}, left: 0, every: 1.0}"
+def test_the_way_is_where_all_commands_lead() -> None:
+    go = (
+        "task.command.go={term: tasks.velocity, forward: {range: [-1, 1]}, left: 0, turn: {range: [-1, 1]}, every: 1.0}"
+    )
     with anysim.make(ROLLING, num_envs=24, curriculum=True, overrides=[go]) as env:
         env.reset(seed=0)
-        speeds: list[np.ndarray] = []
+        commands: list[np.ndarray] = []
         for _ in range(6):
             env.step(np.zeros((24, 0)))
-            speeds.append(np.abs(env.scene.goals["go"][:, 0]))
-        speeds.append(speeds[-1])  # of the step in `moved_by`; the next is drawn after it
-        levels = moved_by(env, [0.9] * 24)
-        mean = np.mean(speeds, axis=0)
-        expected = np.where(0.9 < 0.5 * mean * HORIZON * 0.5, 0, 1)
+            commands.append(env.scene.goals["go"].copy())
+        commands.append(commands[-1])  # of the step in `moved_by`; the next is drawn after it
+        levels = moved_by(env, [0.5] * 24)
+        heading = np.concatenate([np.zeros((1, 24)), np.cumsum([0.5 * c[:, 2] for c in commands[:-1]], axis=0)])
+        led = np.abs(sum(0.5 * c[:, 0] * np.exp(1j * h) for c, h in zip(commands, heading, strict=True)))
+        expected = np.where(0.5 < 0.5 * led * HORIZON / 7, 0, 1)
         assert 4 < expected.sum() < 20
         assert levels == expected.tolist()
 
