@@ -57,7 +57,17 @@ def pair_restitution(restitution: Array) -> Array:
 
 def counted(sensor: ContactSensor, first: Array, second: Array) -> tuple[Array, Array]:
     """Which contacts (C,) a sensor counts as one on their first bodies (C,), and which as one on their second."""
-    own = np.isin(first, sensor.bodies), np.isin(second, sensor.bodies)
+    own = _among(first, sensor.bodies), _among(second, sensor.bodies)
     if sensor.against is None:
         return own
-    return own[0] & np.isin(second, sensor.against), own[1] & np.isin(first, sensor.against)
+    return own[0] & _among(second, sensor.against), own[1] & _among(first, sensor.against)
+
+
+def _among(bodies: Array, some: tuple[int, ...]) -> Array:
+    """Which of the bodies (C,) are some of these: `np.isin`, which takes 30 us also where a sensor has one body."""
+    if len(some) > 8:
+        return np.isin(bodies, some)
+    found = np.zeros(len(bodies), dtype=bool)
+    for one in some:
+        found |= bodies == one
+    return found

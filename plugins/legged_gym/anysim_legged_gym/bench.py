@@ -7,8 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from anysim.engine.base import SimEngine
 from anysim.engine.factory import create_simulation, engine_class
 from anysim.errors import EngineError
+from anysim.model.world import World
 from anysim_legged_gym.simulator import LeggedSimulator
 from anysim_legged_gym.velocity import VelocityEnv
 
@@ -65,7 +67,7 @@ def legged_cost(engine: str, num_envs: int | None = None, rounds: int = 10, robo
     cfg = SETTINGS | {"asset": {"robot": robot}}
     with LeggedSimulator(cfg, engine, num_envs=count) as sim, create_simulation(engine) as bare:
         env = VelocityEnv(sim)
-        bare.create_world(replace(sim.engine.world, contact_sensors=()), count)
+        bare.create_world(_without_extras(sim.engine.world, bare), count)
         substeps = sim.cfg.control.decimation
         draws = np.random.default_rng(0)
         actions = [draws.uniform(-0.2, 0.2, (count, sim.num_actions)) for _ in range(8)]
@@ -90,6 +92,14 @@ def legged_cost(engine: str, num_envs: int | None = None, rounds: int = 10, robo
     heights, level = _ground_costs(engine, min(count, MANY), rounds, robot)
     raw, alone, whole = (count / wall for wall in walls)
     return LeggedCost(engine, count, raw, alone, whole, whole / raw, cpus[0] / cpus[2], heights, level)
+
+
+def _without_extras(world: World, engine: SimEngine) -> World:
+    """The same robots without sensors; and without dry friction where a library's own motors have none beside them."""
+    world = replace(world, contact_sensors=())
+    if engine.parallel:
+        return world
+    return replace(world, joints=tuple(replace(joint, friction=0.0) for joint in world.joints))
 
 
 def _ground_costs(engine: str, count: int, rounds: int, robot: str) -> tuple[float, float]:
