@@ -496,6 +496,9 @@ CASES: dict[str, Case] = {
     "stand_still": Case(
         _rising("dog", 0.3, 0.6), [_shifted("dog", z=-0.11), _tilted("dog", 0.36)], unheld=(), lasting=True
     ),
+    "get_up": Case(
+        _rising("dog", 0.3, 0.6), [_shifted("dog", z=-0.06), _tilted("dog", 0.3), _moving("dog", 0.2)], unheld=()
+    ),
     "stand_on_two_legs": Case(
         _rising("walker", 0.76, 0.8),
         [_shifted("walker", z=-0.27), _shifted("walker", z=0.25), _tilted("walker", 0.62)],
