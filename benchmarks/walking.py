@@ -1,4 +1,4 @@
-"""How well a policy of `go1_velocity` walks, on every engine: five commands, shoves, a slippery floor and rough ground.
+"""Walks of a policy of `go1_velocity` on every engine: five commands, shoves, a slippery floor and rough ground.
 
     python benchmarks/walking.py [POLICY ...] [--engines mujoco,sapien] [-n 8] [--rows commands,shoves,floors]
 

@@ -64,12 +64,16 @@ def _opening(joint: str, first: float, last: float) -> Callable[[TaskEnv, float]
     return lambda env, share: set_opening(env, joint, first + share * (last - first))
 
 
-def _tracking(env: TaskEnv, share: float) -> None:
+def _tracking(robot: str) -> Callable[[TaskEnv, float], None]:
+    return lambda env, share: _walked(env, share, robot)
+
+
+def _walked(env: TaskEnv, share: float, robot: str) -> None:
     """A whole episode at a share of the commanded velocity, but for its last step, which is the one to be judged."""
     speed, goal = np.zeros((env.num_envs, 1, 6)), env.scene.goals["walk"]
     goal[(goal == 0.0).all(axis=1), 0] = 0.5  # to stand is no way
     speed[:, 0, :2], speed[:, 0, 5] = share * goal[:, :2], share * goal[:, 2]
-    env.engine.set_body_state(None, speed, None, [env.engine.index.entity("dog").root])
+    env.engine.set_body_state(None, speed, None, [env.engine.index.entity(robot).root])
     for memory in env.scene.memories:
         memory.forget(np.arange(env.num_envs))
     assert env.spec.task is not None
@@ -492,9 +496,13 @@ CASES: dict[str, Case] = {
         [_shifted("dog", x=0.27), _turned("dog", 0.4), _moving("dog")],
         (),
     ),
-    "go1_velocity": Case(_tracking, [_moving("dog", 9.0), _short], ()),
+    "go1_velocity": Case(_tracking("dog"), [_moving("dog", 9.0), _short], ()),
+    "g1_velocity": Case(_tracking("walker"), [_moving("walker", 9.0), _short], ()),
     "stand_still": Case(
         _rising("dog", 0.3, 0.6), [_shifted("dog", z=-0.11), _tilted("dog", 0.36)], unheld=(), lasting=True
+    ),
+    "get_up": Case(
+        _rising("dog", 0.3, 0.6), [_shifted("dog", z=-0.06), _tilted("dog", 0.3), _moving("dog", 0.2)], unheld=()
     ),
     "stand_on_two_legs": Case(
         _rising("walker", 0.76, 0.8),

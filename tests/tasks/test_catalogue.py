@@ -21,8 +21,8 @@ VARIANTS = {"peg_in_hole_2mm", "insert_round_peg", "nut_on_peg", "usb_insert", "
 """Those that differ from another task in sizes alone, or share its world or its way."""
 SETTLING = "robot.hand_", "partner.hand_", "hand.", "dog.", "walker."
 """Joints of a hand, which an action of zero sends to the middle of their ranges, and of legs that take up a weight."""
-SOFT = "go1_velocity"
-"""A task whose drives hold no weight at once."""
+SOFT = ("go1_velocity", "g1_velocity", "get_up")
+"""Tasks whose drives hold no weight at once, or whose robot begins above the ground."""
 SHIPPED = ["stand_still"]
 """Those that come with a trained policy."""
 DEEPEST, REPLAYED = 2e-3, 50

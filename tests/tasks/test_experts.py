@@ -48,6 +48,7 @@ TASKS = [
     "loco_room_nav",
     "stand_still",
     "go1_velocity",
+    "get_up",
     "stand_on_two_legs",
     "mobile_grasp",
     "mobile_pick_place",

@@ -194,6 +194,17 @@ def test_the_centre_of_mass_is_elsewhere_for_an_episode(engine: str) -> None:
         assert apart[0, 0] != apart[1, 0]
 
 
+def test_a_robot_begins_tipped_over() -> None:
+    tip = {"term": "tasks.tip_over", "roll": {"range": [0.5, 1.0]}, "pitch": 0.0, "lift": 0.1}
+    with dog(3, task={**DOG["task"], "events": {"tip": tip}}) as env:
+        env.reset(seed=0)
+        pose = env.scene.frame("dog").pose
+        np.testing.assert_allclose(pose[:, 2], HEIGHT + 0.1, atol=1e-6)
+        rolls = 2.0 * np.arctan2(pose[:, 3], pose[:, 6])
+        assert ((rolls >= 0.5) & (rolls <= 1.0)).all()
+        assert len(set(rolls.tolist())) == 3
+
+
 def test_what_has_no_legs_has_no_feet() -> None:
     arm = {**DOG["world"], "robots": {"arm": {"robot": "franka_panda", "actions": {"arm": "joint_position"}}}}
     task = {"observations": {"policy": ["joint_pos"]}}

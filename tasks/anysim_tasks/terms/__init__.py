@@ -4,7 +4,7 @@ from anysim_tasks.terms import base_motion, gait
 from anysim_tasks.terms.bounded import at_least
 from anysim_tasks.terms.climb import Climb
 from anysim_tasks.terms.coverage import Coverage, CoverageGain
-from anysim_tasks.terms.disturbance import Shove, com_offset
+from anysim_tasks.terms.disturbance import Shove, com_offset, tip_over
 from anysim_tasks.terms.latch import Latch
 from anysim_tasks.terms.spring import Spring
 from anysim_tasks.terms.velocity import Tracked, Velocity, at_velocity, goal_velocity, velocity_match
@@ -32,5 +32,12 @@ TERMS = {
         "tracked": Tracked,
     },
     "command": {"velocity": Velocity},
-    "event": {"climb": Climb, "com_offset": com_offset, "latch": Latch, "shove": Shove, "spring": Spring},
+    "event": {
+        "climb": Climb,
+        "com_offset": com_offset,
+        "latch": Latch,
+        "shove": Shove,
+        "spring": Spring,
+        "tip_over": tip_over,
+    },
 }

@@ -7,9 +7,10 @@ import numpy as np
 from pydantic import Field
 
 from anysim.conventions import Array
+from anysim.math import pose as P
 from anysim.task.contract import changes_nothing_seen
 from anysim.task.scene import RobotView, SceneView
-from anysim_schemas.values import Vec3Value
+from anysim_schemas.values import FloatValue, Vec3Value
 
 Draw = Callable[..., Array]
 
@@ -41,6 +42,25 @@ class Shove:
         twist = scene.state.body_twist[ids, self._root][:, None].copy()
         twist[:, 0, :3] += draw("velocity", self._velocity, due)
         scene.engine.set_body_state(None, twist, ids, [self._root])
+
+
+@changes_nothing_seen
+def tip_over(
+    scene: SceneView,
+    draw: Draw,
+    *,
+    robot: RobotView,
+    roll: Annotated[FloatValue, Field(description="[rad]")] = 0.0,
+    pitch: Annotated[FloatValue, Field(description="[rad]")] = 0.0,
+    lift: Annotated[FloatValue, Field(description="above where it was put [m]")] = 0.0,
+) -> None:
+    """A robot's base begins the episode tipped over about its own axes, and lifted so that it has room."""
+    root = scene.index.entity(robot.name).root
+    pose = scene.state.body_pose[scene.env_ids, root].copy()
+    turn = P.from_roll_pitch_yaw(np.stack([draw("roll", roll), draw("pitch", pitch), np.zeros(len(pose))], axis=1))
+    pose[:, 3:] = P.multiply(pose[:, 3:], turn)
+    pose[:, 2] += draw("lift", lift)
+    scene.engine.set_body_state(pose[:, None], None, scene.env_ids, [root])
 
 
 @changes_nothing_seen

@@ -40,6 +40,24 @@ def test_a_dog_on_its_side_is_lost_in_its_env_alone() -> None:
         assert policy.describe(1)["outcome"] == "lost"
 
 
+def test_it_rises_to_a_posture_along_a_line() -> None:
+    with blind("get_up", "null", 1) as env:
+        env.reset(seed=2)
+        policy = SkillPolicy(env)
+        policy.begin(np.arange(1))
+        first = policy.act(np.arange(1)).copy()
+        env.scene.elapsed[:] = 24
+        half = policy.act(np.arange(1)).copy()
+        env.scene.elapsed[:] = 80
+        last = policy.act(np.arange(1))
+        wanted = np.tile([0.0, (0.8 - 1.3) / 0.3, (-1.6 + 2.65) / 0.3], 4)
+        np.testing.assert_allclose(last[0], wanted, atol=1e-9)
+        np.testing.assert_allclose(half[0], 0.5 * wanted, atol=1e-9)
+        np.testing.assert_allclose(first[0], wanted / 50, atol=1e-9)
+        with pytest.raises(TaskError, match=r"posture: no joint of 'dog' matches '\*_knee'"):
+            bind_skill("stand", {"robot": "dog", "posture": {"*_knee": 0.0}}, env, "task.expert")
+
+
 def test_a_robot_without_a_controller_is_refused() -> None:
     other = "world.robots.other={robot: unitree_a1, position: [2.0, 0.0, 0.0]}"
     seen_of_one = "task.observations={policy: [{term: projected_gravity, robot: dog}]}"

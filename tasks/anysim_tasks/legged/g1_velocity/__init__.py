@@ -1,0 +1,1 @@
+"""Walk as fast as commanded, on two legs, by positions of the joints."""

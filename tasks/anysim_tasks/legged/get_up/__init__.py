@@ -1,0 +1,1 @@
+"""Get up from the ground and stand, by positions of the joints."""
