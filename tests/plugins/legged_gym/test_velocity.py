@@ -76,6 +76,19 @@ def test_levels_follow_what_was_walked() -> None:
         np.testing.assert_array_equal(sim.terrain_levels, [2, 0, 1, 1])
 
 
+@pytest.mark.parametrize("robot", ["solo12", "anymal_c"])
+def test_diagonal_feet_stand_together(robot: str) -> None:
+    """Front left with hind right, whatever a robot calls them; and hips are what turns about x."""
+    with LeggedSimulator({"asset": {"robot": robot}}, "null") as sim:
+        env = VelocityEnv(sim)
+        env.step(np.zeros((1, 12)))
+        phase = dict(zip((name[:2] for name in sim.feet_names), env._phase()[0], strict=True))
+        left, right = ("HL", "HR") if robot == "solo12" else ("RL", "RR")
+        assert phase["FL"] == phase[right] == pytest.approx(sim.dt * 2.5)
+        assert phase["FR"] == phase[left] == pytest.approx(sim.dt * 2.5 + 0.5)
+        assert [sim.dof_names[i][-3:] for i in env._hips] == ["HAA"] * 4
+
+
 def test_a_trot_needs_four_feet() -> None:
     with LeggedSimulator({"asset": {"robot": "bolt"}}, "null") as sim, pytest.raises(TaskError, match="four feet"):
         VelocityEnv(sim)
