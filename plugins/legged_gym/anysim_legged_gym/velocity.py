@@ -6,6 +6,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.errors import TaskError
+from anysim.math import pose as P
 from anysim_legged_gym.simulator import LeggedSimulator
 
 CLOCK = 2.5
@@ -47,9 +48,13 @@ class VelocityEnv:
         n, self._limit = simulator.num_envs, round(episode / simulator.dt)
         self.commands = np.zeros((n, 3))
         self._ticks, self._episodes = np.zeros(n, dtype=int), np.zeros(n, dtype=int)
-        side = np.array([name.upper().startswith(("FL", "LF", "RR", "RH")) for name in simulator.feet_names])
-        self._offset = np.where(side, 0.0, 0.5)
-        self._hips = np.array([i for i, name in enumerate(simulator.dof_names) if "hip" in name or "HAA" in name])
+        place = simulator.feet_pos[0, :, :2] - simulator.base_pos[0, :2]
+        self._offset = np.where((place[:, 0] > 0) == (place[:, 1] > 0), 0.0, 0.5)  # diagonal pairs in turn
+        world = simulator.engine.world
+        joints = [world.joints[j] for j in simulator.layout.joints]
+        turns = world.initial_body_pose[[joint.body for joint in joints], 3:]
+        axes = P.rotate(turns, np.array([joint.axis for joint in joints]))
+        self._hips = np.flatnonzero(np.abs(axes[:, 0]) > 0.9)
         self._radius = float(np.min(simulator.feet_pos[..., 2] - simulator.heights_around_feet[..., 4]))
         self._stand = float(simulator.base_init_pos[2]) - 0.03
         self._every = np.arange(n)

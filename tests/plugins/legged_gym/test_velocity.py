@@ -1,16 +1,19 @@
 """The velocity env: shapes, determinism, rewards and levels; the tensors' view; the benchmark."""
 
 import importlib.util
+import json
 import sys
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from anysim.cli import main
 from anysim.errors import PluginError, TaskError
 from anysim.testing.engines import require_engine
-from anysim_legged_gym.bench import legged_cost
+from anysim_legged_gym.bench import LeggedCost, legged_cost
 from anysim_legged_gym.simulator import LeggedSimulator
 from anysim_legged_gym.tensors import TensorView
 from anysim_legged_gym.velocity import VelocityEnv
@@ -76,6 +79,19 @@ def test_levels_follow_what_was_walked() -> None:
         np.testing.assert_array_equal(sim.terrain_levels, [2, 0, 1, 1])
 
 
+@pytest.mark.parametrize("robot", ["solo12", "anymal_c"])
+def test_diagonal_feet_stand_together(robot: str) -> None:
+    """Front left with hind right, whatever a robot calls them; and hips are what turns about x."""
+    with LeggedSimulator({"asset": {"robot": robot}}, "null") as sim:
+        env = VelocityEnv(sim)
+        env.step(np.zeros((1, 12)))
+        phase = dict(zip((name[:2] for name in sim.feet_names), env._phase()[0], strict=True))
+        left, right = ("HL", "HR") if robot == "solo12" else ("RL", "RR")
+        assert phase["FL"] == phase[right] == pytest.approx(sim.dt * 2.5)
+        assert phase["FR"] == phase[left] == pytest.approx(sim.dt * 2.5 + 0.5)
+        assert [sim.dof_names[i][-3:] for i in env._hips] == ["HAA"] * 4
+
+
 def test_a_trot_needs_four_feet() -> None:
     with LeggedSimulator({"asset": {"robot": "bolt"}}, "null") as sim, pytest.raises(TaskError, match="four feet"):
         VelocityEnv(sim)
@@ -109,3 +125,17 @@ def test_the_benchmark_measures_all_of_it() -> None:
     assert cost.ratio == pytest.approx(cost.env / cost.raw)
     assert 0 < cost.heights < 1000
     assert cost.level > 0
+
+
+@pytest.mark.slow
+def test_the_command_stands_in_the_group_of_benchmarks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The group is made by another distribution, and joined by this one; a goal that is missed is marked."""
+    made = LeggedCost("mujoco", 256, 100.0, 90.0, 50.0, 0.5, 0.5, 1.0, 2.0)
+    monkeypatch.setattr("anysim_legged_gym.bench.legged_cost", lambda *_: made)
+    main._join_commands()
+    result = CliRunner().invoke(main.app, ["bench", "legged", "--engines", "mujoco"])
+    assert result.exit_code == 0, result.output
+    assert "0.6 missed" in result.output
+    found = json.loads(CliRunner().invoke(main.app, ["bench", "legged", "-e", "mujoco", "--json"]).output)
+    assert (found[0]["env"], found[0]["missed"]) == (50.0, True)
+    assert not made._replace(ratio=0.61).missed
