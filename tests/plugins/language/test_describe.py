@@ -289,3 +289,27 @@ def test_the_words_of_a_scene_are_those_of_every_machine() -> None:
         hashlib.sha256("\n".join(texts).encode()).hexdigest()
         == "e891bd46c7b58e196ad723e020280f6080b171a14bad1a996a216d53ca8c7adb"
     )
+
+
+def test_what_is_carried_along_in_something_is_not_held_itself() -> None:
+    """The cube on the other one, which the tool takes: the tool holds that alone."""
+    episode = carried()
+    world = episode.world
+    cube, base = (world.entities[world.entity_numbers[name]].root for name in ("cube", "base"))
+    poses = episode.body_pose.copy()
+    poses[:, base] = poses[:, cube]
+    poses[:, base, 2] -= 0.002
+    poses[:, cube, 2] += 0.04
+    held = [(c.kind, c.what) for c in changes(replace(episode, body_pose=poses)) if c.kind in ("grasped", "moved")]
+    assert held == [("grasped", "base")]
+
+
+def test_who_takes_a_thing_over_is_told() -> None:
+    episode = begun("handover", 1)
+    phases = ("grasp: descend", "hold out: carry", "take: descend")
+    said = [{"skill": "handover", "phase": phase} for phase in phases for _ in range(6)]
+    poses, joints = (np.repeat(rows, 19, axis=0) for rows in (episode.body_pose, episode.joint_pos))
+    episode = replace(episode, body_pose=poses, joint_pos=joints, annotations=tuple(said))
+    told = narration(episode)
+    assert [sentence.who for sentence in told] == ["panda", "panda", "partner"]
+    assert "at the back comes down to the bar" in told[-1].text

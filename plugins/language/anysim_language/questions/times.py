@@ -82,10 +82,10 @@ def _opened(asker: Asker) -> Iterator[Question]:
 
 def _next(asker: Asker) -> Iterator[Question]:
     told = asker.past.doings
-    if any(abs(sentence.step - asker.step) <= SETTLED for sentence in told) or not asker.moment.viewer.name:
+    if any(abs(sentence.step - asker.step) <= SETTLED for sentence in told):
         return
     later = [sentence for sentence in told if sentence.step > asker.step]
-    if later:
+    if later and later[0].who:
         program = {"kind": later[0].kind, "what": later[0].what, "step": later[0].step}
-        robot = asker.naming.the(asker.moment.viewer.name)
-        yield asker.ask("next", later[0].text, program, (asker.moment.viewer.name,), robot=robot)
+        robot = asker.naming.the(later[0].who)
+        yield asker.ask("next", later[0].text, program, (later[0].who,), robot=robot)
