@@ -9,6 +9,7 @@ from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.model.world import BodyKind
 from anysim_language.episode import Episode
+from anysim_language.joints import movable_parts
 from anysim_language.relations import GROUND, Support, support
 from anysim_language.things import Thing
 
@@ -52,7 +53,7 @@ def changes(episode: Episode) -> list[Change]:
     return sorted(found, key=lambda change: (change.step, _ORDER.index(change.kind), change.what, change.where))
 
 
-_ORDER = ("grasped", "lifted", "left", "moved", "turned", "opened", "closed", "placed", "released")
+_ORDER = ("grasped", "lifted", "left", "moved", "turned", "pressed", "opened", "closed", "placed", "released")
 
 
 def _travels(episode: Episode, thing: Thing) -> Iterator[Change]:
@@ -134,22 +135,17 @@ def _holds(episode: Episode, thing: Thing) -> Iterator[Change]:
 
 
 def _joints(episode: Episode) -> Iterator[Change]:
-    """What the joints of objects do that have two limits: doors, drawers, buttons, valves."""
-    world = episode.world
+    """What is done to movable parts: doors, drawers, buttons, valves."""
     for thing in episode.first.objects:
-        entity = world.entities[thing.entity]
-        for j in range(entity.joint_start, entity.joint_stop):
-            joint = world.joints[j]
-            if not np.isfinite([joint.lower, joint.upper]).all() or joint.upper <= joint.lower or joint.mimic:
-                continue
-            share = (episode.joint_pos[:, j] - joint.lower) / (joint.upper - joint.lower)
-            part = world.bodies[joint.body].name
+        for part in movable_parts(episode.world, thing.entity):
+            share = (episode.joint_pos[:, part.joint] - part.lower) / (part.upper - part.lower)
             is_open, was_ajar = bool(share[0] >= OPEN), bool(share[0] >= AJAR)
             for step in range(1, len(share)):
                 was_ajar = was_ajar or bool(share[step] >= AJAR)
                 if not is_open and share[step] >= OPEN:
                     is_open = True
-                    yield Change(step, "opened", part)
+                    yield Change(step, part.done, part.name)
                 elif was_ajar and share[step] <= SHUT:
                     is_open = was_ajar = False
-                    yield Change(step, "closed", part)
+                    if part.done == "opened":
+                        yield Change(step, "closed", part.name)

@@ -313,3 +313,24 @@ def test_who_takes_a_thing_over_is_told() -> None:
     told = narration(episode)
     assert [sentence.who for sentence in told] == ["panda", "panda", "partner"]
     assert "at the back comes down to the bar" in told[-1].text
+
+
+@pytest.mark.parametrize(
+    ("task", "part", "kinds"),
+    [
+        ("press_button", "button.cap", ["pressed"]),
+        ("screw_cap", "jar.cap", ["turned"]),
+        ("put_away", "cabinet.drawer_1", ["opened", "closed"]),
+        ("push_cart", "cart.body", []),
+    ],
+)
+def test_what_is_done_to_a_part_follows_from_what_its_asset_offers(task: str, part: str, kinds: list[str]) -> None:
+    episode = begun(task, 1)
+    world = episode.world
+    j = next(k for k, joint in enumerate(world.joints) if world.bodies[joint.body].name == part)
+    share = np.concatenate([np.linspace(0.0, 1.0, 20), np.linspace(1.0, 0.0, 20)])
+    joints = np.repeat(episode.joint_pos, 40, axis=0)
+    joints[:, j] = world.joints[j].lower + share * (world.joints[j].upper - world.joints[j].lower)
+    episode = replace(episode, joint_pos=joints, body_pose=np.repeat(episode.body_pose, 40, axis=0))
+    assert [change.kind for change in changes(episode)] == kinds
+    assert all("None" not in sentence.text for sentence in narration(episode))
