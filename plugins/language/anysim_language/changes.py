@@ -9,7 +9,8 @@ from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.model.world import BodyKind
 from anysim_language.episode import Episode
-from anysim_language.relations import support
+from anysim_language.joints import movable_parts
+from anysim_language.relations import GROUND, Support, support
 from anysim_language.things import Thing
 
 STEADY = 5
@@ -52,7 +53,7 @@ def changes(episode: Episode) -> list[Change]:
     return sorted(found, key=lambda change: (change.step, _ORDER.index(change.kind), change.what, change.where))
 
 
-_ORDER = ("grasped", "lifted", "moved", "turned", "opened", "closed", "placed", "released")
+_ORDER = ("grasped", "lifted", "left", "moved", "turned", "pressed", "opened", "closed", "placed", "released")
 
 
 def _travels(episode: Episode, thing: Thing) -> Iterator[Change]:
@@ -72,13 +73,31 @@ def _travels(episode: Episode, thing: Thing) -> Iterator[Change]:
             bottom = moment.extent(thing.name).low[2]
             if not lifted and held is None and bottom >= low + RISEN:
                 lifted = True
-                yield Change(step, "lifted", thing.name, resting.where if resting else "", "")
-            elif not lifted and not slid and held is not None and resting is not None and held.where == resting.where:
+                kind = "left" if _travelling(episode, resting, step) else "lifted"
+                yield Change(step, kind, thing.name, resting.where if resting else "", "")
+            elif (
+                not lifted
+                and not slid
+                and held is not None
+                and resting is not None
+                and held.where == resting.where
+                and not _travelling(episode, held, step)
+            ):
                 slid = True
                 yield Change(step, "moved", thing.name, held.where, held.relation)
             elif lifted and held is not None and not moving[max(step - STEADY, 0) : step + 1].any():
                 lifted, resting, low = False, held, bottom
                 yield Change(step, "placed", thing.name, held.where, held.relation)
+
+
+def _travelling(episode: Episode, held: Support | None, step: int) -> bool:
+    """Whether what carries a thing moves itself: then the thing is carried along, as beads in a cup are."""
+    if held is None or held.where == GROUND:
+        return False
+    root = episode.world.entities[episode.first.by_name[held.where.partition(".")[0]].entity].root
+    if episode.world.bodies[root].kind is not BodyKind.FREE:
+        return False
+    return bool(_moving(episode.body_pose[max(step - WINDOW, 0) : step + 1, root, :3])[-1])
 
 
 def _moving(place: Array) -> Array:
@@ -105,31 +124,28 @@ def _holds(episode: Episode, thing: Thing) -> Iterator[Change]:
             carried = moving & together & close & (np.linalg.norm(tool[:, :3] - tool[ago, :3], axis=1) > MOVED)
             held = False
             for step in np.flatnonzero(carried | ~together | ~close).tolist():
-                if carried[step] and not held:
+                if held == bool(carried[step]):
+                    continue
+                if carried[step] and not _travelling(episode, support(episode.moment(step), thing), step):
                     held = True
                     yield Change(step, "grasped", thing.name, robot.name)
-                elif not carried[step] and held:
+                elif held:
                     held = False
                     yield Change(step, "released", thing.name, robot.name)
 
 
 def _joints(episode: Episode) -> Iterator[Change]:
-    """What the joints of objects do that have two limits: doors, drawers, buttons, valves."""
-    world = episode.world
+    """What is done to movable parts: doors, drawers, buttons, valves."""
     for thing in episode.first.objects:
-        entity = world.entities[thing.entity]
-        for j in range(entity.joint_start, entity.joint_stop):
-            joint = world.joints[j]
-            if not np.isfinite([joint.lower, joint.upper]).all() or joint.upper <= joint.lower or joint.mimic:
-                continue
-            share = (episode.joint_pos[:, j] - joint.lower) / (joint.upper - joint.lower)
-            part = world.bodies[joint.body].name
+        for part in movable_parts(episode.world, thing.entity):
+            share = (episode.joint_pos[:, part.joint] - part.lower) / (part.upper - part.lower)
             is_open, was_ajar = bool(share[0] >= OPEN), bool(share[0] >= AJAR)
             for step in range(1, len(share)):
                 was_ajar = was_ajar or bool(share[step] >= AJAR)
                 if not is_open and share[step] >= OPEN:
                     is_open = True
-                    yield Change(step, "opened", part)
+                    yield Change(step, part.done, part.name)
                 elif was_ajar and share[step] <= SHUT:
                     is_open = was_ajar = False
-                    yield Change(step, "closed", part)
+                    if part.done == "opened":
+                        yield Change(step, "closed", part.name)

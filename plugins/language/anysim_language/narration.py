@@ -17,13 +17,14 @@ _COMMAND = re.compile(r"(\d+) (\w+)(?:: |$)")
 
 
 class Sentence(NamedTuple):
-    """What begins at a control step, in words, and the facts that it is made of."""
+    """What begins at a control step, in words, and the facts that it is made of; `who` is the robot that acts."""
 
     step: int
     text: str
     kind: str
     what: str = ""
     where: str = ""
+    who: str = ""
 
 
 def narration(episode: Episode, seed: int = 0) -> list[Sentence]:
@@ -32,22 +33,22 @@ def narration(episode: Episode, seed: int = 0) -> list[Sentence]:
     words = episode.vocabulary.words
     said: list[Sentence] = []
 
-    def say(step: int, kind: str, what: str = "", where: str = "", /, **values: str) -> None:
+    def say(step: int, kind: str, what: str = "", where: str = "", who: str = "", /, **values: str) -> None:
         template = choose(words.events[kind], seed, episode.name, "L3", kind, what, where)
-        said.append(Sentence(step, capital(render(template, values)), kind, what, where))
+        said.append(Sentence(step, capital(render(template, values)), kind, what, where, who))
 
-    robot = naming.the(episode.viewer.name) if episode.viewer.name else "the robot"
     last: tuple[str, str] = ("", "")
     for step, annotation in enumerate(episode.annotations, 1):
         deed, name, phase = _deed(episode, annotation)
+        who = _who(episode, naming, deed, str(annotation.get("phase", "")))
+        robot = naming.the(who) if who else "the robot"
         if deed is not None and name != last[0]:
             doing = choose(words.skills[deed.skill].doing, seed, episode.name, "L3", "doing", name)
-            who = naming.the(deed.params["robot"]) if naming.owner(deed.params.get("robot")) else robot
-            say(step, "began", name, robot=who, doing=clause_of(naming, doing, deed))
+            say(step, "began", name, "", who, robot=robot, doing=clause_of(naming, doing, deed))
         elif (name, phase) != last and phase in words.phases:
             what = _what(naming, deed)
             if what or "what" not in words.phases[phase]:  # a skill of several objects does not say which one
-                say(step, "phase", phase, robot=robot, doing=render(words.phases[phase], {"what": what}))
+                say(step, "phase", phase, "", who, robot=robot, doing=render(words.phases[phase], {"what": what}))
         last = (name, phase)
     for change in changes(episode):
         where = "the ground" if change.where in (GROUND, "") else naming.the(change.where)
@@ -80,6 +81,17 @@ def _deed(episode: Episode, annotation: Mapping[str, Any]) -> tuple[Deed | None,
     exact = episode.deeds[number - 1] if 0 < number <= len(episode.deeds) else None
     deed = exact if exact is not None and exact in known else known[0] if known else None
     return deed, f"{number} {skill}", phase.rpartition(": ")[2]
+
+
+def _who(episode: Episode, naming: Naming, deed: Deed | None, phase: str) -> str:
+    """The robot that acts in a phase such as `take: descend`: that of its deed, else the first; empty for none."""
+    if deed is not None:
+        actors = episode.vocabulary.words.skills[deed.skill].actors
+        part = next((part for part in phase.split(": ") if part in actors), "")
+        named = naming.owner(deed.params.get(actors.get(part, "robot")))
+        if named:
+            return named
+    return episode.viewer.name
 
 
 def _what(naming: Naming, deed: Deed | None) -> str:

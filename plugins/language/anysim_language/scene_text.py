@@ -2,12 +2,10 @@
 
 from collections.abc import Callable
 
-import numpy as np
-
-from anysim.model.affordance_lookup import affordances_of
 from anysim_language.changes import OPEN
 from anysim_language.choice import choose
 from anysim_language.episode import Episode
+from anysim_language.joints import movable_parts
 from anysim_language.moment import Moment
 from anysim_language.naming import Naming
 from anysim_language.relations import GROUND, NEAR, direction, gap, support
@@ -90,17 +88,14 @@ def _about(the: str, about: str) -> str:
 
 
 def _open_parts(episode: Episode, moment: Moment) -> list[str]:
-    """Parts that an asset offers to be opened, that are closed at the lower end of their range, and that stand open."""
-    world, found = episode.world, list[str]()
-    for thing in moment.objects:
-        entity = world.entities[thing.entity]
-        named = {f"{entity.name}.{one.joint}" for one in affordances_of(world, thing.entity) if "open" in one.use}
-        for j in range(entity.joint_start, entity.joint_stop):
-            joint = world.joints[j]
-            if joint.name in named and joint.lower >= 0.0 and np.isfinite(joint.upper):
-                if episode.joint_pos[moment.step, j] >= joint.lower + OPEN * (joint.upper - joint.lower):
-                    found.append(f"{thing.name}{world.bodies[joint.body].name.removeprefix(entity.name)}")
-    return found
+    """Parts that stand open, of those that are opened and closed."""
+    return [
+        part.name
+        for thing in moment.objects
+        for part in movable_parts(episode.world, thing.entity)
+        if part.done == "opened"
+        and episode.joint_pos[moment.step, part.joint] >= part.lower + OPEN * (part.upper - part.lower)
+    ]
 
 
 def _groups(moment: Moment) -> list[list[str]]:

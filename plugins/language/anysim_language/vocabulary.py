@@ -43,6 +43,9 @@ class SkillWords(Spec):
 
     do: Phrasings = Field(min_length=1, description="as an instruction: `put {{ the(object) }} {{ onto(target) }}`")
     doing: Phrasings = Field(min_length=1, description="of the robot that does it: `puts {{ the(object) }} …`")
+    actors: dict[str, Word] = Field(
+        default_factory=dict, description="the parameter that names who acts, by the part of the skill; else `robot`"
+    )
     minor: Flag = Field(default=False, description="left out of an instruction that has other commands")
 
 

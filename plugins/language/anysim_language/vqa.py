@@ -6,8 +6,10 @@ Each episode's part is written aside and renamed when it is whole, so a call tha
 import hashlib
 import json
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from errno import EDQUOT, ENOSPC
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -89,7 +91,7 @@ def write_questions(
         told: called after each trajectory with the number of its questions.
 
     Raises:
-        RecordError: two trajectories would have one name, or `out` is no directory.
+        RecordError: two trajectories would have one name, or `out` is no directory or cannot be written.
     """
     names: dict[str, Path] = {}
     for path in trajectories:
@@ -101,7 +103,8 @@ def write_questions(
             )
     if out.exists() and not out.is_dir():
         raise RecordError(f"{out} is no directory; --out is the directory that questions and images are written to")
-    (out / PARTS).mkdir(parents=True, exist_ok=True)
+    with _told(out):
+        (out / PARTS).mkdir(parents=True, exist_ok=True)
     parts: dict[Path, dict[str, Any]] = {}
     resumed = 0
     for name, path in names.items():
@@ -110,12 +113,14 @@ def write_questions(
         resumed += part is not None
         if part is None:
             part = {"key": key, **_part(path, name, out, order, base)}
-            _write(file, json.dumps(part, ensure_ascii=False, sort_keys=True))
+            with _told(out):
+                _write(file, json.dumps(part, ensure_ascii=False, sort_keys=True))
         parts[path] = part
         told(path, len(part["rows"]))
     rows = [{**row, "trajectory": str(path)} for path, part in parts.items() for row in part["rows"]]
     lines = (json.dumps(row, ensure_ascii=False, sort_keys=True) + "\n" for row in rows)
-    _write(out / QUESTIONS_FILE, "".join(lines))
+    with _told(out):
+        _write(out / QUESTIONS_FILE, "".join(lines))
     return QuestionSet(
         Counter(row["family"] for row in rows),
         sum(len(part["images"]) for part in parts.values()),
@@ -149,6 +154,18 @@ def _stored(file: Path, key: str, out: Path) -> dict[str, Any] | None:
     return part if whole else None
 
 
+@contextmanager
+def _told(out: Path) -> Generator[None, None, None]:
+    """What the file system refuses, as a sentence."""
+    try:
+        yield
+    except OSError as error:
+        raise RecordError(
+            f"{out} cannot be written: {error.strerror or error}; make room, or give --out a directory that can be "
+            "written; what is whole of it is used when the call is made again"
+        ) from error
+
+
 def _write(file: Path, text: str) -> None:
     aside = file.with_name(f".{file.name}.part")
     aside.write_text(text, encoding="utf-8")
@@ -169,6 +186,9 @@ def _part(path: Path, name: str, out: Path, order: QuestionOrder, base: Path | N
         try:
             shown = pictures(episode, path, sorted({q.step for q in questions}), out, name)
         except (CapabilityError, PluginError, RecordError, OSError) as error:
+            if isinstance(error, OSError) and error.errno in (ENOSPC, EDQUOT):
+                with _told(out):
+                    raise
             unseen = str(error)
     return {
         "rows": [_row(f"{name}-{k:03d}", question, shown) for k, question in enumerate(questions)],

@@ -289,3 +289,48 @@ def test_the_words_of_a_scene_are_those_of_every_machine() -> None:
         hashlib.sha256("\n".join(texts).encode()).hexdigest()
         == "e891bd46c7b58e196ad723e020280f6080b171a14bad1a996a216d53ca8c7adb"
     )
+
+
+def test_what_is_carried_along_in_something_is_not_held_itself() -> None:
+    """The cube on the other one, which the tool takes: the tool holds that alone."""
+    episode = carried()
+    world = episode.world
+    cube, base = (world.entities[world.entity_numbers[name]].root for name in ("cube", "base"))
+    poses = episode.body_pose.copy()
+    poses[:, base] = poses[:, cube]
+    poses[:, base, 2] -= 0.002
+    poses[:, cube, 2] += 0.04
+    held = [(c.kind, c.what) for c in changes(replace(episode, body_pose=poses)) if c.kind in ("grasped", "moved")]
+    assert held == [("grasped", "base")]
+
+
+def test_who_takes_a_thing_over_is_told() -> None:
+    episode = begun("handover", 1)
+    phases = ("grasp: descend", "hold out: carry", "take: descend")
+    said = [{"skill": "handover", "phase": phase} for phase in phases for _ in range(6)]
+    poses, joints = (np.repeat(rows, 19, axis=0) for rows in (episode.body_pose, episode.joint_pos))
+    episode = replace(episode, body_pose=poses, joint_pos=joints, annotations=tuple(said))
+    told = narration(episode)
+    assert [sentence.who for sentence in told] == ["panda", "panda", "partner"]
+    assert "at the back comes down to the bar" in told[-1].text
+
+
+@pytest.mark.parametrize(
+    ("task", "part", "kinds"),
+    [
+        ("press_button", "button.cap", ["pressed"]),
+        ("screw_cap", "jar.cap", ["turned"]),
+        ("put_away", "cabinet.drawer_1", ["opened", "closed"]),
+        ("push_cart", "cart.body", []),
+    ],
+)
+def test_what_is_done_to_a_part_follows_from_what_its_asset_offers(task: str, part: str, kinds: list[str]) -> None:
+    episode = begun(task, 1)
+    world = episode.world
+    j = next(k for k, joint in enumerate(world.joints) if world.bodies[joint.body].name == part)
+    share = np.concatenate([np.linspace(0.0, 1.0, 20), np.linspace(1.0, 0.0, 20)])
+    joints = np.repeat(episode.joint_pos, 40, axis=0)
+    joints[:, j] = world.joints[j].lower + share * (world.joints[j].upper - world.joints[j].lower)
+    episode = replace(episode, joint_pos=joints, body_pose=np.repeat(episode.body_pose, 40, axis=0))
+    assert [change.kind for change in changes(episode)] == kinds
+    assert all("None" not in sentence.text for sentence in narration(episode))

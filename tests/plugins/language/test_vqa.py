@@ -2,11 +2,13 @@
 
 import json
 import shutil
+from errno import ENOSPC
 from pathlib import Path
 
 import pytest
 
 from anysim.errors import RecordError
+from anysim_language import vqa
 from anysim_language.vqa import PARTS, QUESTIONS_FILE, QuestionOrder, write_questions
 
 FEW = QuestionOrder(moments=2, most=12, images=False, forks=False)
@@ -59,3 +61,21 @@ def test_a_file_in_place_of_the_directory_is_refused(two: list[Path], tmp_path: 
     (tmp_path / "out").write_text("")
     with pytest.raises(RecordError, match="is no directory; --out is the directory"):
         write_questions(two, tmp_path / "out", FEW)
+
+
+def test_a_full_disk_is_told_and_what_is_whole_is_used_again(
+    two: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write, out = vqa._write, tmp_path / "out"
+
+    def full(file: Path, text: str) -> None:
+        if file.name.startswith("second"):
+            raise OSError(ENOSPC, "No space left on device")
+        write(file, text)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(vqa, "_write", full)
+        with pytest.raises(RecordError, match="cannot be written: No space left on device; make room"):
+            write_questions(two, out, FEW)
+    assert not (out / QUESTIONS_FILE).exists()
+    assert write_questions(two, out, FEW).resumed == 1

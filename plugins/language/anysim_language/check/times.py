@@ -25,7 +25,7 @@ def first_step(episode: Episode, kind: str, what: str) -> int | None:
     joint = next(j for j, one in enumerate(world.joints) if world.bodies[one.body].name == what)
     limits = world.joints[joint]
     share = (episode.joint_pos[:, joint] - limits.lower) / (limits.upper - limits.lower)
-    if kind == "opened":
+    if kind != "closed":
         steps = np.flatnonzero((share[1:] >= 0.5) & (share[:-1] < 0.5)) + 1
     else:
         steps = np.flatnonzero((share <= 0.05) & (np.maximum.accumulate(share) > 0.2))

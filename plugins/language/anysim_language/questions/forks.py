@@ -18,6 +18,7 @@ from anysim.model.parts import BodyKind, ControlMode, JointType
 from anysim.record.replay import begin, rebuild
 from anysim_language.changes import AJAR
 from anysim_language.episode import Episode
+from anysim_language.joints import movable_parts
 from anysim_language.things import Thing
 
 SAME = 1e-6
@@ -156,18 +157,12 @@ def _changes(episode: Episode, engine: SimEngine, step: int) -> Iterator[Change]
 
 def _shutting(episode: Episode, thing: Thing, step: int) -> Iterator[Change]:
     """Parts of an object that stand open, pushed along or about their joints' axes."""
-    world, entity = episode.world, episode.world.entities[thing.entity]
-    for j in range(entity.joint_start, entity.joint_stop):
-        joint = world.joints[j]
-        force = SHUTTING.get(joint.type, 0.0)
-        if (
-            force
-            and joint.mimic is None
-            and np.isfinite([joint.lower, joint.upper]).all()
-            and joint.lower < joint.upper
-        ):
-            if episode.joint_pos[step, j] >= joint.lower + AJAR * (joint.upper - joint.lower):
-                way = -force * P.rotate(episode.body_pose[step, joint.body, 3:], np.array(joint.axis))
-                x, y, z = way.tolist()
-                wrench = (x, y, z, 0.0, 0.0, 0.0) if joint.type is JointType.PRISMATIC else (0.0, 0.0, 0.0, x, y, z)
-                yield Change("shut", thing.name, world.bodies[joint.body].name, wrench, LOOKED_AT[0])
+    world = episode.world
+    for part in movable_parts(world, thing.entity):
+        joint = world.joints[part.joint]
+        ajar = episode.joint_pos[step, part.joint] >= part.lower + AJAR * (part.upper - part.lower)
+        if part.done == "opened" and ajar and joint.type in SHUTTING:
+            pose = episode.body_pose[step, joint.body]
+            x, y, z = (-SHUTTING[joint.type] * P.rotate(pose[3:], np.array(joint.axis))).tolist()
+            wrench = (x, y, z, 0.0, 0.0, 0.0) if joint.type is JointType.PRISMATIC else (0.0, 0.0, 0.0, x, y, z)
+            yield Change("shut", thing.name, part.name, wrench, LOOKED_AT[0])

@@ -8,7 +8,7 @@ from anysim_language.episode import Episode
 from anysim_language.narration import Sentence, narration
 from anysim_language.questions.forks import Fork
 
-PHRASES = {"lifted": "{} is lifted", "opened": "{} is opened", "closed": "{} is closed"}
+PHRASES = {kind: f"{{}} is {kind}" for kind in ("lifted", "opened", "closed", "turned", "pressed")}
 """Kinds of changes that may be asked about, as clauses."""
 
 

@@ -3,9 +3,8 @@
 from collections.abc import Iterator
 from itertools import combinations
 
-from anysim.conventions import Array
 from anysim_language.changes import OPEN, SHUT
-from anysim_language.episode import Episode
+from anysim_language.joints import movable_parts
 from anysim_language.moment import millimetres
 from anysim_language.questions.past import PHRASES
 from anysim_language.questions.question import Asker, Question
@@ -58,34 +57,25 @@ def _changed(asker: Asker) -> Iterator[Question]:
     yield asker.ask("changed", answer, {"moved": moved}, moved)
 
 
-def _shares(episode: Episode, joint: int) -> Array:
-    limits = episode.world.joints[joint]
-    return (episode.joint_pos[:, joint] - limits.lower) / (limits.upper - limits.lower)
-
-
 def _opened(asker: Asker) -> Iterator[Question]:
     world = asker.episode.world
     for thing in asker.objects:
-        entity = world.entities[thing.entity]
-        for j in range(entity.joint_start, entity.joint_stop):
-            joint = world.joints[j]
-            if not (abs(joint.lower) < 1e3 and abs(joint.upper) < 1e3 and joint.lower < joint.upper) or joint.mimic:
+        for part in movable_parts(world, thing.entity):
+            travel = asker.episode.joint_pos[: asker.step + 1, part.joint] - part.lower
+            share = travel / (part.upper - part.lower)
+            if part.done != "opened" or share[0] > SHUT or SHUT < share.max() < OPEN:
                 continue
-            share = _shares(asker.episode, j)[: asker.step + 1]
-            if share[0] > SHUT or SHUT < share.max() < OPEN:
-                continue
-            part = world.bodies[joint.body].name
             answer = "yes" if share.max() >= OPEN else "no"
-            program = {"joint": joint.name}
-            yield asker.ask("opened", answer, program, (thing.name,), part=asker.naming.the(part))
+            program = {"joint": world.joints[part.joint].name}
+            yield asker.ask("opened", answer, program, (thing.name,), part=asker.naming.the(part.name))
 
 
 def _next(asker: Asker) -> Iterator[Question]:
     told = asker.past.doings
-    if any(abs(sentence.step - asker.step) <= SETTLED for sentence in told) or not asker.moment.viewer.name:
+    if any(abs(sentence.step - asker.step) <= SETTLED for sentence in told):
         return
     later = [sentence for sentence in told if sentence.step > asker.step]
-    if later:
+    if later and later[0].who:
         program = {"kind": later[0].kind, "what": later[0].what, "step": later[0].step}
-        robot = asker.naming.the(asker.moment.viewer.name)
-        yield asker.ask("next", later[0].text, program, (asker.moment.viewer.name,), robot=robot)
+        robot = asker.naming.the(later[0].who)
+        yield asker.ask("next", later[0].text, program, (later[0].who,), robot=robot)
