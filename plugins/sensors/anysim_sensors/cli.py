@@ -17,7 +17,7 @@ def sensors(
     """What readings of sensors cost in processor time of one core: by themselves, and in a control step of 16 envs.
 
     A goal is what is good enough; one that is missed is marked and changes nothing else. The first run of a machine
-    compiles the kernels, which takes a minute.
+    compiles the kernels, which takes half a minute.
 
     Examples:
       anysim bench sensors --geoms 200

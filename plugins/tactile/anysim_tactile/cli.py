@@ -13,7 +13,7 @@ def touch(
     """What readings of taxels cost in processor time of one core, the engine's contacts left out.
 
     A goal is what is good enough; one that is missed is marked and changes nothing else. The first run of a machine
-    compiles the kernels, which takes a minute.
+    compiles the kernels, which takes half a minute.
 
     Examples:
       anysim bench touch --rounds 50

@@ -10,10 +10,12 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim.math.compiled import compiled as in_numba
+from anysim_sensors.kernels.first_use import tell_of_compiling
 from anysim_sensors.tables import BOX, CAPSULE, CYLINDER, PLANE, SPHERE, GeomPoses, Geoms
 
 compiled = partial(in_numba, nogil=True)
 """The decorator of all kernels."""
+tell_of_compiling()
 
 BINS = 16
 DEEPEST = 60
@@ -68,9 +70,10 @@ def _cut(low: Array, high: Array, order: Array, first: int, last: int, halves: b
     if halves or not widest > 0.0:
         return (first + last) // 2
     scale = BINS / widest
-    bins[:, 0] = 0.0
-    bins[:, 1:4] = np.inf
-    bins[:, 4:7] = -np.inf
+    for bin in range(BINS):
+        bins[bin, 0] = 0.0
+        for k in range(3):
+            bins[bin, 1 + k], bins[bin, 4 + k] = np.inf, -np.inf
     for i in range(first, last):
         item = order[i]
         bin = min(int((low[item, axis] + high[item, axis] - start) * scale), BINS - 1)
@@ -78,7 +81,9 @@ def _cut(low: Array, high: Array, order: Array, first: int, last: int, halves: b
         for k in range(3):
             bins[bin, 1 + k] = min(bins[bin, 1 + k], low[item, k])
             bins[bin, 4 + k] = max(bins[bin, 4 + k], high[item, k])
-    right[:] = bins
+    for bin in range(BINS):  # a copy of a whole array takes numba a second to compile, for what it says of other shapes
+        for k in range(7):
+            right[bin, k] = bins[bin, k]
     for bin in range(BINS - 2, -1, -1):
         _join(right, bin, bin + 1)
     best, cost = -1, np.inf

@@ -505,9 +505,12 @@ def view(
                 y = max(posed.low[e, g, 1] - oy, oy - posed.high[e, g, 1], 0.0)
                 z = max(posed.low[e, g, 2] - oz, oz - posed.high[e, g, 2], 0.0)
                 if x * x + y * y + z * z <= reach * reach:
-                    keys[count] = (geoms.entity[g] + 1) * most + g
+                    key, k = (geoms.entity[g] + 1) * most + g, count
+                    while k > 0 and keys[k - 1] > key:  # they are nearly in order
+                        keys[k] = keys[k - 1]
+                        k -= 1
+                    keys[k] = key
                     count += 1
-        keys[:count].sort()
         for k in range(count):
             candidates[k] = keys[k] % most
         gather(posed, e, geoms, candidates, count, boxes, shapes)

@@ -22,6 +22,13 @@ NOTHING = 1e-10
 
 
 @compiled
+def _copy(array: Array, out: Array) -> None:
+    """Number by number: a slice takes numba a second to compile, for what it would say of other shapes."""
+    for i in range(array.shape[0]):
+        out[i] = array[i]
+
+
+@compiled
 def _solve(matrix: Array, right: Array, least: float, out: Array) -> None:
     """The solution (q,) of a symmetric system without negative eigenvalues; 0 where there is no equation.
 
@@ -181,7 +188,8 @@ def _balance(
             steep += slope[a] ** 2
         if steep <= CLOSE**2 * size:
             return True
-        step_matrix[:] = matrix
+        for a in range(q):
+            _copy(matrix[a], step_matrix[a])
         for a in range(q):
             right[a] = -slope[a]
             step_matrix[a, a] += damping
@@ -197,7 +205,10 @@ def _balance(
                 flatter += other[a] ** 2
         if lower <= value + 1e-4 * down or flatter < 0.25 * steep:
             value, damping = lower, 0.1 * damping
-            at[:], slope[:], matrix[:] = trial, other, new_matrix
+            _copy(trial, at)
+            _copy(other, slope)
+            for a in range(q):
+                _copy(new_matrix[a], matrix[a])
         else:  # too far, or taxels that touch nothing yet have to: smaller steps, down the slope
             damping = max(10.0 * damping, DAMPED * largest)
     return False
@@ -230,12 +241,14 @@ def press(
         motion[e], deep[e] = 0.0, 0.0
         if not force[e] > 0.0:
             continue
-        home[:] = _straight(gap[e], lever, stiffness, along[e], force[e]) * along[e]
-        at[:] = home
+        far = _straight(gap[e], lever, stiffness, along[e], force[e])
+        for a in range(q):
+            home[a] = far * along[e, a]
+        _copy(home, at)
         if not _balance(gap[e], lever, stiffness, wanted[e], home, 0.0, largest, at, deep[e]):
-            at[:] = home
+            _copy(home, at)
             _balance(gap[e], lever, stiffness, wanted[e], home, SPRING * largest, largest, at, deep[e])
-        motion[e] = at
+        _copy(at, motion[e])
         _depths(gap[e], lever, at, deep[e])
         for i in range(gap.shape[1]):
             deep[e, i] = max(0.0, deep[e, i])
