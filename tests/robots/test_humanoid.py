@@ -41,6 +41,15 @@ def run(made: TaskEnv, action: np.ndarray, seconds: float) -> None:
         made.step(rows)
 
 
+def push(made: TaskEnv, speed: float) -> None:
+    """Add a velocity [m/s] to the bases of eight envs, each to another side: ahead, and on to the left."""
+    state, root = made.engine.get_state(), made.engine.index.entity("g1").root
+    pose, twist = state.body_pose[:, [root]].copy(), state.body_twist[:, [root]].copy()
+    side = np.arange(8) * np.pi / 4.0
+    twist[:, 0, :2] += speed * np.stack([np.cos(side), np.sin(side)], axis=1)
+    made.engine.set_body_state(pose, twist, np.arange(8), [root])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_it_stands_squats_and_comes_back(engine: str) -> None:
@@ -61,14 +70,65 @@ def test_it_stands_squats_and_comes_back(engine: str) -> None:
 def test_pushes_from_eight_sides_do_not_fell_it(engine: str) -> None:
     made = env(engine, "default", num_envs=8)
     run(made, np.zeros(6), 0.2)
-    state, root = made.engine.get_state(), made.engine.index.entity("g1").root
-    pose, twist = state.body_pose[:, [root]].copy(), state.body_twist[:, [root]].copy()
-    side = np.arange(8) * np.pi / 4.0
-    twist[:, 0, :2] += 0.3 * np.stack([np.cos(side), np.sin(side)], axis=1)
-    made.engine.set_body_state(pose, twist, np.arange(8), [root])
-    start = pose[:, 0, 2]
+    start = pelvis(made)[:, 2]
+    push(made, 0.3)
     run(made, np.zeros(6), 2.0)
     assert (np.abs(pelvis(made)[:, 2] - start) < 0.02).all()
+    made.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ENGINES)
+def test_steps_catch_pushes_that_the_soles_do_not_hold(engine: str) -> None:
+    """Without steps, those from the front and from behind fell it on each engine."""
+    made = env(engine, "lipm_walk", num_envs=8)
+    run(made, np.zeros(3), 0.5)
+    start = pelvis(made)
+    push(made, 0.4)
+    run(made, np.zeros(3), 4.0)
+    moved = np.linalg.norm((pelvis(made) - start)[:, :2], axis=1)
+    print(f"{engine}: pelvis {moved.round(3)} m from where it stood, {(pelvis(made) - start)[:, 2].round(4)} m higher")
+    assert (np.abs(pelvis(made) - start)[:, 2] < 0.01).all()
+    assert np.abs(made.engine.get_state().joint_vel).max() < 0.05, "it stands again"
+    assert (moved[[0, 4]] > 0.05).all(), "it stepped"
+    assert (moved[[2, 6]] < 0.01).all(), "feet beside each other hold those from the sides"
+    assert moved.max() < 0.6
+    made.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ENGINES)
+def test_it_walks_three_metres_with_two_turns(engine: str) -> None:
+    made = env(engine, "lipm_walk")
+    controller = made.actions.slice_of("g1", "base").controller
+    assert isinstance(controller, LipmWalk)
+    start, planned, height = centre(controller), controller.planned()[0], pelvis(made)[0, 2]
+    ahead, left, right = np.array([0.25, 0.0, 0.0]), np.array([0.0, 0.0, 0.3]), np.array([0.0, 0.0, -0.3])
+    far, before = 0.0, start
+    for action, seconds in ((ahead, 5.3), (left, 6.5), (ahead, 5.3), (right, 6.5), (ahead, 5.3), (np.zeros(3), 4.0)):
+        run(made, action, seconds)
+        here = centre(controller)
+        far, before = far + float(np.linalg.norm(here - before)), here
+        plan = controller.planned()[0] - planned
+        assert np.linalg.norm(here - start - plan) < 0.03, "where it planned to be"
+        assert abs(pelvis(made)[0, 2] - height) < 0.02
+    print(f"{engine}: {far:.2f} m, to {(before - start).round(3)} of {plan.round(3)}")
+    assert far > 3.0
+    assert np.abs(made.engine.get_state().joint_vel).max() < 0.05, "it stands after the last step"
+    made.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ENGINES)
+def test_it_steps_aside(engine: str) -> None:
+    made = env(engine, "lipm_walk")
+    controller = made.actions.slice_of("g1", "base").controller
+    assert isinstance(controller, LipmWalk)
+    start, planned = centre(controller), controller.planned()[0]
+    run(made, np.array([0.0, 0.1, 0.0]), 6.0)
+    moved, plan = centre(controller) - start, controller.planned()[0] - planned
+    assert plan[1] > 0.3
+    assert np.linalg.norm(moved - plan) < 0.02
     made.close()
 
 
@@ -136,6 +196,21 @@ def test_a_snapshot_of_a_step_continues_bit_for_bit() -> None:
     run(made, np.array([0.2, 0.05, 0.1]), 0.5)
     assert (made.engine.get_state().joint_pos == once).all()
     assert (once[0] == once[1]).all(), "a row does not depend on its place"
+    made.close()
+
+
+@pytest.mark.slow
+def test_a_snapshot_of_a_catching_step_continues_bit_for_bit() -> None:
+    made = env("mujoco", "lipm_walk", num_envs=8)
+    run(made, np.zeros(3), 0.2)
+    push(made, 0.4)
+    run(made, np.zeros(3), 0.3)
+    saved = made.snapshot()
+    run(made, np.zeros(3), 0.5)
+    once = np.array(made.engine.get_state().joint_pos)
+    made.reset_to(saved)
+    run(made, np.zeros(3), 0.5)
+    assert (made.engine.get_state().joint_pos == once).all()
     made.close()
 
 

@@ -7,19 +7,20 @@ import numpy as np
 import pytest
 
 from anysim import registry
-from anysim.api import compile_world
+from anysim.api import compile_world, make
 from anysim.assets.catalogue import load_robot, missing_source
 from anysim.engine.factory import create_simulation
 from anysim.errors import AssetError
 from anysim.kinematics.pinocchio_model import RobotModel
 from anysim.math import pose as P
 from anysim.model.world import World
+from anysim.testing.quadrupeds import spec, walk
 
 ENGINES = ("mujoco", "pybullet", "sapien")
 NEEDS = {
-    name: spec.needs
+    name: entry.needs
     for name in registry.names("robots")
-    if registry.distribution("robots", name) == "anysim-robots" and (spec := load_robot(name).spec).needs
+    if registry.distribution("robots", name) == "anysim-robots" and (entry := load_robot(name).spec).needs
 }
 DOWN = {
     "kinova3": (0.45, 0.001, 0.3), "koch": (0.002, -0.2, 0.07), "kuka_iiwa": (0.55, 0.0, 0.35),
@@ -80,10 +81,10 @@ def test_the_arms_of_aloha_are_in_front_of_each_other() -> None:
 
 def test_the_tips_of_dclaw_meet_and_part() -> None:
     heads = ("link_f1_head", "link_f2_head", "link_f3_head")
-    spec = load_robot("dclaw").spec.channels["eef"]
-    assert spec.opened is not None
-    for target, radius in ((spec.opened, 0.09), (spec.synergies["pinch"], 0.004)):
-        tips = frames("dclaw", *heads, **dict(zip(spec.joints, target, strict=True)))
+    hand = load_robot("dclaw").spec.channels["eef"]
+    assert hand.opened is not None
+    for target, radius in ((hand.opened, 0.09), (hand.synergies["pinch"], 0.004)):
+        tips = frames("dclaw", *heads, **dict(zip(hand.joints, target, strict=True)))
         assert [np.hypot(*tip[:2]) for tip in tips] == pytest.approx([radius] * 3, abs=0.003)
     (tool,) = frames("dclaw", "tool")
     assert tool[2] == pytest.approx(np.mean([tip[2] for tip in tips]), abs=0.015)
@@ -113,6 +114,24 @@ def test_spot_stands(robot: str, engine: str) -> None:
         assert np.abs(state.body_twist[0, 0]).max() < 0.01
     finally:
         simulation.destroy()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("robot", ["spot", "spot_arm"])
+def test_spot_trots_sidesteps_and_turns(robot: str, engine: str) -> None:
+    """As the quadrupeds whose files are always there; the arm is held at home."""
+    world_of(robot)
+    data = spec(robot, engine)
+    if robot == "spot_arm":
+        data["world"]["robots"]["robot"]["actions"] |= {"arm": "joint_position", "eef": "gripper_binary"}
+    commands = np.diag([0.5, 0.25, 0.6])
+    with make(data, num_envs=3) as env:
+        walked = walk(env, commands, 7.0)
+    assert not walked.fell.any(), f"fell: {walked}"
+    assert walked.place[0, 0] > 3.0, "metres in seven seconds, at half a metre a second"
+    assert np.abs(np.diagonal(walked.velocity) / np.diagonal(commands) - 1.0).max() < 0.12, walked.velocity
+    assert np.rad2deg(walked.tilt.max()) < 10.0
 
 
 @pytest.mark.slow

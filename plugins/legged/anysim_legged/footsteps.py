@@ -12,6 +12,17 @@ from typing import NamedTuple
 import numpy as np
 
 from anysim.conventions import Array
+from anysim_legged.catch import (
+    FASTEST,
+    LEAD,
+    QUICKENING,
+    SETTLED,
+    SLOWEST,
+    SWIFTEST,
+    accelerations,
+    approach,
+    reachable,
+)
 from anysim_legged.support import turned, wrapped
 
 STANDING, STEPPING = 0, 1
@@ -69,6 +80,14 @@ class Footsteps:
         self._path = np.zeros((num_envs, 3))
         """Where the middle of the feet would be in the world, after the step that lands next, had none slipped."""
         self._lead = np.zeros((num_envs, 3))
+        self._rate = np.ones(num_envs)
+        """How much faster than others this step is."""
+        self._hasty = np.zeros(num_envs, dtype=bool)
+        """Whether there is a next one, as fast."""
+        self._shift = np.zeros((num_envs, 2))
+        """How far from `target` the swinging foot lands, to catch the robot [m]."""
+        self._aside = np.zeros((num_envs, 3, 2))
+        """How far it is on that way, with speed and acceleration."""
 
     def begin(self, env: int, places: Array) -> None:
         """The env stands with its feet there."""
@@ -77,6 +96,7 @@ class Footsteps:
         self._from[env] = places[:, :2].mean(axis=0)
         self._double[env], self._next[env], self._lead[env] = 0.0, 0.0, 0.0
         self._path[env] = turned(places[1], 0.0, self._gait.width / 2.0, 0.0)
+        self._rate[env], self._hasty[env], self._shift[env], self._aside[env] = 1.0, False, 0.0, 0.0
 
     def advance(self, env: int, command: Array, middles: Array, lead: Array) -> None:
         """A tick later.
@@ -89,7 +109,7 @@ class Footsteps:
         """
         gait = self._gait
         self._lead[env] = lead
-        self._time[env] += self._tick
+        self._time[env] += self._rate[env] * self._tick
         moving = bool(np.abs(command).max() > 1e-3)
         if self._mode[env] == STANDING:
             if moving and self._time[env] > gait.period:
@@ -98,12 +118,67 @@ class Footsteps:
                 self._step(env, 1 if command[1] >= 0.0 else 0, gait.lead + gait.double, command)
         elif self._time[env] >= self._double[env] + gait.single - 1e-9:
             landed = 1 - int(self._stance[env])
-            self._feet[env, landed] = self._target[env]
+            last = not self._hasty[env]
+            self._land(env, landed)
             self._from[env] = middles[self._stance[env]]
-            if not self._next[env].any() and self._parallel(self._feet[env]):
+            if last and not self._next[env].any() and self._parallel(self._feet[env]):
                 self._mode[env], self._time[env], self._double[env] = STANDING, 0.0, gait.double
             else:
                 self._step(env, landed, gait.double, command)
+        elif self._shift[env].any() and self._time[env] > self._double[env]:
+            self._aside[env] = approach(self._aside[env], self._shift[env], self._left(env) + self._tick, self._tick)
+
+    def _land(self, env: int, foot: int) -> None:
+        self._feet[env, foot] = self._target[env]
+        if self._shift[env].any():
+            self._feet[env, foot, :2] += self._shift[env]
+            x, y = self._shift[env]
+            self._path[env, :2] += turned(np.array([0.0, 0.0, -self._lead[env, 2]]), x, y, 0.0)[:2]
+        self._rate[env] = self._rate[env] if self._hasty[env] else 1.0
+        self._hasty[env], self._shift[env], self._aside[env] = False, 0.0, 0.0
+
+    def catches(self, env: int) -> bool:
+        """Whether the foot that swings, or will, may still be sent elsewhere."""
+        return self._mode[env] == STEPPING and self._left(env) > SETTLED
+
+    def stands(self, env: int) -> bool:
+        """Whether no step is under way."""
+        return self._mode[env] == STANDING
+
+    def start(self, env: int, stance: int, middles: Array, command: Array) -> None:
+        """Begin to step at once, from standing on both feet, with one that stays."""
+        self._from[env], self._next[env] = middles.mean(axis=0), 0.0
+        self._step(env, stance, LEAD + self._gait.double, command)
+
+    def rates(self, env: int) -> list[float]:
+        """How fast this step may go on, with what it does now as the first."""
+        rate = float(self._rate[env])
+        return [rate, max(rate - QUICKENING, SLOWEST), min(rate + QUICKENING, FASTEST)]
+
+    def pace(self, env: int, rate: float) -> None:
+        """Go on with this step, and with another after it, so much faster than others."""
+        self._rate[env], self._hasty[env] = rate, True
+
+    def landing(self, env: int, by: Array) -> tuple[Array, Array]:
+        """The shift (2,) nearest to `by` (2,) more than now that the foot can make; how much more (2,) it is."""
+        stance, place = int(self._stance[env]), self._target[env].copy()
+        at, speed, _ = self._aside[env]
+        left = self._left(env)
+        middle = at + 0.5 * left * speed  # where it would come to rest with an even deceleration
+        away = self._shift[env] + by - middle
+        most = SWIFTEST * left**2 / 5.77  # of the smoothest way, whose largest acceleration is 5.77 d / t^2
+        place[:2] += middle + away * min(1.0, most / max(float(np.hypot(*away)), 1e-9))
+        shift = reachable(place, self._feet[env, stance], 1.0 if stance == 1 else -1.0)[:2] - self._target[env, :2]
+        return shift, shift - self._shift[env]
+
+    def send(self, env: int, shift: Array) -> None:
+        """Have the swinging foot land (2,) aside of its place, and the next beside it."""
+        self._shift[env], self._next[env] = shift, 0.0
+
+    def _left(self, env: int) -> float:
+        """[s] that the swinging foot has, or will have, until it lands."""
+        gait = self._gait
+        return float(min(self._double[env] + gait.single - self._time[env], gait.single) / self._rate[env])
 
     def _step(self, env: int, stance: int, double: float, command: Array) -> None:
         self._mode[env], self._stance[env] = STEPPING, stance
@@ -151,10 +226,11 @@ class Footsteps:
         s = min(since / self._gait.single, 1.0)
         smooth = s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
         places[swing] += smooth * (self._target[env] - places[swing])
+        places[swing, :2] += self._aside[env, 0]
         lift[swing] = self._gait.clearance * 64.0 * (s * (1.0 - s)) ** 3
         return Feet(places, lift, (swing == 1, swing == 0))
 
-    def pressure(self, env: int, command: Array, times: Array, offset: Array) -> Array:
+    def pressure(self, env: int, command: Array, times: Array, offset: Array, further: float = 0.0) -> Array:
         """The pressure (H, 2) that the pendulum is to have at times from now, if the command (3,) stays.
 
         It is where the feet want it less what swinging legs add, so that their sum stays in the middle of the soles:
@@ -165,34 +241,49 @@ class Footsteps:
             command: (vx, vy, turn rate).
             times: (H,) [s].
             offset: (2, 2) of the centre of pressure in each foot's place when it carries alone.
+            further: [m] along x and y, how much further than planned the swinging foot lands.
         """
-        gait, now = self._gait, self._time[env]
+        gait, now, rate = self._gait, float(self._time[env]), float(self._rate[env])
+        ahead, horizon = now + times, float(times[-1])
+        hasty = bool(self._hasty[env])
+        if rate != 1.0:
+            left = float(self._double[env]) + gait.single - now + hasty * gait.period
+            ahead = np.where(rate * times < left, now + rate * times, now + left + times - left / rate)
+            horizon = float(ahead[-1]) - now
         feet = self._feet[env].copy()
         knots, points = [0.0], [self._from[env]]
         clock, double = 0.0, float(self._double[env])
         stance, mode, target, coming = int(self._stance[env]), int(self._mode[env]), self._target[env], self._next[env]
         added = np.zeros((len(times), 2))
+        shift = self._shift[env] + further
+        if mode == STEPPING and shift.any():
+            start = max(double - now, 0.0) / rate
+            more = accelerations(self._aside[env], shift, self._left(env), times - start)
+            added += self._turned(1 - stance, feet[1 - stance], more)
         while True:
             middles = np.array([turned(feet[k], float(offset[k, 0]), float(offset[k, 1]), 0.0)[:2] for k in range(2)])
             end = middles.mean(axis=0) if mode == STANDING else middles[stance]
             knots += [clock + max(double - gait.double, 0.0), clock + double]
             points += [points[-1], end]
             if mode == STEPPING:
-                added += self._added(1 - stance, feet[1 - stance], target, now + times - clock - double)
+                added += rate**2 * self._added(1 - stance, feet[1 - stance], target, ahead - clock - double)
             clock += double + gait.single
             knots.append(clock)
             points.append(end)
-            if mode == STANDING or clock - now > times[-1]:
+            if mode == STANDING or clock - now > horizon:
                 break
             feet[1 - stance] = target
-            if not coming.any() and self._parallel(feet):
+            feet[1 - stance, :2] += shift
+            shift = np.zeros(2)
+            if not hasty and not coming.any() and self._parallel(feet):
                 mode, double = STANDING, gait.double
                 continue
+            rate, hasty = rate if hasty else 1.0, False
             stance, double = 1 - stance, gait.double
             target = self._landing(feet[stance], stance, coming)
             coming = command if np.abs(command).max() > 1e-3 else np.zeros(3)
         at, where = np.array(knots), np.array(points)
-        return np.stack([np.interp(now + times, at, where[:, k]) for k in range(2)], axis=1) - added
+        return np.stack([np.interp(ahead, at, where[:, k]) for k in range(2)], axis=1) - added
 
     def _added(self, side: int, start: Array, target: Array, since: Array) -> Array:
         """What a foot that swings from one place to another adds to the pressure (H, 2), at times since it left."""
@@ -207,6 +298,12 @@ class Footsteps:
         shift = np.stack([along * x, along * y, up], axis=1) @ self._swing[side].T
         return np.stack([c * shift[:, 0] - n * shift[:, 1], n * shift[:, 0] + c * shift[:, 1]], axis=1)
 
+    def _turned(self, side: int, start: Array, more: Array) -> Array:
+        """What accelerations (H, 2) of a foot in the plane add to the pressure (H, 2)."""
+        c, s = np.cos(start[2]), np.sin(start[2])
+        turn = np.array([[c, -s], [s, c]])
+        return more @ turn @ self._swing[side, :, :2].T @ turn.T
+
     def _arrays(self) -> dict[str, Array]:
         return {
             "mode": self._mode,
@@ -219,6 +316,10 @@ class Footsteps:
             "next": self._next,
             "path": self._path,
             "lead": self._lead,
+            "rate": self._rate,
+            "hasty": self._hasty,
+            "shift": self._shift,
+            "aside": self._aside,
         }
 
     def snapshot(self, env_ids: Array) -> dict[str, Array]:

@@ -28,6 +28,12 @@ class Orders(NamedTuple):
     velocity: Array
     effort: Array
     """(D,) of all drives of the robot."""
+    error: Array
+    """(2,) of the capture point, measured less planned [m]."""
+    pressure: Array
+    """(2,) its centre that the plan needs, in the plan's frame."""
+    corners: Array
+    """(H, 2) of the ground that the feet can press on."""
 
 
 class Tracker:
@@ -42,7 +48,7 @@ class Tracker:
     def __init__(self, channel: ChannelView, num_envs: int, period: float, gain: float, margin: float) -> None:
         self.robot = channel.robot
         self.whole = WholeBody(channel.robot.kinematics, channel)
-        self.tick = _tick(period, self.robot.dt, self.robot.control_dt, self.robot.name)
+        self.tick = tick_of(period, self.robot.dt, self.robot.control_dt, self.robot.name)
         self._gain = gain
         self._soles = np.array([shrunken(sole, margin) for sole in self.whole.soles])
         self._pushes = Pushes(self.whole, self.robot, self._soles)
@@ -71,7 +77,14 @@ class Tracker:
         self.q[env, 2] -= min(bottoms)  # the plan stands on z = 0 wherever the ground is
         return places
 
-    def follow(self, env: int, targets: Targets, standing: tuple[bool, bool], seen: tuple[Array, Array]) -> Orders:
+    def follow(
+        self,
+        env: int,
+        targets: Targets,
+        standing: tuple[bool, bool],
+        seen: tuple[Array, Array],
+        jump: Array | None = None,
+    ) -> Orders:
         """Advance the plan of an env by a tick to `targets`, and command it.
 
         Args:
@@ -79,6 +92,8 @@ class Tracker:
             targets: what the posture must do at the end of this tick, in the plan's frame.
             standing: which feet carry.
             seen: the measured configuration (nq,) and velocity (nv,).
+            jump: (2,) [m/s] by which the plan's speed of the centre of mass is another from this tick on: the plan was
+                changed, and nothing has to push for it.
         """
         whole, tick = self.whole, self.tick
         before, rate = self.q[env].copy(), self.v[env].copy()
@@ -89,6 +104,9 @@ class Tracker:
         start[7 + others] += tick * (rate[6 + others] + tick * pull)
         q = whole.solve(start, targets, self._posture)
         v = whole.difference(before, q) / tick
+        if jump is not None:
+            unmoved = whole.solve(start, targets._replace(com=targets.com - tick * jump), self._posture)
+            rate += v - whole.difference(before, unmoved) / tick
         a = (v - rate) / tick
         self.q[env], self.v[env] = q, v
         efforts, force, torque = self._pushes.required(q, v, a)
@@ -99,14 +117,14 @@ class Tracker:
         error = self._capture_point(env, seen, omega) - (now[:2] + speed[:2] / omega)
         com, _, _ = whole.measured(q, v)
         cop = pressure(force, torque)
-        corners = convex_hull(whole.corners(targets.feet, standing, self._soles))
+        corners = self.corners(targets.feet, standing)
         wanted = nearest_inside(cop + self._gain * error, corners)
         force, torque = shifted(force, torque, wanted - cop, com)
         both = standing[0] and standing[1]
         shares = share_of(wanted, whole.middles(targets.feet)) if both else np.array(standing, dtype=float)
         effort = self._pushes.solve(q, efforts, force, torque, targets.feet, targets.lift, shares)
         self._shares[env], self._feet[env] = shares, targets.feet
-        return Orders(q[7 + whole.columns], v[6 + whole.columns], effort)
+        return Orders(q[7 + whole.columns], v[6 + whole.columns], effort, error, cop, corners)
 
     def _capture_point(self, env: int, seen: tuple[Array, Array], omega: float) -> Array:
         """Where the measured robot would come to rest (2,), in the plan's frame."""
@@ -118,6 +136,10 @@ class Tracker:
         offset = (shares[:, None] * (feet[:, :2] - places[:, :2] @ rotation.T)).sum(axis=0)
         self.lead[env] = [*offset, turn]
         return rotation @ (com[:2] + speed[:2] / omega) + offset
+
+    def corners(self, places: Array, standing: tuple[bool, bool]) -> Array:
+        """Corners (H, 2) of the ground that feet at those places can press on, in the plan's frame."""
+        return convex_hull(self.whole.corners(places, standing, self._soles))
 
     def snapshot(self, env_ids: Array) -> dict[str, Array]:
         """Copies of the plan."""
@@ -132,7 +154,7 @@ class Tracker:
         return {"q": self.q, "v": self.v, "shares": self._shares, "feet": self._feet, "lead": self.lead}
 
 
-def _tick(period: float, dt: float, control_dt: float, robot: str) -> float:
+def tick_of(period: float, dt: float, control_dt: float, robot: str) -> float:
     """The time between two commands, which must fit into a control step a whole number of times."""
     steps, substeps = max(1, round(period / dt)), round(control_dt / dt)
     if steps >= substeps:
