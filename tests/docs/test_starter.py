@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from anysim import registry
+from anysim.record.names import trajectories
+from anysim.record.reader import open_trajectory
 from tests.external_packages import EXTERNAL, FOUND, install, offered, run
 
 OTHER_GUIDES = ("evaluate.md", "export.md", "language.md", "teleop.md")
@@ -50,9 +52,14 @@ def test_its_task_is_solved_and_replays_to_the_bit(site: Path, engine: str, tmp_
         "8",
         "-o",
         "record.cameras=[]",
+        "-o",
+        "record.streams.starter_energy.scale=0.5",
         "--out",
         str(tmp_path),
     )
+    reader = open_trajectory(trajectories(tmp_path)[0])
+    energy = reader.stream("energy/joints")
+    assert np.array_equal(energy.values, 0.5 * reader.states_from_reset("joint_vel") ** 2)
     assert found["successes"] == found["attempts"] == 8
     again = anysim(site, "replay", str(tmp_path))
     assert again["identical"] == again["replayed"] == 8
@@ -142,6 +149,8 @@ import sys
 import numpy as np
 import anysim
 from anysim import registry
+from anysim.record.names import trajectories
+from anysim.record.reader import open_trajectory
 from anysim.assets.load import import_asset, model_file
 from anysim.errors import AssetError
 

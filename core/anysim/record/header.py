@@ -21,8 +21,6 @@ Count = Annotated[int, Field(ge=0, lt=1 << 53)]
 Size = Annotated[int, Field(ge=0, le=MAX_VALUES)]
 Label = Annotated[str, Field(max_length=1024)]
 Pose7 = tuple[float, float, float, float, float, float, float]
-
-
 NumberType = Literal["float64", "float32", "int32", "uint16", "int8", "uint8", "bool"]
 
 

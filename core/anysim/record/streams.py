@@ -42,7 +42,6 @@ class StreamSource(ABC):
 
     def begin(self, index: int) -> None:
         """An episode begins in an env, which was just reset; called by the thread that steps."""
-        del index
 
     @abstractmethod
     def parts(self, index: int, columns: EpisodeColumns, status: str) -> Iterator[StreamPart]:
@@ -50,7 +49,6 @@ class StreamSource(ABC):
 
     def close(self) -> None:
         """The run is over, and the recorder's thread has ended."""
-        return
 
 
 def make_sources(env: TaskEnv) -> dict[str, StreamSource]:

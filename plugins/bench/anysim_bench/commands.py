@@ -12,5 +12,7 @@ if TYPE_CHECKING:
 def add_cli(app: "typer.Typer") -> None:
     """`anysim bench`."""
     from anysim_bench import cli
+    from anysim_bench.record import record
 
+    cli.app.command("record")(record)
     app.add_typer(cli.app, name="bench")

@@ -39,10 +39,20 @@ class Still:
         return {}
 
 
+def made(*overrides: str) -> TaskEnv:
+    """Two envs."""
+    return anysim.make(WORLD, num_envs=2, overrides=overrides)
+
+
+def collect(env: TaskEnv, out: Path, episodes: int = 2) -> list[EpisodeResult]:
+    """Collect in them."""
+    return list(Collector(env, Still(env), out, episodes, seed=1).run())
+
+
 def collected(out: Path, *overrides: str, episodes: int = 2) -> list[EpisodeResult]:
-    """Episodes of two envs."""
-    with anysim.make(WORLD, num_envs=2, overrides=overrides) as env:
-        return list(Collector(env, Still(env), out, episodes, seed=1).run())
+    """The same in envs of their own."""
+    with made(*overrides) as env:
+        return collect(env, out, episodes)
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ from anysim_inspect.verify import verify_run
 from anysim_language.describe import described_trajectory
 from tests.plugins.mcap.everything import collected
 
+pytestmark = pytest.mark.slow  # each kind of stream is looked at by itself in the fast tier
 LABELS = "{boxes_2d: {}, flow: {}, point_cloud: {stride: 4}}"
 
 

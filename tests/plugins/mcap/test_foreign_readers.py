@@ -15,6 +15,7 @@ from anysim.record.header import StateLayout
 from anysim_mcap.blocks import BlockEncoder, Channels
 from anysim_mcap.records import MESSAGE_HEAD
 from tests.plugins.mcap.test_columns import columns
+from tests.plugins.mcap.test_streams import Weather, recorded, values
 
 
 @pytest.fixture
@@ -57,8 +58,8 @@ def test_states_by_the_schema_in_the_file(reader, sample):
     for step, (_, message) in enumerate(decoded(reader, "/state")):
         assert message.step == step
         assert message.time == step * 0.02
-        for name, values in sample.frame(step).state.items():
-            assert list(getattr(message, name)) == values.ravel().tolist()
+        for name, rows in sample.frame(step).state.items():
+            assert list(getattr(message, name)) == rows.ravel().tolist()
     for step, (_, message) in enumerate(decoded(reader, "/collect")):
         frame = sample.frame(step)
         assert (message.reward, message.status) == (frame.reward, "running")
@@ -136,3 +137,33 @@ def test_facts_without_the_manifest(reader):
     assert (spec.name, spec.media_type) == ("spec.json", "application/json")
     assert json.loads(spec.data) == {"seed": 7, "engine": {"name": "null"}}
     assert reader.get_header().library == "anysim-mcap 0.1.0"
+
+
+def test_streams_by_the_schemas_in_their_file(tmp_path, sample):
+    path = recorded(tmp_path, sample, Weather())
+    kinds = {"rain": "array", "wet": "array", "range": "image", "map": "image", "picture": "image", "drops": "points"}
+    kinds |= {"report": "text", "none/of/it": "data", "boxes": "data"}
+    names = {"array": "anysim.Array", "image": "foxglove.RawImage", "points": "foxglove.PointCloud"}
+    names |= {"text": "foxglove.Log", "data": "anysim.Data"}
+    schemas = {f"/weather/{name}": names[kind] for name, kind in kinds.items()}
+    with (path / "weather.mcap").open("rb") as file:
+        reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        summary = reader.get_summary()
+        assert summary is not None
+        assert {c.topic: summary.schemas[c.schema_id].name for c in summary.channels.values()} == schemas
+        for topic, schema in schemas.items():
+            if schema == "anysim.Data":
+                for _, channel, message in reader.iter_messages(topics=[topic]):
+                    found = summary.schemas[channel.schema_id]
+                    jsonschema.validate(json.loads(message.data), json.loads(found.data))
+                continue
+            messages = decoded(reader, topic)
+            assert [m.log_time for m, _ in messages] == [40_000_000 * k for k in range(4)]
+            for row, (_, message) in enumerate(messages):
+                value = values(2 * row)[topic[1:]]
+                if schema == "foxglove.Log":
+                    assert message.message == value
+                else:
+                    assert message.data == value.tobytes()
+                if schema == "foxglove.RawImage":
+                    assert (message.height, message.width, message.step) == (3, 4, value.strides[0])
