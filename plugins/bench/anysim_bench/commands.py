@@ -11,8 +11,8 @@ if TYPE_CHECKING:
 @hookimpl
 def add_cli(app: "typer.Typer") -> None:
     """`anysim bench`."""
-    from anysim_bench import cli
-    from anysim_bench.record import record
+    from anysim_bench.cli.bench import app as bench
+    from anysim_bench.cli.record import record
 
-    cli.app.command("record")(record)
-    app.add_typer(cli.app, name="bench")
+    bench.command("record")(record)
+    app.add_typer(bench, name="bench")

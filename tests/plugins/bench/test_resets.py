@@ -7,7 +7,7 @@ from anysim.engine.capability import Capability
 from anysim.engine.factory import runnable
 from anysim.errors import EngineError
 from anysim.testing.engines import require_engine
-from anysim_bench.cli import app
+from anysim_bench.cli.bench import app
 from anysim_bench.resets import Sample, changing_world, growth, reset_cost
 
 RESETS = 300

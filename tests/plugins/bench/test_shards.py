@@ -4,7 +4,7 @@ import pytest
 from typer.testing import CliRunner
 
 from anysim.errors import EngineError
-from anysim_bench.cli import app
+from anysim_bench.cli.bench import app
 from anysim_bench.shards import shard_gains
 
 

@@ -10,7 +10,8 @@ from anysim import api, registry
 from anysim.engine.base import SimEngine
 from anysim.engine.control import NUDGE
 from anysim.engine.factory import create_simulation
-from anysim_bench import cli, step
+from anysim_bench import step
+from anysim_bench.cli import bench as cli
 
 
 @pytest.mark.parametrize(

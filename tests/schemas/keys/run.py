@@ -4,6 +4,7 @@ from tests.schemas.keys.row import OBSERVED, SEEING, Row, row
 from tests.schemas.keys.world import ARM, SEE_ARM
 
 FILMED = *SEEING, "record.cameras=[eye]"
+DEPTH = "world.cameras.eye.channels=[rgb, depth]"
 EASY = "task.success={there: {term: near, a: red, b: goal, tolerance: 9.0}}"
 """Holds from the first step on."""
 
@@ -139,6 +140,8 @@ ROWS: dict[str, Row] = {
     "RecordSpec.writer": row("record.writer=other", seen="recorded", error="no writer named 'other'"),
     "RecordSpec.options": row("record.options={crf: 51}", given=FILMED, seen="filmed"),
     "RecordSpec.cameras": row("record.cameras=[eye]", given=SEEING, seen="filmed"),
+    "RecordSpec.channels": row("record.channels={eye: [depth]}", given=(*SEEING, DEPTH), seen="filmed"),
+    "RecordSpec.streams": row("record.streams={language: {}}", given="record.keep=all", seen="recorded"),
     "RecordSpec.fps": row("record.fps=10", given=FILMED, seen="filmed"),
     "RecordSpec.markers": row("record.markers=false", given=FILMED, seen="filmed"),
     "RecordSpec.keep": row("record.keep=all", seen="recorded"),
