@@ -91,9 +91,10 @@ def _export(
         exporter.check(data)
     sheet = make_sheet(to, registry.distribution("exporters", to), said, data.manifests)
     done = Exported(out, len(paths), sum(one.steps for one in data.manifests), 0, left_out, False)
-    if _is_there(out, sheet):
-        return done._replace(present=True)
     aside = out.absolute().with_name(f".{out.absolute().name}.export")
+    if _is_there(out, sheet):
+        _clear(aside)
+        return done._replace(present=True)
     try:
         aside.parent.mkdir(parents=True, exist_ok=True)
         lock = FileLock.take(aside.with_name(f"{aside.name}.lock"))
@@ -185,6 +186,13 @@ def _is_there(out: Path, sheet: ExportSheet) -> bool:
         others = [name for name in names if getattr(there, name) != getattr(sheet, name)]
         held = f"holds another export ('{there.exporter}', {len(there.episodes)} episodes; other {listing(others)})"
     raise RecordError(f"{out} is there and {held}; nothing is overwritten: choose another --out, or remove it")
+
+
+def _clear(aside: Path) -> None:
+    """Remove what an export has left that died after its data set was there."""
+    if aside.exists() and (lock := FileLock.take(aside.with_name(f"{aside.name}.lock"))) is not None:
+        with lock:
+            shutil.rmtree(aside, ignore_errors=True)
 
 
 def _begin(aside: Path, sheet: ExportSheet) -> int:

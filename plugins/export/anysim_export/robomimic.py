@@ -10,6 +10,7 @@ from pydantic import Field
 
 from anysim.conventions import Array
 from anysim_export.api import DataSet, Episode, Exporter
+from anysim_export.hdf5_files import new_file
 
 DEMO_FILE = "demo.hdf5"
 GYM_TYPE = 2
@@ -37,9 +38,7 @@ class RobomimicExporter(Exporter):
 
     def write_episode(self, folder: Path, episode: Episode, data: DataSet) -> None:
         """A file with the one demonstration."""
-        import h5py  # pyright: ignore[reportMissingImports]
-
-        with h5py.File(folder / DEMO_FILE, "w") as file:
+        with new_file(folder / DEMO_FILE) as (file, _):
             demo = file.create_group("demo")
             demo.attrs["num_samples"] = episode.steps
             demo.attrs["episode_seed"] = str(episode.manifest.episode_seed)  # of 64 bits and more
@@ -77,7 +76,7 @@ class RobomimicExporter(Exporter):
         import h5py  # pyright: ignore[reportMissingImports]
 
         first, names = data.first, [f"demo_{i}" for i in range(len(parts))]
-        with h5py.File(folder / DEMO_FILE, "w") as file:
+        with new_file(folder / DEMO_FILE) as (file, check):
             group = file.create_group("data")
             group.attrs["total"] = sum(one.steps for one in data.manifests)
             env = f"anysim_learning.envs:anysim/{first.task}-v0"
@@ -89,6 +88,7 @@ class RobomimicExporter(Exporter):
             for name, part in zip(names, parts, strict=True):
                 with h5py.File(part / DEMO_FILE, "r") as one:
                     one.copy("demo", group, name)
+                check()
             split = len(names) - round(self._valid * len(names))
             for mask, chosen in (("train", names[:split]), ("valid", names[split:])):
                 if chosen:

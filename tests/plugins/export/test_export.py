@@ -215,6 +215,14 @@ def test_what_another_export_left_aside_is_not_taken(run: Path, exported: dict[s
     assert content(out) != content(exported["webdataset"])
 
 
+def test_what_died_after_its_data_set_was_there_is_cleared(run: Path, tmp_path: Path) -> None:
+    out, aside = tmp_path / "webdataset", tmp_path / ".webdataset.export"
+    export([run], "webdataset", out, {"images": False})
+    (aside / "parts" / "000000").mkdir(parents=True)
+    assert export([run], "webdataset", out, {"images": False}).present
+    assert list(tmp_path.iterdir()) == [out]
+
+
 def test_what_is_there_stays(run: Path, exported: dict[str, Path], tmp_path: Path) -> None:
     before = content(exported["webdataset"])
     assert export([run], "webdataset", exported["webdataset"]).present

@@ -5,6 +5,7 @@
 
 import importlib.util
 import io
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -133,6 +134,52 @@ def test_its_tools_verify_the_files_and_find_equal_exports_equal(
         ).returncode
         != 0
     )
+
+
+KILLED = """
+import os, resource, signal, sys
+from pathlib import Path
+from anysim.errors import RecordError
+from anysim_export.job import export
+from anysim_export.rerun.exporter import RerunExporter
+out, *runs = map(Path, sys.argv[1:])
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, resource.RLIM_INFINITY))
+try:
+    export(runs, "rerun", out)
+except RecordError as error:
+    print(error)
+assert not out.exists()
+resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+whole = RerunExporter.write_episode
+def killed(self, folder, episode, data):
+    whole(self, folder, episode, data)
+    if episode.index == 1:
+        path = folder / "episode.rrd"
+        path.write_bytes(path.read_bytes()[:5000])
+        sys.stdout.flush()
+        os.kill(os.getpid(), signal.SIGKILL)
+RerunExporter.write_episode = killed
+export(runs, "rerun", out)
+"""
+
+
+@needs_rerun
+def test_killed_or_out_of_room_it_goes_on_to_the_same_content(
+    episodes: list[Episode], out: Path, tmp_path: Path
+) -> None:
+    """In one program: files that may not grow, and then a death in the second episode, whose file is cut short."""
+    again, runs = tmp_path / "again", [one.directory for one in episodes]
+    words = [sys.executable, "-c", KILLED, str(again), *map(str, runs)]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=200, check=False)
+    assert done.returncode == -signal.SIGKILL, done.stderr[-400:]
+    assert "File too large" in done.stdout
+    assert not again.exists()
+    assert export(runs, "rerun", again).resumed == 1
+    tool = [str(Path(sys.executable).with_name("rerun")), "rrd", "compare", "--unordered"]
+    for one in episodes:
+        pair = [str(folder / EXPORTED.format(one.index)) for folder in (out, again)]
+        assert subprocess.run([*tool, *pair], capture_output=True, timeout=120, check=False).returncode == 0
 
 
 def test_a_height_field_is_two_triangles_a_cell_seen_from_above() -> None:
