@@ -17,11 +17,11 @@ from tests.tasks.states import blind, failed, judged, put, rewarded, seen, set_o
 NEAR = 1e-5
 """[m, rad] engines keep poses in single precision."""
 ENGINES = ["mujoco", pytest.param("pybullet", marks=pytest.mark.slow), pytest.param("sapien", marks=pytest.mark.slow)]
-VARIANTS = {"peg_in_hole_2mm", "insert_round_peg", "nut_on_peg", "usb_insert", "unplug_charger"}
+VARIANTS = {"peg_in_hole_2mm", "insert_round_peg", "nut_on_peg", "usb_insert", "unplug_charger", "go1_velocity_rough"}
 """Those that differ from another task in sizes alone, or share its world or its way."""
 SETTLING = "robot.hand_", "partner.hand_", "hand.", "dog.", "walker."
 """Joints of a hand, which an action of zero sends to the middle of their ranges, and of legs that take up a weight."""
-SOFT = ("go1_velocity", "g1_velocity", "get_up")
+SOFT = ("go1_velocity", "go1_velocity_rough", "g1_velocity", "get_up")
 """Tasks whose drives hold no weight at once, or whose robot begins above the ground."""
 SHIPPED = ["stand_still"]
 """Those that come with a trained policy."""
