@@ -80,7 +80,7 @@ def test_pushes_from_eight_sides_do_not_fell_it(engine: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_steps_catch_pushes_that_the_soles_do_not_hold(engine: str) -> None:
-    """Without steps, those from the front and from behind fell it on each engine."""
+    """Without steps, those from the front and from behind fell it on MuJoCo."""
     made = env(engine, "lipm_walk", num_envs=8)
     run(made, np.zeros(3), 0.5)
     start = pelvis(made)
