@@ -9,15 +9,10 @@ _log = logging.getLogger("anysim_sensors")
 
 
 def tell_of_compiling() -> Any:
-    """Say so once, when a kernel is compiled: on a terminal as a line, else to the log; returns numba's listener.
-
-    What is read from the cache is not compiled, and nothing is said.
-    """
+    """Say so once, when a kernel is compiled and not read from the cache: to the log, and on a terminal."""
     from numba.core import event
 
     class Teller(event.Listener):
-        """Of the first kernel of ours that is compiled."""
-
         said = False
 
         def on_start(self, event: Any) -> None:
@@ -25,11 +20,9 @@ def tell_of_compiling() -> Any:
             if self.said or not kernel.startswith(("anysim_sensors.", "anysim_tactile.")):
                 return
             self.said = True
+            _log.info(WORDS)
             if sys.stderr.isatty():
                 sys.stderr.write(f"{WORDS}\n")
-                sys.stderr.flush()
-            else:
-                _log.info(WORDS)
 
         def on_end(self, event: Any) -> None:
             pass

@@ -4,6 +4,7 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim_sensors.kernels.bounds import compiled
+from anysim_sensors.kernels.rays import turn_of
 
 
 @compiled
@@ -36,12 +37,7 @@ def locate(distance: Array, number: Array, directions: Array, frames: Array, poi
     """Points (N, R, 3) float32 [m] of the world, NaN where nothing is seen."""
     for e in range(distance.shape[0]):
         p, f = e if directions.shape[0] > 1 else 0, frames[e]
-        x, y, z, w = f[3], f[4], f[5], f[6]
-        turn = (
-            (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
-            (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
-            (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
-        )
+        turn = turn_of(f)
         for r in range(distance.shape[1]):
             t = distance[e, r] if number[e, r] >= 0 else np.nan
             u, v, w = t * directions[p, r, 0], t * directions[p, r, 1], t * directions[p, r, 2]

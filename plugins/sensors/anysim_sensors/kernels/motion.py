@@ -9,24 +9,13 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim_sensors.kernels.bounds import compiled
-from anysim_sensors.kernels.rays import cross_convex, cross_mesh, find_window, turned
+from anysim_sensors.kernels.rays import cross_convex, cross_mesh, find_window, turn_of, turned
 from anysim_sensors.tables import CYLINDER, PLANE, GeomPoses, Geoms, Triangles
 
 TILES = 32
 """Across the longer side of an image: each knows the geoms that it may show."""
 CLOSE = 1e-4
 """[m] What is nearer than this before a point is taken for its own surface."""
-
-
-@compiled
-def _turn(f: Array) -> tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]:
-    """The rotation matrix of a pose (7,), row by row."""
-    x, y, z, w = f[3], f[4], f[5], f[6]
-    return (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
-        (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
-        (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
-    )
 
 
 @compiled
@@ -80,18 +69,9 @@ def follow(
     """How far [pixels] what is seen has come since before, and whether something hid it then.
 
     Args:
-        geoms, triangles: the tables.
-        posed: where geoms are now.
-        before: where they were.
-        seen: (G,) bool, the geoms that count.
+        geoms, triangles, posed, seen, frames, directions, focal, width, distance, number: as of `view`.
+        before, frames_before: where geoms and the camera were.
         row: (geoms + 1,) int32, rows of the tables of geoms.
-        frames: (N, 7) where the camera is.
-        frames_before: (N, 7) where it was.
-        directions: (N or 1, R, 3) of the pixels in the optical frame, unit, row by row.
-        distance: (N, R) [m] along them.
-        number: (N, R) the geom or -1.
-        focal: (N or 1,) [pixels].
-        width: of the image.
         near, far: [m] along the optical axis, of what could be seen.
         flow: (N, R, 2) float32 written, columns and rows; NaN where nothing is seen, and where it was behind the
             camera. Of 0 rows none is.
@@ -112,8 +92,8 @@ def follow(
         p = e if directions.shape[0] > 1 else 0
         f = focal[e if focal.shape[0] > 1 else 0]
         now, then, here, old = frames[e], frames_before[e], posed.frame[e], before.frame[e]
-        (m00, m01, m02), (m10, m11, m12), (m20, m21, m22) = _turn(now)
-        (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = _turn(then)
+        (m00, m01, m02), (m10, m11, m12), (m20, m21, m22) = turn_of(now)
+        (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = turn_of(then)
         if appeared.shape[0] > 0:
             _fill(before, e, seen, then, width, height, f, shift, counts, held)
             for g in range(geometries):

@@ -209,17 +209,23 @@ def _flat(c: Array, i: int) -> tuple[float, float, float]:
 
 
 @compiled
+def turn_of(pose: Array) -> tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]:
+    """The rotation matrix of a pose (7,), row by row."""
+    x, y, z, w = pose[3], pose[4], pose[5], pose[6]
+    return (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
+        (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
+        (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
+    )
+
+
+@compiled
 def place_rays(frame: Array, origins: Array, directions: Array, rays: Array) -> None:
     """Rays (R, 9) of the world: origins and directions (R, 3) in a frame that is a pose (7,); directions made unit.
 
     The last three numbers are the inverse direction.
     """
-    x, y, z, w = frame[3], frame[4], frame[5], frame[6]
-    turn = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
-        (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
-        (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
-    )
+    turn = turn_of(frame)
     for r in range(origins.shape[0]):
         ox, oy, oz = origins[r, 0], origins[r, 1], origins[r, 2]
         dx, dy, dz = directions[r, 0], directions[r, 1], directions[r, 2]
