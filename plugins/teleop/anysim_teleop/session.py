@@ -20,6 +20,7 @@ from anysim.record.incoming import claim
 from anysim.record.manifest import read_manifest
 from anysim.record.names import EPISODES, trajectory_name
 from anysim.record.recorder import Recorder
+from anysim.record.streams import make_sources
 from anysim.record.writer import make_writer
 from anysim.task.bindings import bind_term
 from anysim.task.contract import Status
@@ -100,7 +101,8 @@ class Session:
         except OSError as error:
             raise disk_trouble(f"cannot record into {out}", error, out) from error
         try:
-            self.recorder = Recorder(out, writer, run_header(env, seed), horizon=task.horizon)
+            sources = make_sources(env)
+            self.recorder = Recorder(out, writer, run_header(env, seed), horizon=task.horizon, sources=sources)
             tools = tuple(arm.name for arm in self.drives.arms)
             job = Job(env.name, task.description, env.engine.name, tools, self._dt, setup.speed, setup.turn)
             device.open(job)

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from anysim.errors import RecordError
+from anysim.api import load
+from anysim.errors import RecordError, SpecError
 from anysim.record.columns import EpisodeColumns
 from anysim.record.commit import describe
 from anysim.record.header import StreamInfo
@@ -19,6 +20,7 @@ from anysim.record.recorder import Recorder
 from anysim.record.streams import StreamPart, StreamRow, StreamSource
 from anysim.record.writer import TrajectoryWriter, WrittenFile, make_writer
 from anysim_inspect.verify import verify, verify_run
+from tests.plugins.mcap.everything import WORLD
 
 INFOS = {
     "weather/rain": StreamInfo(kind="array", shape=(2, 2), dtype="int32", unit="mm", about={"legend": {"1": "rain"}}),
@@ -205,3 +207,15 @@ def test_verify_finds_streams_that_contradict_the_manifest(tmp_path: Any, sample
     manifest["files"]["weather.mcap"] = describe(path / "weather.mcap").model_dump(mode="json")
     (path / "manifest.json").write_text(json.dumps(manifest))
     assert "step 8, of 6" in verify(path)[0]
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("record.channels.back=[depth]", "there is no camera 'back'"),
+        ("record.channels.top=[segmentation]", "gives no segmentation; add it to world.cameras.top.channels"),
+    ],
+)
+def test_channels_that_no_camera_gives_are_refused_in_the_file(override: str, message: str) -> None:
+    with pytest.raises(SpecError, match=message):
+        load(WORLD, overrides=[override])

@@ -13,7 +13,7 @@ SHARE_GOAL = 0.10
 def record(
     engine: Annotated[str | None, typer.Option("--engine", "-e", help="default: ANYSIM_ENGINE, else mujoco.")] = None,
     num_envs: Annotated[int, typer.Option("--num-envs", "-n", min=1, help="Envs.")] = 16,
-    episodes: Annotated[int, typer.Option("--episodes", "-k", min=1, help="Episodes, over all envs.")] = 32,
+    episodes: Annotated[int, typer.Option("--episodes", "-k", min=1, help="Episodes, over all envs.")] = 64,
     task: Annotated[str, typer.Option(help="The task, which has an expert and cameras.")] = "pick_cube",
     rounds: Annotated[int, typer.Option(min=1, help="Collections; the one with the median share counts.")] = 3,
     json: AsJson = False,
