@@ -40,9 +40,11 @@ class LanguageStream(StreamSource):
         episode, phrasing = ended(self._blind, self._loaded, columns, status), self._phrasing
         yield StreamRow("language/scene", 0, scene_text(episode, phrasing))
         yield StreamRow("language/instruction", 0, instruction_text(episode, phrasing))
-        for step, text, *facts in narration(episode, phrasing):
-            yield StreamRow("language/narration", step, text)
-            yield StreamRow("language/facts", step, dict(zip(("kind", "what", "where"), facts, strict=True)))
+        for sentence in narration(episode, phrasing):
+            facts = sentence._asdict()
+            step = facts.pop("step")
+            yield StreamRow("language/narration", step, facts.pop("text"))
+            yield StreamRow("language/facts", step, facts)
 
     def close(self) -> None:
         self._blind.close()
