@@ -75,6 +75,15 @@ def render(
     from anysim_film.stage import FilmOrder
 
     if len(directories) == 1 and directories[0].suffix in (".yaml", ".yml"):
+        from anysim.errors import AnysimError
+
+        given = {"--camera": camera, "--size": size, "--fps": fps, "--base": base, "--annotate": annotate}
+        given |= {"--jobs": jobs > 1, "--source": source != "engine"}
+        if told := [name for name, value in given.items() if value]:
+            raise AnysimError(
+                f"{', '.join(told)}: what a job of still images draws stands in {directories[0]}; leave it out, or "
+                "change the file with -o"
+            )
         _stills(directories[0], out, engine, override or (), quiet=json)
         return
     order = FilmOrder(tuple(camera or ()), engine, tuple(override or ()), size, fps, base)

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 import anysim
 from anysim import hooks
 from anysim.cli.main import app
-from anysim.errors import RecordError
+from anysim.errors import AnysimError, RecordError
 from anysim.record.collector import Collector
 from anysim.record.commit import describe
 from anysim.record.names import trajectories
@@ -178,6 +178,12 @@ def test_the_command_says_what_it_made(command: CliRunner, run: list[Path]) -> N
     assert {box["name"] for box in boxes} <= {"panda", "table", "cube"}
     again = command.invoke(app, words)
     assert "0 of 1 episodes annotated" in again.stdout
+
+
+def test_a_job_of_images_takes_no_option_of_recordings(command: CliRunner, tmp_path: Path) -> None:
+    failed = command.invoke(app, ["render", str(tmp_path / "desk.yaml"), "--jobs", "2", "-c", "front"])
+    assert isinstance(failed.exception, AnysimError)
+    assert str(failed.exception).startswith("--camera, --jobs: what a job of still images draws stands in")
 
 
 @pytest.mark.slow
