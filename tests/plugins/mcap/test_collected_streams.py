@@ -92,8 +92,8 @@ def test_language_is_the_description_of_what_was_committed(run: Path) -> None:
             (one.step, one.text) for one in said.narration
         ]
         assert facts.values == [
-        {"kind": one.kind, "what": one.what, "where": one.where, "who": one.who} for one in said.narration
-    ]
+            {"kind": one.kind, "what": one.what, "where": one.where, "who": one.who} for one in said.narration
+        ]
 
 
 def test_streams_change_nothing_else_and_equal_runs_give_equal_files(run: Path, tmp_path: Path) -> None:
