@@ -23,7 +23,7 @@ SETTLING = "robot.hand_", "partner.hand_", "hand.", "dog.", "walker."
 """Joints of a hand, which an action of zero sends to the middle of their ranges, and of legs that take up a weight."""
 SOFT = ("go1_velocity", "go1_velocity_rough", "g1_velocity", "get_up")
 """Tasks whose drives hold no weight at once, or whose robot begins above the ground."""
-SHIPPED = ["stand_still"]
+SHIPPED = ["stand_still", "go1_velocity"]
 """Those that come with a trained policy."""
 DEEPEST, REPLAYED = 2e-3, 50
 """How far things may be inside of one another at a reset [m], and steps that are replayed."""
