@@ -5,6 +5,7 @@ from importlib.metadata import entry_points
 import numpy as np
 import pytest
 
+import anysim
 from anysim.api import load, task_path
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
@@ -138,6 +139,27 @@ def test_the_policy_that_a_task_ships_solves_it(task: str, engine: str) -> None:
     with blind(task, engine, 8) as env:
         told = list(drive(env, make_policy(env, "shipped"), episode_seeds("validation", 0, 8)))
     assert [episode.status for episode in told] == ["success"] * 8
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_shipped_walk_is_a_controller_with_the_action_of_the_trot(engine: str) -> None:
+    require_engine(engine)
+    walk = "package:anysim_tasks/legged/go1_velocity/walk.yaml"
+    dog = {
+        "robot": "unitree_go1",
+        "dynamics": {"kp_scale": 0.26667, "kd_scale": 0.33333},
+        "actions": {"base": {"controller": "policy", "params": {"options": {"file": walk}}}},
+    }
+    run = {
+        "engine": engine,
+        "physics": {"dt": 0.004, "control_dt": 0.02, "actuation": "explicit_pd"},
+        "world": {"terrain": {"kind": "plane", "friction": 0.2}, "robots": {"dog": dog}},
+        "task": {"observations": {"policy": [{"term": "base_lin_vel", "robot": "dog"}]}},
+    }
+    with anysim.make(run) as env:
+        env.reset(seed=0)
+        speeds = [env.step(np.array([[0.5, 0.0, 0.0]])).obs["policy"][0, :2] for _ in range(150)]
+    assert np.allclose(np.mean(speeds[50:], axis=0), [0.5, 0.0], atol=0.06)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

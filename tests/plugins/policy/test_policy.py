@@ -14,7 +14,10 @@ from onnx import TensorProto, helper, numpy_helper
 from anysim.conventions import Array
 from anysim.errors import AnysimError, PluginError, TaskError
 from anysim.task.env import TaskEnv
+from anysim_policy import trust
+from anysim_policy.spec import PolicySpec
 from anysim_policy.trust import TRUSTED
+from anysim_schemas.jsonschema import render
 from tests.runtime import light
 
 TERMS: list[Any] = [
@@ -226,3 +229,8 @@ def test_torchscript_gives_what_numpy_gives(tmp_path: Path, monkeypatch: pytest.
             env.reset(seed=0)
             seen.append([env.step(np.ones((1, 2))).obs["policy"] for _ in range(10)])
     assert np.allclose(seen[0], seen[1], atol=1e-4)
+
+
+def test_the_schema_for_editors_is_that_of_the_model() -> None:
+    written = Path(trust.__file__).with_name("policy.schema.json").read_text()
+    assert written == render(PolicySpec), "write anysim_schemas.jsonschema.render(PolicySpec) into it"
