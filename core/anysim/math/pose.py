@@ -172,6 +172,15 @@ def from_roll_pitch_yaw(rpy: Array) -> Array:
     )
 
 
+def to_roll_pitch_yaw(q: Array) -> Array:
+    """Fixed-axis roll, pitch and yaw (..., 3) of unit quaternions (..., 4), as `from_roll_pitch_yaw` takes them."""
+    x, y, z, w = np.moveaxis(q, -1, 0)
+    roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    pitch = np.arcsin(np.minimum(np.maximum(2.0 * (w * y - z * x), -1.0), 1.0))
+    yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return np.stack([roll, pitch, yaw], axis=-1)
+
+
 def to_matrix(q: Array) -> Array:
     """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
     x, y, z, w = q[..., 0], q[..., 1], q[..., 2], q[..., 3]

@@ -138,10 +138,7 @@ class TrotController(Controller):
 
 def _motion(pose: Array, twist: Array) -> Motion:
     """Roll, pitch and the velocity in the heading frame of bases with poses (E, 7) and twists (E, 6)."""
-    x, y, z, w = (pose[:, k] for k in range(3, 7))
-    roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-    pitch = np.arcsin(np.minimum(np.maximum(2.0 * (w * y - z * x), -1.0), 1.0))
-    yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    roll, pitch, yaw = P.to_roll_pitch_yaw(pose[:, 3:]).T
     c, s = np.cos(yaw), np.sin(yaw)
     velocity = np.stack([c * twist[:, 0] + s * twist[:, 1], c * twist[:, 1] - s * twist[:, 0], twist[:, 5]], axis=1)
     return Motion(velocity, roll, pitch)

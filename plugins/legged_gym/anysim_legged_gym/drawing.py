@@ -8,7 +8,7 @@ from anysim.errors import TaskError
 from anysim.math import pose as P
 from anysim_legged_gym.build import VIEWER
 from anysim_legged_gym.ground import BESIDE, Ground
-from anysim_legged_gym.moment import Moment, roll_pitch_yaw
+from anysim_legged_gym.moment import Moment
 from anysim_legged_gym.spec import ViewerSpec
 
 HEIGHTS, FEET, KEYS = (255, 210, 0), (0, 220, 255), (255, 0, 160)
@@ -77,7 +77,7 @@ class Viewer:
     def _points(self, moment: Moment) -> list[tuple[Array, tuple[int, int, int]]]:
         spec, env = self._spec, self._spec.env
         found: list[tuple[Array, tuple[int, int, int]]] = []
-        yaw = roll_pitch_yaw(moment.base_quat[env])[2]
+        yaw = P.to_roll_pitch_yaw(moment.base_quat[env])[2]
         if spec.debug_draw_height_points_around_base:
             beside = _turned(self._ground.points, yaw) + moment.base_pos[env, :2]
             found.append((np.column_stack([beside, moment.measured_heights[env]]), HEIGHTS))

@@ -45,7 +45,7 @@ class Moment:
 
     @cached_property
     def base_euler(self) -> Array:
-        return _kept(roll_pitch_yaw(self.base_quat))
+        return _kept(P.to_roll_pitch_yaw(self.base_quat))
 
     @cached_property
     def base_lin_vel_w(self) -> Array:
@@ -112,12 +112,3 @@ class Moment:
         pose, twist = self.state.body_pose[:, bodies], self.state.body_twist[:, bodies]
         arm = P.rotate(pose[..., 3:], np.array([frame.position for frame in frames]).reshape(-1, 3))
         return _kept(pose[..., :3] + arm), _kept(twist[..., :3] + P.cross(twist[..., 3:], arm))
-
-
-def roll_pitch_yaw(quaternion: Array) -> Array:
-    """Fixed-axis angles (..., 3) of unit quaternions (..., 4), as `from_roll_pitch_yaw` takes them."""
-    x, y, z, w = np.moveaxis(quaternion, -1, 0)
-    roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-    pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
-    yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return np.stack([roll, pitch, yaw], axis=-1)

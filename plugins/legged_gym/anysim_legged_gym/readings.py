@@ -1,5 +1,6 @@
 """Properties of a simulator, under the names that legged-gym code has for them."""
 
+from abc import ABC, abstractmethod
 from functools import cached_property
 from typing import NamedTuple, Self
 
@@ -42,7 +43,7 @@ class LastValues(NamedTuple):
         return type(self)(*rows)
 
 
-class Readings:
+class Readings(ABC):
     """The properties of `LeggedSimulator`: N envs, D joints, B links, F feet, P points of heights.
 
     Joints and links are in the World's order on every engine, and there is one order: contact forces have the order of
@@ -63,8 +64,9 @@ class Readings:
     _last: LastValues
 
     @property
+    @abstractmethod
     def moment(self) -> Moment:
-        raise NotImplementedError
+        """All quantities of now."""
 
     # ------------------------------------------------------------------ sizes and names
 

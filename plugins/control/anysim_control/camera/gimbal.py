@@ -123,15 +123,8 @@ class CameraGimbal(Controller):
             yaw = np.arctan2(way[:, 1], way[:, 0])
             pitch = -np.arctan2(way[:, 2], np.sqrt(way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1]))
         level = P.from_roll_pitch_yaw(np.stack([np.zeros_like(yaw), pitch + asked[:, 1], yaw + asked[:, 0]], axis=1))
-        x, y, z, w = np.moveaxis(P.multiply(P.conjugate(poses[rows, self._carrier, 3:]), level), -1, 0)
-        return np.stack(
-            [
-                np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
-                np.arcsin(np.minimum(np.maximum(2.0 * (w * y - z * x), -1.0), 1.0)),
-                np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
-            ],
-            axis=1,
-        )
+        turn = P.multiply(P.conjugate(poses[rows, self._carrier, 3:]), level)
+        return P.to_roll_pitch_yaw(turn)[:, ::-1].copy()  # yaw, pitch, roll, as its joints are
 
     def snapshot(self, env_ids: Array) -> dict[str, Array]:
         return {name: rows[env_ids] for name, rows in self._rows.items()}
