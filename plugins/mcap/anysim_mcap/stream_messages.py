@@ -12,6 +12,7 @@
 import json
 import math
 from collections.abc import Callable
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -53,29 +54,35 @@ def kind_of(name: str, info: StreamInfo) -> Kind:
     Raises:
         RecordError: it is an image of a number type that images do not have.
     """
-    from foxglove_schemas_protobuf.Log_pb2 import Log
-    from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
-    from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
-    from mcap_protobuf.schema import build_file_descriptor_set
-
     if info.kind == "image" and (info.dtype, len(info.shape)) not in _ENCODINGS:
         raise RecordError(
             f"the stream '{name}' cannot be images of {info.dtype} with {len(info.shape)} axes; float32, uint16 and "
             "uint8 (H, W) and uint8 (H, W, 3) can; make it of the kind array"
         )
-    if info.kind == "data":
-        return Kind(DATA_SCHEMA["title"], "jsonschema", json_bytes(DATA_SCHEMA), _data, _read_data)
+    return _kinds()[info.kind]
+
+
+@cache
+def _kinds() -> dict[str, Kind]:
+    from foxglove_schemas_protobuf.Log_pb2 import Log
+    from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
+    from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+    from mcap_protobuf.schema import build_file_descriptor_set
+
     messages: dict[str, tuple[Any, Any, Any]] = {
         "image": (RawImage, _image, _read_image),
         "points": (PointCloud, _points, _read_points),
         "text": (Log, _text, _read_text),
         "array": (_array_message(), _array, _read_array),
     }
-    message, encode, decode = messages[info.kind]
-    schema = build_file_descriptor_set(message).SerializeToString(deterministic=True)
-    return Kind(message.DESCRIPTOR.full_name, "protobuf", schema, encode, decode)
+    kinds = {"data": Kind(DATA_SCHEMA["title"], "jsonschema", json_bytes(DATA_SCHEMA), _data, _read_data)}
+    for kind, (message, encode, decode) in messages.items():
+        schema = build_file_descriptor_set(message).SerializeToString(deterministic=True)
+        kinds[kind] = Kind(message.DESCRIPTOR.full_name, "protobuf", schema, encode, decode)
+    return kinds
 
 
+@cache
 def _array_message() -> Any:
     """The class of anysim.Array, built at run time."""
     from google.protobuf import descriptor_pool, message_factory
