@@ -1,16 +1,14 @@
 """Exports that are killed at a dozen moments and go on to the same bytes, and disks that are full."""
 
 import json
-import os
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from tests.plugins.export.runs import record
+from tests.small_disk import small_disk
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("export")]
 FORMS = ("coco", "lerobot", "rlds-ready", "robomimic", "webdataset")
@@ -169,23 +167,9 @@ def test_files_that_may_not_grow_at_ten_sizes(short: Path, tmp_path: Path, form:
     assert all("File too large" in one for one in sentences), sentences
 
 
-@contextmanager
-def small_disk(folder: Path) -> Iterator[Path]:
-    """A file system of 16 MiB."""
-    mount = folder / "disk"
-    mount.mkdir()
-    command = ["mount", "-t", "tmpfs", "-o", "size=16m", "tmpfs", str(mount)]
-    if os.geteuid() != 0 or subprocess.run(command, capture_output=True, check=False).returncode != 0:
-        pytest.skip("mounting a small tmpfs needs privileges that this user does not have")
-    try:
-        yield mount
-    finally:
-        subprocess.run(["umount", str(mount)], check=True)
-
-
 @pytest.mark.parametrize("form", FORMS)
 def test_a_disk_that_is_full_at_ten_sizes(short: Path, tmp_path: Path, form: str) -> None:
-    with small_disk(tmp_path) as mount:
+    with small_disk(tmp_path, 16) as mount:
         done = program(BALLAST + FULL, short, form, mount)
         assert done.returncode == 0, done.stderr[-2000:]
         failed, sentences = json.loads(done.stdout.splitlines()[-1])

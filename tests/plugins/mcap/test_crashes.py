@@ -1,12 +1,9 @@
 """Processes that die and disks that are full, for real."""
 
-import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -14,6 +11,7 @@ import pytest
 from anysim.record.recorder import Recorder
 from anysim.record.writer import make_writer
 from anysim_inspect.verify import verify_run
+from tests.small_disk import small_disk
 
 SAMPLE = str(Path(__file__).with_name("conftest.py"))
 PRELUDE = """
@@ -253,20 +251,6 @@ def test_a_file_that_may_not_grow(tmp_path, where):
     """`early`: in a chunk of the MCAP file, `late`: when it is finished, `video`: in a video."""
     check(run(LIMIT + FULL, tmp_path / "run", where), "File too large")
     assert sorted(p.name for p in (tmp_path / "run").iterdir()) == ["episodes", "run.json"]
-
-
-@contextmanager
-def small_disk(folder: Path) -> Iterator[Path]:
-    """A file system of 4 MiB."""
-    mount = folder / "disk"
-    mount.mkdir()
-    command = ["mount", "-t", "tmpfs", "-o", "size=4m", "tmpfs", str(mount)]
-    if os.geteuid() != 0 or subprocess.run(command, capture_output=True).returncode != 0:
-        pytest.skip("mounting a small tmpfs needs privileges that this user does not have")
-    try:
-        yield mount
-    finally:
-        subprocess.run(["umount", str(mount)], check=True)
 
 
 @pytest.mark.parametrize("where", ["early", "late", "video"])

@@ -11,7 +11,7 @@ import pytest
 from anysim.task.env import TaskEnv
 from anysim_inspect.verify import verify_run
 from tests.plugins.mcap.everything import collect, made
-from tests.plugins.mcap.test_crashes import small_disk
+from tests.small_disk import small_disk
 
 pytestmark = pytest.mark.slow
 EPISODES = 4
