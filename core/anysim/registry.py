@@ -74,7 +74,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     },
     "anysim-export": {"commands": "export tape", "exporters": "lerobot robomimic webdataset"},
     "anysim-film": {"commands": "render"},
-    "anysim-inspect": {"commands": "audit doctor explain replay snapshot verify"},
+    "anysim-inspect": {"commands": "audit check doctor explain list replay snapshot verify"},
     "anysim-language": {"commands": "describe vqa", "streams": "language", "vocabularies": "english"},
     "anysim-learning": {"commands": "train", "learners": "clone rsl-rl sb3-ppo"},
     "anysim-maniskill": {"benchmarks": "maniskill", "commands": "verdicts"},

@@ -9,10 +9,10 @@ import pytest
 from anysim import api
 from anysim.assets.catalogue import load_robot
 from anysim.assets.uri import example_robot_data, locate, locate_folder, resolve_reference
-from anysim.cli.check import report_on
 from anysim.compile.robot import import_robot
 from anysim.compile.world import compile_world
 from anysim.errors import AnysimError, AssetError, PluginError, SpecError
+from anysim_inspect.cli.check import report_on
 from anysim_schemas.run import WorldSpec
 
 

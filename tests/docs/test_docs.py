@@ -70,7 +70,7 @@ def test_a_block_of_python_runs(where: str, code: str, tmp_path: Path) -> None:
     ("where", "code"), blocks("yaml"), ids=lambda v: v if ":" in v[:60] and "\n" not in v else "code"
 )
 def test_a_block_of_yaml_checks(where: str, code: str, tmp_path: Path) -> None:
-    from anysim.cli.check import report_on
+    from anysim_inspect.cli.check import report_on
 
     path = tmp_path / "block.yaml"
     path.write_text(code)
@@ -80,7 +80,7 @@ def test_a_block_of_yaml_checks(where: str, code: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("path", sorted((ROOT / "docs" / "examples").glob("*.yaml")), ids=lambda p: p.name)
 def test_an_example_of_a_world_checks(path: Path) -> None:
-    from anysim.cli.check import report_on
+    from anysim_inspect.cli.check import report_on
 
     assert report_on(str(path), engine=None, all_engines=False, overrides=[]).faults == []
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import anysim
-from anysim.cli.check import report_on
 from anysim.errors import AnysimError
+from anysim_inspect.cli.check import report_on
 from tests.fuzz.budget import Tally
 from tests.fuzz.documents import TEXTS, Dice, Documents
 

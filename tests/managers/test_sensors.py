@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 import anysim
-from anysim.cli.check import report_on
 from anysim.errors import AnysimError, SnapshotError
 from anysim.record.collector import Collector
 from anysim.record.reader import open_trajectory
 from anysim.record.replay import replay
 from anysim.task.env import TaskEnv
 from anysim.task.snapshot import EnvSnapshot
+from anysim_inspect.cli.check import report_on
 from tests.schemas.test_every_key import Still
 
 NOISY = {

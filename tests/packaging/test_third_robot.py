@@ -9,7 +9,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("wheels")]  # built once
 
 def test_its_wheel_brings_a_robot_that_runs(environment, program, external_wheels, tmp_path) -> None:
     wheel = external_wheels["anysim-thirdarm"]
-    python = environment("anysim", "anysim-mujoco", "anysim-robots", others=(wheel,), tools=("yourdfpy",))
+    python = environment("anysim-inspect", "anysim-mujoco", "anysim-robots", others=(wheel,), tools=("yourdfpy",))
     anysim = python.with_name("anysim")
     rows = {row["name"]: row for row in json.loads(program(anysim, "list", "robots", "--json", cwd=tmp_path).stdout)}
     assert (rows["third_arm"]["from"], rows["third_arm"]["available"]) == ("anysim-thirdarm", True)

@@ -108,7 +108,7 @@ def test_a_proposer_is_told_the_scene_and_what_it_says_is_in_the_record() -> Non
 def test_a_file_beside_the_world(tmp_path) -> None:
     """Relative to the YAML that names it, wherever one is; `anysim check` reads it."""
     import anysim
-    from anysim.cli.check import report_on
+    from anysim_inspect.cli.check import report_on
 
     (tmp_path / "plans").mkdir()
     (tmp_path / "plans" / "plan.json").write_text(json.dumps(propose(red={"position": [0.1, 0.2, 0.42]})))

@@ -15,7 +15,6 @@ import pytest
 import anysim
 from anysim import registry
 from anysim.api import load
-from anysim.cli.check import report_on
 from anysim.engine.base import SimEngine
 from anysim.errors import RecordError, SpecError
 from anysim.record.collector import Collector, run_header
@@ -29,6 +28,7 @@ from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
 from anysim.task.terms import TERMS
 from anysim.testing.engines import require_drawing
+from anysim_inspect.cli.check import report_on
 from anysim_inspect.verify import verify
 
 ENGINES = ("mujoco", "pybullet", "sapien")

@@ -8,7 +8,7 @@ from typing import Any
 import typer
 
 from anysim import __version__
-from anysim.cli import check, listing, schema
+from anysim.cli import schema
 from anysim.cli.options import BROKE, CommandEnded, Commands
 
 EXIT_CODES = """Exit codes: 0 done; 1 it ran, and the answer is no (a replay that differs, a file with faults, too few
@@ -27,8 +27,6 @@ app = typer.Typer(
     rich_markup_mode=None,  # plain help: importing what draws boxes takes as long as everything else together
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("check")(check.check)
-app.command("list")(listing.list_)
 app.command("schema")(schema.schema)
 
 

@@ -10,9 +10,11 @@ if TYPE_CHECKING:
 
 @hookimpl
 def add_cli(app: "typer.Typer") -> None:
-    """`anysim replay`, `verify`, `explain`, `doctor`, `audit` and `snapshot`."""
-    from anysim_inspect.cli import audit, doctor, explain, replay, snapshot, verify
+    """`anysim check`, `list`, `replay`, `verify`, `explain`, `doctor`, `audit` and `snapshot`."""
+    from anysim_inspect.cli import audit, check, doctor, explain, list, replay, snapshot, verify
 
+    app.command("check")(check.check)
+    app.command("list")(list.list_)
     app.command("replay")(replay.replay)
     app.command("verify")(verify.verify)
     app.command("explain")(explain.explain)

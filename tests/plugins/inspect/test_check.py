@@ -8,9 +8,9 @@ import pytest
 from typer.testing import CliRunner
 
 from anysim import registry
-from anysim.cli.check import report_on
 from anysim.cli.main import app
 from anysim.errors import listing
+from anysim_inspect.cli.check import report_on
 
 BROKEN = Path(__file__).parent / "broken"
 FILES = sorted(BROKEN.glob("*.yaml"))
@@ -24,7 +24,7 @@ def test_a_broken_file_gives_its_golden_message(path: Path, monkeypatch: pytest.
     for place, word in (
         (sysconfig.get_paths()["purelib"], "<site-packages>"),
         (str(BROKEN), "<here>"),
-        (str(BROKEN.parents[2]), "<root>"),
+        (str(BROKEN.parents[3]), "<root>"),
     ):
         text = text.replace(place, word)
     text = text.replace(", ".join(registry.names("engines")), "<engines>")  # which are installed differs
