@@ -50,12 +50,16 @@ def _metadata(tree: Tree) -> Iterator[Fault]:
 def _known_to_tools(tree: Tree) -> Iterator[Fault]:
     tools = tree.settings["tool"]
     settings = Path("pyproject.toml")
+    layers = tools["importlinter"]["contracts"][0]["layers"]
+    layered = {package for layer in layers for package in layer.split(" | ")}
     for member in tree.members:
         name, package = member.project["name"], member.package
         if name not in tools["uv"]["sources"]:
             yield Fault(settings, 0, f"add {name} = {{ workspace = true }} to tool.uv.sources")
         if package not in tools["importlinter"]["root_packages"]:
-            yield Fault(settings, 0, f"add {package} to root_packages of tool.importlinter, and to its contracts")
+            yield Fault(settings, 0, f"add {package} to root_packages of tool.importlinter")
+        if package not in layered:
+            yield Fault(settings, 0, f"add {package} to the layers of the first contract of tool.importlinter")
         if member.folder.as_posix() not in tools["pyright"]["extraPaths"]:
             yield Fault(settings, 0, f"add {member.folder.as_posix()} to extraPaths of tool.pyright")
 

@@ -17,6 +17,8 @@ anysim = { workspace = true }
 anysim-x = { workspace = true }
 [tool.importlinter]
 root_packages = ["anysim", "anysim_x"]
+[[tool.importlinter.contracts]]
+layers = ["anysim_x", "anysim"]
 [tool.pyright]
 extraPaths = ["core", "plugins/x"]
 [dependency-groups]
@@ -313,9 +315,10 @@ def test_distributions_that_disagree_are_found(make_tree: MakeTree, old: str, ne
 
 
 def test_a_package_unknown_to_the_tools_is_found(make_tree: MakeTree) -> None:
-    settings = ROOT_SETTINGS.replace('"plugins/x"]', "]").replace(', "anysim_x"', "").replace("anysim-x = ", "other = ")
+    settings = ROOT_SETTINGS.replace('"plugins/x"]', "]").replace("anysim-x = ", "other = ")
+    settings = settings.replace(', "anysim_x"', "").replace('"anysim_x", ', "")
     messages = [fault.message for fault in packages.check(make_tree({"pyproject.toml": settings}))]
-    assert len(messages) == 3
+    assert len(messages) == 4
 
 
 @pytest.mark.parametrize(
@@ -334,7 +337,8 @@ def test_a_library_of_backends_is_for_backends(make_tree: MakeTree, change: dict
     settings = ROOT_SETTINGS.replace('"plugins/*"', '"plugins/*", "backends/*"').replace(
         "anysim-x = ", "anysim-m = { workspace = true }\nanysim-e = { workspace = true }\nanysim-x = "
     )
-    settings = settings.replace('"anysim_x"', '"anysim_x", "anysim_m", "anysim_e"')
+    settings = settings.replace(', "anysim_x"]', ', "anysim_x", "anysim_m", "anysim_e"]')
+    settings = settings.replace('layers = ["anysim_x", ', 'layers = ["anysim_x | anysim_e", "anysim_m", ')
     settings = settings.replace('"plugins/x"]', '"plugins/x", "backends/m", "backends/e"]')
     files = {"pyproject.toml": settings, "plugins/x/pyproject.toml": CLEAN["plugins/x/pyproject.toml"]}
     for letter, needed in (("m", ["anysim"]), ("e", ["anysim-m"])):

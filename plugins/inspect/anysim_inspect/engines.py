@@ -11,7 +11,7 @@ from typing import NamedTuple
 from anysim import registry
 from anysim.engine.availability import Finding, Health
 from anysim.errors import AnysimError
-from anysim.processes.own_process import run_module
+from anysim_processes.own_process import run_module
 
 TIMEOUT_S = 180.0
 """Longest time [s] of a trial. SAPIEN's first image takes half a minute with some drivers in software."""

@@ -9,7 +9,7 @@ import sys
 
 from anysim import registry
 from anysim.engine.availability import Finding, Health
-from anysim.processes.own_process import run_module
+from anysim_processes.own_process import run_module
 
 LIMIT_S = 120.0
 """Longest time [s] for all plugins together, and again for those behind one that crashed."""

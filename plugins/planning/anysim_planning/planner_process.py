@@ -11,10 +11,10 @@ from multiprocessing.connection import Connection
 from operator import attrgetter
 
 from anysim.planning.motion import Budget, MotionPlanner, PlanStatus
-from anysim.processes.own_process import end_with_parent
-from anysim.processes.shared_memory import Layout, SharedArrays
 from anysim_planning.answering import Job, PlannerHost, planner_maker
 from anysim_planning.queued import BATCH
+from anysim_processes.own_process import end_with_parent
+from anysim_processes.shared_memory import Layout, SharedArrays
 
 NICENESS = 15
 """The control loop goes first where both want a core. A planner takes one for a tick of the clock at least, of 4 ms on

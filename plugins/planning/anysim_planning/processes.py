@@ -14,11 +14,11 @@ from anysim.errors import AnysimError
 from anysim.model.world import World
 from anysim.planning.motion import PlanAnswer, PlanStatus
 from anysim.planning.service import PlanFuture
-from anysim.processes.shared_memory import SharedArrays
-from anysim.processes.worker_handle import THREAD_POOLS, Worker, WorkerLost
 from anysim_planning.answering import PlannerMaker, planner_maker
 from anysim_planning.planner_process import NOTES
 from anysim_planning.queued import GRACE, QueuedService, Seat, overdue
+from anysim_processes.shared_memory import SharedArrays
+from anysim_processes.worker_handle import THREAD_POOLS, Worker, WorkerLost
 
 GLANCE = 0.05
 """[s] between looks at whether a process hangs."""

@@ -8,7 +8,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.engine.state import ContactPoints
 from anysim.model.world import World
-from anysim.processes.shared_memory import Layout
+from anysim_processes.shared_memory import Layout
 
 
 class WorkerRows(NamedTuple):

@@ -23,8 +23,8 @@ from anysim.engine.executor import usable_cores
 from anysim.engine.state import Availability, ContactPoints, RayHits, SnapshotLevel
 from anysim.errors import EngineError, EngineFailure
 from anysim.model.world import World
-from anysim.processes.shared_memory import SharedArrays
-from anysim.processes.worker_handle import WorkerLost
+from anysim_processes.shared_memory import SharedArrays
+from anysim_processes.worker_handle import WorkerLost
 from anysim_sharded.blocks import Blocks, joined, joined_by_name, joined_contacts, rows_of, state_layout
 from anysim_sharded.hosted import News
 from anysim_sharded.pool import START_S, WorkerPool, importable_path, release_pool, take_pool

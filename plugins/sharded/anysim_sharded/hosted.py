@@ -13,7 +13,7 @@ from anysim.engine.control import Control
 from anysim.engine.parameters import PARAMETERS
 from anysim.engine.state import SnapshotLevel
 from anysim.model.world import World
-from anysim.processes.shared_memory import Layout, SharedArrays
+from anysim_processes.shared_memory import Layout, SharedArrays
 
 
 class News(NamedTuple):

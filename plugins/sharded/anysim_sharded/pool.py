@@ -13,8 +13,8 @@ from typing import Any
 from anysim.engine.base import SimEngine
 from anysim.errors import AnysimError, EngineError, EngineFailure
 from anysim.model.world import World
-from anysim.processes.shared_memory import SharedArrays
-from anysim.processes.worker_handle import THREAD_POOLS, Worker, WorkerLost
+from anysim_processes.shared_memory import SharedArrays
+from anysim_processes.worker_handle import THREAD_POOLS, Worker, WorkerLost
 from anysim_sharded.blocks import Blocks
 
 START_S = 300.0

@@ -13,8 +13,8 @@ from typing import Any
 
 from anysim.errors import AnysimError
 from anysim.model.world import World
-from anysim.processes.own_process import end_with_parent
-from anysim.processes.shared_memory import Layout
+from anysim_processes.own_process import end_with_parent
+from anysim_processes.shared_memory import Layout
 from anysim_sharded.hosted import HostedEngine, hosted_class
 
 LINGER_S = 3e-4

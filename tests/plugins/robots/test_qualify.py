@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from anysim.assets.catalogue import load_robot, missing_source
-from anysim.processes.own_process import ProcessEnd
+from anysim_processes.own_process import ProcessEnd
 from anysim_robots.gallery.page import contact_sheets, page
 from anysim_robots.gallery.store import due, estimate, fingerprint, measure, read
 from anysim_robots.qualify import apart, motion, oracle, run

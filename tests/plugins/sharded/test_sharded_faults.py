@@ -242,7 +242,7 @@ def test_an_interrupted_call_leaves_a_usable_engine(moody, monkeypatch):
     """Ctrl-C while the workers step: their late answers are not taken for those to the next question."""
     alone, engine = _pair()
     with alone, engine:
-        from anysim.processes.worker_handle import Worker
+        from anysim_processes.worker_handle import Worker
 
         def interrupted(*_):
             raise KeyboardInterrupt

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from anysim.assets.catalogue import load_robot, missing_source
 from anysim.engine.factory import availability
 from anysim.errors import AnysimError
-from anysim.processes.own_process import run_module
+from anysim_processes.own_process import run_module
 from anysim_robots.qualify.result import CHECKS, Check, Qualification, from_data
 from anysim_robots.qualify.run import FULL, Durations
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from anysim.processes.own_process import ProcessEnd, how_it_ended, run_module
+from anysim_processes.own_process import ProcessEnd, how_it_ended, run_module
 
 
 @pytest.fixture(autouse=True)

@@ -19,7 +19,7 @@ from typing import Any
 
 from anysim import errors
 from anysim.errors import AnysimError, EngineError
-from anysim.processes.own_process import ParentWatch, how_it_ended
+from anysim_processes.own_process import ParentWatch, how_it_ended
 
 _PROGRAM = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
