@@ -24,6 +24,7 @@ WORDS = {
     "all": "everything below",
     "annotation": "`anysim render --annotate` and jobs of stills: boxes, maps, depth, normals, points, flow",
     "assets": "cabinets, lids, valves, wheeled bases, a gripper, a flying camera, rooms, ground, patterns",
+    "avatars": "people who walk, sit, talk, look and reach",
     "banks": "`anysim bank`: grasps sampled on assets and tried in physics",
     "bench": "`anysim bench`: what anysim costs on top of an engine",
     "collect": "`anysim run`: episodes by scripted solutions, and reports of them",

@@ -413,6 +413,8 @@ def resolve_options(kind: str, name: str) -> type[BaseModel] | None:
             term = find(kind, name)
             with registry.Blame(f"the signature of the {kind} term '{name}'", registry.origin(term)):
                 return options_model(term)
+        if kind == "family":
+            return registry.load("families", name).spec
         made = registry.load(f"{kind}s", name)
         with registry.using(f"{kind}s", name):
             return made.options_model() if kind in ("engine", "writer") else options_model(made)

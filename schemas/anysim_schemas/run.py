@@ -11,6 +11,7 @@ from anysim_schemas.collisions import CollisionsSpec
 from anysim_schemas.contact_sensors import ContactSensorSpec
 from anysim_schemas.engine import EngineSpec, PhysicsSpec
 from anysim_schemas.errors import KeyFault
+from anysim_schemas.families import FamilySpec
 from anysim_schemas.layout import LayoutSourceSpec, PlacementSpec
 from anysim_schemas.lights import LightSpec, ScenerySpec
 from anysim_schemas.messages import listing
@@ -46,6 +47,9 @@ class WorldSpec(Spec):
     sensors: dict[Name, SensorSpec] | None = Field(
         default=None, description="sensors by name: what terms read through `sensor`, and what is recorded"
     )
+    families: dict[Name, FamilySpec] | None = Field(
+        default=None, description="matter and people by name, which a plugin makes and moves beside the engine"
+    )
     collisions: CollisionsSpec = Field(default=CollisionsSpec(), description="what passes through what")
     visual_error: NonNegative | None = Field(
         default=None,
@@ -59,8 +63,10 @@ class WorldSpec(Spec):
             raise KeyFault(
                 f"robots and objects share one name space; both have {', '.join(shared)}", "objects", shared[0]
             )
-        for kind in ("robots", "objects"):
-            if "terrain" in getattr(self, kind):
+        if shared := sorted(set(self.families or ()) & {*self.robots, *self.objects}):
+            raise KeyFault(f"there is already a robot or an object '{shared[0]}'", "families", shared[0])
+        for kind in ("robots", "objects", "families"):
+            if "terrain" in (getattr(self, kind) or ()):
                 raise KeyFault("the name `terrain` is taken by the ground", kind, "terrain")
         return self
 

@@ -1,7 +1,7 @@
-"""Run tests of a contract suite on many engines in one process: `run_engines.py JOBS.json RESULTS.json [planners]`.
+"""Run tests of a contract suite on many engines in one process: `run_engines.py JOBS.json RESULTS.json [SUITE]`.
 
-Jobs map engines, or planners (`module:Class`), to tests (`test_x.py::test_y`); results map engines to tests to
-outcomes, where a parametrised test has failed if one of its cases has.
+SUITE is `planners` or `families`. Jobs map engines, planners or families (`module:Class`), to tests
+(`test_x.py::test_y`); results map them to tests to outcomes, where a parametrised test has failed if one of its cases has.
 """
 
 import json
@@ -46,7 +46,9 @@ def run(engine: str, tests: list[str], option: str = "--engine", suite: Path = S
 
 if __name__ == "__main__":
     jobs, results = Path(sys.argv[1]), Path(sys.argv[2])
-    kind = ("--planner", SUITE / "planners") if "planners" in sys.argv[3:] else ("--engine", SUITE)
+    word = next(iter(sys.argv[3:]), "")
+    suites = {"planners": "--planner", "families": "--family"}
+    kind = (suites[word], SUITE / word) if word else ("--engine", SUITE)
     results.write_text(
         json.dumps({name: run(name, tests, *kind) for name, tests in json.loads(jobs.read_text()).items()})
     )

@@ -14,6 +14,7 @@ from anysim.compile.appearance import compile_lights, compile_scenery
 from anysim.compile.builder import WorldBuilder
 from anysim.compile.collisions import with_exclusions
 from anysim.compile.dynamics import with_dynamics
+from anysim.compile.families import add_families
 from anysim.compile.plausibility import check_places
 from anysim.compile.population import add_population, check_names
 from anysim.compile.robot import add_robot
@@ -79,6 +80,7 @@ def compile_with_report(
         found, varying = add_population(builder, name, thing, issues.at("objects", name), base=_base(base, name))
         notes[name] = tuple(found)
         slots += varying
+    add_families(builder, content.families or {}, issues.at("families"))
     fixtures = [] if content.room is None else furniture_names(content.room)
     logical = [one for name, thing in content.objects.items() for one in instances(name, thing)]
     order = check_layout(

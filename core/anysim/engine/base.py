@@ -119,15 +119,18 @@ class SimEngine(EngineSensing):
             which = self._which(actuators, len(self.world.actuators), "actuator")
             self._commands.set_mode(ControlMode(mode), self._ids(env_ids), which)
 
-    def apply_wrench(self, wrench: ArrayLike, bodies: Sequence[int], env_ids: EnvIds = None) -> None:
-        """Forces and torques (E, K, 6) [N, N m], world axes, at the bodies' centres of mass, for the next step()."""
+    def apply_wrench(self, wrench: ArrayLike, bodies: Indices, env_ids: EnvIds = None, *, once: bool = False) -> None:
+        """Forces and torques (E, K, 6) [N, N m], world axes, at the bodies' centres of mass, for the next step().
+
+        With `once` they are not kept where that keeps wrenches for the one after it.
+        """
         with self._lock:
             self._require_world()
             self._require(Capability.WRENCHES)
             ids, which = self._ids(env_ids), self._which(bodies, len(self.world.bodies), "body")
             forces = arguments.rows("wrench", wrench, (len(ids), len(which), 6))
             there = self._presence.bodies[ids[:, None], which]
-            self._commands.add_wrench(np.where(there[..., None], forces, 0.0), ids, which)
+            self._commands.add_wrench(np.where(there[..., None], forces, 0.0), ids, which, once=once)
 
     # ------------------------------------------------------------------ parameters
 

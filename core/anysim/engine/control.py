@@ -56,6 +56,8 @@ class CommandBuffer:
         self._bodies = len(world.bodies)
         self.control = Control(np.zeros((n, a)), np.zeros((n, a)), np.zeros((n, a)), np.zeros((n, a), dtype=np.int8))
         self.wrench: Array | None = None
+        self.once: Array | None = None
+        """What acts beside `wrench` in the next step call alone."""
         self.reset(np.arange(n))
 
     def reset(self, ids: Array) -> None:
@@ -102,14 +104,22 @@ class CommandBuffer:
         self.control.mode[np.ix_(ids, which)] = MODES.index(mode)
         self.control_changed = True
 
-    def add_wrench(self, wrench: Array, ids: Array, bodies: Array) -> None:
+    def add_wrench(self, wrench: Array, ids: Array, bodies: Array, *, once: bool = False) -> None:
         """Add to the wrenches of the next step call."""
-        if self.wrench is None:
-            self.wrench = np.zeros((len(self.control.position), self._bodies, 6))
-        self.wrench[np.ix_(ids, bodies)] += wrench
+        held = self.once if once else self.wrench
+        if held is None:
+            held = np.zeros((len(self.control.position), self._bodies, 6))
+        held[np.ix_(ids, bodies)] += wrench
+        self.wrench, self.once = (self.wrench, held) if once else (held, self.once)
+
+    @property
+    def acting(self) -> Array | None:
+        """The wrenches of the next step call; None where there are none."""
+        return self.wrench if self.once is None else self.once if self.wrench is None else self.wrench + self.once
 
     def spend_wrench(self, ids: Array | None) -> Array | None:
         """Forget the wrenches of envs (None: of all); returns what still waits for the others."""
+        self.once = None
         if self.wrench is not None:
             if ids is not None:
                 self.wrench[ids] = 0.0

@@ -312,11 +312,14 @@ class EngineLifecycle(EngineLifetime, Primitives):
             if commands.control_changed:
                 self._apply_control(commands.control)
                 commands.control_changed = False
-            if commands.wrench is not None:
-                self._apply_wrench(commands.wrench)
+            if (acting := commands.acting) is not None:
+                self._apply_wrench(acting)
             self._step(n_steps, ids)
-            if commands.wrench is not None and not keep_wrench:
-                commands.spend_wrench(ids)
+            if acting is not None and (not keep_wrench or commands.once is not None):
+                if keep_wrench:
+                    commands.once = None
+                else:
+                    commands.spend_wrench(ids)
                 self._apply_wrench(None)  # what waits for others comes with their step, unless a reset forgets it
             if ids is None:
                 records.ticks += n_steps

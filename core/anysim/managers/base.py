@@ -36,6 +36,7 @@ RESET_ORDER = (
     "parameters",
     "robot",
     "action",
+    "families",
     "light",
     "camera",
     "capture",
@@ -43,8 +44,8 @@ RESET_ORDER = (
     "task",
 )
 """How much of each spread is drawn from, then the ground, what is there, where it is and what it is like, how its
-joints stand and what pulls at it, then the robots and what their drives hold, the lights, the cameras and sensors, and
-the task last, on the settled scene."""
+joints stand and what pulls at it, then the robots and what their drives hold, the families, the lights, the cameras
+and sensors, and the task last, on the settled scene."""
 
 
 class Overridable(NamedTuple):

@@ -9,6 +9,7 @@ from anysim.managers.action import ActionManager
 from anysim.managers.base import Episodes, Manager
 from anysim.managers.camera import CameraManager, CaptureManager
 from anysim.managers.curriculum import CurriculumManager
+from anysim.managers.families import FamilyManager
 from anysim.managers.layout import LayoutManager
 from anysim.managers.layout_proposals import Proposed
 from anysim.managers.object_parameters import SceneManager
@@ -31,6 +32,8 @@ def standard_managers(spec: RunSpec, world: World, num_envs: int, proposals: Pro
     ]  # fmt: skip
     if spec.task is not None and spec.task.curriculum:
         managers.append(CurriculumManager())
+    if spec.world.families:
+        managers.append(FamilyManager())
     if spec.world.sensors:
         managers.append(SensorManager())
     for manager in managers:

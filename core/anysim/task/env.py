@@ -18,6 +18,7 @@ from anysim.managers.action import ActionManager
 from anysim.managers.base import RESET_ORDER, Manager
 from anysim.managers.camera import CaptureManager
 from anysim.managers.curriculum import CurriculumManager
+from anysim.managers.families import FamilyManager
 from anysim.managers.sensors import SensorManager
 from anysim.managers.terrain import TerrainManager
 from anysim.math import arrays
@@ -74,6 +75,8 @@ class TaskEnv:
         self.action_dim = self.actions.dim
         self.scene = SceneView(engine, self._episodes, self._manager(TerrainManager))
         self.scene.capture = self.capture
+        self.families = next((manager for manager in self.managers if isinstance(manager, FamilyManager)), None)
+        self.scene.families = self.families
         self.sensors = next((manager for manager in self.managers if isinstance(manager, SensorManager)), None)
         if self.sensors is not None:
             self.sensors.attach(self._sensor, self.scene.look)
@@ -146,8 +149,9 @@ class TaskEnv:
         return self._code == RUNNING
 
     def sensor_rows(self, env_ids: Array) -> dict[str, Array]:
-        """What is recorded of sensors (n, …), by the names of the arrays."""
-        return {} if self.sensors is None else self.sensors.recorded(env_ids)
+        """What is recorded of sensors and families (n, …), by the names of the arrays."""
+        rows = {} if self.sensors is None else self.sensors.recorded(env_ids)
+        return rows if self.families is None else rows | self.families.recorded(env_ids)
 
     def instruction(self, env: int) -> str:
         """The task in words, as it is in an env's episode."""
@@ -280,12 +284,15 @@ class TaskEnv:
 
     def _advance(self, ids: Array | None) -> None:
         """The physics of a control step, in as many parts as controllers want."""
-        schedule = self.actions.schedule
+        schedule, advance = (
+            self.actions.schedule,
+            (self.engine.step if self.families is None else self.families.advance),
+        )
         for part, steps in enumerate(schedule):
             if part:
                 self.actions.update(part)
             began = time.perf_counter()
-            self.engine.step(steps, ids, keep_wrench=part + 1 < len(schedule))
+            advance(steps, ids, keep_wrench=part + 1 < len(schedule))
             self.physics_seconds += time.perf_counter() - began
 
     def _stepped(self, running: Array, mask: Array | None) -> Array | None:

@@ -18,6 +18,7 @@ from anysim.errors import NameLookupError, TaskError, listing, suggest
 from anysim.geometry.bounds import EntityShape
 from anysim.managers.base import Episodes
 from anysim.managers.camera import CaptureManager
+from anysim.managers.families import FamilyManager
 from anysim.managers.sensors import SensorManager
 from anysim.managers.terrain import TerrainManager
 from anysim.math import pose as P
@@ -57,6 +58,8 @@ class SceneView:
         """The manager that keeps images; None in a scene without managers."""
         self.sensors: SensorManager | None = None
         """The manager of sensors; None where there are none."""
+        self.families: FamilyManager | None = None
+        """The manager of families; None where there are none."""
         self.memories: list[Memory] = []
         """What terms remember, in the order in which they were made."""
         self._rows: Array | slice = slice(None)

@@ -1,13 +1,14 @@
-"""The pytest plugin of the contract suites: `--engine` with its options, `--planner`, and the line that sums a run up.
+"""The pytest plugin of the contract suites: `--engine`, `--planner`, `--family`, and the line that sums a run up.
 
 It is loaded by every pytest run on a machine that has anysim, so it imports nothing but the standard library and
-pytest until `--engine` or `--planner` is given.
+pytest until `--engine`, `--planner` or `--family` is given.
 """
 
 import importlib
 import json
 import re
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ import pytest
 
 HERE = Path(__file__).parent
 PLANNERS = HERE / "planners"
+FAMILIES = HERE / "families"
 CLAIMS = "anysim_claims"
 NEEDS = "anysim_needs"
 OVERLAPS = "anysim_overlaps"
@@ -37,6 +39,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--shards", metavar="N", type=int, default=0, help="run the engine in N worker processes, fewer for fewer envs"
     )
     group.addoption("--planner", metavar="NAME", help="the planner of motion under test (anysim.testing.planners)")
+    group.addoption("--family", metavar="NAME", help="the family under test (anysim.testing.families)")
+    group.addoption(
+        "--family-option",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        help="a parameter of the family, may be repeated; the value is read as JSON, else as text",
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -50,6 +60,8 @@ def pytest_configure(config: pytest.Config) -> None:
         except Exception as error:  # whatever a stranger's planner raises is the answer to its name
             raise pytest.UsageError(f"--planner {name}: {error}") from error
         config.pluginmanager.register(importlib.import_module("anysim.testing.planners.fixtures"), "anysim-planners")
+    if config.getoption("family"):
+        config.pluginmanager.register(importlib.import_module("anysim.testing.families.fixtures"), "anysim-families")
     name = config.getoption("engine")
     if not name:
         return
@@ -64,8 +76,11 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """With an engine to test, the planners' suite is no part of its own."""
-    return True if collection_path == PLANNERS and not config.getoption("planner") else None
+    """With an engine to test, the suites of planners and families are no part of its own."""
+    absent = (collection_path == PLANNERS and not config.getoption("planner")) or (
+        collection_path == FAMILIES and not config.getoption("family")
+    )
+    return True if absent else None
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -74,14 +89,17 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     config.stash[_SUITE] = frozenset(item.nodeid for item in suites)
     if any(item.path.is_relative_to(PLANNERS) for item in suites) and not config.getoption("planner"):
         raise pytest.UsageError("this suite tests one planner: pytest --pyargs anysim.testing.planners --planner NAME")
-    if any(not item.path.is_relative_to(PLANNERS) for item in suites) and not config.getoption("engine"):
+    if any(item.path.is_relative_to(FAMILIES) for item in suites) and not config.getoption("family"):
+        raise pytest.UsageError("this suite tests one family: pytest --pyargs anysim.testing.families --family NAME")
+    others = [item for item in suites if not any(item.path.is_relative_to(own) for own in (PLANNERS, FAMILIES))]
+    if others and not config.getoption("engine"):
         raise pytest.UsageError("the contract suite tests one engine: pytest --pyargs anysim.testing --engine NAME")
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
     """One line: engine or planner, version, counts, and what was skipped for want of which capability."""
     suite = config.stash.get(_SUITE, frozenset())
-    if not suite or not (config.getoption("engine") or config.getoption("planner")):
+    if not suite or not any(map(config.getoption, ("engine", "planner", "family"))):
         return
     outcomes = {
         kind: [r for r in terminalreporter.stats.get(kind, []) if getattr(r, "nodeid", "") in suite]
@@ -93,6 +111,10 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     failures = len(outcomes["failed"]) + len(outcomes["error"])
     counts += [f"{failures} failed"] if failures else []
     counts += [f"{len(outcomes['skipped'])} skipped" + (f" ({detail})" if detail else "")]
+    if family := config.getoption("family"):
+        engine = config.getoption("engine") or "null"
+        terminalreporter.write_line(f"anysim contract: family {family} on {engine}: {', '.join(counts)}")
+        return
     if not config.getoption("engine"):
         planner = planner_class(config)
         terminalreporter.write_line(f"anysim contract: planner {planner.name} {planner.version}: {', '.join(counts)}")
@@ -140,11 +162,16 @@ def planner_class(config: pytest.Config) -> Any:
 
 def engine_options(config: pytest.Config) -> dict[str, Any]:
     """The options that `--engine-option` gives."""
+    return named_values(config.getoption("engine_option"), "--engine-option")
+
+
+def named_values(texts: Sequence[str] | None, option: str) -> dict[str, Any]:
+    """What an option that takes KEY=VALUE gives, each value read as JSON, else as text."""
     options: dict[str, Any] = {}
-    for text in config.getoption("engine_option") or ():
+    for text in texts or ():
         key, equals, value = text.partition("=")
         if not equals:
-            raise pytest.UsageError(f"--engine-option takes KEY=VALUE, got '{text}'")
+            raise pytest.UsageError(f"{option} takes KEY=VALUE, got '{text}'")
         try:
             options[key] = json.loads(value)
         except json.JSONDecodeError:

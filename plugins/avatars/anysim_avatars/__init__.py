@@ -1,0 +1,1 @@
+"""Avatars: people who walk, sit, talk, look and reach in the worlds of anysim."""
