@@ -8,9 +8,11 @@ import pytest
 
 import anysim
 from anysim.errors import AnysimError, SnapshotError
+from anysim.managers.sensors import EVERY_SENSOR
 from anysim.record.collector import Collector
 from anysim.record.reader import open_trajectory
 from anysim.record.replay import replay
+from anysim.sensors.base import SensorField
 from anysim.task.env import TaskEnv
 from anysim.task.snapshot import EnvSnapshot
 from anysim_inspect.cli.check import report_on
@@ -62,7 +64,7 @@ def test_between_two_readings_the_last_one_holds_with_its_time() -> None:
             fresh = np.array_equal(env.sensors.reading("s", "position"), truth(env))
             assert fresh == (tick % 4 == 0)
             assert env.sensors.reading("s", "time")[0] == pytest.approx(tick // 4 * 4 * 0.02)
-            assert env.sensors.reading("s", "valid")[0] == 1.0
+            assert env.sensors.reading("s", "valid").tolist() == [True]
 
 
 def test_a_delayed_sensor_shows_what_was_true_then() -> None:
@@ -206,11 +208,23 @@ def test_recordings_hold_the_readings_and_replay_to_the_bit(tmp_path: Path) -> N
         *(f"sensor_imu_{key}" for key in ("acceleration", "angular_velocity", "time", "valid")),
     }
     assert states["sensor_imu_acceleration"].shape == (30, 3)
+    assert states["sensor_s_valid"].dtype == bool
+    assert {bool(value) for reader in readers for value in reader.states["sensor_s_valid"]} == {True, False}
     assert len(np.unique(states["sensor_s_position"], axis=0)) > 5
     for path in sorted((tmp_path / "episodes").iterdir()):
         result = replay(path)
         assert result.identical
         assert result.drift.fields["sensor_s_position"].identical
+
+
+def test_a_recording_whose_valid_is_a_number_still_replays_to_the_bit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as before:  # as it was recorded until 0.1
+        before.setitem(EVERY_SENSOR, "valid", SensorField((), "1"))  # pyright: ignore[reportArgumentType]
+        (reader, *_) = recorded(throwing(BOTH), tmp_path)
+        assert reader.states["sensor_s_valid"].dtype == np.float64
+    assert replay(reader.directory).identical
 
 
 def test_one_more_sensor_changes_no_other_array(tmp_path: Path) -> None:

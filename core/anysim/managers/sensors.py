@@ -22,8 +22,8 @@ from anysim.randomization.streams import Streams
 from anysim.sensors.base import Sensor, SensorField
 from anysim_schemas.sensors import SensorSpec
 
-EVERY_SENSOR: Mapping[str, SensorField] = {"time": SensorField((), "s"), "valid": SensorField((), "1")}
-"""Fields of each sensor beside its own: the time since the reset that it tells of, and 0 where a reading was lost."""
+EVERY_SENSOR: Mapping[str, SensorField] = {"time": SensorField((), "s"), "valid": SensorField((), "1", dtype="bool")}
+"""Fields of each sensor beside its own: the time since the reset that it tells of, and false where one was lost."""
 
 
 class _Channel:

@@ -144,8 +144,8 @@ class Collector:
             raise disk_trouble(f"cannot record into {out}", error, out) from error
         self._release = weakref.finalize(self, lock.release)
         try:
-            sources = make_sources(env)
-            self.recorder = Recorder(out, writer, run_header(env, seed), horizon=task.horizon, sources=sources)
+            header, sources = run_header(env, seed), make_sources(env)
+            self.recorder = Recorder(out, writer, header, horizon=task.horizon, sources=sources)
         except BaseException:
             self._release()
             raise

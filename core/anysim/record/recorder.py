@@ -8,6 +8,7 @@ episode are drawn by the thread that steps, when it commits the episode.
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cached_property, partial
@@ -30,7 +31,7 @@ from anysim.record.header import EpisodeHeader, Header, RunHeader
 from anysim.record.incoming import Incoming
 from anysim.record.json import plain
 from anysim.record.names import EPISODES, parse_trajectory, trajectories, trajectory_name
-from anysim.record.streams import StreamPart, StreamSource, blame
+from anysim.record.streams import StreamPart, StreamSource, blame, close_sources
 from anysim.record.trajectory_files import Ending, PendingCommit, TrajectoryFiles
 from anysim.record.writer import StreamWriter, TrajectoryWriter
 
@@ -74,35 +75,29 @@ class Recorder:
             run: what is run. An existing directory must hold the same.
             now: the clock of `clock.created_at`.
             horizon: control steps for which room is made; longer episodes get more when they need it.
-            sources: make streams of each episode that is committed, by name; closed with the recorder.
+            sources: make streams of each episode that is committed, by name; closed with the recorder, also
+                where it cannot be made.
 
         Raises:
             RecordError: the directory holds another run, or cannot be written.
         """
-        self.out = Path(out)
-        self.run = RunHeader.model_validate({**dict(run), "spec": plain(run.spec, "spec")})
-        self._now = now
-        self._attempts: dict[int, _Attempt] = {}
-        self._store = ColumnStore(run.layout, horizon + 1)
-        self._checks = BatchChecks(run.layout)
-        self._writer = writer
-        self._committer = Committer(self.out, writer, self.run)
-        self._sources = sources
-        self._streams = {name: info for source in sources.values() for name, info in source.streams.items()}
-        self._closed = False
-        try:
-            self._incoming = Incoming(self.out)
-        except OSError as error:
-            raise disk_trouble(f"cannot record into {self.out}", error, self.out) from error
-        try:
-            with self._incoming.startup():
-                describe_run(self.out, self._incoming.path, self.run)
-        except OSError as error:
-            self._incoming.close()
-            raise disk_trouble(f"cannot record into {self.out}", error, self.out) from error
-        except BaseException:
-            self._incoming.close()
-            raise
+        self.out, self._now, self._writer, self._sources, self._closed = Path(out), now, writer, sources, False
+        with ExitStack() as undo:
+            undo.callback(close_sources, sources)
+            self.run = RunHeader.model_validate({**dict(run), "spec": plain(run.spec, "spec")})
+            self._attempts: dict[int, _Attempt] = {}
+            self._store = ColumnStore(run.layout, horizon + 1)
+            self._checks = BatchChecks(run.layout)
+            self._committer = Committer(self.out, writer, self.run)
+            self._streams = {name: info for source in sources.values() for name, info in source.streams.items()}
+            try:
+                self._incoming = Incoming(self.out)
+                undo.callback(self._incoming.close)
+                with self._incoming.startup():
+                    describe_run(self.out, self._incoming.path, self.run)
+            except OSError as error:
+                raise disk_trouble(f"cannot record into {self.out}", error, self.out) from error
+            undo.pop_all()
 
     @property
     def swept(self) -> tuple[str, ...]:
@@ -276,9 +271,7 @@ class Recorder:
         finally:
             self._committer.stop()
             self._incoming.close()
-            for name, source in self._sources.items():
-                with blame(name, source):
-                    source.close()
+            close_sources(self._sources)
         self._committer.raise_untold()
 
     def __enter__(self) -> Self:

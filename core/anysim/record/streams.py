@@ -6,6 +6,7 @@ thread that steps. What costs and needs no engine it hands over as parts, which 
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack
 from typing import Any, NamedTuple
 
 from anysim import registry
@@ -59,12 +60,27 @@ def make_sources(env: TaskEnv) -> dict[str, StreamSource]:
         SpecError: at an option, what is wrong with it.
     """
     record, sources = env.spec.record, dict[str, StreamSource]()
-    for name, given in ((record.streams or {}) | ({"cameras": {}} if record.channels else {})).items():
-        made: Any = registry.load("streams", name)
-        values = checked(options_model(made), given or {}, f"record.streams.{name}")
-        with registry.using("streams", name):
-            sources[name] = made(env, **{key: getattr(values, key) for key in parameters(made)})
+    with ExitStack() as undo:
+        undo.callback(close_sources, sources)
+        for name, given in ((record.streams or {}) | ({"cameras": {}} if record.channels else {})).items():
+            made: Any = registry.load("streams", name)
+            values = checked(options_model(made), given or {}, f"record.streams.{name}")
+            with registry.using("streams", name):
+                sources[name] = made(env, **{key: getattr(values, key) for key in parameters(made)})
+        undo.pop_all()
     return sources
+
+
+def close_sources(sources: Mapping[str, StreamSource]) -> None:
+    """Close every one of them, also where another cannot be closed."""
+
+    def close(name: str, source: StreamSource) -> None:
+        with blame(name, source):
+            source.close()
+
+    with ExitStack() as stack:
+        for name, source in sources.items():
+            stack.callback(close, name, source)
 
 
 def blame(name: str, source: StreamSource) -> registry.Blame:

@@ -101,8 +101,8 @@ class Session:
         except OSError as error:
             raise disk_trouble(f"cannot record into {out}", error, out) from error
         try:
-            sources = make_sources(env)
-            self.recorder = Recorder(out, writer, run_header(env, seed), horizon=task.horizon, sources=sources)
+            header, sources = run_header(env, seed), make_sources(env)
+            self.recorder = Recorder(out, writer, header, horizon=task.horizon, sources=sources)
             tools = tuple(arm.name for arm in self.drives.arms)
             job = Job(env.name, task.description, env.engine.name, tools, self._dt, setup.speed, setup.turn)
             device.open(job)

@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 
 from anysim.api import load
-from anysim.errors import RecordError, SpecError
+from anysim.errors import PluginError, RecordError, SpecError
 from anysim.record.columns import EpisodeColumns
 from anysim.record.commit import describe
 from anysim.record.header import StreamInfo
 from anysim.record.names import trajectories
 from anysim.record.reader import open_trajectory
 from anysim.record.recorder import Recorder
-from anysim.record.streams import StreamPart, StreamRow, StreamSource
+from anysim.record.streams import StreamPart, StreamRow, StreamSource, make_sources
 from anysim.record.writer import TrajectoryWriter, WrittenFile, make_writer
 from anysim_inspect.verify import verify, verify_run
-from tests.plugins.mcap.everything import WORLD
+from tests.plugins.mcap.everything import WORLD, made
 
 INFOS = {
     "weather/rain": StreamInfo(kind="array", shape=(2, 2), dtype="int32", unit="mm", about={"legend": {"1": "rain"}}),
@@ -128,6 +128,48 @@ def test_every_array_of_every_trajectory_has_a_name(tmp_path: Any, sample: Any, 
 def test_equal_runs_give_equal_files(tmp_path: Any, sample: Any) -> None:
     one, two = (recorded(tmp_path / name, sample, Weather()) for name in ("one", "two"))
     assert (one / "weather.mcap").read_bytes() == (two / "weather.mcap").read_bytes()
+
+
+def test_sources_are_closed_where_nothing_can_be_recorded(tmp_path: Any, sample: Any) -> None:
+    closed: list[str] = []
+
+    class Closing(Weather):
+        def __init__(self, name: str) -> None:
+            super().__init__()
+            self.name = name
+
+        def close(self) -> None:
+            closed.append(self.name)
+            if self.name == "second":
+                raise OSError("the device is gone")
+
+    (tmp_path / "run").write_text("no directory")
+    with pytest.raises(PluginError, match=r"'b'.*the device is gone"):
+        Recorder(
+            tmp_path / "run",
+            make_writer("mcap", {}),
+            sample.RUN,
+            sources={"a": Closing("first"), "b": Closing("second"), "c": Closing("third")},
+        )
+    assert sorted(closed) == ["first", "second", "third"]
+    with pytest.raises(RecordError, match="cannot record into"):
+        Recorder(tmp_path / "run", make_writer("mcap", {}), sample.RUN, sources={"a": Closing("fourth")})
+    assert closed[-1] == "fourth"
+
+
+def test_sources_are_closed_where_another_one_cannot_be_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    closed: list[str] = []
+    with made() as env:
+        monkeypatch.setattr("anysim_mcap.camera_channels.CameraChannels.close", lambda self: closed.append("cameras"))
+        monkeypatch.setattr("anysim_annotation.stream.AnnotationStream.close", lambda self: closed.append("labels"))
+        monkeypatch.setattr("anysim_language.stream.LanguageStream.__init__", _fails)
+        with pytest.raises(PluginError, match="no words"):
+            make_sources(env)
+    assert closed == ["labels"]  # the cameras' come last
+
+
+def _fails(*_: Any, **__: Any) -> None:
+    raise OSError("no words")
 
 
 class Wrong(Weather):
