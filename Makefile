@@ -141,6 +141,7 @@ check-schema:
 check-tables:
 	$(BIN)/python scripts/capability_table.py --check
 	$(BIN)/python scripts/axes_table.py --check
+	$(BIN)/python scripts/export_table.py --check
 	$(BIN)/python scripts/term_table.py --check
 	$(BIN)/python scripts/command_table.py --check
 	$(BIN)/python scripts/limits_table.py --check
@@ -167,6 +168,7 @@ schema: $(STAMP)  ## write the JSON Schemas that editors complete YAML from
 docs: schema $(TEST)  ## write what is generated and run the examples of docs/
 	$(BIN)/python scripts/capability_table.py
 	$(BIN)/python scripts/axes_table.py
+	$(BIN)/python scripts/export_table.py
 	$(BIN)/python scripts/term_table.py
 	$(BIN)/python scripts/command_table.py
 	$(BIN)/python scripts/limits_table.py

@@ -1,7 +1,7 @@
 """The exporter `coco`: images of recorded episodes, drawn anew, with boxes and masks of what is seen in them."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -48,6 +48,11 @@ class CocoExporter(Exporter):
         self._every, self._least, self._ignore = every, least_pixels, ignore
         self._stage = Stage(FilmOrder(tuple(cameras), engine))
         self._capture: tuple[TaskEnv, Capture] | None = None
+
+    def places(self, data: DataSet) -> Mapping[str, str]:
+        """Images and masks are drawn anew, from the poses."""
+        words = {"annotation": "images' `sub_task`: skill, phase", "language": "images' `instruction`"}
+        return {"state/body_pose": "what is drawn", **words}
 
     def check(self, data: DataSet) -> None:
         """Refuse a camera that the world does not have."""

@@ -10,21 +10,23 @@ import io
 import os
 import shutil
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from anysim.conventions import Array
 from anysim.errors import RecordError
 from anysim.record.manifest import Manifest
 from anysim.record.reader import TrajectoryReader
+from anysim_export.streams import Channel, channels_of
 
 
 class DataSet(NamedTuple):
     """What all episodes of a data set share.
 
     Attributes:
-        manifests: of the trajectories, in the order of the episodes; layouts, control steps and cameras are equal.
+        manifests: of the trajectories, in the order of the episodes; layouts, control steps, cameras and what is taken
+            of their streams are equal.
         options: of the exporter, as plain data.
     """
 
@@ -41,6 +43,11 @@ class DataSet(NamedTuple):
         """The robots that act, by name; empty where none does."""
         return ", ".join(dict.fromkeys(name.partition(".")[0] for name in self.first.layout.action))
 
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Depth and segmentation of cameras, where they were recorded."""
+        return channels_of(self.first)
+
 
 class Episode:
     """A trajectory of T steps as trainers see it: row t is what was observed before action t, and that action.
@@ -50,8 +57,9 @@ class Episode:
         manifest: of the trajectory.
         obs: (T+1, D) float32 or float64 by group; the last row is what the last action led to.
         states: (T+1, …) float64 by name, likewise.
-        actions: (T, A) float64; rewards (T,) float64.
+        actions: (T, A) float64; rewards (T,) float64; statuses T of them, after each action.
         tasks: T of them: the instruction under which each action was taken.
+        annotations: T of them: what the policy said of each action, as plain data.
         segments: T of them: the skill, and its phase, that each action was taken by; empty where none said so.
     """
 
@@ -64,9 +72,10 @@ class Episode:
         self.index, self.manifest, self._reader = index, reader.manifest, reader
         self.obs = {name: reader.obs_from_reset(name) for name in reader.obs}
         self.states = {name: reader.states_from_reset(name) for name in reader.states}
-        self.actions, self.rewards = reader.actions, reader.rewards
+        self.actions, self.rewards, self.statuses = reader.actions, reader.rewards, reader.statuses
         said = [words or reader.manifest.instruction or reader.manifest.task for words in reader.language]
         self.tasks = tuple(said)
+        self.annotations = reader.annotations
         self.segments = tuple(_segment(held) for held in reader.annotations)
 
     @property
@@ -85,15 +94,29 @@ class Episode:
         Raises:
             RecordError: the video is damaged, or begins later than the episode.
         """
-        frames = self._reader.images(camera)
-        step, image = next(frames, (1, None))
-        if image is None or step != 0:
-            raise RecordError(f"{self._reader.directory} has no image of '{camera}' from before the first action")
-        following = next(frames, None)
+        return self._images(f"camera/{camera}")
+
+    def channel(self, channel: Channel) -> Iterator[Array]:
+        """T+1 images (H, W) of depth [m] or segmentation, as `images`, with every bit that was recorded.
+
+        Raises:
+            RecordError: the stream is damaged, or begins later than the episode.
+        """
+        return self._images(channel.stream)
+
+    def held(self, stream: str) -> Iterator[Any]:
+        """T+1 values of a stream beside the numbers: the latest before each action, None before its first row."""
+        rows, value = self._reader.rows(stream), None
+        following = next(rows, None)
         for now in range(self.steps + 1):
-            while following is not None and following[0] <= now:
-                image = following[1]
-                following = next(frames, None)
+            while following is not None and following.step <= now:
+                value, following = following.value, next(rows, None)
+            yield value
+
+    def _images(self, stream: str) -> Iterator[Array]:
+        for image in self.held(stream):
+            if image is None:
+                raise RecordError(f"{self._reader.directory} has no image of '{stream}' from before the first action")
             yield image
 
 
@@ -110,6 +133,13 @@ class Exporter(ABC):
         """Refuse, before anything is written, what this form cannot hold; a RecordError that says what to do."""
 
     @abstractmethod
+    def places(self, data: DataSet) -> Mapping[str, str]:
+        """Where in a data set each stream of the recordings goes, by its name; streams that are left out are not in it.
+
+        Names are those of `open_trajectory(path).names()`. The command prints what is left out.
+        """
+
+    @abstractmethod
     def write_episode(self, folder: Path, episode: Episode, data: DataSet) -> None:
         """Write what is needed of an episode into its empty folder."""
 
@@ -120,6 +150,21 @@ class Exporter(ABC):
     def close(self) -> None:
         """Free what was held from one episode to the next; called once, whatever came."""
         return
+
+
+def refuse_shared(names: Iterable[str]) -> None:
+    """Refuse observations of one name, as of a group `front_depth` beside depth of the camera `front`.
+
+    Raises:
+        RecordError: two of these names are equal.
+    """
+    found = list(names)
+    shared = sorted({name for name in found if found.count(name) > 1})
+    if shared:
+        raise RecordError(
+            f"two things that are observed would both be called '{shared[0]}': observation groups, cameras and their "
+            "depth; rename one, or leave one out with --option images=false or --option channels=false"
+        )
 
 
 def write_image(path: Path, image: Array) -> None:

@@ -1,5 +1,6 @@
 """`anysim export`: recorded runs as data sets; `anysim tape`: the actions of a data set played again."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -30,7 +31,8 @@ def export(
     """Write the committed trajectories of runs as a data set that trainers read.
 
     The data set becomes visible when it is whole. Interrupted or killed, the same command goes on where it stopped and
-    gives the same bytes; once it is done, it says so and changes nothing.
+    gives the same bytes; once it is done, it says so and changes nothing. Streams of the recordings that the data set
+    does not hold are named at the end.
 
     Examples:
       anysim export runs/pick --to lerobot --out data/pick
@@ -48,6 +50,20 @@ def export(
     before = f", {done.resumed} of them written before" if done.resumed else ""
     what = "are there already in" if done.present else "->"
     typer.echo(f"{done.episodes} episodes, {done.frames} steps{before} {what} {done.directory}{left}")
+    if done.omitted:
+        typer.echo(f"recorded, and not in it: {_families(done.omitted)}")
+
+
+def _families(streams: Mapping[str, str]) -> str:
+    """Streams by families, each with the option that brings it: `state/joint_pos joint_vel (--option states=true)`."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for name, option in streams.items():
+        family, _, rest = name.partition("/")
+        found.setdefault((f"{family}/" if rest else "", option), []).append(rest or family)
+    return ", ".join(
+        f"{family}{' '.join(names)}{f' (--option {option})' if option else ''}"
+        for (family, option), names in found.items()
+    )
 
 
 def tape(

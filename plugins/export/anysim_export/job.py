@@ -18,6 +18,7 @@ from anysim.record.names import find_trajectories
 from anysim.record.reader import open_trajectory
 from anysim_export.api import DataSet, Episode, Exporter
 from anysim_export.sheet import SHEET_FILE, ExportSheet, make_sheet, read_sheet
+from anysim_export.streams import streams_of
 
 PARTS, WHOLE = "parts", "whole"
 
@@ -34,6 +35,7 @@ class Exported(NamedTuple):
         resumed: episodes that an interrupted export had written already.
         left_out: trajectories that did not succeed.
         present: the same data set was there already.
+        omitted: streams of the recordings that are not in it, each with the option that brings it, or an empty word.
     """
 
     directory: Path
@@ -42,6 +44,7 @@ class Exported(NamedTuple):
     resumed: int
     left_out: int
     present: bool
+    omitted: dict[str, str]
 
 
 def export(
@@ -70,8 +73,9 @@ def export(
         PluginError: no such exporter, or what it needs is not installed.
         SpecError: at `options.KEY`, an option that it does not have.
     """
-    exporter, said = _exporter(to, options or {})
+    exporter, said = made(to, options or {})
     with closing(exporter):
+        _check_needs(to, exporter.needs)
         return _export(exporter, said, runs, to, out, failed_too, tell)
 
 
@@ -86,11 +90,14 @@ def _export(
 ) -> Exported:
     paths, left_out = _chosen(runs, failed_too)
     data = DataSet([manifest for _, manifest in paths], said)
-    _check_alike(paths)
+    with registry.using("exporters", to):
+        places = exporter.places(data)
+    _check_alike(paths, places)
     with registry.using("exporters", to):
         exporter.check(data)
+        lacking = omitted(exporter, said, data)
     sheet = make_sheet(to, registry.distribution("exporters", to), said, data.manifests)
-    done = Exported(out, len(paths), sum(one.steps for one in data.manifests), 0, left_out, False)
+    done = Exported(out, len(paths), sum(one.steps for one in data.manifests), 0, left_out, False, lacking)
     aside = out.absolute().with_name(f".{out.absolute().name}.export")
     if _is_there(out, sheet):
         _clear(aside)
@@ -121,17 +128,44 @@ def _export(
     return done._replace(resumed=resumed)
 
 
-def _exporter(name: str, options: Mapping[str, Any]) -> tuple[Exporter, dict[str, Any]]:
-    """The exporter with its options, and these as plain data, defaults included."""
-    made: type[Exporter] = registry.load("exporters", name)
-    given = checked(options_model(made), options, "options")
-    for module, extra in made.needs.items():
+def made(name: str, options: Mapping[str, Any]) -> tuple[Exporter, dict[str, Any]]:
+    """The exporter with its options, and these as plain data, defaults included.
+
+    Raises:
+        PluginError: no such exporter.
+        SpecError: at `options.KEY`, an option that it does not have.
+    """
+    kind: type[Exporter] = registry.load("exporters", name)
+    with registry.using("exporters", name):
+        return _configured(kind, options)
+
+
+def _configured(kind: type[Exporter], options: Mapping[str, Any]) -> tuple[Exporter, dict[str, Any]]:
+    given = checked(options_model(kind), options, "options")
+    return kind(**{key: getattr(given, key) for key in parameters(kind)}), plain(given.model_dump(mode="json"))
+
+
+def _check_needs(name: str, needs: Mapping[str, str]) -> None:
+    for module, extra in needs.items():
         try:
             importlib.import_module(module)
         except ImportError as error:
             raise PluginError(f"the exporter '{name}' needs {module}: pip install '{extra}' ({error})") from error
-    with registry.using("exporters", name):
-        return made(**{key: getattr(given, key) for key in parameters(made)}), plain(given.model_dump(mode="json"))
+
+
+def omitted(exporter: Exporter, options: Mapping[str, Any], data: DataSet) -> dict[str, str]:
+    """The streams that a data set leaves out, each with the option that would bring it, or with an empty word.
+
+    Args:
+        options: those of the exporter, all of them.
+    """
+    taken, remedies = exporter.places(data), dict[str, str]()
+    for key, value in options.items():
+        if isinstance(value, bool):
+            other, _ = _configured(type(exporter), {**options, key: not value})
+            with closing(other):
+                remedies |= dict.fromkeys(other.places(data), f"{key}={str(not value).lower()}")
+    return {name: remedies.get(name, "") for name in streams_of(data.first) if name not in taken}
 
 
 def _chosen(runs: Sequence[Path], failed_too: bool) -> tuple[list[tuple[Path, Manifest]], int]:
@@ -147,8 +181,11 @@ def _chosen(runs: Sequence[Path], failed_too: bool) -> tuple[list[tuple[Path, Ma
     return kept, len(found) - len(kept)
 
 
-def _check_alike(paths: Sequence[tuple[Path, Manifest]]) -> None:
-    """See that trajectories can be one data set, and hold what was observed before each action."""
+def _check_alike(paths: Sequence[tuple[Path, Manifest]], places: Mapping[str, str]) -> None:
+    """See that trajectories can be one data set, and hold what was observed before each action.
+
+    `places` are of the streams that are taken: others may differ.
+    """
     first, one = paths[0]
     for path, other in paths:
         if not other.has_initial_frame or not other.steps:
@@ -161,6 +198,7 @@ def _check_alike(paths: Sequence[tuple[Path, Manifest]]) -> None:
                 ("states", one.layout.state, other.layout.state),
                 ("control steps", one.control_dt, other.control_dt),
                 ("cameras", _sizes(one), _sizes(other)),
+                ("streams", _streams(one, places), _streams(other, places)),
             )
             if ours != theirs
         ]
@@ -170,6 +208,11 @@ def _check_alike(paths: Sequence[tuple[Path, Manifest]]) -> None:
 
 def _sizes(manifest: Manifest) -> dict[str, tuple[int, int]]:
     return {name: (camera.width, camera.height) for name, camera in manifest.cameras.items()}
+
+
+def _streams(manifest: Manifest, places: Mapping[str, str]) -> dict[str, object]:
+    taken = {name: entry for name, entry in manifest.streams.items() if name in places}
+    return {name: entry.model_dump(exclude={"file", "rows"}) for name, entry in taken.items()}
 
 
 def _is_there(out: Path, sheet: ExportSheet) -> bool:

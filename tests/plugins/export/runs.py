@@ -13,11 +13,18 @@ from anysim.record.reader import open_trajectory
 from anysim.skills.runner import SkillPolicy
 from anysim.testing.engines import require_drawing
 
-SMALL = ("record.cameras=[front,wrist]", "world.cameras.front.size=[48, 32]", "world.cameras.wrist.size=[33, 31]")
+SMALL = (
+    "record.cameras=[front,wrist]",
+    "world.cameras.front.size=[48, 32]",
+    "world.cameras.front.channels=[rgb,depth,segmentation]",
+    "world.cameras.wrist.size=[33, 31]",
+    "record.channels={front: [depth, segmentation]}",
+    "record.streams={language: {}}",
+)
 
 
 def record(out: Path, episodes: int = 3, *more: str) -> Path:
-    """A run in which MuJoCo's robot lifts a cube; the images of one camera have odd sides."""
+    """A run in which MuJoCo's robot lifts a cube; one camera sees depth too, the images of the other have odd sides."""
     require_drawing("mujoco")
     with anysim.make("pick_cube", engine="mujoco", overrides=[*SMALL, *more]) as env:
         list(Collector(env, SkillPolicy(env), out, episodes, 0).run())

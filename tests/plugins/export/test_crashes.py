@@ -12,7 +12,7 @@ from tests.small_disk import small_disk
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("export")]
 FORMS = ("coco", "lerobot", "rlds-ready", "robomimic", "webdataset")
-OPTIONS = {"coco": {"every": 5}}
+OPTIONS = {"coco": {"every": 5}, "lerobot": {"channels": True}, "rlds-ready": {"states": True}}
 
 PRELUDE = """
 import importlib, json, os, signal, sys
@@ -87,7 +87,7 @@ print(json.dumps(found))
 
 @pytest.fixture(scope="module")
 def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Three short episodes, two cameras."""
+    """Three short episodes, two cameras, one of which sees depth and segmentation."""
     return record(tmp_path_factory.mktemp("recorded") / "run", 3, "task.horizon=15", "record.keep=all")
 
 

@@ -29,14 +29,15 @@ pytestmark = pytest.mark.xdist_group("export")  # one recording for all tests of
 
 MAIN = "from anysim.cli.main import main; main()"
 FORMS = ("lerobot", "robomimic", "webdataset")
+OPTIONS: dict[str, dict[str, Any]] = {"lerobot": {"channels": True}}
 
 KILLED = """
-import os, signal, sys
+import json, os, signal, sys
 from pathlib import Path
 from anysim import registry
 from anysim_export.job import export
 
-run, to, out, moment = sys.argv[1:]
+run, to, out, moment, options = sys.argv[1:]
 made = registry.load("exporters", to)
 whole = getattr(made, moment)
 
@@ -49,7 +50,7 @@ def killed(self, folder, part, data):
     os.kill(os.getpid(), signal.SIGKILL)
 
 setattr(made, moment, killed)
-export([Path(run)], to, Path(out))
+export([Path(run)], to, Path(out), json.loads(options))
 """
 """A program that is killed while it writes the second episode, or all of them together: what it wrote is cut short."""
 
@@ -59,7 +60,7 @@ def exported(run: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, P
     """The data sets of all forms."""
     folder = tmp_path_factory.mktemp("exported")
     for form in FORMS:
-        export([run], form, folder / form)
+        export([run], form, folder / form, OPTIONS.get(form))
     return {form: folder / form for form in FORMS}
 
 
@@ -107,7 +108,9 @@ def test_robomimic(exported: dict[str, Path], episodes: list[Episode]) -> None:
             assert {"actions", "rewards", "dones", "states", "obs", "next_obs", *words} == set(demo)
             for name, said in words.items():
                 assert [row.decode() for row in demo[name][:]] == list(said)
-            assert set(demo["obs"]) == set(demo["next_obs"]) == {"policy", "privileged", "front_image", "wrist_image"}
+            pictures = {"front_image", "front_depth", "front_segmentation", "wrist_image"}
+            assert set(demo["obs"]) == set(demo["next_obs"]) == {"policy", "privileged", *pictures}
+            assert demo.attrs["status"] == "success"
             assert all(len(rows) == one.steps for group in ("obs", "next_obs") for rows in demo[group].values())
             np.testing.assert_array_equal(demo["actions"], one.actions)
             np.testing.assert_array_equal(demo["rewards"], one.rewards)
@@ -140,6 +143,9 @@ def test_lerobot(exported: dict[str, Path], episodes: list[Episode]) -> None:
     for name in ("action", "observation.state"):
         rows = [one.actions if name == "action" else one.obs["policy"][:-1] for one in episodes]
         np.testing.assert_array_equal(np.array(frames[name], np.float32), np.concatenate(rows).astype(np.float32))
+    ends = np.cumsum([one.steps for one in episodes]) - 1
+    assert np.flatnonzero(frames["next.success"]).tolist() == np.flatnonzero(frames["next.done"]).tolist()
+    assert np.flatnonzero(frames["next.success"]).tolist() == ends.tolist()
     tasks = pq.read_table(out / "meta/tasks.parquet").to_pydict()
     assert tasks == {"task_index": [0], "__index_level_0__": ["Lift the cube to the goal and come to rest."]}
     subtasks = pq.read_table(out / "meta/subtasks.parquet").to_pydict()["__index_level_0__"]
@@ -172,11 +178,15 @@ def test_webdataset(exported: dict[str, Path], episodes: list[Episode]) -> None:
     with tarfile.open(exported["webdataset"] / "shard-000000.tar") as tar:
         members = tar.getmembers()
         assert {(m.mtime, m.uid, m.uname) for m in members} == {(0, 0, "")}
-        names = [m.name for m in members[:4]]
-        assert names == [f"000000_000000.{kind}" for kind in ("json", "npz", "front.png", "wrist.png")]
-        read = {m.name: tar.extractfile(m).read() for m in members[:4]}
-    assert len(members) == 4 * sum(one.steps for one in episodes)
-    assert json.loads(read[names[0]])["instruction"] == episodes[0].tasks[0]
+        names = [m.name for m in members[:6]]
+        kinds = ("json", "npz", "front.png", "wrist.png", "front_depth.npz", "front_segmentation.npz")
+        assert names == [f"000000_000000.{kind}" for kind in kinds]
+        read = {m.name: tar.extractfile(m).read() for m in members[:6]}
+    assert len(members) == 6 * sum(one.steps for one in episodes)
+    about = json.loads(read[names[0]])
+    assert about["instruction"] == episodes[0].tasks[0]
+    assert (about["status"], about["annotation"]["phase"]) == ("running", "grasp: approach")
+    assert about["language/narration"] == next(episodes[0].held("language/narration"))
     with np.load(io.BytesIO(read[names[1]])) as arrays:
         np.testing.assert_array_equal(arrays["action"], episodes[0].actions[0])
     shown = np.asarray(Image.open(io.BytesIO(read[names[2]])))
@@ -198,10 +208,11 @@ def test_killed_it_goes_on_to_the_same_bytes(
     run: Path, exported: dict[str, Path], tmp_path: Path, form: str, moment: str
 ) -> None:
     out = tmp_path / form
-    command = [sys.executable, "-c", KILLED, str(run), form, str(out), moment]
+    options = OPTIONS.get(form, {})
+    command = [sys.executable, "-c", KILLED, str(run), form, str(out), moment, json.dumps(options)]
     assert subprocess.run(command, check=False, timeout=120).returncode == -signal.SIGKILL
     assert not out.exists()
-    done = export([run], form, out)
+    done = export([run], form, out, options)
     assert done.resumed == (1 if moment == "write_episode" else 3)
     assert content(out) == content(exported[form])
     assert [path.name for path in tmp_path.iterdir()] == [form]
@@ -209,7 +220,7 @@ def test_killed_it_goes_on_to_the_same_bytes(
 
 def test_what_another_export_left_aside_is_not_taken(run: Path, exported: dict[str, Path], tmp_path: Path) -> None:
     out = tmp_path / "webdataset"
-    command = [sys.executable, "-c", KILLED, str(run), "webdataset", str(out), "assemble"]
+    command = [sys.executable, "-c", KILLED, str(run), "webdataset", str(out), "assemble", "{}"]
     subprocess.run(command, check=False, timeout=120)
     assert export([run], "webdataset", out, {"images": False}).resumed == 0
     assert content(out) != content(exported["webdataset"])
@@ -271,6 +282,8 @@ def test_the_commands(run: Path, tmp_path: Path) -> None:
     first, again = (run_python(tmp_path, "-c", MAIN, *words) for _ in range(2))
     assert first.returncode == 0, first.stderr
     assert "3 episodes" in first.stdout
+    assert "recorded, and not in it: state/" in first.stdout
+    assert "camera/front/depth front/segmentation (--option channels=true)" in first.stdout
     assert "are there already in" in again.stdout
     told = json.loads(run_python(tmp_path, "-c", MAIN, "tape", str(out), "--json").stdout)
     assert (told["success"], told["as_recorded"]) == (3, 3)

@@ -12,9 +12,11 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.errors import RecordError
 from anysim.record.json import dump_json
-from anysim_export.api import DataSet, Episode, Exporter
-from anysim_export.lerobot import tables, video
+from anysim.task.contract import Status
+from anysim_export.api import DataSet, Episode, Exporter, refuse_shared
+from anysim_export.lerobot import depth, tables, video
 from anysim_export.lerobot.stats import ImageStats, Stats, sampled, stats_of, thinned, together
+from anysim_export.streams import Channel
 
 VERSION = "v3.0"
 STATE, PRIVILEGED, IMAGES = "observation.state", "observation.environment_state", "observation.images."
@@ -33,7 +35,8 @@ def feature_name(group: str) -> str:
 class LeRobotExporter(Exporter):
     """A frame for each control step: what was observed before an action, the action, and the reward it got.
 
-    An image holds until the next one where a camera was slower than the control steps. Videos have even sides.
+    An image holds until the next one where a camera was slower than the control steps. Videos have even sides. LeRobot
+    has no place for depth and segmentation; where they are asked for, they are images of one channel.
     """
 
     needs: ClassVar[Mapping[str, str]] = {"pyarrow": "anysim-export[lerobot]", "av": "anysim-export[lerobot]"}
@@ -42,16 +45,33 @@ class LeRobotExporter(Exporter):
         self,
         *,
         images: Annotated[bool, Field(description="whether there are videos of the cameras")] = True,
+        channels: Annotated[
+            bool, Field(description="whether recorded depth and segmentation are in it, as images of one channel")
+        ] = False,
         privileged: Annotated[bool, Field(description="whether what only a simulator knows is in it")] = False,
         crf: Annotated[int, Field(ge=0, le=51, description="of the videos: lower is better and larger")] = 18,
         data_mb: Annotated[int, Field(ge=1, description="of a file of frames, at most")] = 100,
         video_mb: Annotated[int, Field(ge=1, description="of a file of videos, at most")] = 200,
     ) -> None:
-        self._images, self._privileged, self._crf = images, privileged, crf
+        self._images, self._channels, self._privileged, self._crf = images, channels, privileged, crf
         self._data_mb, self._video_mb = data_mb, video_mb
 
+    def places(self, data: DataSet) -> Mapping[str, str]:
+        """Features of a frame."""
+        found = {
+            "action": "`action`",
+            "collect/reward": "`next.reward`",
+            "collect/status": "`next.done`, `next.success`",
+        }
+        found |= {"annotation": "`subtask_index`: skill, phase", "language": "`task_index`"}
+        found |= {f"observation/{name}": f"`{feature_name(name)}`" for name in self._groups(data)}
+        found |= {f"camera/{name}": f"`{IMAGES}{name}`" for name in self._cameras(data)}
+        return found | {one.stream: f"`{name}`" for name, one in self._pictures(data)}
+
     def check(self, data: DataSet) -> None:
-        """Refuse names that LeRobot's files cannot have."""
+        """Refuse names and numbers that LeRobot's files cannot have."""
+        refuse_shared([*(IMAGES + name for name in self._cameras(data)), *(name for name, _ in self._pictures(data))])
+        depth.check([one for _, one in self._pictures(data)])
         taken = [name for name in data.first.layout.obs if name in ("state", "environment_state", "images")]
         if taken:
             raise RecordError(f"the observation group '{taken[0]}' has a name that LeRobot gives a meaning of its own")
@@ -65,6 +85,7 @@ class LeRobotExporter(Exporter):
         columns |= {"action": episode.actions, "next.reward": episode.rewards[:, None]}
         columns = {name: rows.astype(np.float32) for name, rows in columns.items()}
         columns["next.done"] = (steps == episode.steps - 1)[:, None]
+        columns["next.success"] = np.array([one == Status.SUCCESS for one in episode.statuses])[:, None]
         columns["timestamp"] = (steps * data.first.control_dt).astype(np.float32)
         columns["frame_index"] = steps
         np.savez(folder / ARRAYS, allow_pickle=False, **columns)
@@ -73,6 +94,8 @@ class LeRobotExporter(Exporter):
         stats = {name: _stats(rows) for name, rows in columns.items()}
         for camera in self._cameras(data):
             stats[IMAGES + camera] = self._write_video(folder, camera, episode, data)
+        if pictures := self._pictures(data):
+            stats |= depth.write(folder / depth.CHANNELS, pictures, episode)
         (folder / STATS).write_bytes(dump_json(stats, "stats"))
 
     def _write_video(self, folder: Path, camera: str, episode: Episode, data: DataSet) -> Stats:
@@ -94,6 +117,10 @@ class LeRobotExporter(Exporter):
     def _cameras(self, data: DataSet) -> list[str]:
         return list(data.first.cameras) if self._images else []
 
+    def _pictures(self, data: DataSet) -> list[tuple[str, Channel]]:
+        """Depth and segmentation by the names of their features."""
+        return [(IMAGES + one.key, one) for one in data.channels] if self._channels else []
+
     # --------------------------------------------------------------- all of them
 
     def assemble(self, folder: Path, parts: Sequence[Path], data: DataSet) -> None:
@@ -105,7 +132,7 @@ class LeRobotExporter(Exporter):
         starts = np.cumsum([0, *lengths]).tolist()
         stats = [_read_stats(part / STATS) for part in parts]
         rows: list[dict[str, Any]] = []
-        frames_files = tables.filled([(part / ARRAYS).stat().st_size for part in parts], self._data_mb * MEGABYTE)
+        frames_files = tables.filled([_frames_size(part) for part in parts], self._data_mb * MEGABYTE)
 
         def frames() -> Iterator[Any]:
             for i, part in enumerate(parts):
@@ -117,7 +144,8 @@ class LeRobotExporter(Exporter):
                 columns["subtask_index"] = np.array([segments.index(one) for one in words[i]["segments"]])
                 for name in ("episode_index", "index", "task_index", "subtask_index"):
                     stats[i][name] = _stats(columns[name])
-                yield tables.frame_table(columns)
+                table = tables.frame_table(columns)
+                yield tables.beside(table, part / depth.CHANNELS) if self._pictures(data) else table
 
         tables.write_tables(folder / "data", frames(), frames_files)
         for i in range(len(parts)):
@@ -178,7 +206,7 @@ class LeRobotExporter(Exporter):
             features[feature_name(group)] = {"dtype": "float32", "shape": [size], "names": names}
         features["action"] = {"dtype": "float32", "shape": [len(layout.action)], "names": list(layout.action)}
         features["next.reward"] = {"dtype": "float32", "shape": [1], "names": None}
-        features["next.done"] = {"dtype": "bool", "shape": [1], "names": None}
+        features |= {name: {"dtype": "bool", "shape": [1], "names": None} for name in ("next.done", "next.success")}
         features |= {name: {"dtype": dtype, "shape": [1], "names": None} for name, dtype in COUNTED.items()}
         for camera in self._cameras(data):
             entry = data.first.cameras[camera]
@@ -196,6 +224,7 @@ class LeRobotExporter(Exporter):
             names = ["height", "width", "channels"]
             shown = {"dtype": "video", "shape": [height, width, 3], "names": names, "info": about}
             features[IMAGES + camera] = shown
+        features |= {name: depth.feature(one) for name, one in self._pictures(data)}
         return {
             "codebase_version": VERSION,
             "robot_type": data.robot or None,
@@ -217,6 +246,10 @@ class LeRobotExporter(Exporter):
 
 def _stats(rows: Array) -> Stats:
     return stats_of(rows.reshape(len(rows), -1))
+
+
+def _frames_size(part: Path) -> int:
+    return sum((part / name).stat().st_size for name in (ARRAYS, depth.CHANNELS) if (part / name).exists())
 
 
 def _read_stats(path: Path) -> dict[str, Stats]:

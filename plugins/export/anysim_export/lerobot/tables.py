@@ -48,6 +48,16 @@ def frame_table(columns: Mapping[str, Array]) -> Any:
     return pa.table(made)
 
 
+def beside(table: Any, path: Path) -> Any:
+    """A table with the columns of a file of as many rows."""
+    import pyarrow.parquet as pq  # pyright: ignore[reportMissingImports]
+
+    more = pq.read_table(path)
+    for name in more.column_names:
+        table = table.append_column(name, more[name])
+    return table
+
+
 def write_tables(folder: Path, tables: Iterator[Any], files: Sequence[int]) -> None:
     """Write tables, each as a row group of its file."""
     import pyarrow.parquet as pq  # pyright: ignore[reportMissingImports]

@@ -1,6 +1,6 @@
 """A table of returns, one row an episode."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -21,6 +21,10 @@ class Ledger(Exporter):
         for one in data.manifests:
             if "\n" in one.instruction:
                 raise RecordError(f"the instruction {one.instruction!r} has more lines than a row; record another")
+
+    def places(self, data: DataSet) -> Mapping[str, str]:
+        """Columns of the table."""
+        return {"collect/reward": "`return`", "language": "`instruction`"}
 
     def write_episode(self, folder: Path, episode: Episode, data: DataSet) -> None:
         """A row."""
