@@ -62,7 +62,8 @@ test-full: $(TEST) test-learning  ## run every test, those that are marked full 
 	$(PYTEST) $(ARGS)
 
 test-learning: $(TORCH)  ## run the tests of the learners and their example, in an environment with torch (gigabytes where CUDA is)
-	OMP_NUM_THREADS=1 .venv-torch/bin/python -m pytest -n 0 tests/plugins/learning/test_learners.py tests/plugins/policy \
+	OMP_NUM_THREADS=1 .venv-torch/bin/python -m pytest -n 0 tests/plugins/learning/test_learners.py tests/plugins/learning/test_kill.py \
+	  tests/plugins/policy \
 	  tests/docs/test_docs.py::test_the_example_with_stable_baselines_trains \
 	  tests/docs/test_starter.py::test_its_learner_trains_stops_and_goes_on $(ARGS)
 

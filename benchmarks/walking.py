@@ -1,22 +1,25 @@
 """Walks of a policy of `go1_velocity` on every engine: five commands, shoves, a slippery floor and rough ground.
 
-    python benchmarks/walking.py [POLICY ...] [--engines mujoco,sapien] [-n 8] [--rows commands,shoves,floors]
+    python benchmarks/walking.py [NAME=POLICY ...] [--engines mujoco,sapien] [-n 32] [--rows commands,shoves,floors]
 
-POLICY is what `anysim evaluate --policy` takes, or the trot and the shipped policy. The robot is that
-of level L0. Errors are the root mean squares of the velocity along the ground after the first 1.5 s, within a stride
-included; falls are of 8 s at 0.5 m/s, with Wilson's intervals at 95 %. Nothing here is a time.
+POLICY is what `anysim evaluate --policy` takes, and NAME what the table calls it; the trot and the shipped policy where
+none is given. The robot is that of level L0. Errors are the root mean squares of the velocity along the ground and of
+the turn after the first 1.5 s, within a stride included; falls are of 8 s. With `--out FILE.json` each cell is on the
+disk once it is measured, and those that are there are not measured again.
 """
 
 import argparse
+import json
 from collections.abc import Iterator
-from typing import NamedTuple
+from pathlib import Path
+from time import process_time
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import anysim
 from anysim.engine.state import State
 from anysim.math import pose as P
-from anysim.math.statistics import wilson
 from anysim_evaluation.policy import make_policy
 
 COMMANDS = ((0.5, 0.0, 0.0), (0.9, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, 0.0, 0.8), (0.5, 0.2, 0.5))
@@ -31,14 +34,13 @@ class Walk(NamedTuple):
     velocity: np.ndarray
     error: float
     turn_error: float
+    version: str
 
 
 def shoved(speed: float) -> list[str]:
-    """A shove of this speed in any direction every two seconds."""
-    return [
-        f"task.events.shove.velocity={{range: [[{-speed}, {-speed}, 0.0], [{speed}, {speed}, 0.0]]}}",
-        "task.events.shove.every=2.0",
-    ]
+    """A shove of this speed in one of eight directions every two seconds."""
+    directions = [[round(speed * float(v), 6) for v in (np.cos(a), np.sin(a), 0.0)] for a in np.arange(8) * np.pi / 4]
+    return [f"task.events.shove.velocity={{choice: {directions}}}", "task.events.shove.every=2.0"]
 
 
 def rough(height: float) -> list[str]:
@@ -49,16 +51,19 @@ def rough(height: float) -> list[str]:
     return [f"world.terrain={{{ground}}}"]
 
 
-ROUGH = (0.02, 0.04, 0.06)
-FLOORS = {
-    "friction 0.3": ["world.robots.dog.dynamics.link_friction_scale=0.375", "world.terrain.friction=0.2"],
-    **{f"rough, {100 * height:g} cm": rough(height) for height in ROUGH},
+CHANGES = {
+    "commands": {"": list[str]()},
+    "shoves": {f"shoves of {speed:g} m/s": shoved(speed) for speed in (0.5, 1.0)},
+    "floors": {
+        "friction 0.3": ["world.robots.dog.dynamics.link_friction_scale=0.375", "world.terrain.friction=0.2"],
+        **{f"rough, ±{100 * height:g} cm": rough(height) for height in (0.02, 0.04, 0.06)},
+    },
 }
-SHOVES = {f"shoves of {speed:g} m/s": shoved(speed) for speed in (0.5, 1.0)}
+"""What is other than in the catalogue by the name of its row, in groups."""
 
 
 def walk(policy: str, engine: str, command: tuple[float, ...], num_envs: int, changes: list[str]) -> Walk:
-    """Walk in all envs at once; an env that has fallen is left alone."""
+    """Walk in all envs at once, in episodes of the test split; an env that has fallen is left alone."""
     asked = [f"task.command.walk.{key}={v}" for key, v in zip(("forward", "left", "turn"), command, strict=True)]
     asked += ["task.command.walk.still=0.0", "task.command.walk.straight=0.0"]
     overrides = ["record.cameras=[]", "world.cameras.front.channels=[]", "level=L0", *asked, *changes]
@@ -80,12 +85,13 @@ def walk(policy: str, engine: str, command: tuple[float, ...], num_envs: int, ch
             if step >= first:
                 seen.append(_own(env.engine.get_state(), base)[env.running])
         fell = int((env.status == "failed").sum())
+    version = getattr(made, "version", "")
     rows = np.concatenate(seen) if seen else np.zeros((0, 3))
     if not len(rows):
-        return Walk(fell, np.full(3, np.nan), np.nan, np.nan)
+        return Walk(fell, np.full(3, np.nan), np.nan, np.nan, version)
     wrong = rows - np.array(command)
     error, turn = np.sqrt((wrong[:, :2] ** 2).sum(axis=1).mean()), np.sqrt((wrong[:, 2] ** 2).mean())
-    return Walk(fell, rows.mean(axis=0), float(error), float(turn))
+    return Walk(fell, rows.mean(axis=0), float(error), float(turn), version)
 
 
 def _own(state: State, base: int) -> np.ndarray:
@@ -94,43 +100,64 @@ def _own(state: State, base: int) -> np.ndarray:
     return np.concatenate([P.rotate_inverse(turn, twist[:, :3])[:, :2], P.rotate_inverse(turn, twist[:, 3:])[:, 2:]], 1)
 
 
-def lines(policy: str, engines: list[str], num_envs: int, rows: list[str]) -> Iterator[str]:
-    """Rows of a Markdown table for a policy."""
-    if "commands" in rows:
-        for command in COMMANDS:
-            walks = [walk(policy, engine, command, num_envs, []) for engine in engines]
-            asked = ", ".join(f"{value:g}" for value in command)
-            yield f"| {policy} | {asked} | " + " | ".join(_tracked(w, command, num_envs) for w in walks) + " |"
-    for group, changes in (("shoves", SHOVES), ("floors", FLOORS)):
-        for name, change in changes.items() if group in rows else ():
-            walks = [walk(policy, engine, COMMANDS[0], num_envs, change) for engine in engines]
-            yield f"| {policy} | {name} | " + " | ".join(_fallen(w.fell, num_envs) for w in walks) + " |"
+def cells(policies: dict[str, str], engines: list[str], num_envs: int, groups: list[str]) -> Iterator[dict[str, Any]]:
+    """What is asked of each policy on each engine; cells with changes walk at 0.5 m/s."""
+    for name in policies:
+        for group in groups:
+            for what, _ in CHANGES[group].items():
+                for command in COMMANDS if group == "commands" else COMMANDS[:1]:
+                    for engine in engines:
+                        yield {
+                            "policy": name,
+                            "group": group,
+                            "what": what,
+                            "command": list(command),
+                            "engine": engine,
+                            "envs": num_envs,
+                        }
 
 
-def _tracked(walk: Walk, command: tuple[float, ...], num_envs: int) -> str:
-    part = int(np.argmax(np.abs(command)))
-    fallen = f"; {walk.fell} of {num_envs} fell" if walk.fell else ""
-    return f"{walk.velocity[part]:.3f} / {walk.error:.3f}, {walk.turn_error:.3f}{fallen}"
+def measured(policy: str, asked: dict[str, Any]) -> dict[str, Any]:
+    """A cell with its numbers; `cpu_s` is what it took, the building of the envs included."""
+    begun = process_time()
+    changes = CHANGES[asked["group"]][asked["what"]]
+    told = walk(policy, asked["engine"], tuple(asked["command"]), asked["envs"], changes)
+    numbers = told._asdict() | {"velocity": told.velocity.tolist()}
+    return (
+        asked | {key: _rounded(value) for key, value in numbers.items()} | {"cpu_s": round(process_time() - begun, 1)}
+    )
 
 
-def _fallen(fell: int, num_envs: int) -> str:
-    low, high = wilson(fell, num_envs)
-    return f"{fell} of {num_envs} fell ({100 * low:.0f} to {100 * high:.0f} %)"
+def _rounded(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_rounded(one) for one in value]
+    return value if not isinstance(value, float) else None if np.isnan(value) else round(value, 4)
 
 
 def main() -> None:
-    """Print the table."""
+    """Measure what is not measured yet, and print it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("policies", nargs="*", default=["expert", "shipped"])
+    parser.add_argument("policies", nargs="*", default=["trot=expert", "shipped=shipped"], metavar="NAME=POLICY")
     parser.add_argument("--engines", default="mujoco,pybullet,sapien")
     parser.add_argument("-n", type=int, default=8, help="envs of each cell")
     parser.add_argument("--rows", default="commands,shoves,floors")
+    parser.add_argument("--out", type=Path, help="a file of the results, which is added to")
     arguments = parser.parse_args()
-    engines = arguments.engines.split(",")
-    print("| policy | what | " + " | ".join(engines) + " |\n|" + "---|" * (2 + len(engines)))
-    for policy in arguments.policies:
-        for line in lines(policy, engines, arguments.n, arguments.rows.split(",")):
-            print(line, flush=True)
+    policies = {name: policy or name for name, _, policy in (text.partition("=") for text in arguments.policies)}
+    done: list[dict[str, Any]] = json.loads(arguments.out.read_text("utf-8")) if _there(arguments.out) else []
+    for asked in cells(policies, arguments.engines.split(","), arguments.n, arguments.rows.split(",")):
+        if any(asked.items() <= cell.items() for cell in done):
+            continue
+        done.append(measured(policies[asked["policy"]], asked))
+        print(json.dumps(done[-1]), flush=True)
+        if arguments.out is not None:
+            draft = arguments.out.with_suffix(".draft")
+            draft.write_text("[\n" + ",\n".join(json.dumps(cell) for cell in done) + "\n]\n", "utf-8")
+            draft.replace(arguments.out)
+
+
+def _there(path: Path | None) -> bool:
+    return path is not None and path.exists()
 
 
 if __name__ == "__main__":

@@ -17,6 +17,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 
 from anysim.errors import SpecError, SpecIssue
 from anysim_schemas.base import Reference
+from anysim_schemas.faults import UNKNOWN_KEY
+from anysim_schemas.messages import sentence, unknown_key
 
 
 @cache
@@ -75,7 +77,13 @@ def checked(model: type[BaseModel], params: Mapping[str, Any], path: str) -> Bas
         return model.model_validate(dict(params))
     except ValidationError as error:
         issues = [
-            SpecIssue("", ".".join(map(str, (path, *e["loc"]))), f"{e['msg']}, got {e['input']!r}")
+            SpecIssue(
+                "",
+                ".".join(map(str, (path, *e["loc"]))),
+                unknown_key(str(e["loc"][0]), list(model.model_fields), {})
+                if e["type"] == UNKNOWN_KEY and len(e["loc"]) == 1
+                else sentence(e["type"], e.get("ctx", {}), e["input"], e["msg"]),
+            )
             for e in error.errors()
         ]
         raise SpecError(issues) from None

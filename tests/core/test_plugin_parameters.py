@@ -5,7 +5,8 @@ from typing import Annotated, TypedDict, Unpack
 import pytest
 from pydantic import Field, ValidationError
 
-from anysim.plugin_parameters import options_model, parameters
+from anysim.errors import SpecError
+from anysim.plugin_parameters import checked, options_model, parameters
 
 
 class Options(TypedDict, total=False):
@@ -56,6 +57,18 @@ def test_what_is_handed_on_is_checked_and_reaches_the_base() -> None:
         options_model(Grandchild).model_validate({"speed": -1.0})
     with pytest.raises(ValidationError, match="Extra inputs"):
         options_model(Grandchild).model_validate({"sped": 1.0})
+
+
+def test_what_is_wrong_is_said_as_of_files() -> None:
+    for params, message in (
+        ({"sped": 1.0}, "option.sped: unknown key; did you mean 'speed'?"),
+        ({"x": 1.0}, "option.x: unknown key; the keys here are speed, gain, mode"),
+        ({"speed": 0}, "option.speed: must be greater than 0, got 0"),
+        ({"gain": "many"}, "option.gain: expected a whole number, got the text 'many'"),
+    ):
+        with pytest.raises(SpecError) as raised:
+            checked(options_model(Grandchild), params, "option")
+        assert str(raised.value).strip() == message
 
 
 def test_options_that_are_handed_to_no_base_are_no_parameters() -> None:

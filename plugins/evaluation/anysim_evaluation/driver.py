@@ -53,6 +53,8 @@ class Episode:
         retries: how often the policy tried again; None where it cannot say.
         done: commands of the task that are done; None where it has none, or the policy cannot say.
         required: those that there are.
+        ground: the kind of its tile, as `stairs down`; None where the ground has no tiles.
+        ground_level: the row of its tile, 0 the easiest; None as well.
     """
 
     seed: int
@@ -64,6 +66,8 @@ class Episode:
     retries: int | None = None
     done: int | None = None
     required: int | None = None
+    ground: str | None = None
+    ground_level: int | None = None
 
 
 def drive(
@@ -140,9 +144,19 @@ def drive(
             failure = "" if status == Status.SUCCESS else FAULT if faults[i] else why or status
             steps = int(env.scene.elapsed[i])
             told = (None, None, None) if striving is None else striving.effort(i, status == Status.SUCCESS)
-            yield Episode(seed, status, failure, steps, float(total[i]), round(steps * control_dt, 6), *told)
+            where = ground(env, i)
+            yield Episode(seed, status, failure, steps, float(total[i]), round(steps * control_dt, 6), *told, *where)
         env.retire(over)
         begin(over)
+
+
+def ground(env: TaskEnv, i: int) -> tuple[str, int] | tuple[None, None]:
+    """The kind and the row of the tile that an env stands on."""
+    terrain, spec = env.scene.terrain, env.spec.world.terrain
+    if terrain is None or not terrain.tiled:
+        return None, None
+    column = spec.tiling.columns[terrain.column[i]]
+    return f"{column.kind} down" if column.down else column.kind, int(terrain.level[i])
 
 
 def _chunks(given: Array, rows: int, dim: int) -> Array:

@@ -6,6 +6,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from anysim_evaluation.summary import ground_table
+
 WIDTH, HEIGHT = 240, 16
 """[px] of a drawn interval."""
 
@@ -40,6 +42,9 @@ def _body(told: Mapping[str, Any], title: str) -> Iterator[str]:
         for name, one in engines.items()
     ]
     yield from table("Success", ("engine", "solved", "", "95 %", "steps", "faults"), rows)
+    for name, one in engines.items():
+        columns, cells = ground_table(one["ground"])
+        yield from table(f"Success by ground, {name}", columns, [[escape(cell) for cell in row] for row in cells])
     kinds = sorted({kind for one in engines.values() for kind in one["failures"]})
     counts = [[escape(kind), *(str(one["failures"].get(kind, 0)) for one in engines.values())] for kind in kinds]
     yield from table("Failures", ("type", *engines), counts)

@@ -34,8 +34,46 @@ def summary(episodes: Sequence[Episode]) -> dict[str, Any]:
         "faults": len(episodes) - len(valid),
         "steps": median(e.steps for e in won) if won else None,
         **effort(valid),
+        "ground": by_ground(valid),
         "episodes": [asdict(e) for e in sorted(episodes, key=lambda e: e.seed)],
     }
+
+
+def by_ground(valid: Sequence[Episode]) -> list[dict[str, Any]]:
+    """Successes by kind and level of the ground, episodes without faults; nothing where the ground has no tiles.
+
+    The level is None in the rows of all levels of a kind, the kind is None in those of all kinds.
+    """
+    found: dict[tuple[str | None, int | None], list[bool]] = {}
+    for e in valid:
+        if e.ground is not None:
+            for kind, level in ((e.ground, e.ground_level), (e.ground, None), (None, e.ground_level), (None, None)):
+                found.setdefault((kind, level), []).append(e.status == Status.SUCCESS)
+    return [
+        {
+            "kind": kind,
+            "level": level,
+            "attempts": len(won),
+            "successes": sum(won),
+            "interval": list(wilson(sum(won), len(won))),
+        }
+        for (kind, level), won in sorted(found.items(), key=lambda item: tuple((k is None, k) for k in item[0]))
+    ]
+
+
+def ground_table(rows: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[list[str]]]:
+    """Columns and cells of what `by_ground` gives: a row for each kind, a column for each level, and all of them."""
+    told = {(one["kind"], one["level"]): one for one in rows}
+    kinds, levels = (sorted({key[k] for key in told}, key=lambda one: (one is None, one)) for k in (0, 1))
+
+    def cell(one: Mapping[str, Any] | None) -> str:
+        if one is None:
+            return ""
+        low, high = (100 * share for share in one["interval"])
+        return f"{one['successes']}/{one['attempts']} ({low:.0f}-{high:.0f} %)"
+
+    columns = ["ground", *("all levels" if level is None else f"level {level}" for level in levels)]
+    return columns, [[kind or "all", *(cell(told.get((kind, level))) for level in levels)] for kind in kinds]
 
 
 def effort(valid: Sequence[Episode]) -> dict[str, float | None]:

@@ -1,8 +1,10 @@
 """A batch of envs as learners want it: an env whose episode ends begins the next one in the same step."""
 
 from collections import deque
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,6 +12,7 @@ from anysim.conventions import Array
 from anysim.errors import TaskError, listing
 from anysim.task.contract import Status
 from anysim.task.env import TaskEnv
+from anysim.task.snapshot import EnvSnapshot
 
 POLICY = "policy"
 """The group of observations that every policy may see."""
@@ -60,8 +63,10 @@ def action_range(env: TaskEnv) -> tuple[Array, Array]:
     """The middle and half of the range of each action (A,), in the units of the env.
 
     Raises:
-        TaskError: an action has no bounds.
+        TaskError: there is no action, or one has no bounds.
     """
+    if env.action_dim == 0:
+        raise TaskError(f"'{env.name}' has no actions, so nothing can be learnt; give a robot `actions` in its world")
     low, high = (np.asarray(bound, dtype=np.float64) for bound in env.action_bounds)
     if not (np.isfinite(low) & np.isfinite(high)).all():
         raise TaskError(f"the actions of '{env.name}' have no bounds, which learners need: bound its controllers")
@@ -111,6 +116,25 @@ class Batch:
         """Begin an episode in each env; the episodes to come follow from `seed`, or go on where it is None."""
         self.env.reset(seed=seed)
         self._total[:] = 0.0
+        return self._obs()
+
+    def state(self) -> dict[str, Any]:
+        """What a checkpoint keeps: the file of a snapshot of the envs as bytes, and what `averages` are of."""
+        with TemporaryDirectory() as folder:
+            file = self.env.snapshot().save(Path(folder) / "envs").read_bytes()
+        ended = [[one.env, one.status, one.total_reward, one.steps] for one in self.recent]
+        return {"envs": np.frombuffer(file, dtype=np.uint8), "total": self._total.copy(), "recent": ended}
+
+    def restore(self, state: Mapping[str, Any]) -> dict[str, Array]:
+        """Go on from there, as if it had not been put away; returns the observations, as `reset` does."""
+        with TemporaryDirectory() as folder:
+            (Path(folder) / "envs").write_bytes(state["envs"].tobytes())
+            snapshot = EnvSnapshot.load(Path(folder) / "envs")
+        self.env.reset(seed=0)
+        self.env.reset_to(snapshot)
+        self._total[:] = state["total"]
+        self.recent.clear()
+        self.recent += [EpisodeEnd(env, status, {}, *rest) for env, status, *rest in state["recent"]]
         return self._obs()
 
     def step(self, action: Array) -> Moment:

@@ -1,4 +1,4 @@
-"""`anysim train`: a policy learns a task."""
+"""`anysim train`: a policy learns a task; `anysim curves`: trainings on one page."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import contextmanager
@@ -41,13 +41,15 @@ def train(
     level: Annotated[str | None, typer.Option(help="A level of difficulty that the task has.")] = None,
     override: Overrides = None,
     out: Annotated[Path | None, typer.Option(help="Directory of the results; default runs/train-….")] = None,
+    video: Annotated[bool, typer.Option(help="Film an episode of the best policy at the end.")] = True,
     json: AsJson = False,
 ) -> None:
     """Train a policy on a task, and write it as policy.onnx.
 
-    The same command again goes on from the last checkpoint. `tensorboard --logdir DIR` draws the curves while it
-    learns; curve.jsonl has the exams: success without noise in 64 episodes of the validation split. The policy of the
-    best exam is the one that is kept. `clone` sees the images that the task observes, too.
+    The same command again goes on from the last checkpoint, as if it had not been interrupted; with more --steps, on
+    from the end. `tensorboard --logdir DIR` draws the curves while it learns; curves.html has the exams as pictures
+    and curve.jsonl as numbers: success without noise in 64 episodes of the validation split. The policy of the best
+    exam is the one that is kept, and filmed at the end. `clone` sees the images that the task observes, too.
 
     Needs torch: pip install 'anysim-learning[sb3]' (or [rsl], or [torch] for `clone`), best in an environment of its
     own.
@@ -65,6 +67,7 @@ def train(
     from anysim.plugin_parameters import checked, options_model, parameters
     from anysim.record.incoming import claim
     from anysim_learning.batch import POLICY
+    from anysim_learning.curves import PAGE
     from anysim_learning.gymnasium import PRIVILEGED
     from anysim_learning.learner import Lesson
     from anysim_learning.train import describe_training, train as run
@@ -92,13 +95,48 @@ def train(
         total = steps or getattr(made, "default_steps", 1_000_000)
         with _telling(f"{learner} on {env.name}, {env.engine.name}", total, json) as tell:
             numbers = run(driven, lesson, examined, total, exams, folder, tell)
+        drawn_by = env.engine.name
+    film = _film_best(task, drawn_by, overrides, folder, len(groups) > 1) if video else None
     if json:
-        print_json({"policy": str(folder / "policy.onnx"), **numbers})
+        print_json({"policy": str(folder / "policy.onnx"), **numbers, "video": film})
     else:
         best = f"{numbers['best']:.0%} of {_EXAMINED} episodes of the validation split solved"
         typer.echo(f"the best of {exams} exams: {best}, which flatters; the test split says how good the policy is")
+        typer.echo(f"processor time: {numbers['cpu_s']:,.0f} s, exams included; the curves: {folder / PAGE}")
         shown = " --privileged" if len(groups) > 1 else ""
         typer.echo(f"next: anysim evaluate {task} --policy {folder / 'policy.onnx'}{shown} --split test --engine all")
+
+
+def curves(
+    runs: Annotated[list[Path], typer.Argument(metavar="DIR...", help="Directories of trainings.")],
+    out: Annotated[Path, typer.Option(help="The page.")] = Path("curves.html"),
+) -> None:
+    """Draw the exams of several trainings, as of several seeds, on one page.
+
+    Examples:
+      anysim curves runs/train-reach-rsl-rl-0 runs/train-reach-rsl-rl-1 --out seeds.html
+    """
+    from anysim.record.commit import write_whole
+    from anysim_learning.curves import page, read_curve
+
+    named = {str(folder): read_curve(folder) for folder in runs}
+    out.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(out.parent, {out.name: page(named)})
+    typer.echo(f"the page: {out}")
+
+
+def _film_best(task: str, engine: str, overrides: Sequence[str], folder: Path, privileged: bool) -> str | None:
+    """The path of the video of the best policy, which the page of the curves then shows; None where there is none."""
+    from anysim.record.commit import write_whole
+    from anysim_learning.curves import PAGE, page, read_curve
+    from anysim_learning.filming import film_best
+
+    made = film_best(task, engine, overrides, folder / "policy.onnx", privileged)
+    if made.missing:
+        typer.echo(f"no video of the policy: {made.missing}", err=True)
+        return None
+    write_whole(folder, {PAGE: page({folder.name: read_curve(folder)}, made.path)})
+    return str(folder / made.path)
 
 
 _EXTRAS = {"sb3-ppo": "sb3", "rsl-rl": "rsl", "clone": "torch"}

@@ -10,7 +10,8 @@ if TYPE_CHECKING:
 
 @hookimpl
 def add_cli(app: "typer.Typer") -> None:
-    """`anysim train`."""
+    """`anysim train` and `anysim curves`."""
     from anysim_learning import cli
 
     app.command("train")(cli.train)
+    app.command("curves")(cli.curves)

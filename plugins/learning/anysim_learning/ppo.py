@@ -13,6 +13,9 @@ from anysim_schemas.base import Positive
 if TYPE_CHECKING:
     import torch  # pyright: ignore[reportMissingImports]
 
+_LAST = ("_last_obs", "_last_episode_starts")
+"""What the library's algorithms keep between two calls of `learn` and have no public name for."""
+
 
 class Sb3Ppo:
     """PPO with running normalisation of observations and rewards, both folded into what is exported."""
@@ -72,7 +75,12 @@ class Sb3Ppo:
         return {"noise": float(self._model.policy.log_std.exp().mean().item()), **self._view.batch.averages()}
 
     def state(self) -> dict[str, Any]:
-        """Weights, the optimiser's moments, and what the normalisation has seen."""
+        """Weights, the optimiser's moments, what the normalisation has seen, the envs, and both generators.
+
+        Those are torch's and numpy's global ones, from which the library draws actions and orders of rows.
+        """
+        import torch  # pyright: ignore[reportMissingImports]
+
         seen = {
             name: {"mean": rms.mean, "var": rms.var, "count": float(rms.count)}
             for name, rms in (("obs", self._normal.obs_rms), ("reward", self._normal.ret_rms))
@@ -82,11 +90,17 @@ class Sb3Ppo:
             "policy": dict(policy.state_dict()),
             "optimizer": policy.optimizer.state_dict(),
             "seen": seen,
+            "returns": self._normal.returns,
+            "last": {name: getattr(self._model, name) for name in _LAST},
+            "envs": self._view.batch.state(),
+            "draws": {"torch": torch.get_rng_state(), "numpy": np.random.get_state()},  # noqa: NPY002  that of the library
             "steps": self.steps,
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Go on from there, with episodes that follow from the seed and how far it is."""
+        """Go on from there, as if it had not been put away."""
+        import torch  # pyright: ignore[reportMissingImports]
+
         from anysim_learning.tensors import tensors
 
         self._model.policy.load_state_dict(tensors(state["policy"]))
@@ -94,8 +108,13 @@ class Sb3Ppo:
         for name, rms in (("obs", self._normal.obs_rms), ("reward", self._normal.ret_rms)):
             kept = state["seen"][name]
             rms.mean, rms.var, rms.count = kept["mean"], kept["var"], kept["count"]
+        self._normal.returns = np.array(state["returns"])
+        for name in _LAST:
+            setattr(self._model, name, np.array(state["last"][name]))
+        self._view.restore(state["envs"])
+        torch.set_rng_state(tensors(state["draws"]["torch"]))
+        np.random.set_state(state["draws"]["numpy"])  # noqa: NPY002  that of the library
         self._model.num_timesteps = int(state["steps"])
-        self._model.set_random_seed(self._view.start + self._model.num_timesteps)
 
     def network(self) -> "torch.nn.Module":
         """The mean action, in the units of the env."""

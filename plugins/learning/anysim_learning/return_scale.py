@@ -31,17 +31,15 @@ class ReturnScale:
         self._return[done] = 0.0
         return np.clip(reward / np.sqrt(self.variance + 1e-8), -CLIP, CLIP)
 
-    def begin(self) -> None:
-        """Other episodes begin in all envs."""
-        self._return[:] = 0.0
-
-    def state(self) -> dict[str, float]:
+    def state(self) -> dict[str, Any]:
         """What a checkpoint keeps."""
-        return {"mean": self.mean, "variance": self.variance, "count": self.count}
+        held = {"mean": self.mean, "variance": self.variance, "count": self.count}
+        return {**held, "returns": self._return.copy()}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Go on from there."""
         self.mean, self.variance, self.count = (float(state[name]) for name in ("mean", "variance", "count"))
+        self._return[:] = state["returns"]
 
     def _take_in(self, rows: Array) -> None:
         """Mean and variance of two samples together (Chan et al. 1979)."""

@@ -90,12 +90,15 @@ class RslPpo:
         return {"noise": noise, **self._view.batch.averages()}
 
     def state(self) -> dict[str, Any]:
-        """What rsl_rl saves, the scale of rewards, and how far it is."""
+        """What rsl_rl saves, the scale of rewards, the envs, the generator, and how far it is."""
+        import torch  # pyright: ignore[reportMissingImports]
+
         alg = self._runner.alg
-        return {"saved": alg.save(), "rate": alg.learning_rate, "scale": self._scale.state(), "steps": self.steps}
+        learnt = {"saved": alg.save(), "rate": alg.learning_rate, "scale": self._scale.state()}
+        return {**learnt, "envs": self._view.batch.state(), "draws": torch.get_rng_state(), "steps": self.steps}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Go on from there, with episodes that follow from the seed and how far it is."""
+        """Go on from there, as if it had not been put away."""
         import torch  # pyright: ignore[reportMissingImports]
 
         from anysim_learning.tensors import tensors
@@ -104,8 +107,8 @@ class RslPpo:
         self._runner.alg.learning_rate = float(state["rate"])
         self._scale.restore(state["scale"])
         self.steps = int(state["steps"])
-        torch.manual_seed(self._lesson.seed + self.steps)
-        self._view.begin(self._lesson.seed + self.steps)
+        self._view.restore(state["envs"])
+        torch.set_rng_state(tensors(state["draws"]))
 
     def network(self) -> "torch.nn.Module":
         """The mean action, in the units of the env."""

@@ -1,5 +1,6 @@
 """The view for rsl_rl 5: a `VecEnv` with all observation groups, and its actor as a network of plain tensors."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -43,11 +44,9 @@ class RslVecEnv(VecEnv):
         extras = {"time_outs": torch.from_numpy(moment.truncated.copy())}
         return self.get_observations(), _tensor(reward), _tensor(moment.done).long(), extras
 
-    def begin(self, seed: int) -> None:
-        """Begin other episodes."""
-        if self.scale is not None:
-            self.scale.begin()
-        self._obs = self.batch.reset(seed)
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Go on with the envs as `batch.state` kept them."""
+        self._obs = self.batch.restore(state)
 
 
 class Actor(torch.nn.Module):

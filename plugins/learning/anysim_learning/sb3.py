@@ -1,6 +1,6 @@
 """The view for Stable-Baselines3: a `VecEnv` whose observation is one vector, of the policy's group unless asked."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -40,6 +40,11 @@ class Sb3VecEnv(VecEnv):
         seed = None if self._begun else self.start
         self._begun = True
         return self._joined(self.batch.reset(seed))
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Go on with the envs as `batch.state` kept them."""
+        self.batch.restore(state)
+        self._begun = True
 
     def step_async(self, actions: Array) -> None:
         """Note the actions (N, A) of the next step."""

@@ -4,15 +4,17 @@ import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 from anysim.errors import RecordError, TaskError
 from anysim.record.commit import write_whole
 from anysim.task.env import TaskEnv
 from anysim_learning import checkpoint
+from anysim_learning.curves import CURVE, PAGE, page
 from anysim_learning.learner import Learner, Lesson
 
-POLICY, CHECKPOINT, ABOUT, CURVE = "policy.onnx", "checkpoint.npz", "train.json", "curve.jsonl"
+POLICY, CHECKPOINT, ABOUT = "policy.onnx", "checkpoint.npz", "train.json"
 
 Tell = Callable[[Mapping[str, float]], None]
 
@@ -22,7 +24,9 @@ def train(
 ) -> Mapping[str, float]:
     """Learn until `steps` are done, from the checkpoint in `out` on where there is one; returns the last numbers.
 
-    The policy that is kept is that of the best exam, the latest of equals: `best` of the numbers is its success.
+    The policy that is kept is that of the best exam, the latest of equals: `best` of the numbers is its success, and
+    `cpu_s` the processor time of this process and of those before it [s]. All else is the same after an interruption
+    as without one.
 
     Args:
         learner: that of the lesson.
@@ -30,7 +34,7 @@ def train(
         examined: envs of the same task for exams, one episode in each.
         steps: when to end, as the learner counts.
         exams: how many there are on the way; a checkpoint is written after each.
-        out: where `policy.onnx`, `checkpoint.npz`, `curve.jsonl` and TensorBoard's files go.
+        out: where `policy.onnx`, `checkpoint.npz`, `curve.jsonl`, `curves.html` and TensorBoard's files go.
         tell: is called with the numbers of each stretch, and how many `steps` are done.
     """
     from torch.utils.tensorboard import SummaryWriter  # pyright: ignore[reportMissingImports]
@@ -44,6 +48,7 @@ def train(
     rows = [row for row in rows if row["steps"] <= learner.steps]  # what was learnt after it is learnt again
     about = described(lesson.env, lesson.groups, learner.chunk, lesson.images)
     numbers: dict[str, float] = rows[-1] if rows else {}
+    spent = numbers.get("cpu_s", 0.0) - process_time()
     with closing(SummaryWriter(str(out / "tensorboard"), purge_step=learner.steps)) as board:
         for goal in _goals(learner.steps, steps, exams):
             while learner.steps < goal:
@@ -55,14 +60,16 @@ def train(
             passed = exam(examined, (*lesson.groups, *lesson.images), network)
             best = max((row["exam"] for row in rows), default=0.0)
             numbers = {**numbers, "steps": learner.steps, "exam": passed, "best": max(passed, best)}
+            numbers["cpu_s"] = round(spent + process_time(), 1)
             board.add_scalar("exam", passed, learner.steps)
             tell(numbers)
             rows.append(numbers)
-            checkpoint.save(out / CHECKPOINT, learner.state())
             if passed >= best:
                 told = about.model_copy(update={"seed": lesson.seed, "steps": learner.steps})
                 export(network, told, out / POLICY)
-            write_whole(out, {CURVE: "".join(json.dumps(row) + "\n" for row in rows)})
+            write_whole(out, {CURVE: "".join(json.dumps(row) + "\n" for row in rows), PAGE: page({out.name: rows})})
+            # Last: what a killed process wrote after the checkpoint before is learnt and written again.
+            checkpoint.save(out / CHECKPOINT, learner.state())
     return numbers
 
 

@@ -213,7 +213,7 @@ def test_orders_are_checked_with_their_keys() -> None:
     assert read_orders("{point_cloud: {stride: 2}}") == {"point_cloud": {"stride": 2}}
     with pytest.raises(PluginError, match="no annotator named 'boxes' is installed; did you mean 'boxes_"):
         read_orders("boxes")
-    with pytest.raises(SpecError, match=r"annotate.point_cloud.stride: Input should be greater"):
+    with pytest.raises(SpecError, match=r"annotate.point_cloud.stride: must be at least 1"):
         read_orders("{point_cloud: {stride: 0}}")
     with pytest.raises(SpecError, match="names no annotator"):
         read_orders(",")

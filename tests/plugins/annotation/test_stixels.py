@@ -53,7 +53,7 @@ def test_the_command_names_it_and_checks_its_parameters(site: Path, tmp_path: Pa
     (tmp_path / "episodes" / "env_0000_episode_0000").mkdir(parents=True)
     words = ("-m", "anysim.cli", "render", str(tmp_path), "--annotate")
     done = run(site, *words, "{stixels: {reach: -1}}")
-    assert "annotate.stixels.reach: Input should be greater than 0" in done.stderr
+    assert "annotate.stixels.reach: must be greater than 0" in done.stderr
 
 
 @pytest.mark.parametrize("name", OURS)

@@ -1,6 +1,7 @@
 """`anysim evaluate`: the same episodes whatever the envs, logs that go on, and what is said of the outcomes."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -22,7 +23,7 @@ from anysim_evaluation.expert import ExpertPolicy
 from anysim_evaluation.log import EpisodeLog
 from anysim_evaluation.page import page
 from anysim_evaluation.policy import make_policy
-from anysim_evaluation.summary import agreement, agreements, gap_interval, summary
+from anysim_evaluation.summary import agreement, agreements, gap_interval, ground_table, summary
 
 BLIND = ["record.cameras=[]"]
 SEEDS = episode_seeds("validation", 0, 5)
@@ -175,6 +176,46 @@ def test_faults_are_no_attempts() -> None:
     assert told["success_rate"] == pytest.approx(1 / 3)
     assert told["interval"] == pytest.approx([0.0615, 0.7923], abs=1e-3)
     assert told["steps"] == 11
+
+
+def test_successes_by_kind_and_level_of_the_ground() -> None:
+    said = [("pits", 1, False), ("stairs down", 1, True), ("stairs down", 1, True), ("pits", 0, True)]
+    tiles = [replace(episode(k, won), ground=kind, ground_level=level) for k, (kind, level, won) in enumerate(said)]
+    told = summary([*tiles, Episode(9, "fault", "fault", 1, 0.0, ground="pits", ground_level=0)])["ground"]
+    rows = {(one["kind"], one["level"]): (one["successes"], one["attempts"]) for one in told}
+    assert rows == {
+        ("pits", 0): (1, 1),
+        ("pits", 1): (0, 1),
+        ("pits", None): (1, 2),
+        ("stairs down", 1): (2, 2),
+        ("stairs down", None): (2, 2),
+        (None, 0): (1, 1),
+        (None, 1): (2, 3),
+        (None, None): (3, 4),
+    }
+    assert told[-1]["interval"] == pytest.approx([0.3006, 0.9544], abs=1e-4)
+    columns, cells = ground_table(told)
+    assert columns == ["ground", "level 0", "level 1", "all levels"]
+    assert [row[0] for row in cells] == ["pits", "stairs down", "all"]
+    assert cells[1] == ["stairs down", "", "2/2 (34-100 %)", "2/2 (34-100 %)"]
+    assert summary([episode(1)])["ground"] == []
+
+
+def test_episodes_on_tiles_say_where_they_were(tmp_path: Path) -> None:
+    """Each draws its tile; the same seed the same tile, and the log keeps it."""
+    ground = (
+        "{kind: tiles, cell: 0.2, tiles: {rows: 2, size: 4.0, columns: [{kind: stairs, down: true}, {kind: pits}]}}"
+    )
+    words = ["reach", "-e", "mujoco", "-p", "zero", "-k", "8", "--out", str(tmp_path), "-o", "task.horizon=2"]
+    done = CliRunner().invoke(app, [*words, "-o", f"world.terrain={ground}"])
+    assert done.exit_code == 0, done.exception
+    assert "level 0" in done.output
+    told = json.loads((tmp_path / "evaluation.json").read_text())["engines"]["mujoco"]
+    seen = {(one["ground"], one["ground_level"]) for one in told["episodes"]}
+    assert seen <= {(kind, level) for kind in ("stairs down", "pits") for level in (0, 1)}
+    assert len(seen) > 1
+    assert told["ground"][-1]["attempts"] == 8
+    assert "Success by ground, mujoco" in (tmp_path / "evaluation.html").read_text()
 
 
 def test_agreement_is_cohens_and_mcnemars() -> None:

@@ -2,22 +2,26 @@
 
 import importlib
 import json
+import shutil
 import tempfile
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 import typer
+from PIL import Image
 from typer.testing import CliRunner
 
 import anysim
-from anysim.errors import RecordError, TaskError
+from anysim.errors import EngineError, RecordError, TaskError
 from anysim.record import incoming
 from anysim.record.collector import Collector
 from anysim.record.reader import open_trajectory
 from anysim.skills.runner import SkillPolicy
-from anysim.testing.engines import require_engine
+from anysim.task.env import TaskEnv
+from anysim.testing.engines import require_drawing, require_engine
 from anysim_learning import cli
 
 torch = pytest.importorskip("torch", reason="the learners need torch: make test-learning")
@@ -115,10 +119,11 @@ def test_a_learner_goes_on_where_it_was_put_away(name: str, runs: Path, tmp_path
             assert np.array_equal(other.network().eval()(rows).numpy(), before)
         other.advance()
         assert other.steps == 2 * first.steps
-        if name in ("clone", "transformer"):  # nothing of it depends on the envs
-            first.advance()
-            with torch.inference_mode():
-                assert np.array_equal(other.network().eval()(rows).numpy(), first.network().eval()(rows).numpy())
+    with anysim.make("reach", engine="mujoco", num_envs=4, overrides=QUIET) as env:
+        whole, _ = learner(name, env, runs)
+        whole.advance(), whole.advance()
+        with torch.inference_mode():
+            assert np.array_equal(other.network().eval()(rows).numpy(), whole.network().eval()(rows).numpy())
 
 
 def test_a_training_is_interrupted_and_goes_on(runs: Path, tmp_path: Path) -> None:
@@ -226,7 +231,6 @@ def test_rewards_are_scaled_by_the_deviation_of_the_return() -> None:
         assert np.allclose(scaled, np.clip(reward / np.std(seen), -10.0, 10.0), rtol=1e-6)
     again = ReturnScale(16, 0.9)
     again.restore(scale.state())
-    again.begin(), scale.begin()
     late = np.full(16, 5.0)
     assert np.array_equal(again(late, late < 0), scale(late, late < 0))
 
@@ -375,3 +379,45 @@ def test_the_command_clones_from_images_and_evaluates(filmed: Path, tmp_path: Pa
 
         policy = make_policy(env, str(tmp_path / "out" / "policy.onnx"))
         assert [one.status for one in drive(env, policy, [10_000, 10_001])] == ["truncated"] * 2
+
+
+def test_the_best_policy_is_filmed_and_its_curves_are_drawn(tmp_path: Path) -> None:
+    require_drawing("mujoco")
+    app = typer.Typer()
+    for command in (cli.train, cli.curves):
+        app.command()(command)
+    out = tmp_path / "out"
+    words = ["train", "reach", "-n", "2", "--steps", "32", "--exams", "2", "--option", "n_steps=8", "-e", "mujoco"]
+    words += ["-o", "task.horizon=20", "-o", "world.cameras.front.size=[64, 48]", "--out", str(out)]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.exception
+    assert "processor time: " in done.output
+    with Image.open(out / "videos" / "best.webp") as video:
+        assert (video.size, getattr(video, "n_frames", 1)) == ((64, 48), 5)
+    text = (out / "curves.html").read_text("utf-8")
+    assert 'src="videos/best.webp"' in text
+    assert ElementTree.fromstring(text.partition("\n")[2]) is not None
+    rows = [json.loads(line) for line in (out / "curve.jsonl").read_text().splitlines()]
+    assert 0.0 < rows[0]["cpu_s"] <= rows[1]["cpu_s"]
+    page = tmp_path / "pages" / "both.html"
+    shutil.copytree(out, tmp_path / "again")
+    done = CliRunner().invoke(app, ["curves", str(out), str(tmp_path / "again"), "--out", str(page)])
+    assert done.exit_code == 0, done.exception
+    assert page.read_text("utf-8").count("<polyline") == 2 * text.count("<polyline")
+    missing = CliRunner().invoke(app, ["curves", str(tmp_path / "none"), "--out", str(page)])
+    assert "has no exams" in str(missing.exception)
+
+
+def test_a_training_ends_well_where_nothing_draws(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def dark(*_: Any, **__: Any) -> Any:
+        raise EngineError("there is no renderer here")
+
+    monkeypatch.setattr(TaskEnv, "render", dark)
+    app = typer.Typer()
+    app.command()(cli.train)
+    words = ["reach", "-n", "2", "--steps", "16", "--exams", "1", "--option", "n_steps=8", "-e", "mujoco"]
+    done = CliRunner().invoke(app, [*words, "-o", "task.horizon=20", "--out", str(tmp_path)])
+    assert done.exit_code == 0, done.exception
+    assert "no video of the policy: there is no renderer here" in done.stderr
+    assert (tmp_path / "policy.onnx").exists()
+    assert "<img" not in (tmp_path / "curves.html").read_text()

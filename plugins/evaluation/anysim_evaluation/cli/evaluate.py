@@ -69,8 +69,8 @@ def evaluate(
     """Say how often a policy solves a task, on one engine or on all, from the same episode seeds.
 
     Each episode is on the disk once it has ended: the same command again goes on where an interrupted one stopped. At
-    the end `evaluation.json` and `evaluation.html` have rates with 95 % intervals, failures by type, and how far the
-    engines agree seed by seed.
+    the end `evaluation.json` and `evaluation.html` have rates with 95 % intervals, by kind and level of the ground
+    where it has tiles, failures by type, and how far the engines agree seed by seed.
 
     BENCHMARK:TASK is a task of an external benchmark (`anysim list benchmarks`), judged by its own rule.
 
@@ -236,6 +236,7 @@ def _filmed(
 
 def _tell(told: Mapping[str, Any]) -> None:
     from anysim.cli.output import print_table
+    from anysim_evaluation.summary import ground_table
 
     def row(name: str, one: Mapping[str, Any]) -> tuple[Any, ...]:
         failures = ", ".join(f"{count} {kind}" for kind, count in one["failures"].items())
@@ -246,6 +247,9 @@ def _tell(told: Mapping[str, Any]) -> None:
     engines: Mapping[str, Any] = told["engines"]
     columns = ("engine", "solved", "95 %", "failures", "steps", "faults")
     print_table(f"{told['policy']} on {told['task']}", columns, [row(*entry) for entry in engines.items()])
+    for name, one in engines.items():
+        if one["ground"]:
+            print_table(f"Success by ground, {name}", *ground_table(one["ground"]))
     pairs = [pair for pair in told["agreement"] if pair["seeds"]]
     if pairs:
         rows = [
