@@ -32,7 +32,7 @@ WORDS = {
     "evaluation": "`anysim evaluate`, `anysim benchmark`: how often policies solve tasks, and whether engines agree",
     "export": "`anysim export`: recorded runs as data sets of LeRobot, robomimic, RLDS and webdataset; `anysim tape`",
     "film": "`anysim render`: videos of recorded episodes, with other sizes, looks or engines",
-    "inspect": "`anysim list`, `check`, `doctor`, `audit`, `explain`, `replay`, `snapshot`: what is here, drawn, recorded",
+    "inspect": "`anysim list`, `check`, `doctor`, `audit`, `explain`, `replay`, `snapshot`: what is here, drawn, kept",
     "kinematics": "mechanics of robots (Pinocchio), for controllers of your own",
     "language": "`anysim describe`, `anysim vqa`: scenes and episodes in words, questions with verified answers",
     "learning": "`anysim train`, tasks for gymnasium, views for learners; torch is `anysim-learning[sb3]` or `[rsl]`",

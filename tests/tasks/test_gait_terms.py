@@ -74,6 +74,45 @@ def test_swinging_feet_rise_and_come_down() -> None:
             )
 
 
+STEP = {"kind": "pits", "depth": 0.1, "platform": 1.2, "cell": 0.1, "size": [4.0, 4.0]}
+"""Up by 0.1 m from x 0.6 to 0.7 m; the robot begins at the bottom."""
+
+
+def on_a_step(env: TaskEnv, x: float, height: float) -> None:
+    root = env.engine.index.entity("dog").root
+    env.engine.set_body_state(np.array([[[x, 0.0, height, 0.0, 0.0, 0.0, 1.0]]]), None, None, [root])
+    env.scene.look(None)
+
+
+def test_a_swinging_foot_is_to_clear_the_step_ahead() -> None:
+    world = {**DOG["world"], "terrain": STEP}
+    with dog(world=world) as env:
+        env.reset(seed=0)
+        env.scene.elapsed[:] = 5  # phases 0.25 and 0.75: a front foot swings, and the hind foot across
+        lift = 0.5 * (1.0 - np.cos(2.0 * np.pi * (0.75 - 0.55) / 0.45))
+        foot = env.engine.index.frame("dog.FL_foot")
+        pose = env.scene.state.body_pose[0, foot.body]
+        front = float((pose[:3] + P.rotate(pose[3:], np.array(foot.position)))[0])
+        for ahead, ground, rise in ((0.15, 0.0, 0.0), (0.05, 0.0, 0.05), (-0.05, 0.05, 0.05), (-0.15, 0.1, 0.0)):
+            on_a_step(env, 0.6 - ahead - front, HEIGHT)
+            wanted = lift * (0.2 + rise / HEIGHT), lift * 0.2
+            found = said(env, "swing_height_l2", frequency=2.5, around=0.1)
+            swung = (-ground / HEIGHT - wanted[0]) ** 2 + wanted[1] ** 2
+            np.testing.assert_allclose(found, swung, atol=2e-4, err_msg=f"{ahead} m before the step")
+
+
+def test_a_base_over_a_step_is_as_high_as_over_its_feet() -> None:
+    with dog(world={**DOG["world"], "terrain": STEP}) as env:
+        env.reset(seed=0)
+        for x, mean in ((0.0, 0.0), (0.72, 0.05), (1.5, 0.1)):  # all feet below, two, none
+            on_a_step(env, x, HEIGHT + mean)
+            np.testing.assert_allclose(said(env, "base_height_l2", share=1.0), 0.0, atol=1e-6)
+            on_a_step(env, x, 0.49 * HEIGHT + mean)
+            assert said(env, "base_sunk", "predicate") == 1.0
+            on_a_step(env, x, 0.51 * HEIGHT + mean)
+            assert said(env, "base_sunk", "predicate") == 0.0
+
+
 def test_feet_slide_with_the_base_while_they_touch_the_ground() -> None:
     with dog() as env:
         env.reset(seed=0)

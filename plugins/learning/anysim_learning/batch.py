@@ -103,14 +103,25 @@ class Batch:
         self._horizon = np.inf if env.spec.task is None else env.spec.task.horizon
 
     def averages(self) -> dict[str, float]:
-        """`reward`, `steps_per_episode` and `success` of recent episodes; nothing before the first has ended."""
+        """`reward`, `steps_per_episode` and `success` of recent episodes; nothing before the first has ended.
+
+        Where envs climb levels of ground: their mean `level`, and `level/N`, the share of envs on each.
+        """
         if not self.recent:
             return {}
         return {
+            **self._levels(),
             "reward": float(np.mean([one.total_reward for one in self.recent])),
             "steps_per_episode": float(np.mean([one.steps for one in self.recent])),
             "success": float(np.mean([one.status == Status.SUCCESS for one in self.recent])),
         }
+
+    def _levels(self) -> dict[str, float]:
+        terrain = self.env.scene.terrain
+        if terrain is None or not terrain.climbs:
+            return {}
+        shares = np.bincount(terrain.level, minlength=terrain.rows) / self.env.num_envs
+        return {"level": float(terrain.level.mean()), **{f"level/{n}": float(v) for n, v in enumerate(shares)}}
 
     def reset(self, seed: int | None = None) -> dict[str, Array]:
         """Begin an episode in each env; the episodes to come follow from `seed`, or go on where it is None."""

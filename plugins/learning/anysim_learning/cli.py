@@ -31,6 +31,9 @@ def train(
     data: Annotated[
         list[Path] | None, typer.Option("--data", help="A run to learn from, for `clone`; may be repeated.")
     ] = None,
+    start: Annotated[
+        Path | None, typer.Option("--from", help="A directory of `anysim train`: begin with the networks learnt there.")
+    ] = None,
     option: Annotated[
         list[str] | None, typer.Option("--option", help="A hyperparameter, KEY=VALUE; may be repeated.")
     ] = None,
@@ -49,7 +52,8 @@ def train(
     The same command again goes on from the last checkpoint, as if it had not been interrupted; with more --steps, on
     from the end. `tensorboard --logdir DIR` draws the curves while it learns; curves.html has the exams as pictures
     and curve.jsonl as numbers: success without noise in 64 episodes of the validation split. The policy of the best
-    exam is the one that is kept, and filmed at the end. `clone` sees the images that the task observes, too.
+    exam is the one that is kept, and filmed at the end. --from begins with what a training of a task has learnt that
+    observes the same, or the first of it. `clone` sees the images that the task observes, too.
 
     Needs torch: pip install 'anysim-learning[sb3]' (or [rsl], or [torch] for `clone`), best in an environment of its
     own.
@@ -57,6 +61,7 @@ def train(
     Examples:
       anysim train reach --steps 2000000
       anysim train pick_cube --privileged --engine mujoco --num-envs 64
+      anysim train go1_velocity_rough --learner rsl-rl --from runs/train-go1_velocity-rsl-rl-0 --option width=128
       anysim train pick_cube --learner clone --data runs/pick_cube --privileged
       anysim evaluate reach --policy runs/train-reach-sb3-ppo-0/policy.onnx --split test --engine all
     """
@@ -70,7 +75,7 @@ def train(
     from anysim_learning.curves import PAGE
     from anysim_learning.gymnasium import PRIVILEGED
     from anysim_learning.learner import Lesson
-    from anysim_learning.train import describe_training, train as run
+    from anysim_learning.train import CHECKPOINT, describe_training, train as run
 
     folder = out or Path("runs") / "-".join(["train", Path(task).stem, *([level] if level else []), learner, str(seed)])
     overrides = [*(override or ()), *([] if level is None else [f"level={level}"]), "record.cameras=[]"]
@@ -88,10 +93,15 @@ def train(
         runs = tuple(path.resolve() for path in data or ())
         coloured = tuple(name for name, shape in env.image_shapes.items() if len(shape) == 3)
         images = coloured if getattr(made, "sees_images", False) else ()
-        describe_training(folder, _about(env, learner, (*groups, *images), seed, given.model_dump(), runs))
+        about = _about(env, learner, (*groups, *images), seed, given.model_dump(), runs)
+        describe_training(folder, about if start is None else {**about, "from": str(start.resolve())})
         lesson = Lesson(env, groups, seed, runs, images)
         with registry.using("learners", learner, (ValueError,)):
             driven = made(lesson, **{key: getattr(given, key) for key in parameters(made)})
+        if start is not None and not (folder / CHECKPOINT).exists():
+            from anysim_learning.adopt import begin_with
+
+            begin_with(driven, lesson, start)
         total = steps or getattr(made, "default_steps", 1_000_000)
         with _telling(f"{learner} on {env.name}, {env.engine.name}", total, json) as tell:
             numbers = run(driven, lesson, examined, total, exams, folder, tell)
@@ -168,7 +178,7 @@ def _telling(what: str, total: int, quiet: bool) -> "Iterator[Any]":
     from anysim.cli.output import interactive
 
     def words(numbers: Mapping[str, float]) -> str:
-        shown = {k: v for k, v in numbers.items() if k != "steps"}
+        shown = {k: v for k, v in numbers.items() if k != "steps" and "/" not in k}
         return ", ".join(f"{name} {value:.3g}" for name, value in shown.items())
 
     if quiet:

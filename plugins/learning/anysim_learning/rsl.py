@@ -18,6 +18,9 @@ from anysim_schemas.base import Positive
 if TYPE_CHECKING:
     import torch  # pyright: ignore[reportMissingImports]
 
+_ADOPTED = 4
+"""As many stretches count what the normalisation of adopted networks has seen: less than what it will see here."""
+
 
 class RslPpo:
     """PPO with running normalisation and an adaptive rate; the critic sees every observation group there is."""
@@ -109,6 +112,27 @@ class RslPpo:
         self.steps = int(state["steps"])
         self._view.restore(state["envs"])
         torch.set_rng_state(tensors(state["draws"]))
+
+    def adopt(self, state: Mapping[str, Any]) -> None:
+        """Begin with the networks of another training, whose observations are the first of these.
+
+        What is observed beyond them has no weight yet. Noise, rate and steps are those of a beginning.
+
+        Raises:
+            TaskError: the networks are of another size.
+        """
+        import torch  # pyright: ignore[reportMissingImports]
+
+        from anysim_learning.adopt import widened
+        from anysim_learning.tensors import tensors
+
+        alg = self._runner.alg
+        made, saved = alg.save(), tensors(state["saved"])
+        for key in ("actor_state_dict", "critic_state_dict"):
+            made[key] = widened(saved[key], made[key])
+            made[key]["obs_normalizer.count"] = torch.tensor(_ADOPTED * self._stretch)
+        alg.load(made, {"actor": True, "critic": True}, True)
+        self._scale.restore(state["scale"])
 
     def network(self) -> "torch.nn.Module":
         """The mean action, in the units of the env."""

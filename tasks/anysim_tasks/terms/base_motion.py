@@ -34,9 +34,12 @@ def flat_orientation_l2(scene: SceneView, *, robot: RobotView) -> Array:
 
 
 def _over_ground(scene: SceneView, robot: RobotView) -> Array:
-    """(n,) height of the base over the ground under it, as a share of that at home."""
-    at = robot.base.position
-    return (at[:, 2] - np.nan_to_num(scene.engine.world.ground.heights_at(at))) / Feet.of(scene, robot).height
+    """(n,) height of the base over the mean ground under its feet, as a share of that at home.
+
+    Not over the ground under the base: that rises at once where a robot begins to climb a step.
+    """
+    feet = Feet.of(scene, robot)
+    return (robot.base.position[:, 2] - feet.ground.mean(axis=1)) / feet.height
 
 
 def base_height_l2(scene: SceneView, *, robot: RobotView, share: Share = 0.93) -> Array:

@@ -18,6 +18,8 @@ TOUCH = 0.005
 Frequency = Annotated[float, Field(gt=0, description="strides a second [1/s]")]
 Duty = Annotated[float, Field(ge=0.5, lt=1, description="share of a stride that a foot stands")]
 
+_ROSE = np.stack([np.cos(np.arange(8) * np.pi / 4), np.sin(np.arange(8) * np.pi / 4)], axis=1)
+
 
 class Feet:
     """The feet of a robot, in the order of its legs.
@@ -63,8 +65,11 @@ class Feet:
         pose = self._scene.state.body_pose[self._scene.rows][:, self._bodies]
         self._arm = P.rotate(pose[..., 3:], np.broadcast_to(self._local, pose[..., :3].shape))
         at = pose[..., :3] + self._arm
-        ground = np.nan_to_num(self._scene.engine.world.ground.heights_at(at))
-        self._above, self._moment = at[..., 2] - self._below - ground, self._scene.moment
+        self._at, self._ground = at, self._heights(at)
+        self._above, self._moment = at[..., 2] - self._below - self._ground, self._scene.moment
+
+    def _heights(self, at: Array) -> Array:
+        return np.nan_to_num(self._scene.engine.world.ground.heights_at(at))
 
     @property
     def above(self) -> Array:
@@ -72,6 +77,18 @@ class Feet:
         if self._moment != self._scene.moment:
             self._see()
         return self._above
+
+    @property
+    def ground(self) -> Array:
+        """(n, L) the height of the ground under each foot [m]."""
+        if self._moment != self._scene.moment:
+            self._see()
+        return self._ground
+
+    def rise(self, reach: float) -> Array:
+        """(n, L) by how much the ground is higher at most in eight places `reach` [m] from each foot."""
+        ground = self.ground
+        return np.maximum(self._heights(self._at[..., None, :2] + reach * _ROSE).max(axis=2) - ground, 0.0)
 
     @property
     def speed(self) -> Array:
@@ -111,14 +128,16 @@ def swing_height_l2(
     frequency: Frequency,
     duty: Duty = 0.55,
     clearance: Annotated[float, Field(gt=0, description="highest, as a share of the base's height at home")] = 0.2,
+    around: Annotated[float, Field(ge=0, description="it is to clear ground as far from it, too [m]")] = 0.0,
 ) -> Array:
     """Squared error of how high swinging feet are, as shares of the base's height at home, summed up.
 
-    A foot is to rise and come down once while the clock lets it swing.
+    A foot is to rise and come down once while the clock lets it swing, and `around` it clears what is higher, too.
     """
     feet = Feet.of(scene, robot)
     swung = (feet.phase(frequency) - duty) / (1.0 - duty)
-    wanted = 0.5 * clearance * (1.0 - np.cos(2.0 * np.pi * swung))
+    highest = clearance + feet.rise(around) / feet.height if around else clearance
+    wanted = 0.5 * highest * (1.0 - np.cos(2.0 * np.pi * swung))
     return (((feet.above / feet.height - wanted) ** 2) * (swung > 0.0)).sum(axis=1)
 
 

@@ -54,6 +54,19 @@ def test_a_batch_is_the_env_with_actions_of_unit_range() -> None:
         assert np.array_equal(moment.obs["policy"], same.obs["policy"]), "the next episodes have begun"
 
 
+def test_a_batch_says_on_which_levels_its_envs_are() -> None:
+    tiles = "world.terrain={kind: tiles, tiles: {rows: 3, columns: [rough], size: 4, choose: curriculum, start: 0}}"
+    overrides = [*blinding("stand_still"), tiles, "task.horizon=1"]
+    with anysim.make("stand_still", engine="null", num_envs=4, overrides=overrides, curriculum=True) as env:
+        batch = Batch(env)
+        batch.reset(0)
+        assert env.scene.terrain is not None
+        env.scene.terrain.promote(np.array([1, 2]), np.array([1, 2]))
+        batch.step(np.zeros((4, env.action_dim)))
+        found = batch.averages()
+        assert (found["level"], found["level/0"], found["level/1"], found["level/2"]) == (0.75, 0.5, 0.25, 0.25)
+
+
 def test_success_in_the_last_step_ends_no_more_than_the_time_does() -> None:
     lasting = "task.success={up: {term: not, of: {low: {term: below, frame: dog, height: 0.1}}}}"
     for horizon, hold, out_of_time in ((3, 3, True), (4, 3, False)):
