@@ -78,15 +78,19 @@ class RayCamera:
 
     def __init__(self, width: int, height: int, fov: ArrayLike, near: float = 0.01, far: float = inf) -> None:
         """`fov` is the vertical field of view [degrees], one for all envs or (N,)."""
-        from anysim_sensors.kernels import images, motion, rays
+        from anysim_sensors.kernels import images, motion, pinhole
 
-        self._kernels, self._view, self._follow = images, rays.view, motion.follow
+        self._kernels, self._view, self._follow = images, pinhole.view, motion.follow
         self.width, self.height, self.near, self.far = width, height, near, far
         self.focal = height / (2 * np.tan(np.radians(np.atleast_1d(np.asarray(fov, dtype=float))) / 2))
         x, y = np.meshgrid(np.arange(width) + 0.5 - width / 2, np.arange(height) + 0.5 - height / 2)
         f = self.focal[:, None]
         along = np.stack([x.ravel() / f, y.ravel() / f, np.ones((len(self.focal), x.size))], axis=-1)
         self.directions = along / np.linalg.norm(along, axis=-1, keepdims=True)
+        x, y, z = np.moveaxis(self.directions, -1, 0)
+        self._lines = np.ascontiguousarray(
+            np.stack([x, y, z], axis=1) * (1.0 / np.sqrt(x * x + y * y + z * z))[:, None]
+        )
         self._reach = far / float(self.directions[..., 2].min())
 
     def images(
@@ -111,7 +115,7 @@ class RayCamera:
         """
         envs, rows = len(frames), self.directions.shape[1]
         distance, number = np.empty((envs, rows)), np.empty((envs, rows), dtype=np.int32)
-        normal = np.zeros((envs if normals else 0, rows, 3))
+        normal = np.empty((envs if normals else 0, rows, 3))
         area = np.empty((envs if whole else 0, len(scene.world.entities) + 1), dtype=np.int32)
         self._view(
             scene.geoms,
@@ -120,6 +124,7 @@ class RayCamera:
             scene.all if seen is None else seen,
             np.ascontiguousarray(frames, dtype=float),
             self.directions,
+            self._lines,
             self.focal,
             self.width,
             self._reach,

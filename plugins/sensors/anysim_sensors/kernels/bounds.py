@@ -15,6 +15,8 @@ from anysim_sensors.tables import BOX, CAPSULE, CYLINDER, PLANE, SPHERE, GeomPos
 
 compiled = partial(in_numba, nogil=True)
 """The decorator of all kernels."""
+guarded = partial(in_numba, nogil=True, error_model="numpy")
+"""And of those that never divide by zero, which need not look whether they do: loops of them take several at once."""
 tell_of_compiling()
 
 BINS = 16

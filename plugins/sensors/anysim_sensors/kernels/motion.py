@@ -1,6 +1,7 @@
 """Compiled motion of pixels: where what is seen was in the image before, and whether it could be seen there.
 
-The shapes are crossed by the functions of `rays`: numba's cache of this file does not notice a change of those.
+The shapes are crossed by the functions of `rays`, and found by those of `pinhole`: numba's cache of this file does not
+notice a change of either.
 """
 
 import math
@@ -9,7 +10,8 @@ import numpy as np
 
 from anysim.conventions import Array
 from anysim_sensors.kernels.bounds import compiled
-from anysim_sensors.kernels.rays import cross_convex, cross_mesh, find_window, turn_of, turned
+from anysim_sensors.kernels.pinhole import find_window
+from anysim_sensors.kernels.rays import cross_convex, cross_mesh, turn_of, turned
 from anysim_sensors.tables import CYLINDER, PLANE, GeomPoses, Geoms, Triangles
 
 TILES = 32

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from anysim.conventions import Array
-from anysim_sensors.kernels.bounds import compiled
+from anysim_sensors.kernels.bounds import compiled, guarded
 from anysim_sensors.tables import BOX, CAPSULE, CYLINDER, PLANE, SPHERE, GeomPoses, Geoms, Triangles
 
 FEW = 96
@@ -22,13 +22,14 @@ EDGE = 1e-12
 ALMOST = 1.0 + 1e-14
 
 
-@compiled
-def _inverse(d: float) -> float:
+@guarded
+def inverse(d: float) -> float:
+    """What a number is divided by when it is multiplied by this; large, not endless, of nearly nothing."""
     return 1.0 / d if abs(d) > 1e-300 else 1e300
 
 
 @compiled
-def _enter(box: Array, i: int, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float) -> float:
+def enter_box(box: Array, i: int, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float) -> float:
     """Distance at which a ray of origin o and inverse direction i enters box i (6,); inf if it does not."""
     p, q = (box[i, 0] - ox) * ix, (box[i, 3] - ox) * ix
     enter, leave = (p, q) if p < q else (q, p)
@@ -54,7 +55,7 @@ def _ball(x: float, y: float, z: float, dx: float, dy: float, dz: float, r: floa
     return middle - half, middle + half
 
 
-@compiled
+@guarded
 def _tube(x: float, y: float, dx: float, dy: float, r: float) -> tuple[float, float]:
     """Where a line is within r of the z axis: from, to."""
     square = dx * dx + dy * dy
@@ -69,7 +70,7 @@ def _tube(x: float, y: float, dx: float, dy: float, r: float) -> tuple[float, fl
     return middle - half, middle + half
 
 
-@compiled
+@guarded
 def _slab(x: float, d: float, half: float) -> tuple[float, float]:
     """Where a line is between -half and half along an axis: from, to."""
     if d == 0.0:
@@ -79,7 +80,7 @@ def _slab(x: float, d: float, half: float) -> tuple[float, float]:
     return (a, b) if a < b else (b, a)
 
 
-@compiled
+@guarded
 def cross_convex(
     kind: int, s0: float, s1: float, s2: float, x: float, y: float, z: float, dx: float, dy: float, dz: float
 ) -> float:
@@ -110,7 +111,7 @@ def cross_convex(
     return enter if enter >= 0.0 else leave
 
 
-@compiled
+@guarded
 def _triangle(c: Array, i: int, x: float, y: float, z: float, dx: float, dy: float, dz: float) -> float:
     """Distance at which a ray meets triangle i, from either side; inf if it does not."""
     e0, e1, e2, f0, f1, f2 = c[i, 3], c[i, 4], c[i, 5], c[i, 6], c[i, 7], c[i, 8]
@@ -149,8 +150,8 @@ def cross_mesh(
 ) -> tuple[float, int]:
     """Distance to the first triangle that a ray in the mesh's frame meets within the limit, and which; inf, -1."""
     best, found = limit, -1
-    ix, iy, iz = _inverse(dx), _inverse(dy), _inverse(dz)
-    enter = _enter(box, root, x, y, z, ix, iy, iz)
+    ix, iy, iz = inverse(dx), inverse(dy), inverse(dz)
+    enter = enter_box(box, root, x, y, z, ix, iy, iz)
     if enter > limit or enter == np.inf:
         return np.inf, -1
     node, top = root, 0
@@ -164,7 +165,7 @@ def cross_mesh(
             descend = False
         else:
             one, two = node + 1, to
-            a, b = _enter(box, one, x, y, z, ix, iy, iz), _enter(box, two, x, y, z, ix, iy, iz)
+            a, b = enter_box(box, one, x, y, z, ix, iy, iz), enter_box(box, two, x, y, z, ix, iy, iz)
             if b < a:
                 one, two, a, b = two, one, b, a
             if b <= best and b < np.inf:
@@ -235,7 +236,7 @@ def place_rays(frame: Array, origins: Array, directions: Array, rays: Array) -> 
             a, b, c = turn[k]
             rays[r, k] = frame[k] + a * ox + b * oy + c * oz
             d = a * dx + b * dy + c * dz
-            rays[r, 3 + k], rays[r, 6 + k] = d, _inverse(d)
+            rays[r, 3 + k], rays[r, 6 + k] = d, inverse(d)
 
 
 @compiled
@@ -316,7 +317,7 @@ def turned(f: Array, k: int, x: float, y: float, z: float) -> tuple[float, float
 
 
 @compiled
-def _write_normal(
+def write_normal(
     kind: int, corner: Array, triangle: int, f: Array, k: int, x: float, y: float, z: float, out: Array, r: int
 ) -> None:
     """The outward unit normal, world frame, of candidate k at a point of the world."""
@@ -384,7 +385,7 @@ def cast(
                 entry[0] = 0.0
             else:
                 for j in range(count):
-                    entry[j] = _enter(boxes, j, ox, oy, oz, ix, iy, iz)
+                    entry[j] = enter_box(boxes, j, ox, oy, oz, ix, iy, iz)
             while True:
                 if tree:
                     if top == 0:
@@ -396,8 +397,8 @@ def cast(
                     leaf, to = posed.link[e, node, 0], posed.link[e, node, 1]
                     if leaf == 0:
                         one, two = node + 1, to
-                        a = _enter(posed.box[e], one, ox, oy, oz, ix, iy, iz)
-                        b = _enter(posed.box[e], two, ox, oy, oz, ix, iy, iz)
+                        a = enter_box(posed.box[e], one, ox, oy, oz, ix, iy, iz)
+                        b = enter_box(posed.box[e], two, ox, oy, oz, ix, iy, iz)
                         if b < a:
                             one, two, a, b = two, one, b, a
                         if b <= best and b < np.inf:
@@ -432,126 +433,4 @@ def cast(
             number[e, r] = geoms.number[candidates[chosen]] if chosen >= 0 else -1
             if normal.shape[0] > 0 and chosen >= 0:
                 x, y, z = ox + best * dx, oy + best * dy, oz + best * dz
-                _write_normal(geoms.kind[candidates[chosen]], corner, which, shapes, chosen, x, y, z, normal[e], r)
-
-
-@compiled
-def find_window(
-    posed: GeomPoses, e: int, g: int, camera: Array, width: int, height: int, focal: float, out: Array
-) -> None:
-    """The columns and rows, first and after the last, in which a geom may be seen, as far as its box tells."""
-    out[0], out[1], out[2], out[3] = width, 0, height, 0
-    x, y, z, w = camera[3], camera[4], camera[5], camera[6]
-    behind = 0
-    for corner in range(8):
-        a = (posed.high if corner & 1 else posed.low)[e, g, 0] - camera[0]
-        b = (posed.high if corner & 2 else posed.low)[e, g, 1] - camera[1]
-        c = (posed.high if corner & 4 else posed.low)[e, g, 2] - camera[2]
-        right = (1 - 2 * (y * y + z * z)) * a + 2 * (x * y + z * w) * b + 2 * (x * z - y * w) * c
-        down = 2 * (x * y - z * w) * a + (1 - 2 * (x * x + z * z)) * b + 2 * (y * z + x * w) * c
-        ahead = 2 * (x * z + y * w) * a + 2 * (y * z - x * w) * b + (1 - 2 * (x * x + y * y)) * c
-        if ahead < 1e-6:
-            behind += 1
-            continue
-        u = min(max(right / ahead * focal + width / 2 - 0.5, -1.0), width + 1.0)
-        v = min(max(down / ahead * focal + height / 2 - 0.5, -1.0), height + 1.0)
-        out[0], out[1] = min(out[0], max(math.floor(u), 0)), max(out[1], min(math.ceil(u) + 1, width))
-        out[2], out[3] = min(out[2], max(math.floor(v), 0)), max(out[3], min(math.ceil(v) + 1, height))
-    if behind == 8:
-        out[1] = 0
-    elif behind > 0:
-        out[0], out[1], out[2], out[3] = 0, width, 0, height
-
-
-@compiled
-def view(
-    geoms: Geoms,
-    triangles: Triangles,
-    posed: GeomPoses,
-    seen: Array,
-    frames: Array,
-    directions: Array,
-    focal: Array,
-    width: int,
-    reach: float,
-    far: float,
-    distance: Array,
-    number: Array,
-    normal: Array,
-    area: Array,
-) -> None:
-    """The same as `cast` for the pixels of a pinhole camera, geom by geom where it may be seen, so that many are cheap.
-
-    Args:
-        geoms, triangles, posed, seen, frames, reach, distance, number, normal: as of `cast`.
-        directions: (N or 1, R, 3) of the pixels in the optical frame, row by row.
-        focal: (N or 1,) [pixels].
-        width: of the image.
-        far: [m] along the optical axis; what is farther is not counted in the area.
-        area: (N, entities + 1) int32 written, the pixels that each entity has with nothing in front of it, last what is
-            of none. Of 0 rows none is.
-    """
-    most, size = seen.shape[0], directions.shape[1]
-    rays, origins = np.empty((size, 9)), np.zeros((size, 3))
-    candidates, keys = np.empty(most, np.int32), np.empty(most, np.int64)
-    window = np.empty(4, np.int64)
-    boxes, shapes = np.empty((most, 6)), np.empty((most, 15))
-    chosen, which, last = np.empty(size, np.int32), np.empty(size, np.int32), np.empty(size, np.int32)
-    stack, near = np.empty(128, np.int32), np.empty(128)
-    box, link, corner = triangles.box, triangles.link, triangles.corner
-    whole = area.shape[0] > 0
-    for e in range(frames.shape[0]):
-        p = e if directions.shape[0] > 1 else 0
-        place_rays(frames[e], origins, directions[p], rays)
-        ox, oy, oz = frames[e, 0], frames[e, 1], frames[e, 2]
-        count = 0
-        for g in range(most):  # those of an entity next to each other, so that one mark a pixel tells that it counts
-            if seen[g] and posed.there[e, g]:
-                x = max(posed.low[e, g, 0] - ox, ox - posed.high[e, g, 0], 0.0)
-                y = max(posed.low[e, g, 1] - oy, oy - posed.high[e, g, 1], 0.0)
-                z = max(posed.low[e, g, 2] - oz, oz - posed.high[e, g, 2], 0.0)
-                if x * x + y * y + z * z <= reach * reach:
-                    key, k = (geoms.entity[g] + 1) * most + g, count
-                    while k > 0 and keys[k - 1] > key:  # they are nearly in order
-                        keys[k] = keys[k - 1]
-                        k -= 1
-                    keys[k] = key
-                    count += 1
-        for k in range(count):
-            candidates[k] = keys[k] % most
-        gather(posed, e, geoms, candidates, count, boxes, shapes)
-        chosen[:], which[:], last[:] = -1, -1, -2
-        distance[e] = np.inf
-        if whole:
-            area[e] = 0
-        for k in range(count):
-            g = candidates[k]
-            kind, entity = geoms.kind[g], geoms.entity[g]
-            root = triangles.root[geoms.mesh[g]] if geoms.mesh[g] >= 0 else 0
-            find_window(posed, e, g, frames[e], width, size // width, focal[p], window)
-            a, b, c = turned(shapes, k, ox - shapes[k, 9], oy - shapes[k, 10], oz - shapes[k, 11])
-            for row in range(window[2], window[3]):
-                for r in range(row * width + window[0], row * width + window[1]):
-                    best = min(distance[e, r], reach)
-                    if kind != PLANE:  # all of the image is its window, and what is cheap to cross needs no box
-                        enter = _enter(boxes, k, ox, oy, oz, rays[r, 6], rays[r, 7], rays[r, 8])
-                        if enter > (reach if whole else best) or enter == np.inf:
-                            continue
-                    u, v, w = turned(shapes, k, rays[r, 3], rays[r, 4], rays[r, 5])
-                    triangle, limit = -1, reach if whole else best
-                    if kind > CYLINDER:
-                        t, triangle = cross_mesh(box, link, corner, root, a, b, c, u, v, w, limit, stack, near)
-                    else:
-                        t = cross_convex(kind, shapes[k, 12], shapes[k, 13], shapes[k, 14], a, b, c, u, v, w)
-                    if t < best or (t == best and t < np.inf and (chosen[r] < 0 or g < candidates[chosen[r]])):
-                        distance[e, r], chosen[r], which[r] = t, k, triangle
-                    if whole and t < np.inf and t * directions[p, r, 2] <= far and last[r] != entity:
-                        area[e, entity] += 1
-                        last[r] = entity
-        for r in range(size):
-            k = chosen[r]
-            number[e, r] = geoms.number[candidates[k]] if k >= 0 else -1
-            if normal.shape[0] > 0 and k >= 0:
-                t = distance[e, r]
-                x, y, z = ox + t * rays[r, 3], oy + t * rays[r, 4], oz + t * rays[r, 5]
-                _write_normal(geoms.kind[candidates[k]], corner, which[r], shapes, k, x, y, z, normal[e], r)
+                write_normal(geoms.kind[candidates[chosen]], corner, which, shapes, chosen, x, y, z, normal[e], r)
