@@ -41,6 +41,7 @@ WORDS = {
     "maniskill": "`anysim verdicts`: peers judge our states; with them `anysim-maniskill[maniskill]`",
     "mcap": "recordings: MCAP files and videos",
     "mujoco": "the engine MuJoCo, and MJCF files",
+    "navigation": "`anysim map`: where bases can go, ways through rooms, and local planning around what moves",
     "parity": "`anysim compare` and `anysim picture`",
     "planning": "collision-free motion, planned beside the simulation",
     "policy": "learned policies (ONNX) as controllers",

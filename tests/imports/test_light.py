@@ -31,7 +31,7 @@ PACKAGES = (
     "anysim_annotation", "anysim_assets", "anysim_avatars", "anysim_banks", "anysim_bench", "anysim_collect",
     "anysim_control",
     "anysim_evaluation", "anysim_export", "anysim_film", "anysim_inspect", "anysim_language", "anysim_learning",
-    "anysim_legged", "anysim_legged_gym", "anysim_maniskill", "anysim_mcap", "anysim_parity", "anysim_planning",
+    "anysim_legged", "anysim_legged_gym", "anysim_maniskill", "anysim_mcap", "anysim_navigation", "anysim_parity", "anysim_planning",
     "anysim_policy", "anysim_processes", "anysim_robots", "anysim_sharded", "anysim_skills", "anysim_tactile",
     "anysim_tasks", "anysim_teleop", "anysim_urdf",
 )  # fmt: skip

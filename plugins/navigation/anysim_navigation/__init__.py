@@ -1,0 +1,1 @@
+"""Navigation: where bases can go, ways through rooms, and local planning around what moves."""
