@@ -1,6 +1,7 @@
 """FamilyManager: the families of a world through the life of its envs, and all that they remember."""
 
 from collections.abc import Iterable, Mapping
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from anysim.managers.base import Manager
 from anysim.model.world import World
 from anysim.plugin_parameters import checked
 from anysim_schemas.base import Spec
+
+FamilyKind = TypeVar("FamilyKind", bound=Family)
 
 
 class FamilyManager(Manager):
@@ -97,6 +100,10 @@ class FamilyManager(Manager):
             known = f"{suggest(name, list(self._families))} (families: {listing(self._families)})"
             raise NameLookupError(f"there is no family '{name}'{known}")
         return self._families[name]
+
+    def of_kind(self, kind: type[FamilyKind]) -> list[FamilyKind]:
+        """The families of a class, in the order of the file."""
+        return [family for family in self._families.values() if isinstance(family, kind)]
 
     def state(self, name: str, env_ids: Array | None = None) -> FamilyState:
         """What a family looks like in these envs, or in all."""

@@ -1,0 +1,456 @@
+"""The family `avatar`: people with a queue of actions each, driven through the engine as they walk, reach and look."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from anysim.assets.uri import locate
+from anysim.conventions import Array
+from anysim.errors import AnysimError, SpecError, SpecIssue, TaskError, listing, suggest
+from anysim.families.base import Family, FamilyPart, FamilySetting, FamilyState
+from anysim.math import pose as P
+from anysim.randomization.distributions import draw_one, nominal
+from anysim.randomization.draw import draw_rows, is_random
+from anysim_avatars import actions, bodies, clips, frames
+from anysim_avatars.actions import LENGTH, WIDTH, Column, Kind
+from anysim_avatars.bodies import BONES, Proportions, proportions
+from anysim_avatars.facts import facts_of
+from anysim_avatars.gait import STRETCH, Gait, Legs, Wish, advance, carrot, stand, wrapped
+from anysim_avatars.motion import Motion, Provider, between, read_motion
+from anysim_avatars.puppet import Aim, Figure, Sizes, figure, posed
+from anysim_avatars.spec import ActionSpec, AvatarSpec
+from anysim_schemas.base import Spec
+
+FADE = 0.4
+"""[s] from one posture to the next, and into gaze, reach and bend."""
+HEAD_RATE = 4.0
+"""[rad/s] that a head turns at most; a gaze that is held follows as fast as it must."""
+ROW = 0.9
+"""[m] between avatars that begin at one place."""
+
+
+class Avatars(Family):
+    """People: capsule humans that walk without slipping, sit, talk, look, reach and bend, and push what they meet."""
+
+    spec = AvatarSpec
+
+    # ------------------------------------------------------------------ the World
+
+    @classmethod
+    def parts(cls, name: str, spec: Spec) -> Iterable[FamilyPart]:
+        assert isinstance(spec, AvatarSpec)
+        for number, one in enumerate(people(spec)):
+            gait = _gait(1)
+            gait.pos[0], gait.yaw[0] = _begin(spec, number), float(nominal(spec.yaw))
+            stand(gait, Legs.of([one], 1), np.zeros((1, 2)))
+            still = _aim(clips.standing(1))
+            poses = figure(gait, Sizes.of([one], 1), still).poses[0]
+            called = name if spec.count == 1 else f"{name}_{number}"
+            yield FamilyPart(called, bodies.model(called, one, poses), "person", driven=True)
+
+    # ------------------------------------------------------------------ made
+
+    def __init__(self, setting: FamilySetting) -> None:
+        super().__init__(setting)
+        assert isinstance(setting.spec, AvatarSpec)
+        self.spec_ = setting.spec
+        world = setting.engine.world
+        entities = [world.entities[i] for i in setting.entities]
+        self.names = tuple(entity.name for entity in entities)
+        self.people, count = people(setting.spec), setting.spec.count
+        self.drives(body for entity in entities for body in range(entity.body_start, entity.body_stop))
+        self._motions: list[Motion | None] = [None] * len(clips.CLIPS)
+        self._clips = list(clips.CLIPS)
+        for clip, file in setting.spec.motions.items():
+            self._clips.append(clip)
+            self._motions.append(self._read(clip, file))
+        self.provider: Provider | None = None
+        shapes = {
+            "pos": (2,),
+            "yaw": (),
+            "vel": (2,),
+            "feet": (2, 4),
+            "phase": (),
+            "lift": (4,),
+            "hips": (),
+            "posture": (clips.POSTURE,),
+            "before": (clips.POSTURE,),
+            "fade": (),
+            "clock": (),
+            "time": (),
+            "head": (2,),
+            "gazing": (),
+            "gaze": (3,),
+            "reaching": (2,),
+            "reach": (2, 3),
+            "missed": (2,),
+            "bend": (),
+            "motion": (),
+            "looks": (3,),
+        }
+        for key, shape in shapes.items():
+            self.remember(key, count, *shape)
+        self.remember("swing", count, dtype=np.int64, bounds=(-1, 1))
+        self.remember("playing", count, dtype=np.int64, bounds=(0, len(self._clips) - 1))
+        self.remember("head_row", count, dtype=np.int64, bounds=(0, LENGTH - 1))
+        self.remember("queue", count, LENGTH, WIDTH)
+        self._points = self.remember("points", count * len(BONES), 3)
+        self._speeds = self.remember("speeds", count * len(BONES), 3)
+        self._script = self._rows(setting.spec.do, f"world.families.{setting.name}.do")
+
+    def _read(self, clip: str, file: str) -> Motion:
+        path = f"world.families.{self.setting.name}.motions.{clip}"
+        try:
+            return read_motion(locate(file).path)
+        except AnysimError as error:
+            raise SpecError([SpecIssue("", path, str(error))]) from error
+
+    def _rows(self, script: Sequence[ActionSpec], path: str) -> Array:
+        issues: list[SpecIssue] = []
+        for number, action in enumerate(script):
+            try:
+                actions.rows_of(action, self.body, self.clip_number)
+            except AnysimError as error:
+                issues.append(SpecIssue("", f"{path}.{number}", str(error)))
+        if issues:
+            raise SpecError(issues)
+        try:
+            return actions.queue(script, self.body, self.clip_number)
+        except ValueError as error:
+            raise SpecError([SpecIssue("", path, str(error))]) from None
+
+    def clip_number(self, name: str) -> int:
+        """The index of a clip; TaskError where there is none, which lists them."""
+        if name not in self._clips:
+            known = f"{suggest(name, self._clips)} (clips: {listing(self._clips)})"
+            raise TaskError(f"there is no clip '{name}'{known}")
+        return self._clips.index(name)
+
+    # ------------------------------------------------------------------ what others ask of it
+
+    def do(self, script: Sequence[ActionSpec], env_ids: Array, avatar: str | None = None) -> None:
+        """Have an avatar, or all of them, do this from now on in these envs, in place of what they were about to do.
+
+        Raises:
+            TaskError: there is no such avatar or clip, or the queue would be too long.
+        """
+        if avatar is not None and avatar not in self.names:
+            raise TaskError(
+                f"there is no avatar '{avatar}'{suggest(avatar, self.names)} (there are: {listing(self.names)})"
+            )
+        which = range(len(self.names)) if avatar is None else [self.names.index(avatar)]
+        try:
+            rows = actions.queue(script, self.body, self.clip_number)
+        except ValueError as error:
+            raise TaskError(str(error)) from None
+        for number in which:
+            self.memory["queue"][env_ids, number] = rows
+            self.memory["head_row"][env_ids, number] = 0
+            self.memory["clock"][env_ids, number] = 0.0
+
+    def provide(self, provider: Provider | None) -> None:
+        """Let a function say how all avatars stand from the next step on, in place of their actions; None ends that.
+
+        What it says must follow from its arguments alone: then snapshots and replays hold.
+        """
+        self.provider = provider
+
+    # ------------------------------------------------------------------ its life
+
+    def reset(self, env_ids: Array) -> None:
+        spec, streams, memory = self.spec_, self.setting.streams, self.memory
+        path = f"world.families.{self.setting.name}"
+        for number in range(spec.count):
+            for column, key in enumerate(("x", "y")):
+                value = getattr(spec, key)
+                stream = f"family/{self.setting.name}/{number}/{key}"
+                drawn = draw_rows(value, stream, streams, env_ids, source=f"{path}.{key}")
+                row = 0.0 if is_random(value) else _begin(spec, number)[column] - value
+                memory["pos"][env_ids, number, column] = drawn + row
+            stream = f"family/{self.setting.name}/{number}/yaw"
+            memory["yaw"][env_ids, number] = draw_rows(spec.yaw, stream, streams, env_ids, source=f"{path}.yaw")
+        memory["queue"][env_ids] = self._script
+        gait, legs, sizes = self._gait(env_ids), self._legs(env_ids), self._sizes(env_ids)
+        stand(gait, legs, self._ground(gait.feet[:, :, :2] + gait.pos[:, None]))
+        posture = clips.standing(len(gait.pos))
+        self._keep(env_ids, gait, {"posture": posture, "before": posture, "fade": np.full(len(posture), FADE)})
+        self._show(env_ids, figure(gait, sizes, _aim(posture)), None)
+
+    def before_step(self, env_ids: Array, duration: float) -> None:
+        rows = len(env_ids) * len(self.names)
+        now = {key: self._take(env_ids, key) for key in _FREE}
+        gait, legs, sizes = self._gait(env_ids), self._legs(env_ids), self._sizes(env_ids)
+        queue = self._take(env_ids, "queue")
+        at = np.arange(rows)
+        row = queue[at, now["head_row"]]
+        poses = self.engine.get_state().body_pose[env_ids]
+        env = np.repeat(np.arange(len(env_ids)), len(self.names))
+
+        now["time"] += duration
+        now["clock"] += duration
+        done = self._over(row, gait, now, _goals(row, poses, env))
+        if done.any():
+            self._next(queue, now, done)
+            self._keep(env_ids, gait, {"queue": queue})
+        row = queue[at, now["head_row"]]
+        kind, goal = row[:, Column.KIND], _goals(row, poses, env)
+        going, turning = kind == Kind.GO, kind == Kind.TURN
+        away = np.sqrt(((goal - gait.pos) ** 2).sum(-1))
+        rest = np.maximum(away - row[:, Column.NEAR], 0.0) / np.maximum(away, 1e-12)
+        short = gait.pos + (goal - gait.pos) * rest[:, None]
+        wish = np.where(
+            going[:, None], carrot(gait.pos, short, duration, row[:, Column.SPEED], row[:, Column.ENDS] > 0), 0.0
+        )
+        heading = np.where(turning, row[:, Column.YAW], gait.yaw)
+        ahead = going & (away > 0.05)
+        heading = np.where(ahead, np.arctan2(goal[:, 1] - gait.pos[:, 1], goal[:, 0] - gait.pos[:, 0]), heading)
+        speed = np.sqrt((gait.vel * gait.vel).sum(-1))
+        self._posture(now, row, gait, sizes, legs, speed, duration)
+        advance(
+            gait,
+            legs,
+            Wish(wish, heading, _height(gait, legs) - now["posture"][:, clips.DROP], now["posture"][:, clips.BACK]),
+            self._ground,
+            duration,
+        )
+        looked = _points(poses, env, row, Column.GAZE_BODY, Column.GAZE)
+        self._overlays(now, row, looked, _points(poses, env, row, Column.REACH_BODY, Column.REACH), duration)
+        aim = Aim(
+            now["posture"], now["bend"], now["gaze"], _eased(now["gazing"]), now["reach"], _eased(now["reaching"])
+        )
+        found = figure(gait, sizes, aim)
+        now["missed"], now["looks"] = found.missed, found.looks
+        now["step"] = np.full(rows, duration)
+        found = self._moved(env_ids, now, row, found, gait, sizes)
+        self._keep(env_ids, gait, now)
+        self._show(env_ids, found, duration)
+
+    # ------------------------------------------------------------------ actions
+
+    def _over(self, row: Array, gait: Gait, now: Mapping[str, Array], goal: Array) -> Array:
+        """Which actions (m,) are over."""
+        kind = row[:, Column.KIND]
+        gap = np.sqrt(((goal - gait.pos) ** 2).sum(-1))
+        through = row[:, Column.ENDS] == 0
+        arrived = gap <= np.where(through, 0.35, row[:, Column.NEAR] + 1e-3)
+        stands = (gait.swing < 0) | through
+        turned = (np.abs(wrapped(row[:, Column.YAW] - gait.yaw)) < 0.01) & (gait.swing < 0)
+        ends = [np.inf if motion is None else motion.seconds for motion in self._motions]
+        lasts = np.minimum(
+            row[:, Column.SECONDS], np.array(ends)[np.clip(row[:, Column.CLIP].astype(int), 0, len(ends) - 1)]
+        )
+        return np.select(
+            [kind == Kind.GO, kind == Kind.TURN, kind == Kind.CLIP],
+            [arrived & stands, turned, now["clock"] >= lasts],
+            False,
+        )
+
+    def _next(self, queue: Array, now: dict[str, Array], done: Array) -> None:
+        """Go on to the next action where one is over; begin anew after the last where that is wished."""
+        head = now["head_row"]
+        for i in np.flatnonzero(done):
+            following = int(head[i]) + 1
+            last = following >= LENGTH or queue[i, following, Column.KIND] == Kind.NOTHING
+            if last and not self.spec_.again:
+                queue[i] = 0.0
+            head[i], now["clock"][i] = 0 if last else following, 0.0
+
+    def _posture(
+        self, now: dict[str, Array], row: Array, gait: Gait, sizes: Sizes, legs: Legs, speed: Array, dt: float
+    ) -> None:
+        """The posture of the clip that plays, and on the way to it from what was."""
+        clip = np.where(row[:, Column.KIND] == Kind.NOTHING, self._clips.index("idle"), row[:, Column.CLIP])
+        clip = np.clip(clip.astype(np.int64), 0, len(self._clips) - 1)
+        clip = np.where((clip == self._clips.index("walk")) & (speed < 0.02) & (gait.swing < 0), 0, clip)
+        changed = clip != now["playing"]
+        now["before"][changed], now["fade"][changed] = now["posture"][changed], 0.0
+        now["playing"] = clip
+        now["fade"] = np.minimum(now["fade"] + dt, FADE)
+        drop = np.maximum(legs.ankle + legs.leg - row[:, Column.SEAT] - 0.1, 0.0)
+        angle = np.pi * (gait.phase + (gait.swing == 1))
+        moment = clips.Moment(now["time"], angle, speed, drop)
+        wanted = np.empty_like(now["posture"])
+        for number in np.unique(clip):
+            rows = np.flatnonzero(clip == number)
+            made = clips.CLIPS.get(self._clips[number], clips.idle)
+            wanted[rows] = made(clips.Moment(*(values[rows] for values in moment)))
+        share = _eased(now["fade"] / FADE)[:, None]
+        now["posture"] = now["before"] + share * (wanted - now["before"])
+
+    def _overlays(self, now: dict[str, Array], row: Array, looked: Array, target: Array, dt: float) -> None:
+        """Gaze, reach and bend come and go over FADE [s]; while one goes, it is about where it was last."""
+        gazing, reaching = row[:, Column.GAZING] > 0, row[:, Column.REACHING] > 0
+        now["gaze"][gazing] = looked[gazing]
+        now["gazing"] = np.clip(now["gazing"] + np.where(gazing, dt, -dt) / FADE, 0.0, 1.0)
+        for hand in (0, 1):
+            mine = reaching & (row[:, Column.HAND] == hand)
+            now["reach"][mine, hand] = target[mine]
+            now["reaching"][:, hand] = np.clip(now["reaching"][:, hand] + np.where(mine, dt, -dt) / FADE, 0.0, 1.0)
+        now["bend"] += np.clip(row[:, Column.BEND] - now["bend"], -1.2 * dt, 1.2 * dt)
+
+    def _moved(
+        self, env_ids: Array, now: dict[str, Array], row: Array, found: Figure, gait: Gait, sizes: Sizes
+    ) -> Figure:
+        """The figure with a recording, or what a provider says, in its place; both come and go over FADE [s]."""
+        clip = np.where(row[:, Column.KIND] == Kind.CLIP, row[:, Column.CLIP], 0).astype(np.int64)
+        clip = np.clip(clip, 0, len(self._motions) - 1)
+        number = np.tile(np.arange(len(self.names)), len(env_ids))
+        playing = np.array([motion is not None for motion in self._motions])[clip] | (self.provider is not None)
+        step = np.where(playing, 1.0, -1.0) * now.pop("step") / FADE
+        now["motion"] = np.clip(now["motion"] + step, 0.0, 1.0)
+        if not playing.any():
+            return found
+        quaternions, hips = frames.quaternions(found.rotation), found.start[:, 0].copy()
+        share = _eased(now["motion"])
+        for which in {int(clip[i]) for i in np.flatnonzero(playing)} if self.provider is None else {-1}:
+            rows = np.flatnonzero(playing & (clip == which)) if which >= 0 else np.arange(len(clip))
+            source = self._motions[which] if which >= 0 else self.provider
+            assert source is not None
+            stance = source(now["clock"][rows], number[rows])
+            level = frames.turned(gait.yaw[rows], np.zeros(len(rows)))
+            way = frames.apply(level, stance.hips * (sizes.bones[rows, 9] + sizes.bones[rows, 11])[:, None])
+            way += np.concatenate([gait.pos[rows], sizes.ankle[rows, None]], axis=-1)
+            turned = P.multiply(frames.quaternions(level)[:, None], stance.rotation)
+            quaternions[rows] = between(quaternions[rows], turned, share[rows, None, None])
+            hips[rows] += share[rows, None] * (way - hips[rows])
+        moved = posed(hips, P.to_matrix(quaternions), sizes)
+        return Figure(
+            *(np.where(playing.reshape(-1, *[1] * (a.ndim - 1)), b, a) for a, b in zip(found, moved, strict=True))
+        )
+
+    # ------------------------------------------------------------------ rows of the memory
+
+    def _take(self, env_ids: Array, key: str) -> Array:
+        """(n * avatars, …) of the memory, a copy."""
+        array = self.memory[key][env_ids]
+        return array.reshape(-1, *array.shape[2:])
+
+    def _gait(self, env_ids: Array) -> Gait:
+        return Gait(*(self._take(env_ids, key) for key in Gait._fields))
+
+    def _legs(self, env_ids: Array) -> Legs:
+        return Legs.of(self.people, len(env_ids))
+
+    def _sizes(self, env_ids: Array) -> Sizes:
+        return Sizes.of(self.people, len(env_ids))
+
+    def _keep(self, env_ids: Array, gait: Gait, more: Mapping[str, Array]) -> None:
+        """Write rows back."""
+        for key, rows in {**gait._asdict(), **more}.items():
+            self.memory[key][env_ids] = rows.reshape(len(env_ids), len(self.names), *rows.shape[1:])
+
+    def _ground(self, points: Array) -> Array:
+        heights = self.engine.world.ground.heights_at(points)
+        return np.where(np.isfinite(heights), heights, 0.0)
+
+    def _show(self, env_ids: Array, found: Figure, duration: float | None) -> None:
+        """Drive the bodies to where the figures are, or put them there."""
+        poses = found.poses.reshape(len(env_ids), -1, 7)
+        points = found.start.reshape(len(env_ids), -1, 3)
+        if duration is None:
+            self.place(env_ids, poses)
+            self._speeds[env_ids] = 0.0
+        else:
+            self.drive(env_ids, poses, duration)
+            self._speeds[env_ids] = (points - self._points[env_ids]) / duration
+        self._points[env_ids] = points
+
+    # ------------------------------------------------------------------ what there is to see
+
+    def state(self, env_ids: Array) -> FamilyState:
+        """Its joints: the beginnings of the bones."""
+        radius = np.array([capsule[0] for one in self.people for capsule in bodies.capsules(one)])
+        ids = np.repeat(np.array(self.setting.entities, dtype=np.int32) + 1, len(BONES))
+        return FamilyState(self._points[env_ids].copy(), self._speeds[env_ids].copy(), radius, ids)
+
+    def facts(self, env: int) -> Mapping[str, Mapping[str, object]]:
+        bodies_ = [body.name for body in self.engine.world.bodies]
+        taken = {key: self.memory[key][env] for key in ("queue", "head_row", "playing", "pos", "vel")}
+        found: dict[str, Mapping[str, object]] = {}
+        for number, name in enumerate(self.names):
+            rows = {key: array[number] for key, array in taken.items()}
+            clip = self._clips[int(rows["playing"])]
+            found[name] = facts_of(rows["queue"][rows["head_row"]], clip, rows, self.people[number].height, bodies_)
+        return found
+
+    def recorded(self, env_ids: Array) -> Mapping[str, Array]:
+        keys = ("pos", "yaw", "vel", "playing", "looks", "missed", "reaching", "gazing")
+        return {key: self.memory[key][env_ids].astype(float) for key in keys}
+
+
+_FREE = (
+    "posture",
+    "before",
+    "fade",
+    "clock",
+    "time",
+    "head",
+    "gazing",
+    "gaze",
+    "reaching",
+    "reach",
+    "missed",
+    "bend",
+    "motion",
+    "looks",
+    "playing",
+    "head_row",
+)
+
+
+def people(spec: AvatarSpec) -> list[Proportions]:
+    """The avatars of a spec, as its seed makes them."""
+    found: list[Proportions] = []
+    for number in range(spec.count):
+        rng = np.random.default_rng([spec.seed, number])
+        tall = float(draw_one(spec.height, rng.random) if is_random(spec.height) else nominal(spec.height))
+        found.append(proportions(tall, rng))
+    return found
+
+
+def _begin(spec: AvatarSpec, number: int) -> tuple[float, float]:
+    """Where an avatar stands in the World, before anything is drawn."""
+    return float(nominal(spec.x)), float(nominal(spec.y)) + ROW * number
+
+
+def _gait(rows: int) -> Gait:
+    return Gait(
+        np.zeros((rows, 2)),
+        np.zeros(rows),
+        np.zeros((rows, 2)),
+        np.zeros((rows, 2, 4)),
+        np.full(rows, -1),
+        np.zeros(rows),
+        np.zeros((rows, 4)),
+        np.zeros(rows),
+    )
+
+
+def _height(gait: Gait, legs: Legs) -> Array:
+    """(m,) the height of the hips of a body that stands straight."""
+    return gait.feet[:, :, 2].min(axis=1) + legs.ankle + STRETCH * legs.leg
+
+
+def _aim(posture: Array) -> Aim:
+    """Nothing beside a posture."""
+    rows = len(posture)
+    return Aim(
+        posture, np.zeros(rows), np.zeros((rows, 3)), np.zeros(rows), np.zeros((rows, 2, 3)), np.zeros((rows, 2))
+    )
+
+
+def _eased(share: Array) -> Array:
+    """From 0 to 1 with no jerk; exactly 1 at the end."""
+    return np.where(share >= 1.0, 1.0, share**3 * (10 - 15 * share + 6 * share**2))
+
+
+def _goals(row: Array, poses: Array, env: Array) -> Array:
+    """(m, 2) where the walks go."""
+    body = np.clip(row[:, Column.BODY].astype(np.int64), -1, poses.shape[1] - 1)
+    return np.where((body >= 0)[:, None], poses[env, body, :2], row[:, Column.X : Column.Y + 1])
+
+
+def _points(poses: Array, env: Array, row: Array, body: int, place: int) -> Array:
+    """(m, 3) what rows are after: points, or where bodies are."""
+    index = np.clip(row[:, body].astype(np.int64), -1, poses.shape[1] - 1)
+    return np.where((index >= 0)[:, None], poses[env, index, :3], row[:, place : place + 3])
