@@ -14,6 +14,7 @@ LEROBOT := .venv-lerobot/installed
 ROBOMIMIC := .venv-lerobot/with-robomimic
 RLDS := .venv-rlds/installed
 RERUN := .venv-rerun/installed
+NODE := .node-mcap/installed
 
 # The demo: a scripted robot picks cubes in four worlds at once, records it, and a picture shows what happened. Then
 # every installed engine gets the same world, and a page shows how far they agree.
@@ -32,7 +33,7 @@ $(BIN)/python -c 'import sysconfig; print("import site; site.addsitedir(%r)" % s
 endef
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test test-slow test-full test-learning test-maniskill test-lerobot test-robomimic test-rlds test-rerun check format lock schema docs site bench wheels clean
+.PHONY: help venv demo test test-slow test-full test-learning test-maniskill test-lerobot test-robomimic test-rlds test-rerun test-viewers check format lock schema docs site bench wheels clean
 
 help:  ## list the targets
 	@echo "make TARGET, where TARGET is one of"
@@ -125,6 +126,14 @@ $(RERUN): $(TEST) plugins/export/pyproject.toml
 	.venv-rerun/bin/python -m pip install --quiet $$($(BIN)/python scripts/extra_requirements.py plugins/export rerun)
 	@touch $@
 
+test-viewers: $(RERUN) $(NODE)  ## open recordings and their export with the MCAP readers of Foxglove (npm) and Rerun
+	.venv-rerun/bin/python -m pytest -n 0 -s tests/plugins/mcap/test_viewers.py $(ARGS)
+
+$(NODE):
+	npm install --prefix .node-mcap --silent --no-fund --no-audit --ignore-scripts \
+	  @mcap/core@2.2.2 @mcap/nodejs@1.0.2 @mcap/support@1.1.0
+	@touch $@
+
 CHECKS := check-lint check-format check-style check-layers check-schema check-tables check-types check-site
 check: $(CHECKS)  ## lint, format, types, layers, style and generated files (make -k check: do not stop at the first)
 .PHONY: $(CHECKS)
@@ -192,5 +201,5 @@ wheels: $(STAMP)  ## build the wheels of all packages into dist/ (docs/install.m
 	@ls dist
 
 clean:  ## remove .venv, caches, wheels and the demo's output; other recordings stay
-	rm -rf .venv .venv-tools .venv-torch .venv-lerobot .venv-rlds .venv-rerun .cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache build dist runs/demo
+	rm -rf .venv .venv-tools .venv-torch .venv-lerobot .venv-rlds .venv-rerun .node-mcap .cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache build dist runs/demo
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -32,4 +32,5 @@ def test_the_commands_of_the_page_work(tmp_path: Path) -> None:
     assert (data / "robomimic" / "demo.hdf5").exists()
     assert (data / "rlds" / "episodes" / "000002" / "steps.npz").exists()
     assert (data / "coco" / "coco.json").exists()
+    assert (data / "foxglove" / "episodes" / "000002" / "episode.mcap").exists()
     assert (data / "shards" / "shard-000000.tar").exists()

@@ -203,6 +203,10 @@ class SensorManager(Manager):
             raise NameLookupError(f"there is no sensor '{name}'{known}")
         return self._channels[name].fields
 
+    def sensor(self, name: str) -> Sensor:
+        """A sensor by its name."""
+        return self._channels[name].sensor
+
     def reading(self, name: str, field: str, env_ids: Array | slice = slice(None)) -> Array:
         """A copy (n, …) of what is seen of a sensor's field now.
 

@@ -17,7 +17,8 @@ def export(
         list[Path], typer.Argument(metavar="RUN…", help="Runs of one task and robot, or trajectories of them.")
     ],
     to: Annotated[
-        str, typer.Option("--to", help="lerobot, robomimic, rlds-ready, coco, webdataset, rerun, or another one.")
+        str,
+        typer.Option("--to", help="lerobot, robomimic, rlds-ready, coco, webdataset, rerun, foxglove, or another one."),
     ],
     out: Annotated[Path, typer.Option(help="Directory of the data set; nothing in it is ever overwritten.")],
     option: Annotated[

@@ -11,7 +11,7 @@ from tests.plugins.export.runs import record
 from tests.small_disk import small_disk
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("export")]
-FORMS = ("coco", "lerobot", "rlds-ready", "robomimic", "webdataset")
+FORMS = ("coco", pytest.param("foxglove", marks=pytest.mark.full), "lerobot", "rlds-ready", "robomimic", "webdataset")
 OPTIONS = {"coco": {"every": 5}, "lerobot": {"channels": True}, "rlds-ready": {"states": True}}
 
 PRELUDE = """
@@ -47,7 +47,7 @@ def steps_of(out, die_at):
             step()
     if die_at is None:
         pass
-    elif form == "coco":  # an engine that is built under a profile takes minutes; what is written is written by Python
+    elif form in ("coco", "foxglove"):  # an engine built under a profile takes minutes; Python writes what is written
         sys.addaudithook(audited)
     else:
         sys.setprofile(called)
@@ -105,7 +105,11 @@ def test_killed_at_a_dozen_moments_it_goes_on_to_the_same_bytes(short: Path, tmp
     assert len(found) == 12
     assert found[0][0] == 0
     assert len({resumed for resumed, _, there in found if not there}) >= 3  # it died in several episodes
-    assert any(begun for _, begun, _ in found) or form in ("webdataset", "coco")  # and while they were put together
+    assert any(begun for _, begun, _ in found) or form in (
+        "webdataset",
+        "coco",
+        "foxglove",
+    )  # and while they were put together
 
 
 # At each of ten sizes that are less than what it takes, the export fails somewhere else.

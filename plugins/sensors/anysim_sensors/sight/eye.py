@@ -68,6 +68,14 @@ class Eye:
         return P.compose(self._frame.pose, self._place)
 
     @property
+    def mount(self) -> tuple[int, Array] | None:
+        """The body that carries it, -1 for the world, and its pose (7,) there; None where that is not one for good."""
+        if not isinstance(self._frame, BodyFrame):
+            return None
+        fixed = self._frame.index
+        return fixed.body, P.compose(np.array([*fixed.position, *fixed.quaternion]), self._place)
+
+    @property
     def posed(self) -> GeomPoses:
         """Where the shapes are in these envs."""
         return self._scenery.at(self._scene)

@@ -78,6 +78,15 @@ class Lidar(Sensor):
         self._scan = self.remember("scan")
         self.fields = {name: FIELDS[name]._replace(shape=(len(first),)) for name in self._channels}
 
+    def rays(self, number: int) -> tuple[int, Array, Array, float] | None:
+        """Where the rays of the `number`-th reading of an episode are, for those who draw it.
+
+        That is the body that carries it (-1: the world), the pose (7,) there, directions (R, 3) in its axes, and `far`;
+        None where it is on a thing that is another one in each episode.
+        """
+        mount = self._eye.mount
+        return None if mount is None else (*mount, self._directions(number), self._far)
+
     def read(self, env_ids: Array) -> Mapping[str, Array]:
         scans = self._scan[env_ids].astype(int)
         directions = self._directions(0) if self._repeats else np.stack([self._directions(k) for k in scans.tolist()])
