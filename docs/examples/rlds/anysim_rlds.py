@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tensorflow as tf  # pyright: ignore[reportMissingImports]
 import tensorflow_datasets as tfds  # pyright: ignore[reportMissingImports]
 
 
@@ -51,9 +52,15 @@ class AnysimRlds(tfds.core.GeneratorBasedBuilder):
                 for name, values in rows.items():
                     _put(step, name, values[t])
                 for name, one in self._about["images"].items():
-                    _put(step, name, str(folder / one["camera"] / f"{t:06d}.png"))
+                    path = str(folder / one["camera"] / f"{t:06d}.png")
+                    _put(step, name, _depth(path) if one["dtype"] == "float32" else path)
                 steps.append(step | {name: words[name][t] for name in self._about["words"]})
             yield number, {"steps": steps, "episode_metadata": words["episode_metadata"]}
+
+
+def _depth(path: str) -> Any:
+    """(H, W, 1) float32 [m], whose four bytes are a pixel of the file; TFDS takes no path of these."""
+    return tf.io.decode_png(tf.io.read_file(path), channels=4).numpy().view("<f4")
 
 
 def _put(step: dict[str, Any], name: str, value: Any) -> None:

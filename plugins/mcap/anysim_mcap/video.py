@@ -26,6 +26,13 @@ def frame_rate(control_dt: float, every: int) -> Fraction:
     return rate.limit_denominator(100_000)
 
 
+def one_thread() -> dict[str, int]:
+    """Arguments of PyAV's conversions: from 17 on they start a thread a core for an image, which takes longer."""
+    import av
+
+    return {"threads": 1} if int(av.__version__.partition(".")[0]) >= 17 else {}
+
+
 class VideoWriter:
     """Encodes (H, W, 3) uint8 images into a file. Odd sizes are padded by repeating the last column or row."""
 
@@ -56,7 +63,7 @@ class VideoWriter:
         if self._pad[0][1] or self._pad[1][1]:
             image = np.pad(image, self._pad, mode="edge")
         rgb = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
-        frame = rgb.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
+        frame = rgb.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG", **one_thread())
         frame.pts, frame.time_base = self.frames, self._clock
         self._container.mux(self._stream.encode(frame))
         self.frames += 1
@@ -80,8 +87,9 @@ def images(path: Path, width: int, height: int) -> Iterator[Array]:
     Raises:
         RecordError: it is not a video of this size, or is damaged.
     """
+    alone = one_thread()
     for frame in _frames(path, width, height):
-        yield frame.to_ndarray(format="rgb24")[:height, :width]
+        yield frame.to_ndarray(format="rgb24", **alone)[:height, :width]
 
 
 def check(path: Path, width: int, height: int, frames: int, fps: float) -> None:

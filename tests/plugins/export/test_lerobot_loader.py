@@ -17,6 +17,7 @@ from anysim.record.reader import open_trajectory
 from anysim_export.api import Episode
 from anysim_export.job import export
 from anysim_export.lerobot.video import padded
+from anysim_export.streams import channels_of
 from tests.plugins.export.runs import committed, import_torchvision, record
 
 pytestmark = [
@@ -80,6 +81,32 @@ def test_it_reads_every_number_and_image(run: Path, loaded: Any) -> None:
     print(
         f"\n{loaded.num_episodes} episodes, {len(loaded)} frames; images differ by up to {worst:.2f} of 255 on average"
     )
+
+
+def test_depth_and_segmentation_come_out_as_they_were_recorded(
+    run: Path, loaded: Any, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """Images of one channel: metres in float32, and numbers of entities, whatever the sampler's batches."""
+    import torch  # pyright: ignore[reportMissingImports]
+    from lerobot.datasets.lerobot_dataset import LeRobotDataset  # pyright: ignore[reportMissingImports]
+
+    out, recorded = tmp_path_factory.mktemp("depth") / "lerobot", episodes(run)[:2]
+    export([one.directory for one in recorded], "lerobot", out, {"channels": True, "images": False})
+    data = LeRobotDataset("anysim/depth", root=out)
+    expected = {
+        channel.name: np.stack([image for one in recorded for image in list(one.channel(channel))[:-1]])
+        for channel in channels_of(recorded[0].manifest)
+    }
+    assert set(expected) == {"depth", "segmentation"}
+    for batch in torch.utils.data.DataLoader(data, batch_size=16, shuffle=True):
+        for name, rows in expected.items():
+            there = batch[f"observation.images.front_{name}"].numpy()
+            assert there.dtype == (np.float32 if name == "depth" else np.int16)
+            np.testing.assert_array_equal(there[:, 0], rows[batch["index"].numpy()])
+    for name, rows in expected.items():
+        stats = data.meta.stats[f"observation.images.front_{name}"]
+        assert stats["max"].shape == (1, 1, 1)
+        assert float(stats["max"].item()) == rows.max()
 
 
 def test_its_statistics_are_the_same(run: Path, loaded: Any) -> None:

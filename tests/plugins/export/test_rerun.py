@@ -17,10 +17,11 @@ from PIL import Image
 
 from anysim.record.reader import open_trajectory
 from anysim.record.replay import begin
-from anysim_export.api import Episode
+from anysim_export.api import DataSet, Episode
 from anysim_export.envs import env_of
-from anysim_export.job import export
+from anysim_export.job import export, made
 from anysim_export.rerun.shapes import corner_normals, field_mesh
+from anysim_export.streams import channels_of, streams_of
 from tests.plugins.export.runs import committed, record
 
 EXPORTED = "episodes/{:06d}/episode.rrd"
@@ -53,6 +54,21 @@ def columns(path: Path) -> dict[str, dict[str, Any]]:
         for name, values in chunk.to_record_batch().to_pydict().items():
             rows.setdefault(kind + name, []).extend(values)
     return found
+
+
+@needs_rerun
+def test_what_it_says_it_takes_is_there(episodes: list[Episode], out: Path) -> None:
+    """Each entity that the exporter declares, and no other with numbers or words."""
+    exporter, options = made("rerun", {})
+    places = exporter.places(DataSet([episodes[0].manifest], options))
+    assert set(places) <= set(streams_of(episodes[0].manifest))
+    declared = {place.strip("`").split("/NAME")[0].split("/BODY")[0] for place in places.values()}
+    declared = {one.partition("`")[0] for one in declared}
+    entities = set(columns(out / EXPORTED.format(0)))
+    for place in declared:
+        assert any(f"{entity}/".startswith(f"/{place}/") for entity in entities), place
+    roots = {place.partition("/")[0] for place in declared}
+    assert {entity.split("/")[1] for entity in entities if entity != "/"} - {"__properties"} == roots
 
 
 @needs_rerun
@@ -110,6 +126,32 @@ def test_shapes_have_the_colours_of_the_episode_and_cameras_their_images(episode
     wrist = np.array(found["/world/cameras/wrist"]["Transform3D:translation"])[:, 0]
     assert np.ptp(wrist, axis=0).max() > 0.05  # it is on the hand
     assert np.ptp(np.array(lens["Transform3D:translation"])[:, 0], axis=0).max() == 0.0
+
+
+@needs_rerun
+def test_depth_is_in_metres_with_every_bit_and_segmentation_has_its_legend(episodes: list[Episode], out: Path) -> None:
+    one, found = episodes[0], columns(out / EXPORTED.format(0))
+    legend: dict[int, str] = {}
+    for channel in channels_of(one.manifest):
+        shown, recorded = found[f"/world/cameras/front/{channel.name}"], list(one.channel(channel))
+        kind = "DepthImage" if channel.name == "depth" else "SegmentationImage"
+        assert shown["step"] == list(range(0, one.steps + 1, 2))  # each when it was taken
+        form = shown[f"shape:{kind}:format"][0][0]
+        assert (form["width"], form["height"]) == (48, 32)
+        for step, [buffer] in zip(shown["step"], shown[f"{kind}:buffer"], strict=True):
+            there = np.frombuffer(bytes(buffer), channel.entry.dtype).reshape(32, 48)
+            np.testing.assert_array_equal(there, recorded[step])
+        if channel.name == "depth":
+            assert shown["shape:DepthImage:meter"] == [[1.0]]
+        else:
+            [said] = shown["shape:AnnotationContext:context"]
+            legend = {row["class_id"]: row["class_description"]["info"]["label"] for row in said}
+    assert "cube" in legend.values()
+    assert legend == {row["id"]: row["name"] for row in channels_of(one.manifest)[1].about["legend"]}
+    said, narrated = list(one.held("language/narration")), found["/language/narration"]
+    starts = [t for t in range(one.steps + 1) if said[t] is not None and (t == 0 or said[t] != said[t - 1])]
+    assert narrated["step"] == starts
+    assert [row[0] for row in narrated["TextLog:text"]] == [said[t] for t in starts]
 
 
 @needs_rerun

@@ -13,6 +13,7 @@ from PIL import Image
 from anysim.record.reader import open_trajectory
 from anysim_export.api import Episode
 from anysim_export.job import export
+from anysim_export.streams import channels_of
 from tests.plugins.export.runs import committed
 
 pytestmark = pytest.mark.xdist_group("export")
@@ -60,6 +61,9 @@ for split in builder.info.splits:
             "steps": len(steps),
             "action": np.stack([step["action"] for step in steps]).tolist(),
             "image": steps[5]["observation"]["wrist"].tolist(),
+            "depth": steps[5]["observation"]["front_depth"][..., 0].tolist(),
+            "entities": steps[5]["observation"]["front_segmentation"][..., 0].tolist(),
+            "types": [str(steps[5]["observation"][f"front_{name}"].dtype) for name in ("depth", "segmentation")],
             "said": steps[5]["language_instruction"].decode(),
             "segment": steps[5]["sub_task"].decode(),
             "last": [bool(step["is_last"]) for step in steps].index(True),
@@ -85,4 +89,8 @@ def test_the_builder_of_the_page_makes_what_tfds_reads(run: Path, tmp_path: Path
         assert (read["steps"], read["last"]) == (one.steps, one.steps - 1)
         np.testing.assert_array_equal(np.array(read["action"], np.float32), one.actions.astype(np.float32))
         np.testing.assert_array_equal(read["image"], list(one.images("wrist"))[5])
+        assert read["types"] == ["float32", "uint16"]
+        channels = {channel.name: list(one.channel(channel))[5] for channel in channels_of(one.manifest)}
+        np.testing.assert_array_equal(np.array(read["depth"], np.float32), channels["depth"])
+        np.testing.assert_array_equal(read["entities"], channels["segmentation"])
         assert (read["said"], read["segment"]) == (one.tasks[5], one.segments[5])

@@ -13,6 +13,7 @@ import pytest
 from anysim.record.reader import open_trajectory
 from anysim_export.api import Episode
 from anysim_export.job import export
+from anysim_export.streams import channels_of
 from tests.plugins.export.runs import committed, import_torchvision, record
 
 pytestmark = [
@@ -70,6 +71,30 @@ def test_it_reads_every_number_and_image(run: Path, file: Path) -> None:
                     for name in IMAGES:
                         np.testing.assert_array_equal(found[group][name][0], images[name][then])
             item += one.steps
+
+
+def test_depth_is_what_was_recorded_and_its_modality_takes_it_by_the_scale(run: Path, tmp_path: Path) -> None:
+    import robomimic.utils.obs_utils as observations  # pyright: ignore[reportMissingImports]
+
+    scale, keys = 32.0, ("front_depth", "front_segmentation")
+    specs = {"low_dim": ["front_segmentation"], "depth": ["front_depth"]}
+    observations.initialize_obs_utils_with_obs_specs({"obs": specs})
+    export([run], "robomimic", tmp_path / "out", {"depth_scale": scale})
+    data = opened(tmp_path / "out" / "demo.hdf5", "train", keys, 1)
+    one = Episode(0, open_trajectory(committed(run)[0]))
+    channels = {channel.key: list(one.channel(channel)) for channel in channels_of(one.manifest)}
+    worst = 0.0
+    for t in range(0, one.steps, 9):
+        found = data[t]["obs"]
+        np.testing.assert_array_equal(found["front_depth"][0, ..., 0] * scale, channels["front_depth"][t])
+        np.testing.assert_array_equal(found["front_segmentation"][0, ..., 0], channels["front_segmentation"][t])
+        seen = observations.process_obs(found["front_depth"], obs_key="front_depth")
+        assert seen.shape == (1, 1, 32, 48)
+        worst = max(worst, float(np.abs(seen[0, 0] * scale - channels["front_depth"][t]).max()))
+    assert worst == 0.0, "robomimic's modality clips at 1"
+    assert max(float(image.max()) for image in channels["front_depth"]) > 1.0  # which metres would have met
+    numbers = {"low_dim": list(NUMBERS), "rgb": list(IMAGES)}
+    observations.initialize_obs_utils_with_obs_specs({"obs": numbers})
 
 
 def test_its_tools_know_the_env_and_the_shapes(file: Path) -> None:

@@ -26,6 +26,13 @@ def padded(image: Array) -> Array:
     return image
 
 
+def one_thread() -> dict[str, int]:
+    """Arguments of PyAV's conversions: from 17 on they start a thread a core for an image, which takes longer."""
+    import av
+
+    return {"threads": 1} if int(av.__version__.partition(".")[0]) >= 17 else {}
+
+
 def encode(path: Path, images: Iterable[Array], rate: Fraction, crf: int) -> None:
     """Encode images (H, W, 3) uint8 with even sides into a file.
 
@@ -44,11 +51,12 @@ def encode(path: Path, images: Iterable[Array], rate: Fraction, crf: int) -> Non
         context = stream.codec_context
         context.thread_count = 1
         context.color_primaries = context.color_trc = context.colorspace = BT709
+        alone = one_thread()
         for number, image in enumerate(images):
             if number == 0:
                 stream.height, stream.width = image.shape[:2]
             rgb = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
-            frame = rgb.reformat(format=PIXELS, dst_colorspace="ITU709", dst_color_range="MPEG")
+            frame = rgb.reformat(format=PIXELS, dst_colorspace="ITU709", dst_color_range="MPEG", **alone)
             frame.pts, frame.time_base = number, 1 / rate
             container.mux(stream.encode(frame))
         container.mux(stream.encode(None))
