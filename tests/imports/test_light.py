@@ -28,10 +28,10 @@ def loaded_by(module: str, watched: tuple[str, ...]) -> list[str]:
 
 PACKAGES = (
     "anysim_schemas", "anysim", "anysim_mechanics", "anysim_mujoco", "anysim_pybullet", "anysim_sapien",
-    "anysim_annotation", "anysim_assets", "anysim_banks", "anysim_bench", "anysim_collect", "anysim_control",
-    "anysim_evaluation", "anysim_export", "anysim_film", "anysim_inspect", "anysim_language", "anysim_learning",
-    "anysim_legged", "anysim_legged_gym", "anysim_maniskill", "anysim_mcap", "anysim_parity", "anysim_planning",
-    "anysim_policy", "anysim_robots", "anysim_sharded", "anysim_skills", "anysim_tactile",
+    "anysim_annotation", "anysim_assets", "anysim_banks", "anysim_bench", "anysim_cameras", "anysim_collect",
+    "anysim_control", "anysim_evaluation", "anysim_export", "anysim_film", "anysim_inspect", "anysim_language",
+    "anysim_learning", "anysim_legged", "anysim_legged_gym", "anysim_maniskill", "anysim_mcap", "anysim_parity",
+    "anysim_planning", "anysim_policy", "anysim_robots", "anysim_sharded", "anysim_skills", "anysim_tactile",
     "anysim_tasks", "anysim_teleop", "anysim_urdf",
 )  # fmt: skip
 
