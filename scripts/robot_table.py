@@ -32,7 +32,7 @@ SHEETS = ROOT / "docs" / "images" / "robots"
 """Contact sheets by category, as `anysim gallery` writes them."""
 DISTRIBUTION = "anysim-robots"
 """The catalogue of this repository; what else is installed on a developer's machine has no place in its table."""
-OURS = ("anysim", "anysim-control", "anysim-legged", "anysim-policy")
+OURS = ("anysim", "anysim-cameras", "anysim-control", "anysim-legged", "anysim-policy")
 """The distributions of this repository that have controllers."""
 ENGINES = ("mujoco", "pybullet", "sapien")
 CONCEPTS = ROOT / "docs" / "concepts" / "robots.md"

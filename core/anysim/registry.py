@@ -63,9 +63,10 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-avatars": {"families": "avatar"},
     "anysim-banks": {"commands": "bank"},
     "anysim-bench": {"commands": "bench"},
+    "anysim-cameras": {"controllers": "camera_follow camera_gimbal camera_motion camera_path"},
     "anysim-collect": {"commands": "counterfactual report run"},
     "anysim-control": {
-        "controllers": "ackermann_drive batched_ik camera_gimbal camera_motion differential_drive differential_ik"
+        "controllers": "ackermann_drive batched_ik differential_drive differential_ik"
         " gripper_multi_finger holonomic_drive mink_ik operational_space pd pink_ik planar_drive",
         "planners": "numba_ik",
     },

@@ -28,7 +28,7 @@ def loaded_by(module: str, watched: tuple[str, ...]) -> list[str]:
 
 PACKAGES = (
     "anysim_schemas", "anysim", "anysim_mechanics", "anysim_mujoco", "anysim_pybullet", "anysim_sapien",
-    "anysim_annotation", "anysim_assets", "anysim_avatars", "anysim_banks", "anysim_bench", "anysim_collect",
+    "anysim_annotation", "anysim_assets", "anysim_avatars", "anysim_banks", "anysim_bench", "anysim_cameras", "anysim_collect",
     "anysim_control",
     "anysim_evaluation", "anysim_export", "anysim_film", "anysim_inspect", "anysim_language", "anysim_learning",
     "anysim_legged", "anysim_legged_gym", "anysim_maniskill", "anysim_mcap", "anysim_navigation", "anysim_parity", "anysim_planning",

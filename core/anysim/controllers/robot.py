@@ -13,6 +13,7 @@ from anysim.math import pose as P
 from anysim.model.frames import find_frame
 from anysim.model.index import Index
 from anysim.model.world import BodyKind, Robot, World
+from anysim.randomization.streams import Streams
 from anysim_schemas.robot_model import RobotModelSpec
 
 
@@ -28,12 +29,13 @@ class ControlledRobot:
         root: the world index of its base's body.
         floating: whether the base is free.
         dt, control_dt: physics and control time steps [s].
+        streams: what a controller draws from, in `reset`; None outside of an env.
     """
 
-    def __init__(self, world: World, name: str) -> None:
+    def __init__(self, world: World, name: str, streams: Streams | None = None) -> None:
         index = Index(world)
         entity = index.entity(name)
-        self.name, self.world = name, world
+        self.name, self.world, self.streams = name, world, streams
         self.robot = index.robot(name)
         self.root = _base_of(world, self.robot, entity.root)
         self.floating = world.bodies[self.root].kind is BodyKind.FREE

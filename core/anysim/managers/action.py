@@ -57,7 +57,7 @@ class ActionManager(Manager):
         self._robots: list[ControlledRobot] = []
         issues: list[SpecIssue] = []
         for robot in world.robots:
-            controlled = ControlledRobot(world, robot.name)
+            controlled = ControlledRobot(world, robot.name, self.streams)
             self._robots.append(controlled)
             for name in self.spec.world.robots[robot.name].actions:
                 channel = robot.channels.get(name)

@@ -10,7 +10,7 @@ from anysim.controllers.base import ChannelView, Command, Controller
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.model.world import JointType
-from anysim_control.camera.easing import brake_speed, minimum_jerk, move_time, room_speeds, shortened, toward, wrapped
+from anysim_cameras.easing import brake_speed, minimum_jerk, move_time, room_speeds, shortened, toward, wrapped
 
 _STATE = ("position", "velocity", "target", "start", "goal", "elapsed", "duration")
 

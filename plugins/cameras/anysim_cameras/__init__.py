@@ -1,0 +1,1 @@
+"""Cameras that fly: controllers that move and aim them."""
