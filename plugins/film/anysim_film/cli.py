@@ -78,13 +78,13 @@ def render(
         from anysim.errors import AnysimError
 
         given = {"--camera": camera, "--size": size, "--fps": fps, "--base": base, "--annotate": annotate}
-        given |= {"--jobs": jobs > 1, "--source": source != "engine"}
+        given |= {"--source": source != "engine"}
         if told := [name for name, value in given.items() if value]:
             raise AnysimError(
                 f"{', '.join(told)}: what a job of still images draws stands in {directories[0]}; leave it out, or "
                 "change the file with -o"
             )
-        _stills(directories[0], out, engine, override or (), quiet=json)
+        _stills(directories[0], out, engine, override or (), jobs, quiet=json)
         return
     order = FilmOrder(tuple(camera or ()), engine, tuple(override or ()), size, fps, base)
     work = film_targets(find_trajectories(directories), out)
@@ -140,12 +140,14 @@ def _annotate(
         typer.echo(f"{new} of {len(done)} episodes annotated, {images} images; the others were there")
 
 
-def _stills(job: Path, out: Path | None, engine: str | None, overrides: "Sequence[str]", *, quiet: bool) -> None:
+def _stills(
+    job: Path, out: Path | None, engine: str | None, overrides: "Sequence[str]", jobs: int, *, quiet: bool
+) -> None:
     """Make still images, which another distribution knows how to."""
     from anysim import registry
     from anysim.cli.output import counting, print_json
 
-    steps = registry.load("renderings", "stills")(job, out, engine, overrides)
+    steps = registry.load("renderings", "stills")(job, out, engine, overrides, jobs)
     last = next(steps)
     with counting("images", last.of - last.done, quiet=quiet) as show:
         for last in steps:

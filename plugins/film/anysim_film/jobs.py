@@ -1,16 +1,17 @@
-"""Work on trajectories in several processes, each with an engine of its own."""
+"""Work shared by several processes, each with an engine of its own."""
 
 import os
 import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from contextlib import AbstractContextManager, contextmanager
 from functools import partial
+from itertools import islice
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, TypeVarTuple
 
 from anysim.errors import AnysimError, RecordError
 from anysim_film.filmer import Filmed, Filmer
@@ -18,51 +19,58 @@ from anysim_film.stage import FilmOrder
 
 WATCH_S = 1.0
 """How often a worker looks whether its parent is there [s]."""
+AHEAD = 4
+"""Items of each process that wait for it, so that a million of them take no room."""
 T = TypeVar("T")
-Treat = Callable[[Path, Path | None], T]
-"""What is done with a trajectory and the directory for what comes of it."""
-Work = Sequence[tuple[Path, Path | None]]
+Item = TypeVarTuple("Item")
 
 
-def film_all(work: Work, order: FilmOrder, jobs: int = 1) -> Iterator[Filmed]:
+def film_all(work: Sequence[tuple[Path, Path | None]], order: FilmOrder, jobs: int = 1) -> Iterator[Filmed]:
     """Film trajectories, each into its directory (`Filmer.film`), in up to `jobs` processes; yields each when done."""
     return treat_all(work, partial(_filming, order), jobs)
 
 
-def treat_all(work: Work, open_: Callable[[], AbstractContextManager[Treat[T]]], jobs: int = 1) -> Iterator[T]:
-    """Do something with trajectories in up to `jobs` processes, each of which opens what does it once.
+def treat_all(
+    work: Sequence[tuple[*Item]], open_: Callable[[], AbstractContextManager[Callable[[*Item], T]]], jobs: int = 1
+) -> Iterator[T]:
+    """Do something with items in up to `jobs` processes, each of which opens what does it once.
 
     What is complete stays, whatever is raised. With more than one process they come in any order, and a program that
     calls this guards its main module (`if __name__ == "__main__"`), which each process imports. `open_` is pickled.
     """
     if jobs == 1 or len(work) < 2:
         with open_() as treat:
-            for trajectory, directory in work:
-                yield treat(trajectory, directory)
+            for item in work:
+                yield treat(*item)
         return
     with ProcessPoolExecutor(
         min(jobs, len(work)), mp_context=get_context("spawn"), initializer=_begin, initargs=(open_, os.getpid())
     ) as pool:
-        futures = [pool.submit(_treated, *item) for item in work]
+        items, begun = iter(work), set[Future[T]]()
         try:
-            for future in as_completed(futures):
-                yield future.result()
+            while True:
+                begun |= {pool.submit(_treated, *item) for item in islice(items, AHEAD * jobs - len(begun))}
+                if not begun:
+                    return
+                done, begun = wait(begun, return_when=FIRST_COMPLETED)
+                for future in done:
+                    yield future.result()
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
 
 
 @contextmanager
-def _filming(order: FilmOrder) -> Iterator[Treat[Filmed]]:
+def _filming(order: FilmOrder) -> Iterator[Callable[[Path, Path | None], Filmed]]:
     with Filmer(order) as filmer:
         yield filmer.film
 
 
-_opened: list[tuple[AbstractContextManager[Treat[Any]], Treat[Any]]] = []
+_opened: list[tuple[AbstractContextManager[Callable[..., Any]], Callable[..., Any]]] = []
 """That of a worker, open until the process ends."""
 
 
-def _begin(open_: Callable[[], AbstractContextManager[Treat[Any]]], parent: int) -> None:
+def _begin(open_: Callable[[], AbstractContextManager[Callable[..., Any]]], parent: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # it reaches the parent, which lets what is begun come to its end
     context = open_()
     _opened.append((context, context.__enter__()))
@@ -75,8 +83,8 @@ def _begin(open_: Callable[[], AbstractContextManager[Treat[Any]]], parent: int)
     threading.Thread(target=watch, name="anysim-film-parent", daemon=True).start()
 
 
-def _treated(trajectory: Path, directory: Path | None) -> Any:
+def _treated(*item: Any) -> Any:
     try:
-        return _opened[0][1](trajectory, directory)
+        return _opened[0][1](*item)
     except AnysimError as error:
         raise RecordError(str(error)) from None  # errors that hold more than words do not survive the way back

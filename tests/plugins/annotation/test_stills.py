@@ -1,6 +1,9 @@
 """Jobs of still images: the same images whatever the batch, and labels that other readers decode."""
 
 import json
+import subprocess
+import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +15,7 @@ from pycocotools.coco import COCO
 
 from anysim.errors import RecordError, SpecError
 from anysim.testing.engines import require_drawing
-from anysim_annotation.stills import job as jobs
+from anysim_annotation.stills import maker
 from anysim_annotation.stills.job import render_job
 from anysim_annotation.stills.labels import kitti_line
 from anysim_annotation.stills.masks import encoded, outlines, run_lengths
@@ -45,11 +48,11 @@ def job(tmp_path: Path) -> Path:
     return tmp_path / "job.yaml"
 
 
-def made(path: Path, out: Path, *overrides: str, **changed: object) -> dict[str, bytes]:
+def made(path: Path, out: Path, *overrides: str, processes: int = 1, **changed: object) -> dict[str, bytes]:
     """Every file of a job that has run to its end."""
     for key, value in changed.items():
         path.write_text(path.read_text().replace("}", f", {key}: {value}}}"))
-    list(render_job(path, out, overrides=overrides))
+    list(render_job(path, out, overrides=overrides, jobs=processes))
     return {str(f.relative_to(out)): f.read_bytes() for f in out.rglob("*") if f.is_file() and f.name != ".lock"}
 
 
@@ -151,7 +154,7 @@ def test_an_interrupted_job_goes_on_to_the_same_bytes(
     job: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = made(job, tmp_path / "whole")
-    out, real, count = tmp_path / "part", jobs.write_png, [0]
+    out, real, count = tmp_path / "part", maker.write_png, [0]
 
     def full(path: Path, image: np.ndarray) -> None:
         count[0] += 1
@@ -161,13 +164,58 @@ def test_an_interrupted_job_goes_on_to_the_same_bytes(
         real(path, image)
 
     with monkeypatch.context() as patch:
-        patch.setattr(jobs, "write_png", full)
+        patch.setattr(maker, "write_png", full)
         with pytest.raises(RecordError, match=r"No space left on device .*start it again"):
             list(render_job(job, out))
     assert not (out / "coco.json").exists()
-    assert len(list((out / "labels").iterdir())) == 3
+    assert len(list((out / "labels").iterdir())) == len(list((out / "images").glob("*.png"))) == 3
     progress = list(render_job(job, out))
     assert (progress[0].done, progress[-1].new) == (3, 4)
+    assert {str(f.relative_to(out)): f.read_bytes() for f in out.rglob("*") if f.is_file()} == whole
+
+
+@pytest.mark.parametrize("processes", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_processes_make_the_bytes_of_one_and_go_on_where_another_stopped(
+    job: Path, tmp_path: Path, processes: int
+) -> None:
+    whole, out = made(job, tmp_path / "whole"), tmp_path / "shared"
+    job.write_text(JOB.replace("images: 7", "images: 7, batch: 1"))
+    begun = render_job(job, out)
+    for _ in range(3):
+        next(begun)  # how many are there, and the two images of a scene
+    begun.close()
+    (out / "labels" / "0000000.json").unlink()
+    (out / "images" / ".0000000.1").write_bytes(b"half an image")
+    progress = list(render_job(job, out, jobs=processes))
+    assert [step.new for step in progress] == list(range(len(progress)))
+    assert progress[-1] == (7, 7, 6)
+    assert {str(f.relative_to(out)): f.read_bytes() for f in out.rglob("*") if f.is_file()} == whole
+
+
+@pytest.mark.slow
+def test_a_fault_of_a_process_reaches_the_one_that_asked(job: Path, tmp_path: Path) -> None:
+    (tmp_path / "out" / "images" / "0000004.png").mkdir(parents=True)
+    with pytest.raises(RecordError, match=r"cannot write into .*0000004.*\. Images that were complete are there"):
+        made(job, tmp_path / "out", processes=2)
+    with pytest.raises(RecordError, match=r"null cannot run 'world': camera 'left'"):
+        list(render_job(job, tmp_path / "other", engine="null", jobs=2))
+
+
+@pytest.mark.slow
+def test_a_job_whose_processes_are_killed_goes_on_to_the_same_bytes(job: Path, tmp_path: Path) -> None:
+    job.write_text(JOB.replace("images: 7", "images: 60, batch: 1"))
+    whole, out = made(job, tmp_path / "whole"), tmp_path / "out"
+    command = [str(Path(sys.executable).with_name("anysim")), "render", str(job), "--out", str(out), "--jobs", "2"]
+    for least in (5, 20):
+        running = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+        while len(list((out / "labels").glob("*.json"))) < least:
+            assert running.poll() is None
+            time.sleep(0.01)
+        running.kill()
+        running.wait()
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "60 of 60 there" in done.stdout
+    assert int(done.stdout.split(" images made")[0].split()[-1]) <= 40
     assert {str(f.relative_to(out)): f.read_bytes() for f in out.rglob("*") if f.is_file()} == whole
 
 
