@@ -12,12 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from anysim.conventions import WORLD, Array
-from anysim.model.pairs import counted
+from anysim.model.pairs import concerned
 from anysim.model.world import World
 from anysim_mechanics.momentum_balance import Balance
 
 _NOISE = 1e-3
 """Relative, of a momentum equation: single precision, and the terms of a link's that are first-order in the step."""
+
+_EYE = np.eye(3)
 
 
 class Pair(NamedTuple):
@@ -52,8 +54,9 @@ def with_friction(pairs: Sequence[Pair], coefficients: Sequence[float], balance:
     """Pairs with the friction that their coefficients and the net contact forces on their bodies make likely."""
     spread: list[Array] = []
     for (_, _, normals, pressure, *_), coefficient in zip(pairs, coefficients, strict=True):
-        across = np.eye(3) * pressure.sum() - np.einsum("p,pi,pj->ij", pressure, normals, normals)
-        spread.append(coefficient**2 * pressure.sum() * across)
+        total = pressure.sum()
+        across = _EYE * total - np.einsum("p,pi,pj->ij", pressure, normals, normals)
+        spread.append(coefficient**2 * total * across)
     friction = _friction(pairs, spread, balance)
     return [pair._replace(friction=f) for pair, f in zip(pairs, friction, strict=True)]
 
@@ -90,12 +93,13 @@ def sensor_forces(world: World, pairs: Sequence[Pair]) -> Array:
     total = np.zeros((len(world.contact_sensors), 3))
     pairs = [pair for pair in pairs if pair.pressure.any()]
     first, second = np.array([(pair.first, pair.second) for pair in pairs], dtype=int).reshape(-1, 2).T
-    for row, sensor in zip(total, world.contact_sensors, strict=True):
-        for pair, on_first, on_second in zip(pairs, *counted(sensor, first, second), strict=True):
-            if on_first:
-                row += pair.force
-            if on_second:
-                row -= pair.force
+    forces = [pair.force for pair in pairs]
+    for place, on_first, on_second in concerned(world.contact_sensors, first, second):
+        for force, adds, takes in zip(forces, on_first.tolist(), on_second.tolist(), strict=True):
+            if adds:
+                total[place] += force
+            if takes:
+                total[place] -= force
     return total
 
 

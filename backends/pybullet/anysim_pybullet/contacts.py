@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import WORLD, Array
-from anysim.model.pairs import counted
+from anysim.model.pairs import concerned
 from anysim.model.world import World
 from anysim_pybullet.bullet import bullet
 from anysim_pybullet.client import Env
@@ -50,8 +50,8 @@ def sensor_forces(world: World, env: Env) -> Array:
     if not points:
         return forces
     on_a, (a, b) = _vectors(points), _bodies(env, points)
-    for row, sensor in enumerate(world.contact_sensors):
-        for counts, sign in zip(counted(sensor, a, b), (1.0, -1.0), strict=True):
+    for row, on_first, on_second in concerned(world.contact_sensors, a, b):
+        for counts, sign in ((on_first, 1.0), (on_second, -1.0)):
             forces[row] += sign * on_a[counts].sum(axis=0)
     return forces
 

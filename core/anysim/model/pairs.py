@@ -1,5 +1,7 @@
 """Pairs of things that touch: which may meet, by which coefficients, and which of them a contact sensor counts."""
 
+from collections.abc import Iterator, Sequence
+
 import numpy as np
 
 from anysim.conventions import WORLD, Array
@@ -61,6 +63,14 @@ def counted(sensor: ContactSensor, first: Array, second: Array) -> tuple[Array, 
     if sensor.against is None:
         return own
     return own[0] & _among(second, sensor.against), own[1] & _among(first, sensor.against)
+
+
+def concerned(sensors: Sequence[ContactSensor], first: Array, second: Array) -> Iterator[tuple[int, Array, Array]]:
+    """The places of sensors whose bodies are among these, with what `counted` says."""
+    touched = {*first.tolist(), *second.tolist()}
+    for place, sensor in enumerate(sensors):
+        if not touched.isdisjoint(sensor.bodies):
+            yield place, *counted(sensor, first, second)
 
 
 def _among(bodies: Array, some: tuple[int, ...]) -> Array:
