@@ -2,8 +2,12 @@
 
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import pytest
+
+ROOT = Path(__file__).parents[2]
 
 ENGINES = ("mujoco", "pybullet", "sapien", "torch")
 HEAVY = (
@@ -26,15 +30,7 @@ def loaded_by(module: str, watched: tuple[str, ...]) -> list[str]:
     return sorted(run(code, module, *watched).split())
 
 
-PACKAGES = (
-    "anysim_schemas", "anysim", "anysim_mechanics", "anysim_mujoco", "anysim_pybullet", "anysim_sapien",
-    "anysim_annotation", "anysim_assets", "anysim_avatars", "anysim_banks", "anysim_bench", "anysim_cameras", "anysim_collect",
-    "anysim_control",
-    "anysim_evaluation", "anysim_export", "anysim_film", "anysim_inspect", "anysim_language", "anysim_learning",
-    "anysim_legged", "anysim_legged_gym", "anysim_maniskill", "anysim_mcap", "anysim_navigation", "anysim_parity", "anysim_planning",
-    "anysim_policy", "anysim_processes", "anysim_robots", "anysim_sharded", "anysim_skills", "anysim_tactile",
-    "anysim_tasks", "anysim_teleop", "anysim_urdf",
-)  # fmt: skip
+PACKAGES = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"]["root_packages"]
 
 
 @pytest.mark.parametrize("package", PACKAGES)

@@ -75,9 +75,13 @@ def test_limbs_point_where_the_file_has_them(tmp_path, prefix, names):
     for bone, expected in {"left_upper_arm": (0, 1, 0), "right_thigh": (0, 0, -1), "torso": (0, 0, 1)}.items():
         np.testing.assert_allclose(direction(motion, 0, bone), expected, atol=1e-9)
     found = {
-        "left_upper_arm": (0, 0, 1), "left_forearm": (0, 0, 1), "right_upper_arm": (0, -1, 0),
-        "right_forearm": (1, 0, 0), "left_thigh": (1, 0, 0), "left_shin": (1, 0, 0),
-    }  # fmt: skip
+        "left_upper_arm": (0, 0, 1),
+        "left_forearm": (0, 0, 1),
+        "right_upper_arm": (0, -1, 0),
+        "right_forearm": (1, 0, 0),
+        "left_thigh": (1, 0, 0),
+        "left_shin": (1, 0, 0),
+    }
     for bone, expected in found.items():
         np.testing.assert_allclose(direction(motion, 1, bone), expected, atol=1e-9, err_msg=bone)
     np.testing.assert_allclose(motion.hips[1] - motion.hips[0], [30 / 83, 0, 0], atol=1e-9)
