@@ -13,6 +13,8 @@ from anysim_navigation.agent import Agent, NoRoute
 SLACK = 1e-6
 """[m] by which a point may be off the mesh and still counts as on it."""
 TRIANGLE = 3
+NO_AREA = 1e-9
+"""[m^2] smaller triangles have corners in a line, and which way they run is rounding."""
 
 
 class NavMesh:
@@ -38,9 +40,7 @@ class NavMesh:
         rings = shapely.get_coordinates(parts).reshape(-1, 4, 2)[:, :3]  # closed
         self.vertices, numbers = np.unique(rings.reshape(-1, 2), axis=0, return_inverse=True)
         triangles = numbers.reshape(-1, 3).astype(np.int64)
-        a, b, c = (self.vertices[triangles[:, k]] for k in range(3))
-        area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-        triangles[area < 0] = triangles[area < 0][:, ::-1]
+        triangles = _counter_clockwise(self.vertices, triangles)
         order = np.lexsort(triangles.T[::-1])  # the order of shapely is not promised
         self.triangles = np.ascontiguousarray(triangles[order])
         self.neighbours = _neighbours(self.triangles)
@@ -111,14 +111,38 @@ class NavMesh:
         return int(self._search.triangle_at(self.vertices, self.triangles, point[0], point[1], SLACK))
 
     def _extent(self, triangle: int) -> float:
-        a, b, c = (self.vertices[self.triangles[self.part == self.part[triangle], k]] for k in range(3))
-        cross = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-        return 0.5 * float(cross.sum())
+        return float(_areas(self.vertices, self.triangles[self.part == self.part[triangle]]).sum())
 
 
 def length_of(path: Array) -> float:
     """[m] of a way (K, 2)."""
     return float(np.hypot(*np.diff(path, axis=0).T).sum())
+
+
+def _areas(vertices: Array, triangles: Array) -> Array:
+    """(T,) [m^2], positive where the corners run counter-clockwise."""
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    return 0.5 * ((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]))
+
+
+def _counter_clockwise(vertices: Array, triangles: Array) -> Array:
+    """The triangles, all turned the same way; one without an area as those beside it, which go along its edges back."""
+    area = _areas(vertices, triangles)
+    triangles = np.where(area[:, None] < 0, triangles[:, ::-1], triangles)
+    beside, flat = _neighbours(triangles), set(np.flatnonzero(np.abs(area) < NO_AREA).tolist())
+    while flat:
+        turned = [t for t in flat if any(n >= 0 and n not in flat for n in beside[t])]
+        if not turned:
+            break
+        for t in turned:
+            flat.discard(t)
+            k = next(k for k in range(TRIANGLE) if beside[t, k] >= 0 and beside[t, k] not in flat)
+            a, b = triangles[t, k], triangles[t, (k + 1) % TRIANGLE]
+            other = triangles[beside[t, k]]
+            if any(other[e] == a and other[(e + 1) % TRIANGLE] == b for e in range(TRIANGLE)):
+                triangles[t] = triangles[t, ::-1]
+                beside[t] = beside[t, [1, 0, 2]]  # the edges of the corners (c, b, a)
+    return triangles
 
 
 def _neighbours(triangles: Array) -> Array:

@@ -66,6 +66,13 @@ def test_two_hundred_rooms() -> None:
     assert np.median(every) < 1.05
 
 
+def test_triangles_without_area_turn_no_way_around() -> None:
+    """Room 53 has corners in a line: a triangle of them with its sides exchanged made ways 60 % longer."""
+    mesh = NavMaps(random_room(53), SMALL).at()
+    start, goal = np.array([3.191362, -1.124725]), np.array([-2.650752, -0.719116])
+    assert length_of(mesh.path(start, goal)) < 1.001 * VisibilityGraph(mesh.free).length(start, goal)
+
+
 def test_a_way_around_a_corner_has_the_length_of_trigonometry() -> None:
     mesh = NavMaps(blocks(((0.5, 0.5, 0.5), (0, 0, 0.5))), SMALL, area=AREA).at()
     path = mesh.path((-2.0, 0.0), (2.0, 0.0))
