@@ -96,7 +96,7 @@ def read_motion(path: Path) -> Motion:
         joints = _hierarchy(words)
         rows, period = _frames(words, sum(len(joint.channels) for joint in joints))
     except (StopIteration, ValueError, OSError) as error:
-        raise AssetError(f"{path.name} is no BVH file that can be read: {error or 'it ends too early'}") from error
+        raise AssetError(f"{path.name} is no BVH file that can be read: {str(error) or 'it ends too early'}") from error
     found = _limbs(joints, path)
     rest = np.zeros((len(joints), 3))
     turn = np.tile(np.eye(3), (len(rows), len(joints), 1, 1))
@@ -135,7 +135,7 @@ def _hierarchy(words: Iterator[str]) -> list[_Joint]:
         elif word == "OFFSET":
             joints[-1].offset = np.array([float(next(words)) for _ in range(3)])
         elif word == "CHANNELS":
-            joints[-1].channels = tuple(next(words) for _ in range(int(next(words))))
+            joints[-1].channels = tuple([next(words) for _ in range(int(next(words)))])
         elif word == "MOTION":
             return joints
         else:

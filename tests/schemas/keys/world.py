@@ -273,6 +273,10 @@ ROWS: dict[str, Row] = {
     "ScenerySpec.background": row("world.scenery.background=red"),
     "ScenerySpec.ambient": row("world.scenery.ambient=[0.1, 0.2, 0.3]"),
     "ScenerySpec.shadows": row("world.scenery.shadows=true"),
+    "WorldSpec.families": row("world.families={ann: {kind: avatar}}"),
+    "FamilySpec.kind": row(
+        "world.families.ann.kind=rigid", given="world.families={ann: {kind: avatar}}", error="what an object is"
+    ),
     "ContactSensorSpec.body": row(
         "world.contact_sensors.touch={body: ball}", given="world.contact_sensors.touch={body: red}"
     ),
