@@ -16,6 +16,7 @@ Every message but foxglove's has `step`; the first three have `time` [s].
 
 import json
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from anysim.record.header import CameraInfo, StateLayout
@@ -117,7 +118,7 @@ def calibration(name: str, camera: CameraInfo) -> Any:
     )
 
 
-def static_transforms(cameras: dict[str, CameraInfo]) -> Any:
+def static_transforms(cameras: Mapping[str, CameraInfo]) -> Any:
     """foxglove.FrameTransforms of the cameras' optical frames in the bodies they ride on, at time 0."""
     from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
     from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
