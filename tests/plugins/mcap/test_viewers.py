@@ -8,6 +8,7 @@ import importlib.util
 import json
 import math
 import re
+import shutil
 import subprocess
 import sys
 from itertools import pairwise
@@ -16,8 +17,14 @@ from typing import Any
 
 import pytest
 
+from anysim.record.film import camera_of
 from anysim.record.reader import TrajectoryReader, open_trajectory
+from anysim.record.replay import begin, rebuild
 from anysim_export.job import export
+from anysim_film.filmer import Filmer
+from anysim_film.stage import FilmOrder
+from anysim_inspect.verify import verify
+from anysim_mcap import messages as m
 from tests.plugins.export.runs import record
 from tests.plugins.mcap.exported import assert_consistent, frames, heard
 
@@ -28,9 +35,11 @@ needs_node = pytest.mark.skipif(not (NODE / "installed").exists(), reason="needs
 needs_rerun = pytest.mark.skipif(importlib.util.find_spec("rerun") is None, reason="needs rerun-sdk: make test-viewers")
 LABELS = "{boxes_2d: {}, boxes_3d: {}, skeleton: {}, eef_waypoint: {}, obj_bbox: {}, affordance: {}, point_cloud: {}}"
 EVERYTHING = (
-    "record.cameras=[front]",  # the other one is seen by streams alone
+    "record.cameras=[front]",  # wrist has streams alone, and side nothing
+    "world.cameras.side={from: [1.0, 1.0, 1.0], look_at: [0, 0, 0.5], size: [16, 12]}",
+    "world.cameras.wrist.channels=[rgb, depth]",
     "world.cameras.front.channels=[rgb, depth, segmentation]",
-    "record.channels={front: [depth, segmentation]}",
+    "record.channels={front: [depth, segmentation], wrist: [depth]}",
     f"record.streams={{annotations: {{annotators: {LABELS}, cameras: [front, wrist]}}, language: {{}}}}",
     "world.sensors={scan: {sensor: lidar, frame: panda.tool, pattern: {kind: planar, columns: 12}, far: 2.0}, "
     "dome: {sensor: lidar, frame: table, pattern: {kind: solid_state, count: 30, half_angle: 0.4}, rate: 10, "
@@ -100,8 +109,9 @@ def test_what_is_worked_out_is_that_of_the_states(reader: TrajectoryReader, out:
         assert [[getattr(j, kind) for j in row.message.joints] for row in joints] == rows.tolist()
     assert [j.name for j in joints[0].message.joints] == list(reader.manifest.layout.joints)
     cameras = {topic for topic in found if topic.endswith("/calibration")}
-    assert cameras == {"/camera/front/calibration", "/camera/wrist/calibration"}
-    assert {"camera/front", "camera/wrist"} <= frames(found)
+    assert cameras == {f"/camera/{name}/calibration" for name in ("front", "wrist", "side")}
+    assert {f"camera/{name}" for name in ("front", "wrist", "side")} <= frames(found)
+    assert all(len(found[topic]) == 1 for topic in cameras)
     assert len(found["/camera/front"]) == reader.manifest.cameras["front"].frames
     assert [row.step for row in found["/sensor/scan"]] == steps
     assert len({row.message.timestamp.nanos for row in found["/sensor/dome"]}) > 3
@@ -114,6 +124,32 @@ def test_what_is_worked_out_is_that_of_the_states(reader: TrajectoryReader, out:
     assert [row.step for row in found["/annotation/front/obj_bbox/marks"]] == begun
     assert found["/sub_task"][0].message.message.startswith("pick")
     assert all(a.message.message != b.message.message for a, b in pairwise(found["/sub_task"]))
+
+
+def test_a_camera_without_a_video_has_its_lens_and_place_beside_its_streams(reader: TrajectoryReader) -> None:
+    with rebuild(reader.manifest) as env:
+        begin(env, reader.manifest)
+        wrist = camera_of(env, 0, "wrist")
+    lens, place = (reader.stream(f"camera/wrist/{name}") for name in ("calibration", "place"))
+    assert place.values == [{"parent": wrist.parent, "pose": list(wrist.pose)}]
+    assert lens.values == [{"width": wrist.width, "height": wrist.height, "k": m.intrinsics(wrist)}]
+    assert lens.steps.tolist() == place.steps.tolist() == [0]
+    assert "camera/front/place" not in reader.names()
+    assert verify(reader.directory) == []
+
+
+def test_a_camera_that_was_filmed_later_has_its_video_lens_and_place(reader: TrajectoryReader, tmp_path: Path) -> None:
+    copy = shutil.copytree(reader.directory, tmp_path / "run" / "episodes" / reader.directory.name)
+    with Filmer(FilmOrder(("wrist", "side"))) as filmer:
+        filmer.film(copy)
+    assert verify(copy) == []
+    export([copy], "foxglove", tmp_path / "out")
+    found = heard(tmp_path / "out" / "episodes" / "000000" / "episode.mcap")
+    assert_consistent(found)
+    for name in ("front", "wrist", "side"):
+        assert len(found[f"/camera/{name}"]) == len(found["/camera/front"])
+        assert len(found[f"/camera/{name}/calibration"]) == 1
+        assert f"camera/{name}" in frames(found)
 
 
 def test_the_page_lists_what_is_worked_out_and_nothing_else(reader: TrajectoryReader, files: list[Path]) -> None:
