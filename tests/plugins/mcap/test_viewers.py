@@ -15,8 +15,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from anysim.math import pose as P
 from anysim.record.film import camera_of
 from anysim.record.reader import TrajectoryReader, open_trajectory
 from anysim.record.replay import begin, rebuild
@@ -124,6 +126,43 @@ def test_what_is_worked_out_is_that_of_the_states(reader: TrajectoryReader, out:
     assert [row.step for row in found["/annotation/front/obj_bbox/marks"]] == begun
     assert found["/sub_task"][0].message.message.startswith("pick")
     assert all(a.message.message != b.message.message for a, b in pairwise(found["/sub_task"]))
+
+
+@pytest.mark.parametrize("camera", ["front", "wrist"])
+def test_shapes_seen_through_the_lenses_are_where_the_drawings_are(out: Path, camera: str) -> None:
+    """Scene, transforms, calibration and marks, which come from four places: a viewer lays one over the other."""
+    found = heard(out)
+    [lens] = [row.message for row in found[f"/camera/{camera}/calibration"]]
+    places = [row for rows in found.values() for row in rows if row.schema == "foxglove.FrameTransforms"]
+    fixed = {t.child_frame_id: t for row in places if row.step == 0 for t in row.message.transforms}[f"camera/{camera}"]
+    [cube] = [entity for entity in found["/scene"][0].message.entities if entity.frame_id == "cube"]
+    [box] = cube.cubes
+    half = np.array([box.size.x, box.size.y, box.size.z]) / 2
+    corners = half * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    compared = 0
+    for row in found[f"/annotation/{camera}/boxes_3d/marks"]:
+        shown = [text.text for text in row.message.texts]
+        if "cube" not in shown:
+            continue
+        moved = {t.child_frame_id: t for t in found["/tf"][row.step].message.transforms}
+        eye = placed(fixed)
+        if fixed.parent_frame_id != "world":
+            eye = P.compose(placed(moved[fixed.parent_frame_id]), eye)
+        thing = placed(moved["cube"])
+        world = thing[:3] + P.rotate(thing[3:], corners)
+        x, y, z = P.rotate_inverse(eye[3:], world - eye[:3]).T
+        pixels = np.stack([lens.K[0] * x / z + lens.K[2], lens.K[4] * y / z + lens.K[5]], axis=-1)
+        edges = row.message.points[shown.index("cube")].points
+        drawn = np.array([[p.x, p.y] for p in edges])
+        if len(edges) == 24 and (z > 0).all():
+            np.testing.assert_allclose(sorted(map(tuple, pixels)), sorted({tuple(one) for one in drawn}), atol=1e-6)
+            compared += 1
+    assert compared > 5
+
+
+def placed(transform: Any) -> np.ndarray:
+    p, q = transform.translation, transform.rotation
+    return np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w])
 
 
 def test_a_camera_without_a_video_has_its_lens_and_place_beside_its_streams(reader: TrajectoryReader) -> None:
