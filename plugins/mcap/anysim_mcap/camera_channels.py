@@ -1,4 +1,7 @@
-"""Depth and segmentation of cameras as streams, drawn from the recorded states of an episode that is kept."""
+"""Depth and segmentation of cameras as streams, drawn from the recorded states of an episode that is kept.
+
+Of a camera with a video the trajectory has lens and place; of others they are streams too, once.
+"""
 
 from collections.abc import Iterator
 
@@ -6,17 +9,18 @@ import numpy as np
 
 from anysim.errors import RecordError
 from anysim.record.columns import EpisodeColumns
-from anysim.record.film import capture_of, refuse_changed
+from anysim.record.film import camera_of, capture_of, refuse_changed
 from anysim.record.header import StreamInfo
 from anysim.record.streams import StreamPart, StreamRow, StreamSource
 from anysim.task.env import TaskEnv
+from anysim_mcap import messages as m
 
 CAMERA = "camera"
 """The family of these streams."""
 
 
 class CameraChannels(StreamSource):
-    """`camera/NAME/depth` float32 [m], at most the far plane's, and `camera/NAME/segmentation` uint16, of entities."""
+    """`camera/NAME/depth` float32 [m], at most the far plane's, `…/segmentation` uint16, `…/calibration`, `…/place`."""
 
     def __init__(self, env: TaskEnv) -> None:
         self._env, self._since = env, np.zeros(env.num_envs, dtype=np.int64)
@@ -40,6 +44,9 @@ class CameraChannels(StreamSource):
             for channel in channels:
                 said = {"kind": "image", "shape": size, "frame": frame, **kinds[channel]}
                 self.streams[f"{frame}/{channel}"] = StreamInfo.model_validate(said)
+            if name not in env.spec.record.cameras:
+                for stream, schema in (("calibration", m.CALIBRATION), ("place", m.TRANSFORMS)):
+                    self.streams[f"{frame}/{stream}"] = StreamInfo(kind="data", frame=frame, about={"schema": schema})
 
     def begin(self, index: int) -> None:
         self._since[index] = self._env.engine.appearance_changes[index]
@@ -47,6 +54,7 @@ class CameraChannels(StreamSource):
     def parts(self, index: int, columns: EpisodeColumns, status: str) -> Iterator[StreamPart]:
         refuse_changed(self._env, index, int(self._since[index]))
         every, render = capture_of(self._env).every, self._env.engine.render
+        yield StreamPart(self._places(index, columns.first_step).copy)
         for step in range(columns.first_step, columns.steps + 1):
             if step % every:
                 continue
@@ -60,3 +68,15 @@ class CameraChannels(StreamSource):
                     found["segmentation"] = found["segmentation"].astype(np.uint16)
                 rows += [StreamRow(f"{CAMERA}/{name}/{channel}", step, found[channel][0]) for channel in channels]
             yield StreamPart(rows.copy, sum(row.value.nbytes for row in rows))
+
+    def _places(self, index: int, step: int) -> list[StreamRow]:
+        """Lenses and places of the cameras without a video."""
+        rows: list[StreamRow] = []
+        for name in self._channels:
+            if f"{CAMERA}/{name}/place" in self.streams:
+                one = camera_of(self._env, index, name)
+                lens = {"width": one.width, "height": one.height, "k": m.intrinsics(one)}
+                rows.append(StreamRow(f"{CAMERA}/{name}/calibration", step, lens))
+                place = {"parent": one.parent, "pose": list(one.pose)}
+                rows.append(StreamRow(f"{CAMERA}/{name}/place", step, place))
+        return rows

@@ -16,6 +16,7 @@ Every message but foxglove's has `step`; the first three have `time` [s].
 
 import json
 import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from anysim.record.header import CameraInfo, StateLayout
@@ -99,26 +100,34 @@ def camera_frame(name: str) -> str:
     return f"camera/{name}"
 
 
+def intrinsics(camera: CameraInfo) -> list[float]:
+    """The matrix K (3, 3) of a pinhole camera, row by row."""
+    focal = 0.5 * camera.height / math.tan(math.radians(camera.fov) / 2)
+    return [focal, 0.0, 0.5 * camera.width, 0.0, focal, 0.5 * camera.height, 0.0, 0.0, 1.0]
+
+
 def calibration(name: str, camera: CameraInfo) -> Any:
     """foxglove.CameraCalibration of a pinhole camera without distortion, at time 0."""
+    return lens(camera_frame(name), camera.width, camera.height, intrinsics(camera))
+
+
+def lens(frame: str, width: int, height: int, k: Sequence[float]) -> Any:
+    """The same by its matrix K."""
     from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
     from google.protobuf.timestamp_pb2 import Timestamp
 
-    focal = 0.5 * camera.height / math.tan(math.radians(camera.fov) / 2)
-    cx, cy = 0.5 * camera.width, 0.5 * camera.height
-    return CameraCalibration(
-        timestamp=Timestamp(),
-        frame_id=camera_frame(name),
-        width=camera.width,
-        height=camera.height,
-        K=[focal, 0, cx, 0, focal, cy, 0, 0, 1],
-        R=[1, 0, 0, 0, 1, 0, 0, 0, 1],
-        P=[focal, 0, cx, 0, 0, focal, cy, 0, 0, 0, 1, 0],
-    )
+    one = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+    p = [*k[0:3], 0.0, *k[3:6], 0.0, *k[6:9], 0.0]
+    return CameraCalibration(timestamp=Timestamp(), frame_id=frame, width=width, height=height, K=k, R=one, P=p)
 
 
-def static_transforms(cameras: dict[str, CameraInfo]) -> Any:
+def static_transforms(cameras: Mapping[str, CameraInfo]) -> Any:
     """foxglove.FrameTransforms of the cameras' optical frames in the bodies they ride on, at time 0."""
+    return transforms({camera_frame(name): (one.parent, one.pose) for name, one in sorted(cameras.items())})
+
+
+def transforms(frames: Mapping[str, tuple[str, Sequence[float]]]) -> Any:
+    """foxglove.FrameTransforms of frames, each by its parent and its pose (7,) there, at time 0."""
     from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
     from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
     from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
@@ -129,11 +138,11 @@ def static_transforms(cameras: dict[str, CameraInfo]) -> Any:
         transforms=[
             FrameTransform(
                 timestamp=Timestamp(),
-                parent_frame_id=camera.parent,
-                child_frame_id=camera_frame(name),
-                translation=Vector3(**dict(zip("xyz", camera.pose[:3], strict=True))),
-                rotation=Quaternion(**dict(zip("xyzw", camera.pose[3:], strict=True))),
+                parent_frame_id=parent,
+                child_frame_id=frame,
+                translation=Vector3(**dict(zip("xyz", pose[:3], strict=True))),
+                rotation=Quaternion(**dict(zip("xyzw", pose[3:], strict=True))),
             )
-            for name, camera in sorted(cameras.items())
+            for frame, (parent, pose) in frames.items()
         ]
     )

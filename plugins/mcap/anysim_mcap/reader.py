@@ -17,6 +17,7 @@ from anysim.record.reader import TrajectoryReader
 from anysim.record.streams import StreamRow
 from anysim_mcap import messages as m, video
 from anysim_mcap.chunks import records
+from anysim_mcap.drawn_faults import drawn_faults
 from anysim_mcap.streams import read_rows, stream_faults
 from anysim_mcap.writer import TRAJECTORY_FILE
 
@@ -110,7 +111,7 @@ class McapReader(TrajectoryReader):
                 found.append(f"{self._path}: the last state is not the one that the manifest describes")
             if self._skip and state_digest(self.initial_state) != self.manifest.initial_digest:
                 found.append(f"{self._path}: the initial state is not the one that the manifest describes")
-            found += self._contradictions()
+            found += self._contradictions() or self._drawn()
         except RecordError as error:
             found.append(str(error))
         if not found:
@@ -132,6 +133,13 @@ class McapReader(TrajectoryReader):
         differing = [name for name in names if name in facts and facts[name] != str(getattr(self.manifest, name))]
         found = [f"{self._path} says another {listing(differing)} than the manifest"] if differing else []
         return found + ([f"{self._path}: {self._untimely[0]}"] if self._untimely else [])
+
+    def _drawn(self) -> list[str]:
+        """What the file says otherwise to those who draw it."""
+        poses = self.states.get("body_pose", np.empty((self.manifest.steps, 0, 7)))
+        first = self.initial_state.get("body_pose", np.full(poses.shape[1:], np.nan))
+        rows = np.concatenate([first[None], poses])
+        return drawn_faults(self._path, self.manifest.layout, rows, self.times_from_reset, self.manifest.cameras)
 
     def _camera(self, name: str) -> CameraEntry:
         entry = self.manifest.cameras.get(name)

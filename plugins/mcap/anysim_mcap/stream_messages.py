@@ -7,6 +7,7 @@
 | array | anysim.Array | shape, number type and bytes |
 | text | foxglove.Log | |
 | data | JSON with a JSON Schema | |
+| data, of which `about` says so | foxglove.CameraCalibration, foxglove.FrameTransforms | one camera's, at time 0 |
 """
 
 import json
@@ -20,6 +21,7 @@ import numpy as np
 from anysim.errors import RecordError
 from anysim.record.header import StreamInfo
 from anysim.record.streams import StreamRow
+from anysim_mcap import messages as m
 from anysim_mcap.messages import json_bytes
 
 ARRAY = "anysim.Array"
@@ -59,11 +61,14 @@ def kind_of(name: str, info: StreamInfo) -> Kind:
             f"the stream '{name}' cannot be images of {info.dtype} with {len(info.shape)} axes; float32, uint16 and "
             "uint8 (H, W) and uint8 (H, W, 3) can; make it of the kind array"
         )
-    return _kinds()[info.kind]
+    kinds = _kinds()
+    return kinds.get(str(info.about.get("schema")), kinds["data"]) if info.kind == "data" else kinds[info.kind]
 
 
 @cache
 def _kinds() -> dict[str, Kind]:
+    from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
+    from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
     from foxglove_schemas_protobuf.Log_pb2 import Log
     from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
     from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
@@ -74,6 +79,8 @@ def _kinds() -> dict[str, Kind]:
         "points": (PointCloud, _points, _read_points),
         "text": (Log, _text, _read_text),
         "array": (_array_message(), _array, _read_array),
+        m.CALIBRATION: (CameraCalibration, _lens, _read_lens),
+        m.TRANSFORMS: (FrameTransforms, _place, _read_place),
     }
     kinds = {"data": Kind(DATA_SCHEMA["title"], "jsonschema", json_bytes(DATA_SCHEMA), _data, _read_data)}
     for kind, (message, encode, decode) in messages.items():
@@ -210,6 +217,33 @@ def _data(row: StreamRow, info: StreamInfo) -> bytes:
 def _read_data(data: bytes, info: StreamInfo) -> Any:
     del info
     return json.loads(data)["data"]
+
+
+def _lens(row: StreamRow, info: StreamInfo) -> bytes:
+    return m.lens(info.frame, **row.value).SerializeToString(deterministic=True)
+
+
+def _read_lens(data: bytes, info: StreamInfo) -> Any:
+    from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
+
+    message = CameraCalibration.FromString(data)
+    if message.frame_id != info.frame:
+        raise ValueError(f"a lens is of {message.frame_id}")
+    return {"width": message.width, "height": message.height, "k": list(message.K)}
+
+
+def _place(row: StreamRow, info: StreamInfo) -> bytes:
+    return m.transforms({info.frame: (row.value["parent"], row.value["pose"])}).SerializeToString(deterministic=True)
+
+
+def _read_place(data: bytes, info: StreamInfo) -> Any:
+    from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+
+    [one] = FrameTransforms.FromString(data).transforms
+    if one.child_frame_id != info.frame:
+        raise ValueError(f"a place is of {one.child_frame_id}")
+    p, q = one.translation, one.rotation
+    return {"parent": one.parent_frame_id, "pose": [p.x, p.y, p.z, q.x, q.y, q.z, q.w]}
 
 
 def _shaped(data: bytes, shape: tuple[int, ...], info: StreamInfo) -> Any:

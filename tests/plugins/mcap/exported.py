@@ -46,7 +46,7 @@ def heard(path: Path) -> dict[str, list[Heard]]:
 
 def frames(found: dict[str, list[Heard]]) -> set[str]:
     """The frames that transforms place, and the root of them all."""
-    rows = [row for topic in ("/tf", "/tf_static") for row in found.get(topic, ())]
+    rows = [row for rows in found.values() for row in rows if row.schema == "foxglove.FrameTransforms"]
     placed = {t.child_frame_id: t.parent_frame_id for row in rows for t in row.message.transforms}
     assert set(placed.values()) <= placed.keys() | {"world"}
     return placed.keys() | {"world"}

@@ -5,9 +5,13 @@ import json
 import re
 import shutil
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from mcap.records import Channel, Message, Schema
 
 from anysim.errors import RecordError
 from anysim.record.columns import Change, ColumnStore, EpisodeColumns
@@ -128,7 +132,8 @@ def test_frame_counts_and_sizes_of_videos(trajectory):
     edit(trajectory, lambda d: d["cameras"]["front"].update(frames=6))
     assert verify(trajectory) == [f"{trajectory / 'front.mp4'} has 5 frames; the manifest says 6"]
     edit(trajectory, lambda d: d["cameras"]["front"].update(frames=5, width=640))
-    (fault,) = verify(trajectory)
+    (lens, fault) = verify(trajectory)
+    assert lens.endswith("/camera/front/calibration is not the lens of that camera in the manifest")
     assert "should hold one video of 640 x 48 pixels; it holds 64 x 48" in fault
 
 
@@ -245,3 +250,68 @@ def test_a_message_that_is_logged_at_another_time(trajectory, monkeypatch):
     monkeypatch.setattr("anysim_mcap.reader.records", late)
     [fault] = verify(trajectory)
     assert fault.endswith("step 3 of /action, at 0.06 s, is logged at 60000001 ns")
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda m: m.transforms[1].translation.__setattr__("x", 9.0), "the transforms of step 3 are not those of its"),
+        (lambda m: m.transforms[1].rotation.__setattr__("w", 9.0), "the transforms of step 3 are not those of its"),
+        (
+            lambda m: m.transforms[0].__setattr__("child_frame_id", "cup"),
+            "the transforms of step 3 are not those of its",
+        ),
+        (lambda m: m.transforms[0].__setattr__("parent_frame_id", "cup"), "the transforms of step 3 are not those of"),
+        (lambda m: m.transforms[2].timestamp.__setattr__("nanos", 1), "the transforms of step 3 are not those of its"),
+        (lambda m: m.transforms.pop(), "the transforms of step 3 are not those of its state"),
+    ],
+)
+def test_transforms_that_contradict_the_states(trajectory, monkeypatch, change, says):
+    fault = rewritten(trajectory, monkeypatch, FrameTransforms, change, lambda record: record.sequence == 3)
+    assert says in fault
+
+
+def test_lenses_and_places_that_contradict_the_manifest(trajectory, monkeypatch):
+    fault = rewritten(
+        trajectory, monkeypatch, CameraCalibration, lambda m: m.K.__setitem__(0, 5.0), lambda record: True
+    )
+    assert fault.endswith("/camera/front/calibration is not the lens of that camera in the manifest")
+
+    def moved(message):
+        message.transforms[1].translation.z += 1.0
+
+    fault = rewritten(trajectory, monkeypatch, FrameTransforms, moved, lambda record: record.log_time == 0)
+    assert fault.endswith("camera/wrist is not where the manifest has that camera")
+
+
+def test_steps_without_transforms_where_others_have_them(trajectory, monkeypatch, tmp_path, record):
+    fault = rewritten(trajectory, monkeypatch, FrameTransforms, None, lambda record: record.sequence == 4)
+    assert fault.endswith("8 steps have transforms, 9 have states")
+    assert verify(record(tmp_path / "bare", steps=8, transforms=False)) == []
+    assert verify(record(tmp_path / "late", steps=8, first=1, cameras={})) == []
+
+
+def rewritten(trajectory, monkeypatch, kind, change, where):
+    """The one fault of a file in which the messages of a kind are changed, or left out."""
+
+    def told(path):
+        schemas, channels = {}, {}
+        for found in records(path):
+            if isinstance(found, Schema):
+                schemas[found.id] = found.name
+            elif isinstance(found, Channel):
+                channels[found.id] = schemas[found.schema_id]
+            elif (
+                isinstance(found, Message) and channels[found.channel_id] == kind.DESCRIPTOR.full_name and where(found)
+            ):
+                if change is None:
+                    continue
+                message = kind.FromString(found.data)
+                change(message)
+                found = replace(found, data=message.SerializeToString())
+            yield found
+
+    with monkeypatch.context() as now:
+        now.setattr("anysim_mcap.drawn_faults.records", told)
+        [fault] = verify(trajectory)
+    return fault

@@ -8,16 +8,25 @@ import importlib.util
 import json
 import math
 import re
+import shutil
 import subprocess
 import sys
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from anysim.math import pose as P
+from anysim.record.film import camera_of
 from anysim.record.reader import TrajectoryReader, open_trajectory
+from anysim.record.replay import begin, rebuild
 from anysim_export.job import export
+from anysim_film.filmer import Filmer
+from anysim_film.stage import FilmOrder
+from anysim_inspect.verify import verify
+from anysim_mcap import messages as m
 from tests.plugins.export.runs import record
 from tests.plugins.mcap.exported import assert_consistent, frames, heard
 
@@ -28,9 +37,11 @@ needs_node = pytest.mark.skipif(not (NODE / "installed").exists(), reason="needs
 needs_rerun = pytest.mark.skipif(importlib.util.find_spec("rerun") is None, reason="needs rerun-sdk: make test-viewers")
 LABELS = "{boxes_2d: {}, boxes_3d: {}, skeleton: {}, eef_waypoint: {}, obj_bbox: {}, affordance: {}, point_cloud: {}}"
 EVERYTHING = (
-    "record.cameras=[front]",  # the other one is seen by streams alone
+    "record.cameras=[front]",  # wrist has streams alone, and side nothing
+    "world.cameras.side={from: [1.0, 1.0, 1.0], look_at: [0, 0, 0.5], size: [16, 12]}",
+    "world.cameras.wrist.channels=[rgb, depth]",
     "world.cameras.front.channels=[rgb, depth, segmentation]",
-    "record.channels={front: [depth, segmentation]}",
+    "record.channels={front: [depth, segmentation], wrist: [depth]}",
     f"record.streams={{annotations: {{annotators: {LABELS}, cameras: [front, wrist]}}, language: {{}}}}",
     "world.sensors={scan: {sensor: lidar, frame: panda.tool, pattern: {kind: planar, columns: 12}, far: 2.0}, "
     "dome: {sensor: lidar, frame: table, pattern: {kind: solid_state, count: 30, half_angle: 0.4}, rate: 10, "
@@ -100,8 +111,9 @@ def test_what_is_worked_out_is_that_of_the_states(reader: TrajectoryReader, out:
         assert [[getattr(j, kind) for j in row.message.joints] for row in joints] == rows.tolist()
     assert [j.name for j in joints[0].message.joints] == list(reader.manifest.layout.joints)
     cameras = {topic for topic in found if topic.endswith("/calibration")}
-    assert cameras == {"/camera/front/calibration", "/camera/wrist/calibration"}
-    assert {"camera/front", "camera/wrist"} <= frames(found)
+    assert cameras == {f"/camera/{name}/calibration" for name in ("front", "wrist", "side")}
+    assert {f"camera/{name}" for name in ("front", "wrist", "side")} <= frames(found)
+    assert all(len(found[topic]) == 1 for topic in cameras)
     assert len(found["/camera/front"]) == reader.manifest.cameras["front"].frames
     assert [row.step for row in found["/sensor/scan"]] == steps
     assert len({row.message.timestamp.nanos for row in found["/sensor/dome"]}) > 3
@@ -114,6 +126,69 @@ def test_what_is_worked_out_is_that_of_the_states(reader: TrajectoryReader, out:
     assert [row.step for row in found["/annotation/front/obj_bbox/marks"]] == begun
     assert found["/sub_task"][0].message.message.startswith("pick")
     assert all(a.message.message != b.message.message for a, b in pairwise(found["/sub_task"]))
+
+
+@pytest.mark.parametrize("camera", ["front", "wrist"])
+def test_shapes_seen_through_the_lenses_are_where_the_drawings_are(out: Path, camera: str) -> None:
+    """Scene, transforms, calibration and marks, which come from four places: a viewer lays one over the other."""
+    found = heard(out)
+    [lens] = [row.message for row in found[f"/camera/{camera}/calibration"]]
+    places = [row for rows in found.values() for row in rows if row.schema == "foxglove.FrameTransforms"]
+    fixed = {t.child_frame_id: t for row in places if row.step == 0 for t in row.message.transforms}[f"camera/{camera}"]
+    [cube] = [entity for entity in found["/scene"][0].message.entities if entity.frame_id == "cube"]
+    [box] = cube.cubes
+    half = np.array([box.size.x, box.size.y, box.size.z]) / 2
+    corners = half * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    compared = 0
+    for row in found[f"/annotation/{camera}/boxes_3d/marks"]:
+        shown = [text.text for text in row.message.texts]
+        if "cube" not in shown:
+            continue
+        moved = {t.child_frame_id: t for t in found["/tf"][row.step].message.transforms}
+        eye = placed(fixed)
+        if fixed.parent_frame_id != "world":
+            eye = P.compose(placed(moved[fixed.parent_frame_id]), eye)
+        thing = placed(moved["cube"])
+        world = thing[:3] + P.rotate(thing[3:], corners)
+        x, y, z = P.rotate_inverse(eye[3:], world - eye[:3]).T
+        pixels = np.stack([lens.K[0] * x / z + lens.K[2], lens.K[4] * y / z + lens.K[5]], axis=-1)
+        edges = row.message.points[shown.index("cube")].points
+        drawn = np.array([[p.x, p.y] for p in edges])
+        if len(edges) == 24 and (z > 0).all():
+            np.testing.assert_allclose(sorted(map(tuple, pixels)), sorted({tuple(one) for one in drawn}), atol=1e-6)
+            compared += 1
+    assert compared > 5
+
+
+def placed(transform: Any) -> np.ndarray:
+    p, q = transform.translation, transform.rotation
+    return np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w])
+
+
+def test_a_camera_without_a_video_has_its_lens_and_place_beside_its_streams(reader: TrajectoryReader) -> None:
+    with rebuild(reader.manifest) as env:
+        begin(env, reader.manifest)
+        wrist = camera_of(env, 0, "wrist")
+    lens, place = (reader.stream(f"camera/wrist/{name}") for name in ("calibration", "place"))
+    assert place.values == [{"parent": wrist.parent, "pose": list(wrist.pose)}]
+    assert lens.values == [{"width": wrist.width, "height": wrist.height, "k": m.intrinsics(wrist)}]
+    assert lens.steps.tolist() == place.steps.tolist() == [0]
+    assert "camera/front/place" not in reader.names()
+    assert verify(reader.directory) == []
+
+
+def test_a_camera_that_was_filmed_later_has_its_video_lens_and_place(reader: TrajectoryReader, tmp_path: Path) -> None:
+    copy = shutil.copytree(reader.directory, tmp_path / "run" / "episodes" / reader.directory.name)
+    with Filmer(FilmOrder(("wrist", "side"))) as filmer:
+        filmer.film(copy)
+    assert verify(copy) == []
+    export([copy], "foxglove", tmp_path / "out")
+    found = heard(tmp_path / "out" / "episodes" / "000000" / "episode.mcap")
+    assert_consistent(found)
+    for name in ("front", "wrist", "side"):
+        assert len(found[f"/camera/{name}"]) == len(found["/camera/front"])
+        assert len(found[f"/camera/{name}/calibration"]) == 1
+        assert f"camera/{name}" in frames(found)
 
 
 def test_the_page_lists_what_is_worked_out_and_nothing_else(reader: TrajectoryReader, files: list[Path]) -> None:

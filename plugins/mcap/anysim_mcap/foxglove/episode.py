@@ -1,6 +1,6 @@
 """Tracks of messages that are worked out of an episode, beside those of its recording."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from typing import Any
 
 import numpy as np
@@ -26,8 +26,9 @@ Track = Iterator[Entry]
 class EpisodeTracks:
     """The tracks of one episode."""
 
-    def __init__(self, episode: Episode, reader: TrajectoryReader, env: TaskEnv) -> None:
-        """`env` has begun the episode."""
+    def __init__(self, episode: Episode, reader: TrajectoryReader, env: TaskEnv, topics: Set[str]) -> None:
+        """`env` has begun the episode; `topics` are those of the recording."""
+        self._topics = topics
         self._episode, self._reader, self._env = episode, reader, env
         self._times = reader.times_from_reset
 
@@ -54,17 +55,18 @@ class EpisodeTracks:
         yield self._entry(0, protobuf_topic("scene", SceneUpdate), update)
 
     def _cameras(self) -> Track:
-        """Where the cameras are of which there is no video, and their lenses; the recording has those of the others."""
+        """Where the cameras are of which the recording does not say it, and their lenses."""
         from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
         from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 
-        world, recorded = self._env.engine.world, self._episode.manifest.cameras
-        others = {one.name: camera_of(self._env, 0, one.name) for one in world.cameras if one.name not in recorded}
+        names = [camera.name for camera in self._env.engine.world.cameras]
+        others = [name for name in names if f"camera/{name}/calibration" not in self._topics]
         if not others:
             return
-        placed = m.static_transforms(others).SerializeToString(deterministic=True)
+        infos = {name: camera_of(self._env, 0, name) for name in others}
+        placed = m.static_transforms(infos).SerializeToString(deterministic=True)
         yield self._entry(0, protobuf_topic("tf_static", FrameTransforms), placed)
-        for name, info in sorted(others.items()):
+        for name, info in sorted(infos.items()):
             lens = m.calibration(name, info).SerializeToString(deterministic=True)
             yield self._entry(0, protobuf_topic(f"camera/{name}/calibration", CameraCalibration), lens)
 

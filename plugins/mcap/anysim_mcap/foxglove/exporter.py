@@ -50,7 +50,8 @@ class FoxgloveExporter(Exporter):
     def write_episode(self, folder: Path, episode: Episode, data: DataSet) -> None:
         """The file of an episode."""
         directory, manifest = episode.directory, episode.manifest
-        own = EpisodeTracks(episode, open_trajectory(directory), self._begun(episode)).all(self._crf)
+        topics = {one.topic.name for one in recorded_messages(directory / TRAJECTORY_FILE)} | manifest.streams.keys()
+        own = EpisodeTracks(episode, open_trajectory(directory), self._begun(episode), topics).all(self._crf)
         files = [TRAJECTORY_FILE, *sorted({stream.file for stream in manifest.streams.values()})]
         tracks = [*(recorded_messages(directory / name) for name in files), *own]
         write_merged(folder / EPISODE, directory / TRAJECTORY_FILE, tracks)
