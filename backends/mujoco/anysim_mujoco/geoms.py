@@ -45,10 +45,9 @@ def own_scenery(options: MujocoOptions) -> Scenery:
     return Scenery((red, green, blue), (AMBIENT, AMBIENT, AMBIENT), options.shadows)
 
 
-def shadow_place(world: World, direction: Array) -> Array:
+def shadow_place(middle: Array, direction: Array, away: float = 4.0) -> Array:
     """Where the shadow map of a light that shines from far away is drawn from: off the middle of the bodies."""
-    middle = world.initial_body_pose[:, :3].mean(axis=0) if world.bodies else np.zeros(3)
-    return middle - 4.0 * direction / np.linalg.norm(direction)
+    return middle - away * direction / np.linalg.norm(direction)
 
 
 def add_look(spec: Any, world: World, options: MujocoOptions) -> None:
@@ -88,7 +87,7 @@ def add_look(spec: Any, world: World, options: MujocoOptions) -> None:
 def _add_light(spec: Any, light: Light, world: World) -> None:
     """A light without a position is directional. Its shadow map still has a place: off the middle of the bodies."""
     direction = np.asarray(light.direction, dtype=float)
-    away = shadow_place(world, direction)
+    away = shadow_place(world.initial_body_pose[:, :3].mean(axis=0) if world.bodies else np.zeros(3), direction)
     element = spec.worldbody.add_light(
         dir=direction,
         pos=away if light.position is None else light.position,

@@ -17,7 +17,11 @@ from anysim_mujoco.options import MujocoOptions
 from anysim_mujoco.query import Queries
 
 _SHADOW = int(mujoco.mjtRndFlag.mjRND_SHADOW)
+_GROUND = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
+_UNSHADING = int(mujoco.mjtCatBit.mjCAT_DECOR)
 _SEGMENT, _ID_COLOR = int(mujoco.mjtRndFlag.mjRND_SEGMENT), int(mujoco.mjtRndFlag.mjRND_IDCOLOR)
+AROUND = 6.0
+"""[m] What the shadow map of a light from far away shows at least to each side of the bodies, and before them."""
 
 
 class Painter:
@@ -38,6 +42,7 @@ class Painter:
         model.vis.quality.offsamples = options.samples(self._thread.in_software())
         self._frames = Frames(model, layout)
         self._context: Any = self._thread.call(lambda: _make_context(model))
+        self._widest = float(self._context.shadowClip)
 
     def close(self) -> None:
         """Free the GPU's copies of the model."""
@@ -80,7 +85,10 @@ class Painter:
         data = self._frames.placed(model, view.body_pose[row])
         everything = mujoco.mjtCatBit.mjCAT_ALL.value
         mujoco.mjv_updateScene(model, data, self._options, None, self._free_camera, everything, self._scene)
-        self._shine(self._looks.of(index))
+        look = self._looks.of(index)
+        self._shine(look)
+        if look.shadows:
+            self._shade(look, view.body_pose[row, :, :3], view.far)
         eye, top = view.pose[row, :3], view.near * tan(radians(view.fov[row]) / 2)
         for camera in self._scene.camera:
             camera.pos, camera.forward, camera.up = eye, axes[:, 2], -axes[:, 1]
@@ -95,10 +103,27 @@ class Painter:
         for k, light in enumerate(lights[: len(look.direction)]):
             direction, emission = look.direction[k], look.emission[k]
             light.dir, light.diffuse, light.specular = direction, emission, [SHINE * float(emission.max())] * 3
-            light.pos = look.position[k] if self._looks.local[k] else shadow_place(self._looks.world, direction)
+            if self._looks.local[k]:
+                light.pos = look.position[k]
         self._scene.flags[_SHADOW] = look.shadows
         if self._sky.wear(None if look.sky else look.background):
             mujoco.mjr_uploadTexture(self._model, self._context, self._sky.texture)
+
+    def _shade(self, look: Look, places: Array, far: float) -> None:
+        """Lay the shadow maps of lights from far away around the bodies, at (B, 3), and let no ground cast a shadow.
+
+        The viewer lays them around the whole model, where a robot on a wide ground is nothing. It draws them a pixel
+        smaller at each edge than it reads them, so that ground would be dotted with its own shadow off their middle.
+        """
+        middle = np.median(places, axis=0) if len(places) else np.zeros(3)
+        reach = float(np.abs(places - middle).max(initial=0.0))
+        self._context.shadowClip = min(self._widest, 2 * reach + AROUND)
+        for k, light in enumerate(list(self._scene.lights)[1 : self._scene.nlight]):
+            if k < len(look.direction) and not self._looks.local[k]:
+                light.pos = shadow_place(middle, look.direction[k], min(AROUND, far / 2))
+        for geom in self._scene.geoms[: self._scene.ngeom]:
+            if geom.type in _GROUND:
+                geom.category = _UNSHADING
 
     def _measure(self, view: CameraView, rect: Any, colors: Array, images: dict[str, Array], row: int) -> None:
         """Depth and segmentation, from one pass in which a geom's colour is its number in the scene plus one."""

@@ -35,6 +35,9 @@ ROUND = 16
 SUN = (-0.35, 0.25, -1.0)
 """Where the light of a world without lights shines to."""
 
+FAR_OFF = 10.0
+"""[m] How far off the world's origin the light is: from nearer, shadows spread, and ground beyond its sight is dark."""
+
 SPREAD = 0.25
 """Light that comes from one side meets the sides of a ball with this share of its strength, on average."""
 
@@ -135,6 +138,7 @@ class Painter:
             lens,
             shadow=int(look.shadows),
             lightDirection=towards.tolist(),
+            lightDistance=FAR_OFF,
             lightColor=(emission / tint).tolist(),
             lightAmbientCoeff=brightness,
             lightDiffuseCoeff=1.0,

@@ -38,6 +38,10 @@ _APPROXIMATE = {
         "dry friction off by more; how several fixed things share the friction of one body is a guess",
         felt=0.005,
     ),
+    Capability.RENDER_DEPTH: (
+        "in software, corners of triangles are on a grid of 1/16 px: depth is that of a point up to 0.03 px beside the "
+        "middle of the pixel, of ground that reaches behind the camera 0.2 px; along a plane, in 20 rows, 1 to 4 % off"
+    ),
     Capability.MATERIALS: (
         "the shader `lit`, which `auto` takes without a graphics card, has highlights and mirrors nothing; `trivial` "
         "shows colours and opacity alone, `default` is physically based"

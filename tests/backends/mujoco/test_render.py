@@ -8,7 +8,20 @@ import pytest
 
 from anysim.errors import EngineError
 from anysim.math import pose as P
-from anysim.model.world import Body, BodyKind, Box, Camera, Geom, Light, Plane, World
+from anysim.model.world import (
+    Body,
+    BodyKind,
+    Box,
+    Camera,
+    Entity,
+    EntityKind,
+    Geom,
+    HeightField,
+    HeightFieldShape,
+    Light,
+    Plane,
+    World,
+)
 from anysim.testing.engines import require_drawing
 
 
@@ -24,8 +37,6 @@ def _looking_down(height: float = 2.0) -> tuple[float, float, float, float]:
 def two_boxes(**camera) -> World:
     """A red and a green box of 0.2 m beside each other on the ground, seen from 2 m above; the image's up is +y."""
     bodies, geoms = [], [Geom("ground", -1, Plane(), color=(0.5, 0.5, 0.5, 1.0))]
-    from anysim.model.world import Entity, EntityKind
-
     entities = []
     for i, (name, x, color) in enumerate((("red", -0.3, (1.0, 0.0, 0.0, 1.0)), ("green", 0.3, (0.0, 1.0, 0.0, 1.0)))):
         bodies.append(Body(name, BodyKind.STATIC, position=(x, 0.0, 0.1)))
@@ -154,6 +165,31 @@ def test_lights_and_shadows(make):
     )
     assert not np.array_equal(plain[0], lit)
     assert (lit[ROW, 26:31].mean(axis=-1) - shaded[ROW, 26:31].mean(axis=-1)).max() > 20
+
+
+@pytest.mark.parametrize("middle", [0.0, 30.0])
+@pytest.mark.parametrize("flat", [True, False])
+def test_shadows_are_beside_what_casts_them_and_nowhere_else(make, flat: bool, middle: float):
+    """On a plane and on wide uneven ground, in its middle and far from it; ground is not dotted with its own shadow."""
+    rows = np.add.outer(np.cos(np.linspace(0, 60, 121)), np.zeros(121)) * 0.02
+    field = HeightField("waves", rows, (80.0, 80.0))
+    ground = Geom("ground", -1, Plane(60.0) if flat else HeightFieldShape("waves"), color=(0.5, 0.5, 0.5, 1.0))
+    body = Body("box", BodyKind.STATIC, position=(middle, 0.0, 0.3))
+    eye = Camera("eye", -1, (middle, 0.0, 12.0), _looking_down(), 60.0, 300, 300)
+    world = World(
+        "box",
+        bodies=(body,),
+        geoms=(ground, Geom("box", 0, Box((0.3, 0.3, 0.3)))),
+        entities=(Entity("box", EntityKind.OBJECT, 0, 1, 0, 0),),
+        heightfields=() if flat else (field,),
+        lights=(Light("lamp", (-0.4, -0.3, -1.0), intensity=0.7),),
+        cameras=(eye,),
+    )
+    lit, shaded = (make(world, shadows=s).render("eye")["rgb"][0].astype(int) for s in (False, True))
+    v, u = np.nonzero(np.abs(lit - shaded).max(axis=2) > 8)
+    away = np.hypot(u - 149.5, v - 149.5) * 24 * np.tan(np.pi / 6) / 300
+    assert len(away) > 20
+    assert away.max() < 1.0
 
 
 def test_the_same_view_is_the_same_picture(make):

@@ -10,6 +10,8 @@ import pytest
 
 from anysim.compile.world import compile_world
 from anysim.errors import EngineError
+from anysim.math import pose as P
+from anysim.model.world import Body, BodyKind, Box, Camera, Entity, EntityKind, Geom, World
 from anysim.testing import worlds
 from anysim.testing.engines import require_drawing
 from anysim_sapien import diagnosis, vulkan
@@ -40,6 +42,8 @@ def test_physics_without_a_vulkan_device():
     code = """
         from anysim.engine.factory import create_simulation
         from anysim.errors import EngineError
+from anysim.math import pose as P
+from anysim.model.world import Body, BodyKind, Box, Camera, Entity, EntityKind, Geom, World
         from anysim.testing import worlds
         engine = create_simulation("sapien").create_world(worlds.scene(cameras=True), 2)
         engine.step(20)
@@ -197,3 +201,35 @@ def test_what_a_driver_says_is_in_the_error(monkeypatch):
     monkeypatch.setattr(sapien.render, "RenderSystem", fail)
     with pytest.raises(EngineError, match="no device; vk: the card is on fire; driver: "):
         vulkan.open_device("auto")
+
+
+@pytest.mark.parametrize(("reach", "pixels"), [(1.0, 0.04), (10.0, 0.25)])
+@pytest.mark.parametrize("size", [(29, 20), (116, 80)])
+def test_depth_is_that_of_a_point_beside_the_middle_of_a_pixel(make, reach, pixels, size):
+    """As declared, on a tilted slab that is all in the image, or reaches behind the camera."""
+    require_drawing("sapien")
+    tilt, eye = P.from_axis_angle(np.array([0.6, 0.8, 0.0]), np.array(0.3)), np.array([1.2, 0.5, 0.8])
+    look, (width, height) = P.look_at(eye, np.array([0.0, 0.0, 0.1])), size
+    slab = Geom("slab", 0, Box((reach, reach, 0.1)))
+    world = World(
+        "slab",
+        bodies=(Body("slab", BodyKind.STATIC, quaternion=tuple(tilt)),),
+        geoms=(slab,),
+        entities=(Entity("slab", EntityKind.OBJECT, 0, 1, 0, 0),),
+        cameras=(Camera("eye", -1, tuple(eye), tuple(look), 60.0, width, height, far=100.0),),
+    )
+    depth = make(world).render("eye", channels=("depth",))["depth"][0].astype(float)
+    focal, turn = height / 2 / np.tan(np.radians(30.0)), P.to_matrix(look)
+    up = P.to_matrix(tilt)[:, 2]
+
+    def answer(u, v):
+        along = np.stack([(u - width / 2) / focal, (v - height / 2) / focal, np.ones_like(u)], axis=-1) @ turn.T
+        there = ((0.1 * up - eye) @ up) / (along @ up)
+        return there, np.abs(P.rotate_inverse(tilt, eye + along * there[..., None])[..., :2]).max(axis=-1)
+
+    u, v = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    right, place = answer(u, v)
+    beside = np.hypot((answer(u + 0.5, v)[0] - answer(u - 0.5, v)[0]), answer(u, v + 0.5)[0] - answer(u, v - 0.5)[0])
+    seen = (right > 0) & (place < 0.9 * reach) & np.isfinite(depth)
+    assert seen.mean() > 0.3
+    assert np.percentile((np.abs(depth - right) / beside)[seen], 98) < pixels
