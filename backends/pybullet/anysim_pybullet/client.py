@@ -1,6 +1,8 @@
 """One env: a Bullet client of its own, built from the plan that all envs share."""
 
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from math import sqrt
 from pathlib import Path
@@ -153,7 +155,7 @@ class Env:
         a removed body gives back are taken in the opposite order.
         """
         p, ground = bullet(), {number for number, *_ in self.plan.ground}
-        with quiet():
+        with self._building(p):
             for _ in range(2):
                 for tree in reversed(self.cast.trees):
                     p.removeBody(self.root_ids[tree.number], physicsClientId=self.id)
@@ -183,24 +185,30 @@ class Env:
         self.body_of: dict[int, dict[int, int]] = {}  # World body by Bullet body and link, -1 for the world
         self.root_ids: list[int] = [-1] * len(plan.trees)
         self._begin: dict[int, float] = {}  # where contacts of a shape begin, where that is not Bullet's default
+        with self._building(p):
+            self._settings(p)
+            for number, geom, file in plan.ground:
+                self._add_ground(p, number, geom, file)
+            for tree in self.cast.trees:
+                self._add_tree(p, tree)
+            self._filter(p)
+            self._couple(p)
+            # else Bullet keeps the first file of a name that it reads, and restores that state again and again
+            p.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self.id)
+        self._measure(p)
+
+    @contextmanager
+    def _building(self, p: Any) -> Iterator[None]:
+        """Silence, and an error of anysim's for one of Bullet's."""
+        failure: Exception | None = None
         with quiet() as words:
             try:
-                self._settings(p)
-                for number, geom, file in plan.ground:
-                    self._add_ground(p, number, geom, file)
-                for tree in self.cast.trees:
-                    self._add_tree(p, tree)
-                self._filter(p)
-                self._couple(p)
-                # else Bullet keeps the first file of a name that it reads, and restores that state again and again
-                p.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self.id)
+                yield
             except p.error as error:
-                failure: Exception | None = error
-            else:
-                failure = None
+                failure = error
         if failure is not None:
-            raise EngineError(f"Bullet cannot build the world '{world.name}': {failure}; {words.tail}") from failure
-        self._measure(p)
+            name = self.plan.world.name
+            raise EngineError(f"Bullet cannot build the world '{name}': {failure}; {words.tail}") from failure
 
     def _measure(self, p: Any) -> None:
         """Note where Bullet has put things."""
