@@ -1,6 +1,8 @@
 """One env: a Bullet client of its own, built from the plan that all envs share."""
 
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from math import sqrt
 from pathlib import Path
@@ -40,6 +42,12 @@ SPEED_LIMIT = 1e15
 HOLD = 1e-5
 """[m] of rolling friction. Without any, a capsule on a level box sets off by itself, 8 mm in the first second."""
 
+WIDE = 20_000
+"""Heights of ground that is kept where an env is built anew: Bullet takes a microsecond for each."""
+
+KEPT = 64
+"""How often it is kept before all is built anew: Bullet keeps 38 kB of a robot that was removed until then."""
+
 
 class Plan:
     """What all envs of an engine share: the trees, their URDF files, the pairs that never touch."""
@@ -70,6 +78,8 @@ class Plan:
             self.close()
             raise
         self.fields: dict[str, HeightField] = {f.name: f for f in world.heightfields}
+        self.wide = sum(len(f.heights) * len(f.heights[0]) for f in world.heightfields) > WIDE
+        """Whether ground takes longer to build than all the rest."""
 
     def close(self) -> None:
         """Remove the files."""
@@ -130,8 +140,34 @@ class Env:
 
     def rebuild(self, cast: Cast, com: Array | None = None) -> None:
         """Build what is there now, in the same client: half the work of a new one, and with the same bits after it."""
+        keeps = cast is self.cast and self.plan.wide and self._kept < KEPT
         self._choose(cast, com)
-        self._build()
+        if keeps:
+            self._kept += 1
+            self._renew_trees()
+        else:
+            self._build()
+
+    def _renew_trees(self) -> None:
+        """Build the trees anew on the ground that is there: a large one takes longer than all the rest.
+
+        Twice, for the bits of a whole build: Bullet orders contacts by numbers that it gives to links, and those that
+        a removed body gives back are taken in the opposite order.
+        """
+        p, ground = bullet(), {number for number, *_ in self.plan.ground}
+        with self._building(p):
+            for _ in range(2):
+                for tree in reversed(self.cast.trees):
+                    p.removeBody(self.root_ids[tree.number], physicsClientId=self.id)
+                self.shape_at = {number: place for number, place in self.shape_at.items() if number in ground}
+                self._begin = {number: begin for number, begin in self._begin.items() if number in ground}
+                self.body_of = {uid: self.body_of[uid] for uid, _ in self.shape_at.values()}
+                self.rubbing = {}
+                for tree in self.cast.trees:
+                    self._add_tree(p, tree)
+            self._filter(p)
+            self._couple(p)
+        self._measure(p)
 
     def _choose(self, cast: Cast, com: Array | None) -> None:
         self.cast, self.frames = cast, self.plan.frames if com is None else shifted(self.plan.frames, com)
@@ -140,6 +176,7 @@ class Env:
 
     def _build(self) -> None:
         p, world, plan = bullet(), self.plan.world, self.plan
+        self._kept = 0
         self.body_at: list[tuple[int, int]] = [(-1, -1)] * len(world.bodies)
         self.joint_link: list[int] = [-1] * len(world.joints)
         self.rubbing: dict[int, float] = {}
@@ -148,23 +185,34 @@ class Env:
         self.body_of: dict[int, dict[int, int]] = {}  # World body by Bullet body and link, -1 for the world
         self.root_ids: list[int] = [-1] * len(plan.trees)
         self._begin: dict[int, float] = {}  # where contacts of a shape begin, where that is not Bullet's default
+        with self._building(p):
+            self._settings(p)
+            for number, geom, file in plan.ground:
+                self._add_ground(p, number, geom, file)
+            for tree in self.cast.trees:
+                self._add_tree(p, tree)
+            self._filter(p)
+            self._couple(p)
+            # else Bullet keeps the first file of a name that it reads, and restores that state again and again
+            p.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self.id)
+        self._measure(p)
+
+    @contextmanager
+    def _building(self, p: Any) -> Iterator[None]:
+        """Silence, and an error of anysim's for one of Bullet's."""
+        failure: Exception | None = None
         with quiet() as words:
             try:
-                self._settings(p)
-                for number, geom, file in plan.ground:
-                    self._add_ground(p, number, geom, file)
-                for tree in self.cast.trees:
-                    self._add_tree(p, tree)
-                self._filter(p)
-                self._couple(p)
-                # else Bullet keeps the first file of a name that it reads, and restores that state again and again
-                p.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self.id)
+                yield
             except p.error as error:
-                failure: Exception | None = error
-            else:
-                failure = None
+                failure = error
         if failure is not None:
-            raise EngineError(f"Bullet cannot build the world '{world.name}': {failure}; {words.tail}") from failure
+            name = self.plan.world.name
+            raise EngineError(f"Bullet cannot build the world '{name}': {failure}; {words.tail}") from failure
+
+    def _measure(self, p: Any) -> None:
+        """Note where Bullet has put things."""
+        plan = self.plan
         self.tree_links = [[self.joint_link[j] for j in tree.joints.tolist()] for tree in plan.trees]
         self.local = np.concatenate([self.frames.inertial, self.frames.anchor], axis=1)
         for tree in self.cast.trees:
