@@ -83,7 +83,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-maniskill": {"benchmarks": "maniskill", "commands": "verdicts"},
     "anysim-mcap": {"readers": "mcap", "streams": "cameras", "writers": "mcap"},
     "anysim-mujoco": {"engines": "mujoco", "importers": "mjcf", "oracles": "mjcf"},
-    "anysim-navigation": {"commands": "map"},
+    "anysim-navigation": {"commands": "map", "planners": "dynamic_window"},
     "anysim-parity": {"commands": "compare picture"},
     "anysim-policy": {"controllers": "policy", "env_policies": "file lerobot openpi"},
     "anysim-planning": {"commands": "retarget", "planners": "roboplan rrt threads"},

@@ -1,4 +1,4 @@
-"""`anysim map` and `anysim bench navmesh`."""
+"""`anysim map`, `anysim bench navmesh` and `anysim bench navigate`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -99,3 +99,51 @@ def navmesh(
         return
     rows = [(name.replace("_", " "), f"{value:.4g}") for name, value in figures.items()]
     print_table(f"Ways of a disc of {radius:g} m in {rooms} rooms, {queries} queries each", ("what", "is"), rows)
+
+
+def navigate(
+    robot: Annotated[
+        str, typer.Argument(help="differential_base, holonomic_base, ackermann_base, or another with a base channel.")
+    ] = "differential_base",
+    engine: Annotated[str, typer.Option("--engine", "-e", help="An installed engine.")] = "mujoco",
+    rooms: Annotated[int, typer.Option(min=1, help="Furnished rooms.")] = 20,
+    radius: Annotated[float, typer.Option(min=0.01, help="That fits where ways begin and end [m].")] = 0.45,
+    json: AsJson = False,
+) -> None:
+    """Drive a base from end to end of furnished rooms in an engine, over 4 m each, with `planner: dynamic_window`.
+
+    A way fails that takes 90 s, or on which something in the room is touched with more than 20 N.
+
+    Examples:
+      anysim bench navigate holonomic_base --rooms 100
+    """
+    from itertools import count
+
+    import numpy as np
+
+    from anysim.cli.output import counting, print_json, print_table
+    from anysim_navigation.drive_bench import Drive, drive
+
+    found: list[Drive] = []
+    with counting("rooms", rooms, quiet=json) as show:
+        for seed in count():
+            if len(found) == rooms:
+                break
+            one = drive(seed, robot, engine, radius=radius)
+            if one is not None:  # else the room is too small for such a way
+                found.append(one)
+                show(f"room {seed}: {one.ended} after {one.seconds:.1f} s", "")
+    solved = [one for one in found if one.ended == "success"]
+    figures = {
+        "rooms": rooms,
+        "solved": len(solved),
+        "failed": {str(one.seed): one.ended for one in found if one.ended != "success"},
+        "hardest_contact_n": max((one.hardest for one in solved), default=0.0),
+        "time_over_shortest": float(np.median([one.seconds / (one.length / 0.6) for one in solved] or [np.nan])),
+        "action_ms": float(np.median([one.tick for one in found])),
+    }
+    if json:
+        print_json(figures)
+        return
+    rows = [(name.replace("_", " "), f"{v:.3g}" if isinstance(v, float) else str(v)) for name, v in figures.items()]
+    print_table(f"{robot} through {rooms} rooms on {engine}", ("what", "is"), rows)

@@ -1,13 +1,14 @@
 """A base on wheels as skills drive it: a pose on the ground to go to in each env, straight and turning in free space.
 
 A base that moves to all sides goes straight to its goal while it turns. One with a differential drive turns towards the
-goal, drives there, and turns again. Obstacles are not seen.
+goal, drives there, and turns again. Obstacles are not seen but by a planner: a `Base` among `anysim.planners`.
 """
 
-from typing import NamedTuple, Self
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
+from anysim import registry
 from anysim.conventions import Array
 from anysim.errors import TaskError, listing
 from anysim.math import pose as P
@@ -27,7 +28,7 @@ GAIN = 4.0
 BACKWARDS = 0.3
 """[m] what lies behind a differential base and is not further away is reached backwards."""
 
-_BASES: PerEnv[tuple[str, str, str], "Base"] = PerEnv()
+_BASES: PerEnv[tuple[str, str, str, str], "Base"] = PerEnv()
 
 
 class Pace(NamedTuple):
@@ -48,7 +49,11 @@ class Base(Mover):
         sideways: bool, whether it moves to all sides while it turns.
         pace: how fast.
         close: [m] from there the rest of the way is not worth another turn.
+        no_way: (N,) bool, whether its planner has found none.
     """
+
+    drives: ClassVar[tuple[tuple[str, ...], ...]] = (HOLONOMIC, DIFFERENTIAL)
+    planned: ClassVar[bool] = False
 
     def __init__(self, env: TaskEnv, robot: RobotView, channel: str, link: str) -> None:
         self.env = env
@@ -58,14 +63,14 @@ class Base(Mover):
         if not link and moved != env.engine.index.entity(robot.name).root:  # under a planar base the rail stays
             self.frame = env.scene.frame(env.engine.world.bodies[moved].name)
         labels = tuple(self._slice.controller.labels)
-        if labels not in (HOLONOMIC, DIFFERENTIAL):
-            known = listing([f"({', '.join(names)})" for names in (HOLONOMIC, DIFFERENTIAL)])
+        if labels not in self.drives:
+            known = listing([f"({', '.join(names)})" for names in self.drives])
             raise TaskError(
                 f"the base of '{robot.name}' takes ({', '.join(labels)}) by the controller of '{channel}'; expected "
                 f"one of {known}, as of holonomic_drive, planar_drive and differential_drive"
             )
         self.sideways = labels == HOLONOMIC
-        self.target = np.zeros((env.num_envs, 3))
+        self.target, self.no_way = np.zeros((env.num_envs, 3)), np.zeros(env.num_envs, dtype=bool)
         self.pace, self.close = Pace(), 0.01
         self._fresh = np.ones(env.num_envs, dtype=bool)
         self._mode = np.zeros(env.num_envs, dtype=np.int64)
@@ -73,13 +78,14 @@ class Base(Mover):
         """(N,) 1 where the base drives forwards, -1 backwards."""
 
     @classmethod
-    def of(cls, env: TaskEnv, robot: RobotView, *, channel: str = "base", link: str = "") -> Self:
-        """The base of an env, shared by all skills that drive it.
+    def of(cls, env: TaskEnv, robot: RobotView, *, channel: str = "base", link: str = "", planner: str = "") -> Self:
+        """The base of an env, shared by all skills that drive it by the same planner, if by any.
 
         Raises:
             TaskError: the channel has no controller, or one that drives no base.
         """
-        made = _BASES.of(env, (robot.name, channel, link), lambda: cls(env, robot, channel, link))
+        kind = registry.load("planners", planner) if planner else cls
+        made = _BASES.of(env, (robot.name, channel, link, planner), lambda: kind(env, robot, channel, link))
         return made  # pyright: ignore[reportReturnType]
 
     @staticmethod

@@ -27,7 +27,7 @@ STOPPED = 0.02
 
 
 class DriveTo(PhasedSkill):
-    """A skill that drives a base straight to a pose on the ground, and stops there.
+    """A skill that drives a base to a pose on the ground, straight or by a `planner`, and stops there.
 
     A base that is held up fails with `controller`; it backs off once and tries again, and then by a place aside. Arms
     that are told where to go in the world would stay behind: those named in `carried` keep their place on the base.
@@ -51,9 +51,10 @@ class DriveTo(PhasedSkill):
             tuple[str, ...], Field(description="tools of arms on the base, which other commands of the episode move")
         ] = (),
         solver: str = "numba_ik",
+        planner: Annotated[str, Field(description="of ways around things, as dynamic_window; straight if empty")] = "",
         steps: Annotated[int, Field(ge=1, description="control steps that the way may take")] = 1500,
     ) -> None:
-        self.base = Base.of(env, robot, channel=channel, link=link)
+        self.base = Base.of(env, robot, channel=channel, link=link, planner=planner)
         self._arms = [Arm.of(env, robot, tool=tool, solver=solver) for tool in carried]
         self._tools = np.zeros((env.num_envs, len(carried), 7))
         """(N, T, 7) where their commands stand in the frame of the base."""
@@ -94,8 +95,7 @@ class DriveTo(PhasedSkill):
 
     def _away(self, ids: Array, at: Array) -> None:
         now = self.base.pose(at)
-        now[:, 0] -= self._back * np.cos(now[:, 2])
-        now[:, 1] -= self._back * np.sin(now[:, 2])
+        now[:, :2] -= self._back * (not self.base.planned) * np.stack([np.cos(now[:, 2]), np.sin(now[:, 2])], axis=1)
         self.base.go(ids, now)
 
     def _backing(self, ids: Array, at: Array) -> Array:
@@ -121,7 +121,8 @@ class DriveTo(PhasedSkill):
         distance, turn = self.base.left(ids, at)
         speed, rate = self.base.speed(at)
         there = (distance < self._tolerance) & (turn < self._angle) & (speed < STOPPED) & (rate < STOPPED)
-        return np.where(there, GO_ON, np.where(self._held_up(ids, at), _CONTROLLER, STAY))
+        said = np.where(self.base.no_way[ids], _NO_PATH, np.where(self._held_up(ids, at), _CONTROLLER, STAY))
+        return np.where(there, GO_ON, said)
 
     def _held_up(self, ids: Array, at: Array) -> Array:
         """(n,) bool: it has not got on for a while; one that turns on the spot is on its way as well."""
@@ -133,7 +134,7 @@ class DriveTo(PhasedSkill):
 
 
 class Navigate(DriveTo):
-    """Drive the base of `robot` to x, y and yaw of `goal` in free space, within `tolerance` and `angle`, and stop."""
+    """Drive the base of `robot` to x, y and yaw of `goal`, within `tolerance` and `angle`, and stop."""
 
     def __init__(
         self,
@@ -157,4 +158,4 @@ class Navigate(DriveTo):
         return np.concatenate([goal[:, :2], yaw[:, None]], axis=1)
 
 
-_CONTROLLER = OUTCOMES.index(Outcome.CONTROLLER)
+_CONTROLLER, _NO_PATH = OUTCOMES.index(Outcome.CONTROLLER), OUTCOMES.index(Outcome.NO_PATH)

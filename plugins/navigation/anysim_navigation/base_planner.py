@@ -1,0 +1,66 @@
+"""The base planner `dynamic_window`: a base that skills send somewhere, driven along a way around things."""
+
+from math import tan
+from typing import Any, ClassVar
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.task.env import TaskEnv
+from anysim.task.scene import RobotView
+from anysim_navigation.limits import OUTPUTS, BaseKind, BaseLimits, kind_of, limits_of, output_of
+from anysim_navigation.robot_shape import discs_of
+from anysim_navigation.router import BaseRouter, Mode, frame_pose
+from anysim_schemas.vehicle import AckermannSpec
+from anysim_skills.moving.base import Base
+
+
+class PlannedBase(Base):
+    """A base whose limits are those of its channel's controller, which come from the robot's entry in the catalogue.
+
+    The pace of the skill that first sends it somewhere may be less.
+    """
+
+    drives: ClassVar[tuple[tuple[str, ...], ...]] = tuple({labels for each in OUTPUTS.values() for labels in each})
+    planned: ClassVar[bool] = True
+
+    def __init__(self, env: TaskEnv, robot: RobotView, channel: str, link: str) -> None:
+        super().__init__(env, robot, channel, link)
+        self._robot, self._wheelbase = robot, 1.0
+        self._labels = tuple(self._slice.controller.labels)
+        self._router: BaseRouter | None = None
+
+    def go(self, ids: Array, target: Array) -> None:
+        super().go(ids, target)
+        if self._router is None:
+            self._router = BaseRouter(self.env.scene, self._robot, self.frame, self._limits(), close=self.close)
+        self._router.go(ids, target, Mode.ROUTE)
+        self.no_way[ids] = False
+
+    def renew(self, ids: Array) -> None:
+        super().renew(ids)
+        if self._router is not None:
+            self._router.go(ids, np.zeros((len(ids), 3)), Mode.STAND)
+
+    def act(self, ids: Array, action: Array) -> None:
+        twist = np.zeros((len(ids), 3)) if self._router is None else self._router.velocities(ids)
+        limits = self._limits() if self._router is None else self._router.limits
+        if self._router is not None:
+            self.no_way[list(self._router.refused)] = True
+        action[ids, self._slice.start : self._slice.stop] = output_of(limits, self._labels, twist, self._wheelbase)
+
+    def _limits(self) -> BaseLimits:
+        entry, controller = self._robot.model.entry, self._slice.controller
+        kind = kind_of(self._labels, 0 if entry is None else len(entry.legs))
+        discs = discs_of(self.env.engine.world, self._robot.name, frame_pose(self.env.scene, self.frame))
+        most, least = np.array(controller.high, dtype=float), np.array(controller.low, dtype=float)
+        options: dict[str, Any] = {}
+        if kind is BaseKind.ACKERMANN and entry is not None and isinstance(entry.vehicle, AckermannSpec):
+            self._wheelbase = entry.vehicle.wheelbase
+            options["turning_radius"] = entry.vehicle.wheelbase / tan(entry.vehicle.max_steering)
+            most[1] = most[0] / options["turning_radius"]
+        if self._labels == ("forward", "left", "turn"):
+            options["side"] = min(self.pace.speed, float(most[1]))
+            options["back"] = min(self.pace.speed, float(-least[0]))
+        speed, turn = min(self.pace.speed, float(most[0])), min(self.pace.rate, float(most[-1]))
+        return limits_of(kind, discs, speed=speed, turn=turn, **options)

@@ -1,0 +1,157 @@
+"""Limits and shapes of bases, in which the variants of local planning differ."""
+
+from enum import StrEnum
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.errors import AnysimError, listing
+
+
+class BaseKind(StrEnum):
+    """How a base moves, and what its channel takes."""
+
+    HOLONOMIC = "holonomic"
+    DIFFERENTIAL = "differential"
+    ACKERMANN = "ackermann"
+    HUMANOID = "humanoid"
+    QUADRUPED = "quadruped"
+
+
+OUTPUTS: dict[BaseKind, tuple[tuple[str, ...], ...]] = {
+    BaseKind.HOLONOMIC: (("forward", "left", "turn"),),
+    BaseKind.DIFFERENTIAL: (("speed", "turn"),),
+    BaseKind.ACKERMANN: (("speed", "turn"), ("speed", "steering")),
+    BaseKind.HUMANOID: (("forward", "left", "turn"),),
+    BaseKind.QUADRUPED: (("forward", "left", "turn"),),
+}
+"""The components of the actions of the channels that each kind drives."""
+SAMPLES: dict[BaseKind, tuple[int, int, int]] = {
+    BaseKind.HOLONOMIC: (7, 7, 5),
+    BaseKind.DIFFERENTIAL: (9, 1, 21),
+    BaseKind.ACKERMANN: (9, 1, 21),
+    BaseKind.HUMANOID: (7, 3, 9),
+    BaseKind.QUADRUPED: (7, 5, 9),
+}
+"""Velocities forward, to the left and turning that are tried of each kind."""
+
+
+class BaseLimits(NamedTuple):
+    """What a base can do, and the room that it takes.
+
+    Attributes:
+        kind: how it moves.
+        low, high: (3,) velocities forward and to the left [m/s] and turning left [rad/s].
+        acceleration: (3,) [m/s^2], [m/s^2], [rad/s^2], to brake as well.
+        discs: (D, 3) x, y and radius [m] in the frame of the base; together they cover it.
+        turning_radius: [m] the tightest circle; 0 for what turns on the spot.
+    """
+
+    kind: BaseKind
+    low: Array
+    high: Array
+    acceleration: Array
+    discs: Array
+    turning_radius: float = 0.0
+
+    @property
+    def radius(self) -> float:
+        """[m] of the largest disc, by which ways keep clear of things."""
+        return float(self.discs[:, 2].max())
+
+    def check(self) -> None:
+        """Look for what no planning is possible with.
+
+        Raises:
+            AnysimError: limits that leave no motion, or discs that are none.
+        """
+        if self.discs.ndim != 2 or self.discs.shape[1] != 3 or not len(self.discs) or (self.discs[:, 2] <= 0).any():
+            raise AnysimError(f"the discs of a {self.kind} base: expected rows x, y and a radius above 0")
+        if not (
+            self.high[0] > 0 and (self.low <= 0).all() and (self.high >= 0).all() and (self.acceleration > 0).all()
+        ):
+            raise AnysimError(
+                f"limits of a {self.kind} base from {self.low.tolist()} to {self.high.tolist()}: expected 0 within all "
+                "of them, a speed forward above 0, and accelerations above 0"
+            )
+
+
+def limits_of(
+    kind: BaseKind,
+    discs: Array,
+    *,
+    speed: float,
+    turn: float,
+    side: float | None = None,
+    back: float | None = None,
+    acceleration: tuple[float, float] = (1.0, 3.0),
+    turning_radius: float = 0.0,
+) -> BaseLimits:
+    """Limits with what is usual for a kind where nothing is given.
+
+    Args:
+        kind: how it moves.
+        discs: (D, 3) x, y, radius [m].
+        speed, turn: forward [m/s], and turning [rad/s].
+        side: [m/s] to both sides; as forward for what is holonomic, a third of it on legs, else none.
+        back: [m/s] backwards; as forward for what is holonomic, else half of it.
+        acceleration: [m/s^2], [rad/s^2].
+        turning_radius: [m] of a car.
+    """
+    if kind in (BaseKind.DIFFERENTIAL, BaseKind.ACKERMANN):
+        side = 0.0
+    elif side is None:
+        side = speed if kind is BaseKind.HOLONOMIC else speed / 3
+    if back is None:
+        back = speed if kind is BaseKind.HOLONOMIC else speed / 2
+    if kind is BaseKind.ACKERMANN and turning_radius <= 0:
+        raise AnysimError("a car has a turning_radius above 0 [m]: wheelbase / tan(most steering)")
+    high = np.array([speed, side, turn])
+    low = np.array([-back, -side, -turn])
+    made = BaseLimits(
+        kind, low, high, np.array([acceleration[0], acceleration[0], acceleration[1]]), discs, turning_radius
+    )
+    made.check()
+    return made
+
+
+def kind_of(labels: tuple[str, ...], legs: int = 0) -> BaseKind:
+    """The kind of a base with a channel of these components, and with so many legs.
+
+    Raises:
+        AnysimError: no kind has such a channel.
+    """
+    if legs:
+        return BaseKind.HUMANOID if legs == 2 else BaseKind.QUADRUPED
+    for kind, outputs in OUTPUTS.items():
+        if labels in outputs:
+            return BaseKind.ACKERMANN if "steering" in labels else kind
+    known = listing([f"({', '.join(names)})" for outputs in OUTPUTS.values() for names in outputs])
+    raise AnysimError(f"a channel of ({', '.join(labels)}) drives no base that can be planned for; known are {known}")
+
+
+def output_of(limits: BaseLimits, labels: tuple[str, ...], twist: Array, wheelbase: float = inf) -> Array:
+    """The action (n, A) of a channel with these components for velocities (n, 3)."""
+    if labels == ("forward", "left", "turn"):
+        return twist
+    if labels == ("speed", "turn"):
+        return twist[:, [0, 2]]
+    moves = np.abs(twist[:, 0]) > 1e-3
+    curvature = np.where(moves, twist[:, 2] / np.where(moves, twist[:, 0], 1.0), 0.0)
+    most = 1.0 / limits.turning_radius
+    return np.stack([twist[:, 0], np.arctan(wheelbase * np.clip(curvature, -most, most))], axis=1)
+
+
+def discs_over(low: Array, high: Array) -> Array:
+    """(D, 3) discs in a row that cover a rectangle from `low` to `high` (2,) [m], along its longer side."""
+    size, middle = high - low, (high + low) / 2
+    long = int(size[1] > size[0])
+    count = max(1, int(np.ceil(size[long] / size[1 - long] - 0.2)))
+    step = size[long] / count
+    discs = np.zeros((count, 3))
+    discs[:, long] = low[long] + step * (np.arange(count) + 0.5)
+    discs[:, 1 - long] = middle[1 - long]
+    discs[:, 2] = np.hypot(step, size[1 - long]) / 2
+    return discs

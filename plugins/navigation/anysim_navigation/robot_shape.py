@@ -1,0 +1,46 @@
+"""Shapes of robots as navigation sees them: discs that cover a base, and the height that it needs."""
+
+from math import inf
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.math import pose as P
+from anysim.model.world import World
+from anysim_assets.rooms.occupancy import footprints
+from anysim_navigation.agent import Agent
+from anysim_navigation.limits import BaseLimits, discs_over
+
+STEP = 0.03
+"""[m] what is lower is driven over, and not counted as part of the robot either."""
+OVER = 0.05
+"""[m] that stays free above a robot."""
+LEAST_HEIGHT = 0.3
+
+
+def discs_of(world: World, robot: str, frame_pose: Array) -> Array:
+    """(D, 3) discs that cover the outline of a robot as it begins, in its frame, which is at a pose (7,) then."""
+    outlines = np.concatenate(_outlines(world, robot))
+    off = np.concatenate([outlines - frame_pose[:2], np.zeros((len(outlines), 1))], axis=1)
+    x, y, z, w = frame_pose[3:]
+    half = 0.5 * np.arctan2(2 * (x * y + z * w), 1 - 2 * (y * y + z * z))
+    level = np.array([0.0, 0.0, np.sin(half), np.cos(half)])
+    local = P.rotate_inverse(np.tile(level, (len(off), 1)), off)[:, :2]
+    return discs_over(local.min(axis=0), local.max(axis=0))
+
+
+def agent_of(world: World, robot: str, limits: BaseLimits) -> Agent:
+    """What gets where the robot gets: by its largest disc and its height."""
+    from anysim.geometry.bounds import EntityShape
+
+    entity = world.entities[world.entity_numbers[robot]]
+    top = float(EntityShape(world, robot).bounds(world.initial_body_pose[entity.root])[1][2])
+    return Agent(limits.radius, max(LEAST_HEIGHT, top + OVER), STEP)
+
+
+def _outlines(world: World, robot: str) -> list[Array]:
+    entity = world.entities[world.entity_numbers[robot]]
+    own = range(entity.body_start, entity.body_stop)
+    others = set(range(len(world.bodies))) - set(own)
+    found = footprints(world, world.initial_body_pose, (STEP, inf), {-1, *others})
+    return found

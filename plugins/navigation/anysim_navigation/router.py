@@ -1,0 +1,240 @@
+"""Router of a base: direct control and planned ways behind one channel, chosen by a mode in each env.
+
+In mode ROUTE a way over the mesh of the env is followed by the dynamic window over the live occupancy scan. Near the
+end of the way, and in mode DIRECT from the beginning, the base goes straight to its pose.
+"""
+
+from collections.abc import Sequence
+from enum import IntEnum
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim.math import pose as P
+from anysim.task.scene import Frame, RobotView, SceneView
+from anysim_navigation.agent import NoRoute
+from anysim_navigation.dynamic_window import STEP, DynamicWindow, distances_of
+from anysim_navigation.limits import BaseKind, BaseLimits
+from anysim_navigation.maps import NavMaps
+from anysim_navigation.movers import Movers
+from anysim_navigation.pose_control import PoseControl, in_frame
+from anysim_navigation.progress import Progress
+from anysim_navigation.robot_shape import agent_of
+from anysim_sensors.occupancy import Grid, occupancy
+from anysim_sensors.sight.eye import Eye
+from anysim_sensors.tables import GeomPoses
+
+ROOM = (0.12, 0.02)
+"""[m] beyond its radius that ways keep from things: as much as makes following them easy, else what fits."""
+NEAR = 0.35
+"""[m] from its end a way is left for the straight line, if that is free."""
+CAR_STOPS = 0.15
+"""[m] from its end a car has arrived: its heading there is that of the way."""
+REPLANS = 12
+"""Ways in a row that did not bring a base on before it gives up."""
+SNAP = 0.6
+"""[m] by which the base may stand off the mesh: something may have come near it."""
+
+
+class Mode(IntEnum):
+    """What a base does: it stands, goes straight to its pose, turns on the spot to its heading, or follows a way."""
+
+    STAND = 0
+    DIRECT = 1
+    TURN = 2
+    ROUTE = 3
+
+
+class BaseRouter:
+    """Velocities of a robot's base in all envs.
+
+    Attributes:
+        target: (N, 3) x, y [m] and yaw [rad] in the world.
+        mode: (N,) of `Mode`.
+        twist: (N, 3) what it was told last: forward, left [m/s] and turn [rad/s].
+        refused: why there is no way, by env.
+    """
+
+    def __init__(
+        self,
+        scene: SceneView,
+        robot: RobotView,
+        frame: Frame,
+        limits: BaseLimits,
+        *,
+        movers: Sequence[str] = (),
+        margin: float = 0.12,
+        close: float = 0.01,
+    ) -> None:
+        """`movers` are entities that move by themselves: they are foreseen, and are on no map."""
+        world, n = scene.engine.world, scene.engine.num_envs
+        self._scene, self._frame, self.limits = scene, frame, limits
+        self.window = DynamicWindow(limits, margin=margin)
+        self._pose_control = PoseControl(limits, close)
+        agent = agent_of(world, robot.name, limits)
+        ignored = (robot.name, *movers)
+        self._maps = [NavMaps(world, agent._replace(radius=limits.radius + more), without=ignored) for more in ROOM]
+        height = frame_pose(scene, frame)[2]
+        self._grid = Grid((6.0, 6.0), 0.05, agent.step - height, agent.height - height)
+        self._eye = Eye(scene, frame, "collision", "entity")
+        self._movers = Movers(scene, movers)
+        self._seen = self._eye.seen & self._eye.geometry.without(self._movers.bodies)
+        self._every = max(1, round(STEP / world.physics.control_dt))
+        self.target, self.twist = np.zeros((2, n, 3))
+        self.mode = np.full(n, Mode.STAND, dtype=np.int64)
+        self._steps, self._replans = np.zeros((2, n), dtype=np.int64)
+        self._progress: list[Progress | None] = [None] * n
+        self.refused: dict[int, str] = {}
+
+    def go(self, ids: Array, target: Array, mode: Mode = Mode.ROUTE) -> None:
+        """Go to x, y, yaw (n, 3) in these envs."""
+        self.target[ids], self.mode[ids], self._steps[ids], self._replans[ids] = target, mode, 0, 0
+        for env in ids.tolist():
+            self._progress[env] = None
+            self.refused.pop(env, None)
+
+    def velocities(self, ids: Array) -> Array:
+        """(n, 3) what the base is to do now in these envs, which the scene looks at in this order."""
+        pose = pose_of(self._frame.pose)
+        due = self._steps[ids] % self._every == 0
+        self._steps[ids] += 1
+        route = np.flatnonzero(due & (self.mode[ids] == Mode.ROUTE))
+        if len(route):
+            self._tick(ids, route, pose)
+        for row, env in enumerate(ids.tolist()):
+            mode = self.mode[env]
+            if mode == Mode.ROUTE:
+                continue
+            turn = _wrapped(self.target[env, 2] - pose[row, 2])
+            if mode == Mode.DIRECT:
+                way = in_frame(pose[row], self.target[env : env + 1, :2])[0]
+                self.twist[env] = self._pose_control.twist(way, turn, self.twist[env])
+            else:
+                self.twist[env] = self._pose_control.turning(turn) if mode == Mode.TURN else 0.0
+        return self.twist[ids]
+
+    # ------------------------------------------------------------------ a way is followed
+
+    def _tick(self, ids: Array, rows: Array, pose: Array) -> None:
+        envs = ids[rows]
+        for row, env in zip(rows.tolist(), envs.tolist(), strict=True):
+            self._look(env, pose[row])
+        going = [k for k, env in enumerate(envs.tolist()) if self._progress[env] is not None]
+        if not going:
+            return
+        rows, envs = rows[going], envs[going]
+        posed = GeomPoses(*(array[rows] for array in self._eye.posed))
+        cells = occupancy(self._eye.geometry, posed, self._eye.poses[rows], self._grid, seen=self._seen)
+        twist = in_base(self._frame.twist[rows], pose[rows])
+        movers = self._movers.around(rows, pose[rows])
+        for k, env in enumerate(envs.tolist()):
+            self._steer(env, pose[rows[k]], distances_of(cells[k], self._grid.cell), twist[k], movers[k])
+
+    def _look(self, env: int, pose: Array) -> None:
+        """Where the base is on its way; a way is made where there is none, or it has become stale."""
+        progress = self._progress[env]
+        if progress is not None:
+            before = progress.arc
+            progress.look(pose[:2], STEP)
+            if progress.arc > before + 1e-3 and progress.off < 0.3:
+                self._replans[env] = 0 if progress.idle == 0.0 else self._replans[env]
+            if not progress.stale or progress.recovering > 0:
+                return
+        if self._replans[env] > REPLANS:
+            self._refuse(env, "the base does not get on along any way that it has tried")
+            return
+        try:
+            path = self._way(env, pose)
+        except NoRoute as reason:
+            self._refuse(env, str(reason))
+            return
+        stuck = progress is not None
+        made = self._progress[env] = Progress(path)
+        made.look(pose[:2], 0.0)
+        self._replans[env] += 1
+        if stuck:
+            made.recover()
+
+    def _way(self, env: int, pose: Array) -> Array:
+        """(K, 2) over the mesh with the most room, or over the tightest that has a way."""
+        poses, present, end = self._scene.state.body_pose[env], self._scene.presence[env], self.target[env, :2]
+        for maps in self._maps[:-1]:
+            try:
+                return self._joined(pose[:2], maps.at(poses, present).path(pose[:2], end, snap=SNAP), end)
+            except NoRoute:
+                continue
+        return self._joined(pose[:2], self._maps[-1].at(poses, present).path(pose[:2], end, snap=SNAP), end)
+
+    @staticmethod
+    def _joined(start: Array, path: Array, end: Array) -> Array:
+        """The way from where the base is to where it is to be, at least two points."""
+        return np.concatenate([start[None], path[1:-1], end[None]])
+
+    def _refuse(self, env: int, why: str) -> None:
+        self.refused[env], self._progress[env], self.twist[env] = why, None, 0.0
+        self.mode[env] = Mode.STAND
+
+    def _steer(self, env: int, pose: Array, field: Array, now: Array, movers: Array) -> None:
+        progress = self._progress[env]
+        assert progress is not None
+        cell, end = self._grid.cell, self.target[env, :2]
+        car = self.limits.kind is BaseKind.ACKERMANN
+        if car and float(np.hypot(*(end - pose[:2]))) < CAR_STOPS:
+            self.mode[env], self.twist[env] = Mode.STAND, 0.0  # it cannot turn on the spot, so there is nothing to do
+            return
+        if progress.left < NEAR and not car and self._straight(field, pose, end):
+            self.mode[env] = Mode.DIRECT
+            way = in_frame(pose, end[None])[0]
+            self.twist[env] = self._pose_control.twist(way, _wrapped(self.target[env, 2] - pose[2]), self.twist[env])
+            return
+        path, aim = self.window.ahead(progress, pose, field, cell)
+        if progress.recovering > 0:
+            aim = _roomiest(field, cell)
+            path = aim[None]
+        choice = self.window.choose(field, cell, path, aim, now, self.twist[env], movers)
+        self.twist[env] = choice.twist
+        if self.limits.kind in (BaseKind.DIFFERENTIAL,) and np.isfinite(choice.cost) and not choice.twist.any():
+            bearing = float(np.arctan2(aim[1], aim[0]))
+            self.twist[env] = self._pose_control.turning(bearing)  # who stands may turn
+
+    def _straight(self, field: Array, pose: Array, end: Array) -> bool:
+        """Whether the line to the end of the way is free on the scan."""
+        from anysim_navigation.kernels.window import clearance
+
+        way = in_frame(pose, end[None])[0]
+        no_movers, discs = np.zeros((0, 5)), self.limits.discs
+        points = np.linspace(0.0, 1.0, 6)[1:, None] * way
+        return all(clearance(field, self._grid.cell, discs, no_movers, x, y, 0.0, 0.0) > -0.02 for x, y in points)
+
+
+def pose_of(pose: Array) -> Array:
+    """(n, 3) x, y [m] and yaw [rad] of poses (n, 7)."""
+    x, y, z, w = np.moveaxis(pose[:, 3:], -1, 0)
+    yaw = np.arctan2(2 * (x * y + z * w), 1 - 2 * (y * y + z * z))
+    return np.concatenate([pose[:, :2], yaw[:, None]], axis=1)
+
+
+def in_base(twist: Array, pose: Array) -> Array:
+    """(n, 3) forward, left and turn of twists (n, 6) of the world, in bases at poses (n, 3)."""
+    c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
+    return np.stack([c * twist[:, 0] + s * twist[:, 1], c * twist[:, 1] - s * twist[:, 0], twist[:, 5]], axis=1)
+
+
+def frame_pose(scene: SceneView, frame: Frame) -> Array:
+    """(7,) of a frame in the world, as that begins."""
+    at = scene.engine.index.frame(frame.name)
+    local = np.array([*at.position, *at.quaternion])
+    return P.compose(scene.engine.world.initial_body_pose[at.body], local)
+
+
+def _wrapped(angle: float) -> float:
+    return float((angle + np.pi) % (2 * np.pi) - np.pi)
+
+
+def _roomiest(field: Array, cell: float) -> Array:
+    """(2,) [m] the place at 0.35 m around the base that is furthest from everything."""
+    from anysim_navigation.kernels.window import distance_at
+
+    turn = 2 * np.pi * np.arange(16) / 16
+    places = 0.35 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    return places[int(np.argmax([distance_at(field, cell, x, y) for x, y in places]))]

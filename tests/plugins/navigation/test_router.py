@@ -1,0 +1,91 @@
+"""Bases that a skill sends through furnished rooms, in an engine: by ways, past what stands there, or refused."""
+
+import numpy as np
+import pytest
+
+from anysim import make
+from anysim.errors import PluginError
+from anysim.skills.base import OUTCOMES, Outcome
+from anysim.skills.runner import SkillPolicy
+from anysim.task.env import TaskEnv
+from anysim.testing.engines import require_engine
+from anysim_navigation.drive_bench import HARD, drive
+from tests.plugins.skills.test_navigate import WORLD
+
+
+@pytest.mark.parametrize("base", ["differential_base", "holonomic_base"])
+def test_a_base_gets_through_a_furnished_room(base: str) -> None:
+    require_engine("mujoco")
+    found = drive(1, base, "mujoco")
+    assert found is not None
+    assert found.ended == "success"
+    assert found.length > 4.0
+    assert found.hardest < HARD
+    assert found.seconds < 3.0 * found.length / 0.6 + 10.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["pybullet", "sapien"])
+@pytest.mark.parametrize("base", ["differential_base", "holonomic_base"])
+def test_it_gets_through_on_the_other_engines(base: str, engine: str) -> None:
+    require_engine(engine)
+    found = drive(1, base, engine)
+    assert found is not None
+    assert (found.ended, found.hardest < HARD) == ("success", True)
+
+
+def walled(gap: bool) -> TaskEnv:
+    """A goal behind a wall, which is 8 m long or has a passage at its side."""
+    require_engine("mujoco")
+    wall = [
+        f"world.objects.wall={{source: {{box: [0.1, {3.0 if gap else 8.0}, 1.0]}}, fixed: true}}",
+        "world.layout.wall={position: [1.0, 0.0, 0.5]}",
+        "world.layout.spot={position: [2.0, 0.0, -0.02], yaw: 0.0, checked: false}",
+        "task.expert.planner=dynamic_window",
+        "task.on_success=continue",
+    ]
+    if not gap:  # and walls from there to behind the goal
+        for name, y in (("left", 3.9), ("right", -3.9)):
+            wall += [
+                f"world.objects.{name}={{source: {{box: [3.0, 0.1, 1.0]}}, fixed: true}}",
+                f"world.layout.{name}={{position: [2.5, {y}, 0.5]}}",
+            ]
+        wall += [
+            "world.objects.back={source: {box: [0.1, 8.0, 1.0]}, fixed: true}",
+            "world.layout.back={position: [4.0, 0.0, 0.5]}",
+        ]
+    return make(WORLD, engine="mujoco", num_envs=1, overrides=wall)
+
+
+def outcome(env: TaskEnv, steps: int) -> tuple[Outcome, float]:
+    """How the skill ended, and where the base was farthest to the side on its way."""
+    env.reset(seed=3)
+    policy, one, aside = SkillPolicy(env), np.array([0]), 0.0
+    policy.begin(one)
+    for _ in range(steps):
+        if policy.skill.outcome[0]:
+            break
+        env.step(policy.act(one))
+        aside = max(aside, abs(float(env.scene.robot("base").base.position[0, 1])))
+    return OUTCOMES[policy.skill.outcome[0]], aside
+
+
+def test_a_wall_is_gone_around() -> None:
+    with walled(gap=True) as env:
+        ended, aside = outcome(env, 900)
+        assert ended is Outcome.OK
+        assert 1.5 + 0.25 < aside < 2.4
+
+
+def test_a_goal_that_is_closed_off_is_refused() -> None:
+    with walled(gap=False) as env:
+        assert outcome(env, 100)[0] is Outcome.NO_PATH
+
+
+def test_a_planner_that_is_not_installed_is_named() -> None:
+    require_engine("mujoco")
+    with (
+        pytest.raises(PluginError, match="no planner named 'teb'"),
+        make(WORLD, engine="mujoco", overrides=["task.expert.planner=teb"]) as env,
+    ):
+        outcome(env, 3)
