@@ -1,7 +1,7 @@
 """Run tests of a contract suite on many engines in one process: `run_engines.py JOBS.json RESULTS.json [SUITE]`.
 
 SUITE is `planners` or `families`. Jobs map what is under test (`module:Class`, or an engine) to tests
-(`test_x.py::test_y`); results map it to tests to outcomes, where a parametrised test has failed if one of its cases has.
+(`test_x.py::test_y`); results map it to tests to outcomes; a parametrised test has failed if one of its cases has.
 """
 
 import json
