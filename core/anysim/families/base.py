@@ -52,6 +52,7 @@ class FamilySetting(NamedTuple):
         engine: has its World.
         streams: randomness of the envs; names of its streams begin with `family/NAME/`.
         entities: the indices of its entities, in the order of `parts`.
+        origin: (N, 3) [m] where an env's scene stands on the ground; it may be another one after a reset.
     """
 
     name: str
@@ -59,6 +60,7 @@ class FamilySetting(NamedTuple):
     engine: SimEngine
     streams: Streams
     entities: tuple[int, ...]
+    origin: Array
 
 
 class Family(ABC):

@@ -55,7 +55,9 @@ class FamilyManager(Manager):
             self._blames[name] = registry.Blame(who, registry.origin(kind), prefix=True)
             values, own = self._settings[name]
             with self._blames[name]:
-                self._families[name] = kind(FamilySetting(name, values, engine, self.streams, own))
+                self._families[name] = kind(
+                    FamilySetting(name, values, engine, self.streams, own, self.episodes.origin)
+                )
         self._by_step = [name for name, family in self._families.items() if family.rate == "physics"]
         self._by_part = [name for name in self._families if name not in self._by_step]
         self._dt = engine.world.physics.dt

@@ -1,5 +1,6 @@
 """Bodies of avatars: bones by stature, capsules around them, and the seed that makes each its own."""
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -72,7 +73,7 @@ class Proportions(NamedTuple):
 
 def proportions(height: float, rng: np.random.Generator) -> Proportions:
     """Those of an adult of a height: legs, arms and girth vary by some percent."""
-    leg, arm = height * rng.uniform(0.97, 1.03), height * rng.uniform(0.97, 1.03)
+    leg, arm = (height * float(rng.uniform(0.97, 1.03)) for _ in range(2))
     girth, wide = float(rng.uniform(0.92, 1.2)), float(rng.uniform(0.95, 1.08))
     thigh, shin, ankle = 0.243 * leg, 0.240 * leg, 0.048 * height
     neck = 0.095 * height
@@ -106,9 +107,9 @@ def lengths(one: Proportions) -> Array:
 def capsules(one: Proportions) -> list[tuple[float, float, Vec3, Quat]]:
     """Radius, half length, place and rotation in the link's frame (z along the bone, in its middle), of each link."""
     slim = one.height * one.girth / 1.75
-    size = lengths(one)
+    size: list[float] = lengths(one).tolist()  # numbers of Python: engines write them into files as they are
     along: Quat = (0.0, 0.0, 0.0, 1.0)
-    across: Quat = (np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5))  # its axis along y
+    across: Quat = (sqrt(0.5), 0.0, 0.0, sqrt(0.5))  # its axis along y
     radii = (0.115, 0.125, 0.105, 0.048, 0.048, 0.040, 0.040, 0.036, 0.036, 0.075, 0.075, 0.052, 0.052, 0.042, 0.042)
     found: list[tuple[float, float, Vec3, Quat]] = []
     for bone, (name, radius) in enumerate(zip(BONES, radii, strict=True)):

@@ -1,6 +1,7 @@
 """The family `avatar`: people with a queue of actions each, driven through the engine as they walk, reach and look."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -166,7 +167,7 @@ class Avatars(Family):
                 stream = f"family/{self.setting.name}/{number}/{key}"
                 drawn = draw_rows(value, stream, streams, env_ids, source=f"{path}.{key}")
                 row = 0.0 if is_random(value) else _begin(spec, number)[column] - value
-                memory["pos"][env_ids, number, column] = drawn + row
+                memory["pos"][env_ids, number, column] = drawn + row + self.setting.origin[env_ids, column]
             stream = f"family/{self.setting.name}/{number}/yaw"
             memory["yaw"][env_ids, number] = draw_rows(spec.yaw, stream, streams, env_ids, source=f"{path}.yaw")
         memory["queue"][env_ids] = self._script
@@ -185,15 +186,16 @@ class Avatars(Family):
         row = queue[at, now["head_row"]]
         poses = self.engine.get_state().body_pose[env_ids]
         env = np.repeat(np.arange(len(env_ids)), len(self.names))
+        scene = Scene(poses, self.setting.origin[env_ids], env)
 
         now["time"] += duration
         now["clock"] += duration
-        done = self._over(row, gait, now, _goals(row, poses, env))
+        done = self._over(row, gait, now, _goals(row, scene))
         if done.any():
             self._next(queue, now, done)
             self._keep(env_ids, gait, {"queue": queue})
         row = queue[at, now["head_row"]]
-        kind, goal = row[:, Column.KIND], _goals(row, poses, env)
+        kind, goal = row[:, Column.KIND], _goals(row, scene)
         going, turning = kind == Kind.GO, kind == Kind.TURN
         away = np.sqrt(((goal - gait.pos) ** 2).sum(-1))
         rest = np.maximum(away - row[:, Column.NEAR], 0.0) / np.maximum(away, 1e-12)
@@ -213,8 +215,8 @@ class Avatars(Family):
             self._ground,
             duration,
         )
-        looked = _points(poses, env, row, Column.GAZE_BODY, Column.GAZE)
-        self._overlays(now, row, looked, _points(poses, env, row, Column.REACH_BODY, Column.REACH), duration)
+        looked = _points(scene, row, Column.GAZE_BODY, Column.GAZE)
+        self._overlays(now, row, looked, _points(scene, row, Column.REACH_BODY, Column.REACH), duration)
         aim = Aim(
             now["posture"], now["bend"], now["gaze"], _eased(now["gazing"]), now["reach"], _eased(now["reaching"])
         )
@@ -444,13 +446,23 @@ def _eased(share: Array) -> Array:
     return np.where(share >= 1.0, 1.0, share**3 * (10 - 15 * share + 6 * share**2))
 
 
-def _goals(row: Array, poses: Array, env: Array) -> Array:
+class Scene(NamedTuple):
+    """Poses of all bodies (n, B, 7) and origins (n, 3) of the envs at hand, and the env of each avatar (m,)."""
+
+    poses: Array
+    origin: Array
+    env: Array
+
+
+def _goals(row: Array, scene: Scene) -> Array:
     """(m, 2) where the walks go."""
-    body = np.clip(row[:, Column.BODY].astype(np.int64), -1, poses.shape[1] - 1)
-    return np.where((body >= 0)[:, None], poses[env, body, :2], row[:, Column.X : Column.Y + 1])
+    body = np.clip(row[:, Column.BODY].astype(np.int64), -1, scene.poses.shape[1] - 1)
+    point = row[:, Column.X : Column.Y + 1] + scene.origin[scene.env, :2]
+    return np.where((body >= 0)[:, None], scene.poses[scene.env, body, :2], point)
 
 
-def _points(poses: Array, env: Array, row: Array, body: int, place: int) -> Array:
+def _points(scene: Scene, row: Array, body: int, place: int) -> Array:
     """(m, 3) what rows are after: points, or where bodies are."""
-    index = np.clip(row[:, body].astype(np.int64), -1, poses.shape[1] - 1)
-    return np.where((index >= 0)[:, None], poses[env, index, :3], row[:, place : place + 3])
+    index = np.clip(row[:, body].astype(np.int64), -1, scene.poses.shape[1] - 1)
+    point = row[:, place : place + 3] + scene.origin[scene.env]
+    return np.where((index >= 0)[:, None], scene.poses[scene.env, index, :3], point)

@@ -148,10 +148,10 @@ def _step(state: Gait, legs: Legs, neutral: Array, ground_at: GroundAt, dt: floa
     target = state.pos[air] + left * (legs.hip[air] * 1.05)[:, None] + state.vel[air] * later[:, None]
     ease = phase**3 * (10 - 15 * phase + 6 * phase**2)
     start, feet = state.lift[air], state.feet
-    height = ground_at(state.feet[air, foot, :2])
     way = start[:, :2] + (target - start[:, :2]) * ease[:, None] - feet[air, foot, :2]
     far = np.sqrt((way * way).sum(-1))
     feet[air, foot, :2] += way * np.minimum(1.0, FOOT * dt / np.maximum(far, 1e-12))[:, None]
+    height = ground_at(feet[air, foot, :2])
     feet[air, foot, 3] = start[:, 3] + wrapped(state.yaw[air] - start[:, 3]) * ease
     arc = 4 * phase * (1 - phase) * (0.05 + 0.03 * np.minimum(speed[air], 1.5))
     feet[air, foot, 2] = start[:, 2] + (height - start[:, 2]) * ease + arc

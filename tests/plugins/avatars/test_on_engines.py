@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 import anysim
+from anysim.engine.factory import create_simulation
 from anysim.record.collector import Collector
 from anysim.record.reader import open_trajectory
 from anysim.record.replay import replay
+from anysim.testing.audit import audit
 from anysim.testing.engines import require_engine
 from tests.plugins.avatars.people import avatars, lived, run_of, wait
 from tests.schemas.test_every_key import Still
@@ -132,6 +134,17 @@ def test_what_if_begins_with_equal_people(engine: str) -> None:
             wait(env)
         state = env.engine.get_state().body_pose
         assert np.abs(state[0] - state[1]).max() > 0.05
+
+
+@EACH
+def test_engines_build_what_was_meant(engine: str) -> None:
+    require_engine(engine)
+    world = anysim.compile_world(run_of([], height=1.75, count=2))
+    with create_simulation(engine) as simulation:
+        simulation.create_world(world)
+        lines = audit(simulation)
+    assert len(lines) > 100
+    assert [line for line in lines if line.ok is False] == []
 
 
 @pytest.mark.slow

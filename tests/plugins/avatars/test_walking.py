@@ -75,3 +75,29 @@ def test_turns_on_the_spot():
         assert family.memory["yaw"][0, 0] == pytest.approx(2.5, abs=0.02)
         assert family.memory["pos"][0, 0] == pytest.approx([0, 0])
         assert np.abs(family.memory["feet"][0, 0, :, 3] - 2.5).max() < 0.25
+
+
+GROUNDS = {
+    "waves": {"kind": "waves", "amplitude": 0.05, "wavelength": 1.5, "size": [8, 8], "platform": 0.4, "seed": 2},
+    "tiles": {"kind": "tiles", "cell": 0.2, "tiles": {"columns": ["rough", "slopes"], "size": 6, "rows": 2}},
+}
+
+
+@pytest.mark.parametrize("kind", list(GROUNDS))
+def test_feet_stand_on_the_ground_wherever_a_scene_is(kind):
+    run = run_of([{"path": [[1.2, 0.4]], "speed": 0.8}], world={"terrain": GROUNDS[kind]}, num_envs=3)
+    off, heights, stretch = [], [], 0.0
+    for env, family in lived(run, 130):
+        feet, swing = family.memory["feet"][:, 0], family.memory["swing"][:, 0]
+        down = np.stack([swing != 0, swing != 1], axis=1)
+        ground = env.engine.world.ground.heights_at(feet[..., :2])
+        off.append(np.abs(feet[..., 2] - ground)[down].max())
+        heights.append(ground[down])
+        ankle = feet[..., :3] + np.array([0, 0, family.people[0].ankle])
+        hips = family.state(np.arange(3)).points[:, [BONES.index("left_thigh"), BONES.index("right_thigh")]]
+        stretch = max(stretch, (np.linalg.norm(ankle - hips, axis=-1) / family.people[0].leg).max())
+        last = family.memory["pos"][:, 0] - env.scene.origin[:, :2]
+    assert max(off) < 1e-9
+    assert np.ptp(np.concatenate(heights)) > 0.02
+    assert stretch < 1.0
+    np.testing.assert_allclose(last, [[1.2, 0.4]] * 3, atol=3e-3)
