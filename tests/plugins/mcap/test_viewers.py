@@ -207,8 +207,26 @@ def test_the_page_lists_what_is_worked_out_and_nothing_else(reader: TrajectoryRe
     assert {one for found in matches.values() for one in found} == new
 
 
+def test_the_page_of_records_names_every_stream_with_its_schema(reader: TrajectoryReader, files: list[Path]) -> None:
+    recorded = {topic[1:]: rows[0].schema for path in files[:-1] for topic, rows in heard(path).items()}
+    page = (ROOT / "docs" / "concepts" / "record.md").read_text().split("## Streams", 1)[1].split("\n## ", 1)[0]
+    rows = re.findall(r"^\| (`.*?`) \| .*? \| (.*?) \|$", page, re.MULTILINE)
+    used = set[int]()
+    for name in reader.names():
+        found = [
+            k
+            for k, (names, schemas) in enumerate(rows)
+            if any(_named(pattern, name) for pattern in re.findall(r"`(.*?)`", names))
+            and (name not in reader.manifest.streams or recorded[name].replace("anysim.Data", "JSON") in schemas)
+        ]
+        assert len(found) == 1, name
+        used |= {found[0]}
+    assert used == set(range(len(rows)))
+
+
 def _named(pattern: str, topic: str) -> bool:
-    return re.fullmatch(re.sub(r"[A-Z]+", "[^/]+", pattern), topic) is not None
+    """Whether a topic is one of a pattern: words in capitals stand for a name, `…` for more of them."""
+    return re.fullmatch(re.sub(r"[A-Z]+", "[^/]+", pattern).replace("…", "(/.*)?"), topic) is not None
 
 
 # ---------------------------------------------------------------------- Foxglove's reader
