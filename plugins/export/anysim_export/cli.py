@@ -9,7 +9,7 @@ import typer
 from anysim.cli.options import AsJson, option_values
 
 if TYPE_CHECKING:
-    from anysim_export.job import Told
+    from anysim_export.parts import Told
 
 
 def export(
@@ -27,6 +27,7 @@ def export(
     failed_too: Annotated[
         bool, typer.Option("--failed-too", help="Export committed episodes too that did not succeed.")
     ] = False,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Processes that write episodes.")] = 1,
     json: AsJson = False,
 ) -> None:
     """Write the committed trajectories of runs as a data set that trainers read.
@@ -43,7 +44,8 @@ def export(
     from anysim_export.job import export as write
 
     with _Bar(lambda total: counting("episodes", total, quiet=json)) as bar:
-        done = write(directories, to, out, option_values(option, "images=false"), failed_too=failed_too, tell=bar.begin)
+        options = option_values(option, "images=false")
+        done = write(directories, to, out, options, failed_too=failed_too, jobs=jobs, tell=bar.begin)
     if json:
         print_json({**done._asdict(), "directory": str(done.directory)})
         return

@@ -218,6 +218,40 @@ def test_killed_it_goes_on_to_the_same_bytes(
     assert [path.name for path in tmp_path.iterdir()] == [form]
 
 
+PARENT_KILLED = """
+import json, os, signal, sys, threading, time
+from pathlib import Path
+from anysim_export.job import export
+
+if __name__ == "__main__":
+    run, to, out, _, options = sys.argv[1:]
+    parts = Path(out).with_name(f".{Path(out).name}.export") / "parts"
+    def watch():
+        while not any(parts.glob("*.new/*")):
+            time.sleep(0.001)
+        os.kill(os.getpid(), signal.SIGKILL)
+    threading.Thread(target=watch).start()
+    export([Path(run)], to, Path(out), json.loads(options), jobs=2)
+"""
+"""A program that is killed while its two processes write; they end a second later."""
+
+
+@pytest.mark.parametrize(
+    "form", ["webdataset", *(pytest.param(form, marks=pytest.mark.slow) for form in ("lerobot", "robomimic"))]
+)
+def test_two_processes_write_the_same_bytes_and_killed_too(
+    run: Path, exported: dict[str, Path], tmp_path: Path, form: str
+) -> None:
+    out, options, program = tmp_path / form, OPTIONS.get(form, {}), tmp_path / "program.py"
+    program.write_text(PARENT_KILLED)
+    command = [sys.executable, str(program), str(run), form, str(out), "", json.dumps(options)]
+    assert subprocess.run(command, check=False, timeout=120).returncode == -signal.SIGKILL
+    assert not out.exists()
+    export([run], form, out, options, jobs=2)
+    assert content(out) == content(exported[form])
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([form, "program.py"])
+
+
 def test_what_another_export_left_aside_is_not_taken(run: Path, exported: dict[str, Path], tmp_path: Path) -> None:
     out = tmp_path / "webdataset"
     command = [sys.executable, "-c", KILLED, str(run), "webdataset", str(out), "assemble", "{}"]
