@@ -78,7 +78,9 @@ def tape(
         str | None,
         typer.Option(help="A task to play in, where the data set says none of its own (it has no anysim.json)."),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", "-s", min=0, help="With --task: of the first episode.")] = 0,
+    seed: Annotated[
+        int | None, typer.Option("--seed", "-s", min=0, help="With --task: of the first episode, 0 if not given.")
+    ] = None,
     json: AsJson = False,
 ) -> None:
     """Play the actions of a LeRobot data set, each episode from its own beginning, and say how it came out.
@@ -88,14 +90,20 @@ def tape(
 
     Examples:
       anysim export runs/pick --to lerobot --out data/pick && anysim tape data/pick
+      anysim tape data/pick --engine pybullet
+      anysim tape data/from_elsewhere --task pick_cube --seed 3
     """
     from anysim.cli.output import counting, print_json
     from anysim_export.tape import play, read_tape
 
+    if seed is not None and task is None:
+        raise typer.BadParameter(
+            "goes with --task; without it episodes begin as they were recorded", param_hint="--seed"
+        )
     reel = read_tape(directory)
     played: list[Any] = []
     with counting("episodes", len(reel.actions), quiet=json) as show:
-        for one in play(reel, engine=engine, task=task, seed=seed):
+        for one in play(reel, engine=engine, task=task, seed=seed or 0):
             played.append(one)
             was = f" (recorded: {one.recorded})" if one.recorded else ""
             show(f"episode {one.episode}: {one.status}{was}, {one.steps} steps", f"{len(played)}")

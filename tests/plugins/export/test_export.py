@@ -308,6 +308,12 @@ def test_a_tape_comes_to_the_same_success(exported: dict[str, Path], episodes: l
     with pytest.raises(RecordError, match=r"no anysim\.json\); name the task to play in with --task"):
         next(play(foreign))
     assert next(play(foreign, task="pick_cube")).recorded == ""
+    with pytest.raises(
+        RecordError, match=r"has 30 actions a second; 'pick_cube' takes 50\. Name a task with this rate"
+    ):
+        next(play(foreign._replace(fps=30.0), task="pick_cube"))
+    with pytest.raises(RecordError, match=r"is no data set of LeRobot: it has no meta/info\.json"):
+        read_tape(exported["robomimic"])
 
 
 def test_the_commands(run: Path, tmp_path: Path) -> None:
@@ -321,6 +327,9 @@ def test_the_commands(run: Path, tmp_path: Path) -> None:
     assert "are there already in" in again.stdout
     told = json.loads(run_python(tmp_path, "-c", MAIN, "tape", str(out), "--json").stdout)
     assert (told["success"], told["as_recorded"]) == (3, 3)
+    refused = run_python(tmp_path, "-c", MAIN, "tape", str(out), "--seed", "3")
+    assert refused.returncode == 2
+    assert "goes with --task" in refused.stderr
 
 
 def test_statistics_of_known_numbers() -> None:
