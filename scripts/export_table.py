@@ -13,10 +13,11 @@ from generated import main
 from anysim.record.header import ArrayLayout, StateLayout
 from anysim.record.manifest import CameraEntry, FileEntry, Manifest, StreamEntry
 from anysim_export.api import DataSet
-from anysim_export.job import made, omitted
+from anysim_export.job import omitted
+from anysim_export.parts import made
 from anysim_export.streams import streams_of
 
-FORMS = ("lerobot", "robomimic", "rlds-ready", "webdataset", "rerun", "coco")
+FORMS = ("lerobot", "robomimic", "rlds-ready", "webdataset", "rerun", "foxglove", "coco")
 
 
 def recording() -> Manifest:
@@ -78,7 +79,7 @@ def rows() -> str:
         exporter, options = made(form, {})
         data = DataSet([one], options)
         places = dict(exporter.places(data))
-        for stream, option in omitted(exporter, options, data).items():
+        for stream, option in omitted(form, exporter, data).items():
             if option:
                 key, value = option.split("=")
                 other, _ = made(form, {key: value == "true"})

@@ -48,7 +48,8 @@ _BEFORE = pytest.StashKey[frozenset[str]]()
 
 
 def _listing() -> frozenset[str]:
-    return frozenset(path.name for path in Path.cwd().iterdir())
+    """Of environments nothing is told: `make test-rlds` may make one while the tests of another one run."""
+    return frozenset(path.name for path in Path.cwd().iterdir() if not path.name.startswith(".venv"))
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -41,6 +41,10 @@ def test_what_a_test_leaves_behind_is_an_error(tmp_path: Path, test: str, compla
     assert complaint in said
 
 
+def test_an_environment_that_is_made_meanwhile_belongs_to_no_test(tmp_path: Path) -> None:
+    assert "1 passed" in outcome(tmp_path, "import os\ndef test():\n    os.mkdir('.venv-other')\n")
+
+
 def test_one_worker_runs_all_tests_of_a_group(tmp_path: Path) -> None:
     """What a group shares is set up once. Versions of pytest and pytest-xdist that do not fit say nothing about it."""
     test = """

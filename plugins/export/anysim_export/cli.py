@@ -9,7 +9,7 @@ import typer
 from anysim.cli.options import AsJson, option_values
 
 if TYPE_CHECKING:
-    from anysim_export.job import Told
+    from anysim_export.parts import Told
 
 
 def export(
@@ -27,6 +27,7 @@ def export(
     failed_too: Annotated[
         bool, typer.Option("--failed-too", help="Export committed episodes too that did not succeed.")
     ] = False,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Processes that write episodes.")] = 1,
     json: AsJson = False,
 ) -> None:
     """Write the committed trajectories of runs as a data set that trainers read.
@@ -43,7 +44,8 @@ def export(
     from anysim_export.job import export as write
 
     with _Bar(lambda total: counting("episodes", total, quiet=json)) as bar:
-        done = write(directories, to, out, option_values(option, "images=false"), failed_too=failed_too, tell=bar.begin)
+        options = option_values(option, "images=false")
+        done = write(directories, to, out, options, failed_too=failed_too, jobs=jobs, tell=bar.begin)
     if json:
         print_json({**done._asdict(), "directory": str(done.directory)})
         return
@@ -76,7 +78,9 @@ def tape(
         str | None,
         typer.Option(help="A task to play in, where the data set says none of its own (it has no anysim.json)."),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", "-s", min=0, help="With --task: of the first episode.")] = 0,
+    seed: Annotated[
+        int | None, typer.Option("--seed", "-s", min=0, help="With --task: of the first episode, 0 if not given.")
+    ] = None,
     json: AsJson = False,
 ) -> None:
     """Play the actions of a LeRobot data set, each episode from its own beginning, and say how it came out.
@@ -86,14 +90,20 @@ def tape(
 
     Examples:
       anysim export runs/pick --to lerobot --out data/pick && anysim tape data/pick
+      anysim tape data/pick --engine pybullet
+      anysim tape data/from_elsewhere --task pick_cube --seed 3
     """
     from anysim.cli.output import counting, print_json
     from anysim_export.tape import play, read_tape
 
+    if seed is not None and task is None:
+        raise typer.BadParameter(
+            "goes with --task; without it episodes begin as they were recorded", param_hint="--seed"
+        )
     reel = read_tape(directory)
     played: list[Any] = []
     with counting("episodes", len(reel.actions), quiet=json) as show:
-        for one in play(reel, engine=engine, task=task, seed=seed):
+        for one in play(reel, engine=engine, task=task, seed=seed or 0):
             played.append(one)
             was = f" (recorded: {one.recorded})" if one.recorded else ""
             show(f"episode {one.episode}: {one.status}{was}, {one.steps} steps", f"{len(played)}")

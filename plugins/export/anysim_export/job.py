@@ -9,21 +9,17 @@ from typing import Any, NamedTuple
 
 from anysim import registry
 from anysim.errors import PluginError, RecordError, listing
-from anysim.plugin_parameters import checked, options_model, parameters
-from anysim.record.commit import describe, fsync, publish, write_durably
+from anysim.record.commit import publish, write_durably
 from anysim.record.incoming import FileLock
-from anysim.record.json import load_json, plain
+from anysim.record.json import load_json
 from anysim.record.manifest import Manifest, read_manifest
 from anysim.record.names import find_trajectories
-from anysim.record.reader import open_trajectory
-from anysim_export.api import DataSet, Episode, Exporter
+from anysim_export.api import DataSet, Exporter
+from anysim_export.parts import Told, made, sync, wait_for_writers, write_parts
 from anysim_export.sheet import SHEET_FILE, ExportSheet, make_sheet, read_sheet
 from anysim_export.streams import streams_of
 
 PARTS, WHOLE = "parts", "whole"
-
-Told = Callable[[str, str], None]
-"""Called once for each finished episode, with a line about it and what has come so far."""
 
 
 class Exported(NamedTuple):
@@ -54,6 +50,7 @@ def export(
     options: Mapping[str, Any] | None = None,
     *,
     failed_too: bool = False,
+    jobs: int = 1,
     tell: Callable[[int], Told] | None = None,
 ) -> Exported:
     """Write committed trajectories as a data set.
@@ -66,6 +63,8 @@ def export(
         out: directory of the data set, which must not exist, or be the same export.
         options: the exporter's.
         failed_too: export episodes too that did not succeed.
+        jobs: processes that write episodes; the bytes are the same. A program that asks for more than one guards its
+            main module (`if __name__ == "__main__"`), which each of them imports.
         tell: asked for a `Told` with the number of episodes to write.
 
     Raises:
@@ -76,7 +75,7 @@ def export(
     exporter, said = made(to, options or {})
     with closing(exporter):
         _check_needs(to, exporter.needs)
-        return _export(exporter, said, runs, to, out, failed_too, tell)
+        return _export(exporter, said, runs, to, out, failed_too, jobs, tell)
 
 
 def _export(
@@ -86,6 +85,7 @@ def _export(
     to: str,
     out: Path,
     failed_too: bool,
+    jobs: int,
     tell: Callable[[int], Told] | None,
 ) -> Exported:
     paths, left_out = _chosen(runs, failed_too)
@@ -95,7 +95,7 @@ def _export(
     _check_alike(paths, places)
     with registry.using("exporters", to):
         exporter.check(data)
-        lacking = omitted(exporter, said, data)
+        lacking = omitted(to, exporter, data)
     sheet = make_sheet(to, registry.distribution("exporters", to), said, data.manifests)
     done = Exported(out, len(paths), sum(one.steps for one in data.manifests), 0, left_out, False, lacking)
     aside = out.absolute().with_name(f".{out.absolute().name}.export")
@@ -111,13 +111,13 @@ def _export(
             resumed = _begin(aside, sheet)
             told = (lambda line, standing: None) if tell is None else tell(len(paths))
             with registry.using("exporters", to, (OSError,)):
-                parts = [_part(aside, i, path, exporter, data, told) for i, (path, _) in enumerate(paths)]
+                parts = write_parts(aside / PARTS, to, [path for path, _ in paths], data, jobs, told)
                 whole = aside / WHOLE
                 shutil.rmtree(whole, ignore_errors=True)
                 whole.mkdir()
                 exporter.assemble(whole, parts, data)
             write_durably(whole / SHEET_FILE, sheet.encode())
-            _sync(whole)
+            sync(whole)
             publish(whole, out.absolute())
             shutil.rmtree(aside)
     except OSError as error:
@@ -128,23 +128,6 @@ def _export(
     return done._replace(resumed=resumed)
 
 
-def made(name: str, options: Mapping[str, Any]) -> tuple[Exporter, dict[str, Any]]:
-    """The exporter with its options, and these as plain data, defaults included.
-
-    Raises:
-        PluginError: no such exporter.
-        SpecError: at `options.KEY`, an option that it does not have.
-    """
-    kind: type[Exporter] = registry.load("exporters", name)
-    with registry.using("exporters", name):
-        return _configured(kind, options)
-
-
-def _configured(kind: type[Exporter], options: Mapping[str, Any]) -> tuple[Exporter, dict[str, Any]]:
-    given = checked(options_model(kind), options, "options")
-    return kind(**{key: getattr(given, key) for key in parameters(kind)}), plain(given.model_dump(mode="json"))
-
-
 def _check_needs(name: str, needs: Mapping[str, str]) -> None:
     for module, extra in needs.items():
         try:
@@ -153,16 +136,12 @@ def _check_needs(name: str, needs: Mapping[str, str]) -> None:
             raise PluginError(f"the exporter '{name}' needs {module}: pip install '{extra}' ({error})") from error
 
 
-def omitted(exporter: Exporter, options: Mapping[str, Any], data: DataSet) -> dict[str, str]:
-    """The streams that a data set leaves out, each with the option that would bring it, or with an empty word.
-
-    Args:
-        options: those of the exporter, all of them.
-    """
-    taken, remedies = exporter.places(data), dict[str, str]()
+def omitted(name: str, exporter: Exporter, data: DataSet) -> dict[str, str]:
+    """The streams that a data set leaves out, each with the option that would bring it, or with an empty word."""
+    taken, remedies, options = exporter.places(data), dict[str, str](), data.options
     for key, value in options.items():
         if isinstance(value, bool):
-            other, _ = _configured(type(exporter), {**options, key: not value})
+            other, _ = made(name, {**options, key: not value})
             with closing(other):
                 remedies |= dict.fromkeys(other.places(data), f"{key}={str(not value).lower()}")
     return {name: remedies.get(name, "") for name in streams_of(data.first) if name not in taken}
@@ -240,6 +219,7 @@ def _clear(aside: Path) -> None:
 
 def _begin(aside: Path, sheet: ExportSheet) -> int:
     """The folder of this export's work; what another export has left there is removed. Returns the episodes in it."""
+    wait_for_writers(aside)
     path = aside / SHEET_FILE
     try:
         same = path.exists() and ExportSheet.model_validate(load_json(path)) == sheet
@@ -250,30 +230,3 @@ def _begin(aside: Path, sheet: ExportSheet) -> int:
         (aside / PARTS).mkdir(parents=True)
         write_durably(path, sheet.encode())
     return sum(1 for part in (aside / PARTS).iterdir() if part.suffix == "")
-
-
-def _part(aside: Path, index: int, path: Path, exporter: Exporter, data: DataSet, told: Told) -> Path:
-    """The folder of an episode, written now unless it is there."""
-    final = aside / PARTS / f"{index:06d}"
-    if not final.exists():
-        incoming = final.with_suffix(".new")
-        shutil.rmtree(incoming, ignore_errors=True)
-        incoming.mkdir()
-        _check_whole(path, data.manifests[index])
-        exporter.write_episode(incoming, Episode(index, open_trajectory(path)), data)
-        _sync(incoming)
-        publish(incoming, final)
-    told(f"{path.name}: {data.manifests[index].steps} steps", f"{index + 1} of {len(data.manifests)}")
-    return final
-
-
-def _check_whole(path: Path, manifest: Manifest) -> None:
-    """See that a trajectory's files are those that were committed."""
-    for name, entry in manifest.files.items():
-        if not (path / name).is_file() or describe(path / name) != entry:
-            raise RecordError(f"{path / name} is not the file that was committed; `anysim verify {path}` says more")
-
-
-def _sync(folder: Path) -> None:
-    for path in sorted(folder.rglob("*")):
-        fsync(path)

@@ -16,10 +16,11 @@ from anysim_export.sheet import ExportSheet, read_sheet
 
 
 class Tape(NamedTuple):
-    """Actions (T, A) float64 of each episode, and how these began where the data set says it."""
+    """Actions (T, A) float64 of each episode, so many a second, and how these began where the data set says it."""
 
     directory: Path
     actions: list[Array]
+    fps: float
     sheet: ExportSheet | None
 
 
@@ -44,6 +45,11 @@ def read_tape(directory: Path) -> Tape:
         from pyarrow.lib import ArrowException  # pyright: ignore[reportMissingImports]
     except ImportError as error:
         raise PluginError("a tape is read with pyarrow: pip install 'anysim-export[lerobot]'") from error
+    if not (directory / "meta" / "info.json").exists():
+        raise RecordError(
+            f"{directory} is no data set of LeRobot: it has no meta/info.json. A tape is what `anysim export --to "
+            "lerobot` writes, or such a data set from elsewhere; a recording is played by `anysim replay`"
+        )
     info = load_json(directory / "meta" / "info.json")
     version = info.get("codebase_version") if isinstance(info, dict) else None
     if version != VERSION:
@@ -67,7 +73,11 @@ def read_tape(directory: Path) -> Tape:
     actions = [np.stack([action for _, action in rows[i]]) for i in found]
     if sheet is not None and [one.steps for one in sheet.episodes] != [len(one) for one in actions]:
         raise RecordError(f"{directory}: anysim.json tells of other episodes than there are; remove it, or export anew")
-    return Tape(directory, actions, sheet)
+    try:
+        fps = float(info["fps"])
+    except (KeyError, TypeError, ValueError):
+        raise RecordError(f"{directory}/meta/info.json does not say how many frames a second has (`fps`)") from None
+    return Tape(directory, actions, fps, sheet)
 
 
 def play(tape: Tape, *, engine: str | None = None, task: str | None = None, seed: int = 0) -> Iterator[Played]:
@@ -80,7 +90,7 @@ def play(tape: Tape, *, engine: str | None = None, task: str | None = None, seed
 
     Raises:
         RecordError: the data set does not say what its episodes began with, and no task is given; or the actions are
-            others than the robot's.
+            others than the robot's, or for other control steps.
     """
     if task is None and tape.sheet is None:
         raise RecordError(
@@ -99,6 +109,12 @@ def play(tape: Tape, *, engine: str | None = None, task: str | None = None, seed
             if actions.shape[1] != env.action_dim:
                 raise RecordError(
                     f"{tape.directory} has actions of {actions.shape[1]} numbers; '{env.name}' takes {env.action_dim}"
+                )
+            rate = 1.0 / env.engine.world.physics.control_dt
+            if abs(tape.fps / rate - 1.0) > 1e-3:
+                raise RecordError(
+                    f"{tape.directory} has {tape.fps:g} actions a second; '{env.name}' takes {rate:g}. "
+                    "Name a task with this rate, or convert the data set: as they are, movements had another speed"
                 )
             if begun is None:
                 env.reset(episode_seeds=[seed + i])

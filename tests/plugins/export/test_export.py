@@ -218,6 +218,40 @@ def test_killed_it_goes_on_to_the_same_bytes(
     assert [path.name for path in tmp_path.iterdir()] == [form]
 
 
+PARENT_KILLED = """
+import json, os, signal, sys, threading, time
+from pathlib import Path
+from anysim_export.job import export
+
+if __name__ == "__main__":
+    run, to, out, _, options = sys.argv[1:]
+    parts = Path(out).with_name(f".{Path(out).name}.export") / "parts"
+    def watch():
+        while not any(parts.glob("*.new/*")):
+            time.sleep(0.001)
+        os.kill(os.getpid(), signal.SIGKILL)
+    threading.Thread(target=watch).start()
+    export([Path(run)], to, Path(out), json.loads(options), jobs=2)
+"""
+"""A program that is killed while its two processes write; they end a second later."""
+
+
+@pytest.mark.parametrize(
+    "form", ["webdataset", *(pytest.param(form, marks=pytest.mark.slow) for form in ("lerobot", "robomimic"))]
+)
+def test_two_processes_write_the_same_bytes_and_killed_too(
+    run: Path, exported: dict[str, Path], tmp_path: Path, form: str
+) -> None:
+    out, options, program = tmp_path / form, OPTIONS.get(form, {}), tmp_path / "program.py"
+    program.write_text(PARENT_KILLED)
+    command = [sys.executable, str(program), str(run), form, str(out), "", json.dumps(options)]
+    assert subprocess.run(command, check=False, timeout=120).returncode == -signal.SIGKILL
+    assert not out.exists()
+    export([run], form, out, options, jobs=2)
+    assert content(out) == content(exported[form])
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([form, "program.py"])
+
+
 def test_what_another_export_left_aside_is_not_taken(run: Path, exported: dict[str, Path], tmp_path: Path) -> None:
     out = tmp_path / "webdataset"
     command = [sys.executable, "-c", KILLED, str(run), "webdataset", str(out), "assemble", "{}"]
@@ -274,6 +308,12 @@ def test_a_tape_comes_to_the_same_success(exported: dict[str, Path], episodes: l
     with pytest.raises(RecordError, match=r"no anysim\.json\); name the task to play in with --task"):
         next(play(foreign))
     assert next(play(foreign, task="pick_cube")).recorded == ""
+    with pytest.raises(
+        RecordError, match=r"has 30 actions a second; 'pick_cube' takes 50\. Name a task with this rate"
+    ):
+        next(play(foreign._replace(fps=30.0), task="pick_cube"))
+    with pytest.raises(RecordError, match=r"is no data set of LeRobot: it has no meta/info\.json"):
+        read_tape(exported["robomimic"])
 
 
 def test_the_commands(run: Path, tmp_path: Path) -> None:
@@ -287,6 +327,9 @@ def test_the_commands(run: Path, tmp_path: Path) -> None:
     assert "are there already in" in again.stdout
     told = json.loads(run_python(tmp_path, "-c", MAIN, "tape", str(out), "--json").stdout)
     assert (told["success"], told["as_recorded"]) == (3, 3)
+    refused = run_python(tmp_path, "-c", MAIN, "tape", str(out), "--seed", "3")
+    assert refused.returncode == 2
+    assert "goes with --task" in refused.stderr
 
 
 def test_statistics_of_known_numbers() -> None:

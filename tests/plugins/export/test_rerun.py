@@ -19,7 +19,8 @@ from anysim.record.reader import open_trajectory
 from anysim.record.replay import begin
 from anysim_export.api import DataSet, Episode
 from anysim_export.envs import env_of
-from anysim_export.job import export, made
+from anysim_export.job import export
+from anysim_export.parts import made
 from anysim_export.rerun.shapes import corner_normals, field_mesh
 from anysim_export.streams import channels_of, streams_of
 from tests.plugins.export.runs import committed, record

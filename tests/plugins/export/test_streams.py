@@ -18,7 +18,8 @@ from anysim.errors import RecordError
 from anysim.record.reader import open_trajectory
 from anysim_export.api import DataSet, Episode, Exporter
 from anysim_export.cli import _families  # pyright: ignore[reportPrivateUsage]
-from anysim_export.job import export, made, omitted
+from anysim_export.job import export, omitted
+from anysim_export.parts import made
 from anysim_export.streams import streams_of
 from tests.plugins.export.made import Made
 from tests.plugins.export.runs import committed
@@ -64,7 +65,7 @@ def test_the_streams_are_those_of_the_reader(run: Path) -> None:
 
 def test_what_is_left_out_comes_with_the_option_that_brings_it() -> None:
     exporter, options = made("lerobot", {})
-    lacking = omitted(exporter, options, DataSet([recording()], options))
+    lacking = omitted("lerobot", exporter, DataSet([recording()], options))
     assert lacking["camera/front/depth"] == lacking["camera/front/segmentation"] == "channels=true"
     assert lacking["observation/privileged"] == "privileged=true"
     assert lacking["language/narration"] == lacking["state/joint_pos"] == ""

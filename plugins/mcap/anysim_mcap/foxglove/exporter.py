@@ -1,6 +1,6 @@
 """The exporter `foxglove`: one MCAP file of each episode, with all that Foxglove draws."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -35,6 +35,16 @@ class FoxgloveExporter(Exporter):
     ) -> None:
         self._crf, self._engine = crf if images else None, engine
         self._env: tuple[dict[str, Any], TaskEnv] | None = None
+
+    def places(self, data: DataSet) -> Mapping[str, str]:
+        """Topics: those of the recording, and videos."""
+        first = data.first
+        found = {"action": "`/action`", "annotation": "`/annotation`", "language": "`/language`"}
+        found |= {"collect/reward": "`/collect`", "collect/status": "`/collect`"}
+        found |= {f"state/{name}": "`/state`" for name in first.layout.state}
+        found |= {f"observation/{name}": "`/collect`" for name in first.layout.obs}
+        found |= {f"camera/{name}": f"`/camera/{name}`" for name in first.cameras if self._crf is not None}
+        return found | {name: f"`/{name}`" for name in first.streams}
 
     def check(self, data: DataSet) -> None:
         """Refuse recordings of other writers, and those without poses."""
