@@ -8,6 +8,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.env import TaskEnv
+from tests.tasks import camera_paths as camera
 from tests.tasks.states import failed, level, offset, put, rewarded, seen, set_joint, set_opening
 
 
@@ -535,4 +536,14 @@ CASES: dict[str, Case] = {
         [lambda env: set_opening(env, _DRAWER, 0.1), _shifted("cube", x=0.1), _moving("rover")],
         (),
     ),
+    "camera_goto": Case(camera.to_goal, [camera.moved(x=0.06), camera.moved(yaw=0.1), camera.drifting], ()),
+    "camera_look_at": Case(
+        camera.to_view,
+        [camera.moved(yaw=0.15), camera.moved(x=0.25), camera.moved(z=-0.5, pitch=-0.7), camera.drifting],
+        (),
+    ),
+    "camera_orbit_scan": Case(
+        camera.around, [camera.moved(yaw=0.2), camera.moved(pitch=0.2), camera.drifting], ("scan",)
+    ),
+    "camera_track_target": Case(camera.tracking, [_short], ()),
 }

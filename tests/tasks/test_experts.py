@@ -64,6 +64,10 @@ TASKS = [
     "rotate_valve",
     "bi_dex_lift",
     "rope_straighten",
+    "camera_goto",
+    "camera_look_at",
+    "camera_orbit_scan",
+    "camera_track_target",
 ]
 LONG = {"mobile_pick_place", "pack", "fetch_from_drawer", "rope_straighten", "dex_relocate"}
 """Episodes of many commands: on one engine in the slow tier, on the others before a release."""

@@ -46,7 +46,8 @@ class CameraMotion(Controller):
         together = np.flatnonzero(slides)
         self._groups = [(together, speed, acceleration)] if len(together) else []
         self._groups += [(np.array([i]), rate, angular_acceleration) for i in np.flatnonzero(~np.array(slides))]
-        self._command, self._damped, self._response = command, easing == "damped", response
+        self.push, self.turn_push = acceleration, angular_acceleration
+        self.command, self._damped, self._response = command, easing == "damped", response
         self._endless = ~(np.isfinite(channel.lower) & np.isfinite(channel.upper))
         if command == "velocity":
             self.high = np.array([speed if s else rate for s in slides])
@@ -63,7 +64,7 @@ class CameraMotion(Controller):
 
     def apply(self, action: Array, env_ids: Array | None) -> Command:
         rows = slice(None) if env_ids is None else env_ids
-        if self._command == "pose":
+        if self.command == "pose":
             here = self._rows["goal" if not self._damped else "position"][rows]
             self._rows["target"][rows] = np.where(self._endless, here + wrapped(action - here), action)
         else:
@@ -74,7 +75,7 @@ class CameraMotion(Controller):
         rows = slice(None) if env_ids is None else env_ids
         state = {name: values[rows] for name, values in self._rows.items()}
         for number, group in enumerate(self._groups):
-            if self._command == "velocity":
+            if self.command == "velocity":
                 self._cruise(state, *group)
             elif self._damped:
                 self._settle(state, *group)
@@ -138,7 +139,7 @@ class CameraMotion(Controller):
     # ------------------------------------------------------------------ the rest of the contract
 
     def action_for(self, targets: Array, env_ids: Array) -> Array:
-        if self._command != "pose":
+        if self.command != "pose":
             return super().action_for(targets, env_ids)
         turned = np.where(self._endless, wrapped(targets), targets)
         return np.minimum(np.maximum(turned, self.low), self.high)

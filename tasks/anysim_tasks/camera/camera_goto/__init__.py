@@ -1,0 +1,1 @@
+"""Fly a camera to a pose, around furniture."""

@@ -1,0 +1,1 @@
+"""Find a view of a thing that another one hides."""

@@ -1,0 +1,1 @@
+"""See a thing from all around."""

@@ -1,0 +1,1 @@
+"""Keep what flies about in the middle of the image."""
