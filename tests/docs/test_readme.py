@@ -57,11 +57,20 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def _words(line: str, folder: Path) -> list[str]:
-    """The program and its arguments; `runs/…` is the first run."""
-    runs = sorted((folder / "runs").glob("*/run.json"), key=lambda path: path.stat().st_mtime_ns)
-    line = line.replace("runs/…", str(runs[0].parent.relative_to(folder)) if runs else "runs/…")
+    """The program and its arguments; `runs/…` is the first run, that of the page's first command."""
+    if "runs/…" in line:
+        runs = _runs(folder)
+        if not runs:  # this line was asked for alone
+            subprocess.run(_words(commands()[0], folder), cwd=folder, capture_output=True, timeout=900, check=True)
+            runs = _runs(folder)
+        line = line.replace("runs/…", str(runs[0].relative_to(folder)))
     words = shlex.split(line.replace(" FILE ", " moment.snapshot "))
     return [str(Path(sys.executable).with_name(words[0])), *words[1:]]
+
+
+def _runs(folder: Path) -> list[Path]:
+    """What was recorded there, the first first."""
+    return [p.parent for p in sorted((folder / "runs").glob("*/run.json"), key=lambda path: path.stat().st_mtime_ns)]
 
 
 @pytest.mark.full

@@ -149,7 +149,7 @@ def _stills(
 
     steps = registry.load("renderings", "stills")(job, out, engine, overrides, jobs)
     last = next(steps)
-    with counting("images", last.of - last.done, quiet=quiet) as show:
+    with counting("images", last.of - last.done, quiet=quiet or last.done == last.of) as show:
         for last in steps:
             show(f"{last.done} of {last.of} images", "")
     if quiet:
