@@ -51,13 +51,15 @@ class PlannedBase(Base):
 
     def _limits(self) -> BaseLimits:
         entry, controller = self._robot.model.entry, self._slice.controller
-        kind = kind_of(self._labels, 0 if entry is None else len(entry.legs))
+        vehicle = None if entry is None else entry.vehicle
+        car = vehicle if isinstance(vehicle, AckermannSpec) else None  # which may be steered by its rate of turning
+        kind = BaseKind.ACKERMANN if car else kind_of(self._labels, 0 if entry is None else len(entry.legs))
         discs = discs_of(self.env.engine.world, self._robot.name, frame_pose(self.env.scene, self.frame))
         most, least = np.array(controller.high, dtype=float), np.array(controller.low, dtype=float)
         options: dict[str, Any] = {}
-        if kind is BaseKind.ACKERMANN and entry is not None and isinstance(entry.vehicle, AckermannSpec):
-            self._wheelbase = entry.vehicle.wheelbase
-            options["turning_radius"] = entry.vehicle.wheelbase / tan(entry.vehicle.max_steering)
+        if car:
+            self._wheelbase = car.wheelbase
+            options["turning_radius"] = car.wheelbase / tan(car.max_steering)
             most[1] = most[0] / options["turning_radius"]
         if self._labels == ("forward", "left", "turn"):
             options["side"] = min(self.pace.speed, float(most[1]))

@@ -107,7 +107,10 @@ def navigate(
     ] = "differential_base",
     engine: Annotated[str, typer.Option("--engine", "-e", help="An installed engine.")] = "mujoco",
     rooms: Annotated[int, typer.Option(min=1, help="Furnished rooms.")] = 20,
-    radius: Annotated[float, typer.Option(min=0.01, help="That fits where ways begin and end [m].")] = 0.45,
+    radius: Annotated[
+        float | None,
+        typer.Option(min=0.01, help="That fits where ways begin and end [m]; default 0.45, 0.7 for a car."),
+    ] = None,
     json: AsJson = False,
 ) -> None:
     """Drive a base from end to end of furnished rooms in an engine, over 4 m each, with `planner: dynamic_window`.
@@ -125,11 +128,12 @@ def navigate(
     from anysim_navigation.drive_bench import Drive, drive
 
     found: list[Drive] = []
+    room = radius or (0.7 if robot == "ackermann_base" else 0.45)
     with counting("rooms", rooms, quiet=json) as show:
         for seed in count():
             if len(found) == rooms:
                 break
-            one = drive(seed, robot, engine, radius=radius)
+            one = drive(seed, robot, engine, radius=room)
             if one is not None:  # else the room is too small for such a way
                 found.append(one)
                 show(f"room {seed}: {one.ended} after {one.seconds:.1f} s", "")

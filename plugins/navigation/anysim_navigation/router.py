@@ -13,6 +13,7 @@ from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.scene import Frame, RobotView, SceneView
 from anysim_navigation.agent import NoRoute
+from anysim_navigation.car_ways import car_way
 from anysim_navigation.dynamic_window import STEP, DynamicWindow, distances_of
 from anysim_navigation.limits import BaseKind, BaseLimits
 from anysim_navigation.maps import NavMaps
@@ -30,6 +31,8 @@ NEAR = 0.35
 """[m] from its end a way is left for the straight line, if that is free."""
 CAR_STOPS = 0.15
 """[m] from its end a car has arrived: its heading there is that of the way."""
+CUSP = 0.15
+"""[m] before it changes its direction a car may do so."""
 REPLANS = 12
 """Ways in a row that did not bring a base on before it gives up."""
 SNAP = 0.6
@@ -84,6 +87,8 @@ class BaseRouter:
         self.mode = np.full(n, Mode.STAND, dtype=np.int64)
         self._steps, self._replans = np.zeros((2, n), dtype=np.int64)
         self._progress: list[Progress | None] = [None] * n
+        self._later: list[list[Array]] = [[] for _ in range(n)]
+        """Of a car's way, the stretches beyond its next change of direction."""
         self.refused: dict[int, str] = {}
 
     def go(self, ids: Array, target: Array, mode: Mode = Mode.ROUTE) -> None:
@@ -157,6 +162,10 @@ class BaseRouter:
 
     def _way(self, env: int, pose: Array) -> Array:
         """(K, 2) over the mesh with the most room, or over the tightest that has a way."""
+        if self.limits.kind is BaseKind.ACKERMANN:
+            maps = self._maps[-1].at(self._scene.state.body_pose[env], self._scene.presence[env])
+            first, *self._later[env] = [path for path, _ in car_way(maps, self.limits, pose, self.target[env, :2])]
+            return first
         poses, present, end = self._scene.state.body_pose[env], self._scene.presence[env], self.target[env, :2]
         for maps in self._maps[:-1]:
             try:
@@ -187,6 +196,9 @@ class BaseRouter:
             way = in_frame(pose, end[None])[0]
             self.twist[env] = self._pose_control.twist(way, _wrapped(self.target[env, 2] - pose[2]), self.twist[env])
             return
+        if self._later[env] and progress.left < CUSP:
+            progress = self._progress[env] = Progress(self._later[env].pop(0))
+            progress.look(pose[:2], 0.0)
         path, aim = self.window.ahead(progress, pose, field, cell)
         if progress.recovering > 0:
             aim = _roomiest(field, cell)

@@ -163,6 +163,8 @@ def choose(
                             math.cos(math.atan2(aim[1] - y, aim[0] - x) - yaw),
                         )
                     )
+                if turning_radius > 0.0 and forward < 0.0:
+                    off = math.pi - off  # a car that goes backwards looks away from where it goes
                 flips = (1.0 if turn * last[2] < -0.01 else 0.0) + (1.0 if forward * last[0] < -1e-3 else 0.0)
                 flips += 1.0 if aside * last[1] < -1e-3 else 0.0
                 cost = (
