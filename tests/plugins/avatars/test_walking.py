@@ -41,7 +41,13 @@ def walked(path, speed, engine="null", steps=500):
 
 
 @pytest.mark.parametrize("speed", [1.2, pytest.param(0.6, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("path", [pytest.param(path, id=name) for name, path in PATHS.items()])
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, id=name, marks=[] if name in ("corner", "behind") else pytest.mark.slow)
+        for name, path in PATHS.items()
+    ],
+)
 def test_nothing_slips_or_stretches(path, speed):
     slip, bone_error, stretch, fastest, end, swing = walked(path, speed, steps=300 if speed > 1 else 500)
     assert slip < 1e-9
