@@ -39,6 +39,7 @@ def test_a_right_family_passes(engine: str, tmp_path: Path) -> None:
     assert re.search(rf"anysim contract: family .*Paddle on {engine}: 9 passed, 0 skipped", done.stdout)
 
 
+@pytest.mark.slow
 def test_the_suite_is_of_one_family(tmp_path: Path) -> None:
     import anysim.testing.families as suite
 

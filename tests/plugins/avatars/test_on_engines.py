@@ -182,7 +182,8 @@ def test_images_and_rays_see_people(engine: str) -> None:
         assert ((ranges > 1.2) & (ranges < 1.5)).any()
 
 
-@EACH
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ENGINES)
 def test_the_suite_clears_them(engine: str, tmp_path: Path) -> None:
     require_engine(engine)
     options = [
