@@ -25,6 +25,7 @@ def _outside_box(points: Array, pose: Array, half: Array) -> Array:
     return P.norm(np.maximum(apart, 0.0)) + np.minimum(apart.max(axis=1), 0.0)
 
 
+@pytest.mark.slow
 def test_ways_keep_clear_of_things() -> None:
     """32 flights past furniture: the least distance from the lens to it is the hull's and the clearance, nearly."""
     require_engine("mujoco")
