@@ -51,7 +51,9 @@ _APPROXIMATE = {
         astray=3e-3,
         stalled=3.4,
     ),
-    Capability.RENDER_SHADOWS: "faint and with gaps: the light sees the scene as coarsely as the camera",
+    Capability.RENDER_SHADOWS: (
+        "faint and with gaps: the light sees the scene as coarsely as the camera; ground many metres off is dark"
+    ),
     Capability.RENDER_LIGHTS: (
         "the first light shines, the others light all sides alike with a quarter of their strength; one with a place "
         "shines as if from far away, towards the middle of the bodies"

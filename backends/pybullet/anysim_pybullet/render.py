@@ -35,8 +35,9 @@ ROUND = 16
 SUN = (-0.35, 0.25, -1.0)
 """Where the light of a world without lights shines to."""
 
-FAR_OFF = 10.0
-"""[m] How far off the world's origin the light is: from nearer, shadows spread, and ground beyond its sight is dark."""
+FAR_OFF = 6.0
+"""[m] How far off the world's origin the light is. From nearer, shadows spread, and more of the ground is out of its
+sight, and dark; from further, it sees small images' worth of the scene so coarsely that floors have stripes."""
 
 SPREAD = 0.25
 """Light that comes from one side meets the sides of a ball with this share of its strength, on average."""

@@ -145,7 +145,11 @@ class Painter:
     def _read(self, camera: Any, images: dict[str, Array], row: int, look: Look) -> None:
         seen = camera.get_picture("Segmentation")[..., 1]
         if "rgb" in images:
-            color = np.where(seen[..., None] > 0, camera.get_picture("Color")[..., :3], look.background)
+            drawn = camera.get_picture("Color")
+            behind = (
+                0.0 if self._shader == "default" else (1.0 - drawn[..., 3:]) * look.background
+            )  # the others have black
+            color = np.where(seen[..., None] > 0, drawn[..., :3] + behind, look.background)
             images["rgb"][row] = np.rint(np.clip(color, 0.0, 1.0) * 255)
         if "depth" in images:
             depth = -camera.get_picture("Position")[..., 2]

@@ -11,7 +11,7 @@ import pytest
 from anysim.compile.world import compile_world
 from anysim.errors import EngineError
 from anysim.math import pose as P
-from anysim.model.world import Body, BodyKind, Box, Camera, Entity, EntityKind, Geom, World
+from anysim.model.world import Body, BodyKind, Box, Camera, Entity, EntityKind, Geom, Scenery, World
 from anysim.testing import worlds
 from anysim.testing.engines import require_drawing
 from anysim_sapien import diagnosis, vulkan
@@ -43,7 +43,7 @@ def test_physics_without_a_vulkan_device():
         from anysim.engine.factory import create_simulation
         from anysim.errors import EngineError
 from anysim.math import pose as P
-from anysim.model.world import Body, BodyKind, Box, Camera, Entity, EntityKind, Geom, World
+from anysim.model.world import Body, BodyKind, Box, Camera, Entity, EntityKind, Geom, Scenery, World
         from anysim.testing import worlds
         engine = create_simulation("sapien").create_world(worlds.scene(cameras=True), 2)
         engine.step(20)
@@ -233,3 +233,21 @@ def test_depth_is_that_of_a_point_beside_the_middle_of_a_pixel(make, reach, pixe
     seen = (right > 0) & (place < 0.9 * reach) & np.isfinite(depth)
     assert seen.mean() > 0.3
     assert np.percentile((np.abs(depth - right) / beside)[seen], 98) < pixels
+
+
+@pytest.mark.parametrize("shader", ["lit", "trivial"])
+def test_the_background_is_seen_through_glass(make, shader):
+    """A black pane of half opacity, with nothing behind it: half of the background's light, not black."""
+    require_drawing("sapien")
+    eye = np.array([0.0, 0.0, 2.0])
+    world = World(
+        "pane",
+        bodies=(Body("pane", BodyKind.STATIC),),
+        geoms=(Geom("pane", 0, Box((0.2, 0.2, 0.01)), color=(0.0, 0.0, 0.0, 0.5)),),
+        entities=(Entity("pane", EntityKind.OBJECT, 0, 1, 0, 0),),
+        cameras=(Camera("eye", -1, tuple(eye), tuple(P.look_at(eye, np.zeros(3))), 40.0, 33, 33),),
+        scenery=Scenery(background=(0.2, 0.6, 1.0)),
+    )
+    image = make(world, shader=shader).render("eye")["rgb"][0]
+    assert image[0, 0].tolist() == [51, 153, 255]
+    assert image[16, 16] / 255 == pytest.approx([0.1, 0.3, 0.5], abs=0.08)  # and what shines on it
