@@ -1,11 +1,13 @@
 """Walks of a policy of `go1_velocity` on every engine: five commands, shoves, a slippery floor and rough ground.
 
-    python benchmarks/walking.py [NAME=POLICY ...] [--engines mujoco,sapien] [-n 32] [--rows commands,shoves,floors]
+    python benchmarks/walking.py [NAME=POLICY ...] [--engines mujoco,sapien] [-n 32] [--rows shoves,floors] [--out FILE]
 
 POLICY is what `anysim evaluate --policy` takes, and NAME what the table calls it; the trot and the shipped policy where
-none is given. The robot is that of level L0. Errors are the root mean squares of the velocity along the ground and of
-the turn after the first 1.5 s, within a stride included; falls are of 8 s. With `--out FILE.json` each cell is on the
-disk once it is measured, and those that are there are not measured again.
+none is given. The robot is that of level L0; with `drawn` and on slippery floors that of L1, which is another one in
+each episode. Without either all episodes would be the same walk, so `commands` are one each. Errors are the root mean
+squares of the velocity along the ground and of the turn after the first 1.5 s, within a stride included; falls are of
+8 s. With `--out FILE.json` each cell is on the disk once it is measured, and those that are there are not measured
+again.
 """
 
 import argparse
@@ -44,29 +46,33 @@ def shoved(speed: float) -> list[str]:
 
 
 def rough(height: float) -> list[str]:
-    """Ground whose heights vary by this much both ways, in cells of 20 cm, about a flat start."""
+    """Ground whose heights vary by this much both ways, in cells of 20 cm; robots set off to all sides of a flat."""
     ground = (
         f"kind: rough, amplitude: {height}, grain: 0.2, cell: 0.1, size: [16.0, 16.0], platform: 1.0, friction: 0.8"
     )
-    return [f"world.terrain={{{ground}}}"]
+    place = ["position={range: [[-0.3, -0.3, 0.0], [0.3, 0.3, 0.0]]}", "yaw={range: [-3.14159, 3.14159]}"]
+    return [f"world.terrain={{{ground}}}", *(f"world.robots.dog.{key}" for key in place)]
 
 
+NOMINAL = ["level=L0"]
+DRAWN = ["level=L1", "task.events.shove.velocity=[0.0, 0.0, 0.0]"]
 CHANGES = {
-    "commands": {"": list[str]()},
-    "shoves": {f"shoves of {speed:g} m/s": shoved(speed) for speed in (0.5, 1.0)},
+    "commands": {"": NOMINAL},
+    "drawn": {"": DRAWN},
+    "shoves": {f"shoves of {speed:g} m/s": [*NOMINAL, *shoved(speed)] for speed in (0.5, 1.0)},
     "floors": {
-        "friction 0.3": ["world.robots.dog.dynamics.link_friction_scale=0.375", "world.terrain.friction=0.2"],
-        **{f"rough, ±{100 * height:g} cm": rough(height) for height in (0.02, 0.04, 0.06)},
+        "friction 0.3": [*DRAWN, "world.robots.dog.dynamics.link_friction_scale=0.375"],
+        **{f"rough, ±{100 * height:g} cm": [*NOMINAL, *rough(height)] for height in (0.02, 0.04, 0.06)},
     },
 }
-"""What is other than in the catalogue by the name of its row, in groups."""
+"""Overrides of the task by the name of their row, in groups."""
 
 
 def walk(policy: str, engine: str, command: tuple[float, ...], num_envs: int, changes: list[str]) -> Walk:
     """Walk in all envs at once, in episodes of the test split; an env that has fallen is left alone."""
     asked = [f"task.command.walk.{key}={v}" for key, v in zip(("forward", "left", "turn"), command, strict=True)]
     asked += ["task.command.walk.still=0.0", "task.command.walk.straight=0.0"]
-    overrides = ["record.cameras=[]", "world.cameras.front.channels=[]", "level=L0", *asked, *changes]
+    overrides = ["record.cameras=[]", "world.cameras.front.channels=[]", *asked, *changes]
     with anysim.make("go1_velocity", engine=engine, num_envs=num_envs, overrides=overrides) as env:
         everyone = np.arange(num_envs)
         env.reset(episode_seeds=everyone + 20_000)
@@ -105,7 +111,7 @@ def cells(policies: dict[str, str], engines: list[str], num_envs: int, groups: l
     for name in policies:
         for group in groups:
             for what, _ in CHANGES[group].items():
-                for command in COMMANDS if group == "commands" else COMMANDS[:1]:
+                for command in COMMANDS if not what else COMMANDS[:1]:
                     for engine in engines:
                         yield {
                             "policy": name,
@@ -113,7 +119,7 @@ def cells(policies: dict[str, str], engines: list[str], num_envs: int, groups: l
                             "what": what,
                             "command": list(command),
                             "engine": engine,
-                            "envs": num_envs,
+                            "envs": 1 if group == "commands" else num_envs,
                         }
 
 
@@ -140,7 +146,7 @@ def main() -> None:
     parser.add_argument("policies", nargs="*", default=["trot=expert", "shipped=shipped"], metavar="NAME=POLICY")
     parser.add_argument("--engines", default="mujoco,pybullet,sapien")
     parser.add_argument("-n", type=int, default=8, help="envs of each cell")
-    parser.add_argument("--rows", default="commands,shoves,floors")
+    parser.add_argument("--rows", default="commands,drawn,shoves,floors")
     parser.add_argument("--out", type=Path, help="a file of the results, which is added to")
     arguments = parser.parse_args()
     policies = {name: policy or name for name, _, policy in (text.partition("=") for text in arguments.policies)}

@@ -1,0 +1,134 @@
+"""The walks of policies in docs/locomotion.md, from docs/walking.json and docs/walking_trainings.json.
+
+    python scripts/walking_table.py [--check]
+
+The first file is made by these commands, which go on where they were cut off; the second has what trainings took:
+
+    python benchmarks/walking.py trot=expert shipped -n 32 --out docs/walking.json
+    python benchmarks/walking.py "seed 1=runs/…-1/policy.onnx" --rows commands -n 32 --out docs/walking.json
+
+`--check` writes nothing and exits with 1 if the page has drifted from these files.
+"""
+
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from benchmark_table import table
+from generated import ROOT, main
+
+from anysim.math.statistics import wilson
+
+STORE, TRAININGS = ROOT / "docs" / "walking.json", ROOT / "docs" / "walking_trainings.json"
+GOAL = 0.06
+"""[m/s] of the error that a policy should have at most."""
+POLICIES, GROUPS = ("trot", "shipped"), ("drawn", "shoves", "floors")
+"""What is compared, in the order of the table."""
+MISSING = "…"
+
+Cell = Mapping[str, Any]
+
+
+def cells() -> list[Cell]:
+    """What was measured."""
+    return json.loads(STORE.read_text("utf-8"))
+
+
+def asked(cell: Cell) -> str:
+    """A command in words."""
+    units = zip(("forward", "left", "turning"), cell["command"], ("m/s", "m/s", "rad/s"), strict=True)
+    return ", ".join(f"{name} {value:g} {unit}" for name, value, unit in units if value)
+
+
+def fallen(cell: Cell) -> str:
+    """How many fell, with the interval."""
+    low, high = wilson(cell["fell"], cell["envs"])
+    return f"{cell['fell']} ({100 * low:.0f} to {100 * high:.0f} %)"
+
+
+def tracked(cell: Cell) -> str:
+    """The speed that was reached along what was asked most for, and the errors of velocity and turn."""
+    part = int(np.argmax(np.abs(cell["command"])))
+    return f"{cell['velocity'][part]:.2f}; {cell['error']:.3f}, {cell['turn_error']:.3f}"
+
+
+def walks() -> str:
+    """The shipped policy beside the trot."""
+    found = [cell for cell in cells() if cell["policy"] in POLICIES and cell["group"] != "commands"]
+    engines = sorted({cell["engine"] for cell in found})
+    rows: dict[tuple[str, str, str], dict[str, Cell]] = {}
+    for cell in found:
+        what = cell["what"] or asked(cell)
+        rows.setdefault((cell["policy"], cell["group"], what), {})[cell["engine"]] = cell
+    lines = [
+        [what, policy, *_both(rows[policy, group, what], engines)]
+        for group, what in sorted(dict.fromkeys(row[1:] for row in rows), key=lambda row: GROUPS.index(row[0]))
+        for policy in POLICIES
+        if (policy, group, what) in rows
+    ]
+    count = {cell["envs"] for cell in found}
+    missing = any(MISSING in line for line in lines)
+    return "\n\n".join(
+        [
+            f"Of each cell {', '.join(map(str, count))} episodes of 8 s of the test split: first how many fell, with "
+            "Wilson's interval at 95 %, then the mean speed along what was asked most for, and the root mean "
+            "squares of the errors of velocity [m/s] and turn [rad/s] while they were up"
+            + (f"; {MISSING} is yet to be measured:" if missing else ":"),
+            table(["what", "policy", *engines], lines),
+        ]
+    )
+
+
+def _both(row: Mapping[str, Cell], engines: Sequence[str]) -> list[str]:
+    return [f"{fallen(row[e])}; {tracked(row[e])}" if e in row else MISSING for e in engines]
+
+
+def seeds() -> str:
+    """Policies of several seeds of the training against the goals."""
+    trained = json.loads(TRAININGS.read_text("utf-8"))
+    found = cells()
+    engines = sorted({cell["engine"] for cell in found})
+    lines: list[list[str]] = []
+    for one in trained:
+        own = [cell for cell in found if cell["policy"] == one["policy"] and cell["group"] == "commands"]
+        for command in dict.fromkeys(asked(cell) for cell in own):
+            by_engine = {cell["engine"]: cell for cell in own if asked(cell) == command}
+            lines.append([one["name"], command, *(_judged(by_engine[e]) if e in by_engine else "" for e in engines)])
+    took = table(
+        ["training", "steps", "best exam", "CPU s"],
+        [
+            [
+                one["name"],
+                f"{one['steps']:,}",
+                f"{one['best']:.0%}",
+                f"{one['cpu_s']:,}" if one["cpu_s"] else "not noted",
+            ]
+            for one in trained
+        ],
+    )
+    return "\n\n".join(
+        [
+            "What the same command made of other seeds, and what it took on one busy core:",
+            took,
+            f"One walk of 8 s of each on the robot as it is in the catalogue: the error of velocity [m/s], of which at "
+            f"most {GOAL} is good enough (others are bold), and falls where there were any:",
+            table(["training", "command", *engines], lines),
+        ]
+    )
+
+
+def _judged(cell: Cell) -> str:
+    error = f"{cell['error']:.3f}"
+    falls = f", {cell['fell']} of {cell['envs']} fell" if cell["fell"] else ""
+    return (error if cell["error"] <= GOAL else f"**{error}**") + falls
+
+
+if __name__ == "__main__":
+    pages = ("docs/locomotion.md",)
+    codes = [
+        main(__doc__, name, "walking_table.py", pages, content)
+        for name, content in (("walks", walks), ("seeds", seeds))
+    ]
+    sys.exit(max(codes))
