@@ -98,9 +98,9 @@ def _inertial(world: World, frames: Frames, body: int) -> list[str]:
     return [
         "<inertial>",
         _origin(frames.inertial[body]),
-        f'<mass value="{world.bodies[body].inertial.mass!r}"/>',
-        f'<inertia ixx="{x!r}" ixy="0" ixz="0"',
-        f' iyy="{y!r}" iyz="0" izz="{z!r}"/>',
+        f'<mass value="{float(world.bodies[body].inertial.mass)!r}"/>',
+        f'<inertia ixx="{float(x)!r}" ixy="0" ixz="0"',
+        f' iyy="{float(y)!r}" iyz="0" izz="{float(z)!r}"/>',
         "</inertial>",
     ]
 
@@ -113,13 +113,13 @@ def _collision(geom: Geom, anchor: Array, meshes: dict[str, Path]) -> list[str]:
 def _shape(geom: Geom, meshes: dict[str, Path]) -> str:
     match geom.shape:
         case Box((x, y, z)):
-            return f'<box size="{2 * x!r} {2 * y!r} {2 * z!r}"/>'
+            return f'<box size="{float(2 * x)!r} {float(2 * y)!r} {float(2 * z)!r}"/>'
         case Sphere(r):
-            return f'<sphere radius="{r!r}"/>'
+            return f'<sphere radius="{float(r)!r}"/>'
         case Capsule(r, h):
-            return f'<capsule radius="{r!r}" length="{2 * h!r}"/>'
+            return f'<capsule radius="{float(r)!r}" length="{float(2 * h)!r}"/>'
         case Cylinder(r, h):
-            return f'<cylinder radius="{r!r}" length="{2 * h!r}"/>'
+            return f'<cylinder radius="{float(r)!r}" length="{float(2 * h)!r}"/>'
         case MeshShape(name):
             return f'<mesh filename="{meshes[name].name}"/>'
         case _:
@@ -142,8 +142,8 @@ def _joint(world: World, frames: Frames, body: int) -> list[str]:
         f'<parent link="{body_link(world.bodies[body].parent)}"/>',
         f'<child link="{body_link(body)}"/>',
         _origin(link_pose(world, frames, body)),
-        f'<axis xyz="{x!r} {y!r} {z!r}"/>',
-        f'<limit lower="{lower!r}" upper="{upper!r}"',
+        f'<axis xyz="{float(x)!r} {float(y)!r} {float(z)!r}"/>',
+        f'<limit lower="{float(lower)!r}" upper="{float(upper)!r}"',
         f' effort="{UNLIMITED!r}" velocity="{UNLIMITED!r}"/>',
         '<dynamics damping="0" friction="0"/>',
         "</joint>",

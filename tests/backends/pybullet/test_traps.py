@@ -8,12 +8,12 @@ import pytest
 
 import anysim_pybullet
 from anysim.math import pose as P
-from anysim.model.world import Box, Geom, HeightField, HeightFieldShape, MeshShape, Sphere
+from anysim.model.world import Box, Capsule, Geom, HeightField, HeightFieldShape, MeshShape, Sphere
 from anysim.testing import worlds
 from anysim.testing.compare import assert_same, play, read, spread, tape
 from anysim.testing.sketch import Sketch
 from anysim_pybullet.bullet import bullet
-from anysim_pybullet.urdf import roll_pitch_yaw
+from anysim_pybullet.urdf import roll_pitch_yaw, world_geom_urdf
 
 
 def _client(engine):
@@ -25,6 +25,13 @@ def test_calls_that_crash_are_not_made(call):
     """Bullet's own MJCF reader makes bodies that crash the audit's query; soft bodies crash without their file."""
     for file in Path(anysim_pybullet.__file__).parent.glob("*.py"):
         assert call not in file.read_text("utf-8"), file.name
+
+
+def test_numbers_of_numpy_are_written_as_numbers():
+    """`float` before `repr`: Bullet reads a capsule of radius `np.float64(0.1)` as a ball, without a word."""
+    radius, half = 0.1, 0.2
+    text = world_geom_urdf(Geom("limb", -1, Capsule(np.float64(radius), np.float64(half))), {})
+    assert text == world_geom_urdf(Geom("limb", -1, Capsule(radius, half)), {})
 
 
 def test_the_past_decides_nothing(build, own):
