@@ -10,6 +10,7 @@ from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
 from anysim_navigation.drive_bench import HARD, drive
+from anysim_navigation.movers import Movers
 from tests.plugins.skills.test_navigate import WORLD
 
 
@@ -89,3 +90,23 @@ def test_a_planner_that_is_not_installed_is_named() -> None:
         make(WORLD, engine="mujoco", overrides=["task.expert.planner=teb"]) as env,
     ):
         outcome(env, 3)
+
+
+def test_movers_are_seen_with_the_velocity_that_they_have() -> None:
+    """A box that slides at (0.3, 0.4) m/s, from a base that looks along y: to its right, and on its way ahead."""
+    ball = (
+        "world.objects.mover={source: {box: [0.4, 0.2, 0.5]}}",
+        "world.layout.mover={position: [2.0, 1.0, 0.25]}",
+        "world.layout.spot={position: [-1.0, 0.0, -0.02], checked: false}",
+    )
+    with make(WORLD, engine="null", num_envs=2, overrides=ball) as env:
+        env.reset(seed=1)
+        root = env.engine.world.entities[env.engine.world.entity_numbers["mover"]].root
+        twist = env.engine.get_state().body_twist[:, root].copy()
+        twist[1, :2] = (0.3, 0.4)
+        env.engine.set_body_state(twist=twist[:, None], bodies=[root])
+        env.scene.look(None)
+        seen = Movers(env.scene, ["mover"]).around(np.array([0, 1]), np.array([[0.0, 0.0, np.pi / 2]] * 2))
+        assert np.allclose(seen[:, 0, :2], [[1.0, -2.0]] * 2, atol=1e-6)
+        assert np.allclose(seen[:, 0, 2:4], [[0.0, 0.0], [0.4, -0.3]], atol=1e-6)
+        assert np.allclose(seen[:, 0, 4], 0.2)
