@@ -19,8 +19,8 @@ from anysim_annotation.recorded import EpisodeFiles
 from anysim_annotation.sheet import SHEET_FILE, SUFFIX, AnnotationSheet, CameraSheet, read_annotations
 from anysim_annotation.view import Source
 from anysim_film.commit import move_in, workspace
-from anysim_film.jobs import treat_all
 from anysim_film.stage import FilmOrder, Stage, facts_of, refuse_damage, refuse_unknown_cameras
+from anysim_processes.jobs import treat_all
 from anysim_schemas.load import LoadedRun
 
 

@@ -18,7 +18,7 @@ from anysim.record.json import plain
 from anysim.record.manifest import Manifest
 from anysim.record.reader import open_trajectory
 from anysim_export.api import DataSet, Episode, Exporter
-from anysim_film.jobs import treat_all
+from anysim_processes.jobs import treat_all
 
 SYNCING = 16
 """Files that are brought to the disk at a time: what waits together takes one turn of its journal."""

@@ -70,8 +70,7 @@ def render(
     """
     from anysim.cli.output import counting, print_json
     from anysim.record.names import find_trajectories
-    from anysim_film.filmer import film_targets
-    from anysim_film.jobs import film_all
+    from anysim_film.filmer import film_all, film_targets
     from anysim_film.stage import FilmOrder
 
     if len(directories) == 1 and directories[0].suffix in (".yaml", ".yml"):

@@ -1,8 +1,10 @@
 """Filming recorded trajectories: their videos, made afterwards, as they would have been or otherwise."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Self
 
@@ -15,6 +17,7 @@ from anysim_film.commit import add_videos, workspace
 from anysim_film.episode import film_episode
 from anysim_film.sheet import FILM_FILE, FilmSheet, read_sheet
 from anysim_film.stage import FilmOrder, Stage, facts_of, refuse_damage, refuse_unknown_cameras
+from anysim_processes.jobs import treat_all
 from anysim_schemas.load import LoadedRun
 
 
@@ -168,3 +171,14 @@ def film_targets(trajectories: Sequence[Path], out: Path | None) -> list[tuple[P
         if len(set(places)) == len(places):
             return list(zip(trajectories, places, strict=True))
     raise RecordError("runs of the same name were given together; film them one by one, each into its own --out")
+
+
+def film_all(work: Sequence[tuple[Path, Path | None]], order: FilmOrder, jobs: int = 1) -> Iterator[Filmed]:
+    """Film trajectories, each into its directory (`Filmer.film`), in up to `jobs` processes; yields each when done."""
+    return treat_all(work, partial(_filming, order), jobs)
+
+
+@contextmanager
+def _filming(order: FilmOrder) -> Iterator[Callable[[Path, Path | None], Filmed]]:
+    with Filmer(order) as filmer:
+        yield filmer.film

@@ -20,8 +20,7 @@ from anysim.skills.runner import SkillPolicy
 from anysim.testing.engines import require_drawing
 from anysim_film import commit
 from anysim_film.episode import moments_for
-from anysim_film.filmer import Filmer, film_targets
-from anysim_film.jobs import film_all
+from anysim_film.filmer import Filmer, film_all, film_targets
 from anysim_film.sheet import FILM_FILE, read_sheet
 from anysim_film.stage import FilmOrder
 from anysim_inspect.verify import verify

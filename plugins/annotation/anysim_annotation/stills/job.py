@@ -12,8 +12,8 @@ from anysim.record.json import dump_json, load_json, plain
 from anysim_annotation.stills.labels import coco, kitti_camera, kitti_line
 from anysim_annotation.stills.maker import IMAGES, LABELS, StillsMaker, is_there, loaded_job, numbers_lacking, stem
 from anysim_annotation.stills.spec import StillsSpec
-from anysim_film.jobs import treat_all
 from anysim_film.stage import refuse_unknown_cameras
+from anysim_processes.jobs import treat_all
 from anysim_schemas.load import LoadedRun
 
 JOB_FILE, COCO_FILE = "job.json", "coco.json"

@@ -120,7 +120,7 @@ def way_of_a_car(
                         continue
                     cost[index], came[index], gear[index], bend[index] = new, here, direction, turn
                     pose[index, 0], pose[index, 1], pose[index, 2] = x, y, yaw
-                    heapq.heappush(heap, (float(new + ahead[i, j]), index))
+                    heapq.heappush(heap, (float(new + ahead[i, j]), index))  # pyright: ignore[reportArgumentType]
     length, here = 0, last
     while here >= 0:
         length, here = length + 1, came[here]

@@ -1,4 +1,4 @@
-"""Work shared by several processes, each with an engine of its own."""
+"""Items of work shared by several processes, each of which opens what does them once, as an engine."""
 
 import os
 import signal
@@ -6,16 +6,12 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from contextlib import AbstractContextManager, contextmanager
-from functools import partial
+from contextlib import AbstractContextManager
 from itertools import islice
 from multiprocessing import get_context
-from pathlib import Path
 from typing import Any, TypeVar, TypeVarTuple
 
 from anysim.errors import AnysimError, RecordError
-from anysim_film.filmer import Filmed, Filmer
-from anysim_film.stage import FilmOrder
 
 WATCH_S = 1.0
 """How often a worker looks whether its parent is there [s]."""
@@ -23,11 +19,6 @@ AHEAD = 4
 """Items of each process that wait for it, so that a million of them take no room."""
 T = TypeVar("T")
 Item = TypeVarTuple("Item")
-
-
-def film_all(work: Sequence[tuple[Path, Path | None]], order: FilmOrder, jobs: int = 1) -> Iterator[Filmed]:
-    """Film trajectories, each into its directory (`Filmer.film`), in up to `jobs` processes; yields each when done."""
-    return treat_all(work, partial(_filming, order), jobs)
 
 
 def treat_all(
@@ -60,12 +51,6 @@ def treat_all(
             raise
 
 
-@contextmanager
-def _filming(order: FilmOrder) -> Iterator[Callable[[Path, Path | None], Filmed]]:
-    with Filmer(order) as filmer:
-        yield filmer.film
-
-
 _opened: list[tuple[AbstractContextManager[Callable[..., Any]], Callable[..., Any]]] = []
 """That of a worker, open until the process ends."""
 
@@ -80,7 +65,7 @@ def _begin(open_: Callable[[], AbstractContextManager[Callable[..., Any]]], pare
             time.sleep(WATCH_S)
         os._exit(1)  # half a result is left aside, where the next process removes it
 
-    threading.Thread(target=watch, name="anysim-film-parent", daemon=True).start()
+    threading.Thread(target=watch, name="anysim-jobs-parent", daemon=True).start()
 
 
 def _treated(*item: Any) -> Any:
