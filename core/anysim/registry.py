@@ -51,6 +51,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-annotation": {
         "annotators": "affordance boxes_2d boxes_3d camera depth eef_waypoint flow instance nav_point normals obj_bbox"
         " point_cloud semantic skeleton",
+        "exporters": "coco",
         "renderings": "annotations stills",
         "streams": "annotations",
     },
@@ -63,7 +64,10 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-avatars": {"families": "avatar"},
     "anysim-banks": {"commands": "bank"},
     "anysim-bench": {"commands": "bench"},
-    "anysim-cameras": {"controllers": "camera_follow camera_gimbal camera_motion camera_path"},
+    "anysim-cameras": {
+        "controllers": "camera_follow camera_gimbal camera_motion camera_path",
+        "skills": "fly_look fly_orbit fly_to fly_track watch",
+    },
     "anysim-collect": {"commands": "counterfactual report run"},
     "anysim-control": {
         "controllers": "ackermann_drive batched_ik differential_drive differential_ik"
@@ -75,13 +79,13 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
         "commands": "benchmark evaluate",
         "env_policies": "expert random zero",
     },
-    "anysim-export": {"commands": "export tape", "exporters": "lerobot robomimic webdataset"},
+    "anysim-export": {"commands": "export tape", "exporters": "lerobot rerun rlds-ready robomimic webdataset"},
     "anysim-film": {"commands": "render"},
     "anysim-inspect": {"commands": "audit check doctor explain list replay snapshot verify"},
     "anysim-language": {"commands": "describe vqa", "streams": "language", "vocabularies": "english"},
-    "anysim-learning": {"commands": "train", "learners": "clone rsl-rl sb3-ppo"},
+    "anysim-learning": {"commands": "curves train", "learners": "clone rsl-rl sb3-ppo"},
     "anysim-maniskill": {"benchmarks": "maniskill", "commands": "verdicts"},
-    "anysim-mcap": {"readers": "mcap", "streams": "cameras", "writers": "mcap"},
+    "anysim-mcap": {"exporters": "foxglove", "readers": "mcap", "streams": "cameras", "writers": "mcap"},
     "anysim-mujoco": {"engines": "mujoco", "importers": "mjcf", "oracles": "mjcf"},
     "anysim-navigation": {"commands": "map", "planners": "dynamic_window"},
     "anysim-parity": {"commands": "compare picture"},

@@ -13,7 +13,7 @@ from anysim.record.names import trajectories
 from anysim.record.reader import open_trajectory
 from tests.external_packages import EXTERNAL, FOUND, install, offered, run
 
-OTHER_GUIDES = ("evaluate.md", "export.md", "language.md", "teleop.md")
+OTHER_GUIDES = ("evaluate.md", "export.md", "families.md", "language.md", "teleop.md")
 """Pages that say what a user does and, at their ends, how others add to it."""
 PAGES = sorted((Path(__file__).parents[2] / "docs").rglob("*.md"))
 

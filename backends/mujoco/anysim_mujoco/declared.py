@@ -41,7 +41,7 @@ _APPROXIMATE = {
         dent=7.5e-3,
     ),
     Capability.RENDER_LIGHTS: "one with a place shines in a wide cone about its direction alone",
-    Capability.RENDER_SHADOWS: "ground casts none, and they end some 6 m from the bodies",
+    Capability.RENDER_SHADOWS: "ground casts none, and they end some metres from the bodies",
     Capability.MATERIALS: "one lamp's highlight, as strong as specular or metallic says; nothing is mirrored",
     Capability.VARYING_ENTITIES: approximately(
         "what is absent takes time, and moves the rest by up to {shift:g} m within 3.6 s", shift=3e-10

@@ -39,8 +39,8 @@ _APPROXIMATE = {
         felt=0.005,
     ),
     Capability.RENDER_DEPTH: (
-        "in software, corners of triangles are on a grid of 1/16 px: depth is that of a point up to 0.03 px beside the "
-        "middle of the pixel, of ground that reaches behind the camera 0.2 px; along a plane, in 20 rows, 1 to 4 % off"
+        "in software, corners of triangles are on a grid a part of a pixel wide: depth is that of a point beside the "
+        "middle of the pixel, most so on ground that reaches behind the camera; along a plane, in few rows, some percent off"
     ),
     Capability.MATERIALS: (
         "the shader `lit`, which `auto` takes without a graphics card, has highlights and mirrors nothing; `trivial` "

@@ -51,7 +51,7 @@ def write_parts(
     """
     parts = [folder / f"{i:06d}" for i in range(len(trajectories))]
     work = [(i, trajectories[i], part) for i, part in enumerate(parts) if not part.exists()]
-    for done, i in enumerate(treat_all(work, partial(_writing, to, data), jobs), 1 + len(parts) - len(work)):
+    for done, i in enumerate(treat_all(work, partial(_writing, folder, to, data), jobs), 1 + len(parts) - len(work)):
         told(f"{trajectories[i].name}: {data.manifests[i].steps} steps", f"{done} of {len(parts)}")
     return parts
 
@@ -65,28 +65,27 @@ def wait_for_writers(folder: Path) -> None:
 
 
 @contextmanager
-def _writing(to: str, data: DataSet) -> Iterator[Callable[[int, Path, Path], int]]:
-    """What writes the folder of an episode, with an exporter of this process."""
+def _writing(folder: Path, to: str, data: DataSet) -> Iterator[Callable[[int, Path, Path], int]]:
+    """What writes the folder of an episode, with an exporter of this process; as long as it may, it holds a lock."""
     exporter, _ = made(to, data.options)
-    with closing(exporter):
+    with closing(exporter), _lock(folder.with_name(f"{os.getpid()}.writer")):
         yield partial(_write, exporter, data)
 
 
 def _write(exporter: Exporter, data: DataSet, index: int, trajectory: Path, part: Path) -> int:
     incoming = part.with_suffix(".new")
-    with _lock(part.parent.with_name(f"{os.getpid()}.writer")):
-        shutil.rmtree(incoming, ignore_errors=True)
-        incoming.mkdir()
-        _check_whole(trajectory, data.manifests[index])
-        exporter.write_episode(incoming, Episode(index, open_trajectory(trajectory)), data)
-        sync(incoming)
-        publish(incoming, part)
+    shutil.rmtree(incoming, ignore_errors=True)
+    incoming.mkdir()
+    _check_whole(trajectory, data.manifests[index])
+    exporter.write_episode(incoming, Episode(index, open_trajectory(trajectory)), data)
+    sync(incoming)
+    publish(incoming, part)
     return index
 
 
 def _lock(path: Path) -> FileLock:
     lock = FileLock.take(path)
-    assert lock is not None, "a process writes one episode at a time"
+    assert lock is not None, "a process writes one data set at a time"
     return lock
 
 

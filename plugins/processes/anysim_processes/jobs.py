@@ -57,6 +57,8 @@ _opened: list[tuple[AbstractContextManager[Callable[..., Any]], Callable[..., An
 
 def _begin(open_: Callable[[], AbstractContextManager[Callable[..., Any]]], parent: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # it reaches the parent, which lets what is begun come to its end
+    if os.getppid() != parent:
+        os._exit(1)
     context = open_()
     _opened.append((context, context.__enter__()))
 

@@ -42,8 +42,6 @@ def test_physics_without_a_vulkan_device():
     code = """
         from anysim.engine.factory import create_simulation
         from anysim.errors import EngineError
-from anysim.math import pose as P
-from anysim.model.world import Body, BodyKind, Box, Camera, Entity, EntityKind, Geom, Scenery, World
         from anysim.testing import worlds
         engine = create_simulation("sapien").create_world(worlds.scene(cameras=True), 2)
         engine.step(20)

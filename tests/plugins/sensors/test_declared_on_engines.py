@@ -65,7 +65,8 @@ def test_one_file_gives_equal_readings_on_three_engines() -> None:
     assert np.ptp(first["sensor_eye_depth"]) > 0.5
     for engine in ("mujoco", "pybullet"):
         for name, rows in readings[engine].items():
-            assert np.abs(rows - first[name]).max() < 1e-6, (engine, name, np.abs(rows - first[name]).max())
+            gap = np.abs(rows.astype(float) - first[name]).max()
+            assert gap < 1e-6, (engine, name, gap)
 
 
 def test_none_of_five_thousand_rays_is_a_millimetre_off_mujocos() -> None:
