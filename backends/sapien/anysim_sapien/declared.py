@@ -40,7 +40,8 @@ _APPROXIMATE = {
     ),
     Capability.RENDER_DEPTH: (
         "in software, corners of triangles are on a grid a part of a pixel wide: depth is that of a point beside the "
-        "middle of the pixel, most so on ground that reaches behind the camera; along a plane, in few rows, some percent off"
+        "middle of the pixel, most so on ground that reaches behind the camera; along a plane, in few rows, it is some "
+        "percent off"
     ),
     Capability.MATERIALS: (
         "the shader `lit`, which `auto` takes without a graphics card, has highlights and mirrors nothing; `trivial` "
