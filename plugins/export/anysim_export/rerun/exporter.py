@@ -11,11 +11,9 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
 from anysim.errors import RecordError
-from anysim.record.replay import begin
 from anysim.task.contract import Status
-from anysim.task.env import TaskEnv
 from anysim_export.api import DataSet, Episode, Exporter, take_over
-from anysim_export.envs import env_of
+from anysim_export.envs import EpisodeEnv
 from anysim_export.rerun.shapes import drawn
 from anysim_export.streams import Channel, others_of
 
@@ -42,8 +40,7 @@ class RerunExporter(Exporter):
         quality: Annotated[int, Field(ge=1, le=100, description="of the images, as JPEG has it")] = 90,
         engine: Annotated[str | None, Field(description="that tells where cameras are; None: the recording's")] = None,
     ) -> None:
-        self._images, self._channels, self._quality, self._engine = images, channels, quality, engine
-        self._env: tuple[dict[str, Any], TaskEnv] | None = None
+        self._images, self._channels, self._quality, self._env = images, channels, quality, EpisodeEnv(engine)
 
     def places(self, data: DataSet) -> Mapping[str, str]:
         """Entities."""
@@ -71,7 +68,7 @@ class RerunExporter(Exporter):
         import rerun as rr  # pyright: ignore[reportMissingImports]
 
         manifest = episode.manifest
-        engine = self._begun(episode).engine
+        engine = self._env.begun(manifest).engine
         identity = f"{manifest.task}-{manifest.episode_seed}"
         with rr.RecordingStream("anysim", recording_id=identity, send_properties=False) as stream:
             sink = stream.binary_stream()
@@ -91,18 +88,7 @@ class RerunExporter(Exporter):
 
     def close(self) -> None:
         """Free the engine."""
-        if self._env is not None:
-            self._env[1].close()
-            self._env = None
-
-    def _begun(self, episode: Episode) -> TaskEnv:
-        """An env in which the episode has begun; the last one again where the run is the same."""
-        spec = episode.manifest.spec
-        if self._env is None or self._env[0] != spec:
-            self.close()
-            self._env = spec, env_of(spec, self._engine)
-        begin(self._env[1], episode.manifest)
-        return self._env[1]
+        self._env.close()
 
 
 class _Log:

@@ -2,16 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import Field
 
 from anysim.errors import RecordError
 from anysim.record.reader import open_trajectory
-from anysim.record.replay import begin
-from anysim.task.env import TaskEnv
 from anysim_export.api import DataSet, Episode, Exporter, take_over
-from anysim_export.envs import env_of
+from anysim_export.envs import EpisodeEnv
 from anysim_mcap.foxglove.episode import EpisodeTracks
 from anysim_mcap.foxglove.merged import recorded_messages, write_merged
 from anysim_mcap.writer import TRAJECTORY_FILE
@@ -33,8 +31,7 @@ class FoxgloveExporter(Exporter):
         crf: Annotated[int, Field(ge=0, le=51, description="quality of the videos; less is better")] = 23,
         engine: Annotated[str | None, Field(description="that tells colours and places; None: the recording's")] = None,
     ) -> None:
-        self._crf, self._engine = crf if images else None, engine
-        self._env: tuple[dict[str, Any], TaskEnv] | None = None
+        self._crf, self._env = crf if images else None, EpisodeEnv(engine)
 
     def places(self, data: DataSet) -> Mapping[str, str]:
         """Topics: those of the recording, and videos."""
@@ -61,7 +58,7 @@ class FoxgloveExporter(Exporter):
         """The file of an episode."""
         directory, manifest = episode.directory, episode.manifest
         topics = {one.topic.name for one in recorded_messages(directory / TRAJECTORY_FILE)} | manifest.streams.keys()
-        own = EpisodeTracks(episode, open_trajectory(directory), self._begun(episode), topics).all(self._crf)
+        own = EpisodeTracks(episode, open_trajectory(directory), self._env.begun(manifest), topics).all(self._crf)
         files = [TRAJECTORY_FILE, *sorted({stream.file for stream in manifest.streams.values()})]
         tracks = [*(recorded_messages(directory / name) for name in files), *own]
         write_merged(folder / EPISODE, directory / TRAJECTORY_FILE, tracks)
@@ -73,15 +70,4 @@ class FoxgloveExporter(Exporter):
 
     def close(self) -> None:
         """Free the engine."""
-        if self._env is not None:
-            self._env[1].close()
-            self._env = None
-
-    def _begun(self, episode: Episode) -> TaskEnv:
-        """An env in which the episode has begun; the last one again where the run is the same."""
-        spec = episode.manifest.spec
-        if self._env is None or self._env[0] != spec:
-            self.close()
-            self._env = spec, env_of(spec, self._engine)
-        begin(self._env[1], episode.manifest)
-        return self._env[1]
+        self._env.close()
