@@ -1,33 +1,20 @@
 """The suite of planners: it clears the right ones, and finds each wrong one by the test named for its defect."""
 
 import inspect
-import json
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
+from tests.contract.suite_runs import outcomes_of, run
 from tests.planning import wrong_planners
 
-HERE = Path(__file__).parent
 WRONG = [
     name
     for name, made in inspect.getmembers(wrong_planners, inspect.isclass)
     if made.__module__ == wrong_planners.__name__ and not name.startswith("_")
 ]
 SUITE = ("-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", "--pyargs", "anysim.testing.planners")
-
-
-def run(*words: str, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
-    paths = [str(HERE.parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
-    command = [sys.executable, *words]
-    return subprocess.run(
-        command, capture_output=True, text=True, timeout=300, env=environment, cwd=folder, check=False
-    )
 
 
 @pytest.mark.parametrize(
@@ -66,15 +53,8 @@ def _suite() -> str:
 @pytest.fixture(scope="module")
 def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, str]]:
     """Of all wrong planners, in one process."""
-    folder = tmp_path_factory.mktemp("wrong")
     jobs = {name: inspect.getdoc(getattr(wrong_planners, name)).split() for name in WRONG}
-    named = {f"{wrong_planners.__name__}:{name}": tests for name, tests in jobs.items()}
-    (folder / "jobs.json").write_text(json.dumps(named))
-    runner = HERE.parent / "contract" / "run_engines.py"
-    done = run(str(runner), str(folder / "jobs.json"), str(folder / "results.json"), "planners", folder=folder)
-    assert done.returncode == 0, done.stdout[-4000:] + done.stderr
-    found = json.loads((folder / "results.json").read_text())
-    return {name.rpartition(":")[2]: tests for name, tests in found.items()}
+    return outcomes_of("planners", wrong_planners.__name__, jobs, tmp_path_factory.mktemp("wrong"))
 
 
 @pytest.mark.slow
