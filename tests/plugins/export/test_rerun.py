@@ -145,7 +145,7 @@ def test_depth_is_in_metres_with_every_bit_and_segmentation_has_its_legend(episo
         if channel.name == "depth":
             assert shown["shape:DepthImage:meter"] == [[1.0]]
         else:
-            [said] = shown["shape:AnnotationContext:context"]
+            [[said]] = shown["shape:AnnotationContext:context"]
             legend = {row["class_id"]: row["class_description"]["info"]["label"] for row in said}
     assert "cube" in legend.values()
     assert legend == {row["id"]: row["name"] for row in channels_of(one.manifest)[1].about["legend"]}
