@@ -4,9 +4,13 @@ Everything is written component by component: numpy rounds elementwise operation
 same bits whatever the batch around it (a matrix product through BLAS or einsum would not promise that).
 """
 
+from typing import TypeVar
+
 import numpy as np
 
 from anysim.conventions import Array
+
+Angle = TypeVar("Angle", float, Array)
 
 _LEFT, _RIGHT = np.array([1, 2, 0, 2, 0, 1]), np.array([2, 0, 1, 1, 2, 0])
 """A cross product is the first three products of these components of the factors less the last three."""
@@ -177,8 +181,18 @@ def to_roll_pitch_yaw(q: Array) -> Array:
     x, y, z, w = np.moveaxis(q, -1, 0)
     roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
     pitch = np.arcsin(np.minimum(np.maximum(2.0 * (w * y - z * x), -1.0), 1.0))
-    yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return np.stack([roll, pitch, yaw], axis=-1)
+    return np.stack([roll, pitch, yaw(q)], axis=-1)
+
+
+def yaw(q: Array) -> Array:
+    """Directions (...) [rad] of the x axes of unit quaternions (..., 4) over the ground."""
+    x, y, z, w = np.moveaxis(q, -1, 0)
+    return np.arctan2(2.0 * (x * y + z * w), 1.0 - 2.0 * (y * y + z * z))
+
+
+def wrapped(angle: Angle) -> Angle:
+    """The same angles [rad] within [-pi, pi)."""
+    return (angle + np.pi) % (2.0 * np.pi) - np.pi
 
 
 def to_matrix(q: Array) -> Array:

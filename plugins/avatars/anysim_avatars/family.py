@@ -16,7 +16,7 @@ from anysim_avatars import actions, bodies, clips, frames
 from anysim_avatars.actions import LENGTH, WIDTH, Column, Kind
 from anysim_avatars.bodies import BONES, Proportions, proportions
 from anysim_avatars.facts import facts_of
-from anysim_avatars.gait import STRETCH, Gait, Legs, Wish, advance, carrot, stand, wrapped
+from anysim_avatars.gait import STRETCH, Gait, Legs, Wish, advance, carrot, stand
 from anysim_avatars.motion import Motion, Provider, between, read_motion
 from anysim_avatars.puppet import Aim, Figure, Sizes, figure, posed
 from anysim_avatars.spec import ActionSpec, AvatarSpec
@@ -236,7 +236,7 @@ class Avatars(Family):
         through = row[:, Column.ENDS] == 0
         arrived = gap <= np.where(through, 0.35, row[:, Column.NEAR] + 1e-3)
         stands = (gait.swing < 0) | through
-        turned = (np.abs(wrapped(row[:, Column.YAW] - gait.yaw)) < 0.01) & (gait.swing < 0)
+        turned = (np.abs(P.wrapped(row[:, Column.YAW] - gait.yaw)) < 0.01) & (gait.swing < 0)
         ends = [np.inf if motion is None else motion.seconds for motion in self._motions]
         lasts = np.minimum(
             row[:, Column.SECONDS], np.array(ends)[np.clip(row[:, Column.CLIP].astype(int), 0, len(ends) - 1)]

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.math import pose as P
 from anysim_avatars.bodies import Proportions
 
 GroundAt = Callable[[Array], Array]
@@ -69,11 +70,6 @@ class Wish(NamedTuple):
     back: Array
 
 
-def wrapped(angle: Array) -> Array:
-    """Angles in [-pi, pi)."""
-    return (angle + np.pi) % (2 * np.pi) - np.pi
-
-
 def places(pos: Array, yaw: Array, legs: Legs) -> Array:
     """(m, 2, 2) where the feet belong below a body."""
     left = np.stack([-np.sin(yaw), np.cos(yaw)], axis=-1) * (legs.hip * 1.05)[:, None]
@@ -111,10 +107,10 @@ def advance(state: Gait, legs: Legs, wish: Wish, ground_at: GroundAt, dt: float)
 
 
 def _move(state: Gait, wish: Wish, dt: float) -> None:
-    turn = wrapped(wish.heading - state.yaw)
+    turn = P.wrapped(wish.heading - state.yaw)
     state.yaw[:] += np.clip(turn * min(1.0, 6.0 * dt), -TURN * dt, TURN * dt)
     for foot in (0, 1):  # a leg does not turn further
-        twist = wrapped(state.yaw - state.feet[:, foot, 3])
+        twist = P.wrapped(state.yaw - state.feet[:, foot, 3])
         state.yaw[:] += np.clip(twist, -TWIST, TWIST) - twist
     vel = wish.vel * np.maximum(np.cos(np.clip(turn, -np.pi / 2, np.pi / 2)), 0.0)[:, None] ** 2
     change = vel - state.vel
@@ -129,7 +125,7 @@ def _step(state: Gait, legs: Legs, neutral: Array, ground_at: GroundAt, dt: floa
     rows = np.arange(len(state.pos))
     speed = np.sqrt((state.vel * state.vel).sum(-1))
     off = np.sqrt(((state.feet[:, :, :2] - neutral) ** 2).sum(-1))
-    twist = np.abs(wrapped(state.feet[:, :, 3] - state.yaw[:, None]))
+    twist = np.abs(P.wrapped(state.feet[:, :, 3] - state.yaw[:, None]))
     wrong = (off > IN_PLACE) | (twist > IN_LINE)
     restless = (speed > 0.03) | wrong.any(axis=1)
     fresh = (state.swing < 0) & restless
@@ -152,7 +148,7 @@ def _step(state: Gait, legs: Legs, neutral: Array, ground_at: GroundAt, dt: floa
     far = np.sqrt((way * way).sum(-1))
     feet[air, foot, :2] += way * np.minimum(1.0, FOOT * dt / np.maximum(far, 1e-12))[:, None]
     height = ground_at(feet[air, foot, :2])
-    feet[air, foot, 3] = start[:, 3] + wrapped(state.yaw[air] - start[:, 3]) * ease
+    feet[air, foot, 3] = start[:, 3] + P.wrapped(state.yaw[air] - start[:, 3]) * ease
     arc = 4 * phase * (1 - phase) * (0.05 + 0.03 * np.minimum(speed[air], 1.5))
     feet[air, foot, 2] = start[:, 2] + (height - start[:, 2]) * ease + arc
     down = air[state.phase[air] >= 1.0]

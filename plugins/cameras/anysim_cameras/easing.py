@@ -52,8 +52,3 @@ def shortened(vectors: Array, most: float | Array) -> Array:
 def toward(velocity: Array, wanted: Array, change: float | Array) -> Array:
     """Velocities (..., k) moved straight towards those wanted, by a change of at most this length."""
     return velocity + shortened(wanted - velocity, change)
-
-
-def wrapped(angle: Array) -> Array:
-    """The same direction in [-pi, pi)."""
-    return (angle + np.pi) % (2.0 * np.pi) - np.pi

@@ -9,7 +9,7 @@ from anysim.planning.motion import Budget, PlanRequest, Scenes, Trajectory, moti
 from anysim.skills.phases import Mover
 from anysim.task.env import TaskEnv
 from anysim.task.scene import RobotView
-from anysim_cameras.easing import brake_speed, shortened, wrapped
+from anysim_cameras.easing import brake_speed, shortened
 from anysim_cameras.motion import CameraMotion
 
 RESPONSE = 5.0
@@ -85,7 +85,7 @@ class Eye(Mover):
     def left(self, ids: Array) -> tuple[Array, Array]:
         """(n,) [m] and (n,) [rad] that are left."""
         place, angles = self.joints(ids)
-        return P.norm(self.place[ids] - place), np.abs(wrapped(self.angles[ids] - angles)).max(axis=1)
+        return P.norm(self.place[ids] - place), np.abs(P.wrapped(self.angles[ids] - angles)).max(axis=1)
 
     # ------------------------------------------------------------------ ways around things
 
@@ -148,7 +148,7 @@ class Eye(Mover):
         distance = P.norm(way)
         pace = brake_speed(distance, self._push, RESPONSE) / np.maximum(distance, 1e-9)
         moved = shortened(self.drift[ids] + way * pace[:, None], self.speed)
-        turn = wrapped(self.angles[ids] - angles)
+        turn = P.wrapped(self.angles[ids] - angles)
         turned = self.swing[ids] + np.sign(turn) * brake_speed(np.abs(turn), self._turn_push, RESPONSE)
         for one, values in zip(self._slices, (moved, turned), strict=True):
             action[ids, one.start : one.stop] = np.clip(values, one.controller.low, one.controller.high)

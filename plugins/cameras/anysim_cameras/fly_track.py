@@ -12,7 +12,6 @@ from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, RobotView
-from anysim_cameras.easing import wrapped
 from anysim_cameras.fly_to import Flight
 
 Steps = Annotated[int, Field(ge=1, description="control steps")]
@@ -34,7 +33,7 @@ class FlyTrack(Flight):
         next_ = self.eye.local(at, self._target.position[at] + self._dt * self._target.twist[at, :3])
         self.eye.angles[ids] = self.eye.towards(places, now)
         ahead = self.eye.towards(places, next_)
-        self.eye.swing[ids] = wrapped(ahead - self.eye.angles[ids]) / self._dt
+        self.eye.swing[ids] = P.wrapped(ahead - self.eye.angles[ids]) / self._dt
         done = np.where(self.steps[ids] >= self._late - 1, GO_ON, STAY)
         return np.where(self._target.present[at], done, _ABSENT)
 

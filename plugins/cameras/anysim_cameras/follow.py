@@ -80,7 +80,7 @@ class CameraFollow(Controller):
         return P.compose(pose, np.broadcast_to(self._local, pose.shape))
 
     def _yaw(self, frame: Array) -> Array:
-        return P.to_roll_pitch_yaw(frame[:, 3:])[:, 2] if self._heading else np.zeros(len(frame))
+        return P.yaw(frame[:, 3:]) if self._heading else np.zeros(len(frame))
 
     @staticmethod
     def _turned(way: Array, yaw: Array) -> Array:

@@ -12,7 +12,7 @@ from anysim.errors import NameLookupError, TaskError
 from anysim.math import pose as P
 from anysim.model.frames import find_frame
 from anysim.model.world import JointType
-from anysim_cameras.easing import brake_speed, room_speeds, wrapped
+from anysim_cameras.easing import brake_speed, room_speeds
 from anysim_cameras.shake import Shake
 from anysim_schemas.base import Vec3
 
@@ -110,10 +110,10 @@ class CameraGimbal(Controller):
         angles = self._angles(rows, env_ids)
         if self._goes_over:
             angles = self._nearer(rows, angles, position)
-        wanted = position + wrapped(angles - position)
+        wanted = position + P.wrapped(angles - position)
         wanted = np.minimum(np.maximum(wanted, self.channel.lower), self.channel.upper)
         before, fresh = self._rows["wanted"][rows], self._rows["fresh"][rows] > 0
-        drift = np.where(fresh, 0.0, wrapped(wanted - before) / self._dt)
+        drift = np.where(fresh, 0.0, P.wrapped(wanted - before) / self._dt)
         drift = np.minimum(np.maximum(drift, -self._rate), self._rate)
         way = wanted - position
         pace = drift + np.sign(way) * brake_speed(np.abs(way), self._acceleration, self._response)
@@ -134,7 +134,7 @@ class CameraGimbal(Controller):
         """Of the two ways to turn the joints to one view, the one at hand; near the vertical the nearer one."""
         over = self._rows["over"][rows]
         other = np.stack([angles[:, 0] + np.pi, np.pi - angles[:, 1], angles[:, 2] + np.pi], axis=1)
-        left = [np.abs(wrapped(way - position)[:, :2]).sum(axis=1) for way in (angles, other)]
+        left = [np.abs(P.wrapped(way - position)[:, :2]).sum(axis=1) for way in (angles, other)]
         nearer = np.where(over[:, 0] > 0, left[1] > left[0] + _EDGE, left[0] > left[1] + _EDGE)
         over = np.abs(over - (nearer & (np.abs(angles[:, 1]) > _STEEP))[:, None])
         self._rows["over"][rows] = over
@@ -166,7 +166,7 @@ class CameraGimbal(Controller):
 
     def _heading(self, rows: slice | Array, way: Array, yaw: Array) -> Array:
         """Headings (E,) of level views; where what is looked at passes near the vertical, that of its passing."""
-        carrier = P.to_roll_pitch_yaw(self.robot.state.body_pose[rows, self._carrier, 3:])[:, 2]
+        carrier = P.yaw(self.robot.state.body_pose[rows, self._carrier, 3:])
         now = self._rows["position"][rows, 0] + carrier
         aside = way[:, :2] / np.maximum(np.abs(way[:, 2:]), 1e-9)
         rate = np.where(self._rows["fresh"][rows] > 0, 0.0, (aside - self._rows["aside"][rows]) / self._dt)
@@ -175,7 +175,7 @@ class CameraGimbal(Controller):
         nearest = np.abs(aside[:, 0] * rate[:, 1] - aside[:, 1] * rate[:, 0]) / np.maximum(quick, 1e-12)
         passes = (far < _CONE) & (quick > _QUICK * self._rate * nearest) & (quick > 0.01)
         along = np.arctan2(rate[:, 1], rate[:, 0])
-        along = along + np.where(np.abs(wrapped(along - now)) > np.pi / 2, np.pi, 0.0)
+        along = along + np.where(np.abs(P.wrapped(along - now)) > np.pi / 2, np.pi, 0.0)
         return np.where(passes, along, np.where(far < _HELD, now, yaw))
 
     def snapshot(self, env_ids: Array) -> dict[str, Array]:

@@ -10,7 +10,7 @@ from anysim.controllers.base import ChannelView, Command, Controller
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.model.world import JointType
-from anysim_cameras.easing import brake_speed, minimum_jerk, move_time, room_speeds, shortened, toward, wrapped
+from anysim_cameras.easing import brake_speed, minimum_jerk, move_time, room_speeds, shortened, toward
 
 _STATE = ("position", "velocity", "target", "start", "goal", "elapsed", "duration")
 
@@ -66,7 +66,7 @@ class CameraMotion(Controller):
         rows = slice(None) if env_ids is None else env_ids
         if self.command == "pose":
             here = self._rows["goal" if not self._damped else "position"][rows]
-            self._rows["target"][rows] = np.where(self._endless, here + wrapped(action - here), action)
+            self._rows["target"][rows] = np.where(self._endless, here + P.wrapped(action - here), action)
         else:
             self._rows["target"][rows] = action
         return self.update(env_ids)
@@ -141,7 +141,7 @@ class CameraMotion(Controller):
     def action_for(self, targets: Array, env_ids: Array) -> Array:
         if self.command != "pose":
             return super().action_for(targets, env_ids)
-        turned = np.where(self._endless, wrapped(targets), targets)
+        turned = np.where(self._endless, P.wrapped(targets), targets)
         return np.minimum(np.maximum(turned, self.low), self.high)
 
     def snapshot(self, env_ids: Array) -> dict[str, Array]:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.math import pose as P
 from anysim_legged.catch import (
     FASTEST,
     LEAD,
@@ -23,7 +24,7 @@ from anysim_legged.catch import (
     approach,
     reachable,
 )
-from anysim_legged.support import turned, wrapped
+from anysim_legged.support import turned
 
 STANDING, STEPPING = 0, 1
 CORRECTION = np.array([0.03, 0.03, 0.05])
@@ -189,7 +190,7 @@ class Footsteps:
             self._path[env] = turned(self._path[env], vx, vy, rate)
             wanted = turned(turned(self._lead[env], *self._path[env]), 0.0, self._half(stance), 0.0)
             miss = wanted - self._target[env]
-            miss[2] = wrapped(miss[2])
+            miss[2] = P.wrapped(miss[2])
             self._target[env] += np.clip(miss, -CORRECTION, CORRECTION)
         self._next[env] = command if np.abs(command).max() > 1e-3 else 0.0
 

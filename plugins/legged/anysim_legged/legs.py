@@ -143,7 +143,7 @@ class Legs:
             thigh * np.sin(along) + shank * np.sin(along + knee), thigh * np.cos(along) + shank * np.cos(along + knee)
         )
         about = np.stack([hip, np.arctan2(x, z) - own, knee - (bent - along)], axis=-1)
-        joints = self.home + _wrapped(self.signs * about - self.home)
+        joints = self.home + P.wrapped(self.signs * about - self.home)
         foot, jacobian = self._chain(joints)
         return Postures(joints + np.where(reached[..., None], solve(jacobian, feet - foot), 0.0), jacobian, reached)
 
@@ -157,11 +157,6 @@ def _joints(robot: ControlledRobot, name: str, joints: tuple[str, ...], where: s
     if unknown:
         raise TaskError(f"{where}: leg '{name}' names a joint '{unknown[0]}' that the robot has not")
     return [known.index(joint) for joint in joints]
-
-
-def _wrapped(angle: Array) -> Array:
-    """The same angle in [-pi, pi)."""
-    return (angle + np.pi) % (2.0 * np.pi) - np.pi
 
 
 def solve(matrix: Array, right: Array) -> Array:

@@ -53,10 +53,5 @@ def turned(place: Array, x: float, y: float, yaw: float) -> Array:
     return np.array([place[0] + c * x - s * y, place[1] + s * x + c * y, place[2] + yaw])
 
 
-def wrapped(angle: float) -> float:
-    """The same angle [rad] between -pi and pi."""
-    return float((angle + np.pi) % (2.0 * np.pi) - np.pi)
-
-
 def _turn(a: Array, b: Array, c: Array) -> float:
     return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))

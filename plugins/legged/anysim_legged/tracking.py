@@ -12,8 +12,9 @@ import numpy as np
 from anysim.controllers.base import ChannelView
 from anysim.conventions import Array
 from anysim.errors import TaskError
+from anysim.math import pose as P
 from anysim_legged.contact import Pushes, pressure, share_of, shifted
-from anysim_legged.support import convex_hull, nearest_inside, shrunken, wrapped
+from anysim_legged.support import convex_hull, nearest_inside, shrunken
 from anysim_legged.wholebody import Targets, WholeBody
 
 FOLLOW = 25.0
@@ -130,7 +131,7 @@ class Tracker:
         """Where the measured robot would come to rest (2,), in the plan's frame."""
         com, speed, places = self.whole.measured(*seen)
         shares, feet = self._shares[env], self._feet[env]
-        turn = sum(float(shares[k]) * wrapped(feet[k, 2] - places[k, 2]) for k in range(2))
+        turn = sum(float(shares[k]) * P.wrapped(feet[k, 2] - places[k, 2]) for k in range(2))
         c, s = np.cos(turn), np.sin(turn)
         rotation = np.array([[c, -s], [s, c]])
         offset = (shares[:, None] * (feet[:, :2] - places[:, :2] @ rotation.T)).sum(axis=0)

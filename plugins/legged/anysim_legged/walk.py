@@ -7,10 +7,10 @@ import numpy as np
 from anysim.controllers.base import ChannelView, Command, Controller
 from anysim.conventions import Array
 from anysim.errors import TaskError
+from anysim.math import pose as P
 from anysim_legged.catch import HELD, STANDS, beyond, lowered
 from anysim_legged.footsteps import Feet, Footsteps, Gait
 from anysim_legged.preview import Preview
-from anysim_legged.support import wrapped
 from anysim_legged.tracking import Tracker
 from anysim_legged.wholebody import Targets, about_z
 
@@ -140,7 +140,7 @@ class LipmWalk(Controller):
         self._steps.advance(env, command, self._middles(feet.places), self.tracker.lead[env])
         feet = self._steps.now(env)
         left, right = feet.places
-        heading = right[2] + wrapped(left[2] - right[2]) / 2.0
+        heading = right[2] + P.wrapped(left[2] - right[2]) / 2.0
         turn = about_z(heading)
         aside = feet.places[:, :2] - self._com[env] - self._under @ turn[:2, :2].T
         height = self._height - lowered(aside, feet.lift)

@@ -13,7 +13,8 @@ from anysim.controllers.base import ChannelView
 from anysim.conventions import Array
 from anysim.errors import TaskError
 from anysim.kinematics.pinocchio_model import RobotModel, from_se3, pinocchio, se3
-from anysim_legged.support import sole_corners, turned, wrapped
+from anysim.math import pose as P
+from anysim_legged.support import sole_corners, turned
 
 FEET = (20.0, 10.0)
 """Weights of a foot's place [1/m] and turn [1/rad]: what stands must not move."""
@@ -112,7 +113,9 @@ class WholeBody:
     def _seen(self) -> Array:
         frames = [self.model.data.oMf[f] for f in self.feet]
         yaws = [np.arctan2(f.rotation[1, 0], f.rotation[0, 0]) for f in frames]
-        return np.array([[*f.translation[:2], wrapped(y - o)] for f, y, o in zip(frames, yaws, self.yaws, strict=True)])
+        return np.array(
+            [[*f.translation[:2], P.wrapped(y - o)] for f, y, o in zip(frames, yaws, self.yaws, strict=True)]
+        )
 
     def corners(self, places: Array, standing: Sequence[bool], soles: Array) -> Array:
         """Corners (P, 2) on the ground of those soles (2, 4) that stand."""

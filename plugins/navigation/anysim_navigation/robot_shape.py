@@ -22,8 +22,7 @@ def discs_of(world: World, robot: str, frame_pose: Array) -> Array:
     """(D, 3) discs that cover the outline of a robot as it begins, in its frame, which is at a pose (7,) then."""
     outlines = np.concatenate(_outlines(world, robot))
     off = np.concatenate([outlines - frame_pose[:2], np.zeros((len(outlines), 1))], axis=1)
-    x, y, z, w = frame_pose[3:]
-    half = 0.5 * np.arctan2(2 * (x * y + z * w), 1 - 2 * (y * y + z * z))
+    half = 0.5 * P.yaw(frame_pose[3:])
     level = np.array([0.0, 0.0, np.sin(half), np.cos(half)])
     local = P.rotate_inverse(np.tile(level, (len(off), 1)), off)[:, :2]
     return discs_over(local.min(axis=0), local.max(axis=0))

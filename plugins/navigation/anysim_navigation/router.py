@@ -110,7 +110,7 @@ class BaseRouter:
             mode = self.mode[env]
             if mode == Mode.ROUTE:
                 continue
-            turn = _wrapped(self.target[env, 2] - pose[row, 2])
+            turn = P.wrapped(self.target[env, 2] - pose[row, 2])
             if mode == Mode.DIRECT:
                 way = in_frame(pose[row], self.target[env : env + 1, :2])[0]
                 self.twist[env] = self._pose_control.twist(way, turn, self.twist[env])
@@ -194,7 +194,7 @@ class BaseRouter:
         if progress.left < NEAR and not car and self._straight(field, pose, end):
             self.mode[env] = Mode.DIRECT
             way = in_frame(pose, end[None])[0]
-            self.twist[env] = self._pose_control.twist(way, _wrapped(self.target[env, 2] - pose[2]), self.twist[env])
+            self.twist[env] = self._pose_control.twist(way, P.wrapped(self.target[env, 2] - pose[2]), self.twist[env])
             return
         if self._later[env] and progress.left < CUSP:
             progress = self._progress[env] = Progress(self._later[env].pop(0))
@@ -221,9 +221,7 @@ class BaseRouter:
 
 def pose_of(pose: Array) -> Array:
     """(n, 3) x, y [m] and yaw [rad] of poses (n, 7)."""
-    x, y, z, w = np.moveaxis(pose[:, 3:], -1, 0)
-    yaw = np.arctan2(2 * (x * y + z * w), 1 - 2 * (y * y + z * z))
-    return np.concatenate([pose[:, :2], yaw[:, None]], axis=1)
+    return np.concatenate([pose[:, :2], P.yaw(pose[:, 3:])[:, None]], axis=1)
 
 
 def in_base(twist: Array, pose: Array) -> Array:
@@ -237,10 +235,6 @@ def frame_pose(scene: SceneView, frame: Frame) -> Array:
     at = scene.engine.index.frame(frame.name)
     local = np.array([*at.position, *at.quaternion])
     return P.compose(scene.engine.world.initial_body_pose[at.body], local)
-
-
-def _wrapped(angle: float) -> float:
-    return float((angle + np.pi) % (2 * np.pi) - np.pi)
 
 
 def _roomiest(field: Array, cell: float) -> Array:

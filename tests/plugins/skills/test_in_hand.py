@@ -11,11 +11,11 @@ from onnx import TensorProto, helper, numpy_helper
 
 from anysim import make
 from anysim.errors import TaskError
+from anysim.math import pose as P
 from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
-from anysim_skills.moving.base import yaw_of
 
 WORLD = Path(__file__).parent / "worlds/in_hand.yaml"
 PUSHING = ("joint_9.0", "joint_1.0")
@@ -69,7 +69,7 @@ def test_the_bar_is_turned_to_the_goal(engine: str, yaw: float, tmp_path: Path) 
     with make(WORLD, engine=engine, overrides=[policy(tmp_path), goal]) as env:
         assert turned(env) is Outcome.OK
         env.scene.look(None)
-        assert yaw_of(env.scene.frame("bar").quaternion)[0] == pytest.approx(yaw, abs=0.1)
+        assert P.yaw(env.scene.frame("bar").quaternion)[0] == pytest.approx(yaw, abs=0.1)
 
 
 def test_a_bar_that_is_gone_is_lost(tmp_path: Path) -> None:

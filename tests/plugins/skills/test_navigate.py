@@ -11,7 +11,6 @@ from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
-from anysim_skills.moving.base import wrapped, yaw_of
 from anysim_skills.moving.navigate import Navigate
 from tests.plugins.skills.test_pick import rollout
 
@@ -45,7 +44,7 @@ def arrives(engine: str, base: str, num_envs: int) -> None:
         env.scene.look(None)
         here, goal = env.scene.robot("base").base, env.scene.frame("spot").pose
         assert (np.linalg.norm(here.position[:, :2] - goal[:, :2], axis=1) < 0.02).all()
-        assert (np.abs(wrapped(yaw_of(here.quaternion) - yaw_of(goal[:, 3:]))) < np.deg2rad(2)).all()
+        assert (np.abs(P.wrapped(P.yaw(here.quaternion) - P.yaw(goal[:, 3:]))) < np.deg2rad(2)).all()
         assert (np.abs(here.twist[:, [0, 1, 5]]) < 0.02).all()
 
 
@@ -81,7 +80,7 @@ def test_the_way_back_is_driven_backwards_where_it_is_short() -> None:
         yaws = []
         while not policy.skill.outcome[0]:
             env.step(policy.act(np.array([0])))
-            yaws.append(float(yaw_of(env.scene.robot("base").base.quaternion)[0]))
+            yaws.append(float(P.yaw(env.scene.robot("base").base.quaternion)[0]))
         assert isinstance(policy.skill, Navigate)
         assert np.abs(yaws).max() < 0.1
 

@@ -108,7 +108,7 @@ class Base(Mover):
     def pose(self, at: Array) -> Array:
         """(n, 3) x, y [m] and yaw [rad]; `at` are rows of the scene."""
         pose = self.frame.pose[at]
-        return np.concatenate([pose[:, :2], yaw_of(pose[:, 3:])[:, None]], axis=1)
+        return np.concatenate([pose[:, :2], P.yaw(pose[:, 3:])[:, None]], axis=1)
 
     def go(self, ids: Array, target: Array) -> None:
         """Go to x, y, yaw (n, 3)."""
@@ -117,7 +117,7 @@ class Base(Mover):
     def left(self, ids: Array, at: Array) -> tuple[Array, Array]:
         """(n,) [m] and (n,) [rad] that are left of the way."""
         now, target = self.pose(at), self.target[ids]
-        return P.norm(target[:, :2] - now[:, :2]), np.abs(wrapped(target[:, 2] - now[:, 2]))
+        return P.norm(target[:, :2] - now[:, :2]), np.abs(P.wrapped(target[:, 2] - now[:, 2]))
 
     def speed(self, at: Array) -> tuple[Array, Array]:
         """(n,) [m/s] over the ground and (n,) [rad/s] about the vertical."""
@@ -128,7 +128,7 @@ class Base(Mover):
         """Write the action of these envs, which the scene looks at."""
         now = self.pose(np.arange(len(ids)))
         way = self.target[ids, :2] - now[:, :2]
-        turn = wrapped(self.target[ids, 2] - now[:, 2])
+        turn = P.wrapped(self.target[ids, 2] - now[:, 2])
         cosine, sine = np.cos(now[:, 2]), np.sin(now[:, 2])
         forward, aside = cosine * way[:, 0] + sine * way[:, 1], cosine * way[:, 1] - sine * way[:, 0]
         drive = self._straight if self.sideways else self._turning
@@ -166,14 +166,3 @@ class Base(Mover):
         size = np.abs(angle)
         braking = np.sqrt(2 * self.pace.turn_braking * size)
         return np.sign(angle) * np.minimum(np.minimum(self.pace.rate, braking), GAIN * size)
-
-
-def yaw_of(quaternion: Array) -> Array:
-    """(n,) [rad] the direction of the frame's x axis over the ground."""
-    x, y, z, w = np.moveaxis(quaternion, -1, 0)
-    return np.arctan2(2 * (x * y + z * w), 1 - 2 * (y * y + z * z))
-
-
-def wrapped(angle: Array) -> Array:
-    """The same angles within [-pi, pi)."""
-    return (angle + np.pi) % (2 * np.pi) - np.pi

@@ -15,7 +15,7 @@ from anysim.math import pose as P
 from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.phases import GO_ON, STAY
 from anysim_skills.arm import ARRIVED, TURN_RATE, Arm
-from anysim_skills.moving.base import GAIN, Base, wrapped
+from anysim_skills.moving.base import GAIN, Base
 
 AHEAD = 2.0
 """Control steps by which the motion of the base is foreseen: one to the next command, one that joints are behind."""
@@ -97,14 +97,14 @@ class MobileServoL:
         arm.go(ids, self._foreseen(at, command), limits.speed)
         arm.command[ids] = arm.target[ids]
         here = P.norm(target[:, :3] - arm.tool.position[at]) < ARRIVED
-        left, turn = np.hypot(*(stand - self.base.pose(at))[:, :2].T), wrapped(stand - self.base.pose(at))[:, 2]
+        left, turn = np.hypot(*(stand - self.base.pose(at))[:, :2].T), P.wrapped(stand - self.base.pose(at))[:, 2]
         there = here & (left < SETTLED) & (np.abs(turn) < SETTLED)
         return np.where(self.deviation[ids] > limits.deviation, _CONTROLLER, np.where(there, GO_ON, STAY))
 
     def _drive(self, ids: Array, at: Array, stand: Array, share: Array) -> None:
         """A goal of the base that is only so far away that it goes at the share (n,) of its speed."""
         now, limits = self.base.pose(at), self.limits
-        way, turn = stand[:, :2] - now[:, :2], wrapped(stand[:, 2] - now[:, 2])
+        way, turn = stand[:, :2] - now[:, :2], P.wrapped(stand[:, 2] - now[:, 2])
         near = share * limits.base_speed / GAIN / np.maximum(P.norm(way), 1e-9)
         most = share * limits.base_rate / GAIN
         target = np.concatenate(

@@ -7,12 +7,13 @@ import numpy as np
 from pydantic import Field
 
 from anysim.conventions import Array
+from anysim.math import pose as P
 from anysim.skills.phases import Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.grasping.grasp import Metres, Speed
-from anysim_skills.moving.base import Base, yaw_of
+from anysim_skills.moving.base import Base
 from anysim_skills.moving.mobile import MobileLimits, MobileMoveL
 from anysim_skills.recovery.homing import Homing
 
@@ -61,5 +62,5 @@ class MobileReach(PhasedSkill):
     def _enter(self, ids: Array, at: Array) -> None:
         target = np.concatenate([self._goal.position[at], self.arm.tool.quaternion[at]], axis=1)
         place = self._stand.pose[at]
-        stand = np.concatenate([place[:, :2], yaw_of(place[:, 3:])[:, None]], axis=1)
+        stand = np.concatenate([place[:, :2], P.yaw(place[:, 3:])[:, None]], axis=1)
         self.move.begin(ids, at, target, stand)

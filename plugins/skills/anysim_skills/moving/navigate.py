@@ -15,7 +15,7 @@ from anysim.task.env import TaskEnv
 from anysim.task.scene import Frame, RobotView
 from anysim_skills.arm import Arm
 from anysim_skills.grasping.grasp import Metres
-from anysim_skills.moving.base import Base, Pace, yaw_of
+from anysim_skills.moving.base import Base, Pace
 from anysim_skills.recovery.way_around import WayAround
 
 HELD_UP = 75
@@ -151,7 +151,7 @@ class Navigate(DriveTo):
         del ids
         goal = self._goal.pose[at]
         if self._heading:
-            yaw = yaw_of(goal[:, 3:])
+            yaw = P.yaw(goal[:, 3:])
         else:
             way = goal[:, :2] - self.base.pose(at)[:, :2]
             yaw = np.arctan2(way[:, 1], way[:, 0])

@@ -6,7 +6,7 @@ from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.env import TaskEnv
 from anysim_skills.arm import Arm
-from anysim_skills.moving.base import Base, wrapped
+from anysim_skills.moving.base import Base
 from anysim_skills.moving.footprint import Footprint
 
 DIRECTIONS, RINGS = 16, 4
@@ -44,7 +44,7 @@ class Stands:
         here = self._base.pose(at)
         stands = np.concatenate([middle[:, None, :2], np.zeros((len(ids), 1, 1))], axis=2) + self._offsets
         way = stands - here[:, None]
-        way[..., 2] = wrapped(way[..., 2])
+        way[..., 2] = P.wrapped(way[..., 2])
         effort = P.norm(way[..., :2]) + TURN_COST * np.abs(way[..., 2])
         around, free = self._footprint.look(ids, at), np.ones(effort.shape, dtype=bool)
         for share in np.linspace(0.0, 1.0, WAY_POINTS + 1)[1:]:

@@ -8,7 +8,7 @@ from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.env import TaskEnv
 from anysim.task.scene import RobotView
-from anysim_skills.moving.base import Base, wrapped
+from anysim_skills.moving.base import Base
 from anysim_skills.moving.footprint import Around, Footprint
 
 DIRECTIONS = 24
@@ -52,7 +52,7 @@ class WayAround:
         One that cannot move sideways looks to where it drives on all of it.
         """
         way, free = end - begin, np.ones(begin.shape[:2], dtype=bool)
-        way[..., 2] = wrapped(way[..., 2])
+        way[..., 2] = P.wrapped(way[..., 2])
         ahead = np.arctan2(way[..., 1], way[..., 0])
         for share in np.linspace(0.0, 1.0, POINTS + 1):
             pose = begin + share * way
