@@ -1,23 +1,22 @@
 """A camera that keeps its place beside something that moves, or goes round it, without an action."""
 
-from collections.abc import Mapping
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
-from anysim.controllers.base import ChannelView, Command, Controller
+from anysim.controllers.base import ChannelView, Command
 from anysim.conventions import Array
 from anysim.errors import NameLookupError, TaskError
 from anysim.math import pose as P
 from anysim.model.frames import find_frame
 from anysim.model.world import JointType
+from anysim_cameras.controller import HandHeld
 from anysim_cameras.easing import brake_speed, shortened, toward
-from anysim_cameras.shake import Shake
 from anysim_schemas.base import Vec3
 
 
-class CameraFollow(Controller):
+class CameraFollow(HandHeld):
     """Keeps the camera at an offset from a frame, and carries it round the vertical through that frame if asked.
 
     It has no action. The speed of the frame is fed forward, so that the camera does not trail behind it; when the frame
@@ -43,10 +42,11 @@ class CameraFollow(Controller):
         shake: Annotated[float, Field(ge=0, description="root mean square of what a hand adds [m]")] = 0.0,
         tremor: Annotated[float, Field(gt=0, le=10, description="how quickly the hand shakes [Hz]")] = 1.5,
     ) -> None:
-        super().__init__(channel, num_envs)
+        super().__init__(channel, num_envs, shake, tremor)
         world = channel.robot.world
-        joints = [world.joints[world.actuators[a].joint] for a in channel.actuators]
-        if [(j.type, j.axis) for j in joints] != [(JointType.PRISMATIC, tuple(axis)) for axis in np.eye(3).tolist()]:
+        if [(j.type, j.axis) for j in self.joints] != [
+            (JointType.PRISMATIC, tuple(axis)) for axis in np.eye(3).tolist()
+        ]:
             raise TaskError(
                 f"camera_follow needs three sliding joints along x, y and z; "
                 f"'{channel.robot.name}.{channel.name}' has others"
@@ -57,12 +57,10 @@ class CameraFollow(Controller):
             raise TaskError(f"frame: {error}") from None
         self._body, self._local = found.body, P.pose(found.position, found.quaternion)
         self.dim, self.low, self.high = 0, np.zeros(0), np.zeros(0)
-        self.period = self._dt = channel.robot.dt
         self._offset, self._heading, self._turn = offset, axes == "heading", turn
         self._speed, self._acceleration, self._response = speed, acceleration, response
-        self._rows = {name: np.zeros((num_envs, 3)) for name in ("position", "velocity", "wanted", "offset")}
+        self._rows |= {name: np.zeros((num_envs, 3)) for name in ("position", "velocity", "wanted", "offset")}
         self._rows["ticks"] = np.zeros((num_envs, 1))
-        self._shake = Shake(channel, num_envs, shake, tremor)
 
     def reset(self, env_ids: Array, targets: Array) -> None:
         self._rows["position"][env_ids], self._rows["velocity"][env_ids] = targets, 0.0
@@ -111,11 +109,3 @@ class CameraFollow(Controller):
         self._rows["ticks"][rows] = state["ticks"] + 1.0
         extra = self._shake.step(rows)
         return Command(position=kept + extra.position, velocity=velocity + extra.velocity)
-
-    def snapshot(self, env_ids: Array) -> dict[str, Array]:
-        return {name: rows[env_ids] for name, rows in self._rows.items()} | self._shake.snapshot(env_ids)
-
-    def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
-        for name, rows in self._rows.items():
-            rows[env_ids] = data[name]
-        self._shake.restore(env_ids, data)

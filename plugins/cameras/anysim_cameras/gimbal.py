@@ -1,19 +1,18 @@
 """A gimbal: three joints that keep a camera level and turn it where it is to look."""
 
-from collections.abc import Mapping
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
-from anysim.controllers.base import ChannelView, Command, Controller
+from anysim.controllers.base import ChannelView, Command
 from anysim.conventions import Array
 from anysim.errors import NameLookupError, TaskError
 from anysim.math import pose as P
 from anysim.model.frames import find_frame
 from anysim.model.world import JointType
+from anysim_cameras.controller import HandHeld
 from anysim_cameras.easing import brake_speed, room_speeds
-from anysim_cameras.shake import Shake
 from anysim_schemas.base import Vec3
 
 _AXES = ("yaw about z", (0.0, 0.0, 1.0)), ("pitch about y", (0.0, 1.0, 0.0)), ("roll about x", (1.0, 0.0, 0.0))
@@ -24,7 +23,7 @@ _HELD, _CONE, _QUICK = 0.02, 1.0, 1.5
 is gone over where a level view would have to turn so many times quicker than the joint does."""
 
 
-class CameraGimbal(Controller):
+class CameraGimbal(HandHeld):
     """Keeps the horizon level in the world, however its carrier is tilted, and looks at a place or in a direction.
 
     The action is yaw and pitch [rad], positive pitch down: added to where `look_at` is, else from the heading of the
@@ -53,32 +52,28 @@ class CameraGimbal(Controller):
         shake: Annotated[float, Field(ge=0, description="root mean square of what a hand adds [rad]")] = 0.0,
         tremor: Annotated[float, Field(gt=0, le=10, description="how quickly the hand shakes [Hz]")] = 1.5,
     ) -> None:
-        super().__init__(channel, num_envs)
-        world = channel.robot.world
-        joints = [world.joints[world.actuators[a].joint] for a in channel.actuators]
-        fitting = len(joints) == 3 and all(
+        super().__init__(channel, num_envs, shake, tremor)
+        fitting = len(self.joints) == 3 and all(
             joint.type is JointType.REVOLUTE and np.allclose(joint.axis, axis)
-            for joint, (_, axis) in zip(joints, _AXES, strict=True)
+            for joint, (_, axis) in zip(self.joints, _AXES, strict=True)
         )
         if not fitting:
             raise TaskError(
                 f"camera_gimbal needs three turning joints, {', '.join(name for name, _ in _AXES)}, one on the other; "
                 f"'{channel.robot.name}.{channel.name}' has others"
             )
-        self._carrier, self._eye = world.bodies[joints[0].body].parent, joints[2].body
+        self._carrier, self._eye = channel.robot.world.bodies[self.joints[0].body].parent, self.joints[2].body
         self._target = None if look_at is None else self._found(look_at)
         self.labels = type(self).labels if steered else ()
         self.dim = len(self.labels)
         self.high = np.array([np.pi, np.pi / 2])[: self.dim]
         self.low = -self.high
-        self.period = self._dt = channel.robot.dt
         self._rate, self._acceleration, self._response = rate, acceleration, response
-        self._rows = {name: np.zeros((num_envs, 3)) for name in ("position", "velocity", "wanted")}
+        self._rows |= {name: np.zeros((num_envs, 3)) for name in ("position", "velocity", "wanted")}
         self._rows["asked"] = np.zeros((num_envs, 2))
         self._rows["fresh"] = np.ones((num_envs, 1))
         self._rows["over"], self._rows["aside"] = np.zeros((num_envs, 1)), np.zeros((num_envs, 2))
         self._goes_over = bool(np.isinf(channel.upper[1]))
-        self._shake = Shake(channel, num_envs, shake, tremor)
 
     def _found(self, look_at: Vec3 | str) -> tuple[int, Array]:
         """The body, or -1 for the world, and the point in its frame."""
@@ -177,11 +172,3 @@ class CameraGimbal(Controller):
         along = np.arctan2(rate[:, 1], rate[:, 0])
         along = along + np.where(np.abs(P.wrapped(along - now)) > np.pi / 2, np.pi, 0.0)
         return np.where(passes, along, np.where(far < _HELD, now, yaw))
-
-    def snapshot(self, env_ids: Array) -> dict[str, Array]:
-        return {name: rows[env_ids] for name, rows in self._rows.items()} | self._shake.snapshot(env_ids)
-
-    def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
-        for name, rows in self._rows.items():
-            rows[env_ids] = data[name]
-        self._shake.restore(env_ids, data)

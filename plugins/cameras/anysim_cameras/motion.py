@@ -6,16 +6,17 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from anysim.controllers.base import ChannelView, Command, Controller
+from anysim.controllers.base import ChannelView, Command
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.model.world import JointType
+from anysim_cameras.controller import CameraController
 from anysim_cameras.easing import brake_speed, minimum_jerk, move_time, room_speeds, shortened, toward
 
 _STATE = ("position", "velocity", "target", "start", "goal", "elapsed", "duration")
 
 
-class CameraMotion(Controller):
+class CameraMotion(CameraController):
     """Moves the joints of a channel smoothly, commanding their drives anew in every physics step.
 
     The action is a velocity for each joint [m/s, rad/s], or its place [m, rad]. The limits hold for the straight line
@@ -40,9 +41,8 @@ class CameraMotion(Controller):
         response: Annotated[float, Field(gt=0, le=50, description="damped: how fast it settles [1/s]")] = 6.0,
     ) -> None:
         super().__init__(channel, num_envs)
-        world, k = channel.robot.world, len(channel)
-        self.dim, self.period, self._dt = k, channel.robot.dt, channel.robot.dt
-        slides = [world.joints[world.actuators[a].joint].type is JointType.PRISMATIC for a in channel.actuators]
+        self.dim = k = len(channel)
+        slides = [joint.type is JointType.PRISMATIC for joint in self.joints]
         together = np.flatnonzero(slides)
         self._groups = [(together, speed, acceleration)] if len(together) else []
         self._groups += [(np.array([i]), rate, angular_acceleration) for i in np.flatnonzero(~np.array(slides))]
@@ -56,7 +56,7 @@ class CameraMotion(Controller):
             self.low = np.where(self._endless, -np.pi, channel.lower)
             self.high = np.where(self._endless, np.pi, channel.upper)
         groups = len(self._groups)
-        self._rows = {name: np.zeros((num_envs, groups if name in ("elapsed", "duration") else k)) for name in _STATE}
+        self._rows |= {name: np.zeros((num_envs, groups if name in ("elapsed", "duration") else k)) for name in _STATE}
 
     def reset(self, env_ids: Array, targets: Array) -> None:
         for name, rows in self._rows.items():
@@ -143,10 +143,3 @@ class CameraMotion(Controller):
             return super().action_for(targets, env_ids)
         turned = np.where(self._endless, P.wrapped(targets), targets)
         return np.minimum(np.maximum(turned, self.low), self.high)
-
-    def snapshot(self, env_ids: Array) -> dict[str, Array]:
-        return {name: rows[env_ids] for name, rows in self._rows.items()}
-
-    def restore(self, env_ids: Array, data: Mapping[str, Array]) -> None:
-        for name, rows in self._rows.items():
-            rows[env_ids] = data[name]
