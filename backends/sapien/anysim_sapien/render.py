@@ -146,9 +146,8 @@ class Painter:
         seen = camera.get_picture("Segmentation")[..., 1]
         if "rgb" in images:
             drawn = camera.get_picture("Color")
-            behind = (
-                0.0 if self._shader == "default" else (1.0 - drawn[..., 3:]) * look.background
-            )  # the others have black
+            blended = self._shader == "default"  # the other shaders have black behind glass
+            behind = 0.0 if blended else (1.0 - drawn[..., 3:]) * look.background
             color = np.where(seen[..., None] > 0, drawn[..., :3] + behind, look.background)
             images["rgb"][row] = np.rint(np.clip(color, 0.0, 1.0) * 255)
         if "depth" in images:

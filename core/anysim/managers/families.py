@@ -37,7 +37,7 @@ class FamilyManager(Manager):
                 )
             values = checked(made.spec, spec.params, f"world.families.{name}")
             assert isinstance(values, Spec)
-            own = tuple(i for i, entity in enumerate(world.entities) if entity.category == name)
+            own = tuple(i for i, one in enumerate(world.entities) if (one.family, one.category) == (spec.kind, name))
             self._kinds[name], self._settings[name] = made, (values, own)
         self._everyone = np.arange(self.streams.num_envs)
 

@@ -59,6 +59,8 @@ class Avatars(Family):
         entities = [world.entities[i] for i in setting.entities]
         self.names = tuple(entity.name for entity in entities)
         self.people, count = people(setting.spec), setting.spec.count
+        self._every_leg = Legs.of(self.people, setting.engine.num_envs)
+        self._every_size = Sizes.of(self.people, setting.engine.num_envs)
         self.drives(body for entity in entities for body in range(entity.body_start, entity.body_stop))
         self._motions: list[Motion | None] = [None] * len(clips.CLIPS)
         self._clips = list(clips.CLIPS)
@@ -331,10 +333,10 @@ class Avatars(Family):
         return Gait(*(self._take(env_ids, key) for key in Gait._fields))
 
     def _legs(self, env_ids: Array) -> Legs:
-        return Legs.of(self.people, len(env_ids))
+        return Legs(*(rows[: len(env_ids) * len(self.people)] for rows in self._every_leg))
 
     def _sizes(self, env_ids: Array) -> Sizes:
-        return Sizes.of(self.people, len(env_ids))
+        return Sizes(*(rows[: len(env_ids) * len(self.people)] for rows in self._every_size))
 
     def _keep(self, env_ids: Array, gait: Gait, more: Mapping[str, Array]) -> None:
         """Write rows back."""

@@ -1,4 +1,4 @@
-"""What controllers of cameras share: joints that are told where to be in each physics step, and rows that are kept."""
+"""The base of camera controllers: joints that are told where to be in each physics step, and rows that are kept."""
 
 from collections.abc import Mapping
 
