@@ -145,7 +145,7 @@ def output_of(limits: BaseLimits, labels: tuple[str, ...], twist: Array, wheelba
 
 
 def discs_over(low: Array, high: Array, least: int = 1) -> Array:
-    """(D, 3) discs in a row, `least` or more, that cover a rectangle from `low` to `high` (2,) [m] along its longer side."""
+    """(D, 3) discs in a row, `least` or more, over a rectangle from `low` to `high` (2,) [m], along its longer side."""
     size, middle = high - low, (high + low) / 2
     long = int(size[1] > size[0])
     count = max(least, int(np.ceil(size[long] / size[1 - long] - 0.2)))
