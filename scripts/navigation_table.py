@@ -34,7 +34,7 @@ def failed(one: dict[str, Any]) -> str:
     """What ended the drives that failed, and the rooms."""
     by_word: dict[str, list[str]] = {}
     for seed, word in one["failed"].items():
-        by_word.setdefault(WORDS.get(word, word), []).append(seed)
+        by_word.setdefault(WORDS[word] if word in WORDS else str(word), []).append(seed)
     return "; ".join(f"{word}: {', '.join(seeds)}" for word, seeds in by_word.items())
 
 

@@ -11,8 +11,8 @@ from anysim.errors import AnysimError
 from anysim.math.statistics import wilson
 from anysim_navigation.drive_bench import BASES, Drive, Ridden
 
-PLACES = (0, 0, 2, 2, 1, 3, 0)
-"""Decimals of the fields of a drive that are kept."""
+PLACES = {"seconds": 2, "length": 2, "hardest": 1, "tick": 3}
+"""Decimals of fields of a drive that are kept."""
 
 
 class Cell(NamedTuple):
@@ -47,7 +47,7 @@ class DriveStore:
 
     def add(self, cell: Cell, one: Drive) -> None:
         """Keep a drive, in the file too."""
-        kept = Drive(*(round(v, places) if isinstance(v, float) else v for v, places in zip(one, PLACES, strict=True)))
+        kept = one._replace(**{key: round(getattr(one, key), places) for key, places in PLACES.items()})
         self.drives.setdefault(cell, []).append(kept)
         if self.path is None:
             return
