@@ -7,7 +7,8 @@ import numpy as np
 
 from anysim.assets.model import ImportedModel
 from anysim.conventions import Array
-from anysim.model.world import Body, BodyKind, Capsule, Geom, Inertial, Quat, Surface, Vec3
+from anysim.math import pose as P
+from anysim.model.world import Body, BodyKind, Capsule, Geom, Inertial, Quat, Site, Surface, Vec3
 
 BONES = (
     "pelvis",
@@ -30,6 +31,10 @@ BONES = (
 PARENTS = (-1, 0, 1, 1, 1, 3, 4, 5, 6, 0, 0, 9, 10, 11, 12)
 MASS = 1e5
 """[kg] of a body that is driven: what it meets changes its velocity by a millionth and not where it goes."""
+OVER = 0.045
+"""[m] above a palm what is put into it may be held."""
+BITE = 0.045
+"""[m] before a mouth is the middle of a spoon that it eats from."""
 _SKIN = ((0.94, 0.78, 0.66), (0.80, 0.60, 0.46), (0.55, 0.38, 0.27), (0.36, 0.24, 0.17))
 _CLOTHES = (
     (0.17, 0.32, 0.56),
@@ -123,6 +128,32 @@ def capsules(one: Proportions) -> list[tuple[float, float, Vec3, Quat]]:
     return found
 
 
+def segments(one: Proportions) -> tuple[Array, Array]:
+    """The ends (2, 15, 3) of the axes of the capsules in the frames of their links, and their radii (15,) [m]."""
+    found = capsules(one)
+    half = np.array([half for _, half, _, _ in found])
+    axis = np.stack([P.rotate(np.array(turn), np.array([0.0, 0.0, 1.0])) for *_, turn in found])
+    place = np.array([place for *_, place, _ in found])
+    return np.stack([place - half[:, None] * axis, place + half[:, None] * axis]), np.array([r for r, *_ in found])
+
+
+def sites(one: Proportions) -> tuple[Site, ...]:
+    """Frames: `mouth`, x out of the face; `left_palm` and its kin, z out of the skin and x towards the fingers.
+
+    `bite` is BITE before the mouth, where the middle of what it is fed from is brought.
+
+    `left_over_palm` is OVER above it, where what is offered to a hand is brought.
+    """
+    radii = [capsule[0] for capsule in capsules(one)]
+    outwards: Quat = (sqrt(0.5), 0.0, sqrt(0.5), 0.0)
+    face = sqrt(max(radii[2] ** 2 - 0.025**2, 0.0))
+    found = [Site(name, 2, (face + ahead, 0.0, one.neck - 0.05)) for name, ahead in (("mouth", 0.0), ("bite", BITE))]
+    for name, bones, above in (("palm", (7, 8), 0.0), ("over_palm", (7, 8), OVER), ("forearm_top", (5, 6), 0.0)):
+        for side, bone in zip(("left", "right"), bones, strict=True):
+            found.append(Site(f"{side}_{name}", bone, (radii[bone] + above, 0.0, 0.0), outwards))
+    return tuple(found)
+
+
 def model(name: str, one: Proportions, poses: Array) -> ImportedModel:
     """The bodies of an avatar, at poses (15, 7) of its links in the world."""
     skin, shirt, trousers = one.colors
@@ -156,5 +187,6 @@ def model(name: str, one: Proportions, poses: Array) -> ImportedModel:
         tuple(bodies),
         geoms=tuple(geoms),
         geom_links=tuple(BONES[g.body] if g.body else "" for g in geoms),
+        sites=sites(one),
         links=links,
     )
