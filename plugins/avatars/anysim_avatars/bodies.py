@@ -31,6 +31,8 @@ BONES = (
 PARENTS = (-1, 0, 1, 1, 1, 3, 4, 5, 6, 0, 0, 9, 10, 11, 12)
 MASS = 1e5
 """[kg] of a body that is driven: what it meets changes its velocity by a millionth and not where it goes."""
+CHIN, WRIST = 0.05, 0.03
+"""[m] of a mouth below the middle of a head; of `forearm_top` from the middle of a forearm."""
 OVER = 0.045
 """[m] above a palm what is put into it may be held."""
 BITE = 0.045
@@ -122,7 +124,8 @@ def capsules(one: Proportions) -> list[tuple[float, float, Vec3, Quat]]:
         if name == "pelvis":
             found.append((r, one.hip * 0.8, (0.0, 0.0, 0.0), across))
         elif name == "head":
-            found.append((r, 0.028 * slim, (0.0, 0.0, size[bone] / 2), along))
+            half = 0.028 * slim
+            found.append((r, half, (0.0, 0.0, size[bone] + 0.065 * one.height - half - r), along))  # up to its height
         else:
             found.append((r, half, (0.0, 0.0, 0.0), along))
     return found
@@ -142,16 +145,22 @@ def sites(one: Proportions) -> tuple[Site, ...]:
 
     `bite` is BITE before the mouth, where the middle of what it is fed from is brought.
 
-    `left_over_palm` is OVER above it, where what is offered to a hand is brought.
+    `left_over_palm` is OVER above it, where what is offered to a hand is brought; `left_forearm_top` is nearer to the
+    wrist than to the elbow.
     """
-    radii = [capsule[0] for capsule in capsules(one)]
+    found = capsules(one)
+    radii, half, middle = [capsule[0] for capsule in found], found[2][1], found[2][2][2]
     outwards: Quat = (sqrt(0.5), 0.0, sqrt(0.5), 0.0)
-    face = sqrt(max(radii[2] ** 2 - 0.025**2, 0.0))
-    found = [Site(name, 2, (face + ahead, 0.0, one.neck - 0.05)) for name, ahead in (("mouth", 0.0), ("bite", BITE))]
-    for name, bones, above in (("palm", (7, 8), 0.0), ("over_palm", (7, 8), OVER), ("forearm_top", (5, 6), 0.0)):
+    face = sqrt(radii[2] ** 2 - max(CHIN - half, 0.0) ** 2)
+    sites = [Site(name, 2, (face + ahead, 0.0, middle - CHIN)) for name, ahead in (("mouth", 0.0), ("bite", BITE))]
+    for name, bones, above, along in (
+        ("palm", (7, 8), 0.0, 0.0),
+        ("over_palm", (7, 8), OVER, 0.0),
+        ("forearm_top", (5, 6), 0.0, WRIST),
+    ):
         for side, bone in zip(("left", "right"), bones, strict=True):
-            found.append(Site(f"{side}_{name}", bone, (radii[bone] + above, 0.0, 0.0), outwards))
-    return tuple(found)
+            sites.append(Site(f"{side}_{name}", bone, (radii[bone] + above, 0.0, along), outwards))
+    return tuple(sites)
 
 
 def model(name: str, one: Proportions, poses: Array) -> ImportedModel:
