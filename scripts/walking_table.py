@@ -6,6 +6,7 @@ The first two files are made by these commands, which go on where they were cut 
 
     python benchmarks/walking.py trot=expert shipped -n 32 --out docs/walking.json
     python benchmarks/walking.py "seed 1=runs/…-1/policy.onnx" --rows commands -n 32 --out docs/walking.json
+    python benchmarks/rough_walking.py shipped -n 8 --out docs/rough_walking.json
     python benchmarks/walking.py mujoco=runs/…/policy.onnx … --rows drawn -n 32 --out docs/walking_matrix.json
 
 `--check` writes nothing and exits with 1 if the page has drifted from these files.
@@ -25,6 +26,7 @@ from anysim.math.statistics import wilson
 STORE, TRAININGS = ROOT / "docs" / "walking.json", ROOT / "docs" / "walking_trainings.json"
 MATRIX = ROOT / "docs" / "walking_matrix.json"
 """Walks of a policy of each engine, which is its name, on all of them."""
+CROSSINGS = ROOT / "docs" / "rough_walking.json"
 GOAL = 0.06
 """[m/s] of the error that a policy should have at most."""
 POLICIES, GROUPS = ("trot", "shipped"), ("drawn", "shoves", "floors")
@@ -120,6 +122,38 @@ def seeds() -> str:
             table(["training", "command", *engines], lines),
         ]
     )
+
+
+def crossings() -> str:
+    """How many tiles of each kind and level a policy gets over, on each engine."""
+    found: list[Cell] = json.loads(CROSSINGS.read_text("utf-8"))
+    found.sort(key=lambda one: one["engine"])
+    levels = range(len(found[0]["through"]))
+    lines = []
+    for k, kind in enumerate(found[0]["kinds"]):
+        for one in found:
+            own = [_told(one["through"][level][k], one["fell"][level][k]) for level in levels]
+            lines.append([kind, one["engine"], str(one["n"]), *own])
+    for one in found:
+        total = one["n"] * len(one["kinds"])
+        own = [_share(sum(one["through"][level]), total) for level in levels]
+        lines.append(["all", one["engine"], str(total), *own])
+    return "\n\n".join(
+        [
+            "How many of n tiles of each kind and level were left on foot, and how many ended in a fall where any did; of all "
+            "kinds together the share, with Wilson's interval at 95 %:",
+            table(["kind", "engine", "n", *(f"level {level}" for level in levels)], lines),
+        ]
+    )
+
+
+def _told(through: int, fell: int) -> str:
+    return f"{through}" + (f" ({fell} fell)" if fell else "")
+
+
+def _share(count: int, total: int) -> str:
+    low, high = wilson(count, total)
+    return f"{count / total:.0%} ({100 * low:.0f} to {100 * high:.0f})"
 
 
 def engines() -> str:
