@@ -279,8 +279,9 @@ class RemoteEnv:
             if len(ids) == self.num_envs and np.array_equal(ids, np.arange(self.num_envs)):
                 self._obs[name] = obs[name].copy()
                 continue
-            fresh = np.zeros((self.num_envs, *rows.shape[1:]), rows.dtype) if kept is None else kept.copy()
-            fresh[ids] = obs[name]
+            seen = obs[name]
+            fresh = np.zeros((self.num_envs, *seen.shape[1:]), seen.dtype) if kept is None else kept.copy()
+            fresh[ids] = seen
             self._obs[name] = fresh
         self._stale = False
         return obs

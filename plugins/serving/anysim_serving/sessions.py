@@ -27,6 +27,7 @@ class Session:
     """A simulator that belongs to the client who created it: `key` is known to that client alone.
 
     Attributes:
+        ready: whether it is built; how long that may take is limited elsewhere.
         attached: whether a connection has it now.
         last: of the greatest number of a message so far; each must be greater.
         counts: operations, errors, steps (of one env each) and bytes.
@@ -38,6 +39,7 @@ class Session:
     num_envs: int
     simulator: Simulator
     spec: dict[str, Any] = field(default_factory=dict)
+    ready: bool = False
     attached: bool = False
     last: int = 0
     counts: Counter[str] = field(default_factory=Counter)
@@ -79,6 +81,10 @@ class Sessions:
             AnysimError: what is asked for is not served, or cannot be built.
         """
         count = await asyncio.to_thread(self._checked, request)
+        while self._ending and len(self.open) + len(self._ending) >= self.limits.sessions:
+            ends = next(iter(self._ending))  # memory that is being freed may be had again
+            await asyncio.to_thread(ends.join, _UNTIL_FREED_S)
+            self._ending.discard(ends)
         self._refuse_more(count)
         ident = secrets.token_hex(8)
         simulator = Simulator(ident, lambda: self.catalogue.build(request), self.limits.waiting)
@@ -93,6 +99,7 @@ class Sessions:
                 raise TookTooLong(f"building took longer than {self.limits.op_s:g} s") from None
             raise
         self.total["created"] += 1
+        session.ready, session.used = True, time.monotonic()
         return session
 
     def _checked(self, request: SessionRequest) -> int:
@@ -100,7 +107,7 @@ class Sessions:
         return self.catalogue.envs(request)
 
     def _refuse_more(self, count: int) -> None:
-        if len(self.open) + len(self._ending) >= self.limits.sessions:
+        if len(self.open) >= self.limits.sessions:
             raise LimitExceeded(f"there are {self.limits.sessions} sessions, which is the most; end one, or wait")
         taken = sum(session.num_envs for session in self.open.values())
         if taken + count > self.limits.total_envs:
@@ -178,7 +185,7 @@ class Sessions:
         now, limits = time.monotonic(), self.limits
         for session in list(self.open.values()):
             idle = now - session.used
-            if not session.simulator.built.done():  # is being built, which has a limit of its own
+            if not session.ready:
                 continue
             if session.simulator.ended:
                 self.end(session, "died")

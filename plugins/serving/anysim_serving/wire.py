@@ -38,7 +38,7 @@ def pack(message: Mapping[str, Any]) -> bytes:
         tree = encode(message, arrays)
     except SnapshotError as error:
         raise MalformedFrame(str(error).replace("a snapshot's file", "a message")) from None
-    rows = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
+    rows = {name: array if array.flags.c_contiguous else array.copy() for name, array in arrays.items()}
     head = {"tree": tree, "arrays": [[name, array.dtype.str, array.shape] for name, array in rows.items()]}
     try:
         packed = msgpack.packb(head)
@@ -77,7 +77,7 @@ def _unpacked(view: memoryview) -> dict[str, Any]:
     length = int.from_bytes(view[4:8], "little")
     if length > min(HEAD_BYTES, len(view) - 8):
         raise MalformedFrame(f"the head of the frame should have {length} bytes, and {len(view) - 8} follow")
-    head = msgpack.unpackb(view[8 : 8 + length], object_hook=_large, strict_map_key=True)
+    head = msgpack.unpackb(view[8 : 8 + length], object_hook=_large, ext_hook=_refuse, timestamp=1)
     if not isinstance(head, dict) or head.keys() != {"tree", "arrays"} or not isinstance(head["arrays"], list):
         raise MalformedFrame("the head of a frame has the keys `tree` and `arrays`")
     if len(head["arrays"]) > MOST_ARRAYS:
@@ -124,6 +124,10 @@ def _small(value: Any) -> Any:
     if isinstance(value, int) and not -(1 << 63) <= value < 1 << 64:
         return {_INT: hex(value)}
     return value
+
+
+def _refuse(code: int, _: bytes) -> Any:
+    raise MalformedFrame(f"msgpack's extension {code} has no place in a frame")
 
 
 def _large(found: dict[Any, Any]) -> Any:
