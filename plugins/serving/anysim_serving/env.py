@@ -15,7 +15,7 @@ from anysim.math import arrays
 from anysim.task.contract import STATUS_NAMES, Obs, StepResult
 from anysim.task.snapshot import EnvSnapshot
 from anysim_schemas.run import RunSpec
-from anysim_serving.errors import ConnectionLost, ServiceError
+from anysim_serving.errors import ServiceError
 from anysim_serving.link import Link
 from anysim_serving.operations import Chunk, from_jpegs, snapshot_data, snapshot_of
 from anysim_serving.shared import MARK, Shared
@@ -81,7 +81,8 @@ class RemoteEnv:
         self._full = full or None
         self._shared: Shared | None = None
         self._obs: dict[str, Array | None] = {}
-        """The latest of all envs; None where it is still in the shared memory."""
+        """The latest of all envs; None where a caller has it, in shared memory."""
+        self._slot: int | None = None
         self._code, self._running = np.zeros(self.num_envs, np.int8), np.zeros(self.num_envs, bool)
         self._info: dict[str, Array] = {}
         self._stale, self._closed = True, False
@@ -93,14 +94,14 @@ class RemoteEnv:
 
     def _negotiate(self) -> None:
         terms = self._link.call("share")
-        found = Shared.open(terms) if terms else None
         if not terms:
             return
-        agreed = self._link.call("share", proof=np.zeros(0, np.uint8) if found is None else found[1])["shared"]
+        found = Shared.found(terms)
+        agreed = self._link.call("share", proof=np.zeros(0, np.uint8) if found is None else found.proof)["shared"]
         if found is not None and agreed:
-            self._shared = found[0]
+            self._shared = found
         elif found is not None:
-            found[0].close()
+            found.close()
 
     # ------------------------------------------------------------------ facts
 
@@ -133,9 +134,10 @@ class RemoteEnv:
     def obs(self) -> Obs:
         """The latest observation of all envs, as after the last reset or step."""
         self._refresh()
-        return {
-            name: self._from_memory(name) if rows is None else rows.copy() for name, rows in self._obs.items()
-        }
+        if missing := [name for name, rows in self._obs.items() if rows is None]:
+            seen = self._rows(self._ask("observe", keys=missing), np.arange(self.num_envs))
+            return {name: seen[name] if rows is None else rows.copy() for name, rows in self._obs.items()}
+        return {name: rows.copy() for name, rows in self._obs.items() if rows is not None}
 
     @property
     def status(self) -> Array:
@@ -196,7 +198,7 @@ class RemoteEnv:
         """Ask for a step; `end_step` waits for it. In between nothing else may be asked."""
         given = {k: np.asarray(v) for k, v in action.items()} if isinstance(action, Mapping) else np.asarray(action)
         self._stale = True
-        self._link.send("step", action=given, mask=mask, full=self._full, **self._form)
+        self._send("step", action=given, mask=mask, full=self._full, **self._form)
 
     def end_step(self) -> StepResult:
         """What the step gave."""
@@ -250,11 +252,14 @@ class RemoteEnv:
     # ------------------------------------------------------------------ what is asked, and what is kept of it
 
     def _ask(self, op: str, **sent: Any) -> dict[str, Any]:
-        for name in [name for name, rows in self._obs.items() if rows is None]:
-            self._obs[name] = self._from_memory(name)  # the answer may write over it
-        self._stale = self._stale or op not in ("snapshot", "render", "info")
-        self._link.send(op, **sent)
+        self._stale = self._stale or op not in ("snapshot", "render", "info", "observe")
+        self._send(op, **sent)
         return self._heard()
+
+    def _send(self, op: str, **sent: Any) -> None:
+        if self._shared is not None and self._slot is None:
+            self._slot = self._shared.slot()
+        self._link.send(op, slot=self._slot, **sent)
 
     def _heard(self) -> dict[str, Any]:
         answer = self._link.receive()
@@ -270,11 +275,16 @@ class RemoteEnv:
     def _rows(self, answer: Mapping[str, Any], ids: Array) -> Obs:
         """Observations of some envs; they are kept, and what is returned is not written to later."""
         obs: Obs = {}
+        leased: dict[str, Array] = {}
         for name, rows in answer["obs"].items():
             if isinstance(rows, dict) and MARK in rows:
-                obs[name], self._obs[name] = self._from_memory(name), None
+                if not leased and self._shared is not None and self._slot is not None:
+                    leased, self._slot = self._shared.arrays(self._slot), None
+                obs[name], self._obs[name] = leased[name], None
                 continue
             obs[name] = from_jpegs(rows) if isinstance(rows, dict) else rows
+            if self._obs.get(name, 0) is None:  # a caller has the others, who may have changed them
+                continue
             kept = self._obs.get(name)
             if len(ids) == self.num_envs and np.array_equal(ids, np.arange(self.num_envs)):
                 self._obs[name] = obs[name].copy()
@@ -285,11 +295,6 @@ class RemoteEnv:
             self._obs[name] = fresh
         self._stale = False
         return obs
-
-    def _from_memory(self, name: str) -> Array:
-        if self._shared is None:
-            raise ConnectionLost("the images are gone with their service")
-        return self._shared.take(name)
 
     def _chosen(self, mask: Array | None) -> Array:
         if mask is None:

@@ -224,8 +224,9 @@ class PooledEnv:
         for member in asked:
             try:
                 assert member.env is not None
-                reward[member.start : member.stop] = member.env.end_step().reward
-                self._gather(member)
+                result = member.env.end_step()
+                reward[member.start : member.stop] = result.reward
+                self._gather(member, result.obs)
             except LOST as error:
                 self._lose(member, error)
                 reward[member.ids[wanted[member.start : member.stop]]] = np.nan
@@ -344,7 +345,7 @@ class PooledEnv:
             raise refused
         return answers
 
-    def _gather(self, member: Member) -> None:
+    def _gather(self, member: Member, obs: Obs | None = None) -> None:
         """Keep what a member's envs are like now."""
         if member.env is None:
             return
@@ -352,7 +353,7 @@ class PooledEnv:
         self._code[rows], self._running[rows] = member.env._code, member.env._running
         for name, values in member.env.info.items():
             self._info[name][rows] = values
-        for name, values in member.env.obs.items():
+        for name, values in (member.env.obs if obs is None else obs).items():
             self._obs[name][rows] = values
 
     def _lose(self, member: Member, error: Exception) -> None:

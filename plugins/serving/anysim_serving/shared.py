@@ -2,16 +2,22 @@
 
 The service makes a file in memory under a name that nobody can guess and that only its user can open, writes a number
 into it, and tells the name. A client that finds the number there is on the same machine and of the same user, and says
-so; the name is removed before the first image, so nothing is left when both end, however they end. From then on an
-answer has the place of its images, and the client copies them before it asks again.
+so; the name is removed then, so nothing is left when both end, however they end.
+
+The memory has several slots. With each message the client names one that is free, and gets arrays that lie in it: they
+are the caller's own, and the slot is free again when the last of them is gone. Where none is free, images are sent.
 """
 
+import contextlib
+import ctypes
 import hmac
+import mmap
 import os
 import re
 import secrets
 import stat
 import tempfile
+import weakref
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Self
@@ -21,74 +27,92 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.task.contract import Obs
 from anysim.task.env import TaskEnv
-from anysim_processes.shared_memory import SharedArrays
+from anysim_serving.errors import MalformedFrame
+from anysim_serving.operations import image_kind
 
 MARK = "shared"
+SLOTS = 4
 _NAME = re.compile(r"anysim-[0-9a-f]{32}")
-_PROOF, _PROOF_BYTES = "proof", 32
-_FREE_S = 16 << 20
-"""Bytes of memory that stay free of what is shared."""
+_PROOF_BYTES = 32
+_PAGE = 4096
+_LEFT_FREE = 16 << 20
+"""Bytes of memory that what is shared must leave free."""
+Layout = dict[str, tuple[int, tuple[int, ...], str]]
+"""By name the place in a slot, the shape and the type of an array."""
 
 
 def _folder() -> Path:
     return Path("/dev/shm") if Path("/dev/shm").is_dir() else Path(tempfile.gettempdir())  # noqa: S108
 
 
-class Shared:
-    """Memory for the images of one env, on either side."""
+def _layout(shapes: Mapping[str, tuple[int, ...]], num_envs: int) -> tuple[Layout, int]:
+    """The layout of a slot and its size."""
+    layout: Layout = {}
+    place = 0
+    for name, shape in shapes.items():
+        kind = image_kind(name)
+        layout[name] = (place, (num_envs, *shape), kind)
+        place += -(-int(np.prod((num_envs, *shape))) * np.dtype(kind).itemsize // _PAGE) * _PAGE
+    return layout, place
 
-    def __init__(self, name: str, arrays: SharedArrays) -> None:
-        self.name, self._arrays = name, arrays
-        self._proof = b""
 
-    # ------------------------------------------------------------------ the service's side
+class Offer:
+    """The service's side: memory for the images of one env, and the proof that a client is near."""
+
+    def __init__(self, name: str, memory: mmap.mmap, layout: Layout, slot_bytes: int) -> None:
+        self.name, self._memory, self._layout, self._slot_bytes = name, memory, layout, slot_bytes
+        self._proof = secrets.token_bytes(_PROOF_BYTES)
+        memory[:_PROOF_BYTES] = self._proof
+        self._arrays = [
+            {
+                key: np.ndarray(shape, kind, memory, _PAGE + slot * slot_bytes + place)
+                for key, (place, shape, kind) in layout.items()
+            }
+            for slot in range(SLOTS)
+        ]
 
     @classmethod
-    def offer(cls, env: TaskEnv) -> "Self | None":
+    def of(cls, env: TaskEnv) -> "Self | None":
         """Memory for an env's images under a fresh name; None where it has none, or there is no room."""
-        layout = {
-            name: ((env.num_envs, *shape), kind) for name, (shape, kind) in _images(env.image_shapes).items()
-        } | {_PROOF: ((_PROOF_BYTES,), "|u1")}
-        size = sum(int(np.prod(shape)) * np.dtype(kind).itemsize for shape, kind in layout.values())
-        if len(layout) == 1:
+        layout, slot_bytes = _layout(env.image_shapes, env.num_envs)
+        if not layout:
             return None
-        name = f"anysim-{secrets.token_hex(16)}"
-        path = _folder() / name
+        size, path = _PAGE + SLOTS * slot_bytes, _folder() / f"anysim-{secrets.token_hex(16)}"
         try:
             space = os.statvfs(path.parent)
-            if space.f_bavail * space.f_frsize < size + _FREE_S:
+            if space.f_bavail * space.f_frsize < size + _LEFT_FREE:
                 return None
             descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0), 0o600)
             try:
-                os.ftruncate(descriptor, size + 64 * len(layout))
-                shared = cls(name, SharedArrays(layout, descriptor))
+                os.ftruncate(descriptor, size)
+                return cls(path.name, mmap.mmap(descriptor, size), layout, slot_bytes)
             except BaseException:
-                os.close(descriptor)
                 path.unlink(missing_ok=True)
                 raise
+            finally:
+                os.close(descriptor)
         except OSError:
             return None
-        shared._proof = secrets.token_bytes(_PROOF_BYTES)
-        shared._arrays[_PROOF][:] = np.frombuffer(shared._proof, np.uint8)
-        return shared
 
     def terms(self) -> dict[str, Any]:
         """What the client has to know to find it."""
-        layout = [[name, list(shape), kind] for name, (shape, kind) in self._arrays.layout.items()]
-        return {"name": self.name, "layout": layout}
+        layout = {name: [place, list(shape), kind] for name, (place, shape, kind) in self._layout.items()}
+        return {"name": self.name, "layout": layout, "slot_bytes": self._slot_bytes, "slots": SLOTS}
 
     def confirmed(self, proof: object) -> bool:
         """Whether the client found what was written there; the name is removed in any case."""
         self._unlink()
         given = proof.tobytes() if isinstance(proof, np.ndarray) else b""
-        return bool(self._proof) and hmac.compare_digest(given, self._proof)
+        return hmac.compare_digest(given, self._proof)
 
-    def put(self, obs: Obs) -> dict[str, Any]:
-        """Observations with their images moved here; rows of a part of the envs travel as they are."""
+    def put(self, obs: Obs, slot: object) -> dict[str, Any]:
+        """Observations with their images moved to a slot; rows of a part of the envs travel as they are."""
+        if type(slot) is not int or not 0 <= slot < SLOTS:
+            raise MalformedFrame(f"slots of the shared memory are 0 to {SLOTS - 1}")
         answer: dict[str, Any] = {}
         for name, rows in obs.items():
-            there = self._arrays[name] if name in self._arrays.layout and isinstance(rows, np.ndarray) else None
-            if there is None or there.shape != rows.shape:
+            there = self._arrays[slot].get(name)
+            if there is None or not isinstance(rows, np.ndarray) or there.shape != rows.shape:
                 answer[name] = rows
             else:
                 np.copyto(there, rows)
@@ -103,47 +127,73 @@ class Shared:
     def close(self) -> None:
         """Give the memory back. May be called twice."""
         self._unlink()
-        self._arrays.close()
+        self._arrays.clear()
+        self._memory.close()
 
-    # ------------------------------------------------------------------ the client's side
+
+class Shared:
+    """The client's side: slots, and which of them are free.
+
+    Attributes:
+        proof: what the service wrote there.
+    """
+
+    def __init__(self, memory: mmap.mmap, layout: Layout, slot_bytes: int, slots: int) -> None:
+        self._memory, self._layout, self._slot_bytes = memory, layout, slot_bytes
+        self._free = set(range(slots))
+        self.proof = np.frombuffer(memory[:_PROOF_BYTES], np.uint8)
 
     @classmethod
-    def open(cls, terms: Mapping[str, Any]) -> "tuple[Self, Array] | None":
-        """The memory that a service offered, and what is written there; None if it is not here.
+    def found(cls, terms: Mapping[str, Any]) -> "Self | None":
+        """The memory that a service offered; None if it is not here.
 
         A service is not trusted with more than its own memory: the name has one form and one folder, and what is there
         must be a file of this user and of the stated size.
         """
-        name, layout = terms.get("name"), terms.get("layout")
-        if not isinstance(name, str) or not _NAME.fullmatch(name) or not isinstance(layout, list):
+        name = terms.get("name")
+        if not isinstance(name, str) or not _NAME.fullmatch(name):
             return None
         try:
             descriptor = os.open(_folder() / name, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
         except OSError:
             return None
         try:
-            forms = {str(key): (tuple(map(int, shape)), str(kind)) for key, shape, kind in layout}
-            size = sum(int(np.prod(shape)) * np.dtype(kind).itemsize for shape, kind in forms.values())
-            about = os.fstat(descriptor)
-            right = stat.S_ISREG(about.st_mode) and about.st_uid == os.getuid() and about.st_size >= size > 0
-            if not right or any(np.dtype(kind).kind not in "biuf" for _, kind in forms.values()):
-                raise ValueError
-            shared = cls("", SharedArrays(forms, descriptor))
-        except (ValueError, TypeError, OSError):
-            os.close(descriptor)
+            slot_bytes, slots = int(terms["slot_bytes"]), int(terms["slots"])
+            layout = {
+                str(key): (int(place), tuple(map(int, shape)), str(kind))
+                for key, (place, shape, kind) in terms["layout"].items()
+            }
+            for place, shape, kind in layout.values():
+                size = int(np.prod(shape)) * np.dtype(kind).itemsize
+                if np.dtype(kind).kind not in "biuf" or min(shape) < 0 or not 0 <= place <= slot_bytes - size:
+                    return None
+            about, size = os.fstat(descriptor), _PAGE + slots * slot_bytes
+            if not stat.S_ISREG(about.st_mode) or about.st_uid != os.getuid() or about.st_size != size:
+                return None
+            return cls(mmap.mmap(descriptor, size), layout, slot_bytes, slots)
+        except (ValueError, TypeError, KeyError, AttributeError, OSError):
             return None
-        return shared, shared._arrays[_PROOF].copy()
+        finally:
+            os.close(descriptor)
 
-    def take(self, name: str, into: Array | None = None) -> Array:
-        """A copy of an array, in memory of its own or in `into`."""
-        there = self._arrays[name]
-        if into is None:
-            return there.copy()
-        np.copyto(into, there)
-        return into
+    def slot(self) -> int | None:
+        """A slot that nobody reads any more; None if there is none."""
+        return self._free.pop() if self._free else None
 
+    def release(self, slot: int) -> None:
+        """The slot was not used."""
+        self._free.add(slot)
 
-def _images(shapes: Mapping[str, tuple[int, ...]]) -> dict[str, tuple[tuple[int, ...], str]]:
-    from anysim_serving.operations import image_kind
+    def arrays(self, slot: int) -> dict[str, Array]:
+        """The images in a slot, which is free again when the last array, and whatever views it, is gone."""
+        lease = (ctypes.c_char * self._slot_bytes).from_buffer(self._memory, _PAGE + slot * self._slot_bytes)
+        weakref.finalize(lease, self._free.add, slot).atexit = False
+        return {
+            name: np.frombuffer(lease, kind, int(np.prod(shape)), place).reshape(shape)
+            for name, (place, shape, kind) in self._layout.items()
+        }
 
-    return {name: (shape, image_kind(name)) for name, shape in shapes.items()}
+    def close(self) -> None:
+        """Give the memory back, or leave that to the last array in it."""
+        with contextlib.suppress(BufferError):
+            self._memory.close()

@@ -22,7 +22,7 @@ from anysim_serving import wire
 from anysim_serving.errors import MalformedFrame, ServiceBusy, ServiceError, status_of, to_data
 from anysim_serving.operations import perform
 from anysim_serving.sessions import Session, Sessions
-from anysim_serving.shared import Shared
+from anysim_serving.shared import Offer
 
 _log = logging.getLogger(__name__)
 WITHOUT_ANSWER = 64
@@ -37,8 +37,8 @@ class _Link:
     """What a connection keeps beside its session: the memory that it shares, if it does."""
 
     session: Session
-    shared: Shared | None = None
-    offered: Shared | None = None
+    shared: Offer | None = None
+    offered: Offer | None = None
     ahead: int = 0
     """Messages that were read and not answered yet."""
     answers: "asyncio.Queue[Future[Any] | bytes | None]" = field(default_factory=lambda: asyncio.Queue(WITHOUT_ANSWER))
@@ -104,12 +104,8 @@ async def _read(websocket: WebSocket, sessions: Sessions, link: _Link) -> None:
         else:
             session.counts["bytes_in"] += len(data)
             try:
-                if link.ahead >= (1 if link.shared is not None else limits.waiting):
-                    raise ServiceBusy(
-                        "the last answer was not read yet, and its images are in shared memory: one message at a time"
-                        if link.shared is not None
-                        else f"{limits.waiting} messages wait already; read their answers first"
-                    )
+                if link.ahead >= limits.waiting:
+                    raise ServiceBusy(f"{limits.waiting} messages wait already; read their answers first")
                 answer = sessions.submit(session, lambda env, data=data: _answer(env, data, link, sessions))
                 link.ahead += 1
             except AnysimError as error:
@@ -147,8 +143,8 @@ def _answer(env: TaskEnv, data: bytes, link: _Link, sessions: Sessions) -> bytes
         answer = perform(env, message, sessions.limits)
         if message["op"] in ("step", "step_chunk"):
             session.counts["steps"] += int(answer["steps"].sum()) if "steps" in answer else _stepped(env, message)
-        if link.shared is not None and "obs" in answer:
-            answer["obs"] = link.shared.put(answer["obs"])
+        if link.shared is not None and "obs" in answer and message.get("slot") is not None:
+            answer["obs"] = link.shared.put(answer["obs"], message["slot"])
         return wire.pack({"seq": number, "ok": answer})
     except Exception as error:
         if status_of(error) >= 500:
@@ -179,7 +175,7 @@ def _share(env: TaskEnv, message: Mapping[str, Any], link: _Link) -> dict[str, A
             if old is not None:
                 old.close()
         link.shared = None
-        offered = Shared.offer(env)
+        offered = Offer.of(env)
         link.session.counts["shares"] += offered is not None
         link.offered = offered
         return {} if offered is None else offered.terms()
