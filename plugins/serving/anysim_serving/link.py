@@ -9,11 +9,14 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+import numpy as np
+
+from anysim.conventions import Array
 from anysim.errors import TaskError
 from anysim.math.arrays import shown
 from anysim_serving import wire
 from anysim_serving.access import TOKEN_ENV, kept_token
-from anysim_serving.errors import ConnectionLost, ServiceError, from_data
+from anysim_serving.errors import ConnectionLost, LimitExceeded, ServiceError, from_data
 from anysim_serving.settings import PROTOCOL
 from anysim_serving.websocket import Refused, WebSocket
 
@@ -139,7 +142,7 @@ class Link:
         if self._socket is None:
             raise ConnectionLost("the env is closed, or its service is gone; connect anew")
         try:
-            answer = wire.unpack(self._socket.receive())
+            answer = wire.unpack(self._frame(self._socket))
         except ServiceError:
             self.drop()
             raise
@@ -149,6 +152,18 @@ class Link:
             self.drop()
             raise ConnectionLost(f"the service answered {answer.get('seq')} where {self._number} was asked")
         return answer["ok"]
+
+    def _frame(self, socket: WebSocket) -> Array:
+        message = socket.receive()
+        total = wire.announced(message)
+        if not total:
+            return message
+        if total > LARGEST:
+            raise LimitExceeded(f"an answer of the service has {total} bytes, more than {LARGEST}")
+        frame, place = np.empty(total, np.uint8), 0
+        while place < total:
+            place += len(socket.receive(frame[place:]))
+        return frame
 
     def call(self, op: str, **arguments: Any) -> dict[str, Any]:
         """Ask, and wait for the answer."""

@@ -20,7 +20,6 @@ from anysim_serving.settings import PROTOCOL, Limits
 
 IMAGES = ("raw", "jpeg", "none")
 """Forms of images in an answer: arrays, JPEG of the colour images, or left out."""
-_CODES = {str(word): code for code, word in enumerate(STATUS_NAMES)}
 
 
 class Chunk(NamedTuple):
@@ -257,7 +256,7 @@ def _state(env: TaskEnv) -> dict[str, Any]:
 
 
 def _codes(words: Array) -> Array:
-    return np.array([_CODES[str(word)] for word in words.reshape(-1)], dtype=np.int8).reshape(words.shape)
+    return (words[..., None] == STATUS_NAMES).argmax(axis=-1).astype(np.int8)
 
 
 OPERATIONS: Mapping[str, Callable[[Call], dict[str, Any]]] = {

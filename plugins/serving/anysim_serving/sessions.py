@@ -162,7 +162,8 @@ class Sessions:
             TookTooLong: it goes on beyond its time; the session is ended.
         """
         try:
-            return await asyncio.wait_for(asyncio.wrap_future(future), self.limits.op_s)
+            async with asyncio.timeout(self.limits.op_s):
+                return await asyncio.wrap_future(future)
         except TimeoutError:
             self.end(session, "too_long")
             raise TookTooLong(f"an operation took longer than {self.limits.op_s:g} s; the session has ended") from None

@@ -28,8 +28,9 @@ _log = logging.getLogger(__name__)
 WITHOUT_ANSWER = 64
 """Answers that may wait for a client to read them; then no more is read of it."""
 SEND_S = 60.0
-"""How long one answer may take to be read [s]; then the client is taken for gone."""
+"""How long one message of an answer may take to be read [s]; then the client is taken for gone."""
 _IDLE_CLOSE = 4408
+Frame = list[wire.Part]
 
 
 @dataclass
@@ -41,7 +42,7 @@ class _Link:
     offered: Offer | None = None
     ahead: int = 0
     """Messages that were read and not answered yet."""
-    answers: "asyncio.Queue[Future[Any] | bytes | None]" = field(default_factory=lambda: asyncio.Queue(WITHOUT_ANSWER))
+    answers: "asyncio.Queue[Future[Any] | Frame | None]" = field(default_factory=lambda: asyncio.Queue(WITHOUT_ANSWER))
 
 
 async def serve_socket(websocket: WebSocket, sessions: Sessions, ident: str, key: str) -> None:
@@ -100,7 +101,7 @@ async def _read(websocket: WebSocket, sessions: Sessions, link: _Link) -> None:
         data = message.get("bytes")
         session.counts["operations"] += 1
         if data is None:
-            answer: Future[Any] | bytes = _error(0, MalformedFrame("messages are binary frames; text is not read"))
+            answer: Future[Any] | Frame = _error(0, MalformedFrame("messages are binary frames; text is not read"))
         else:
             session.counts["bytes_in"] += len(data)
             try:
@@ -110,7 +111,7 @@ async def _read(websocket: WebSocket, sessions: Sessions, link: _Link) -> None:
                 link.ahead += 1
             except AnysimError as error:
                 answer = _error(0, error)
-        if isinstance(answer, bytes):
+        if isinstance(answer, list):
             session.counts["errors"] += 1
         await link.answers.put(answer)
 
@@ -124,28 +125,30 @@ async def _write(websocket: WebSocket, sessions: Sessions, link: _Link) -> None:
             except AnysimError as error:
                 answer = _error(0, error)
             link.ahead -= 1
-        session.counts["bytes_out"] += len(answer)
+        session.counts["bytes_out"] += sum(len(part) for part in answer)
         try:
-            await asyncio.wait_for(websocket.send_bytes(answer), SEND_S)
+            for message in wire.messages(answer):
+                async with asyncio.timeout(SEND_S):
+                    await websocket.send({"type": "websocket.send", "bytes": message})
         except TimeoutError:
             _log.warning("session %s: its client does not read", session.id)
             return
 
 
-def _answer(env: TaskEnv, data: bytes, link: _Link, sessions: Sessions) -> bytes:
+def _answer(env: TaskEnv, data: bytes, link: _Link, sessions: Sessions) -> Frame:
     """The frame that answers one; on the thread of the simulator. Nothing is raised but what ends the thread."""
     number, session = 0, link.session
     try:
         message = wire.unpack(data)
         number = _number(message, session)
         if message.get("op") == "share":
-            return wire.pack({"seq": number, "ok": _share(env, message, link)})
+            return wire.parts({"seq": number, "ok": _share(env, message, link)})
         answer = perform(env, message, sessions.limits)
         if message["op"] in ("step", "step_chunk"):
             session.counts["steps"] += int(answer["steps"].sum()) if "steps" in answer else _stepped(env, message)
         if link.shared is not None and "obs" in answer and message.get("slot") is not None:
             answer["obs"] = link.shared.put(answer["obs"], message["slot"])
-        return wire.pack({"seq": number, "ok": answer})
+        return wire.parts({"seq": number, "ok": answer})
     except Exception as error:
         if status_of(error) >= 500:
             _log.exception("session %s: an operation failed", session.id)
@@ -188,5 +191,5 @@ def _share(env: TaskEnv, message: Mapping[str, Any], link: _Link) -> dict[str, A
     return {"shared": False}
 
 
-def _error(number: int, error: BaseException) -> bytes:
-    return wire.pack({"seq": number, "error": to_data(error)})
+def _error(number: int, error: BaseException) -> Frame:
+    return wire.parts({"seq": number, "error": to_data(error)})

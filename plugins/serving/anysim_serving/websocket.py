@@ -132,19 +132,19 @@ class WebSocket:
 
     # ------------------------------------------------------------------ receiving
 
-    def receive(self) -> Array:
-        """The next binary message as bytes (n,) uint8 in memory of its own.
+    def receive(self, into: Array | None = None) -> Array:
+        """The next binary message as bytes (n,) uint8, in memory of its own or at the beginning of `into`.
 
         Raises:
             ConnectionLost: the other side has closed, or nothing came in time.
             LimitExceeded: it is larger than was agreed.
         """
         try:
-            return self._receive()
+            return self._receive(into)
         except OSError as error:
             raise self._lost(error) from None
 
-    def _receive(self) -> Array:
+    def _receive(self, into: Array | None) -> Array:
         parts: list[Array] = []
         total = 0
         while True:
@@ -157,7 +157,12 @@ class WebSocket:
             total += length if kind < _CLOSE else 0
             if total > self._largest:
                 raise LimitExceeded(f"a message of the service has {total} bytes, more than {self._largest}")
-            content = np.empty(length, np.uint8)
+            if into is not None and kind < _CLOSE:
+                if length > len(into):
+                    raise MalformedFrame("the service sent more than it had said")
+                content, into = into[:length], into[length:]
+            else:
+                content = np.empty(length, np.uint8)
             self._fill(memoryview(content))
             if kind == _PING:
                 self._send(_PONG, content.tobytes())

@@ -3,11 +3,12 @@
 A frame is `ASF1`, the length of the head as a little-endian uint32, the head, and then the arrays, each from the next
 multiple of 64 bytes on. The head is `{"tree": …, "arrays": [[name, dtype, shape], …]}`; where an array stands in the
 tree is `{"~array": name}`. The other marks are those of snapshots (`anysim.engine.snapshots.file`), and `~int` for a
-number of more than 64 bits. Nothing in a frame is code: arrays are of truth values, numbers or text, never objects.
+number of more than 64 bits. A service sends a frame of more than `PIECE` bytes in pieces: a message `ASP1` with the length
+of the frame as a little-endian uint64, and then messages that hold it, one after the other. Nothing in a frame is code: arrays are of truth values, numbers or text, never objects.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import msgpack
@@ -18,7 +19,10 @@ from anysim.engine.snapshots.file import decode, encode
 from anysim.errors import SnapshotError
 from anysim_serving.errors import MalformedFrame
 
-MAGIC = b"ASF1"
+MAGIC, IN_PIECES = b"ASF1", b"ASP1"
+PIECE = 1 << 19
+"""Bytes that stay in a processor's cache while they are copied from layer to layer, and travel while the next are."""
+Part = bytes | memoryview
 ALIGNMENT = 64
 HEAD_BYTES = 16 << 20
 """Of the head alone, at most."""
@@ -29,6 +33,15 @@ _INT = "~int"
 
 def pack(message: Mapping[str, Any]) -> bytes:
     """The frame of a tree of mappings, lists, tuples, arrays and plain values; equal messages give equal frames.
+
+    Raises:
+        MalformedFrame: something in it cannot travel.
+    """
+    return b"".join(parts(message))
+
+
+def parts(message: Mapping[str, Any]) -> list[Part]:
+    """The frame of `pack` as what it is made of: its arrays are not copied, and must stay as they are until it is sent.
 
     Raises:
         MalformedFrame: something in it cannot travel.
@@ -46,12 +59,40 @@ def pack(message: Mapping[str, Any]) -> bytes:
         packed = msgpack.packb(_small(head))
     except (ValueError, RecursionError) as error:
         raise MalformedFrame(f"a message cannot be packed: {error}") from None
-    parts: list[Any] = [MAGIC, len(packed).to_bytes(4, "little"), packed]
-    place = 8 + len(packed)
+    made: list[Part] = [MAGIC + len(packed).to_bytes(4, "little") + packed]
+    place = len(made[0])
     for array in rows.values():
-        parts += [bytes(-place % ALIGNMENT), array.reshape(-1).view(np.uint8).data if array.nbytes else b""]
-        place += -place % ALIGNMENT + array.nbytes
-    return b"".join(parts)
+        if gap := -place % ALIGNMENT:
+            made.append(bytes(gap))
+        if array.nbytes:
+            made.append(memoryview(array.reshape(-1).view(np.uint8)))
+        place += gap + array.nbytes
+    return made
+
+
+def messages(frame: Sequence[Part]) -> Iterator[Part]:
+    """The messages that a frame travels in."""
+    total = sum(len(part) for part in frame)
+    if total <= PIECE:
+        yield b"".join(frame)
+        return
+    yield IN_PIECES + total.to_bytes(8, "little")
+    small: list[Part] = []
+    for part in frame:
+        if len(part) <= ALIGNMENT:  # what is between arrays travels with the next one
+            small.append(part)
+            continue
+        for start in range(0, len(part), PIECE):
+            piece = part[start : start + PIECE]
+            yield b"".join([*small, piece]) if small else piece
+            small = []
+    if small:
+        yield b"".join(small)
+
+
+def announced(message: Array) -> int:
+    """The length of the frame that follows in pieces; 0 if the message is the frame itself."""
+    return int.from_bytes(message[4:].tobytes(), "little") if message[:4].tobytes() == IN_PIECES else 0
 
 
 def unpack(frame: "bytes | Array") -> dict[str, Any]:
