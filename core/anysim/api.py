@@ -367,6 +367,26 @@ def make(
     return env
 
 
+def connect(address: str | Sequence[str], **options: object) -> "TaskEnv":
+    """The env of a service: `env = anysim.connect("http://127.0.0.1:8470", task="pick_cube", num_envs=16)`.
+
+    It has the methods of what `make` gives, and its results are the same, bit for bit.
+
+    Args:
+        address: where `anysim serve` listens; or several of them, whose envs are one batch that outlives their loss.
+        options: what the client of the address's scheme takes, such as `task`, `num_envs`, `engine` and `seed`.
+
+    Raises:
+        PluginError: no client of that scheme is installed.
+        AnysimError: nothing answers there, or the service refuses.
+    """
+    first = address if isinstance(address, str) else next(iter(address), "")
+    scheme, separator, _ = first.partition("://")
+    if not separator:
+        raise TaskError(f"a service has an address such as http://127.0.0.1:8470, got {shown(address)}")
+    return registry.load("clients", scheme)(address, **options)
+
+
 def _announce_instances(loaded: LoadedRun, base: Path | None) -> bool:
     """Say what the instances of objects cost where they are very many, from what fewer of them do: whether they are."""
     from anysim.task.cost import CROWD, announce, grown
