@@ -49,3 +49,22 @@ def rows(spec: MatterSpec, long: float, wide: float) -> tuple[Array, Array]:
         middles.append(points)
         ways.append(np.tile([1.0, 0.0, 0.0] if along else [0.0, 1.0, 0.0], (len(points), 1)))
     return np.concatenate(middles), np.concatenate(ways)
+
+
+def scattered(spec: MatterSpec, radius: float, count: int, numbers: np.random.Generator) -> Array:
+    """As many balls (P, 3) [m] at random places of the block, none in another, the lowest first.
+
+    Where no room is found for the last ones, they stand over the block.
+    """
+    from anysim_particles.kernels.packing import pack
+
+    size = np.array(_size(spec))
+    low, high = np.array([-size[0] / 2, -size[1] / 2, 0.0]) + radius, np.array([size[0] / 2, size[1] / 2, size[2]])
+    high = np.maximum(high - radius, low)
+    packed, done, top = np.zeros((count, 3)), 0, high.copy()
+    while done < count:
+        tried = numbers.uniform(low, top, (20 * count, 3))
+        tried = np.ascontiguousarray(tried[_within(spec, tried, radius)])
+        done = pack(tried, low, top, 2 * radius, packed, done)
+        top[2] += 2 * radius
+    return packed[np.argsort(packed[:, 2], kind="stable")]

@@ -8,12 +8,12 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.families.base import FamilySetting
 from anysim.math import pose as P
-from anysim_particles.blocks import lattice, rows
+from anysim_particles.blocks import lattice, rows, scattered
 from anysim_particles.family import Particles
 from anysim_particles.spec import GrainSpec, MatterSpec, RiceSpec, SandSpec
 
-ROOM = 1.1
-"""Width of the cell of a grain at the reset, in widths of the grain."""
+ROOM = 1.25
+"""Width of the room that a grain has at the reset, in widths of the grain: heaps of a denser lattice stand by its order."""
 
 
 class Grains(Particles):
@@ -79,8 +79,7 @@ class Sand(Grains):
         return spec.radius
 
     def disordered(self, env: int) -> Array:
-        shift = self.generator(env, "packing").uniform(-1.0, 1.0, self._block.shape)
-        return self._block + shift * (ROOM - 1.0) * self.ball
+        return scattered(self.grains, self.ball, len(self._block), self.generator(env, "packing"))
 
 
 class Rice(Grains):
@@ -101,7 +100,7 @@ class Rice(Grains):
     @classmethod
     def members(cls, spec: MatterSpec) -> int:
         assert isinstance(spec, RiceSpec)
-        return 1 + max(2, ceil((spec.length - spec.width) / (0.6 * spec.width)))
+        return 1 + max(2, ceil((spec.length - spec.width) / (0.6 * spec.width) - 1e-9))
 
     @classmethod
     def radius(cls, spec: MatterSpec) -> float:
@@ -127,6 +126,6 @@ class Rice(Grains):
         assert isinstance(self.matter, RiceSpec)
         middles, ways = self._grains(self.matter)
         numbers = self.generator(env, "packing")
-        middles = middles + numbers.uniform(-1.0, 1.0, middles.shape) * (ROOM - 1.0) * self.ball
-        ways = ways + numbers.uniform(-1.0, 1.0, ways.shape) * 0.5 * (ROOM - 1.0)
+        middles = middles + numbers.uniform(-0.7, 0.7, middles.shape) * (ROOM - 1.0) * self.ball
+        ways = ways + numbers.uniform(-0.1, 0.1, ways.shape)
         return self._beads(self.matter, middles, ways / P.norm(ways)[:, None])

@@ -4,7 +4,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from anysim_schemas.base import Color, Integer, Name, Positive, Spec, Vec3
+from anysim_schemas.base import Color, Integer, Positive, Reference, Spec, Vec3
 from anysim_schemas.errors import KeyFault
 from anysim_schemas.values import DensityValue, FloatValue, FractionValue, NonNegativeValue, Value
 
@@ -23,9 +23,9 @@ class MatterSpec(Spec):
     )
     position: Value[Vec3] = Field(default=(0.0, 0.0, 0.0), description="the middle of the block's bottom [m]")
     yaw: FloatValue = Field(default=0.0, description="of the block [rad]")
-    at: Name | None = Field(
+    at: Reference | None = Field(
         default=None,
-        description="a body: `position` is then in its frame, turned by its heading alone, as it is placed at the reset",
+        description="a body, or an object: `position` is then in its frame, turned by its heading alone, as it is placed at the reset",
     )
     fill: FractionValue = Field(default=1.0, description="share of the block's particles that are there")
     density: DensityValue = Field(default=1000.0, description="of the matter [kg/m^3]")

@@ -83,7 +83,7 @@ def grain_step(
     still = b.com.shape[0] - 1
     p, near = x.copy(), no_contacts(n)
     pairs, count = np.empty((8 * n + 64, 2), dtype=np.int32), 0
-    load, touched = np.empty(1), np.empty(1)
+    load, touched, rubbed, dragged = np.empty(1), np.empty(1), np.empty(1), np.empty(1)
     skin, used = 0.0, np.inf
     for _ in range(substeps):
         expect(b, gravity, h)
@@ -101,11 +101,11 @@ def grain_step(
         near = find_contacts(p, n, radius + far, geoms, triangles, b, near)
         some = near.begin[n]
         if touched.shape[0] < some:
-            touched = np.empty(2 * some)
+            touched, dragged = np.empty(2 * some), np.empty(2 * some)
         if load.shape[0] < count:
-            load = np.empty(pairs.shape[0])
-        load[:count] = 0.0
-        touched[:some] = 0.0
+            load, rubbed = np.empty(pairs.shape[0]), np.empty(pairs.shape[0])
+        load[:count], rubbed[:count] = 0.0, 0.0
+        touched[:some], dragged[:some] = 0.0, 0.0
         for _ in range(iterations):
             for q in range(count):
                 i, j = pairs[q, 0], pairs[q, 1]
@@ -132,7 +132,9 @@ def grain_step(
                 slide = math.sqrt(u * u + w * w + z * z)
                 back = 0.0
                 if slide > 0.0:
-                    back = min(1.0, friction * load[q] / slide)
+                    rub = min(slide, max(0.0, friction * load[q] - rubbed[q]))
+                    rubbed[q] += rub
+                    back = rub / slide
                 m0, m1, m2 = 0.5 * (move * n0 - back * u), 0.5 * (move * n1 - back * w), 0.5 * (move * n2 - back * z)
                 p[i, 0] += m0
                 p[i, 1] += m1
@@ -157,9 +159,11 @@ def grain_step(
                     slide = math.sqrt(u * u + w * w + z * z)
                     back = 0.0
                     if slide > 0.0:
-                        limit = max(friction, near.friction[c]) * touched[c] / slide
                         give = mass * yields(b, k, x[i, 0], x[i, 1], x[i, 2], u / slide, w / slide, z / slide)
-                        back = min(1.0 / (1.0 + give), limit)
+                        left = max(friction, near.friction[c]) * touched[c] - dragged[c]
+                        rub = min(slide / (1.0 + give), max(0.0, left))
+                        dragged[c] += rub
+                        back = rub / slide
                     m0, m1, m2 = move * n0 - back * u, move * n1 - back * w, move * n2 - back * z
                     p[i, 0] += m0
                     p[i, 1] += m1
