@@ -20,6 +20,7 @@ class FamilyPart(NamedTuple):
     Attributes:
         name: of the entity.
         model: its bodies are all roots, each at its place in the world; its links and joints, where it has any, follow.
+            Matter that engines do not hold is one static body without geoms, which gives it a name and an id.
         label: what people call it.
         driven: the family says where its bodies go (`Family.drive`): they pass through the ground, what is fixed, and
             one another, which could not yield either.
@@ -65,7 +66,7 @@ def add_families(builder: WorldBuilder, families: Mapping[str, FamilySpec], issu
                 part.name,
                 EntityKind.OBJECT,
                 part.model,
-                root=BodyKind.FREE,
+                root=root.kind,
                 position=root.position,
                 quaternion=root.quaternion,
                 label=part.label or name,
