@@ -135,7 +135,7 @@ class BaseRouter:
         return self.twist[ids]
 
     def snapshot(self, ids: Array) -> tuple[Errand, ...]:
-        """What it knows of these envs: with a snapshot of the env all goes on from here again, bit for bit."""
+        """What it knows of these envs: with a snapshot of the env the drive goes on from here again."""
         return tuple(
             Errand(
                 self.target[env].copy(),
