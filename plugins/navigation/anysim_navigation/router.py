@@ -31,7 +31,7 @@ NEAR = 0.35
 """[m] from its end a way is left for the straight line, if that is free."""
 CAR_STOPS = 0.15
 """[m] from its end a car has arrived: its heading there is that of the way."""
-CUSP = 0.15
+CUSP = 0.05
 """[m] before it changes its direction a car may do so."""
 REPLANS = 12
 """Ways in a row that did not bring a base on before it gives up."""
