@@ -204,6 +204,6 @@ if __name__ == "__main__":
     pages = ("docs/locomotion.md",)
     codes = [
         main(__doc__, name, "walking_table.py", pages, content)
-        for name, content in (("walks", walks), ("seeds", seeds))
+        for name, content in (("walks", walks), ("seeds", seeds), ("crossings", crossings))
     ]
     sys.exit(max(codes))
