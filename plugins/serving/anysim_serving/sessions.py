@@ -11,8 +11,8 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field
 from typing import Any
 
+from anysim_client.errors import LimitExceeded, SessionGone, SessionTaken, TookTooLong
 from anysim_serving.catalogue import Catalogue, SessionRequest
-from anysim_serving.errors import LimitExceeded, SessionGone, SessionTaken, TookTooLong
 from anysim_serving.operations import handshake
 from anysim_serving.settings import Limits
 from anysim_serving.simulator import Job, Simulator

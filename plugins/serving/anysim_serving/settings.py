@@ -4,10 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from anysim.errors import TaskError
-
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
-PROTOCOL = 1
-"""The version of the protocol; client and service must have the same."""
+from anysim_client.token import LOOPBACK
 
 
 @dataclass(frozen=True)

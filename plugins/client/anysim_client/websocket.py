@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
-from anysim_serving.errors import ConnectionLost, LimitExceeded, MalformedFrame
+from anysim_client.errors import ConnectionLost, LimitExceeded, MalformedFrame
 
 _GUID = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
 _CONTINUED, _TEXT, _BINARY, _CLOSE, _PING, _PONG = 0, 1, 2, 8, 9, 10
@@ -163,7 +163,7 @@ class WebSocket:
                 content, into = into[:length], into[length:]
             else:
                 content = np.empty(length, np.uint8)
-            self._fill(memoryview(content))
+            self._fill(content.data)
             if kind == _PING:
                 self._send(_PONG, content.tobytes())
             elif kind == _CLOSE:
@@ -228,4 +228,4 @@ def _masked(data: bytes, mask: bytes) -> Any:
     padded = np.zeros(words, np.uint32)
     padded.view(np.uint8)[: len(data)] = np.frombuffer(data, np.uint8)
     padded ^= np.frombuffer(mask, np.uint32)
-    return memoryview(padded.view(np.uint8))[: len(data)]
+    return padded.view(np.uint8).data[: len(data)]
