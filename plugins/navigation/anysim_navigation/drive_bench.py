@@ -36,7 +36,7 @@ POINTS = 30
 """Of the walk of each of them at most; then it begins anew."""
 
 
-class Ridden(NamedTuple):
+class Driving(NamedTuple):
     """How a base is driven, and what of it counts as there.
 
     Attributes:
@@ -63,18 +63,18 @@ class Ridden(NamedTuple):
 
 
 _ON_LEGS: dict[str, Any] = {"close": 0.25, "facing": 0.3, "still": (0.15, 0.6), "tilts": True}
-BASES: dict[str, Ridden] = {
-    "differential_base": Ridden(controller="differential_drive"),
-    "holonomic_base": Ridden(controller="holonomic_drive"),
-    "ackermann_base": Ridden(
+BASES: dict[str, Driving] = {
+    "differential_base": Driving(controller="differential_drive"),
+    "holonomic_base": Driving(controller="holonomic_drive"),
+    "ackermann_base": Driving(
         0.7,
         {"controller": "ackermann_drive", "params": {"steer_by": "rate"}},
         {"heading": False, "tolerance": 0.1, "angle": 3.2},
         close=0.25,
         facing=None,
     ),
-    "unitree_go1": Ridden(skill={"tolerance": 0.15, "angle": 0.15, "speed": 0.5, "rate": 0.8}, **_ON_LEGS),
-    "unitree_g1": Ridden(
+    "unitree_go1": Driving(skill={"tolerance": 0.15, "angle": 0.15, "speed": 0.5, "rate": 0.8}, **_ON_LEGS),
+    "unitree_g1": Driving(
         controller="lipm_walk", skill={"tolerance": 0.15, "angle": 0.15, "speed": 0.25, "rate": 0.3}, **_ON_LEGS
     ),
 }
@@ -110,7 +110,7 @@ def drive(
 
     `people` walk between points of the room meanwhile, and yield to nothing.
     """
-    world, how = random_room(seed), BASES.get(robot, Ridden())
+    world, how = random_room(seed), BASES.get(robot, Driving())
     half = np.abs(np.concatenate([world.geoms[g].position for g in world.body_geoms[0]])).max()
     box = [[-half, -half], [half, -half], [half, half], [-half, half]]
     mesh = NavMaps(world, Agent(how.radius if radius is None else radius), area=box).at()
@@ -174,7 +174,7 @@ def _people(count: int, mesh: NavMesh, start: Array, rng: np.random.Generator) -
 
 
 def _task(
-    seed: int, world: World, robot: str, how: Ridden, start: Array, goal: Array, yaws: Array, planner: str
+    seed: int, world: World, robot: str, how: Driving, start: Array, goal: Array, yaws: Array, planner: str
 ) -> dict[str, Any]:
     names = ["room", *(e.name for e in world.entities if e.name != "room")]
     x, y = (round(float(v), 3) for v in start)

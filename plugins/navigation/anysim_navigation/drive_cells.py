@@ -9,7 +9,7 @@ import numpy as np
 
 from anysim.errors import AnysimError
 from anysim.math.statistics import wilson
-from anysim_navigation.drive_bench import BASES, Drive, Ridden
+from anysim_navigation.drive_bench import BASES, Drive, Driving
 
 PLACES = {"seconds": 2, "length": 2, "hardest": 1, "tick": 3}
 """Decimals of fields of a drive that are kept."""
@@ -62,7 +62,7 @@ class DriveStore:
 def figures(cell: Cell, drives: list[Drive]) -> dict[str, Any]:
     """What the drives of a cell come to, as plain data."""
     solved = [one for one in drives if one.ended == "success"]
-    pace = BASES.get(cell.robot, Ridden()).speed
+    pace = BASES.get(cell.robot, Driving()).speed
     met = [one.met for one in drives if one.met]
     return {
         **cell._asdict(),
