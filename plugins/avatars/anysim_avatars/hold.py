@@ -162,7 +162,9 @@ class Hold(Family):
 
     def facts(self, env: int) -> Mapping[str, Mapping[str, object]]:
         what = ("empty", "holds", "let go")[int(self.holding[env])]
-        return {self.setting.name: {"kind": "hold", "hand": self.body_names[0], "object": self.body_names[1], "is": what}}
+        return {
+            self.setting.name: {"kind": "hold", "hand": self.body_names[0], "object": self.body_names[1], "is": what}
+        }
 
     def recorded(self, env_ids: Array) -> Mapping[str, Array]:
         return {"holding": self.holding[env_ids].astype(float)}
