@@ -140,8 +140,8 @@ def crossings() -> str:
         lines.append(["all", one["engine"], str(total), *own])
     return "\n\n".join(
         [
-            "How many of n tiles of each kind and level were left on foot, and how many ended in a fall where any did; of all "
-            "kinds together the share, with Wilson's interval at 95 %:",
+            "How many of n tiles of each kind and level were left on foot, and how many ended in a fall where any did; "
+            "of all kinds together the share, with Wilson's interval at 95 %:",
             table(["kind", "engine", "n", *(f"level {level}" for level in levels)], lines),
         ]
     )
@@ -173,10 +173,12 @@ def engines() -> str:
     count = ", ".join(map(str, sorted({cell["envs"] for cell in found})))
     return "\n\n".join(
         [
-            f"{count} episodes of 8 s of each cell with masses, gains and friction drawn: the error of velocity [m/s] and half "
-            "its interval at 95 %, and falls where there were any:",
+            f"{count} episodes of 8 s of each cell with masses, gains and friction drawn: the error of velocity [m/s] "
+            "and half its interval at 95 %, and falls where there were any:",
             table(["trained on", "command", *(f"on {name}" for name in names)], lines),
-            "Further from what it is where it was trained than both intervals allow [m/s]: " + ("; ".join(gaps) or "none") + ".",
+            "Further from what it is where it was trained than both intervals allow [m/s]: "
+            + ("; ".join(gaps) or "none")
+            + ".",
         ]
     )
 

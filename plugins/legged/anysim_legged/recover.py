@@ -51,7 +51,8 @@ class Recover(Skill):
         rises: Annotated[float, Field(gt=0, description="time until the posture is reached [s]")] = 1.0,
     ) -> None:
         super().__init__(env)
-        self._base, self._least, self._slice = robot.base, float(np.cos(tilt)), env.actions.slice_of(robot.name, channel)
+        self._base, self._least = robot.base, float(np.cos(tilt))
+        self._slice = env.actions.slice_of(robot.name, channel)
         if type(self._slice.controller).action_for is Controller.action_for:
             raise TaskError(f"the skill recover commands joint positions, which '{robot.name}.{channel}' does not take")
         self._home = robot.channel_columns(channel).home[None]
