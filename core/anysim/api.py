@@ -223,7 +223,7 @@ def blind_env(loaded: LoadedRun, world: "World", name: str) -> "TaskEnv":
 
     blind = replace(world, cameras=tuple(replace(camera, channels=()) for camera in world.cameras))
     try:
-        return _env(loaded, blind, engine_class("null")(), 1, name, _proposals(loaded, None))
+        return _env(loaded, blind, engine_class("null")(), 1, name, _proposals(loaded, None), unchecked=True)
     except SpecError as error:
         raise located(error, loaded) from None
 
@@ -248,8 +248,9 @@ def _env(
     proposals: Any = None,
     *,
     strict_observers: bool = False,
+    unchecked: bool = False,
 ) -> "TaskEnv":
-    """An env on a fresh engine; the engine is destroyed if anything fails."""
+    """An env on a fresh engine, which is asked for what it needs or not; it is destroyed if anything fails."""
     from anysim.managers.standard import check_run, standard_managers
     from anysim.task.env import TaskEnv
 
@@ -257,7 +258,8 @@ def _env(
         spec = loaded.spec
         managers = standard_managers(spec, world, num_envs, proposals)
         place, options = (lambda path: place_of(loaded, path)), simulation.options
-        check_run(simulation, world, managers, f"'{world.name}'", place, options)
+        if not unchecked:
+            check_run(simulation, world, managers, f"'{world.name}'", place, options)
         simulation.create_world(world, num_envs)
         located = partial(_located_path, loaded)
         return TaskEnv(spec, simulation, managers, name, strict_observers=strict_observers, located=located)
