@@ -48,9 +48,14 @@ def connect(
         AnysimError: the service refuses, or nothing answers.
     """
     request: dict[str, Any] = {
-        "task": task, "num_envs": num_envs, "engine": engine, "robot": robot, "seed": seed, "curriculum": curriculum,
+        "task": task,
+        "num_envs": num_envs,
+        "engine": engine,
+        "robot": robot,
+        "seed": seed,
+        "curriculum": curriculum,
         "overrides": list(overrides),
-    }  # fmt: skip
+    }
     if not isinstance(address, str):
         from anysim_client.pool import PooledEnv
 

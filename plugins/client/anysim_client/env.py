@@ -17,7 +17,7 @@ from anysim.task.snapshot import EnvSnapshot
 from anysim_client.errors import ServiceError
 from anysim_client.link import Link
 from anysim_client.messages import Chunk, from_jpegs, snapshot_data, snapshot_of
-from anysim_client.shared import MARK, Shared
+from anysim_client.shared import MARK, SharedSlots
 from anysim_schemas.run import RunSpec
 
 STAYS = frozenset(
@@ -73,14 +73,16 @@ class RemoteEnv:
         self.observation_sizes = {name: int(size) for name, size in spec["observations"].items()}
         self.image_shapes = {name: tuple(shape) for name, (shape, _) in spec["images"].items()}
         self.engine = _Engine(
-            spec["engine"], spec["engine_version"], self.num_envs,
+            spec["engine"],
+            spec["engine_version"],
+            self.num_envs,
             _World(spec["world"], spec["world_hash"], _Physics(spec["control_dt"])),
-        )  # fmt: skip
+        )
         self.streams, self.scene = _Streams(self), _Scene(self)
         self.latest: list[dict[str, Any]] = []
         self._form = {"images": "jpeg", "quality": quality} if images == "jpeg" else {}
         self._full = full or None
-        self._shared: Shared | None = None
+        self._shared: SharedSlots | None = None
         self._obs: dict[str, Array | None] = {}
         """The latest of all envs; None where a caller has it, in shared memory."""
         self._slot: int | None = None
@@ -97,7 +99,7 @@ class RemoteEnv:
         terms = self.link.call("share")
         if not terms:
             return
-        found = Shared.found(terms)
+        found = SharedSlots.found(terms)
         agreed = self.link.call("share", proof=np.zeros(0, np.uint8) if found is None else found.proof)["shared"]
         if found is not None and agreed:
             self._shared = found

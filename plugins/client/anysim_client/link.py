@@ -18,7 +18,7 @@ from anysim_client import wire
 from anysim_client.errors import ConnectionLost, LimitExceeded, ServiceError, from_data
 from anysim_client.messages import PROTOCOL
 from anysim_client.token import TOKEN_ENV, kept_token
-from anysim_client.websocket import Refused, WebSocket
+from anysim_client.websocket import HandshakeRefusal, WebSocket
 
 LARGEST = 1 << 30
 """Bytes of one answer."""
@@ -115,10 +115,15 @@ class Link:
         where = self.address
         try:
             self._socket = WebSocket.open(
-                where.host, where.port, f"/v1/sessions/{self.id}/socket", where.headers(self._key),
-                context=where.context, timeout=where.timeout, largest=LARGEST,
-            )  # fmt: skip
-        except Refused as refused:
+                where.host,
+                where.port,
+                f"/v1/sessions/{self.id}/socket",
+                where.headers(self._key),
+                context=where.context,
+                timeout=where.timeout,
+                largest=LARGEST,
+            )
+        except HandshakeRefusal as refused:
             raise refusal(refused.status, refused.body) from None
         self._number = 0
 

@@ -1,4 +1,4 @@
-"""What messages say: chunks of steps, snapshots, and images, as both sides of the protocol read them."""
+"""Contents of messages: chunks of steps, snapshots, and images, as both sides of the protocol read them."""
 
 from collections.abc import Mapping
 from io import BytesIO

@@ -29,8 +29,16 @@ _log = logging.getLogger(__name__)
 LOST = (ConnectionLost, SessionGone, TookTooLong)
 """What says that a member is no more."""
 _MUST_AGREE = (
-    "protocol", "made_with", "task", "engine", "engine_version", "world_hash", "spec_hash", "observations", "images",
-)  # fmt: skip
+    "protocol",
+    "made_with",
+    "task",
+    "engine",
+    "engine_version",
+    "world_hash",
+    "spec_hash",
+    "observations",
+    "images",
+)
 
 
 @dataclass

@@ -37,7 +37,7 @@ def shared_folder() -> Path:
     return Path("/dev/shm") if Path("/dev/shm").is_dir() else Path(tempfile.gettempdir())
 
 
-class Shared:
+class SharedSlots:
     """The client's side: slots, and which of them are free.
 
     Attributes:

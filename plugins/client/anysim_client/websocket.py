@@ -24,7 +24,7 @@ _BUFFER = 1 << 16
 _HEAD_BYTES = 65536
 
 
-class Refused(Exception):
+class HandshakeRefusal(Exception):
     """The server answered the handshake as HTTP: `status` and `body`."""
 
     def __init__(self, status: int, body: bytes) -> None:
@@ -58,7 +58,7 @@ class WebSocket:
 
         Raises:
             ConnectionLost: nobody answers.
-            Refused: the server answers otherwise.
+            HandshakeRefusal: the server answers otherwise.
         """
         try:
             stream = socket.create_connection((host, port), timeout)
@@ -103,7 +103,7 @@ class WebSocket:
         if int(status[1]) != 101:
             length = int(given.get(b"content-length", b"0") or 0)
             body = rest + (self._read(min(length, _HEAD_BYTES) - len(rest)) if length > len(rest) else b"")
-            raise Refused(int(status[1]), body)
+            raise HandshakeRefusal(int(status[1]), body)
         accept = base64.b64encode(hashlib.sha1(key + _GUID, usedforsecurity=False).digest())
         if given.get(b"sec-websocket-accept") != accept or b"sec-websocket-extensions" in given:
             raise MalformedFrame("what answers there does not speak the WebSocket that was asked for")

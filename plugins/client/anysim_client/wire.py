@@ -109,9 +109,16 @@ def unpack(frame: "bytes | Array") -> dict[str, Any]:
     except MalformedFrame:
         raise
     except (
-        msgpack.UnpackException, ValueError, TypeError, KeyError, IndexError, OverflowError, RecursionError,
-        AttributeError, MemoryError,
-    ) as error:  # fmt: skip
+        msgpack.UnpackException,
+        ValueError,
+        TypeError,
+        KeyError,
+        IndexError,
+        OverflowError,
+        RecursionError,
+        AttributeError,
+        MemoryError,
+    ) as error:
         raise MalformedFrame(f"the frame is damaged: {type(error).__name__}: {str(error)[:120]}") from None
 
 

@@ -50,7 +50,7 @@ class ResetRequest(Spec):
     overrides: dict[str, Any] | list[dict[str, Any]] | None = None
 
 
-def _owned(request: Request, session: str, key: Key = "") -> Session:
+async def _owned(request: Request, session: str, key: Key = "") -> Session:
     return request.app.state.sessions.owned(session, key)
 
 
@@ -72,10 +72,15 @@ def application(catalogue: Catalogue, settings: Settings) -> FastAPI:
             await sessions.close(_log.warning)
 
     app = FastAPI(
-        title="anysim", version=__version__, lifespan=lifespan, docs_url=None, redoc_url=None,
-        openapi_url="/openapi.json", dependencies=[Depends(HTTPBearer(auto_error=False))],
+        title="anysim",
+        version=__version__,
+        lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
+        openapi_url="/openapi.json",
+        dependencies=[Depends(HTTPBearer(auto_error=False))],
         summary="Envs of tasks and worlds. Steps go over the socket of a session: see docs/serve.md.",
-    )  # fmt: skip
+    )
     app.state.sessions = sessions
     _answer_errors(app)
 

@@ -1,4 +1,4 @@
-"""What a service costs: round trips and bytes per second against a bare echo server, and many clients for long.
+"""Costs of a service: round trips and bytes per second against a bare echo server, and many clients for long.
 
 The env that is served stands still: its observations are there already, so what is measured is the service and its
 client and nothing else. The echo server is the library `websockets` alone: it sends bytes of the same number.

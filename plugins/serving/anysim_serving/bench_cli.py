@@ -38,9 +38,17 @@ def serve(
         print_json({"exchanges": [c._asdict() for c in found], "soak": None if run is None else run._asdict()})
         return
     heads = (
-        "exchange", "MB", "ms (median)", "ms (fastest)", "MB/s", "processor ms",
-        "echo ms (median)", "echo ms (fastest)", "echo processor ms", "budget",
-    )  # fmt: skip
+        "exchange",
+        "MB",
+        "ms (median)",
+        "ms (fastest)",
+        "MB/s",
+        "processor ms",
+        "echo ms (median)",
+        "echo ms (fastest)",
+        "echo processor ms",
+        "budget",
+    )
     rows = [
         (
             c.what,

@@ -41,7 +41,7 @@ def serve(
 ) -> None:
     """Serve envs over HTTP and WebSocket; `anysim.connect(ADDRESS)` gives the env that `anysim.make` would.
 
-    Each client gets a session with a simulator of its own. Whoever has the token may use the service. It is printed
+    Each client gets a session with a simulator of its own. Everyone with the token may use the service. It is printed
     once, and kept for your own clients on this machine in a file that only you can read. ANYSIM_SERVE_TOKEN gives
     another one. SIGINT and SIGTERM end it: operations at hand finish, envs are freed.
 

@@ -139,7 +139,7 @@ class Sessions:
         session.used = time.monotonic()
 
     def detach(self, session: Session) -> None:
-        """The connection is gone; whoever has the key may take it up again for a while."""
+        """The connection is gone; with the key it can be taken up again for a while."""
         session.attached, session.used = False, time.monotonic()
 
     def submit(self, session: Session, job: Job) -> "Future[Any]":

@@ -46,7 +46,7 @@ class Settings:
 
     Attributes:
         host, port: where it listens; port 0 is any that is free.
-        token: who sends it may do everything; empty: whoever reaches the port may, on loopback alone.
+        token: who sends it may do everything; empty: everyone who reaches the port may, on loopback alone.
         hosts: names under which it may be asked, beside its own address.
         origins: origins of web pages that may ask.
         certificate, key: PEM files of TLS.

@@ -69,7 +69,7 @@ async def serve_socket(websocket: WebSocket, sessions: Sessions, ident: str, key
         if gone.done() and not gone.cancelled():
             await websocket.close(_IDLE_CLOSE, "the session has ended")
     except (WebSocketDisconnect, RuntimeError, OSError):
-        pass  # the client is gone, and with it whoever could be told
+        pass  # the client is gone, and nobody is left to be told
     finally:
         sessions.detach(session)
         await _drained(link)

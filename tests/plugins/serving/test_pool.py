@@ -1,4 +1,4 @@
-"""Pools: the same bits as one local env, whoever is lost."""
+"""Pools: the same bits as one local env, also where a service is lost."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack

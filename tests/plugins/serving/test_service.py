@@ -1,4 +1,4 @@
-"""What a service answers over HTTP, to whom, and within which limits."""
+"""Answers of a service over HTTP: what it says, to whom, and within which limits."""
 
 import http.client
 import json
@@ -14,7 +14,7 @@ from anysim.errors import SpecError, TaskError
 from anysim.task.snapshot import EnvSnapshot
 from anysim_client.errors import ConnectionLost, ForbiddenSource, LimitExceeded, SessionGone, SessionTaken, Unauthorized
 from anysim_client.token import keep_token, kept_token, token_file
-from anysim_client.websocket import Refused, WebSocket
+from anysim_client.websocket import HandshakeRefusal, WebSocket
 from anysim_serving.catalogue import Catalogue
 from anysim_serving.server import Service, serving
 from anysim_serving.settings import Limits, Settings
@@ -73,11 +73,16 @@ def test_who_may_ask(made: Service, path: str, headers: dict[str, str], status: 
 
 def test_a_socket_is_behind_the_same_checks(made: Service) -> None:
     def shake(headers: dict[str, str]) -> int:
-        with pytest.raises(Refused) as refused:
+        with pytest.raises(HandshakeRefusal) as refused:
             WebSocket.open(
-                "127.0.0.1", made.settings.port, "/v1/sessions/none/socket", headers,
-                context=None, timeout=30, largest=1000,
-            )  # fmt: skip
+                "127.0.0.1",
+                made.settings.port,
+                "/v1/sessions/none/socket",
+                headers,
+                context=None,
+                timeout=30,
+                largest=1000,
+            )
         assert "error" in json.loads(refused.value.body)
         return refused.value.status
 
