@@ -159,6 +159,7 @@ check-tables:
 	$(BIN)/python scripts/robot_table.py --check
 	$(BIN)/python scripts/benchmark_table.py --check
 	$(BIN)/python scripts/walking_table.py --check
+	$(BIN)/python scripts/navigation_table.py --check
 	$(BIN)/python scripts/task_gallery.py --check
 	$(BIN)/python scripts/task_pages.py --check
 	$(BIN)/python scripts/task_robots.py --check
