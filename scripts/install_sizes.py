@@ -45,6 +45,7 @@ WORDS = {
     "mujoco": "the engine MuJoCo, and MJCF files",
     "navigation": "`anysim map`: where bases can go, ways through rooms, and local planning around what moves",
     "parity": "`anysim compare` and `anysim picture`",
+    "particles": "fluid, sand and rice beside any engine",
     "planning": "collision-free motion, planned beside the simulation",
     "policy": "learned policies (ONNX) as controllers",
     "pybullet": "the engine PyBullet",
