@@ -5,8 +5,8 @@
 POLICY is what `anysim evaluate --policy` takes, or the trot and the shipped policy. The robot is that of level L0. It
 begins in any direction in the middle of a tile, and is told to walk forward at 0.5 m/s for 10 s: it got through
 where it left the tile, which ends 3 m from its middle, and did not fall before. `--blind` takes the height scan from
-the observations, for policies of `go1_velocity`. Nothing here is a time. `--out FILE.json` keeps what was found, in place
-of what is there of the same policy on the same engine.
+the observations, for policies of `go1_velocity`. Nothing here is a time. `--out FILE.json` keeps what was found, in
+place of what is there of the same policy on the same engine.
 """
 
 import argparse

@@ -1,28 +1,35 @@
 """Walks of a policy of `go1_velocity` on every engine: five commands, shoves, a slippery floor and rough ground.
 
     python benchmarks/walking.py [NAME=POLICY ...] [--engines mujoco,sapien] [-n 32] [--rows shoves,floors] [--out FILE]
+    python benchmarks/walking.py [NAME=POLICY ...] --engines mujoco --rows drawn --stiff
 
 POLICY is what `anysim evaluate --policy` takes, and NAME what the table calls it; the trot and the shipped policy where
 none is given. The robot is that of level L0; with `drawn` and on slippery floors that of L1, which is another one in
 each episode. Without either all episodes would be the same walk, so `commands` are one each. Errors are the root mean
 squares of the velocity along the ground and of the turn after the first 1.5 s, within a stride included; falls are of
 8 s. With `--out FILE.json` each cell is on the disk once it is measured, and those that are there are not measured
-again.
+again. `--stiff` makes MuJoCo's contacts as stiff as its time step lets them be, which tells whether a gap to the other
+engines is one of contact.
 """
 
 import argparse
 import json
 from collections.abc import Iterator
+from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from time import process_time
 from typing import Any, NamedTuple
+from unittest.mock import patch
 
 import numpy as np
 
 import anysim
 from anysim.engine.state import State
 from anysim.math import pose as P
+from anysim.model.world import Surface
 from anysim_evaluation.policy import make_policy
+from anysim_mujoco.surfaces import STIFF_IMPEDANCE, ContactParameters, contact_parameters
 
 COMMANDS = ((0.5, 0.0, 0.0), (0.9, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, 0.0, 0.8), (0.5, 0.2, 0.5))
 """Forward and to the left [m/s], turning [rad/s]."""
@@ -118,6 +125,11 @@ def _own(state: State, base: int) -> np.ndarray:
     return np.concatenate([P.rotate_inverse(turn, twist[:, :3])[:, :2], P.rotate_inverse(turn, twist[:, 3:])[:, 2:]], 1)
 
 
+def stiff(surface: Surface, dt: float) -> ContactParameters:
+    """What MuJoCo is told of a surface, with a time constant of two steps and next to no compliance."""
+    return replace(contact_parameters(surface, dt), solref=(2.0 * dt, 1.0), solimp=STIFF_IMPEDANCE)
+
+
 def cells(policies: dict[str, str], engines: list[str], num_envs: int, groups: list[str]) -> Iterator[dict[str, Any]]:
     """What is asked of each policy on each engine; cells with changes walk at 0.5 m/s."""
     for name in policies:
@@ -160,13 +172,18 @@ def main() -> None:
     parser.add_argument("-n", type=int, default=8, help="envs of each cell")
     parser.add_argument("--rows", default="commands,drawn,shoves,floors")
     parser.add_argument("--out", type=Path, help="a file of the results, which is added to")
+    parser.add_argument("--stiff", action="store_true", help="MuJoCo's contacts as stiff as they can be")
     arguments = parser.parse_args()
     policies = {name: policy or name for name, _, policy in (text.partition("=") for text in arguments.policies)}
     done: list[dict[str, Any]] = json.loads(arguments.out.read_text("utf-8")) if _there(arguments.out) else []
     for asked in cells(policies, arguments.engines.split(","), arguments.n, arguments.rows.split(",")):
-        if any(asked.items() <= cell.items() for cell in done):
+        if arguments.stiff:
+            asked["stiff"] = True
+        if any(asked.items() <= cell.items() and cell.get("stiff") == asked.get("stiff") for cell in done):
             continue
-        done.append(measured(policies[asked["policy"]], asked))
+        surfaces = patch("anysim_mujoco.geoms.contact_parameters", stiff) if arguments.stiff else nullcontext()
+        with surfaces:
+            done.append(measured(policies[asked["policy"]], asked))
         print(json.dumps(done[-1]), flush=True)
         if arguments.out is not None:
             draft = arguments.out.with_suffix(".draft")

@@ -140,8 +140,8 @@ def crossings() -> str:
         lines.append(["all", one["engine"], str(total), *own])
     return "\n\n".join(
         [
-            "How many of n tiles of each kind and level were left on foot, and how many ended in a fall where any did; of all "
-            "kinds together the share, with Wilson's interval at 95 %:",
+            "How many of n tiles of each kind and level were left on foot, and how many ended in a fall where any did; "
+            "of all kinds together the share, with Wilson's interval at 95 %:",
             table(["kind", "engine", "n", *(f"level {level}" for level in levels)], lines),
         ]
     )
@@ -159,39 +159,51 @@ def _share(count: int, total: int) -> str:
 def engines() -> str:
     """Policies that were trained on each engine, on all of them, and which gaps are above the intervals."""
     found: list[Cell] = json.loads(MATRIX.read_text("utf-8"))
-    names = list(dict.fromkeys(cell["policy"] for cell in found))
-    by = {(cell["policy"], asked(cell), cell["engine"]): cell for cell in found}
+    names = sorted({cell["policy"] for cell in found})
     commands = list(dict.fromkeys(asked(cell) for cell in found))
+    by = {(cell["policy"], asked(cell), _where(cell)): cell for cell in found}
+    wheres = [*names, *sorted({_where(cell) for cell in found} - {*names})]
     lines, gaps = [], []
     for name in names:
         for command in commands:
             own = by[name, command, name]
-            row = [by[name, command, engine] for engine in names]
-            lines.append([name, command, *(f"{cell['error']:.3f} ± {_half(cell):.3f}{_falls(cell)}" for cell in row)])
-            apart = [(c["engine"], c["error"] - own["error"]) for c in row if _gap(c, own)]
-            gaps += [f"{command}, trained on {name}, on {engine}: {more:+.3f}" for engine, more in apart]
+            row = {where: by[name, command, where] for where in wheres}
+            lines.append([name, command, *map(_measured, row.values())])
+            gaps += [
+                [name, command, where, f"{cell['error'] - own['error']:+.3f}", f"{cell['fell']}, {own['fell']}"]
+                for where, cell in row.items()
+                if _apart(cell, own)
+            ]
     count = ", ".join(map(str, sorted({cell["envs"] for cell in found})))
     return "\n\n".join(
         [
-            f"{count} episodes of 8 s of each cell with masses, gains and friction drawn: the error of velocity [m/s] and half "
-            "its interval at 95 %, and falls where there were any:",
-            table(["trained on", "command", *(f"on {name}" for name in names)], lines),
-            "Further from what it is where it was trained than both intervals allow [m/s]: " + ("; ".join(gaps) or "none") + ".",
+            f"{count} episodes of 8 s of each cell with masses, gains and friction drawn: the error of velocity "
+            "while they were up [m/s] and half its interval at 95 %, and how many fell, with Wilson's interval:",
+            table(["trained on", "command", *(f"on {where}" for where in wheres)], lines),
+            "Where an error or the falls are further from those on the engine of the training than intervals allow:",
+            table(["trained on", "command", "on", "error more [m/s]", "falls there and where trained"], gaps),
         ]
     )
+
+
+def _measured(cell: Cell) -> str:
+    return f"{cell['error']:.3f} ± {_half(cell):.3f}" + (f", {fallen(cell)} fell" if cell["fell"] else "")
+
+
+def _where(cell: Cell) -> str:
+    return cell["engine"] + (", stiff" if cell.get("stiff") else "")
+
+
+def _apart(cell: Cell, other: Cell) -> bool:
+    """Whether the errors of two cells, or the shares that fell, are further apart than their intervals allow."""
+    errors = abs(cell["error"] - other["error"]) > (_half(cell) ** 2 + _half(other) ** 2) ** 0.5
+    (low, high), (least, most) = (wilson(one["fell"], one["envs"]) for one in (cell, other))
+    return errors or low > most or least > high
 
 
 def _half(cell: Cell) -> float:
     """Half the interval of the error at 95 %, of as many envs with an error each."""
     return 1.96 * cell["spread"] / cell["envs"] ** 0.5
-
-
-def _gap(cell: Cell, other: Cell) -> bool:
-    return abs(cell["error"] - other["error"]) > (_half(cell) ** 2 + _half(other) ** 2) ** 0.5
-
-
-def _falls(cell: Cell) -> str:
-    return f", {fallen(cell)} fell" if cell["fell"] else ""
 
 
 def _judged(cell: Cell) -> str:
@@ -204,6 +216,6 @@ if __name__ == "__main__":
     pages = ("docs/locomotion.md",)
     codes = [
         main(__doc__, name, "walking_table.py", pages, content)
-        for name, content in (("walks", walks), ("seeds", seeds))
+        for name, content in (("walks", walks), ("seeds", seeds), ("crossings", crossings), ("engines", engines))
     ]
     sys.exit(max(codes))

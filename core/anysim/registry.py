@@ -69,6 +69,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
         "controllers": "camera_follow camera_gimbal camera_motion camera_path",
         "skills": "fly_look fly_orbit fly_to fly_track watch",
     },
+    "anysim-client": {"clients": "http https"},
     "anysim-collect": {"commands": "counterfactual report run"},
     "anysim-control": {
         "controllers": "ackermann_drive batched_ik differential_drive differential_ik"
@@ -96,7 +97,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-robots": {"commands": "gallery robot"},
     "anysim-sapien": {"engines": "sapien"},
     "anysim-sensors": {"sensors": "contact depth force_torque heights imu joints lidar occupancy tracking"},
-    "anysim-serving": {"clients": "http https", "commands": "serve"},
+    "anysim-serving": {"commands": "serve"},
     "anysim-sharded": {"executors": "processes"},
     "anysim-skills": {"skills": "pick"},
     "anysim-tactile": {"sensors": "tactile_fingertip tactile_pad tactile_probe"},

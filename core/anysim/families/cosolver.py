@@ -6,7 +6,6 @@ What the matter gains is accounted for: see `balance`.
 """
 
 from abc import abstractmethod
-from collections.abc import Iterable
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -22,7 +21,6 @@ class MetBodies(NamedTuple):
     """K bodies in n envs at the beginning of a physics step, world axes; those that are not there have no mass.
 
     Attributes:
-        pose: (n, K, 7) of their frames.
         com: (n, K, 3) [m] their centres of mass.
         twist: (n, K, 6) [m/s, rad/s] velocity of the centre of mass, and rate.
         mass: (n, K) [kg]; inf of what joints hold, which a co-solver takes to move as it does, whatever it meets.
@@ -32,7 +30,6 @@ class MetBodies(NamedTuple):
         body_pose: (n, B, 7) of all bodies.
     """
 
-    pose: Array
     com: Array
     twist: Array
     mass: Array
@@ -143,7 +140,7 @@ class CoSolver(Family):
         inertia = np.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz], axis=-1).reshape(*own.shape[:2], 3, 3)
         turn = P.to_matrix(own[..., 3:])
         inertia = turn @ inertia @ np.swapaxes(turn, -1, -2)
-        return MetBodies(own, own[..., :3] + arm, twist, mass, inertia, self._friction[env_ids], there, pose)
+        return MetBodies(own[..., :3] + arm, twist, mass, inertia, self._friction[env_ids], there, pose)
 
     # ------------------------------------------------------------------ what others ask of it
 

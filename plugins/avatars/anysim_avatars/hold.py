@@ -46,8 +46,7 @@ class Hold(Family):
     """A hand that takes an object, holds it with a bounded force, and lets go of what is pulled out of it."""
 
     spec = HoldSpec
-    needs: ClassVar[tuple[Capability, ...]] = (Capability.WRENCHES,)
-    rate = "physics"
+    rate: ClassVar[Literal["control", "physics"]] = "physics"
 
     @classmethod
     def parts(cls, name: str, spec: Spec) -> Iterable[FamilyPart]:
@@ -105,8 +104,15 @@ class Hold(Family):
         pose, twist = state.body_pose[env_ids[:, None], self._both], state.body_twist[env_ids[:, None], self._both]
         self._take(env_ids, pose, twist, duration)
         held = self.holding[env_ids] == HELD
-        if held.any():
+        if held.any() and Capability.WRENCHES in self.engine.capabilities:
             self._pull(env_ids[held], pose[held], twist[held], duration)
+        elif held.any():
+            self._carry(env_ids[held], pose[held, 0])
+
+    def _carry(self, ids: Array, hand: Array) -> None:
+        """On an engine that takes no forces the object is where the hand has it."""
+        pose = P.compose(hand, self._grip[ids])[:, None]
+        self.engine.set_body_state(pose, np.zeros((len(ids), 1, 6)), ids, self._only)
 
     def _take(self, ids: Array, pose: Array, twist: Array, duration: float) -> None:
         """The hand closes on what has been at the palm for long enough, and moves with it."""
@@ -156,7 +162,9 @@ class Hold(Family):
 
     def facts(self, env: int) -> Mapping[str, Mapping[str, object]]:
         what = ("empty", "holds", "let go")[int(self.holding[env])]
-        return {self.setting.name: {"kind": "hold", "hand": self.body_names[0], "object": self.body_names[1], "is": what}}
+        return {
+            self.setting.name: {"kind": "hold", "hand": self.body_names[0], "object": self.body_names[1], "is": what}
+        }
 
     def recorded(self, env_ids: Array) -> Mapping[str, Array]:
         return {"holding": self.holding[env_ids].astype(float)}

@@ -84,11 +84,7 @@ def gap(scene: SceneView, *, avatar: AvatarView, frame: Frame) -> Array:
 
 
 def within(
-    scene: SceneView,
-    *,
-    avatar: AvatarView,
-    frame: Frame,
-    distance: Annotated[float, Field(gt=0, description="[m]")],
+    scene: SceneView, *, avatar: AvatarView, frame: Frame, distance: Annotated[float, Field(gt=0, description="[m]")]
 ) -> Array:
     """A frame's origin is nearer than `distance` to the surface of an avatar's limbs."""
     return avatar.gap(frame.position) < distance

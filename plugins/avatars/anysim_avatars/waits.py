@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from anysim.conventions import Array
+from anysim.math import pose as P
 from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.phases import GO_ON, STAY, Phase, PhasedSkill, Rung
 from anysim.task.env import TaskEnv
@@ -26,7 +27,7 @@ class _Waits(PhasedSkill):
         self._ready = np.zeros(env.num_envs, dtype=np.int64)
         super().__init__(env)
 
-    def ready(self, ids: Array) -> Array:
+    def ready(self, ids: Array, at: Array) -> Array:
         """(n,) STAY, GO_ON where it is as it should be, or a failure."""
         raise NotImplementedError
 
@@ -42,8 +43,7 @@ class _Waits(PhasedSkill):
         self._ready[ids] = 0
 
     def _wait(self, ids: Array, at: Array) -> Array:
-        del at
-        said = self.ready(ids)
+        said = self.ready(ids, at)
         self._ready[ids] = (self._ready[ids] + 1) * (said == GO_ON)
         return np.where((said == GO_ON) & (self._ready[ids] < self._steps), STAY, said)
 
@@ -55,9 +55,36 @@ class AwaitHold(_Waits):
         self._hold = hold.family
         super().__init__(env, steps, patience)
 
-    def ready(self, ids: Array) -> Array:
+    def ready(self, ids: Array, at: Array) -> Array:
+        del at
         now = self._hold.holding[ids]
         return np.select([now == HELD, now == GIVEN], [GO_ON, _LOST], STAY)
+
+
+class AwaitRest(_Waits):
+    """Do nothing until `frame` has come to rest at least `moved` from where it was, as what is reached out does."""
+
+    def __init__(
+        self,
+        env: TaskEnv,
+        *,
+        frame: Frame,
+        moved: Annotated[float, Field(ge=0, description="[m]")] = 0.1,
+        speed: Annotated[float, Field(gt=0, description="[m/s]")] = 0.03,
+        steps: Steps = 5,
+        patience: Patience = 400,
+    ) -> None:
+        self._frame, self._moved, self._speed = frame, moved, speed
+        self._from = np.zeros((env.num_envs, 3))
+        super().__init__(env, steps, patience)
+
+    def _begin(self, ids: Array, at: Array) -> None:
+        super()._begin(ids, at)
+        self._from[ids] = self._frame.position[at]
+
+    def ready(self, ids: Array, at: Array) -> Array:
+        far = P.norm(self._frame.position[at] - self._from[ids]) >= self._moved
+        return np.where(far & (P.norm(self._frame.twist[at, :3]) < self._speed), GO_ON, STAY)
 
 
 class AwaitClear(_Waits):
@@ -85,13 +112,10 @@ class AwaitClear(_Waits):
         super()._begin(ids, at)
         self._came[ids] = self._at_once
 
-    def _wait(self, ids: Array, at: Array) -> Array:
-        self._far = self._avatar.gap(self._frame.position)[at] > self._distance
-        return super()._wait(ids, at)
-
-    def ready(self, ids: Array) -> Array:
-        self._came[ids] |= ~self._far
-        return np.where(self._far & self._came[ids], GO_ON, STAY)
+    def ready(self, ids: Array, at: Array) -> Array:
+        far = self._avatar.gap(self._frame.position)[at] > self._distance
+        self._came[ids] |= ~far
+        return np.where(far & self._came[ids], GO_ON, STAY)
 
 
 _LOST = OUTCOMES.index(Outcome.LOST)

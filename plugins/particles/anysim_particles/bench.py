@@ -88,7 +88,9 @@ def cost(kind: str, particles: int, num_envs: int, engine: str, steps: int) -> F
 
 def _made(world: dict[str, Any], engine: str, num_envs: int) -> Any:
     run = {"engine": engine, "physics": {"dt": 0.004, "control_dt": 0.004 * SUBSTEPS}, "world": world}
-    return anysim.make({**run, "task": {"observations": {"policy": ["last_action"]}, "horizon": 10_000}}, num_envs=num_envs)
+    return anysim.make(
+        {**run, "task": {"observations": {"policy": ["last_action"]}, "horizon": 10_000}}, num_envs=num_envs
+    )
 
 
 def _run(work: Callable[[], object], times: int) -> tuple[float, float]:

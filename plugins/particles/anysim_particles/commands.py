@@ -1,4 +1,4 @@
-"""What joins the command line, and what looks on while an env runs."""
+"""Commands that join the command line, and an observer that keeps points for the record."""
 
 from typing import TYPE_CHECKING
 

@@ -15,6 +15,7 @@ from anysim.errors import SpecError, SpecIssue
 from anysim.families.base import FamilyPart, FamilySetting, FamilyState
 from anysim.families.cosolver import CoSolver, MetBodies
 from anysim.math import pose as P
+from anysim.model.appearance import rgb
 from anysim.model.world import Body, BodyKind
 from anysim.randomization.draw import draw_rows
 from anysim_particles.spec import MOST, MatterSpec
@@ -199,7 +200,7 @@ class Particles(CoSolver):
         return FamilyState(self.x[env_ids].copy(), self.v[env_ids].copy(), radius, ids, fields=fields)
 
     def fault(self, env_ids: Array) -> Array:
-        return ~np.isfinite(self.x[env_ids]).all(axis=(1, 2))
+        return np.array([not np.isfinite(self.x[env]).all() for env in env_ids], dtype=bool)
 
     def facts(self, env: int) -> Mapping[str, Mapping[str, object]]:
         count = int(self.count[env])
@@ -219,7 +220,7 @@ class Particles(CoSolver):
     def draw(self, env_ids: Array, view: CameraView, images: Mapping[str, Array]) -> None:
         from anysim_particles.draw import draw_spheres
 
-        color = self.color if self.matter.color is None else self.matter.color[:3]
+        color = self.color if self.matter.color is None else rgb(self.matter.color)
         for row, env in enumerate(env_ids.tolist()):
             draw_spheres(
                 self.x[env, : self.count[env]],
@@ -230,4 +231,3 @@ class Particles(CoSolver):
                 row,
                 images,
             )
-

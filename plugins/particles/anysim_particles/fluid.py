@@ -2,8 +2,6 @@
 
 from typing import Any, ClassVar
 
-import numpy as np
-
 from anysim.conventions import Array
 from anysim.families.base import FamilySetting
 from anysim_particles.blocks import lattice

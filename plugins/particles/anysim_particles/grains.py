@@ -13,7 +13,7 @@ from anysim_particles.family import Particles
 from anysim_particles.spec import GrainSpec, MatterSpec, RiceSpec, SandSpec
 
 ROOM = 1.25
-"""Width of the room that a grain has at the reset, in widths of the grain: heaps of a denser lattice stand by its order."""
+"""Width of the room that a grain has at the reset, in widths of the grain."""
 
 
 class Grains(Particles):

@@ -25,7 +25,7 @@ class MatterSpec(Spec):
     yaw: FloatValue = Field(default=0.0, description="of the block [rad]")
     at: Reference | None = Field(
         default=None,
-        description="a body, or an object: `position` is then in its frame, turned by its heading alone, as it is placed at the reset",
+        description="a body, or an object: `position` is then in its frame, turned by its heading alone, at the reset",
     )
     fill: FractionValue = Field(default=1.0, description="share of the block's particles that are there")
     density: DensityValue = Field(default=1000.0, description="of the matter [kg/m^3]")
@@ -46,8 +46,8 @@ class FluidSpec(MatterSpec):
     spacing: Positive = Field(default=0.01, description="of its particles at rest [m]: what it can resolve")
     smoothing: FractionValue = Field(
         default=0.1,
-        description="share of the difference of velocities to its neighbours that a particle loses in a substep (XSPH); "
-        "no viscosity in Pa s",
+        description="share of the difference of velocities to its neighbours that a particle loses in a substep "
+        "(XSPH); no viscosity in Pa s",
     )
     drag: FractionValue = Field(
         default=0.0, description="share of the velocity along a surface that a particle there loses in a substep"
@@ -63,9 +63,7 @@ class GrainSpec(MatterSpec):
         description="coefficient between grains; with a body the larger of it and the surface's. Heaps are the steeper "
         "the larger it is, and not as steep as its arctangent",
     )
-    settling: Positive = Field(
-        default=0.2, description="speed [m/s] at most with which grains that overlap come apart"
-    )
+    settling: Positive = Field(default=0.2, description="speed [m/s] at most with which grains that overlap come apart")
     substeps: Integer = Field(default=6, gt=0, le=50, description="of the solver in a physics step")
 
 

@@ -20,13 +20,14 @@ from anysim import __version__
 from anysim.errors import AnysimError
 from anysim.record.json import plain
 from anysim.task.snapshot import EnvSnapshot
+from anysim_client.errors import MalformedFrame, ServiceError, to_data
+from anysim_client.messages import PROTOCOL
 from anysim_schemas.base import Spec
 from anysim_serving.catalogue import Catalogue, SessionRequest
-from anysim_serving.errors import MalformedFrame, ServiceError, to_data
 from anysim_serving.metrics import exposition
 from anysim_serving.operations import perform
 from anysim_serving.sessions import Session, Sessions
-from anysim_serving.settings import PROTOCOL, Settings
+from anysim_serving.settings import Settings
 from anysim_serving.socket import serve_socket
 
 _log = logging.getLogger(__name__)
@@ -49,6 +50,13 @@ class ResetRequest(Spec):
     overrides: dict[str, Any] | list[dict[str, Any]] | None = None
 
 
+async def _owned(request: Request, session: str, key: Key = "") -> Session:
+    return request.app.state.sessions.owned(session, key)
+
+
+Owned = Annotated[Session, Depends(_owned)]
+
+
 def application(catalogue: Catalogue, settings: Settings) -> FastAPI:
     """The application, without the checks of `access.Gate` before it; `app.state.sessions` are its sessions."""
     sessions = Sessions(catalogue, settings.limits)
@@ -64,23 +72,29 @@ def application(catalogue: Catalogue, settings: Settings) -> FastAPI:
             await sessions.close(_log.warning)
 
     app = FastAPI(
-        title="anysim", version=__version__, lifespan=lifespan, docs_url=None, redoc_url=None,
-        openapi_url="/openapi.json", dependencies=[Depends(HTTPBearer(auto_error=False))],
+        title="anysim",
+        version=__version__,
+        lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
+        openapi_url="/openapi.json",
+        dependencies=[Depends(HTTPBearer(auto_error=False))],
         summary="Envs of tasks and worlds. Steps go over the socket of a session: see docs/serve.md.",
-    )  # fmt: skip
+    )
     app.state.sessions = sessions
     _answer_errors(app)
-
-    def owned(session: str, key: Key = "") -> Session:
-        return sessions.owned(session, key)
-
-    Owned = Annotated[Session, Depends(owned)]
 
     @app.get("/v1/health")
     async def health() -> dict[str, Any]:
         """Whether it is well, and since when."""
         up = round(time.monotonic() - began, 3)
-        return {"status": "ok", "version": __version__, "protocol": PROTOCOL, "up_s": up, "sessions": len(sessions.open)}
+        return {
+            "status": "ok",
+            "version": __version__,
+            "protocol": PROTOCOL,
+            "up_s": up,
+            "sessions": len(sessions.open),
+        }
 
     @app.get("/v1/catalogue")
     async def catalogue_of() -> dict[str, Any]:
@@ -149,9 +163,7 @@ def application(catalogue: Catalogue, settings: Settings) -> FastAPI:
         return Response(content, media_type="application/octet-stream")
 
     @app.post("/v1/sessions/{session}/reset_to")
-    async def reset_to(
-        session: Owned, file: Annotated[bytes, Body(media_type="application/octet-stream")]
-    ) -> Response:
+    async def reset_to(session: Owned, file: Annotated[bytes, Body(media_type="application/octet-stream")]) -> Response:
         """Put the envs of such a file into the session's."""
         loaded = await asyncio.to_thread(_from_file, file)
         return _json(await ask(session, {"op": "reset_to", "file": loaded, "images": "none"}))
@@ -168,7 +180,7 @@ async def _sweep(sessions: Sessions) -> None:
         await asyncio.sleep(SWEEP_S)
         try:
             sessions.sweep()
-        except Exception:
+        except Exception:  # noqa: BLE001 - the next one may succeed
             _log.exception("a sweep over the sessions failed")
 
 
@@ -229,5 +241,3 @@ def _from_file(content: bytes) -> EnvSnapshot:
             return EnvSnapshot.load(path)
         except AnysimError as error:
             raise type(error)(str(error).replace(str(path), "the file that was sent")) from None
-
-

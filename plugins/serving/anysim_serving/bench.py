@@ -1,4 +1,4 @@
-"""What a service costs: round trips and bytes per second against a bare echo server, and many clients for long.
+"""Costs of a service: round trips and bytes per second against a bare echo server, and many clients for long.
 
 The env that is served stands still: its observations are there already, so what is measured is the service and its
 client and nothing else. The echo server is the library `websockets` alone: it sends bytes of the same number.
@@ -18,11 +18,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anysim.task.contract import Obs
-from anysim_serving import wire
-from anysim_serving.connect import connect
-from anysim_serving.env import RemoteEnv
-from anysim_serving.errors import ServiceError
-from anysim_serving.websocket import WebSocket
+from anysim_client import wire
+from anysim_client.connect import connect
+from anysim_client.env import RemoteEnv
+from anysim_client.errors import ServiceError
+from anysim_client.websocket import WebSocket
 
 ENVS, NUMBERS, CAMERAS, SIDE = 64, 50, 4, 128
 """Of the observation: 64 envs, 50 numbers each; and images of 4 cameras, 12.6 MB."""
@@ -86,7 +86,7 @@ def _cost(what: str, env: Any, keys: list[str], said: dict[str, Any], seconds: f
 
 
 def _observed(env: RemoteEnv, keys: list[str]) -> Obs:
-    return env._rows(env._ask("observe", keys=keys), np.arange(ENVS))
+    return env.observe(keys)
 
 
 def _in_turn(
@@ -107,9 +107,7 @@ def _in_turn(
                 one()
                 taken[side].append((time.perf_counter() - began) * 1e3)
             worked[side] += time.process_time() + _worked(process) - before
-    found = [
-        Exchange(float(np.median(ms)), min(ms), s * 1e3 / len(ms)) for ms, s in zip(taken, worked, strict=True)
-    ]
+    found = [Exchange(float(np.median(ms)), min(ms), s * 1e3 / len(ms)) for ms, s in zip(taken, worked, strict=True)]
     return found[0], found[1]
 
 
@@ -222,7 +220,7 @@ def soak(clients: int, seconds: float) -> Soak:
 
 
 def _sessions(said: dict[str, Any]) -> int:
-    from anysim_serving.link import Address
+    from anysim_client.link import Address
 
     try:
         return int(Address(said["address"], said["token"]).ask("GET", "/v1/health")["sessions"])

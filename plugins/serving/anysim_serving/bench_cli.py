@@ -9,9 +9,7 @@ from anysim.cli.options import AsJson
 
 def serve(
     seconds: Annotated[float, typer.Option(min=0.1, help="How long each row is measured.")] = 5.0,
-    soak: Annotated[
-        float, typer.Option(min=0.0, help="Seconds for which many clients step; 0 leaves that out.")
-    ] = 0.0,
+    soak: Annotated[float, typer.Option(min=0.0, help="Seconds for which many clients step; 0 leaves that out.")] = 0.0,
     clients: Annotated[int, typer.Option(min=1, help="Clients of the soak, each with a session of its own.")] = 64,
     json: AsJson = False,
 ) -> None:
@@ -40,9 +38,17 @@ def serve(
         print_json({"exchanges": [c._asdict() for c in found], "soak": None if run is None else run._asdict()})
         return
     heads = (
-        "exchange", "MB", "ms (median)", "ms (fastest)", "MB/s", "processor ms",
-        "echo ms (median)", "echo ms (fastest)", "echo processor ms", "budget",
-    )  # fmt: skip
+        "exchange",
+        "MB",
+        "ms (median)",
+        "ms (fastest)",
+        "MB/s",
+        "processor ms",
+        "echo ms (median)",
+        "echo ms (fastest)",
+        "echo processor ms",
+        "budget",
+    )
     rows = [
         (
             c.what,
@@ -63,8 +69,14 @@ def serve(
         return
     order = sorted(run.steps)
     rate = sum(order) / run.seconds if run.seconds else 0.0
-    typer.echo(f"soak: {run.clients} clients, {run.seconds:.0f} s, {sum(order):,} steps ({rate:,.0f}/s), {len(run.errors)} errors")
-    typer.echo(f"  steps of a client: least {order[0]}, median {order[len(order) // 2]}, most {order[-1]}; fairness {run.fairness:.3f}")
+    typer.echo(
+        f"soak: {run.clients} clients, {run.seconds:.0f} s, {sum(order):,} steps ({rate:,.0f}/s), "
+        f"{len(run.errors)} errors"
+    )
+    typer.echo(
+        f"  steps of a client: least {order[0]}, median {order[len(order) // 2]}, most {order[-1]}; "
+        f"fairness {run.fairness:.3f}"
+    )
     typer.echo(
         f"  memory of the service: {run.memory_mb:.1f} MB, at the end {run.memory_end_mb:.1f} MB; left: "
         f"{run.sessions_left} sessions, {run.threads_left} threads"

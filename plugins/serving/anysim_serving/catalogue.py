@@ -11,8 +11,8 @@ from pydantic import ConfigDict, Field
 from anysim import registry
 from anysim.api import load, make, watched
 from anysim.errors import TaskError, listing, suggest
+from anysim_client.errors import ForbiddenSource, LimitExceeded
 from anysim_schemas.base import Spec
-from anysim_serving.errors import ForbiddenSource, LimitExceeded
 from anysim_serving.settings import Limits
 
 if TYPE_CHECKING:
@@ -121,8 +121,8 @@ class Catalogue:
             key, equals, value = override.partition("=")
             if not equals or key.strip() not in OPEN or not _PLAIN.fullmatch(value.strip()):
                 raise ForbiddenSource(
-                    f"a client cannot set '{override[:80]}'; it can set {listing(OPEN)}, each to one number or word. The "
-                    f"rest is the owner's: anysim serve -o KEY=VALUE"
+                    f"a client cannot set '{override[:80]}'; it can set {listing(OPEN)}, each to one number or word. "
+                    f"The rest is the owner's: anysim serve -o KEY=VALUE"
                 )
         if (count := self.envs(request)) > self.limits.envs:
             raise LimitExceeded(f"a session has at most {self.limits.envs} envs, asked for {count}")

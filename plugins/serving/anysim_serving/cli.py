@@ -13,7 +13,8 @@ PORT = 8470
 
 def serve(
     sources: Annotated[
-        list[str], typer.Argument(metavar="TASK|WORLD…", help="Installed tasks or YAML files; the first is the default.")
+        list[str],
+        typer.Argument(metavar="TASK|WORLD…", help="Installed tasks or YAML files; the first is the default."),
     ],
     num_envs: NumEnvs = None,
     engine: Engine = None,
@@ -36,13 +37,11 @@ def serve(
     max_envs: Annotated[int, typer.Option(min=1, help="Envs of one session.")] = 256,
     max_total_envs: Annotated[int, typer.Option(min=1, help="Envs of all sessions together.")] = 1024,
     idle: Annotated[float, typer.Option(min=1.0, help="Seconds after which an unused session is ended.")] = 600.0,
-    linger: Annotated[
-        float, typer.Option(min=0.0, help="The same where its client's connection is gone.")
-    ] = 30.0,
+    linger: Annotated[float, typer.Option(min=0.0, help="The same where its client's connection is gone.")] = 30.0,
 ) -> None:
     """Serve envs over HTTP and WebSocket; `anysim.connect(ADDRESS)` gives the env that `anysim.make` would.
 
-    Each client gets a session with a simulator of its own. Whoever has the token may use the service. It is printed
+    Each client gets a session with a simulator of its own. Everyone with the token may use the service. It is printed
     once, and kept for your own clients on this machine in a file that only you can read. ANYSIM_SERVE_TOKEN gives
     another one. SIGINT and SIGTERM end it: operations at hand finish, envs are freed.
 
@@ -53,7 +52,7 @@ def serve(
     """
     import logging
 
-    from anysim_serving.access import TOKEN_ENV, forget_token, keep_token
+    from anysim_client.token import TOKEN_ENV, forget_token, keep_token
     from anysim_serving.catalogue import Catalogue
     from anysim_serving.server import Service, fresh_token
     from anysim_serving.settings import Limits, Settings
@@ -76,7 +75,9 @@ def serve(
     def told() -> None:
         typer.echo(f"serving {', '.join(catalogue.names())} at {service.address}")
         if kept is None:
-            typer.echo("warning: there is no token: every process and user of this machine can use the service", err=True)
+            typer.echo(
+                "warning: there is no token: every process and user of this machine can use the service", err=True
+            )
         else:
             typer.echo(f"token: {'that of ' + TOKEN_ENV if given else token}")
             typer.echo(f"kept for your own clients on this machine in {kept}")

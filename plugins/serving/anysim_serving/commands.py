@@ -14,6 +14,8 @@ def add_cli(app: "typer.Typer") -> None:
     from anysim_serving import bench_cli, cli
 
     app.command("serve")(cli.serve)
-    for group in app.registered_groups:  # that of anysim-bench is there before: plugins join in the order of their names
+    for (
+        group
+    ) in app.registered_groups:  # that of anysim-bench is there before: plugins join in the order of their names
         if group.name == "bench" and group.typer_instance is not None:
             group.typer_instance.command("serve")(bench_cli.serve)

@@ -22,7 +22,12 @@ def exposition(sessions: Sessions) -> str:
     metric("sessions_attached", "gauge", "Of them, with a connection.", sum(s.attached for s in sessions.open.values()))
     metric("envs", "gauge", "Envs of all sessions now.", sum(s.num_envs for s in sessions.open.values()))
     metric("waiting", "gauge", "Operations that wait for their simulator.", sum(s.depth for s in simulators))
-    metric("busy_seconds", "gauge", "Seconds that simulators of today's sessions worked.", sum(s.busy_s for s in simulators))
+    metric(
+        "busy_seconds",
+        "gauge",
+        "Seconds that simulators of today's sessions worked.",
+        sum(s.busy_s for s in simulators),
+    )
     metric("sessions_created_total", "counter", "Sessions so far.", total["created"])
     for name, words in (
         ("operations", "Operations so far."),

@@ -1,7 +1,6 @@
 """Operations of a session on its env: what each takes, does and answers. They run on the thread of the simulator."""
 
 from collections.abc import Callable, Mapping
-from io import BytesIO
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,62 +8,17 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.engine import arguments
 from anysim.engine.snapshots.file import made_with
-from anysim.engine.state import stamp_of, stamp_words, stamped
-from anysim.errors import SnapshotError, TaskError, listing
+from anysim.errors import TaskError, listing
 from anysim.math.arrays import shown, whole
 from anysim.task.contract import STATUS_NAMES, Obs
 from anysim.task.env import TaskEnv
 from anysim.task.snapshot import EnvSnapshot, spec_hash
-from anysim_serving.errors import LimitExceeded, MalformedFrame
-from anysim_serving.settings import PROTOCOL, Limits
+from anysim_client.errors import LimitExceeded, MalformedFrame
+from anysim_client.messages import PROTOCOL, jpegs, snapshot_data, snapshot_of, step_chunk
+from anysim_serving.settings import Limits
 
 IMAGES = ("raw", "jpeg", "none")
 """Forms of images in an answer: arrays, JPEG of the colour images, or left out."""
-
-
-class Chunk(NamedTuple):
-    """What several control steps in a row gave.
-
-    Attributes:
-        obs: after the last step that was made, as in `StepResult`.
-        reward: (N, K) float32; 0 in steps that an env did not make.
-        status: (N, K) words of `Status` after each step.
-        info: after the last step.
-        steps: (N,) control steps that each env made: one that ends is not stepped on.
-    """
-
-    obs: Obs
-    reward: Array
-    status: Array
-    info: dict[str, Array]
-    steps: Array
-
-
-def step_chunk(env: TaskEnv, actions: Any) -> Chunk:
-    """Steps of all envs with actions (N, K, A); envs that have ended wait for the others.
-
-    Raises:
-        TaskError: the actions have another shape, or no env is running.
-    """
-    actions = np.asarray(actions)
-    if actions.ndim != 3 or actions.shape[::2] != (env.num_envs, env.action_dim) or not actions.shape[1]:
-        raise TaskError(
-            f"a chunk of actions has shape ({env.num_envs}, K, {env.action_dim}) with K of 1 or more, got {actions.shape}"
-        )
-    if not env.running.any():
-        raise TaskError("no env is running; call reset() before step_chunk()")
-    rewards = np.zeros(actions.shape[:2], dtype=np.float32)
-    words = np.tile(env.status[:, None], (1, actions.shape[1]))
-    steps = np.zeros(env.num_envs, dtype=np.int64)
-    for k in range(actions.shape[1]):
-        running = env.running
-        if not running.any():
-            break
-        result = env.step(actions[:, k], None if running.all() else running)
-        rewards[:, k] = result.reward
-        words[:, k:] = result.status[:, None]
-        steps += running
-    return Chunk(env.obs, rewards, words, env.info, steps)
 
 
 # ---------------------------------------------------------------------------------------------- what a client must know
@@ -127,37 +81,6 @@ def details(env: TaskEnv) -> list[dict[str, Any]]:
     ]
 
 
-# ------------------------------------------------------------------------------------------------------------ snapshots
-
-
-def snapshot_data(snapshot: EnvSnapshot) -> dict[str, Any]:
-    """A snapshot as a message."""
-    stamp = {"task": snapshot.task, "spec_hash": snapshot.spec_hash, **stamp_of(snapshot.engine)}
-    data = {"engine": dict(snapshot.engine.data), "managers": snapshot.managers, "streams": snapshot.streams}
-    return {"stamp": stamp, "made_with": dict(made_with()), "data": data}
-
-
-def snapshot_of(message: Any) -> EnvSnapshot:
-    """The snapshot of a message; `TaskEnv.reset_to` checks what is in it.
-
-    Raises:
-        SnapshotError: it is of another form, or was made with other versions.
-    """
-    try:
-        stamp, data, versions = message["stamp"], message["data"], dict(message["made_with"])
-        engine, managers, streams = stamped(stamp, data["engine"]), data["managers"], data["streams"]
-        if not all(isinstance(rows, Mapping) for rows in (managers, streams, *managers.values())):
-            raise TypeError
-    except (KeyError, TypeError, ValueError, AttributeError):
-        raise SnapshotError("the snapshot is damaged: it is no message of one; take a new one") from None
-    if versions != dict(made_with()):
-        raise SnapshotError(
-            f"the snapshot was made with {versions}, the service has {dict(made_with())}, so going on from it would not "
-            f"give the same bits; install the same versions on both sides"
-        )
-    return EnvSnapshot(engine, managers, streams, *stamp_words(stamp, "task", "spec_hash"))
-
-
 # ----------------------------------------------------------------------------------------------------------- operations
 
 
@@ -176,7 +99,7 @@ class Call(NamedTuple):
 def _reset(call: Call) -> dict[str, Any]:
     m, env = call.message, call.env
     if m.get("pass_over"):  # a seed without an episode, as `env.streams.seed`
-        ids = arguments.indices(m.get("env_ids"), env.num_envs, "env")
+        ids = arguments.indices(m.get("env_ids", ()), env.num_envs, "env")
         env.streams.seed(m["seed"], ids)
         return _state(env)
     obs, _ = env.reset(
@@ -246,7 +169,7 @@ def _info(call: Call) -> dict[str, Any]:
 
 
 def _retire(call: Call) -> dict[str, Any]:
-    call.env.retire(arguments.indices(call.message.get("env_ids"), call.env.num_envs, "env"))
+    call.env.retire(arguments.indices(call.message.get("env_ids", ()), call.env.num_envs, "env"))
     return _state(call.env)
 
 
@@ -297,7 +220,7 @@ def perform(env: TaskEnv, message: Mapping[str, Any], limits: Limits) -> dict[st
     return answer
 
 
-# ------------------------------------------------------------------------------------------------------- forms of images
+# ------------------------------------------------------------------------------------------------------ forms of images
 
 
 def in_form(obs: Obs, form: str, quality: Any) -> dict[str, Any]:
@@ -308,33 +231,3 @@ def in_form(obs: Obs, form: str, quality: Any) -> dict[str, Any]:
         name: jpegs(rows, quality) if name.startswith("images/") and rows.dtype == np.uint8 else rows
         for name, rows in obs.items()
     }
-
-
-def jpegs(images: Array, quality: Any) -> dict[str, Any]:
-    """Images (N, H, W, 3) uint8 as JPEG, one after the other in `data`, each of `sizes` bytes."""
-    from PIL import Image
-
-    quality = whole("quality", quality, TaskError, least=1)
-    if quality > 100:
-        raise TaskError(f"quality is 1 to 100, got {quality}")
-    parts: list[bytes] = []
-    for image in images:
-        buffer = BytesIO()
-        Image.fromarray(image).save(buffer, "jpeg", quality=quality)
-        parts.append(buffer.getvalue())
-    data = np.frombuffer(b"".join(parts), dtype=np.uint8)
-    return {"jpeg": data, "sizes": np.array([len(part) for part in parts], dtype=np.int64)}
-
-
-def from_jpegs(packed: Mapping[str, Any]) -> Array:
-    """Images (N, H, W, 3) uint8 of what `jpegs` gave."""
-    from PIL import Image
-
-    data, ends = packed["jpeg"].tobytes(), np.cumsum(packed["sizes"])
-    starts = ends - packed["sizes"]
-    return np.stack(
-        [
-            np.asarray(Image.open(BytesIO(data[a:b]), formats=("JPEG",)))
-            for a, b in zip(starts.tolist(), ends.tolist(), strict=True)
-        ]
-    )

@@ -11,9 +11,9 @@ from dataclasses import replace
 from typing import Any
 
 from anysim.errors import TaskError
+from anysim_client.errors import ServiceError
 from anysim_serving.access import Gate
 from anysim_serving.catalogue import Catalogue
-from anysim_serving.errors import ServiceError
 from anysim_serving.settings import Settings
 
 GRACE_S = 5
@@ -82,8 +82,10 @@ class Service:
         return self._server.started
 
     def run(self, told: Callable[[], object]) -> None:
-        """Serve until SIGINT or SIGTERM; a second one ends connections that are still open. `told` is called once it
-        answers."""
+        """Serve until SIGINT or SIGTERM; a second one ends connections that are still open.
+
+        `told` is called once it answers.
+        """
 
         async def serve() -> None:
             loop = asyncio.get_running_loop()
@@ -126,7 +128,7 @@ class Service:
 
 @contextmanager
 def serving(*sources: Any, settings: Settings | None = None, **options: Any) -> Iterator[Service]:
-    """A service of tasks and worlds on a thread, for notebooks and tests: `with serving("pick_cube") as service:`.
+    """A service of tasks and worlds on a thread, for notebooks and tests.
 
     Args:
         sources: installed tasks by name, files, or mappings.

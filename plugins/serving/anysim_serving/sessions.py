@@ -11,8 +11,8 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field
 from typing import Any
 
+from anysim_client.errors import LimitExceeded, SessionGone, SessionTaken, TookTooLong
 from anysim_serving.catalogue import Catalogue, SessionRequest
-from anysim_serving.errors import LimitExceeded, SessionGone, SessionTaken, TookTooLong
 from anysim_serving.operations import handshake
 from anysim_serving.settings import Limits
 from anysim_serving.simulator import Job, Simulator
@@ -139,7 +139,7 @@ class Sessions:
         session.used = time.monotonic()
 
     def detach(self, session: Session) -> None:
-        """The connection is gone; whoever has the key may take it up again for a while."""
+        """The connection is gone; with the key it can be taken up again for a while."""
         session.attached, session.used = False, time.monotonic()
 
     def submit(self, session: Session, job: Job) -> "Future[Any]":

@@ -4,10 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from anysim.errors import TaskError
-
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
-PROTOCOL = 1
-"""The version of the protocol; client and service must have the same."""
+from anysim_client.token import LOOPBACK
 
 
 @dataclass(frozen=True)
@@ -49,7 +46,7 @@ class Settings:
 
     Attributes:
         host, port: where it listens; port 0 is any that is free.
-        token: who sends it may do everything; empty: whoever reaches the port may, on loopback alone.
+        token: who sends it may do everything; empty: everyone who reaches the port may, on loopback alone.
         hosts: names under which it may be asked, beside its own address.
         origins: origins of web pages that may ask.
         certificate, key: PEM files of TLS.

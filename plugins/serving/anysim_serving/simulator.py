@@ -1,4 +1,4 @@
-"""Simulators of a service: an env and the one thread that builds, steps and frees it, with a bounded queue before it."""
+"""Simulators of a service: an env, the one thread that builds, steps and frees it, and a bounded queue."""
 
 import logging
 import queue
@@ -9,7 +9,7 @@ from concurrent.futures import Future
 from typing import Any
 
 from anysim.task.env import TaskEnv
-from anysim_serving.errors import ServiceBusy, SessionGone
+from anysim_client.errors import ServiceBusy, SessionGone
 
 _log = logging.getLogger(__name__)
 Job = Callable[[TaskEnv], Any]
@@ -97,7 +97,7 @@ class Simulator:
             self._refuse_waiting()
             try:
                 env.close()
-            except Exception:
+            except Exception:  # noqa: BLE001 - whatever it is, the thread ends
                 _log.exception("an env could not be closed")
 
     def _serve(self, env: TaskEnv) -> None:

@@ -18,8 +18,8 @@ from starlette.websockets import WebSocketDisconnect
 
 from anysim.errors import AnysimError
 from anysim.task.env import TaskEnv
-from anysim_serving import wire
-from anysim_serving.errors import MalformedFrame, ServiceBusy, ServiceError, status_of, to_data
+from anysim_client import wire
+from anysim_client.errors import MalformedFrame, ServiceBusy, ServiceError, status_of, to_data
 from anysim_serving.operations import perform
 from anysim_serving.sessions import Session, Sessions
 from anysim_serving.shared import Offer
@@ -59,7 +59,7 @@ async def serve_socket(websocket: WebSocket, sessions: Sessions, ident: str, key
         await websocket.accept()
         reader = asyncio.create_task(_read(websocket, sessions, link))
         writer = asyncio.create_task(_write(websocket, sessions, link))
-        gone = asyncio.create_task(session.over.wait())
+        gone = asyncio.create_task(_ended(session))
         _, running = await asyncio.wait((reader, writer, gone), return_when=asyncio.FIRST_COMPLETED)
         if reader.done() and not writer.done() and not gone.done():
             await link.answers.put(None)
@@ -69,10 +69,14 @@ async def serve_socket(websocket: WebSocket, sessions: Sessions, ident: str, key
         if gone.done() and not gone.cancelled():
             await websocket.close(_IDLE_CLOSE, "the session has ended")
     except (WebSocketDisconnect, RuntimeError, OSError):
-        pass  # the client is gone, and with it whoever could be told
+        pass  # the client is gone, and nobody is left to be told
     finally:
         sessions.detach(session)
         await _drained(link)
+
+
+async def _ended(session: Session) -> None:
+    await session.over.wait()
 
 
 async def _drained(link: _Link) -> None:
@@ -149,7 +153,7 @@ def _answer(env: TaskEnv, data: bytes, link: _Link, sessions: Sessions) -> Frame
         if link.shared is not None and "obs" in answer and message.get("slot") is not None:
             answer["obs"] = link.shared.put(answer["obs"], message["slot"])
         return wire.parts({"seq": number, "ok": answer})
-    except Exception as error:
+    except Exception as error:  # noqa: BLE001 - it is the answer
         if status_of(error) >= 500:
             _log.exception("session %s: an operation failed", session.id)
         session.counts["errors"] += 1

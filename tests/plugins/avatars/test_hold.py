@@ -6,13 +6,19 @@ import pytest
 import anysim
 from anysim.errors import SpecError
 from anysim.math import pose as P
+from anysim.record.collector import Collector
+from anysim.record.reader import open_trajectory
+from anysim.record.replay import replay
 from anysim.testing.engines import require_engine
 from anysim_avatars.hold import FREE, GIVEN, HELD, Hold
 from anysim_avatars.terms import AvatarView
 from anysim_avatars.waits import AwaitClear
 from tests.plugins.avatars.people import avatars, joints, run_of, wait
+from tests.schemas.test_every_key import Still
+from tests.tasks.states import blind
 
 ENGINES = ("mujoco", "pybullet", "sapien")
+EACH = pytest.mark.parametrize("engine", ["mujoco", *(pytest.param(e, marks=pytest.mark.slow) for e in ENGINES[1:])])
 OUT = {"clip": "idle", "reach": [0.4, -0.2, 1.1]}
 
 
@@ -38,7 +44,7 @@ def pull(env, force):
     wait(env)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@EACH
 def test_a_hand_holds_on_to_what_is_pulled_with_less_than_its_force(engine):
     require_engine(engine)
     do = [{"clip": "idle", "reach": [0.3, -0.2, 1.0], "seconds": 0.2}, {**OUT, "ease": 0.5}]
@@ -150,3 +156,29 @@ def test_clear_is_what_somebody_has_left():
             wait(env)
         assert when is not None
         assert 40 < when < 60
+
+
+@EACH
+def test_a_task_with_a_person_goes_on_and_replays_with_the_same_bits(engine, tmp_path):
+    """The bar is in the hand: a moment goes on in two envs alike, then apart; a recording replays."""
+    require_engine(engine)
+    with blind("take_from_human", engine, 2, "task.horizon=25", "record.keep=all") as env:
+        env.reset(seed=4)
+        action = np.full((2, env.action_dim), 0.3)
+        for _ in range(8):
+            env.step(action)
+        moment = env.snapshot(np.array([True, False]))
+        env.reset_to(moment, [0])
+        env.reset_to(moment, [1])
+        for _ in range(8):
+            env.step(action)
+        state = env.engine.get_state()
+        assert state.body_pose[0].tobytes() == state.body_pose[1].tobytes()
+        action[1] = -0.3
+        for _ in range(3):
+            env.step(action)
+        assert np.abs(np.diff(env.engine.get_state().joint_pos, axis=0)).max() > 0.01
+        list(Collector(env, Still(env), tmp_path, 1, seed=1).run())
+    (folder,) = (tmp_path / "episodes").iterdir()
+    assert open_trajectory(folder).states["family_offer_holding"].all()
+    assert replay(folder).identical

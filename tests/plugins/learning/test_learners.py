@@ -168,6 +168,7 @@ def test_of_policies_that_solve_as_much_the_one_of_the_greatest_reward_is_kept(
     runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     import onnx
+
     from anysim_learning import exam
     from anysim_learning.train import POLICY, train
     from anysim_schemas.policy_file import METADATA

@@ -11,8 +11,12 @@ from anysim.testing.engines import require_engine
 from tests.plugins.skills.test_pick import rollout
 from tests.tasks.states import blind, put, seen
 
-POSTURES = {"posture": {"*_thigh_joint": 0.8}, "left": {"*L_thigh_joint": 3.0}, "right": {"*R_thigh_joint": 3.0}}
-EXPERT = {"skill": "recover", "robot": "dog", "waits": 0.04, "pushes": 0.06, "folds": 0.04, "rises": 0.1, **POSTURES}
+TURNS = [
+    {"left": {"*_calf_joint": -2.05}, "right": {"*_calf_joint": -2.05}, "pushes": 0.04, "folds": 0.02},
+    {"left": {"*L_thigh_joint": 3.0}, "right": {"*R_thigh_joint": 3.0}, "pushes": 0.06, "folds": 0.04},
+]
+WORDS = {"robot": "dog", "posture": {"*_thigh_joint": 0.8}, "turns": TURNS}
+EXPERT = {"skill": "recover", "waits": 0.04, "rises": 0.1, **WORDS}
 
 
 def lying(env: TaskEnv, *rolls: float) -> None:
@@ -52,7 +56,20 @@ def test_what_takes_no_joint_positions_is_refused() -> None:
         blind("stand_still", "null", 1, "world.robots.dog.actions.base=trot") as env,
         pytest.raises(TaskError, match=r"recover commands joint positions, which 'dog\.base' does not take"),
     ):
-        bind_skill("recover", {"robot": "dog", **POSTURES}, env, "task.expert")
+        bind_skill("recover", WORDS, env, "task.expert")
+
+
+def test_on_its_back_it_tries_one_turn_after_the_other() -> None:
+    with blind("get_up", "null", 1, f"task.expert={EXPERT}") as env:
+        env.reset(seed=2)
+        policy = SkillPolicy(env)
+        policy.begin(np.arange(1))
+        lying(env, 3.0)
+        told = np.array([0.3 * policy.act(np.arange(1))[0, :6] for _ in range(13)])  # of its front legs
+        thighs, calves = told[2:, 1::3], told[2:, 2::3]
+        both, right, home = [0.6, 0.6], [0.0, 1.7], [0.0, 0.0]
+        np.testing.assert_allclose(calves, [both] * 2 + [home] * 6 + [both] * 2 + [home], atol=1e-9)
+        np.testing.assert_allclose(thighs, [home] * 3 + [right] * 3 + [home] * 5, atol=1e-9)
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""What matter and bodies give to each other: no momentum is lost, and engines agree."""
+"""Momentum that matter and bodies trade: none is lost, and engines agree."""
 
 import numpy as np
 import pytest

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import anysim
-from anysim_serving.env import RemoteEnv
+from anysim_client.env import RemoteEnv
 from anysim_serving.server import Service, fresh_token, serving
 from anysim_serving.settings import Limits, Settings
 from tests.task.helpers import BLIND, BLOCKS
@@ -20,9 +20,7 @@ SEEN: dict[str, Any] = {
         "name": "seen",
         "objects": {"red": {"source": {"box": [0.05, 0.05, 0.05]}, "mass": 0.2, "color": "red"}},
         "layout": {"red": {"position": [0.0, 0.0, 0.1], "yaw": {"range": [-3.0, 3.0]}}},
-        "cameras": {
-            "eye": {"from": [0.4, 0.4, 0.4], "look_at": "red", "size": [32, 24], "channels": ["rgb", "depth"]}
-        },
+        "cameras": {"eye": {"from": [0.4, 0.4, 0.4], "look_at": "red", "size": [32, 24], "channels": ["rgb", "depth"]}},
     },
     "task": {
         "horizon": 8,

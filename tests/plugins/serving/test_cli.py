@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import anysim
-from anysim_serving.errors import ConnectionLost
+from anysim_client.errors import ConnectionLost
 from tests.plugins.serving.helpers import BLOCKS, local, same
 
 
@@ -38,7 +38,7 @@ def started(folder: Path, *more: str) -> tuple[subprocess.Popen[str], list[str]]
     raise AssertionError(f"{process.wait(30)}: {''.join(lines)}")
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.slow)])
 def test_it_serves_and_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals) -> None:
     monkeypatch.setenv("ANYSIM_STATE_DIR", str(tmp_path / "state"))
     monkeypatch.delenv("ANYSIM_SERVE_TOKEN", raising=False)

@@ -13,9 +13,9 @@ import anysim
 from anysim.errors import PluginError, SnapshotError, TaskError
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
+from anysim_client.env import STAYS
+from anysim_client.messages import step_chunk
 from anysim_learning.gymnasium import GymEnv, GymVectorEnv
-from anysim_serving.env import STAYS
-from anysim_serving.operations import step_chunk
 from anysim_serving.server import Service
 from tests.plugins.serving.helpers import BLIND, BLOCKS, SEEN, connected, local, same, service
 
@@ -95,7 +95,7 @@ def test_results_are_the_same_bits(arms: Service) -> None:
 def test_refusals_are_those_of_the_env(served: Service) -> None:
     with connected(served, num_envs=2) as far, local(num_envs=2) as near:
         for env in (far, near):
-            with pytest.raises(TaskError, match="not reset yet.*call reset"):
+            with pytest.raises(TaskError, match=r"not reset yet.*call reset"):
                 env.step(np.zeros((2, 0)))
             env.reset(seed=0)
             with pytest.raises(TaskError, match="mask must be a bool array"):
@@ -219,9 +219,9 @@ def test_images_come_by_each_way() -> None:
                 assert same(far.obs, after)
                 assert same(far.render(env_ids=[1], size=(20, 16)), near.render(env_ids=[1], size=(20, 16)))
             far.close()
-        from anysim_serving.shared import _folder
+        from anysim_client.shared import shared_folder
 
-        assert not list(_folder().glob("anysim-*"))
+        assert not list(shared_folder().glob("anysim-*"))
 
 
 def test_a_scheme_without_a_client_is_told() -> None:

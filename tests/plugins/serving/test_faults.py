@@ -1,4 +1,4 @@
-"""What goes wrong between a client and a service: answers have a type, and other sessions do not notice."""
+"""Faults between a client and a service: answers have a type, and other sessions do not notice."""
 
 import threading
 import time
@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from anysim.errors import TaskError
-from anysim_serving import socket as socket_module, wire
-from anysim_serving.errors import ConnectionLost, MalformedFrame, ServiceBusy, SessionGone, TookTooLong
+from anysim_client import wire
+from anysim_client.errors import ConnectionLost, MalformedFrame, ServiceBusy, SessionGone, TookTooLong
+from anysim_serving import socket as socket_module
 from anysim_serving.server import Service
 from anysim_serving.settings import Limits
 from tests.plugins.serving.helpers import BLOCKS, connected, local, same, service
@@ -49,17 +50,17 @@ def until(true: Callable[[], bool], seconds: float = 30.0) -> None:
 
 
 def send(env: Any, data: bytes) -> dict[str, Any]:
-    env._link._socket.send(data)
-    return wire.unpack(env._link._socket.receive())
+    env.link._socket.send(data)
+    return wire.unpack(env.link._socket.receive())
 
 
 def test_a_client_that_vanishes_in_a_step_leaves_nothing(made: Service, bystander: Callable[[], None]) -> None:
     threads = threading.active_count()
     env = connected(made, num_envs=2)
-    ident = env._link.id
+    ident = env.link.id
     env.reset(seed=0)
     env.begin_step(np.zeros((2, 0)))
-    env._link._socket._stream.close()
+    env.link._socket._stream.close()
     bystander()
     until(lambda: ident not in sessions(made))
     bystander()
@@ -70,18 +71,18 @@ def test_a_lost_connection_is_taken_up_again(made: Service) -> None:
     with connected(made) as env, local() as near:
         env.reset(seed=0)
         near.reset(seed=0)
-        env._link.drop()
+        env.link.drop()
         with pytest.raises(ConnectionLost):
             env.step(np.zeros((1, 0)))
-        until(lambda: not sessions(made)[env._link.id].attached)
-        env._link.attach()
+        until(lambda: not sessions(made)[env.link.id].attached)
+        env.link.attach()
         assert same(tuple(env.step(np.zeros((1, 0)))), tuple(near.step(np.zeros((1, 0)))))
 
 
 def test_what_is_no_message_is_answered(made: Service, bystander: Callable[[], None]) -> None:
     with connected(made) as env:
         env.reset(seed=0)
-        number = env._link._number
+        number = env.link._number
         for data, words in (
             (b"", "begins with"),
             (b"\x80" * 100, "begins with"),
@@ -108,15 +109,15 @@ def test_what_is_no_message_is_answered(made: Service, bystander: Callable[[], N
         ):
             number += 10
             assert send(env, wire.pack({"seq": number, **message}))["error"]["type"] == kind, message
-        env._link._number = number
+        env.link._number = number
         bystander()
         env.step(np.zeros((1, 0)))
 
 
 def test_text_is_not_read(made: Service) -> None:
     with connected(made) as env:
-        env._link._socket._send(1, b"step")
-        assert "binary" in wire.unpack(env._link._socket.receive())["error"]["message"]
+        env.link._socket._send(1, b"step")
+        assert "binary" in wire.unpack(env.link._socket.receive())["error"]["message"]
 
 
 def test_a_message_that_is_too_large_ends_its_connection(made: Service, bystander: Callable[[], None]) -> None:
@@ -132,26 +133,26 @@ def test_more_than_may_wait_is_busy(made: Service, bystander: Callable[[], None]
     with connected(made) as env:
         env.reset(seed=0)
         go_on = threading.Event()
-        session = sessions(made)[env._link.id]
+        session = sessions(made)[env.link.id]
         session.simulator.submit(lambda _: go_on.wait(30))
-        number = env._link._number
+        number = env.link._number
         for i in range(10):
-            env._link._socket.send(wire.pack({"op": "observe", "seq": number + 1 + i}))
+            env.link._socket.send(wire.pack({"op": "observe", "seq": number + 1 + i}))
         until(lambda: session.counts["errors"] >= 6)
         bystander()
         go_on.set()
-        answers = [wire.unpack(env._link._socket.receive()) for _ in range(10)]
+        answers = [wire.unpack(env.link._socket.receive()) for _ in range(10)]
         busy = [answer["error"]["type"] for answer in answers if "error" in answer]
         assert busy == [ServiceBusy.__name__] * len(busy)
         assert len(busy) in (6, 7)  # the first of the others may wait beside the one that is worked on
-        env._link._number += 10
+        env.link._number += 10
         env.step(np.zeros((1, 0)))
 
 
 def test_a_step_during_a_reset_comes_after_it(made: Service) -> None:
     """One thread has the simulator: what is sent while it works is done in order, and answered in order."""
     with connected(made, num_envs=2) as env, local(num_envs=2) as near:
-        number = env._link._number
+        number = env.link._number
         for i, message in enumerate(
             [
                 {"op": "step", "action": np.zeros((2, 0))},
@@ -159,8 +160,8 @@ def test_a_step_during_a_reset_comes_after_it(made: Service) -> None:
                 {"op": "step", "action": np.zeros((2, 0))},
             ]
         ):
-            env._link._socket.send(wire.pack({"seq": number + 1 + i, **message}))
-        early, reset, step = (wire.unpack(env._link._socket.receive()) for _ in range(3))
+            env.link._socket.send(wire.pack({"seq": number + 1 + i, **message}))
+        early, reset, step = (wire.unpack(env.link._socket.receive()) for _ in range(3))
         near.reset(seed=5)
         assert early["error"]["type"] == TaskError.__name__
         assert reset["ok"]["running"].all()
@@ -174,14 +175,14 @@ def test_a_client_that_does_not_read_holds_up_itself(
     monkeypatch.setattr(socket_module, "SEND_S", 0.5)
     env = connected(made, num_envs=8)
     env.reset(seed=0)
-    session = sessions(made)[env._link.id]
-    number = env._link._number
+    session = sessions(made)[env.link.id]
+    number = env.link._number
     for _ in range(2000):
         done = session.counts["bytes_out"]
         for _ in range(LIMITS.waiting):
             number += 1
             if session.attached:
-                env._link._socket.send(wire.pack({"op": "snapshot", "seq": number}))
+                env.link._socket.send(wire.pack({"op": "snapshot", "seq": number}))
         until(lambda done=done: session.counts["bytes_out"] > done or not session.attached)
         if not session.attached:
             break
@@ -197,7 +198,7 @@ def test_a_service_that_ends_and_comes_back() -> None:
     with service(BLOCKS) as one:
         env = connected(one)
         env.reset(seed=0)
-        simulator = sessions(one)[env._link.id].simulator
+        simulator = sessions(one)[env.link.id].simulator
     assert simulator.join(0)
     with pytest.raises(ConnectionLost):
         env.step(np.zeros((1, 0)))
@@ -223,7 +224,7 @@ def test_an_operation_that_takes_too_long_ends_its_session() -> None:
     with service(limits=Limits(op_s=0.3)) as one:
         env = connected(one)
         stuck = threading.Event()
-        sessions(one)[env._link.id].simulator.submit(lambda _: stuck.wait(20))
+        sessions(one)[env.link.id].simulator.submit(lambda _: stuck.wait(20))
         try:
             with pytest.raises((TookTooLong, ConnectionLost)):
                 env.reset(seed=0)
@@ -240,11 +241,11 @@ def test_a_bug_is_told_without_its_words(made: Service, caplog: pytest.LogCaptur
 
         def broken(engine_env: Any) -> None:
             def step(*_: Any) -> None:
-                raise RuntimeError("/home/someone/secret")
+                raise RuntimeError("somewhere/secret")
 
             engine_env.step = step
 
-        sessions(made)[env._link.id].simulator.submit(broken).result()
+        sessions(made)[env.link.id].simulator.submit(broken).result()
         with pytest.raises(Exception, match="the service failed") as raised:
             env.step(np.zeros((1, 0)))
         assert type(raised.value).__name__ == "EngineFailure"
@@ -272,8 +273,12 @@ def fuzz(made: Service, count: int) -> None:
             cut = frame[: rng.integers(0, len(frame))] if rng.random() < 0.1 else frame
             answer = send(env, cut.tobytes())
             assert "ok" in answer or answer["error"]["type"] in (
-                "MalformedFrame", "TaskError", "EngineError", "LimitExceeded", "SnapshotError",
-            ), answer  # fmt: skip
+                "MalformedFrame",
+                "TaskError",
+                "EngineError",
+                "LimitExceeded",
+                "SnapshotError",
+            ), answer
     with connected(made, num_envs=2) as far, local(num_envs=2) as near:
         assert same(far.reset(seed=1), near.reset(seed=1))
 

@@ -1,4 +1,4 @@
-"""Pools: the same bits as one local env, whoever is lost."""
+"""Pools: the same bits as one local env, also where a service is lost."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -10,9 +10,9 @@ import pytest
 import anysim
 from anysim.errors import TaskError
 from anysim.task.env import TaskEnv
-from anysim_serving.env import STAYS
-from anysim_serving.errors import ConnectionLost, ServiceError
-from anysim_serving.pool import PooledEnv
+from anysim_client.env import STAYS
+from anysim_client.errors import ConnectionLost, ServiceError
+from anysim_client.pool import PooledEnv
 from anysim_serving.server import Service
 from tests.plugins.serving.helpers import BLOCKS, local, same, service
 

@@ -1,4 +1,4 @@
-"""What a service answers over HTTP, to whom, and within which limits."""
+"""Answers of a service over HTTP: what it says, to whom, and within which limits."""
 
 import http.client
 import json
@@ -12,12 +12,12 @@ import pytest
 import anysim
 from anysim.errors import SpecError, TaskError
 from anysim.task.snapshot import EnvSnapshot
-from anysim_serving.access import keep_token, kept_token, token_file
+from anysim_client.errors import ConnectionLost, ForbiddenSource, LimitExceeded, SessionGone, SessionTaken, Unauthorized
+from anysim_client.token import keep_token, kept_token, token_file
+from anysim_client.websocket import HandshakeRefusal, WebSocket
 from anysim_serving.catalogue import Catalogue
-from anysim_serving.errors import ConnectionLost, ForbiddenSource, LimitExceeded, SessionGone, SessionTaken, Unauthorized
 from anysim_serving.server import Service, serving
 from anysim_serving.settings import Limits, Settings
-from anysim_serving.websocket import Refused, WebSocket
 from tests.plugins.serving.helpers import BLOCKS, connected, local, same, service
 
 LIMITS = Limits(sessions=3, envs=4, total_envs=6, linger_s=0.2, body_bytes=4096)
@@ -39,7 +39,9 @@ def ask(made: Service, path: str, method: str = "GET", body: Any = None, **heade
     answer = link.getresponse()
     content = answer.read()
     link.close()
-    return answer.status, json.loads(content) if content and "json" in answer.headers.get("content-type", "") else content
+    return answer.status, json.loads(content) if content and "json" in answer.headers.get(
+        "content-type", ""
+    ) else content
 
 
 # ------------------------------------------------------------------ who may ask
@@ -71,11 +73,16 @@ def test_who_may_ask(made: Service, path: str, headers: dict[str, str], status: 
 
 def test_a_socket_is_behind_the_same_checks(made: Service) -> None:
     def shake(headers: dict[str, str]) -> int:
-        with pytest.raises(Refused) as refused:
+        with pytest.raises(HandshakeRefusal) as refused:
             WebSocket.open(
-                "127.0.0.1", made.settings.port, "/v1/sessions/none/socket", headers,
-                context=None, timeout=30, largest=1000,
-            )  # fmt: skip
+                "127.0.0.1",
+                made.settings.port,
+                "/v1/sessions/none/socket",
+                headers,
+                context=None,
+                timeout=30,
+                largest=1000,
+            )
         assert "error" in json.loads(refused.value.body)
         return refused.value.status
 
@@ -222,9 +229,9 @@ def test_a_session_over_http(made: Service, tmp_path: Path) -> None:
 def test_a_session_belongs_to_who_has_its_key(made: Service) -> None:
     with connected(made) as env:
         shown = ask(made, "/v1/sessions")[1]
-        assert shown[0]["id"] == env._link.id
-        assert env._link._key not in json.dumps(shown)
-        path = f"/v1/sessions/{env._link.id}"
+        assert shown[0]["id"] == env.link.id
+        assert env.link._key not in json.dumps(shown)
+        path = f"/v1/sessions/{env.link.id}"
         for key in ({}, {"Anysim-Session-Key": "wrong"}):
             assert ask(made, path, "DELETE", **key)[0] == 404
             assert ask(made, f"{path}/reset", "POST", {}, **key)[0] == 404
@@ -256,13 +263,13 @@ def test_two_clients_cannot_have_one_session(made: Service) -> None:
     with connected(made) as env:
         env.reset(seed=0)
         with pytest.raises(SessionTaken, match="another connection"):
-            type(env._link).attach(_copy(env._link))
+            type(env.link).attach(_copy(env.link))
         env.step(np.zeros((1, 0)))
 
 
 def test_an_ended_session_is_gone(made: Service) -> None:
     env = connected(made)
-    link = _copy(env._link)
+    link = _copy(env.link)
     env.close()
     with pytest.raises(SessionGone):
         link.attach()

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from anysim.conventions import Array
-from anysim_particles.kernels import compiled
+from anysim_particles.kernels.compiling import compiled
 from anysim_sensors.kernels.distances import convex, meshed
 from anysim_sensors.tables import CYLINDER, Geoms, Triangles
 
@@ -221,11 +221,7 @@ def find_contacts(
                 continue
             f = b.frame[g]
             u, v, w = x - f[9], y - f[10], z - f[11]
-            u, v, w = (
-                f[0] * u + f[3] * v + f[6] * w,
-                f[1] * u + f[4] * v + f[7] * w,
-                f[2] * u + f[5] * v + f[8] * w,
-            )
+            u, v, w = (f[0] * u + f[3] * v + f[6] * w, f[1] * u + f[4] * v + f[7] * w, f[2] * u + f[5] * v + f[8] * w)
             if geoms.kind[g] > CYLINDER:
                 gap, p0, p1, p2 = meshed(triangles, triangles.root[geoms.mesh[g]], u, v, w, 3 * reach, stack, near)
             else:

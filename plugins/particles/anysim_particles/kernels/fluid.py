@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from anysim.conventions import Array
-from anysim_particles.kernels import compiled
+from anysim_particles.kernels.compiling import compiled
 from anysim_particles.kernels.contacts import (
     Proxies,
     expect,
@@ -85,7 +85,7 @@ def fluid_step(
     h, reach = dt / substeps, REACH * spacing
     still = b.com.shape[0] - 1
     p, near = np.empty((n, 3)), no_contacts(n)
-    pairs, towards, weight = np.empty((24 * n + 64, 2), dtype=np.int32), np.empty((1, 3)), np.empty(1)
+    pairs, towards = np.empty((24 * n + 64, 2), dtype=np.int32), np.empty((1, 3))
     density, square, along = np.empty(n), np.empty(n), np.empty((n, 3))
     steep = STEEP / reach
     soft = SOFT * 6 * (steep / 4) ** 2
@@ -99,7 +99,7 @@ def fluid_step(
         pairs, count = near_pairs(p, n, reach, pairs)
         near = find_contacts(p, n, reach, geoms, triangles, b, near)
         if towards.shape[0] < count:
-            towards, weight = np.empty((pairs.shape[0], 3)), np.empty(pairs.shape[0])
+            towards = np.empty((pairs.shape[0], 3))
         some = near.begin[n]
         shares, slopes = np.empty(some), np.empty(some)
         for _ in range(iterations):

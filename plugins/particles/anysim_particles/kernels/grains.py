@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from anysim.conventions import Array
-from anysim_particles.kernels import compiled
+from anysim_particles.kernels.compiling import compiled
 from anysim_particles.kernels.contacts import (
     Proxies,
     expect,
@@ -72,7 +72,7 @@ def grain_step(
         slow: [m/s] at which what overlaps comes apart.
     """
     grains = n // beads
-    first = x_[: n : beads].copy()
+    first = x_[:n:beads].copy()
     by_grain = sorted_by_cell(first, grains, 4 * radius)
     order = np.empty(n, dtype=np.int64)
     for a in range(grains):

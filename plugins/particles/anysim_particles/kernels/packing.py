@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from anysim.conventions import Array
-from anysim_particles.kernels import compiled
+from anysim_particles.kernels.compiling import compiled
 
 
 @compiled

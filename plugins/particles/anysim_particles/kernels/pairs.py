@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from anysim.conventions import Array
-from anysim_particles.kernels import compiled
+from anysim_particles.kernels.compiling import compiled
 
 STEPS = 13
 """Of the 26 cells around a cell half are looked at: pairs are found once."""
@@ -32,7 +32,7 @@ def _sides(p: Array, n: int, cell: float, low: Array, sides: Array) -> None:
 def _place(p: Array, n: int, cell: float, low: Array, at: Array) -> None:
     for i in range(n):
         for k in range(3):
-            at[i, k] = int(math.floor((p[i, k] - low[k]) / cell))
+            at[i, k] = math.floor((p[i, k] - low[k]) / cell)
 
 
 @compiled

@@ -3,7 +3,7 @@
 import math
 
 from anysim.conventions import Array
-from anysim_particles.kernels import compiled
+from anysim_particles.kernels.compiling import compiled
 
 LIGHT = (-0.35, -0.65, -0.67)
 """Unit vector towards the light in the optical frame (x right, y down, z forward)."""

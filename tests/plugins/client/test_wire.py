@@ -6,8 +6,8 @@ import msgpack
 import numpy as np
 import pytest
 
-from anysim_serving import wire
-from anysim_serving.errors import MalformedFrame
+from anysim_client import wire
+from anysim_client.errors import MalformedFrame
 from tests.plugins.serving.helpers import same
 
 MESSAGE: dict[str, Any] = {
@@ -49,7 +49,7 @@ def test_what_cannot_travel_is_refused(value: Any) -> None:
 
 
 def forged(tree: Any, arrays: Any, body: bytes = b"") -> bytes:
-    head = msgpack.packb({"tree": tree, "arrays": arrays})
+    head = msgpack.Packer().pack({"tree": tree, "arrays": arrays})
     return b"ASF1" + len(head).to_bytes(4, "little") + head + body
 
 

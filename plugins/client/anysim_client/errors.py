@@ -67,10 +67,18 @@ class TookTooLong(ServiceError):
 _OWN = {
     kind.__name__: kind
     for kind in (
-        ServiceError, MalformedFrame, Unauthorized, ForbiddenSource, SessionGone, SessionTaken, LimitExceeded,
-        ServiceBusy, ConnectionLost, TookTooLong,
+        ServiceError,
+        MalformedFrame,
+        Unauthorized,
+        ForbiddenSource,
+        SessionGone,
+        SessionTaken,
+        LimitExceeded,
+        ServiceBusy,
+        ConnectionLost,
+        TookTooLong,
     )
-}  # fmt: skip
+}
 
 
 def status_of(error: BaseException) -> int:

@@ -14,11 +14,11 @@ from anysim.errors import SnapshotError, TaskError
 from anysim.math import arrays
 from anysim.task.contract import STATUS_NAMES, Obs, StepResult
 from anysim.task.snapshot import EnvSnapshot
+from anysim_client.errors import ServiceError
+from anysim_client.link import Link
+from anysim_client.messages import Chunk, from_jpegs, snapshot_data, snapshot_of
+from anysim_client.shared import MARK, SharedSlots
 from anysim_schemas.run import RunSpec
-from anysim_serving.errors import ServiceError
-from anysim_serving.link import Link
-from anysim_serving.operations import Chunk, from_jpegs, snapshot_data, snapshot_of
-from anysim_serving.shared import MARK, Shared
 
 STAYS = frozenset(
     "managers actions capture families sensors bindings mdp counterfactuals located physics_seconds".split()
@@ -58,28 +58,31 @@ class RemoteEnv:
         scene: `elapsed` (N,) control steps, and `terrain`, which is None.
         streams: `seed` and `episode_seed`.
         latest: of each env what `details` tells, as of the last step, where it was asked for with `full`.
+        link: the session, and the connection to it.
         source: what the session is of, by the service's name for it.
     """
 
     def __init__(self, link: Link, images: str = "auto", quality: int = 90, full: bool = False) -> None:
-        """`images` are sent `raw`, as `jpeg` of a `quality`, or `shared` in memory; `auto` is shared where it can be."""
+        """`images` are sent `raw`, as `jpeg` of a `quality`, or `shared` in memory; `auto` shares where that can be."""
         if images not in ("auto", "raw", "jpeg", "shared"):
             raise TaskError(f"images are sent auto, raw, jpeg or shared, not {arrays.shown(images)}")
-        self._link, spec = link, link.spec
+        self.link, spec = link, link.spec
         self.name, self.num_envs, self.source = str(spec["task"]), int(spec["num_envs"]), str(spec["source"])
         self._low, self._high = (np.array(spec["action"][end], dtype=float) for end in ("low", "high"))
         self.action_dim = len(self._low)
         self.observation_sizes = {name: int(size) for name, size in spec["observations"].items()}
         self.image_shapes = {name: tuple(shape) for name, (shape, _) in spec["images"].items()}
         self.engine = _Engine(
-            spec["engine"], spec["engine_version"], self.num_envs,
+            spec["engine"],
+            spec["engine_version"],
+            self.num_envs,
             _World(spec["world"], spec["world_hash"], _Physics(spec["control_dt"])),
-        )  # fmt: skip
+        )
         self.streams, self.scene = _Streams(self), _Scene(self)
         self.latest: list[dict[str, Any]] = []
         self._form = {"images": "jpeg", "quality": quality} if images == "jpeg" else {}
         self._full = full or None
-        self._shared: Shared | None = None
+        self._shared: SharedSlots | None = None
         self._obs: dict[str, Array | None] = {}
         """The latest of all envs; None where a caller has it, in shared memory."""
         self._slot: int | None = None
@@ -93,11 +96,11 @@ class RemoteEnv:
                 raise ServiceError("the service is not on this machine, or has no room: its images cannot be shared")
 
     def _negotiate(self) -> None:
-        terms = self._link.call("share")
+        terms = self.link.call("share")
         if not terms:
             return
-        found = Shared.found(terms)
-        agreed = self._link.call("share", proof=np.zeros(0, np.uint8) if found is None else found.proof)["shared"]
+        found = SharedSlots.found(terms)
+        agreed = self.link.call("share", proof=np.zeros(0, np.uint8) if found is None else found.proof)["shared"]
         if found is not None and agreed:
             self._shared = found
         elif found is not None:
@@ -113,7 +116,7 @@ class RemoteEnv:
     @cached_property
     def spec(self) -> RunSpec:
         """The whole spec that the service runs; its terms must be installed here too."""
-        return load(self._link.spec["spec"]).spec
+        return load(self.link.spec["spec"]).spec
 
     @property
     def action_bounds(self) -> tuple[Array, Array]:
@@ -124,7 +127,7 @@ class RemoteEnv:
     def action_spaces(self) -> ActionSpaces:
         """What each channel takes, by `robot.channel`, in the order of the flat action."""
         channels: dict[str, ChannelSpace] = {}
-        for name, space in self._link.spec["action"]["channels"].items():
+        for name, space in self.link.spec["action"]["channels"].items():
             low, start = np.array(space["low"], dtype=float), int(space["start"])
             labels = tuple(space["labels"])
             channels[name] = ChannelSpace(low, np.array(space["high"], dtype=float), labels, start, start + len(low))
@@ -135,7 +138,7 @@ class RemoteEnv:
         """The latest observation of all envs, as after the last reset or step."""
         self._refresh()
         if missing := [name for name, rows in self._obs.items() if rows is None]:
-            seen = self._rows(self._ask("observe", keys=missing), np.arange(self.num_envs))
+            seen = self.observe(missing)
             return {name: seen[name] if rows is None else rows.copy() for name, rows in self._obs.items()}
         return {name: rows.copy() for name, rows in self._obs.items() if rows is not None}
 
@@ -157,10 +160,23 @@ class RemoteEnv:
         self._refresh()
         return self._running.copy()
 
+    @property
+    def codes(self) -> Array:
+        """(N,) int8, the place of each env's word in `Status`."""
+        self._refresh()
+        return self._code.copy()
+
+    def observe(self, keys: Sequence[str]) -> Obs:
+        """Some groups and images of the latest observation of all envs, asked of the service."""
+        return self._rows(self.ask("observe", keys=list(keys), **self._form), np.arange(self.num_envs))
+
     def details(self) -> list[dict[str, Any]]:
-        """Everything that the service knows of each env's episode: `instruction`, `draws`, `overridden`, `bindings`,
-        `goals` and `poses` by name (7,), `sensors`, `held` and `status`."""
-        return self._ask("info")["details"]
+        """Everything that the service knows of each env's episode, by name.
+
+        `instruction`, `status`, `held`, `draws`, `overridden`, `bindings`; `goals` and `poses` (7,) [m, xyzw] by name;
+        `sensors`, what is recorded of them.
+        """
+        return self.ask("info")["details"]
 
     def instruction(self, env: int) -> str:
         """The task in words, as it is in an env's episode."""
@@ -183,7 +199,7 @@ class RemoteEnv:
     ) -> tuple[Obs, dict[str, Array]]:
         """Start new episodes in all envs, or where `mask` (N,) is true; as `TaskEnv.reset`."""
         ids = self._chosen(mask)
-        answer = self._ask(
+        answer = self.ask(
             "reset", seed=_plain(seed), mask=mask, episode_seeds=_plain(episode_seeds), overrides=_plain(overrides)
         )
         obs = self._rows(answer, ids)
@@ -209,17 +225,17 @@ class RemoteEnv:
 
     def step_chunk(self, actions: Any) -> Chunk:
         """Several control steps with actions (N, K, A) in one message; envs that end wait for the others."""
-        answer = self._ask("step_chunk", actions=np.asarray(actions), **self._form)
+        answer = self.ask("step_chunk", actions=np.asarray(actions), **self._form)
         obs = self._rows(answer, np.arange(self.num_envs))
         return Chunk(obs, answer["reward"], STATUS_NAMES[answer["codes"]], self.info, answer["steps"])
 
     def retire(self, env_ids: Array) -> None:
         """End episodes that are given up: these envs are truncated now if they were running."""
-        self._ask("retire", env_ids=np.asarray(env_ids))
+        self.ask("retire", env_ids=np.asarray(env_ids))
 
     def snapshot(self, mask: Array | None = None) -> EnvSnapshot:
         """Envs at this moment; it can be put into a local env of the same task, and the other way round."""
-        return snapshot_of(self._ask("snapshot", mask=mask)["snapshot"])
+        return snapshot_of(self.ask("snapshot", mask=mask)["snapshot"])
 
     def reset_to(
         self, snapshot: EnvSnapshot, env_ids: Sequence[int] | Array | None = None, overrides: Any = None
@@ -229,9 +245,7 @@ class RemoteEnv:
             raise SnapshotError(f"reset_to() takes what snapshot() of an env gives, got a {type(snapshot).__name__}")
         ids = np.arange(self.num_envs) if env_ids is None else arguments.indices(env_ids, self.num_envs, "env")
         chosen = None if env_ids is None else ids
-        answer = self._ask(
-            "reset_to", snapshot=snapshot_data(snapshot), env_ids=chosen, overrides=_plain(overrides)
-        )
+        answer = self.ask("reset_to", snapshot=snapshot_data(snapshot), env_ids=chosen, overrides=_plain(overrides))
         return self._rows(answer, ids)
 
     def render(
@@ -245,13 +259,14 @@ class RemoteEnv:
         """Images (E, H, W, 3) uint8 of a camera; as `TaskEnv.render`."""
         chosen = None if env_ids is None else arguments.indices(env_ids, self.num_envs, "env")
         sides = size if isinstance(size, Sequence) else (None, None, None)
-        answer = self._ask("render", camera=camera, env_ids=chosen, size=list(sides), markers=markers, **self._form)
+        answer = self.ask("render", camera=camera, env_ids=chosen, size=list(sides), markers=markers, **self._form)
         images = answer["images"]
         return from_jpegs(images) if isinstance(images, dict) else images
 
     # ------------------------------------------------------------------ what is asked, and what is kept of it
 
-    def _ask(self, op: str, **sent: Any) -> dict[str, Any]:
+    def ask(self, op: str, **sent: Any) -> dict[str, Any]:
+        """The answer to an operation of the protocol."""
         self._stale = self._stale or op not in ("snapshot", "render", "info", "observe")
         self._send(op, **sent)
         return self._heard()
@@ -259,10 +274,10 @@ class RemoteEnv:
     def _send(self, op: str, **sent: Any) -> None:
         if self._shared is not None and self._slot is None:
             self._slot = self._shared.slot()
-        self._link.send(op, slot=self._slot, **sent)
+        self.link.send(op, slot=self._slot, **sent)
 
     def _heard(self) -> dict[str, Any]:
-        answer = self._link.receive()
+        answer = self.link.receive()
         if "running" in answer:
             self._code, self._running, self._info = answer["code"], answer["running"], answer["info"]
         return answer
@@ -270,7 +285,7 @@ class RemoteEnv:
     def _refresh(self) -> None:
         """See the envs anew where the last thing that was asked failed half-way, or nothing was asked yet."""
         if self._stale:
-            self._rows(self._ask("observe", **self._form), np.arange(self.num_envs))
+            self._rows(self.ask("observe", **self._form), np.arange(self.num_envs))
 
     def _rows(self, answer: Mapping[str, Any], ids: Array) -> Obs:
         """Observations of some envs; they are kept, and what is returned is not written to later."""
@@ -308,7 +323,7 @@ class RemoteEnv:
         """End the session. May be called twice."""
         if not self._closed:
             self._closed = True
-            self._link.close()
+            self.link.close()
             if self._shared is not None:
                 self._shared.close()
                 self._shared = None
@@ -336,7 +351,7 @@ class _Streams:
 
     def seed(self, seed: int | Sequence[int], env_ids: Array) -> None:
         """Seed envs: an int seeds env i with (seed, i); a sequence gives one seed to each of `env_ids`."""
-        self._env._ask("reset", seed=_plain(seed), env_ids=np.asarray(env_ids), pass_over=True)
+        self._env.ask("reset", seed=_plain(seed), env_ids=np.asarray(env_ids), pass_over=True)
 
     @property
     def episode_seed(self) -> Array:
@@ -367,5 +382,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Sequence) and not isinstance(value, str | bytes):
         return [_plain(item) for item in value]
     return value
-
-

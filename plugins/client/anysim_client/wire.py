@@ -3,8 +3,10 @@
 A frame is `ASF1`, the length of the head as a little-endian uint32, the head, and then the arrays, each from the next
 multiple of 64 bytes on. The head is `{"tree": …, "arrays": [[name, dtype, shape], …]}`; where an array stands in the
 tree is `{"~array": name}`. The other marks are those of snapshots (`anysim.engine.snapshots.file`), and `~int` for a
-number of more than 64 bits. A service sends a frame of more than `PIECE` bytes in pieces: a message `ASP1` with the length
-of the frame as a little-endian uint64, and then messages that hold it, one after the other. Nothing in a frame is code: arrays are of truth values, numbers or text, never objects.
+number of more than 64 bits. Nothing in a frame is code: arrays are of truth values, numbers or text, never objects.
+
+A service sends a frame of more than `PIECE` bytes in pieces: a message `ASP1` with the length of the frame as a
+little-endian uint64, and then messages that hold it, one after the other.
 """
 
 import re
@@ -17,7 +19,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.engine.snapshots.file import decode, encode
 from anysim.errors import SnapshotError
-from anysim_serving.errors import MalformedFrame
+from anysim_client.errors import MalformedFrame
 
 MAGIC, IN_PIECES = b"ASF1", b"ASP1"
 PIECE = 1 << 19
@@ -53,10 +55,11 @@ def parts(message: Mapping[str, Any]) -> list[Part]:
         raise MalformedFrame(str(error).replace("a snapshot's file", "a message")) from None
     rows = {name: array if array.flags.c_contiguous else array.copy() for name, array in arrays.items()}
     head = {"tree": tree, "arrays": [[name, array.dtype.str, array.shape] for name, array in rows.items()]}
+    packer = msgpack.Packer()
     try:
-        packed = msgpack.packb(head)
+        packed = packer.pack(head)
     except OverflowError:
-        packed = msgpack.packb(_small(head))
+        packed = msgpack.Packer().pack(_small(head))
     except (ValueError, RecursionError) as error:
         raise MalformedFrame(f"a message cannot be packed: {error}") from None
     made: list[Part] = [MAGIC + len(packed).to_bytes(4, "little") + packed]
@@ -65,7 +68,7 @@ def parts(message: Mapping[str, Any]) -> list[Part]:
         if gap := -place % ALIGNMENT:
             made.append(bytes(gap))
         if array.nbytes:
-            made.append(memoryview(array.reshape(-1).view(np.uint8)))
+            made.append(array.reshape(-1).view(np.uint8).data)
         place += gap + array.nbytes
     return made
 
@@ -102,13 +105,20 @@ def unpack(frame: "bytes | Array") -> dict[str, Any]:
         MalformedFrame: it is no frame, or says of itself what is not so.
     """
     try:
-        return _unpacked(memoryview(frame).cast("B") if len(frame) else memoryview(b""))
+        return _unpacked(frame.data if isinstance(frame, np.ndarray) else memoryview(frame))
     except MalformedFrame:
         raise
     except (
-        msgpack.UnpackException, ValueError, TypeError, KeyError, IndexError, OverflowError, RecursionError,
-        AttributeError, MemoryError,
-    ) as error:  # fmt: skip
+        msgpack.UnpackException,
+        ValueError,
+        TypeError,
+        KeyError,
+        IndexError,
+        OverflowError,
+        RecursionError,
+        AttributeError,
+        MemoryError,
+    ) as error:
         raise MalformedFrame(f"the frame is damaged: {type(error).__name__}: {str(error)[:120]}") from None
 
 

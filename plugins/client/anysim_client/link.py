@@ -14,11 +14,11 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.errors import TaskError
 from anysim.math.arrays import shown
-from anysim_serving import wire
-from anysim_serving.access import TOKEN_ENV, kept_token
-from anysim_serving.errors import ConnectionLost, LimitExceeded, ServiceError, from_data
-from anysim_serving.settings import PROTOCOL
-from anysim_serving.websocket import Refused, WebSocket
+from anysim_client import wire
+from anysim_client.errors import ConnectionLost, LimitExceeded, ServiceError, from_data
+from anysim_client.messages import PROTOCOL
+from anysim_client.token import TOKEN_ENV, kept_token
+from anysim_client.websocket import HandshakeRefusal, WebSocket
 
 LARGEST = 1 << 30
 """Bytes of one answer."""
@@ -26,8 +26,10 @@ KEY = "Anysim-Session-Key"
 
 
 class Address:
-    """Where a service is, and what it is asked with: the token that was given, that of the environment, or the file
-    that a service of this user keeps on this machine."""
+    """Where a service is, and the token that it is asked with.
+
+    That is the one that was given, that of the environment, or what a service of this user keeps on this machine.
+    """
 
     def __init__(
         self, address: str, token: str | None = None, ca: str | Path | None = None, timeout: float = 660.0
@@ -101,7 +103,7 @@ class Link:
             if self.spec["protocol"] != PROTOCOL:
                 raise ServiceError(
                     f"the service speaks version {self.spec['protocol']} of the protocol, this client {PROTOCOL}; "
-                    f"install the same version of anysim-serving on both sides"
+                    f"install the same version of anysim-client on both sides"
                 )
             self.attach()
         except BaseException:
@@ -113,10 +115,15 @@ class Link:
         where = self.address
         try:
             self._socket = WebSocket.open(
-                where.host, where.port, f"/v1/sessions/{self.id}/socket", where.headers(self._key),
-                context=where.context, timeout=where.timeout, largest=LARGEST,
-            )  # fmt: skip
-        except Refused as refused:
+                where.host,
+                where.port,
+                f"/v1/sessions/{self.id}/socket",
+                where.headers(self._key),
+                context=where.context,
+                timeout=where.timeout,
+                largest=LARGEST,
+            )
+        except HandshakeRefusal as refused:
             raise refusal(refused.status, refused.body) from None
         self._number = 0
 

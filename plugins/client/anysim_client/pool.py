@@ -21,16 +21,24 @@ from anysim.math import arrays
 from anysim.randomization.streams import Streams
 from anysim.task.contract import FAILED, STATUS_NAMES, Obs, StepResult
 from anysim.task.snapshot import EnvSnapshot
-from anysim_serving.env import RemoteEnv
-from anysim_serving.errors import ConnectionLost, ServiceError, SessionGone, TookTooLong
-from anysim_serving.link import Address, Link
+from anysim_client.env import RemoteEnv
+from anysim_client.errors import ConnectionLost, ServiceError, SessionGone, TookTooLong
+from anysim_client.link import Address, Link
 
 _log = logging.getLogger(__name__)
 LOST = (ConnectionLost, SessionGone, TookTooLong)
 """What says that a member is no more."""
 _MUST_AGREE = (
-    "protocol", "made_with", "task", "engine", "engine_version", "world_hash", "spec_hash", "observations", "images",
-)  # fmt: skip
+    "protocol",
+    "made_with",
+    "task",
+    "engine",
+    "engine_version",
+    "world_hash",
+    "spec_hash",
+    "observations",
+    "images",
+)
 
 
 @dataclass
@@ -79,7 +87,7 @@ class PooledEnv:
             self.close()
             raise
         first = self._any()
-        self._spec = first._link.spec
+        self._spec = first.link.spec
         self.num_envs = self.members[-1].stop
         self.name, self.source, self.action_dim = first.name, first.source, first.action_dim
         self.observation_sizes, self.image_shapes = first.observation_sizes, first.image_shapes
@@ -113,12 +121,12 @@ class PooledEnv:
         raise ConnectionLost("all services of the pool are lost")
 
     def _refuse_another(self, env: RemoteEnv) -> None:
-        ours = getattr(self, "_spec", None) or self._any()._link.spec
+        ours = getattr(self, "_spec", None) or self._any().link.spec
         for what in _MUST_AGREE:
-            if env._link.spec[what] != ours[what]:
+            if env.link.spec[what] != ours[what]:
                 raise ServiceError(
-                    f"{env._link.address.address} has another {what.replace('_', ' ')} than the pool: "
-                    f"{str(env._link.spec[what])[:80]} in place of {str(ours[what])[:80]}; one batch needs the same"
+                    f"{env.link.address.address} has another {what.replace('_', ' ')} than the pool: "
+                    f"{str(env.link.spec[what])[:80]} in place of {str(ours[what])[:80]}; one batch needs the same"
                 )
 
     # ------------------------------------------------------------------ facts
@@ -180,7 +188,9 @@ class PooledEnv:
         given = None if episode_seeds is None else arrays.wholes("episode_seeds", episode_seeds, len(ids), TaskError)
         before = [self.streams.snapshot(np.array([i])) for i in ids.tolist()]
         self.streams.begin(ids, given)
-        each = dict(zip(ids.tolist(), overrides, strict=True)) if isinstance(overrides, list | tuple) and overrides else {}
+        each = (
+            dict(zip(ids.tolist(), overrides, strict=True)) if isinstance(overrides, list | tuple) and overrides else {}
+        )
         concerned = self._concerned(ids)
         for member in concerned:
             if member.env is None:
@@ -350,7 +360,7 @@ class PooledEnv:
         if member.env is None:
             return
         rows = slice(member.start, member.stop)
-        self._code[rows], self._running[rows] = member.env._code, member.env._running
+        self._code[rows], self._running[rows] = member.env.codes, member.env.running
         for name, values in member.env.info.items():
             self._info[name][rows] = values
         for name, values in (member.env.obs if obs is None else obs).items():
@@ -361,7 +371,7 @@ class PooledEnv:
         _log.warning("%s is lost with %d envs: %s", member.address.address, member.stop - member.start, error)
         self.losses += 1
         if member.env is not None:
-            member.env._link.drop()
+            member.env.link.drop()
             member.env.close()
         member.env = None
         rows = slice(member.start, member.stop)
@@ -432,5 +442,3 @@ class _Scene:
     def elapsed(self) -> Array:
         """(N,) control steps of each env's episode."""
         return self._env.info["elapsed_steps"]
-
-

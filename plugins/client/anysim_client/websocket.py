@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from anysim.conventions import Array
-from anysim_serving.errors import ConnectionLost, LimitExceeded, MalformedFrame
+from anysim_client.errors import ConnectionLost, LimitExceeded, MalformedFrame
 
 _GUID = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
 _CONTINUED, _TEXT, _BINARY, _CLOSE, _PING, _PONG = 0, 1, 2, 8, 9, 10
@@ -24,7 +24,7 @@ _BUFFER = 1 << 16
 _HEAD_BYTES = 65536
 
 
-class Refused(Exception):
+class HandshakeRefusal(Exception):
     """The server answered the handshake as HTTP: `status` and `body`."""
 
     def __init__(self, status: int, body: bytes) -> None:
@@ -58,7 +58,7 @@ class WebSocket:
 
         Raises:
             ConnectionLost: nobody answers.
-            Refused: the server answers otherwise.
+            HandshakeRefusal: the server answers otherwise.
         """
         try:
             stream = socket.create_connection((host, port), timeout)
@@ -103,7 +103,7 @@ class WebSocket:
         if int(status[1]) != 101:
             length = int(given.get(b"content-length", b"0") or 0)
             body = rest + (self._read(min(length, _HEAD_BYTES) - len(rest)) if length > len(rest) else b"")
-            raise Refused(int(status[1]), body)
+            raise HandshakeRefusal(int(status[1]), body)
         accept = base64.b64encode(hashlib.sha1(key + _GUID, usedforsecurity=False).digest())
         if given.get(b"sec-websocket-accept") != accept or b"sec-websocket-extensions" in given:
             raise MalformedFrame("what answers there does not speak the WebSocket that was asked for")
@@ -163,7 +163,7 @@ class WebSocket:
                 content, into = into[:length], into[length:]
             else:
                 content = np.empty(length, np.uint8)
-            self._fill(memoryview(content))
+            self._fill(content.data)
             if kind == _PING:
                 self._send(_PONG, content.tobytes())
             elif kind == _CLOSE:
@@ -228,4 +228,4 @@ def _masked(data: bytes, mask: bytes) -> Any:
     padded = np.zeros(words, np.uint32)
     padded.view(np.uint8)[: len(data)] = np.frombuffer(data, np.uint8)
     padded ^= np.frombuffer(mask, np.uint32)
-    return memoryview(padded.view(np.uint8))[: len(data)]
+    return padded.view(np.uint8).data[: len(data)]

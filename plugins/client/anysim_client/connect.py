@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from anysim.errors import TaskError
-from anysim_serving.env import RemoteEnv
-from anysim_serving.link import Address, Link
+from anysim_client.env import RemoteEnv
+from anysim_client.link import Address, Link
 
 if TYPE_CHECKING:
-    from anysim_serving.pool import PooledEnv
+    from anysim_client.pool import PooledEnv
 
 
 def connect(
@@ -32,7 +32,7 @@ def connect(
     """The env of a session that is created for it, and ended when it is closed.
 
     Args:
-        address: `http://HOST:PORT` or `https://…`; of several the envs are one batch (`anysim_serving.pool`).
+        address: `http://HOST:PORT` or `https://…`; of several the envs are one batch (`anysim_client.pool`).
         task: one of those that the service has; by default its first.
         num_envs, engine, robot, seed, curriculum: as of `anysim.make`, within what the service allows; `num_envs` are
             those of each service.
@@ -48,14 +48,21 @@ def connect(
         AnysimError: the service refuses, or nothing answers.
     """
     request: dict[str, Any] = {
-        "task": task, "num_envs": num_envs, "engine": engine, "robot": robot, "seed": seed, "curriculum": curriculum,
+        "task": task,
+        "num_envs": num_envs,
+        "engine": engine,
+        "robot": robot,
+        "seed": seed,
+        "curriculum": curriculum,
         "overrides": list(overrides),
-    }  # fmt: skip
+    }
     if not isinstance(address, str):
-        from anysim_serving.pool import PooledEnv
+        from anysim_client.pool import PooledEnv
 
         if images == "jpeg" or full:
-            raise TaskError("a pool has images as they are, and no details; connect to its services one by one for more")
+            raise TaskError(
+                "a pool has images as they are, and no details; connect to its services one by one for more"
+            )
         return PooledEnv([Address(one, token, ca, timeout) for one in address], request, images)
     link = Link(Address(address, token, ca, timeout), request)
     try:
