@@ -11,7 +11,7 @@ from capability_table import DISTRIBUTIONS
 from generated import main
 
 from anysim import registry
-from anysim.engine.capability import Capability
+from anysim.engine.capability import Capabilities, Capability
 from anysim.families.base import Family
 from anysim.families.cosolver import CoSolver
 
@@ -28,9 +28,7 @@ def table() -> str:
         if registry.distribution("families", name) not in FAMILIES:
             continue
         kind = registry.load("families", name)
-        cells: list[str] = []
-        for engine in made.values():
-            cells.append(_cell(kind, engine.capabilities))
+        cells = [_cell(kind, engine.capabilities) for engine in made.values()]
         lines.append(f"| `{name}` | {_mover(kind)} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
@@ -42,8 +40,7 @@ def _mover(kind: type) -> str:
     return f"{'a solver of its own' if issubclass(kind, CoSolver) else 'the family'}, {rate}"
 
 
-def _cell(kind: type, capabilities: object) -> str:
-    assert hasattr(capabilities, "__contains__")
+def _cell(kind: type, capabilities: Capabilities) -> str:
     needs = kind.needs if issubclass(kind, Family) else (Capability.RIGID_BODIES,)
     absent = [str(need) for need in needs if need not in capabilities]
     if absent:
