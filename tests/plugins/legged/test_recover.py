@@ -68,7 +68,9 @@ def test_on_its_back_it_tries_one_turn_after_the_other() -> None:
         told = np.array([0.3 * policy.act(np.arange(1))[0, :6] for _ in range(13)])  # of its front legs
         thighs, calves = told[2:, 1::3], told[2:, 2::3]
         right, home = [0.0, 1.7], [0.0, 0.0]
-        np.testing.assert_allclose(calves, 0.6 * np.array([[1.0] * 2] * 2 + [home] * 6 + [[1.0] * 2] * 2 + [home]), atol=1e-9)
+        np.testing.assert_allclose(
+            calves, 0.6 * np.array([[1.0] * 2] * 2 + [home] * 6 + [[1.0] * 2] * 2 + [home]), atol=1e-9
+        )
         np.testing.assert_allclose(thighs, [home] * 3 + [right] * 3 + [home] * 5, atol=1e-9)
 
 
