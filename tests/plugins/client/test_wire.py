@@ -40,6 +40,17 @@ def test_a_message_comes_back_as_it_was() -> None:
     writable["arrays"]["float"][0, 0] = 9
 
 
+def test_a_large_frame_travels_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(wire, "PIECE", 100)
+    message = {"a": np.arange(1000), "b": np.zeros(0), "c": np.arange(7, dtype=np.uint8), "d": [np.ones(30)] * 3}
+    first, *pieces = [bytes(piece) for piece in wire.messages(wire.parts(message))]
+    assert wire.announced(np.frombuffer(first, np.uint8)) == sum(map(len, pieces))
+    assert max(map(len, pieces)) <= 100 + wire.ALIGNMENT
+    assert b"".join(pieces) == wire.pack(message)
+    monkeypatch.undo()
+    assert [bytes(piece) for piece in wire.messages(wire.parts(message))] == [wire.pack(message)]
+
+
 @pytest.mark.parametrize(
     "value", [np.array([object()]), np.zeros(2, complex), np.zeros(2, "V3"), b"bytes", {1: 2}, {"~array": 1}, set()]
 )

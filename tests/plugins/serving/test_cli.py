@@ -1,5 +1,6 @@
 """`anysim serve` as a process: what it prints and keeps, and how it ends."""
 
+import json
 import os
 import re
 import signal
@@ -16,8 +17,6 @@ from tests.plugins.serving.helpers import BLOCKS, local, same
 
 
 def world(folder: Path) -> Path:
-    import json
-
     path = folder / "blocks.yaml"
     path.write_text(json.dumps(BLOCKS))  # JSON is YAML
     return path
@@ -86,3 +85,29 @@ def test_one_that_is_killed_leaves_its_clients_an_error(tmp_path: Path, monkeypa
         process.kill()
         process.wait()
         process.stdout.close()  # type: ignore[union-attr]
+
+
+@pytest.mark.slow
+def test_exchanges_and_many_clients_are_measured() -> None:
+    command = [
+        sys.executable,
+        "-m",
+        "anysim.cli",
+        "bench",
+        "serve",
+        "--seconds",
+        "0.1",
+        "--soak",
+        "1",
+        "--clients",
+        "3",
+    ]
+    done = subprocess.run([*command, "--json"], capture_output=True, text=True, timeout=300, check=True)
+    found = json.loads(done.stdout)
+    rows = found["exchanges"]
+    assert [round(row["megabytes"], 1) for row in rows] == [0.0, 12.6, 12.6]
+    assert all(0 < row["service"][1] <= row["service"][0] for row in rows)
+    run = found["soak"]
+    assert (len(run["steps"]), run["errors"], run["sessions_left"]) == (3, [], 0)
+    assert min(run["steps"]) > 0
+    assert 0.3 < run["fairness"] <= 1

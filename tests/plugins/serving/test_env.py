@@ -13,6 +13,7 @@ import anysim
 from anysim.errors import PluginError, SnapshotError, TaskError
 from anysim.task.env import TaskEnv
 from anysim.testing.engines import require_engine
+from anysim_client import wire
 from anysim_client.env import STAYS
 from anysim_client.messages import step_chunk
 from anysim_learning.gymnasium import GymEnv, GymVectorEnv
@@ -191,8 +192,9 @@ def _plain(value: Any) -> Any:
 # ------------------------------------------------------------------ images
 
 
-def test_images_come_by_each_way() -> None:
+def test_images_come_by_each_way(monkeypatch: pytest.MonkeyPatch) -> None:
     """Raw and shared are the same bits as local ones; JPEG is close; nothing is left in the memory's folder."""
+    monkeypatch.setattr(wire, "PIECE", 1000)  # as images of many megabytes travel
     require_engine("mujoco")
     with service(SEEN) as made, local(SEEN, num_envs=2) as near:
         ways = {images: connected(made, num_envs=2, images=images) for images in ("raw", "shared", "jpeg")}
@@ -218,6 +220,10 @@ def test_images_come_by_each_way() -> None:
                 assert same(again, part)
                 assert same(far.obs, after)
                 assert same(far.render(env_ids=[1], size=(20, 16)), near.render(env_ids=[1], size=(20, 16)))
+                kept = [far.observe([colour])[colour] for _ in range(6)]  # more than there are places for
+                kept[0][:] = 0
+                assert all(same(one, after[colour]) for one in kept[1:])
+                assert same(far.obs, after)
             far.close()
         from anysim_client.shared import shared_folder
 
