@@ -11,6 +11,7 @@ from anysim.task.scene import RobotView
 from anysim_navigation.limits import OUTPUTS, BaseKind, BaseLimits, kind_of, limits_of, output_of
 from anysim_navigation.robot_shape import discs_of
 from anysim_navigation.router import BaseRouter, Mode, frame_pose
+from anysim_navigation.way_costs import way_lengths
 from anysim_schemas.vehicle import AckermannSpec
 from anysim_skills.moving.base import Base
 
@@ -32,10 +33,16 @@ class PlannedBase(Base):
 
     def go(self, ids: Array, target: Array) -> None:
         super().go(ids, target)
+        self._made().go(ids, target, Mode.ROUTE)
+        self.no_way[ids] = False
+
+    def way_lengths(self, ids: Array, at: Array, places: Array) -> Array:
+        return way_lengths(self._made(), ids, self.pose(at), places)
+
+    def _made(self) -> BaseRouter:
         if self._router is None:
             self._router = BaseRouter(self.env.scene, self._robot, self.frame, self._limits(), close=self.close)
-        self._router.go(ids, target, Mode.ROUTE)
-        self.no_way[ids] = False
+        return self._router
 
     def renew(self, ids: Array) -> None:
         super().renew(ids)
