@@ -1,15 +1,18 @@
 """Crossings of tiles: how far a policy of `go1_velocity_rough` gets on each kind and level, on every engine.
 
-    python benchmarks/rough_walking.py [POLICY ...] [--engines mujoco,sapien] [-n 16] [--blind]
+    python benchmarks/rough_walking.py [POLICY ...] [--engines mujoco,sapien] [-n 16] [--blind] [--out FILE]
 
 POLICY is what `anysim evaluate --policy` takes, or the trot and the shipped policy. The robot is that of level L0. It
 begins in any direction in the middle of a tile, and is told to walk forward at 0.5 m/s for 10 s: it got through
 where it left the tile, which ends 3 m from its middle, and did not fall before. `--blind` takes the height scan from
-the observations, for policies of `go1_velocity`. Nothing here is a time.
+the observations, for policies of `go1_velocity`. Nothing here is a time. `--out FILE.json` keeps what was found, in
+place of what is there of the same policy on the same engine.
 """
 
 import argparse
+import json
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -106,6 +109,15 @@ def lines(policy: str, engine: str, found: Crossings) -> list[str]:
     return [*rows, f"| {policy} | {engine} | all | " + " | ".join(shares) + " |"]
 
 
+def keep(file: Path, policy: str, engine: str, found: Crossings) -> None:
+    """Write what was found of a policy on an engine."""
+    known = json.loads(file.read_text("utf-8")) if file.exists() else []
+    other = [one for one in known if (one["policy"], one["engine"]) != (policy, engine)]
+    counts = {"through": found.through.tolist(), "fell": found.fell.tolist()}
+    own = {"policy": policy, "engine": engine, "n": found.n, "kinds": list(found.kinds), **counts}
+    file.write_text("[\n" + ",\n".join(json.dumps(one) for one in [*other, own]) + "\n]\n", "utf-8")
+
+
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -113,10 +125,13 @@ def main() -> None:
     parser.add_argument("--engines", default="mujoco,pybullet,sapien")
     parser.add_argument("-n", type=int, default=16, help="episodes of each tile")
     parser.add_argument("--blind", action="store_true", help="without the height scan")
+    parser.add_argument("--out", type=Path, help="a file of the results, which is added to")
     arguments = parser.parse_args()
     for policy in arguments.policies:
         for engine in arguments.engines.split(","):
             found = cross(policy, engine, arguments.n, [BLIND] if arguments.blind else [])
+            if arguments.out is not None:
+                keep(arguments.out, policy, engine, found)
             levels = " | ".join(f"level {r}" for r in range(len(found.through)))
             print(f"\n| policy | engine | kind | {levels} |\n|" + "---|" * (3 + len(found.through)))
             print("\n".join(lines(policy, engine, found)), flush=True)

@@ -30,12 +30,21 @@ SECONDS, SETTLED = 8.0, 1.5
 
 
 class Walk(NamedTuple):
-    """What came of some envs: how many fell, mean velocity (3,), and the errors of velocity and turn."""
+    """What came of some envs.
+
+    Attributes:
+        fell: how many fell.
+        velocity: (3,) the mean, forward and left [m/s] and turning [rad/s].
+        error, turn_error: of velocity [m/s] and turn [rad/s], over all steps of all envs.
+        spread: the standard deviation of the error of an env over the envs [m/s].
+        version: that of the policy.
+    """
 
     fell: int
     velocity: np.ndarray
     error: float
     turn_error: float
+    spread: float
     version: str
 
 
@@ -89,15 +98,18 @@ def walk(policy: str, engine: str, command: tuple[float, ...], num_envs: int, ch
             action[up] = made.act({group: rows[up] for group, rows in env.obs.items()}, up)
             env.step(action, None if len(up) == num_envs else env.running)
             if step >= first:
-                seen.append(_own(env.engine.get_state(), base)[env.running])
+                rows = _own(env.engine.get_state(), base)
+                seen.append(np.where(env.running[:, None], rows, np.nan))
         fell = int((env.status == "failed").sum())
     version = getattr(made, "version", "")
-    rows = np.concatenate(seen) if seen else np.zeros((0, 3))
-    if not len(rows):
-        return Walk(fell, np.full(3, np.nan), np.nan, np.nan, version)
-    wrong = rows - np.array(command)
-    error, turn = np.sqrt((wrong[:, :2] ** 2).sum(axis=1).mean()), np.sqrt((wrong[:, 2] ** 2).mean())
-    return Walk(fell, rows.mean(axis=0), float(error), float(turn), version)
+    walked = np.stack(seen) if seen else np.full((1, 1, 3), np.nan)
+    walked = walked[:, np.isfinite(walked).any(axis=(0, 2))]
+    if not walked.shape[1]:
+        return Walk(fell, np.full(3, np.nan), np.nan, np.nan, np.nan, version)
+    squares = (walked - np.array(command)) ** 2
+    own = np.sqrt(np.nanmean(squares[..., :2].sum(axis=2), axis=0))
+    error, turn = np.sqrt(np.nanmean(squares[..., :2].sum(axis=2))), np.sqrt(np.nanmean(squares[..., 2]))
+    return Walk(fell, np.nanmean(walked, axis=(0, 1)), float(error), float(turn), float(own.std()), version)
 
 
 def _own(state: State, base: int) -> np.ndarray:

@@ -66,7 +66,7 @@ def spelled(annotation: Any) -> str:
         return " or ".join(", ".join(filter(None, typed(part))) for part in get_args(annotation))
     if text.startswith("collections.abc.Sequence[tuple["):
         return "points"
-    if text == "tuple[str, ...]":
+    if text.removesuffix(" | None") == "tuple[str, ...]":
         return "words"
     if text.startswith("tuple["):
         return f"{len(get_args(annotation))} numbers"

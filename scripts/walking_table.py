@@ -1,11 +1,13 @@
-"""The walks of policies in docs/locomotion.md, from docs/walking.json and docs/walking_trainings.json.
+"""The walks of policies in docs/locomotion.md, from docs/walking.json, walking_matrix.json and walking_trainings.json.
 
     python scripts/walking_table.py [--check]
 
-The first file is made by these commands, which go on where they were cut off; the second has what trainings took:
+The first two files are made by these commands, which go on where they were cut off; the last has what trainings took:
 
     python benchmarks/walking.py trot=expert shipped -n 32 --out docs/walking.json
     python benchmarks/walking.py "seed 1=runs/…-1/policy.onnx" --rows commands -n 32 --out docs/walking.json
+    python benchmarks/rough_walking.py shipped -n 8 --out docs/rough_walking.json
+    python benchmarks/walking.py mujoco=runs/…/policy.onnx … --rows drawn -n 32 --out docs/walking_matrix.json
 
 `--check` writes nothing and exits with 1 if the page has drifted from these files.
 """
@@ -22,6 +24,9 @@ from generated import ROOT, main
 from anysim.math.statistics import wilson
 
 STORE, TRAININGS = ROOT / "docs" / "walking.json", ROOT / "docs" / "walking_trainings.json"
+MATRIX = ROOT / "docs" / "walking_matrix.json"
+"""Walks of a policy of each engine, which is its name, on all of them."""
+CROSSINGS = ROOT / "docs" / "rough_walking.json"
 GOAL = 0.06
 """[m/s] of the error that a policy should have at most."""
 POLICIES, GROUPS = ("trot", "shipped"), ("drawn", "shoves", "floors")
@@ -119,6 +124,78 @@ def seeds() -> str:
     )
 
 
+def crossings() -> str:
+    """How many tiles of each kind and level a policy gets over, on each engine."""
+    found: list[Cell] = json.loads(CROSSINGS.read_text("utf-8"))
+    found.sort(key=lambda one: one["engine"])
+    levels = range(len(found[0]["through"]))
+    lines = []
+    for k, kind in enumerate(found[0]["kinds"]):
+        for one in found:
+            own = [_told(one["through"][level][k], one["fell"][level][k]) for level in levels]
+            lines.append([kind, one["engine"], str(one["n"]), *own])
+    for one in found:
+        total = one["n"] * len(one["kinds"])
+        own = [_share(sum(one["through"][level]), total) for level in levels]
+        lines.append(["all", one["engine"], str(total), *own])
+    return "\n\n".join(
+        [
+            "How many of n tiles of each kind and level were left on foot, and how many ended in a fall where any did; "
+            "of all kinds together the share, with Wilson's interval at 95 %:",
+            table(["kind", "engine", "n", *(f"level {level}" for level in levels)], lines),
+        ]
+    )
+
+
+def _told(through: int, fell: int) -> str:
+    return f"{through}" + (f" ({fell} fell)" if fell else "")
+
+
+def _share(count: int, total: int) -> str:
+    low, high = wilson(count, total)
+    return f"{count / total:.0%} ({100 * low:.0f} to {100 * high:.0f})"
+
+
+def engines() -> str:
+    """Policies that were trained on each engine, on all of them, and which gaps are above the intervals."""
+    found: list[Cell] = json.loads(MATRIX.read_text("utf-8"))
+    names = list(dict.fromkeys(cell["policy"] for cell in found))
+    by = {(cell["policy"], asked(cell), cell["engine"]): cell for cell in found}
+    commands = list(dict.fromkeys(asked(cell) for cell in found))
+    lines, gaps = [], []
+    for name in names:
+        for command in commands:
+            own = by[name, command, name]
+            row = [by[name, command, engine] for engine in names]
+            lines.append([name, command, *(f"{cell['error']:.3f} ± {_half(cell):.3f}{_falls(cell)}" for cell in row)])
+            apart = [(c["engine"], c["error"] - own["error"]) for c in row if _gap(c, own)]
+            gaps += [f"{command}, trained on {name}, on {engine}: {more:+.3f}" for engine, more in apart]
+    count = ", ".join(map(str, sorted({cell["envs"] for cell in found})))
+    return "\n\n".join(
+        [
+            f"{count} episodes of 8 s of each cell with masses, gains and friction drawn: the error of velocity [m/s] "
+            "and half its interval at 95 %, and falls where there were any:",
+            table(["trained on", "command", *(f"on {name}" for name in names)], lines),
+            "Further from what it is where it was trained than both intervals allow [m/s]: "
+            + ("; ".join(gaps) or "none")
+            + ".",
+        ]
+    )
+
+
+def _half(cell: Cell) -> float:
+    """Half the interval of the error at 95 %, of as many envs with an error each."""
+    return 1.96 * cell["spread"] / cell["envs"] ** 0.5
+
+
+def _gap(cell: Cell, other: Cell) -> bool:
+    return abs(cell["error"] - other["error"]) > (_half(cell) ** 2 + _half(other) ** 2) ** 0.5
+
+
+def _falls(cell: Cell) -> str:
+    return f", {fallen(cell)} fell" if cell["fell"] else ""
+
+
 def _judged(cell: Cell) -> str:
     error = f"{cell['error']:.3f}"
     falls = f", {cell['fell']} of {cell['envs']} fell" if cell["fell"] else ""
@@ -129,6 +206,6 @@ if __name__ == "__main__":
     pages = ("docs/locomotion.md",)
     codes = [
         main(__doc__, name, "walking_table.py", pages, content)
-        for name, content in (("walks", walks), ("seeds", seeds))
+        for name, content in (("walks", walks), ("seeds", seeds), ("crossings", crossings))
     ]
     sys.exit(max(codes))

@@ -10,6 +10,7 @@ __version__ = "0.1.0"
 
 _LAZY = {
     "make": "anysim.api",
+    "connect": "anysim.api",
     "load": "anysim.api",
     "compile_world": "anysim.api",
     "create_simulation": "anysim.engine.factory",
@@ -20,7 +21,7 @@ _LAZY = {
 __all__ = [*_LAZY, "__version__"]
 
 if TYPE_CHECKING:
-    from anysim.api import compile_world as compile_world, load as load, make as make
+    from anysim.api import compile_world as compile_world, connect as connect, load as load, make as make
     from anysim.engine.base import SimEngine as SimEngine
     from anysim.engine.factory import create_simulation as create_simulation
     from anysim.model.world import World as World

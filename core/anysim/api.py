@@ -223,7 +223,7 @@ def blind_env(loaded: LoadedRun, world: "World", name: str) -> "TaskEnv":
 
     blind = replace(world, cameras=tuple(replace(camera, channels=()) for camera in world.cameras))
     try:
-        return _env(loaded, blind, engine_class("null")(), 1, name, _proposals(loaded, None))
+        return _env(loaded, blind, engine_class("null")(), 1, name, _proposals(loaded, None), unchecked=True)
     except SpecError as error:
         raise located(error, loaded) from None
 
@@ -248,8 +248,9 @@ def _env(
     proposals: Any = None,
     *,
     strict_observers: bool = False,
+    unchecked: bool = False,
 ) -> "TaskEnv":
-    """An env on a fresh engine; the engine is destroyed if anything fails."""
+    """An env on a fresh engine, which is asked for what it needs or not; it is destroyed if anything fails."""
     from anysim.managers.standard import check_run, standard_managers
     from anysim.task.env import TaskEnv
 
@@ -257,7 +258,8 @@ def _env(
         spec = loaded.spec
         managers = standard_managers(spec, world, num_envs, proposals)
         place, options = (lambda path: place_of(loaded, path)), simulation.options
-        check_run(simulation, world, managers, f"'{world.name}'", place, options)
+        if not unchecked:
+            check_run(simulation, world, managers, f"'{world.name}'", place, options)
         simulation.create_world(world, num_envs)
         located = partial(_located_path, loaded)
         return TaskEnv(spec, simulation, managers, name, strict_observers=strict_observers, located=located)
@@ -363,6 +365,26 @@ def make(
     if seed is not None:
         env.streams.seed(seed, np.arange(spec.num_envs))
     return env
+
+
+def connect(address: str | Sequence[str], **options: object) -> "TaskEnv":
+    """The env of a service: `env = anysim.connect("http://127.0.0.1:8470", task="pick_cube", num_envs=16)`.
+
+    It has the methods of what `make` gives, and its results are the same, bit for bit.
+
+    Args:
+        address: where `anysim serve` listens; or several of them, whose envs are one batch that outlives their loss.
+        options: what the client of the address's scheme takes, such as `task`, `num_envs`, `engine` and `seed`.
+
+    Raises:
+        PluginError: no client of that scheme is installed.
+        AnysimError: nothing answers there, or the service refuses.
+    """
+    first = address if isinstance(address, str) else next(iter(address), "")
+    scheme, separator, _ = first.partition("://")
+    if not separator:
+        raise TaskError(f"a service has an address such as http://127.0.0.1:8470, got {shown(address)}")
+    return registry.load("clients", scheme)(address, **options)
 
 
 def _announce_instances(loaded: LoadedRun, base: Path | None) -> bool:

@@ -31,6 +31,7 @@ KINDS: Mapping[str, str] = {
     "planners": "planners",
     "families": "families: what things and people are made of, and who moves them",
     "exporters": "exporters, which write recorded runs as data sets (`anysim export`)",
+    "clients": "clients of services, by the scheme of an address, for `anysim.connect`",
     "executors": "executors, which step the envs of an engine elsewhere",
     "devices": "input devices, with which people drive robots",
     "writers": "record writers",
@@ -68,6 +69,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
         "controllers": "camera_follow camera_gimbal camera_motion camera_path",
         "skills": "fly_look fly_orbit fly_to fly_track watch",
     },
+    "anysim-client": {"clients": "http https"},
     "anysim-collect": {"commands": "counterfactual report run"},
     "anysim-control": {
         "controllers": "ackermann_drive batched_ik differential_drive differential_ik"
@@ -95,6 +97,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-robots": {"commands": "gallery robot"},
     "anysim-sapien": {"engines": "sapien"},
     "anysim-sensors": {"sensors": "contact depth force_torque heights imu joints lidar occupancy tracking"},
+    "anysim-serving": {"commands": "serve"},
     "anysim-sharded": {"executors": "processes"},
     "anysim-skills": {"skills": "pick"},
     "anysim-tactile": {"sensors": "tactile_fingertip tactile_pad tactile_probe"},

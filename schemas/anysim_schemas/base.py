@@ -1,5 +1,6 @@
 """The base of every spec: frozen, closed, in SI units, and written in one form."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, cast
 
@@ -22,6 +23,9 @@ class Spec(BaseModel):
 
     kept_under_text: ClassVar[tuple[str, ...]] = ()
     """Keys that stay where a file or an override replaces an inherited mapping by a bare string."""
+
+    belongs_to: ClassVar[Mapping[str, str]] = {}
+    """Keys that are looked for here and belong elsewhere, with where that is."""
 
     @classmethod
     def from_text(cls, text: str) -> dict[str, Any] | None:

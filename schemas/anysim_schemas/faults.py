@@ -170,7 +170,9 @@ def _message(located: _LocatedError, more_keys: Sequence[str]) -> str:
     lengths = {shape.length for shape in shapes if shape.length is not None}
     if kind == UNKNOWN_KEY:
         known = [*keys(shapes), *(more_keys if located.depth == 0 else ())]
-        return unknown_key(str(located.path[-1]), known, _further_down(shapes))
+        key = str(located.path[-1])
+        owner = next((s.spec.belongs_to[key] for s in shapes if s.spec and key in s.spec.belongs_to), None)
+        return unknown_key(key, known, _further_down(shapes)) if owner is None else f"unknown key; {owner}"
     if (kind == "too_long" or _is_short_list(located)) and lengths:
         items = located.node.value
         got = len(items) if isinstance(items, list) else 0

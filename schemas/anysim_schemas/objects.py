@@ -1,5 +1,6 @@
 """Objects: what exists. Where it goes is in layout, how it behaves is in its physical fields."""
 
+from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, Strict, model_validator
@@ -48,6 +49,10 @@ class ObjectSpec(Spec):
     """One object of the world."""
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("mass",), ("density",))
+    belongs_to: ClassVar[Mapping[str, str]] = dict.fromkeys(
+        ("position", "pose", "quaternion", "on", "yaw", "x", "y", "z"),
+        "where an object is belongs to `world.layout`, under its name",
+    )
 
     source: Source = Field(description="its shape: a primitive, a mesh or an asset; or several to draw from")
     scale: ScaleValue = Field(

@@ -36,8 +36,9 @@ ANY_IN_SIGNATURES = 132
 `Mapping[str, Any]` does; the number only falls."""
 
 SENTENCE = re.compile(r"(What|Who|Whose|Where|How|Whether|When|Why|From|Whoeve[r])\b")
-PUBLIC = frozenset({"anysim.skills.living_bank"})
-"""Documented for authors of skills, and used by one distribution so far: banks that change while a run goes on."""
+PUBLIC = frozenset({"anysim.skills.living_bank", "anysim.families.cosolver"})
+"""Documented for authors of plugins, and used by one distribution so far: banks that change while a run goes on, and
+matter with a solver of its own."""
 
 LOCAL_NAMES = frozenset({"__init__", "__main__", "base"})
 """File names that are the same in many packages on purpose."""

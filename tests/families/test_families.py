@@ -10,6 +10,7 @@ from anysim import registry
 from anysim.engine.factory import create_simulation
 from anysim.errors import CapabilityError, NameLookupError, SnapshotError, SpecError
 from anysim.task.snapshot import EnvSnapshot
+from tests.families.paddles import Paddle, PaddleSpec
 
 RUN = """
 engine: mujoco
@@ -64,6 +65,26 @@ def test_parameters_are_told_at_their_lines(tmp_path, line, words):
 def test_what_is_no_family_is_refused(tmp_path, change, words):
     with pytest.raises(SpecError, match=words):
         anysim.make(written(tmp_path, RUN.replace(*change)))
+
+
+def test_two_parts_of_one_name_are_told(tmp_path, monkeypatch):
+    made = Paddle.parts
+    monkeypatch.setattr(Paddle, "parts", classmethod(lambda cls, name, spec: [*made(name, spec), *made(name, spec)]))
+    with pytest.raises(SpecError, match=r"families\.it.*the family 'paddle' of .* makes two parts called 'it'"):
+        anysim.make(written(tmp_path))
+
+
+def test_what_is_not_derived_from_a_family_is_told(tmp_path, monkeypatch):
+    load = registry.load
+    monkeypatch.setattr(registry, "load", lambda kind, name: Stranger if kind == "families" else load(kind, name))
+    with pytest.raises(SpecError, match=r"families\.it.*the family 'paddle' of .* is no Family; derive it from"):
+        anysim.make(written(tmp_path))
+
+
+class Stranger:
+    """Has parameters, and nothing else of a family."""
+
+    spec = PaddleSpec
 
 
 def test_an_engine_without_what_it_needs_is_refused(tmp_path):

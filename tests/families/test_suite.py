@@ -7,23 +7,26 @@ from pathlib import Path
 import pytest
 
 from tests.contract.suite_runs import outcomes_of, run
-from tests.families import paddles
+from tests.families import matter, paddles
 
-WRONG = [
-    name
-    for name, made in inspect.getmembers(paddles, inspect.isclass)
-    if issubclass(made, paddles.Paddle) and made is not paddles.Paddle
-]
+RIGHT = {"paddles:Paddle": "9 passed, 1 skipped", "matter:Lump": "9 passed, 1 skipped"}
+WRONG = {
+    name: module
+    for module, right in ((paddles, paddles.Paddle), (matter, matter.Lump))
+    for name, made in inspect.getmembers(module, inspect.isclass)
+    if issubclass(made, right) and made is not right
+}
 SUITE = ("-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", "--pyargs", "anysim.testing.families")
 
 
 @pytest.mark.parametrize(
     "engine", ["mujoco", *(pytest.param(name, marks=pytest.mark.slow) for name in ("pybullet", "sapien"))]
 )
-def test_a_right_family_passes(engine: str, tmp_path: Path) -> None:
-    done = run(*SUITE, "--family", "tests.families.paddles:Paddle", "--engine", engine, folder=tmp_path)
+@pytest.mark.parametrize("name", RIGHT)
+def test_a_right_family_passes(name: str, engine: str, tmp_path: Path) -> None:
+    done = run(*SUITE, "--family", f"tests.families.{name}", "--engine", engine, folder=tmp_path)
     assert done.returncode == 0, done.stdout[-4000:]
-    assert re.search(rf"anysim contract: family .*Paddle on {engine}: 9 passed, 0 skipped", done.stdout)
+    assert re.search(rf"anysim contract: family .*{name} on {engine}: {RIGHT[name]}", done.stdout)
 
 
 @pytest.mark.slow
@@ -39,8 +42,12 @@ def test_the_suite_is_of_one_family(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, str]]:
     """Of all wrong families, in one process."""
-    jobs = {name: [f"test_family.py::{inspect.getdoc(getattr(paddles, name))}"] for name in WRONG}
-    return outcomes_of("families", paddles.__name__, jobs, tmp_path_factory.mktemp("wrong"))
+    found = dict[str, dict[str, str]]()
+    for module in (paddles, matter):
+        names = [name for name, where in WRONG.items() if where is module]
+        jobs = {name: [f"test_family.py::{inspect.getdoc(getattr(module, name))}"] for name in names}
+        found |= outcomes_of("families", module.__name__, jobs, tmp_path_factory.mktemp("wrong"))
+    return found
 
 
 @pytest.mark.slow

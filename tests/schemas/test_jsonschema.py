@@ -112,9 +112,10 @@ def test_what_is_wrong_in_one_file_is_invalid(text):
 
 
 SEEN_WHOLE = {
-    "alias_of_a_fault", "bad_enum", "bad_name", "bad_value", "color_of_wrong_type", "extends_not_text", "fov_too_wide",
-    "list_at_the_top", "misplaced_key", "negative_mass", "python_tag", "range_lower_above_upper", "robot_catalogue",
-    "unknown_key", "wrong_length", "wrong_plugin_parameter", "wrong_type",
+    "alias_of_a_fault", "bad_enum", "bad_name", "bad_value", "color_of_wrong_type", "extends_not_text",
+    "fov_too_wide", "key_of_the_layout", "list_at_the_top", "misplaced_key", "negative_mass", "python_tag",
+    "range_lower_above_upper", "robot_catalogue", "unknown_key", "wrong_length", "wrong_plugin_parameter",
+    "wrong_type",
 }  # fmt: skip
 
 

@@ -8,7 +8,8 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.env import TaskEnv
-from tests.tasks import camera_paths as camera
+from anysim_avatars.hold import FREE, HELD
+from tests.tasks import camera_paths as camera, person_paths as person
 from tests.tasks.states import failed, level, offset, put, rewarded, seen, set_joint, set_opening
 
 
@@ -585,4 +586,13 @@ CASES: dict[str, Case] = {
         camera.around, [camera.moved(yaw=0.2), camera.moved(pitch=0.2), camera.drifting], ("scan",)
     ),
     "camera_track_target": Case(camera.tracking, [_short], ()),
+    "take_from_human": Case(person.taken, [_shifted("bar", x=0.15), _moving("bar"), person.holding(HELD)], ("touch",)),
+    "hand_to_human": Case(
+        person.given, [_shifted("bar", z=0.1), _moving("bar"), person.holding(FREE)], ("reach", "touch")
+    ),
+    "wipe_arm": Case(person.wiped, [person.unwiped], ("wipe", "press")),
+    "feed_spoon": Case(person.fed, [_tilted("spoon", 0.3), _shifted("spoon", x=-0.05), _moving("spoon", 0.15)]),
+    "cowork_place": Case(
+        person.placed, [_shifted("red_cube", x=0.06), _shifted("blue_cube", z=0.05), _moving("red_cube")], ("touch",)
+    ),
 }

@@ -24,8 +24,8 @@ SETTLING = "robot.hand_", "partner.hand_", "hand.", "dog.", "walker."
 """Joints of a hand, which an action of zero sends to the middle of their ranges, and of legs that take up a weight."""
 SOFT = ("go1_velocity", "go1_velocity_rough", "g1_velocity", "get_up")
 """Tasks whose drives hold no weight at once, or whose robot begins above the ground."""
-SHIPPED = ["stand_still", "go1_velocity"]
-"""Those that come with a trained policy."""
+SHIPPED = {"stand_still": 8, "go1_velocity": 8, "go1_velocity_rough": 4}
+"""Those that come with a trained policy, and how many of eight episodes it has to solve."""
 DEEPEST, REPLAYED = 2e-3, 50
 """How far things may be inside of one another at a reset [m], and steps that are replayed."""
 TASKS = [pytest.param(task, marks=pytest.mark.slow) if task in VARIANTS else task for task in CASES]
@@ -133,12 +133,14 @@ def _replayed(env: TaskEnv, actions: np.ndarray) -> list[bytes]:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("task", SHIPPED)
+@pytest.mark.parametrize(
+    "task", [pytest.param(task, marks=pytest.mark.slow) if task in VARIANTS else task for task in SHIPPED]
+)
 def test_the_policy_that_a_task_ships_solves_it(task: str, engine: str) -> None:
     require_engine(engine)
     with blind(task, engine, 8) as env:
         told = list(drive(env, make_policy(env, "shipped"), episode_seeds("validation", 0, 8)))
-    assert [episode.status for episode in told] == ["success"] * 8
+    assert [episode.status for episode in told].count("success") >= SHIPPED[task]
 
 
 @pytest.mark.parametrize("engine", ENGINES)

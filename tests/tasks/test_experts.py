@@ -71,8 +71,13 @@ TASKS = [
     "camera_look_at",
     "camera_orbit_scan",
     "camera_track_target",
+    "take_from_human",
+    "hand_to_human",
+    "wipe_arm",
+    "feed_spoon",
+    "cowork_place",
 ]
-LONG = {"mobile_pick_place", "pack", "fetch_from_drawer", "rope_straighten", "dex_relocate"}
+LONG = {"cowork_place", "mobile_pick_place", "pack", "fetch_from_drawer", "rope_straighten", "dex_relocate"}
 """Episodes of many commands: on one engine in the slow tier, on the others before a release."""
 RUNS = [
     pytest.param(task, engine, marks=pytest.mark.full if task in LONG and engine != "mujoco" else pytest.mark.slow)

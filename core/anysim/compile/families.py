@@ -8,7 +8,7 @@ from anysim import registry
 from anysim.assets.model import ImportedModel
 from anysim.compile.builder import WorldBuilder
 from anysim.conventions import WORLD
-from anysim.errors import AnysimError, Issues, SpecError
+from anysim.errors import AnysimError, Issues, PluginError, SpecError
 from anysim.model.world import BodyKind, EntityKind
 from anysim.plugin_parameters import checked
 from anysim_schemas.families import FamilySpec
@@ -20,6 +20,7 @@ class FamilyPart(NamedTuple):
     Attributes:
         name: of the entity.
         model: its bodies are all roots, each at its place in the world; its links and joints, where it has any, follow.
+            Matter that engines do not hold is one static body without geoms, which gives it a name and an id.
         label: what people call it.
         driven: the family says where its bodies go (`Family.drive`): they pass through the ground, what is fixed, and
             one another, which could not yield either.
@@ -37,6 +38,10 @@ def add_families(builder: WorldBuilder, families: Mapping[str, FamilySpec], issu
     for name, spec in families.items():
         try:
             made, who = registry.load("families", spec.kind), f"the family '{spec.kind}'"
+            if not hasattr(made, "parts"):  # the class itself stands to the right of here; its manager checks it
+                raise PluginError(
+                    f"{who} of {registry.origin(made)} is no Family; derive it from anysim.families.base.Family"
+                )
             values = checked(made.spec, spec.params, "")
             with registry.Blame(who, registry.origin(made)):
                 parts: tuple[FamilyPart, ...] = tuple(made.parts(name, values))
@@ -47,17 +52,21 @@ def add_families(builder: WorldBuilder, families: Mapping[str, FamilySpec], issu
         except AnysimError as error:
             issues.add(name, str(error))
             continue
-        taken = {entity.name for entity in builder.entities}
+        taken, own = {entity.name for entity in builder.entities}, set[str]()
         for number, part in enumerate(parts):
+            if part.name in own:
+                issues.add(name, f"{who} of {registry.origin(made)} makes two parts called '{part.name}'")
+                continue
             if part.name in taken:
                 issues.add(name, f"there is already an entity '{part.name}'; give the family another name")
                 continue
+            own.add(part.name)
             root = part.model.bodies[0]
             entity = builder.add(
                 part.name,
                 EntityKind.OBJECT,
                 part.model,
-                root=BodyKind.FREE,
+                root=root.kind,
                 position=root.position,
                 quaternion=root.quaternion,
                 label=part.label or name,

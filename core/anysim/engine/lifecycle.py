@@ -2,7 +2,7 @@
 
 import threading
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from typing import Any, ClassVar, Self
 
@@ -11,6 +11,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.engine import arguments
 from anysim.engine.availability import Finding, LibraryRequirement
+from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Allowance, Capabilities, Capability, Need, check
 from anysim.engine.conditioning import doubts
 from anysim.engine.control import CommandBuffer
@@ -33,6 +34,10 @@ EnvIds = Sequence[int] | Array | None
 
 Indices = Sequence[int] | Array | None
 """Indices of joints, bodies, actuators and the like: None for all, else unique ones."""
+
+
+Overlay = Callable[[Array, CameraView, Mapping[str, Array]], None]
+"""Draws into images (E, H, W, …) of the envs (E,) by channel, where nearer than their `depth`, and keeps that."""
 
 
 class EngineLifecycle(EngineLifetime, Primitives):
@@ -63,6 +68,8 @@ class EngineLifecycle(EngineLifetime, Primitives):
         self._lock = threading.RLock()
         self._world: World | None = None
         self._built = self._destroyed = False
+        self.overlays: list[Overlay] = []
+        """What is drawn over the engine's images, in order: matter that it does not hold."""
 
     # ------------------------------------------------------------------ what it is
 

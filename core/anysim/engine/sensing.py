@@ -43,7 +43,19 @@ class EngineSensing(EngineLifecycle):
                     raise EngineError(f"there is no channel '{channel}' (channels: rgb, depth, segmentation)")
                 self._require(Capability(f"render: {channel}"))
             ids = self._ids(env_ids)
-            return self._render(self._seen_from(camera_name, ids, body_pose, width, height), ids, tuple(channels))
+            view = self._seen_from(camera_name, ids, body_pose, width, height)
+            if not self.overlays:
+                return self._render(view, ids, tuple(channels))
+            if body_pose is not None:
+                raise EngineError(
+                    "matter that families draw is where it is now, and cannot be seen with bodies as they once were; "
+                    "take images while the episode runs (`record.film: live`)"
+                )
+            self._require(Capability.RENDER_DEPTH)
+            images = self._render(view, ids, tuple(dict.fromkeys((*channels, "depth"))))
+            for overlay in self.overlays:
+                overlay(ids, view, images)
+            return {channel: images[channel] for channel in channels}
 
     def camera_view(self, camera_name: str, env_ids: EnvIds = None, body_pose: ArrayLike | None = None) -> CameraView:
         """What `render` would draw from: world poses and lenses of a camera now, or with `body_pose` as there."""

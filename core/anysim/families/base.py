@@ -16,6 +16,7 @@ import numpy as np
 from anysim.compile.families import FamilyPart as FamilyPart
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
+from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Capability
 from anysim.errors import PluginError, listing
 from anysim.math import pose as P
@@ -70,6 +71,7 @@ class Family(ABC):
         spec: its parameters in YAML: a closed class, whose faults are told with file, line and column.
         needs: capabilities of the engine beyond those that its World needs.
         rate: whether it is asked at each physics step, or at each part of a control step that controllers make.
+        drawn: whether it draws (`draw`) what engines do not: its matter.
         memory: (N, …) by name, zero when an episode begins: the whole of what it knows.
         bounds: (low, high) of those arrays whose values something else is looked up by.
     """
@@ -77,6 +79,7 @@ class Family(ABC):
     spec: ClassVar[type[Spec]]
     needs: ClassVar[tuple[Capability, ...]] = ()
     rate: ClassVar[Literal["control", "physics"]] = "control"
+    drawn: ClassVar[bool] = False
 
     def __init__(self, setting: FamilySetting) -> None:
         self.setting, self.engine = setting, setting.engine
@@ -121,6 +124,16 @@ class Family(ABC):
     @abstractmethod
     def state(self, env_ids: Array) -> FamilyState:
         """What it looks like now."""
+
+    def draw(self, env_ids: Array, view: CameraView, images: Mapping[str, Array]) -> None:
+        """Draw its matter into images (n, H, W, …) as an engine has made them, where it is nearer than their `depth`.
+
+        They have `depth`, which it must keep up to date, and maybe `rgb` and `segmentation`.
+        """
+
+    def fault(self, env_ids: Array) -> Array:
+        """(n,) bool: envs whose matter is beyond repair, not finite; their episodes end as those of a broken engine."""
+        return np.zeros(len(env_ids), dtype=bool)
 
     def facts(self, env: int) -> Mapping[str, Mapping[str, object]]:
         """What can be said of its entities now, plain data by entity."""

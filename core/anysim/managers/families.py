@@ -8,6 +8,7 @@ import numpy as np
 from anysim import registry
 from anysim.conventions import Array
 from anysim.engine.base import SimEngine
+from anysim.engine.cameras import CameraView
 from anysim.engine.capability import Need
 from anysim.engine.snapshots.row_checks import refuse_range
 from anysim.errors import NameLookupError, PluginError, listing, suggest
@@ -61,6 +62,9 @@ class FamilyManager(Manager):
         self._by_step = [name for name, family in self._families.items() if family.rate == "physics"]
         self._by_part = [name for name in self._families if name not in self._by_step]
         self._dt = engine.world.physics.dt
+        self._drawn = [name for name, family in self._families.items() if family.drawn]
+        if self._drawn:
+            engine.overlays.append(self._draw)
 
     # ------------------------------------------------------------------ episodes
 
@@ -89,6 +93,19 @@ class FamilyManager(Manager):
             family = self._families[name]
             with self._blames[name]:
                 (family.before_step if before else family.after_step)(env_ids, duration)
+
+    def _draw(self, env_ids: Array, view: CameraView, images: Mapping[str, Array]) -> None:
+        for name in self._drawn:
+            with self._blames[name]:
+                self._families[name].draw(env_ids, view, images)
+
+    def fault(self, env_ids: Array) -> Array:
+        """(n,) bool: envs in which the matter of a family is beyond repair."""
+        found = np.zeros(len(env_ids), dtype=bool)
+        for name, family in self._families.items():
+            with self._blames[name]:
+                found |= family.fault(env_ids)
+        return found
 
     # ------------------------------------------------------------------ what there is to see
 

@@ -57,6 +57,9 @@ def hindrances(spec: RunSpec) -> list[str]:
     for name, term in (spec.task.command if spec.task is not None else {}).items():
         if goes_on("command", term) == 7:
             reasons.append(f"the goal '{name}' moves, and where it was is not recorded")
+    for name, family in (spec.world.families or {}).items():
+        if getattr(registry.load("families", family.kind), "drawn", False):
+            reasons.append(f"where the matter of the family '{name}' was is not in the poses of bodies")
     writer: type[TrajectoryWriter] = registry.load("writers", spec.record.writer)
     if spec.record.cameras and writer.open_images is TrajectoryWriter.open_images:
         reasons.append(f"the writer '{spec.record.writer}' writes no images")

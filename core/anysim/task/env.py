@@ -314,6 +314,8 @@ class TaskEnv:
     def _evaluate(self, rows: Any) -> None:
         success, failure = self.mdp.judge()
         fault = self.engine.get_state().fault[rows]
+        if self.families is not None:
+            fault = fault | self.families.fault(self.scene.env_ids)
         self._fault[rows] = fault
         self._success[rows] = success & ~fault
         self._code[rows] = RUNNING

@@ -6,6 +6,7 @@ from enum import IntEnum
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.randomization.distributions import nominal
 from anysim_avatars.spec import ActionSpec
 
 LENGTH = 32
@@ -34,9 +35,12 @@ class Column(IntEnum):
     REACH_BODY = 18
     REACH = 19
     BEND = 22
+    EASE = 23
 
 
-WIDTH = 23
+WIDTH = 24
+DRAWN = {"seconds": slice(Column.SECONDS, Column.SECONDS + 1), "reach": slice(Column.REACH, Column.REACH + 3)}
+"""Where the values of an action are that may be drawn anew in each episode."""
 
 
 class Kind(IntEnum):
@@ -58,7 +62,8 @@ def rows_of(action: ActionSpec, body: FindBody, clip: FindClip) -> list[Array]:
     row[[Column.BODY, Column.GAZE_BODY, Column.REACH_BODY]] = -1
     row[Column.SPEED], row[Column.SEAT], row[Column.BEND] = action.speed, action.seat, action.bend
     row[Column.NEAR], row[Column.ENDS] = action.near, 1
-    row[Column.SECONDS] = np.inf if action.seconds is None else action.seconds
+    row[Column.SECONDS] = np.inf if action.seconds is None else nominal(action.seconds)
+    row[Column.EASE] = action.ease
     for target, flag, where, at in (
         (action.gaze, Column.GAZING, Column.GAZE_BODY, Column.GAZE),
         (action.reach, Column.REACHING, Column.REACH_BODY, Column.REACH),
@@ -68,7 +73,7 @@ def rows_of(action: ActionSpec, body: FindBody, clip: FindClip) -> list[Array]:
             if isinstance(target, str):
                 row[where] = body(target)
             else:
-                row[at : at + 3] = target
+                row[at : at + 3] = nominal(target)
     row[Column.HAND] = action.hand == "right"
     points: Sequence[tuple[float, float]] = action.path or ()
     if action.path is not None or action.go_to is not None:

@@ -7,7 +7,8 @@ import numpy as np
 
 from anysim.assets.model import ImportedModel
 from anysim.conventions import Array
-from anysim.model.world import Body, BodyKind, Capsule, Geom, Inertial, Quat, Surface, Vec3
+from anysim.math import pose as P
+from anysim.model.world import Body, BodyKind, Capsule, Geom, Inertial, Quat, Site, Surface, Vec3
 
 BONES = (
     "pelvis",
@@ -30,6 +31,12 @@ BONES = (
 PARENTS = (-1, 0, 1, 1, 1, 3, 4, 5, 6, 0, 0, 9, 10, 11, 12)
 MASS = 1e5
 """[kg] of a body that is driven: what it meets changes its velocity by a millionth and not where it goes."""
+CHIN, WRIST = 0.05, 0.03
+"""[m] of a mouth below the middle of a head; of `forearm_top` from the middle of a forearm."""
+OVER = 0.045
+"""[m] above a palm what is put into it may be held."""
+BITE = 0.045
+"""[m] before a mouth is the middle of a spoon that it eats from."""
 _SKIN = ((0.94, 0.78, 0.66), (0.80, 0.60, 0.46), (0.55, 0.38, 0.27), (0.36, 0.24, 0.17))
 _CLOTHES = (
     (0.17, 0.32, 0.56),
@@ -117,10 +124,43 @@ def capsules(one: Proportions) -> list[tuple[float, float, Vec3, Quat]]:
         if name == "pelvis":
             found.append((r, one.hip * 0.8, (0.0, 0.0, 0.0), across))
         elif name == "head":
-            found.append((r, 0.028 * slim, (0.0, 0.0, size[bone] / 2), along))
+            half = 0.028 * slim
+            found.append((r, half, (0.0, 0.0, size[bone] + 0.065 * one.height - half - r), along))  # up to its height
         else:
             found.append((r, half, (0.0, 0.0, 0.0), along))
     return found
+
+
+def segments(one: Proportions) -> tuple[Array, Array]:
+    """The ends (2, 15, 3) of the axes of the capsules in the frames of their links, and their radii (15,) [m]."""
+    found = capsules(one)
+    half = np.array([half for _, half, _, _ in found])
+    axis = np.stack([P.rotate(np.array(turn), np.array([0.0, 0.0, 1.0])) for *_, turn in found])
+    place = np.array([place for *_, place, _ in found])
+    return np.stack([place - half[:, None] * axis, place + half[:, None] * axis]), np.array([r for r, *_ in found])
+
+
+def sites(one: Proportions) -> tuple[Site, ...]:
+    """Frames: `mouth`, x out of the face; `left_palm` and its kin, z out of the skin and x towards the fingers.
+
+    `bite` is BITE before the mouth, where the middle of what it is fed from is brought.
+
+    `left_over_palm` is OVER above it, where what is offered to a hand is brought; `left_forearm_top` is nearer to the
+    wrist than to the elbow.
+    """
+    found = capsules(one)
+    radii, half, middle = [capsule[0] for capsule in found], found[2][1], found[2][2][2]
+    outwards: Quat = (sqrt(0.5), 0.0, sqrt(0.5), 0.0)
+    face = sqrt(radii[2] ** 2 - max(CHIN - half, 0.0) ** 2)
+    sites = [Site(name, 2, (face + ahead, 0.0, middle - CHIN)) for name, ahead in (("mouth", 0.0), ("bite", BITE))]
+    for name, bones, above, along in (
+        ("palm", (7, 8), 0.0, 0.0),
+        ("over_palm", (7, 8), OVER, 0.0),
+        ("forearm_top", (5, 6), 0.0, WRIST),
+    ):
+        for side, bone in zip(("left", "right"), bones, strict=True):
+            sites.append(Site(f"{side}_{name}", bone, (radii[bone] + above, 0.0, along), outwards))
+    return tuple(sites)
 
 
 def model(name: str, one: Proportions, poses: Array) -> ImportedModel:
@@ -156,5 +196,6 @@ def model(name: str, one: Proportions, poses: Array) -> ImportedModel:
         tuple(bodies),
         geoms=tuple(geoms),
         geom_links=tuple(BONES[g.body] if g.body else "" for g in geoms),
+        sites=sites(one),
         links=links,
     )

@@ -24,8 +24,8 @@ from anysim_schemas.base import Spec
 
 FADE = 0.4
 """[s] from one posture to the next, and into gaze, reach and bend."""
-HEAD_RATE = 4.0
-"""[rad/s] that a head turns at most; a gaze that is held follows as fast as it must."""
+PASS = 0.5
+"""[m] from one point that is reached for to another, in the time that an action eases in."""
 ROW = 0.9
 """[m] between avatars that begin at one place."""
 
@@ -41,11 +41,13 @@ class Avatars(Family):
     def parts(cls, name: str, spec: Spec) -> Iterable[FamilyPart]:
         assert isinstance(spec, AvatarSpec)
         for number, one in enumerate(people(spec)):
-            gait = _gait(1)
+            gait, legs = _gait(1), Legs.of([one], 1)
             gait.pos[0], gait.yaw[0] = _begin(spec, number), float(nominal(spec.yaw))
-            stand(gait, Legs.of([one], 1), np.zeros((1, 2)))
-            still = _aim(clips.standing(1))
-            poses = figure(gait, Sizes.of([one], 1), still).poses[0]
+            stand(gait, legs, np.zeros((1, 2)))
+            first = spec.do[0] if spec.do else ActionSpec()
+            posture = _first(first.clip or "", np.array([first.seat]), legs)
+            gait.hips[:] -= posture[:, clips.DROP]
+            poses = figure(gait, Sizes.of([one], 1), _aim(posture)).poses[0]
             called = name if spec.count == 1 else f"{name}_{number}"
             yield FamilyPart(called, bodies.model(called, one, poses), "person", driven=True)
 
@@ -61,6 +63,7 @@ class Avatars(Family):
         self.people, count = people(setting.spec), setting.spec.count
         self._every_leg = Legs.of(self.people, setting.engine.num_envs)
         self._every_size = Sizes.of(self.people, setting.engine.num_envs)
+        self._capsules = [bodies.segments(one) for one in self.people]
         self.drives(body for entity in entities for body in range(entity.body_start, entity.body_stop))
         self._motions: list[Motion | None] = [None] * len(clips.CLIPS)
         self._clips = list(clips.CLIPS)
@@ -100,6 +103,7 @@ class Avatars(Family):
         self._points = self.remember("points", count * len(BONES), 3)
         self._speeds = self.remember("speeds", count * len(BONES), 3)
         self._script = self._rows(setting.spec.do, f"world.families.{setting.name}.do")
+        self._drawn = list(_drawn(setting.spec.do, self.body, self.clip_number))
 
     def _read(self, clip: str, file: str) -> Motion:
         path = f"world.families.{self.setting.name}.motions.{clip}"
@@ -173,11 +177,41 @@ class Avatars(Family):
             stream = f"family/{self.setting.name}/{number}/yaw"
             memory["yaw"][env_ids, number] = draw_rows(spec.yaw, stream, streams, env_ids, source=f"{path}.yaw")
         memory["queue"][env_ids] = self._script
+        for row, columns, key, value in self._drawn:
+            for number in range(spec.count):
+                stream = f"family/{self.setting.name}/{number}/do/{key}"
+                drawn = draw_rows(value, stream, streams, env_ids, source=f"{path}.do.{key}")
+                memory["queue"][env_ids, number, row, columns] = drawn.reshape(len(env_ids), -1)
         gait, legs, sizes = self._gait(env_ids), self._legs(env_ids), self._sizes(env_ids)
         stand(gait, legs, self._ground(gait.feet[:, :, :2] + gait.pos[:, None]))
-        posture = clips.standing(len(gait.pos))
-        self._keep(env_ids, gait, {"posture": posture, "before": posture, "fade": np.full(len(posture), FADE)})
-        self._show(env_ids, figure(gait, sizes, _aim(posture)), None)
+        self._begin_as_told(env_ids, gait, legs, sizes)
+
+    def _begin_as_told(self, env_ids: Array, gait: Gait, legs: Legs, sizes: Sizes) -> None:
+        """They hold the clip, gaze, reach and bend of their first action when an episode begins."""
+        rows = len(gait.pos)
+        first = self._take(env_ids, "queue")[:, 0]
+        clip = self._clips[int(first[0, Column.CLIP])] if first[0, Column.KIND] == Kind.CLIP else ""
+        posture = _first(clip, first[:, Column.SEAT], legs)
+        gait.hips[:] -= posture[:, clips.DROP]
+        now = {"posture": posture, "before": posture, "fade": np.full(rows, FADE), "bend": first[:, Column.BEND]}
+        if clip in clips.CLIPS:
+            now["playing"] = np.full(rows, self.clip_number(clip))
+        scene = self._scene(env_ids)
+        now["gazing"], now["gaze"] = first[:, Column.GAZING], _points(scene, first, Column.GAZE_BODY, Column.GAZE)
+        hand = first[:, Column.HAND].astype(int)
+        now["reaching"], now["reach"] = np.zeros((rows, 2)), np.zeros((rows, 2, 3))
+        now["reaching"][np.arange(rows), hand] = first[:, Column.REACHING]
+        now["reach"][np.arange(rows), hand] = _points(scene, first, Column.REACH_BODY, Column.REACH)
+        found = figure(
+            gait, sizes, Aim(posture, now["bend"], now["gaze"], now["gazing"], now["reach"], now["reaching"])
+        )
+        now["missed"], now["looks"] = found.missed, found.looks
+        self._keep(env_ids, gait, now)
+        self._show(env_ids, found, None)
+
+    def _scene(self, env_ids: Array) -> "Scene":
+        poses = self.engine.get_state().body_pose[env_ids]
+        return Scene(poses, self.setting.origin[env_ids], np.repeat(np.arange(len(env_ids)), len(self.names)))
 
     def before_step(self, env_ids: Array, duration: float) -> None:
         rows = len(env_ids) * len(self.names)
@@ -186,10 +220,7 @@ class Avatars(Family):
         queue = self._take(env_ids, "queue")
         at = np.arange(rows)
         row = queue[at, now["head_row"]]
-        poses = self.engine.get_state().body_pose[env_ids]
-        env = np.repeat(np.arange(len(env_ids)), len(self.names))
-        scene = Scene(poses, self.setting.origin[env_ids], env)
-
+        scene = self._scene(env_ids)
         now["time"] += duration
         now["clock"] += duration
         done = self._over(row, gait, now, _goals(row, scene))
@@ -282,14 +313,16 @@ class Avatars(Family):
         now["posture"] = now["before"] + share * (wanted - now["before"])
 
     def _overlays(self, now: dict[str, Array], row: Array, looked: Array, target: Array, dt: float) -> None:
-        """Gaze, reach and bend come and go over FADE [s]; while one goes, it is about where it was last."""
+        """Gaze, reach and bend come and go over the action's `ease` [s]; while one goes, it is about where it was."""
         gazing, reaching = row[:, Column.GAZING] > 0, row[:, Column.REACHING] > 0
+        rate = dt / np.where(row[:, Column.EASE] > 0.0, row[:, Column.EASE], FADE)
         now["gaze"][gazing] = looked[gazing]
-        now["gazing"] = np.clip(now["gazing"] + np.where(gazing, dt, -dt) / FADE, 0.0, 1.0)
+        now["gazing"] = np.clip(now["gazing"] + np.where(gazing, rate, -rate), 0.0, 1.0)
         for hand in (0, 1):
             mine = reaching & (row[:, Column.HAND] == hand)
-            now["reach"][mine, hand] = target[mine]
-            now["reaching"][:, hand] = np.clip(now["reaching"][:, hand] + np.where(mine, dt, -dt) / FADE, 0.0, 1.0)
+            before, share = now["reach"][mine, hand], now["reaching"][mine, hand]
+            now["reach"][mine, hand] = _onward(before, target[mine], PASS * rate[mine], share)
+            now["reaching"][:, hand] = np.clip(now["reaching"][:, hand] + np.where(mine, rate, -rate), 0.0, 1.0)
         now["bend"] += np.clip(row[:, Column.BEND] - now["bend"], -1.2 * dt, 1.2 * dt)
 
     def _moved(
@@ -367,6 +400,15 @@ class Avatars(Family):
         ids = np.repeat(np.array(self.setting.entities, dtype=np.int32) + 1, len(BONES))
         return FamilyState(self._points[env_ids].copy(), self._speeds[env_ids].copy(), radius, ids)
 
+    def gap(self, poses: Array, number: int, points: Array) -> Array:
+        """(n,) [m] from points (n, 3) to the nearest surface of an avatar, of poses (n, B, 7) of all bodies."""
+        own = poses[:, self._driven[number * len(BONES) : (number + 1) * len(BONES)]]
+        ends, radii = self._capsules[number]
+        a, b = (own[..., :3] + P.rotate(own[..., 3:], np.broadcast_to(end, own[..., :3].shape)) for end in ends)
+        way, to = b - a, points[:, None] - a
+        share = np.clip(P.dot(to, way) / np.maximum(P.dot(way, way), 1e-12), 0.0, 1.0)
+        return (P.norm(to - share[..., None] * way) - radii).min(axis=1)
+
     def facts(self, env: int) -> Mapping[str, Mapping[str, object]]:
         bodies_ = [body.name for body in self.engine.world.bodies]
         taken = {key: self.memory[key][env] for key in ("queue", "head_row", "playing", "pos", "vel")}
@@ -410,6 +452,34 @@ def people(spec: AvatarSpec) -> list[Proportions]:
         tall = float(draw_one(spec.height, rng.random) if is_random(spec.height) else nominal(spec.height))
         found.append(proportions(tall, rng))
     return found
+
+
+def _first(clip: str, seat: Array, legs: Legs) -> Array:
+    """(m, POSTURE) how avatars are held when an episode begins: as a clip holds them, or standing."""
+    zero = np.zeros(len(seat))
+    drop = np.maximum(legs.ankle + legs.leg - seat - 0.1, 0.0)
+    made = clips.CLIPS.get(clip)
+    return clips.standing(len(seat)) if made is None else made(clips.Moment(zero, zero, zero, drop))
+
+
+def _drawn(
+    script: Sequence[ActionSpec], body: actions.FindBody, clip: actions.FindClip
+) -> Iterable[tuple[int, slice, str, object]]:
+    """Row and columns of each value of a script that is drawn anew in each episode, its path in there, and itself."""
+    row = 0
+    for number, action in enumerate(script):
+        for key, columns in actions.DRAWN.items():
+            if is_random(value := getattr(action, key)):
+                yield row, columns, f"{number}.{key}", value
+        row += len(actions.rows_of(action, body, clip))
+
+
+def _onward(point: Array, target: Array, most: Array, share: Array) -> Array:
+    """(m, 3) the point that a palm is put to next: no faster from one point to another than it comes to one."""
+    gap = target - point
+    far = P.norm(gap)
+    step = np.minimum(most, far)
+    return np.where((share > 0.0)[:, None], point + gap * (step / np.maximum(far, 1e-12))[:, None], target)
 
 
 def _begin(spec: AvatarSpec, number: int) -> tuple[float, float]:

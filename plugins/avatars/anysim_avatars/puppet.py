@@ -107,9 +107,10 @@ def figure(gait: Gait, sizes: Sizes, aim: Aim, head: Array | None = None) -> Fig
         wrist = elbow + sizes.bones[:, 5 + side, None] * along
         tip = wrist + sizes.bones[:, 7 + side, None] * along
         hinge = frames.unit(P.cross(elbow - shoulder, reached - elbow) + 1e-9 * left)
-        for bone, a, b in ((3, shoulder, elbow), (5, elbow, wrist), (7, wrist, tip)):
+        palm_up = hinge + share * (frames.unit(P.cross(along, _UP + zero[:, None]) + 1e-9 * hinge) - hinge)
+        for bone, a, b, beside in ((3, shoulder, elbow, hinge), (5, elbow, wrist, palm_up), (7, wrist, tip, palm_up)):
             start[:, bone + side], end[:, bone + side] = a, b
-            turn[:, bone + side] = frames.along(b - a, hinge)
+            turn[:, bone + side] = frames.along(b - a, beside)
         hip = hips + (sign * sizes.hip)[:, None] * left
         foot, heading = gait.feet[:, side], gait.feet[:, side, 3]
         ankle = foot[:, :3] + sizes.ankle[:, None] * np.array([0.0, 0.0, 1.0])

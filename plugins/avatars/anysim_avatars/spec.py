@@ -24,12 +24,15 @@ class ActionSpec(Spec):
         description="a clip, or one of `motions`: idle, sit, talk, …; beside a walk, how the arms are held",
     )
     seat: Positive = Field(default=0.45, description="height of the seat behind it [m], for the clip `sit`")
-    seconds: NonNegative | None = Field(
+    seconds: NonNegative | Range[NonNegative] | None = Field(
         default=None, description="how long a clip lasts [s]; a recording once, another for ever if not given"
     )
     speed: Positive = Field(default=1.0, lt=2.01, description="of walking, at most [m/s]")
     gaze: Vec3 | Reference | None = Field(default=None, description="a point [m] or a body that is looked at")
-    reach: Vec3 | Reference | None = Field(default=None, description="a point [m] or a body that the palm is put to")
+    reach: Vec3 | Range[Vec3] | Reference | None = Field(
+        default=None, description="a point [m], may be drawn, or a body that the palm is put to"
+    )
+    ease: Positive = Field(default=0.4, description="in which gaze and reach come, and go before it [s]")
     hand: Literal["left", "right"] = Field(default="right", description="the hand that reaches")
     bend: Number = Field(default=0.0, ge=-0.4, le=1.4, description="how far the trunk leans forward [rad]")
 

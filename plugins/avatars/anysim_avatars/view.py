@@ -24,3 +24,7 @@ class AvatarView:
     def rows(self, key: str) -> Array:
         """(n, …) of its memory."""
         return self.family.memory[key][self.scene.env_ids, self.number]
+
+    def gap(self, points: Array) -> Array:
+        """(n,) [m] from points (n, 3) to the nearest of its capsules."""
+        return self.family.gap(self.scene.state.body_pose[self.scene.env_ids], self.number, points)

@@ -1,6 +1,7 @@
-"""Exams of a policy while it learns: its success without noise, in episodes of the validation split."""
+"""Exams of a policy while it learns: its success and reward without noise, in episodes of the validation split."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import torch  # pyright: ignore[reportMissingImports]
@@ -13,21 +14,34 @@ FIRST = 10_000
 """The first seed of the validation split, as `anysim evaluate` has it."""
 
 
-def exam(env: TaskEnv, groups: Sequence[str], network: torch.nn.Module) -> float:
-    """The share of episodes that a policy solves: one in each env, of the first seeds of the validation split.
+class Mark(NamedTuple):
+    """What came of an exam; the better of two is the greater, so rewards decide where as many are solved.
+
+    Attributes:
+        success: the share of episodes that are solved.
+        reward: the sum of an episode's rewards, in the mean.
+    """
+
+    success: float
+    reward: float
+
+
+def exam(env: TaskEnv, groups: Sequence[str], network: torch.nn.Module) -> Mark:
+    """How a policy does in one episode in each env, of the first seeds of the validation split.
 
     `groups` are its inputs in order: observation groups and images.
     """
     network.eval()
     env.reset(episode_seeds=list(range(FIRST, FIRST + env.num_envs)))
-    chunk = np.zeros((env.num_envs, 0, env.action_dim))
+    chunk, total = np.zeros((env.num_envs, 0, env.action_dim)), np.zeros(env.num_envs)
     while (active := env.running).any():
         if chunk.shape[1] == 0:
             chunk = _acted(network, [env.obs[group] for group in groups])
         action, chunk = chunk[:, 0], chunk[:, 1:]
-        env.step(action, None if active.all() else active)
+        reward = env.step(action, None if active.all() else active).reward
+        total += np.where(active & ~env.info["fault"], reward, 0.0)
         env.retire(np.flatnonzero(active & (env.status != Status.RUNNING)))
-    return float((env.status == Status.SUCCESS).mean())
+    return Mark(float((env.status == Status.SUCCESS).mean()), float(total.mean()))
 
 
 def _acted(network: torch.nn.Module, rows: Sequence[Array]) -> Array:

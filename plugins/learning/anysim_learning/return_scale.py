@@ -38,8 +38,12 @@ class ReturnScale:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Go on from there."""
-        self.mean, self.variance, self.count = (float(state[name]) for name in ("mean", "variance", "count"))
+        self.adopt(state)
         self._return[:] = state["returns"]
+
+    def adopt(self, state: Mapping[str, Any]) -> None:
+        """Begin with the scale of others, however many envs they had."""
+        self.mean, self.variance, self.count = (float(state[name]) for name in ("mean", "variance", "count"))
 
     def _take_in(self, rows: Array) -> None:
         """Mean and variance of two samples together (Chan et al. 1979)."""

@@ -132,7 +132,7 @@ class RslPpo:
             made[key] = widened(saved[key], made[key])
             made[key]["obs_normalizer.count"] = torch.tensor(_ADOPTED * self._stretch)
         alg.load(made, {"actor": True, "critic": True}, True)
-        self._scale.restore(state["scale"])
+        self._scale.adopt(state["scale"])
 
     def network(self) -> "torch.nn.Module":
         """The mean action, in the units of the env."""

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
+from math import inf
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -24,9 +25,9 @@ def train(
 ) -> Mapping[str, float]:
     """Learn until `steps` are done, from the checkpoint in `out` on where there is one; returns the last numbers.
 
-    The policy that is kept is that of the best exam, the latest of equals: `best` of the numbers is its success, and
-    `cpu_s` the processor time of this process and of those before it [s]. All else is the same after an interruption
-    as without one.
+    The policy that is kept is that of the best exam: of those that solve most, that of the greatest reward, and the
+    latest of equals. `best` of the numbers is its success, and `cpu_s` the processor time of this process and of those
+    before it [s]. All else is the same after an interruption as without one.
 
     Args:
         learner: that of the lesson.
@@ -39,7 +40,7 @@ def train(
     """
     from torch.utils.tensorboard import SummaryWriter  # pyright: ignore[reportMissingImports]
 
-    from anysim_learning.exam import exam
+    from anysim_learning.exam import Mark, exam
     from anysim_learning.export import described, export
 
     rows = [json.loads(line) for line in _lines(out / CURVE)]
@@ -58,15 +59,17 @@ def train(
                 tell(numbers)
             network = learner.network()
             passed = exam(examined, (*lesson.groups, *lesson.images), network)
-            best = max((row["exam"] for row in rows), default=0.0)
-            numbers = {**numbers, "steps": learner.steps, "exam": passed, "best": max(passed, best)}
+            best = max([Mark(row["exam"], row.get("exam_reward", -inf)) for row in rows], default=passed)
+            told = {"exam": passed.success, "exam_reward": passed.reward, "best": max(passed, best).success}
+            numbers = {**numbers, "steps": learner.steps, **told}
             numbers["cpu_s"] = round(spent + process_time(), 1)
-            board.add_scalar("exam", passed, learner.steps)
+            board.add_scalar("exam", passed.success, learner.steps)
+            board.add_scalar("exam_reward", passed.reward, learner.steps)
             tell(numbers)
             rows.append(numbers)
             if passed >= best:
-                told = about.model_copy(update={"seed": lesson.seed, "steps": learner.steps})
-                export(network, told, out / POLICY)
+                signed = about.model_copy(update={"seed": lesson.seed, "steps": learner.steps})
+                export(network, signed, out / POLICY)
             write_whole(out, {CURVE: "".join(json.dumps(row) + "\n" for row in rows), PAGE: page({out.name: rows})})
             # Last: what a killed process wrote after the checkpoint before is learnt and written again.
             checkpoint.save(out / CHECKPOINT, learner.state())

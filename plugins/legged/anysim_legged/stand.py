@@ -44,22 +44,11 @@ class Stand(Skill):
         if not self._slices:
             raise TaskError(f"no channel of '{robot.name}' has a controller; add world.robots.{robot.name}.actions")
         self._homes = [robot.channel_columns(s.channel).home[None] for s in self._slices]
+        alone = len(self._slices) == 1
         self._risen = [
-            self._posture(robot, s, home, posture) for s, home in zip(self._slices, self._homes, strict=True)
+            postured(env, robot, s, home, posture, alone) for s, home in zip(self._slices, self._homes, strict=True)
         ]
         self._steps = max(1.0, rises / env.engine.world.physics.control_dt)
-
-    def _posture(self, robot: RobotView, s: ActionSlice, home: Array, posture: Mapping[str, float]) -> Array:
-        """(1, K) where the joints of a channel are to be."""
-        joints = [self.env.engine.world.joints[j].name for j in robot.channel(s.channel).joints]
-        own = [joint.removeprefix(f"{robot.name}.") for joint in joints]
-        wanted = home.copy()
-        for pattern, position in posture.items():
-            matching = [fnmatchcase(joint, pattern) for joint in own]
-            if not any(matching) and len(self._slices) == 1:
-                raise TaskError(f"posture: no joint of '{robot.name}' matches '{pattern}' (joints: {listing(own, 20)})")
-            wanted[0, matching] = position
-        return wanted
 
     def act(self, env_ids: Array, action: Array) -> None:
         self.env.scene.look(env_ids)
@@ -73,3 +62,22 @@ class Stand(Skill):
         x, y = self._base.pose[:, 3], self._base.pose[:, 4]
         fallen = 1.0 - 2.0 * (x * x + y * y) < self._least
         self.outcome[env_ids[fallen]] = OUTCOMES.index(Outcome.LOST)
+
+
+def postured(
+    env: TaskEnv, robot: RobotView, s: ActionSlice, home: Array, posture: Mapping[str, float], alone: bool = True
+) -> Array:
+    """(1, K) where the joints of a channel are to be: at `home` (1, K) but for those that a posture names.
+
+    Raises:
+        TaskError: a pattern matches no joint, and there is no other channel (`alone`) whose joint it could be.
+    """
+    joints = [env.engine.world.joints[j].name for j in robot.channel(s.channel).joints]
+    own = [joint.removeprefix(f"{robot.name}.") for joint in joints]
+    wanted = home.copy()
+    for pattern, position in posture.items():
+        matching = [fnmatchcase(joint, pattern) for joint in own]
+        if not any(matching) and alone:
+            raise TaskError(f"posture: no joint of '{robot.name}' matches '{pattern}' (joints: {listing(own, 20)})")
+        wanted[0, matching] = position
+    return wanted

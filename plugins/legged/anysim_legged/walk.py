@@ -39,7 +39,7 @@ class LipmWalk(Controller):
         TaskError: a robot without two flat feet, or whose home does not stand.
     """
 
-    labels = ("vx", "vy", "turn_rate")
+    labels = ("forward", "left", "turn")
     period: float = 0.01
 
     def __init__(

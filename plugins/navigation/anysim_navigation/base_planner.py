@@ -1,14 +1,17 @@
 """The base planner `dynamic_window`: a base that skills send somewhere, driven along a way around things."""
 
+from collections.abc import Sequence
 from math import tan
 from typing import Any, ClassVar
 
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.errors import TaskError
 from anysim.task.env import TaskEnv
 from anysim.task.scene import RobotView
 from anysim_navigation.limits import OUTPUTS, BaseKind, BaseLimits, kind_of, limits_of, output_of
+from anysim_navigation.movers import movers_of
 from anysim_navigation.robot_shape import discs_of
 from anysim_navigation.router import BaseRouter, Mode, frame_pose
 from anysim_navigation.way_costs import way_lengths
@@ -20,6 +23,9 @@ class PlannedBase(Base):
     """A base whose limits are those of its channel's controller, which come from the robot's entry in the catalogue.
 
     The pace of the skill that first sends it somewhere may be less.
+
+    Attributes:
+        router: of its ways, once a skill has sent it somewhere.
     """
 
     drives: ClassVar[tuple[tuple[str, ...], ...]] = tuple({labels for each in OUTPUTS.values() for labels in each})
@@ -29,7 +35,13 @@ class PlannedBase(Base):
         super().__init__(env, robot, channel, link)
         self._robot, self._wheelbase = robot, 1.0
         self._labels = tuple(self._slice.controller.labels)
-        self._router: BaseRouter | None = None
+        self.router: BaseRouter | None = None
+        self._named: tuple[str, ...] | None = None
+
+    def foresee(self, movers: Sequence[str]) -> None:
+        if self.router is not None:
+            raise TaskError(f"the base of '{self._robot.name}' drives already: movers are named before")
+        self._named = movers_of(self.env.engine.world, self._robot.name, (*(self._named or ()), *movers))
 
     def go(self, ids: Array, target: Array) -> None:
         super().go(ids, target)
@@ -40,20 +52,22 @@ class PlannedBase(Base):
         return way_lengths(self._made(), ids, self.pose(at), places)
 
     def _made(self) -> BaseRouter:
-        if self._router is None:
-            self._router = BaseRouter(self.env.scene, self._robot, self.frame, self._limits(), close=self.close)
-        return self._router
+        if self.router is None:
+            movers = movers_of(self.env.engine.world, self._robot.name, self._named)
+            scene, limits = self.env.scene, self._limits()
+            self.router = BaseRouter(scene, self._robot, self.frame, limits, movers=movers, close=self.close)
+        return self.router
 
     def renew(self, ids: Array) -> None:
         super().renew(ids)
-        if self._router is not None:
-            self._router.go(ids, np.zeros((len(ids), 3)), Mode.STAND)
+        if self.router is not None:
+            self.router.go(ids, np.zeros((len(ids), 3)), Mode.STAND)
 
     def act(self, ids: Array, action: Array) -> None:
-        twist = np.zeros((len(ids), 3)) if self._router is None else self._router.velocities(ids)
-        limits = self._limits() if self._router is None else self._router.limits
-        if self._router is not None:
-            self.no_way[list(self._router.refused)] = True
+        twist = np.zeros((len(ids), 3)) if self.router is None else self.router.velocities(ids)
+        limits = self._limits() if self.router is None else self.router.limits
+        if self.router is not None:
+            self.no_way[list(self.router.refused)] = True
         action[ids, self._slice.start : self._slice.stop] = output_of(limits, self._labels, twist, self._wheelbase)
 
     def _limits(self) -> BaseLimits:
@@ -61,7 +75,8 @@ class PlannedBase(Base):
         vehicle = None if entry is None else entry.vehicle
         car = vehicle if isinstance(vehicle, AckermannSpec) else None  # which may be steered by its rate of turning
         kind = BaseKind.ACKERMANN if car else kind_of(self._labels, 0 if entry is None else len(entry.legs))
-        discs = discs_of(self.env.engine.world, self._robot.name, frame_pose(self.env.scene, self.frame))
+        shape = self.env.engine.world, self._robot.name, frame_pose(self.env.scene, self.frame)
+        discs = discs_of(*shape, 2 if car else 1)  # who cannot turn on the spot needs no room to
         most, least = np.array(controller.high, dtype=float), np.array(controller.low, dtype=float)
         options: dict[str, Any] = {}
         if car:

@@ -46,13 +46,17 @@ class RoomFigures(NamedTuple):
 
 def random_room(seed: int) -> World:
     """A furnished room of a style, size and openings that the seed says; every fourth is closed."""
+    return compile_world(WorldSpec.model_validate({"name": f"room_{seed}", "room": room_of(seed)}))
+
+
+def room_of(seed: int) -> dict[str, Any]:
+    """The room that `random_room` makes of a seed, as a spec."""
     rng = np.random.default_rng(seed)
     size = [round(float(v), 2) for v in rng.uniform((4.0, 3.8), (7.0, 6.0))]
     sides = rng.permutation(["south", "east", "north", "west"]).tolist()
     count = (1 + seed % 2) if seed % 4 != 3 else 0
     doors = [{"wall": side, "at": round(float(rng.uniform(0.25, 0.75)), 2)} for side in sides[:count]]
-    room = {"style": ROOM_STYLES[seed % 4], "size": size, "doors": doors, "seed": seed}
-    return compile_world(WorldSpec.model_validate({"name": f"room_{seed}", "room": room}))
+    return {"style": ROOM_STYLES[seed % 4], "size": size, "doors": doors, "seed": seed}
 
 
 def measure_room(world: World, agent: Agent, queries: int, rng: np.random.Generator, *, compared: int) -> RoomFigures:

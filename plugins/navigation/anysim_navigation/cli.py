@@ -102,52 +102,68 @@ def navmesh(
 
 
 def navigate(
-    robot: Annotated[
-        str, typer.Argument(help="differential_base, holonomic_base, ackermann_base, or another with a base channel.")
-    ] = "differential_base",
-    engine: Annotated[str, typer.Option("--engine", "-e", help="An installed engine.")] = "mujoco",
-    rooms: Annotated[int, typer.Option(min=1, help="Furnished rooms.")] = 20,
-    radius: Annotated[
-        float | None,
-        typer.Option(min=0.01, help="That fits where ways begin and end [m]; default 0.45, 0.7 for a car."),
+    robots: Annotated[
+        str,
+        typer.Option(
+            help="Bases, separated by commas: of wheels, unitree_go1, unitree_g1, others with a base channel."
+        ),
+    ] = "differential_base,holonomic_base,ackermann_base",
+    engines: Annotated[str, typer.Option("--engines", "-e", help="Installed engines, separated by commas.")] = "mujoco",
+    rooms: Annotated[int, typer.Option(min=1, help="Furnished rooms for each.")] = 20,
+    people: Annotated[int, typer.Option(min=0, max=8, help="Who walk there meanwhile and do not yield.")] = 0,
+    out: Annotated[
+        Path | None, typer.Option(help="A JSON file of all drives, which is added to: what it has is not driven again.")
     ] = None,
     json: AsJson = False,
 ) -> None:
-    """Drive a base from end to end of furnished rooms in an engine, over 4 m each, with `planner: dynamic_window`.
+    """Drive bases from end to end of furnished rooms in an engine, over 4 m each, with `planner: dynamic_window`.
 
-    A way fails that takes 90 s, or on which something in the room is touched with more than 20 N.
+    A way fails that takes 90 s, or on which something in the room or a person is touched with more than 20 N.
 
     Examples:
-      anysim bench navigate holonomic_base --rooms 100
+      anysim bench navigate --robots holonomic_base --rooms 100
+      anysim bench navigate --robots holonomic_base --people 4 --out people.json
     """
     from itertools import count
 
-    import numpy as np
-
     from anysim.cli.output import counting, print_json, print_table
-    from anysim_navigation.drive_bench import Drive, drive
+    from anysim_navigation.drive_bench import drive
+    from anysim_navigation.drive_cells import Cell, DriveStore, figures
 
-    found: list[Drive] = []
-    room = radius or (0.7 if robot == "ackermann_base" else 0.45)
-    with counting("rooms", rooms, quiet=json) as show:
-        for seed in count():
-            if len(found) == rooms:
-                break
-            one = drive(seed, robot, engine, radius=room)
-            if one is not None:  # else the room is too small for such a way
-                found.append(one)
-                show(f"room {seed}: {one.ended} after {one.seconds:.1f} s", "")
-    solved = [one for one in found if one.ended == "success"]
-    figures = {
-        "rooms": rooms,
-        "solved": len(solved),
-        "failed": {str(one.seed): one.ended for one in found if one.ended != "success"},
-        "hardest_contact_n": max((one.hardest for one in solved), default=0.0),
-        "time_over_shortest": float(np.median([one.seconds / (one.length / 0.6) for one in solved] or [np.nan])),
-        "action_ms": float(np.median([one.tick for one in found])),
-    }
+    store = DriveStore(out)
+    cells = [
+        Cell(robot.strip(), engine.strip(), people) for robot in robots.split(",") for engine in engines.split(",")
+    ]
+    with counting("rooms", rooms * len(cells), quiet=json) as show:
+        for cell in cells:
+            known, driven = {one.seed: one for one in store.known(cell)}, 0
+            for seed in count():
+                if driven == rooms:
+                    break
+                one = known.get(seed)
+                if one is None:
+                    one = drive(seed, cell.robot, cell.engine, people=people)
+                    if one is None:  # the room is too small for such a way
+                        continue
+                    store.add(cell, one)
+                driven += 1
+                show(f"{cell.robot}, {cell.engine}, room {seed}: {one.ended} after {one.seconds:.1f} s", "")
+    found = [figures(cell, store.known(cell)[:rooms]) for cell in cells]
     if json:
-        print_json(figures)
+        print_json(found)
         return
-    rows = [(name.replace("_", " "), f"{v:.3g}" if isinstance(v, float) else str(v)) for name, v in figures.items()]
-    print_table(f"{robot} through {rooms} rooms on {engine}", ("what", "is"), rows)
+    words = ("robot", "engine", "people", "rooms", "solved", "interval", "failed", "hardest [N]", "time", "action [ms]")
+    shown = [[_cell(v) for v in list(one.values())[: len(words)]] for one in found]
+    print_table(
+        f"Ways over 4 m through {rooms} furnished rooms",
+        (*words, "met"),
+        [[*line, _cell(one["met"])] for line, one in zip(shown, found, strict=True)],
+    )
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{key}: {v}" for key, v in value.items())
+    if isinstance(value, list):
+        return " to ".join(map(str, value))
+    return f"{value:.3g}" if isinstance(value, float) else str(value)

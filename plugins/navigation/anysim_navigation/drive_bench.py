@@ -7,27 +7,78 @@ import numpy as np
 
 from anysim.api import make
 from anysim.conventions import Array
+from anysim.model.world import World
 from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.runner import SkillPolicy
 from anysim.task.contract import Status
 from anysim.task.env import TaskEnv
 from anysim_navigation.agent import Agent, NoRoute
-from anysim_navigation.bench import ROOM_STYLES, free_pairs, random_room
+from anysim_navigation.bench import free_pairs, random_room, room_of
 from anysim_navigation.maps import NavMaps
-from anysim_navigation.navmesh import length_of
+from anysim_navigation.navmesh import NavMesh, length_of
 
-DRIVES: dict[str, Any] = {
-    "differential_base": "differential_drive",
-    "holonomic_base": "holonomic_drive",
-    "ackermann_base": {"controller": "ackermann_drive", "params": {"steer_by": "rate"}},
-}
-"""Bases of the catalogue and their controllers."""
 FURTHER = 4.0
 """[m] that ways are longer than."""
 HARD = 20.0
 """[N] a contact with something in the room that is harder is a failure."""
 LATE = 90.0
 """[s]"""
+CONTROL_DT = 0.02
+MOVES = 0.05
+"""[m/s] what is slower stands."""
+MET = ("", "standing", "moving", "towards")
+"""Contacts with people: none, while the base stood, while it moved, and while it moved towards them."""
+PEOPLE_APART = 1.2
+"""[m] that people begin from where the base does, at least."""
+PACES = (0.2, 0.5)
+"""[m/s] at which they walk."""
+POINTS = 30
+"""Of the walk of each of them at most; then it begins anew."""
+
+
+class Driving(NamedTuple):
+    """How a base is driven, and what of it counts as there.
+
+    Attributes:
+        radius: [m] of a disc for which there is to be a way: that of the base, and room to turn.
+        controller: of its channel `base`.
+        skill: parameters of `navigate`.
+        close, facing: [m], and 1 less the cosine of the angle; None where the heading is free.
+        still: [m/s], [rad/s] that it may have in the end.
+        tilts: whether it can fall.
+    """
+
+    radius: float = 0.45
+    controller: Any = "default"
+    skill: dict[str, Any] = {}  # noqa: RUF012 - of a named tuple, and read only
+    close: float = 0.1
+    facing: float | None = 0.1
+    still: tuple[float, float] = (0.05, 0.1)
+    tilts: bool = False
+
+    @property
+    def speed(self) -> float:
+        """[m/s] at which it goes at most."""
+        return float(self.skill.get("speed", 0.6))
+
+
+_ON_LEGS: dict[str, Any] = {"close": 0.25, "facing": 0.3, "still": (0.15, 0.6), "tilts": True}
+BASES: dict[str, Driving] = {
+    "differential_base": Driving(controller="differential_drive"),
+    "holonomic_base": Driving(controller="holonomic_drive"),
+    "ackermann_base": Driving(
+        0.7,
+        {"controller": "ackermann_drive", "params": {"steer_by": "rate"}},
+        {"heading": False, "tolerance": 0.1, "angle": 3.2},
+        close=0.25,
+        facing=None,
+    ),
+    "unitree_go1": Driving(skill={"tolerance": 0.15, "angle": 0.15, "speed": 0.5, "rate": 0.8}, **_ON_LEGS),
+    "unitree_g1": Driving(
+        controller="lipm_walk", skill={"tolerance": 0.15, "angle": 0.15, "speed": 0.25, "rate": 0.3}, **_ON_LEGS
+    ),
+}
+"""Bases of the catalogue; others are driven by their default controller, and as a base on wheels is."""
 
 
 class Drive(NamedTuple):
@@ -35,11 +86,12 @@ class Drive(NamedTuple):
 
     Attributes:
         seed: of the room.
-        ended: `success`, or what the episode ended with.
+        ended: `success`, the outcome of the skill, `truncated`, or what failed: `contact`, `person`, `fell`.
         seconds: that it took, of simulated time.
         length: [m] of the way that was planned first.
         hardest: [N] the hardest contact with something in the room.
         tick: [ms] of processor time that choosing actions took, per control step.
+        met: the worst contact with people, of `MET`.
     """
 
     seed: int
@@ -48,35 +100,37 @@ class Drive(NamedTuple):
     length: float
     hardest: float
     tick: float
+    met: str = ""
 
 
-def drive(seed: int, robot: str, engine: str, *, radius: float = 0.45, planner: str = "dynamic_window") -> Drive | None:
-    """Drive a base through the room of a seed; None where no way there is long enough."""
-    world = random_room(seed)
+def drive(
+    seed: int, robot: str, engine: str, *, radius: float | None = None, people: int = 0, planner: str = "dynamic_window"
+) -> Drive | None:
+    """Drive a base through the room of a seed; None where no way there is long enough.
+
+    `people` walk between points of the room meanwhile, and yield to nothing.
+    """
+    world, how = random_room(seed), BASES.get(robot, Driving())
     half = np.abs(np.concatenate([world.geoms[g].position for g in world.body_geoms[0]])).max()
     box = [[-half, -half], [half, -half], [half, half], [-half, half]]
-    found = _ends(NavMaps(world, Agent(radius), area=box), np.random.default_rng(seed), room_of(seed)["size"])
+    mesh = NavMaps(world, Agent(how.radius if radius is None else radius), area=box).at()
+    found = _ends(mesh, np.random.default_rng(seed), room_of(seed)["size"])
     if found is None:
         return None
     start, goal, length = found
-    rng = np.random.default_rng([seed, 1])
-    yaws = rng.uniform(-np.pi, np.pi, 2)
-    with make(_task(seed, robot, start, goal, yaws, planner), engine=engine, num_envs=1) as env:
+    yaws = np.random.default_rng([seed, 1]).uniform(-np.pi, np.pi, 2)
+    task = _task(seed, world, robot, how, start, goal, yaws, planner)
+    if people:
+        walks = NavMaps(world, Agent(0.3, 1.9), area=box).at()
+        task["world"]["families"] = _people(people, walks, start, np.random.default_rng([seed, 2]))
+        for name in task["world"]["families"]:
+            task["world"]["contact_sensors"][f"met_{name}"] = {"body": name, "against": "base"}
+            task["task"]["failure"][f"met_{name}"] = {"term": "force_over", "sensor": f"met_{name}", "limit": HARD}
+    with make(task, engine=engine, num_envs=1) as env:
         return _driven(env, seed, length)
 
 
-def room_of(seed: int) -> dict[str, Any]:
-    """The room that `random_room` makes of a seed, as a spec, with a door in each."""
-    rng = np.random.default_rng(seed)
-    size = [round(float(v), 2) for v in rng.uniform((4.0, 3.8), (7.0, 6.0))]
-    sides = rng.permutation(["south", "east", "north", "west"]).tolist()
-    count = (1 + seed % 2) if seed % 4 != 3 else 0
-    doors = [{"wall": side, "at": round(float(rng.uniform(0.25, 0.75)), 2)} for side in sides[:count]]
-    return {"style": ROOM_STYLES[seed % 4], "size": size, "doors": doors, "seed": seed}
-
-
-def _ends(maps: NavMaps, rng: np.random.Generator, size: list[float]) -> tuple[Array, Array, float] | None:
-    mesh = maps.at()
+def _ends(mesh: NavMesh, rng: np.random.Generator, size: list[float]) -> tuple[Array, Array, float] | None:
     half = 0.5 * np.array(size)
     for start, goal in free_pairs(mesh, 400, rng):
         if (np.abs(start) > half).any() or (np.abs(goal) > half).any():
@@ -90,45 +144,76 @@ def _ends(maps: NavMaps, rng: np.random.Generator, size: list[float]) -> tuple[A
     return None
 
 
-def _task(seed: int, robot: str, start: Array, goal: Array, yaws: Array, planner: str) -> dict[str, Any]:
-    room = room_of(seed)
-    names = ["room", *(e.name for e in random_room(seed).entities if e.name != "room")]
+def _people(count: int, mesh: NavMesh, start: Array, rng: np.random.Generator) -> dict[str, Any]:
+    """Avatars that walk around furniture between random points, and begin away from the base."""
+    made: dict[str, Any] = {}
+    pairs = iter(free_pairs(mesh, 40 * count, rng).reshape(-1, 2))
+    while len(made) < count:
+        begin = here = next(pairs)
+        if np.hypot(*(begin - start)) < PEOPLE_APART:
+            continue
+        points: list[Array] = []
+        for target in (*(next(pairs) for _ in range(4)), begin):
+            try:
+                stretch = mesh.path(here, target)[1:]
+            except NoRoute:  # of two parts of the room
+                continue
+            if len(points) + len(stretch) <= POINTS:
+                points, here = [*points, *stretch], target
+        walk = [[round(float(v), 3) for v in point] for point in points]
+        speed = round(float(rng.uniform(*PACES)), 3)
+        made[f"person_{len(made)}"] = {
+            "kind": "avatar",
+            "seed": int(rng.integers(1000)),
+            "x": round(float(begin[0]), 3),
+            "y": round(float(begin[1]), 3),
+            "do": [{"path": walk[k : k + 16], "speed": speed} for k in range(0, len(walk), 16)],
+            "again": True,
+        }
+    return made
+
+
+def _task(
+    seed: int, world: World, robot: str, how: Driving, start: Array, goal: Array, yaws: Array, planner: str
+) -> dict[str, Any]:
+    names = ["room", *(e.name for e in world.entities if e.name != "room")]
     x, y = (round(float(v), 3) for v in start)
     place = [round(float(v), 3) for v in goal]
-    car = robot == "ackermann_base"
-    facing: dict[str, Any] = {} if car else {"facing": {"term": "aligned", "a": "base", "b": "goal", "tolerance": 0.1}}
-    skill = {"skill": "navigate", "robot": "base", "goal": "goal", "planner": planner, "steps": int(LATE / 0.02)}
-    if car:
-        skill |= {"heading": False, "tolerance": 0.1, "angle": 3.2}
+    facing: dict[str, Any] = {}
+    if how.facing is not None:
+        facing = {"facing": {"term": "aligned", "a": "base", "b": "goal", "tolerance": how.facing}}
+    fell: dict[str, Any] = {}
+    if how.tilts:
+        fell = {"fell": {"term": "not", "of": {"upright": {"frame": "base", "tolerance": 0.6}}}}
+    skill = {"skill": "navigate", "robot": "base", "goal": "goal", "planner": planner, "steps": int(LATE / CONTROL_DT)}
     return {
-        "physics": {"dt": 0.002, "control_dt": 0.02},
+        "physics": {"dt": 0.002, "control_dt": CONTROL_DT},
         "world": {
             "name": f"drive_{seed}",
-            "room": room,
+            "room": room_of(seed),
             "robots": {
                 "base": {
                     "robot": robot,
                     "position": [x, y, 0.0],
                     "yaw": float(yaws[0]),
-                    "actions": {"base": DRIVES.get(robot, "default")},
+                    "actions": {"base": how.controller},
                 }
             },
             "contact_sensors": {f"hit_{name}": {"body": name, "against": "base"} for name in names},
         },
         "task": {
             "description": "Drive to the goal in the room and stand as it points.",
-            "horizon": int(LATE / 0.02),
+            "horizon": int(LATE / CONTROL_DT),
             "command": {"goal": {"term": "goal_pose", "position": [*place, 0.08], "yaw": float(yaws[1])}},
             "observations": {"policy": [{"term": "relative_pose", "a": "base", "b": "goal"}]},
             "success": {
-                "there": {"term": "near", "a": "base", "b": "goal", "tolerance": 0.25 if car else 0.1, "axes": "xy"},
-                "still": {"term": "still", "frame": "base", "speed": 0.05, "rate": 0.1},
+                "there": {"term": "near", "a": "base", "b": "goal", "tolerance": how.close, "axes": "xy"},
+                "still": {"term": "still", "frame": "base", "speed": how.still[0], "rate": how.still[1]},
                 **facing,
             },
-            "failure": {
-                f"hit_{name}": {"term": "force_over", "sensor": f"hit_{name}", "limit": HARD} for name in names
-            },
-            "expert": skill,
+            "failure": {f"hit_{name}": {"term": "force_over", "sensor": f"hit_{name}", "limit": HARD} for name in names}
+            | fell,
+            "expert": skill | how.skill,
         },
         "record": {"cameras": []},
     }
@@ -138,19 +223,32 @@ def _driven(env: TaskEnv, seed: int, length: float) -> Drive:
     env.reset(seed=seed)
     policy, one = SkillPolicy(env), np.array([0])
     policy.begin(one)
-    hardest, steps, thought = 0.0, 0, 0.0
+    world, base = env.engine.world, env.scene.robot("base").base
+    names = [sensor.name for sensor in world.contact_sensors]
+    things = np.array([name.startswith("hit_") for name in names])
+    people = np.array([world.entities[world.entity_numbers[n[4:]]].root for n in np.array(names)[~things]], dtype=int)
+    hardest, steps, thought, met = 0.0, 0, 0.0, 0
     while True:
         begun = process_time()
         action = policy.act(one)
         thought += process_time() - begun
+        env.scene.look(None)
+        speed = base.twist[0, :2].copy()
+        towards = env.engine.get_state().body_pose[0, people, :2] - base.position[0, :2]
         result = env.step(action)
         steps += 1
-        forces = env.engine.get_state().contact_force
-        hardest = max(hardest, float(np.linalg.norm(forces[0], axis=-1).max(initial=0.0)))
+        force = np.linalg.norm(env.engine.get_state().contact_force[0], axis=-1)
+        hardest = max(hardest, float(force[things].max(initial=0.0)))
+        for way in towards[force[~things] > 0.0]:
+            moves = np.hypot(*speed) > MOVES
+            met = max(met, 1 + int(moves) + int(moves and speed @ way > MOVES * np.hypot(*way)))
         status = str(result.status[0])
         ended = OUTCOMES[policy.skill.outcome[0]]
         if status == Status.RUNNING and ended not in (Outcome.RUNNING, Outcome.OK):
             status = ended.value
         if status != Status.RUNNING:
             break
-    return Drive(seed, status, steps * 0.02, length, hardest, 1e3 * thought / steps)
+    if status == Status.FAILED:
+        over = force > HARD
+        status = "contact" if over[things].any() else "person" if over.any() else "fell"
+    return Drive(seed, status, steps * CONTROL_DT, length, hardest, 1e3 * thought / steps, MET[met])

@@ -144,11 +144,11 @@ def output_of(limits: BaseLimits, labels: tuple[str, ...], twist: Array, wheelba
     return np.stack([twist[:, 0], np.arctan(wheelbase * np.clip(curvature, -most, most))], axis=1)
 
 
-def discs_over(low: Array, high: Array) -> Array:
-    """(D, 3) discs in a row that cover a rectangle from `low` to `high` (2,) [m], along its longer side."""
+def discs_over(low: Array, high: Array, least: int = 1) -> Array:
+    """(D, 3) discs in a row, `least` or more, over a rectangle from `low` to `high` (2,) [m], along its longer side."""
     size, middle = high - low, (high + low) / 2
     long = int(size[1] > size[0])
-    count = max(1, int(np.ceil(size[long] / size[1 - long] - 0.2)))
+    count = max(least, int(np.ceil(size[long] / size[1 - long] - 0.2)))
     step = size[long] / count
     discs = np.zeros((count, 3))
     discs[:, long] = low[long] + step * (np.arange(count) + 0.5)

@@ -5,17 +5,57 @@ from collections.abc import Sequence
 import numpy as np
 
 from anysim.conventions import Array
+from anysim.errors import AnysimError, listing, suggest
 from anysim.geometry.bounds import EntityShape
+from anysim.model.world import BodyKind, Entity, EntityKind, JointType, World
 from anysim.task.scene import SceneView
 
 PARKED = 100.0
 """[m] how far off a mover is put that is not there."""
+STANDS = 0.1
+"""[m/s] a mover that is slower stands in the way as furniture does."""
+PEOPLE = "avatar"
+"""The family whose members walk."""
+STRIDE = 0.08
+"""[m] by which feet and hands of people come further out than as they stand."""
+
+
+def movers_of(world: World, robot: str, names: Sequence[str] | None = None) -> tuple[str, ...]:
+    """The entities beside a robot that move by themselves: those named, or else all people and other robots.
+
+    Raises:
+        AnysimError: a name that there is not, or of something that cannot move.
+    """
+    others = [entity for entity in world.entities if entity.name != robot]
+    if names is None:
+        return tuple(e.name for e in others if _walks(e) and moving_body(world, e) is not None)
+    for name in names:
+        entity = next((e for e in others if e.name == name), None)
+        if entity is None or moving_body(world, entity) is None:
+            known = [e.name for e in others if moving_body(world, e) is not None]
+            why = "is fixed to the world" if entity else f"is nothing beside '{robot}'{suggest(name, known)}"
+            raise AnysimError(f"the mover '{name}' {why} (what moves: {listing(known)})")
+    return tuple(dict.fromkeys(names))
+
+
+def moving_body(world: World, entity: Entity) -> int | None:
+    """The body that goes where the entity goes: its root, or what a rail of three joints carries; None if it stands."""
+    if world.bodies[entity.root].kind is not BodyKind.STATIC:
+        return entity.root
+    over_ground = [world.joints[j] for j in range(entity.joint_start, min(entity.joint_start + 3, entity.joint_stop))]
+    types = [joint.type for joint in over_ground]
+    return over_ground[2].body if types == [JointType.PRISMATIC, JointType.PRISMATIC, JointType.REVOLUTE] else None
+
+
+def _walks(entity: Entity) -> bool:
+    return entity.kind is EntityKind.ROBOT or entity.family == PEOPLE
 
 
 class Movers:
     """Entities that move by themselves. Their velocity is that which they have, not one that they were told.
 
     Attributes:
+        names: theirs.
         bodies: all of theirs.
     """
 
@@ -24,12 +64,23 @@ class Movers:
         self._scene = scene
         entities = [world.entities[world.entity_numbers[name]] for name in names]
         self._numbers = np.array([world.entity_numbers[name] for name in names], dtype=np.int64)
-        self._roots = np.array([e.root for e in entities], dtype=np.int64)
+        self.names = tuple(names)
+        moving = [moving_body(world, e) for e in entities]
+        self._roots = np.array([e.root if m is None else m for e, m in zip(entities, moving, strict=True)], np.int64)
         self.bodies = {body for e in entities for body in range(e.body_start, e.body_stop)}
         upright = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
         corners = [EntityShape(world, name).bounds(upright) for name in names]
         self._offset = np.array([0.5 * (low + high)[:2] for low, high in corners]).reshape(-1, 2)
-        self._radius = np.array([0.5 * float((high - low)[:2].max()) for low, high in corners])
+        stride = [STRIDE * (entity.family == PEOPLE) for entity in entities]
+        self._radius = np.array([0.5 * float((high - low)[:2].max()) for low, high in corners]) + stride
+
+    def there(self, row: int, standing: bool) -> Array:
+        """(E,) bool: the entities that a map is to have, in a row of the scene: of movers none, or those that stand."""
+        env = int(self._scene.env_ids[row])
+        present = self._scene.presence[env].copy()
+        speed = np.hypot(*self._scene.state.body_twist[env, self._roots, :2].T)
+        present[self._numbers[(speed > STANDS) | (not standing)]] = False
+        return present
 
     def around(self, rows: Array, pose: Array) -> Array:
         """(n, M, 5) x, y, vx, vy and radius in frames x, y, yaw (n, 3); `rows` are those of the scene."""

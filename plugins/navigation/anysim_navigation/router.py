@@ -5,7 +5,9 @@ end of the way, and in mode DIRECT from the beginning, the base goes straight to
 """
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,7 +34,7 @@ NEAR = 0.35
 """[m] from its end a way is left for the straight line, if that is free."""
 CAR_STOPS = 0.15
 """[m] from its end a car has arrived: its heading there is that of the way."""
-CUSP = 0.15
+CUSP = 0.05
 """[m] before it changes its direction a car may do so."""
 REPLANS = 12
 """Ways in a row that did not bring a base on before it gives up."""
@@ -47,6 +49,19 @@ class Mode(IntEnum):
     DIRECT = 1
     TURN = 2
     ROUTE = 3
+
+
+class Errand(NamedTuple):
+    """What a router knows of one env: where the base goes, what it was told last, and where it is on its way."""
+
+    target: Array
+    twist: Array
+    mode: int
+    steps: int
+    replans: int
+    progress: Progress | None
+    later: tuple[Array, ...]
+    refused: str | None
 
 
 class BaseRouter:
@@ -70,14 +85,15 @@ class BaseRouter:
         margin: float = 0.12,
         close: float = 0.01,
     ) -> None:
-        """`movers` are entities that move by themselves: they are foreseen, and are on no map."""
+        """`movers` are entities that move by themselves: they are foreseen, and are on a map while they stand."""
         world, n = scene.engine.world, scene.engine.num_envs
         self._scene, self._frame, self.limits = scene, frame, limits
         self.window = DynamicWindow(limits, margin=margin)
         self._pose_control = PoseControl(limits, close)
         agent = agent_of(world, robot.name, limits)
-        ignored = (robot.name, *movers)
-        self._maps = [NavMaps(world, agent._replace(radius=limits.radius + more), without=ignored) for more in ROOM]
+        self._maps = [
+            NavMaps(world, agent._replace(radius=limits.radius + more), without=(robot.name,)) for more in ROOM
+        ]
         height = frame_pose(scene, frame)[2]
         self._grid = Grid((6.0, 6.0), 0.05, agent.step - height, agent.height - height)
         self._eye = Eye(scene, frame, "collision", "entity")
@@ -123,12 +139,38 @@ class BaseRouter:
                 self.twist[env] = self._pose_control.turning(turn) if mode == Mode.TURN else 0.0
         return self.twist[ids]
 
+    def snapshot(self, ids: Array) -> tuple[Errand, ...]:
+        """What it knows of these envs: with a snapshot of the env all goes on from here again, bit for bit."""
+        return tuple(
+            Errand(
+                self.target[env].copy(),
+                self.twist[env].copy(),
+                int(self.mode[env]),
+                int(self._steps[env]),
+                int(self._replans[env]),
+                copy(self._progress[env]),
+                tuple(self._later[env]),
+                self.refused.get(env),
+            )
+            for env in ids.tolist()
+        )
+
+    def restore(self, ids: Array, errands: Sequence[Errand]) -> None:
+        """Go on in these envs with what a snapshot knew, row by row."""
+        for env, one in zip(ids.tolist(), errands, strict=True):
+            self.target[env], self.twist[env], self.mode[env] = one.target, one.twist, one.mode
+            self._steps[env], self._replans[env] = one.steps, one.replans
+            self._progress[env], self._later[env] = copy(one.progress), list(one.later)
+            self.refused.pop(env, None)
+            if one.refused is not None:
+                self.refused[env] = one.refused
+
     # ------------------------------------------------------------------ a way is followed
 
     def _tick(self, ids: Array, rows: Array, pose: Array) -> None:
         envs = ids[rows]
         for row, env in zip(rows.tolist(), envs.tolist(), strict=True):
-            self._look(env, pose[row])
+            self._look(env, row, pose[row])
         going = [k for k, env in enumerate(envs.tolist()) if self._progress[env] is not None]
         if not going:
             return
@@ -140,7 +182,7 @@ class BaseRouter:
         for k, env in enumerate(envs.tolist()):
             self._steer(env, pose[rows[k]], distances_of(cells[k], self._grid.cell), twist[k], movers[k])
 
-    def _look(self, env: int, pose: Array) -> None:
+    def _look(self, env: int, row: int, pose: Array) -> None:
         """Where the base is on its way; a way is made where there is none, or it has become stale."""
         progress = self._progress[env]
         if progress is not None:
@@ -154,7 +196,7 @@ class BaseRouter:
             self._refuse(env, "the base does not get on along any way that it has tried")
             return
         try:
-            path = self._way(env, pose)
+            path = self._way(env, row, pose)
         except NoRoute as reason:
             self._refuse(env, str(reason))
             return
@@ -165,13 +207,22 @@ class BaseRouter:
         if stuck:
             made.recover()
 
-    def _way(self, env: int, pose: Array) -> Array:
+    def _way(self, env: int, row: int, pose: Array) -> Array:
+        """(K, 2) around movers that stand, or where there is no way so, through where they are."""
+        try:
+            return self._way_past(env, self._movers.there(row, standing=True), pose)
+        except NoRoute:
+            if not self._movers.names:
+                raise
+            return self._way_past(env, self._movers.there(row, standing=False), pose)
+
+    def _way_past(self, env: int, present: Array, pose: Array) -> Array:
         """(K, 2) over the mesh with the most room, or over the tightest that has a way."""
+        poses, end = self._scene.state.body_pose[env], self.target[env, :2]
         if self.limits.kind is BaseKind.ACKERMANN:
-            maps = self._maps[-1].at(self._scene.state.body_pose[env], self._scene.presence[env])
-            first, *self._later[env] = [path for path, _ in car_way(maps, self.limits, pose, self.target[env, :2])]
+            maps = self._maps[-1].at(poses, present)
+            first, *self._later[env] = [path for path, _ in car_way(maps, self.limits, pose, end)]
             return first
-        poses, present, end = self._scene.state.body_pose[env], self._scene.presence[env], self.target[env, :2]
         for maps in self._maps[:-1]:
             try:
                 return self._joined(pose[:2], maps.at(poses, present).path(pose[:2], end, snap=SNAP), end)

@@ -17,7 +17,7 @@ from anysim.record.reader import open_trajectory
 from anysim.record.replay import replay
 from anysim.testing.engines import require_engine
 from anysim_collect import commands
-from anysim_collect.cli.counterfactual import parse_factors
+from anysim_collect.cli.counterfactual import parse_factors, say_pairs
 from anysim_collect.divergence_plot import Gap, divergence_picture
 from anysim_inspect.verify_runs import verify_all
 
@@ -191,3 +191,14 @@ def test_factors_are_paths_and_values() -> None:
     ):
         with pytest.raises(TaskError, match=said):
             parse_factors(texts)
+
+
+def test_a_factor_that_nothing_depends_on_is_told_with_the_rule_of_pairs(capsys: pytest.CaptureFixture[str]) -> None:
+    pair = {"episode": 0, "status": ["success"] * 2, "steps": [9, 9], "largest": {"body_pose": 0.0}}
+    pair |= {"diverges": None, "differs": None, "acts_apart": None}
+    told = {"pairs": [pair], "incomplete": [], "tolerance": 1e-6, "factors": {"objects.cube.friction": 0.2}}
+    say_pairs(Path("out"), told, json=False)
+    assert "not one bit differs" in (said := capsys.readouterr().err)
+    assert "the larger friction counts" in said
+    say_pairs(Path("out"), told | {"pairs": [pair | {"differs": 3}]}, json=False)
+    assert "not one bit" not in capsys.readouterr().err

@@ -164,6 +164,41 @@ def test_a_training_is_interrupted_and_goes_on(runs: Path, tmp_path: Path) -> No
             train(again, lesson, examined, 256, 4, tmp_path, told.append)
 
 
+def test_of_policies_that_solve_as_much_the_one_of_the_greatest_reward_is_kept(
+    runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import onnx
+
+    from anysim_learning import exam
+    from anysim_learning.train import POLICY, train
+    from anysim_schemas.policy_file import METADATA
+
+    marks = [exam.Mark(0.5, 9.0), exam.Mark(1.0, 3.0), exam.Mark(1.0, 4.0), exam.Mark(1.0, 2.0)]
+    left = iter(marks)
+    monkeypatch.setattr(exam, "exam", lambda *_: next(left))
+    with anysim.make("reach", engine="mujoco", num_envs=4, overrides=QUIET) as env:
+        made, lesson = learner("sb3-ppo", env, runs)
+        numbers = train(made, lesson, env, 128, len(marks), tmp_path, lambda _: None)
+    assert (numbers["exam"], numbers["exam_reward"], numbers["best"]) == (1.0, 2.0, 1.0)
+    notes = {note.key: note.value for note in onnx.load(str(tmp_path / POLICY)).metadata_props}
+    assert json.loads(notes[METADATA])["steps"] == 96
+
+
+def test_an_exam_is_marked_by_success_and_reward() -> None:
+    from anysim_learning.exam import exam
+
+    class Still(torch.nn.Module):
+        def forward(self, row: Any) -> Any:
+            return torch.zeros(len(row), 8)
+
+    with anysim.make("reach", engine="mujoco", num_envs=2, overrides=[*QUIET, "task.horizon=5"]) as env:
+        mark = exam(env, ("policy",), Still())
+        env.reset(episode_seeds=[10_000, 10_001])
+        total = sum(env.step(np.zeros((2, 8))).reward.mean() for _ in range(5))
+    assert mark.success == 0.0
+    assert mark.reward == pytest.approx(total)
+
+
 def test_two_trainings_do_not_share_a_directory(tmp_path: Path) -> None:
     app = typer.Typer()
     app.command()(cli.train)

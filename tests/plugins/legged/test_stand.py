@@ -43,13 +43,13 @@ def test_a_dog_on_its_side_is_lost_in_its_env_alone() -> None:
 def test_it_rises_to_a_posture_along_a_line() -> None:
     with blind("get_up", "null", 1) as env:
         env.reset(seed=2)
-        policy = SkillPolicy(env)
-        policy.begin(np.arange(1))
-        first = policy.act(np.arange(1)).copy()
-        env.scene.elapsed[:] = 24
-        half = policy.act(np.arange(1)).copy()
-        env.scene.elapsed[:] = 80
-        last = policy.act(np.arange(1))
+        rising = {"robot": "dog", "posture": {"*_thigh_joint": 0.8, "*_calf_joint": -1.6}}
+        skill = bind_skill("stand", rising, env, "task.expert")
+        skill.begin(np.arange(1))
+        first, half, last = (np.zeros((1, env.action_dim)) for _ in range(3))
+        for elapsed, action in ((0, first), (24, half), (80, last)):
+            env.scene.elapsed[:] = elapsed
+            skill.act(np.arange(1), action)
         wanted = np.tile([0.0, (0.8 - 1.3) / 0.3, (-1.6 + 2.65) / 0.3], 4)
         np.testing.assert_allclose(last[0], wanted, atol=1e-9)
         np.testing.assert_allclose(half[0], 0.5 * wanted, atol=1e-9)

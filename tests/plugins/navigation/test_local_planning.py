@@ -98,6 +98,16 @@ def test_a_car_keeps_to_its_circle() -> None:
         assert abs(twist[2]) * 0.5 <= abs(twist[0]) + 1e-9
 
 
+@pytest.mark.parametrize("speed", [0.1, 0.2, 0.6])
+def test_a_slow_car_turns_as_tightly_as_a_fast_one(speed: float) -> None:
+    """Its turns are tried in steps of its tightest at each speed, not of its fastest turn."""
+    window = DynamicWindow(limits(BaseKind.ACKERMANN, speed))
+    aim = np.array([0.1, 0.5])
+    twist = window.choose(Scene().field(np.zeros(3)), CELL, aim[None], aim, np.zeros(3), np.zeros(3)).twist
+    assert twist[0] != 0.0
+    assert abs(twist[2]) * 0.5 == pytest.approx(abs(twist[0]))
+
+
 # ---------------------------------------------------------------------------------------------------- the five rules
 
 

@@ -35,6 +35,18 @@ def test_it_gets_through_on_the_other_engines(base: str, engine: str) -> None:
     assert (found.ended, found.hardest < HARD) == ("success", True)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("base", "room"),
+    [("ackermann_base", 9), ("ackermann_base", 16), ("unitree_go1", 4)],  # cars that shunt where they begin, and legs
+)
+def test_cars_and_legs_get_through_as_well(base: str, room: int) -> None:
+    require_engine("mujoco")
+    found = drive(room, base, "mujoco")
+    assert found is not None
+    assert (found.ended, found.hardest < HARD) == ("success", True)
+
+
 def walled(gap: bool) -> TaskEnv:
     """A goal behind a wall, which is 8 m long or has a passage at its side."""
     require_engine("mujoco")

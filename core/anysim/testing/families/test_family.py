@@ -10,6 +10,7 @@ import pytest
 
 import anysim
 from anysim.errors import SpecError
+from anysim.families.cosolver import CoSolver
 from anysim.task.snapshot import EnvSnapshot
 from anysim.testing.families.fixtures import ENVS, NAME, STEPS, Make, family_of, run, same, seen
 
@@ -137,6 +138,21 @@ def test_driven(make: Make) -> None:
         said = family.memory["driven"][0, :, :3]
         gap = np.abs(there[:, None] - said[None]).max(axis=2).min(axis=0).max()
         assert gap < 1e-4, f"a driven body is {gap * 1e3:.2f} mm from where the family has it"
+
+
+def test_balance(make: Make) -> None:
+    """What the matter of a co-solver gains is what weight and fixed things gave it, less what bodies got, to 1e-6."""
+    env = make(ENVS)
+    family, everyone = family_of(env), np.arange(ENVS)
+    if not isinstance(family, CoSolver):
+        pytest.skip("it has no solver of its own")
+    env.reset(seed=1)
+    run(env)
+    found = family.balance(everyone)
+    lost = found.now - found.begun - found.received + found.given
+    scale = max(np.abs(rows[:, :3]).max() for rows in (found.received, found.given))
+    assert scale > 0, "nothing acts on its matter"
+    assert np.abs(lost[:, :3]).max() <= 1e-6 * scale, "momentum is lost; count all that it gets and gives"
 
 
 def _bodies(env: Any, entity: int) -> range:

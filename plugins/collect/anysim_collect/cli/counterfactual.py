@@ -54,7 +54,7 @@ def counterfactual(
     again goes on where it stopped. A path that nothing has is answered with all that can be changed.
 
     Examples:
-      anysim counterfactual pick_cube --factor objects.cube.friction=0.2 -k 8 --out runs/slippery
+      anysim counterfactual pick_cube --factor objects.cube.mass=0.5 -k 8 --out runs/heavy
       anysim counterfactual push_cube --factor objects.cube.mass=1.5 -k 8 --actions same -o record.cameras=[]
     """
     import hashlib
@@ -89,7 +89,7 @@ def counterfactual(
                 f"{env.name} on {env.engine.name} {env.engine.version}: {pairs} pairs, seed {begin}: {directory}"
             )
         told = _collect(env, directory, pairs, plan, quiet=json)
-    _say(directory, told, json)
+    say_pairs(directory, told, json)
 
 
 def parse_factors(texts: Sequence[str]) -> dict[str, Any]:
@@ -199,7 +199,8 @@ def _collect(env: "TaskEnv", out: Path, count: int, plan: dict[str, Any], quiet:
     return told
 
 
-def _say(out: Path, told: dict[str, Any], json: bool) -> None:
+def say_pairs(out: Path, told: dict[str, Any], json: bool) -> None:
+    """Print a table of pairs, and how many are apart."""
     from anysim.cli.output import print_json, print_table
 
     if json:
@@ -216,6 +217,10 @@ def _say(out: Path, told: dict[str, Any], json: bool) -> None:
     typer.echo(
         f"{apart} of {len(told['pairs'])} pairs are apart by more than {told['tolerance']:g}; {out / PAIRS_FILE}"
     )
+    if told["pairs"] and all(pair["differs"] is None for pair in told["pairs"]):
+        rubs = any(path.endswith(".friction") for path in told["factors"])
+        why = ": of two surfaces that touch the larger friction counts, or that of the higher priority, as pads have"
+        typer.echo(f"not one bit differs: nothing that happened depends on the factor{why if rubs else ''}", err=True)
 
 
 def _row(pair: dict[str, Any]) -> tuple[Any, ...]:

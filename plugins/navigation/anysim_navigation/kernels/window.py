@@ -126,10 +126,13 @@ def choose(
         forward = _of_window(bottom[0], top[0], a, samples[0])
         for b in range(samples[1]):
             aside = _of_window(bottom[1], top[1], b, samples[1])
-            for c in range(samples[2]):
-                turn = _of_window(bottom[2], top[2], c, samples[2])
-                if turning_radius > 0.0 and abs(turn) * turning_radius > abs(forward) + 1e-9:
-                    continue
+            slowest, fastest = bottom[2], top[2]
+            if turning_radius > 0.0:  # a car's turns follow from its speed, so that at any it has its tightest ones
+                tightest = abs(forward) / turning_radius
+                slowest = min(tightest, max(-tightest, slowest))
+                fastest = max(-tightest, min(tightest, fastest))
+            for c in range(samples[2] if slowest < fastest else 1):
+                turn = _of_window(slowest, fastest, c, samples[2])
                 x, y, yaw = 0.0, 0.0, 0.0
                 vx, vy, w = now[0], now[1], now[2]
                 speed = math.hypot(forward, aside)

@@ -4,6 +4,7 @@ A base that moves to all sides goes straight to its goal while it turns. One wit
 goal, drives there, and turns again. Obstacles are not seen but by a planner: a `Base` among `anysim.planners`.
 """
 
+from collections.abc import Sequence
 from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -92,6 +93,10 @@ class Base(Mover):
     def driven(env: TaskEnv, robot: RobotView) -> "Base | None":
         """The base of a robot that a skill of the env drives, if there is one."""
         return next((base for (name, *_), base in _BASES.known(env).items() if name == robot.name), None)
+
+    def foresee(self, movers: Sequence[str]) -> None:
+        """Go around entities that move by themselves as well, as they go on; a planner does."""
+        raise TaskError(f"movers ({listing(movers)}) are foreseen by a planner; add `planner: dynamic_window`")
 
     def renew(self, ids: Array) -> None:
         """These envs have just been reset."""

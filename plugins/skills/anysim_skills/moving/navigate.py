@@ -52,9 +52,14 @@ class DriveTo(PhasedSkill):
         ] = (),
         solver: str = "numba_ik",
         planner: Annotated[str, Field(description="of ways around things, as dynamic_window; straight if empty")] = "",
+        movers: Annotated[
+            tuple[str, ...] | None, Field(description="that it foresees; people and other robots if not given")
+        ] = None,
         steps: Annotated[int, Field(ge=1, description="control steps that the way may take")] = 1500,
     ) -> None:
         self.base = Base.of(env, robot, channel=channel, link=link, planner=planner)
+        if movers is not None:
+            self.base.foresee(movers)
         self._arms = [Arm.of(env, robot, tool=tool, solver=solver) for tool in carried]
         self._tools = np.zeros((env.num_envs, len(carried), 7))
         """(N, T, 7) where their commands stand in the frame of the base."""

@@ -1,0 +1,101 @@
+"""Costs of matter: a tank with a box that floats or lies on top, with and without what is in it."""
+
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import anysim
+
+SETTLE = 15
+"""Control steps until it is measured."""
+SUBSTEPS = 5
+
+
+class FamilyCost(NamedTuple):
+    """Physics steps of 4 ms.
+
+    Attributes:
+        engine, family, particles, num_envs: what was measured.
+        per_second: steps of one env per second of processor time.
+        wall_per_second: steps of all envs together per second.
+        alone: steps of one env per second of processor time without the matter.
+        one_by_one: the same in calls of one step each.
+    """
+
+    engine: str
+    family: str
+    particles: int
+    num_envs: int
+    per_second: float
+    wall_per_second: float
+    alone: float
+    one_by_one: float
+
+
+def tank(edge: float, height: float, wall: float = 0.02) -> dict[str, Any]:
+    """A world with four walls on the ground around a square of an edge [m]."""
+    out = edge / 2 + wall / 2
+    walls = {
+        "west": ([wall, edge + 2 * wall, height], [-out, 0.0, height / 2]),
+        "east": ([wall, edge + 2 * wall, height], [out, 0.0, height / 2]),
+        "south": ([edge, wall, height], [0.0, -out, height / 2]),
+        "north": ([edge, wall, height], [0.0, out, height / 2]),
+    }
+    return {
+        "objects": {name: {"source": {"box": size}, "fixed": True} for name, (size, _) in walls.items()},
+        "layout": {name: {"position": place} for name, (_, place) in walls.items()},
+    }
+
+
+def world_of(kind: str, particles: int) -> dict[str, Any]:
+    """The tank with about so many particles of a family, as deep as it is wide, and a box over it."""
+    size = {"fluid": 0.01, "sand": 2.5 * 0.005, "rice": 3.125e-3}[kind]
+    members = 4 if kind == "rice" else 1
+    side = max(3, round((particles / members) ** (1 / 3)))
+    edge, deep = side * size, side * size
+    if kind == "rice":  # cells of grains are longer than wide
+        edge = size * 3 * max(2, round((particles / members / 3) ** (1 / 3)))
+        deep = size * max(1, round(particles / members / ((edge // 0.00725) * (edge // size))))
+    matter: dict[str, Any] = {"kind": kind, "box": [edge + 1e-6, edge + 1e-6, deep + 1e-6]}
+    if kind == "sand":
+        matter["radius"] = 0.005
+    world = tank(edge + 1e-6, 3 * deep + 0.05)
+    world["objects"]["float"] = {"source": {"box": [edge / 3] * 3}, "density": 400.0}
+    world["layout"]["float"] = {"position": [0.0, 0.0, deep + edge / 6 + 0.01]}
+    return {**world, "families": {"matter": matter}}
+
+
+def cost(kind: str, particles: int, num_envs: int, engine: str, steps: int) -> FamilyCost:
+    """What a physics step costs with matter at rest, and without it."""
+    world = world_of(kind, particles)
+    with _made(world, engine, num_envs) as env:
+        env.reset(seed=0)
+        action = np.zeros((num_envs, 0))
+        _run(lambda: env.step(action), SETTLE)
+        cpu, wall = _run(lambda: env.step(action), steps)
+        assert env.families is not None
+        there = env.families.state("matter").points.shape[1]
+    with _made({**world, "families": {}}, engine, num_envs) as env:
+        env.reset(seed=0)
+        _run(lambda: env.engine.step(SUBSTEPS), 4)
+        alone, _ = _run(lambda: env.engine.step(SUBSTEPS), 20)
+        one, _ = _run(lambda: [env.engine.step(1) for _ in range(SUBSTEPS)], 20)
+    done = SUBSTEPS * num_envs
+    return FamilyCost(engine, kind, there, num_envs, done / cpu, done / wall, done / alone, done / one)
+
+
+def _made(world: dict[str, Any], engine: str, num_envs: int) -> Any:
+    run = {"engine": engine, "physics": {"dt": 0.004, "control_dt": 0.004 * SUBSTEPS}, "world": world}
+    return anysim.make(
+        {**run, "task": {"observations": {"policy": ["last_action"]}, "horizon": 10_000}}, num_envs=num_envs
+    )
+
+
+def _run(work: Callable[[], object], times: int) -> tuple[float, float]:
+    """Seconds of processor time and of wall time of one call."""
+    cpu, wall = time.process_time(), time.perf_counter()
+    for _ in range(times):
+        work()
+    return (time.process_time() - cpu) / times, (time.perf_counter() - wall) / times

@@ -1,0 +1,56 @@
+"""`anysim bench families`: what matter costs."""
+
+from typing import Annotated
+
+import typer
+
+from anysim.cli.options import AsJson
+
+
+def families(
+    engine: Annotated[str, typer.Option("--engine", "-e", help="Engines, separated by commas.")] = "mujoco",
+    particles: Annotated[str, typer.Option(help="Particles of each env, separated by commas.")] = "1000,5000",
+    num_envs: Annotated[str, typer.Option("--num-envs", "-n", help="Numbers of envs, separated by commas.")] = "1,4",
+    kinds: Annotated[str, typer.Option(help="Families, separated by commas.")] = "fluid,sand,rice",
+    steps: Annotated[int, typer.Option(min=1, help="Control steps of five physics steps that are measured.")] = 10,
+    json: AsJson = False,
+) -> None:
+    """Physics steps of one env per second of processor time, with matter at rest in a tank beside a box that floats.
+
+    The rest of the step is what the same world costs without the matter, stepped five at a time, and one at a time as
+    it is beside a co-solver. Wall time is that of all envs together, shared by threads.
+
+    Examples:
+      anysim bench families --engine mujoco,pybullet,sapien --particles 1000
+    """
+    from anysim.cli.output import print_json, print_table
+    from anysim_particles.bench import cost
+
+    found = [
+        cost(kind.strip(), int(size), int(envs), name.strip(), steps)
+        for name in engine.split(",")
+        for kind in kinds.split(",")
+        for size in particles.split(",")
+        for envs in num_envs.split(",")
+    ]
+    if json:
+        print_json([one._asdict() for one in found])
+        return
+    heads = ("engine", "family", "particles", "envs", "steps/s (cpu)", "steps/s (wall)", "alone", "alone, one by one")
+    print_table(
+        "Physics steps per second, of one env",
+        heads,
+        [
+            (
+                one.engine,
+                one.family,
+                f"{one.particles:,}",
+                str(one.num_envs),
+                f"{one.per_second:,.0f}",
+                f"{one.wall_per_second:,.0f}",
+                f"{one.alone:,.0f}",
+                f"{one.one_by_one:,.0f}",
+            )
+            for one in found
+        ],
+    )

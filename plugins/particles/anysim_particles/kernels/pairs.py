@@ -1,0 +1,114 @@
+"""Pairs of particles that are near to each other, by cells of a grid that is folded where particles are far apart."""
+
+import math
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim_particles.kernels.compiling import compiled
+
+STEPS = 13
+"""Of the 26 cells around a cell half are looked at: pairs are found once."""
+
+
+@compiled
+def _sides(p: Array, n: int, cell: float, low: Array, sides: Array) -> None:
+    """The lowest corner of the particles, and the number of cells along each side."""
+    for k in range(3):
+        a, b = np.inf, -np.inf
+        for i in range(n):
+            a, b = min(a, p[i, k]), max(b, p[i, k])
+        low[k] = a
+        wide = (b - a) / cell + 1.0
+        sides[k] = 3 if not wide > 3.0 else (128 if wide > 128.0 else int(wide))
+    while sides[0] * sides[1] * sides[2] > 8 * n + 64:
+        k = 0 if sides[0] >= sides[1] and sides[0] >= sides[2] else (1 if sides[1] >= sides[2] else 2)
+        if sides[k] <= 3:
+            break
+        sides[k] = max(3, sides[k] // 2)
+
+
+@compiled
+def _place(p: Array, n: int, cell: float, low: Array, at: Array) -> None:
+    for i in range(n):
+        for k in range(3):
+            at[i, k] = math.floor((p[i, k] - low[k]) / cell)
+
+
+@compiled
+def _start(at: Array, n: int, sides: Array, home: Array, begin: Array, order: Array) -> None:
+    """Sort particles by cell: those of cell c are order[begin[c]:begin[c + 1]]."""
+    begin[:] = 0
+    for i in range(n):
+        c = at[i, 0] % sides[0] + sides[0] * (at[i, 1] % sides[1] + sides[1] * (at[i, 2] % sides[2]))
+        home[i] = c
+        begin[c + 1] += 1
+    for c in range(begin.shape[0] - 1):
+        begin[c + 1] += begin[c]
+    fill = begin[:-1].copy()
+    for i in range(n):
+        order[fill[home[i]]] = i
+        fill[home[i]] += 1
+
+
+@compiled
+def sorted_by_cell(p: Array, n: int, cell: float) -> Array:
+    """The particles (n,) int64 in the order of their cells: neighbours come to lie near to each other in memory."""
+    low, sides = np.empty(3), np.empty(3, dtype=np.int64)
+    _sides(p, n, cell, low, sides)
+    at = np.empty((n, 3), dtype=np.int64)
+    _place(p, n, cell, low, at)
+    home, order = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    begin = np.zeros(sides[0] * sides[1] * sides[2] + 1, dtype=np.int64)
+    _start(at, n, sides, home, begin, order)
+    return order
+
+
+@compiled
+def _grown(pairs: Array) -> Array:
+    more = np.empty((2 * pairs.shape[0], 2), dtype=np.int32)
+    more[: pairs.shape[0]] = pairs
+    return more
+
+
+@compiled
+def near_pairs(p: Array, n: int, reach: float, pairs: Array) -> tuple[Array, int]:
+    """Pairs of particles that are less than `reach` [m] apart.
+
+    Args:
+        p: (n or more, 3) [m].
+        n: how many of them count.
+        reach: also the width of the cells.
+        pairs: (capacity, 2) int32 written; another one is returned where it is too small.
+
+    Returns:
+        The array, and how many of its rows are pairs.
+    """
+    low, sides = np.empty(3), np.empty(3, dtype=np.int64)
+    _sides(p, n, reach, low, sides)
+    at = np.empty((n, 3), dtype=np.int64)
+    _place(p, n, reach, low, at)
+    home, order = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    begin = np.zeros(sides[0] * sides[1] * sides[2] + 1, dtype=np.int64)
+    _start(at, n, sides, home, begin, order)
+    count, square = 0, reach * reach
+    for a in range(n):
+        i = order[a]
+        x, y, z = p[i, 0], p[i, 1], p[i, 2]
+        for step in range(STEPS + 1):
+            s = step + STEPS  # the second half of the 27 cells, this one first
+            dx, dy, dz = s % 3 - 1, (s // 3) % 3 - 1, s // 9 - 1
+            u, v, w = at[i, 0] + dx, at[i, 1] + dy, at[i, 2] + dz
+            c = u % sides[0] + sides[0] * (v % sides[1] + sides[1] * (w % sides[2]))
+            first = a + 1 if step == 0 else begin[c]
+            for b in range(first, begin[c + 1]):
+                j = order[b]
+                if at[j, 0] != u or at[j, 1] != v or at[j, 2] != w:
+                    continue
+                e, f, g = x - p[j, 0], y - p[j, 1], z - p[j, 2]
+                if e * e + f * f + g * g < square:
+                    if count == pairs.shape[0]:
+                        pairs = _grown(pairs)
+                    pairs[count, 0], pairs[count, 1] = i, j
+                    count += 1
+    return pairs, count

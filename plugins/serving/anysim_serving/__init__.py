@@ -1,0 +1,1 @@
+"""Service of envs: `anysim serve`, its client, and pools of many servers."""

@@ -1,0 +1,1 @@
+"""Tasks with a person: what is passed, worn, fed, and shared."""

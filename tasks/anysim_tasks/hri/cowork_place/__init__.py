@@ -1,0 +1,1 @@
+"""Place cubes on a table over which a person reaches too."""

@@ -1,0 +1,1 @@
+"""Feed a person beads from a spoon."""

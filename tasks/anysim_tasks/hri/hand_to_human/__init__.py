@@ -1,0 +1,1 @@
+"""Put a bar into the hand of a person."""

@@ -1,0 +1,1 @@
+"""Take a bar out of the hand of a person."""

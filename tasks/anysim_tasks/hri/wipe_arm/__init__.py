@@ -1,0 +1,1 @@
+"""Wipe the forearm of a person with a sponge."""

@@ -1,0 +1,144 @@
+"""Movers: named or found, foreseen while they move, gone around while they stand, and replayed."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import anysim
+from anysim import make
+from anysim.api import compile_world
+from anysim.errors import AnysimError
+from anysim.skills.base import OUTCOMES, Outcome
+from anysim.skills.runner import SkillPolicy
+from anysim.task.env import TaskEnv
+from anysim.testing.engines import require_engine
+from anysim_navigation.base_planner import PlannedBase
+from anysim_navigation.drive_bench import HARD, drive
+from anysim_navigation.movers import Movers, movers_of
+
+BALL = {"source": {"box": [0.4, 0.4, 0.4]}}
+WORLD: dict[str, Any] = {
+    "name": "crossing",
+    "terrain": "plane",
+    "robots": {
+        "base": {"robot": "holonomic_base", "actions": {"base": "holonomic_drive"}},
+        "other": {"robot": "differential_base", "position": [-2.0, 2.0, 0.0]},
+        "rail": {"robot": "unitree_g1_assisted", "position": [-3.0, -2.0, 0.0]},
+    },
+    "objects": {"ball": BALL, "post": BALL | {"fixed": True}},
+    "layout": {"ball": {"position": [3.0, 3.0, 0.2]}, "post": {"position": [3.0, -3.0, 0.2]}},
+    "families": {
+        "ann": {"kind": "avatar", "x": 1.5, "y": -1.2, "yaw": 1.57, "do": [{"go_to": [1.5, 1.6], "speed": 0.5}]}
+    },
+}
+
+
+def crossing(engine: str, expert: dict[str, Any], do: list[Any] | None = None) -> TaskEnv:
+    """A base on its way to where ann crosses its path."""
+    require_engine(engine)
+    ann = WORLD["families"]["ann"] | ({} if do is None else {"do": do})
+    world = WORLD | {"robots": {"base": WORLD["robots"]["base"]}, "families": {"ann": ann}}
+    world |= {"contact_sensors": {"met": {"body": "ann", "against": "base"}}}
+    task = {
+        "horizon": 1000,
+        "command": {"goal": {"term": "goal_pose", "position": [3.0, 0.0, 0.08]}},
+        "observations": {"policy": [{"term": "relative_pose", "a": "base", "b": "goal"}]},
+        "expert": {"skill": "navigate", "robot": "base", "goal": "goal", **expert},
+    }
+    run = {"physics": {"dt": 0.004, "control_dt": 0.02}, "world": world, "task": task, "record": {"cameras": []}}
+    return make(run, engine=engine, num_envs=1)
+
+
+def gone(env: TaskEnv, policy: SkillPolicy, steps: int) -> tuple[np.ndarray, float]:
+    """Where the base was in each step (K, 7), and the hardest contact with ann [N]."""
+    base, seen, hardest = env.scene.robot("base").base, [], 0.0
+    for _ in range(steps):
+        if policy.skill.outcome[0]:
+            break
+        env.step(policy.act(np.array([0])))
+        seen.append(base.pose[0].copy())
+        hardest = max(hardest, float(np.linalg.norm(env.engine.get_state().contact_force)))
+    return np.array(seen), hardest
+
+
+def begun(env: TaskEnv) -> SkillPolicy:
+    env.reset(seed=2)
+    policy = SkillPolicy(env)
+    policy.begin(np.array([0]))
+    return policy
+
+
+def test_people_and_other_robots_are_movers_where_none_are_named() -> None:
+    world = compile_world({"world": WORLD})
+    assert movers_of(world, "base") == ("other", "rail", "ann")
+    assert movers_of(world, "base", ["ball", "ann"]) == ("ball", "ann")
+    assert movers_of(world, "base", []) == ()
+    for name, why in (("post", "is fixed to the world"), ("balk", "is nothing beside 'base'; did you mean 'ball'")):
+        with pytest.raises(AnysimError, match=f"the mover '{name}' {why}"):
+            movers_of(world, "base", [name])
+
+
+def test_who_stands_is_on_the_map_and_who_moves_is_not() -> None:
+    with crossing("null", {"planner": "dynamic_window"}) as env:
+        env.reset(seed=1)
+        env.scene.look(None)
+        movers, ann = Movers(env.scene, ["ann"]), env.engine.world.entity_numbers["ann"]
+        assert movers.there(0, standing=True)[ann]
+        assert not movers.there(0, standing=False)[ann]
+        env.step(np.zeros((1, 3)))
+        for _ in range(40):
+            env.step(np.zeros((1, 3)))
+        env.scene.look(None)
+        assert not movers.there(0, standing=True)[ann]
+        assert movers.there(0, standing=True).sum() == len(env.engine.world.entities) - 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("to", [1.6, 0.0])
+def test_a_base_gets_past_a_person_who_crosses_its_way_or_stops_on_it(to: float) -> None:
+    with crossing("mujoco", {"planner": "dynamic_window"}, [{"go_to": [1.5, to], "speed": 0.5}]) as env:
+        policy = begun(env)
+        _, hardest = gone(env, policy, 900)
+        assert (OUTCOMES[policy.skill.outcome[0]], hardest) == (Outcome.OK, 0.0)
+
+
+@pytest.mark.slow
+def test_one_that_goes_straight_meets_her() -> None:
+    """What the test above shows is the planner's doing."""
+    with crossing("mujoco", {}) as env:
+        assert gone(env, begun(env), 300)[1] > HARD
+
+
+def test_movers_need_a_planner() -> None:
+    with (
+        pytest.raises(anysim.errors.TaskError, match="are foreseen by a planner; add `planner: dynamic_window`"),
+        crossing("null", {"movers": ["ann"]}) as env,
+    ):
+        SkillPolicy(env)
+
+
+def test_a_drive_among_people_goes_on_from_a_snapshot_bit_for_bit() -> None:
+    with crossing("mujoco", {"planner": "dynamic_window"}) as env:
+        policy, one = begun(env), np.array([0])
+        gone(env, policy, 63)
+        base = policy.skill.movers[0]
+        assert isinstance(base, PlannedBase)
+        assert base.router is not None
+        env_then, router_then = env.snapshot(), base.router.snapshot(one)
+        first, _ = gone(env, policy, 40)
+        env.reset_to(env_then)
+        base.router.restore(one, router_then)
+        again, _ = gone(env, policy, 40)
+        assert np.array_equal(first, again)
+        env.reset_to(env_then)  # and without what the router knew it goes another way
+        assert not np.array_equal(first, gone(env, policy, 40)[0])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["mujoco", "pybullet", "sapien"])
+def test_a_room_is_crossed_among_four_people(engine: str) -> None:
+    require_engine(engine)
+    found = drive(1, "holonomic_base", engine, people=4)
+    assert found is not None
+    assert (found.ended, found.met != "towards") == ("success", True)
