@@ -42,6 +42,7 @@ WORDS = {
     "legged-gym": "the simulator interface of legged-gym training code, on any engine",
     "maniskill": "`anysim verdicts`: peers judge our states; with them `anysim-maniskill[maniskill]`",
     "mcap": "recordings: MCAP files and videos",
+    "mobile": "bases that drive up to things, follow people, and stop for them; `anysim bench stopping`",
     "mujoco": "the engine MuJoCo, and MJCF files",
     "navigation": "`anysim map`: where bases can go, ways through rooms, and local planning around what moves",
     "parity": "`anysim compare` and `anysim picture`",

@@ -25,7 +25,7 @@ LARGE_PLUGINS = {
     "language": 4_200,  # questions and the checker that finds their answers again read the same episodes and words
     "parity": 3_660,  # one comparison: its layers and probes are read together, and its page shows all of them
     "sensors": 4_000,  # one geometry and every sensor that asks it: kernels, tables, and what worlds declare
-    "skills": 10_050,  # one library of arms and phases that every group of skills builds on, a folder a group
+    "skills": 10_060,  # one library of arms and phases that every group of skills builds on, a folder a group
 }
 """Plugins that stay whole although they are larger, with what they may have: it rises with what they newly do alone."""
 

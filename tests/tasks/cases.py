@@ -98,6 +98,34 @@ def _reach(env: TaskEnv, share: float) -> None:
     env.scene.moment += 1
 
 
+def _before_named(env: TaskEnv) -> Array:
+    """Poses of the base 0.8 m before what each env's instruction names, facing it."""
+    names, (rows, index) = ("crate", "drum", "stool", "case"), env.scene.drawn["target"]
+    places = np.stack([seen(env, name) for name in names])
+    which = np.argmax(rows[index], axis=1)
+    pose = seen(env, "rover")
+    way = places[which, np.arange(env.num_envs), :2] - pose[:, :2]
+    yaw = np.arctan2(way[:, 1], way[:, 0])
+    pose[:, :2] += way - 0.8 * np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
+    pose[:, 3:] = P.from_roll_pitch_yaw(np.stack([0.0 * yaw, 0.0 * yaw, yaw], axis=1))
+    return pose
+
+
+def _followed(env: TaskEnv, share: float) -> None:
+    """So many seconds behind the person, at a distance that becomes that which is to be kept."""
+    pose, person = seen(env, "rover"), seen(env, "person")
+    pose[:, :2] = person[:, :2] - np.array([3.2 - 1.7 * share, 0.0])
+    pose[:, 3:] = [0.0, 0.0, 0.0, 1.0]
+    put(env, "rover", pose)
+    for memory in env.scene.memories:
+        memory.forget(np.arange(env.num_envs))
+    for step in (1, 2, 1000):
+        env.scene.elapsed[:] = step
+        env.scene.look(None)
+        if step < 1000:
+            env.mdp.judge()
+
+
 def _off_goal(env: TaskEnv) -> None:
     env.scene.goals["goal"][:, 0] += 0.011
     env.scene.moment += 1
@@ -457,6 +485,17 @@ CASES: dict[str, Case] = {
     "nav_to_pose": Case(
         _towards("rover", lambda env: seen(env, "goal")),
         [_shifted("rover", x=0.11), _tilted("rover", 0.15), _moving("rover")],
+        (),
+    ),
+    "nav_to_object": Case(
+        _towards("rover", lambda env: _before_named(env)),
+        [_shifted("rover", x=2.5), _turned("rover", 0.3), _moving("rover")],
+        ("turn",),
+    ),
+    "follow_person": Case(_followed, [_shifted("rover", x=-1.0), _turned("rover", 0.8)], ()),
+    "stop_for_person": Case(
+        _towards("rover", lambda env: seen(env, "goal")),
+        [_shifted("rover", x=0.11), _turned("rover", 0.2), _moving("rover")],
         (),
     ),
     "walk_to_pose": Case(

@@ -9,30 +9,9 @@ from pydantic import Field
 from anysim.conventions import Array
 from anysim.errors import NameLookupError, listing
 from anysim.task.scene import Frame, SceneView
-from anysim_avatars.family import Avatars
+from anysim_avatars.events import StepOut, stroll
 from anysim_avatars.hold import GIVEN, HELD, Hold
-
-
-class AvatarView:
-    """An avatar of the world. In YAML: its name."""
-
-    reference_kind: ClassVar[str] = "avatar"
-
-    def __init__(self, scene: SceneView, name: str) -> None:
-        self.scene = scene
-        found = {} if scene.families is None else scene.families.of_kind(Avatars)
-        where = {one: (family, number) for family in found for number, one in enumerate(family.names)}
-        if name not in where:
-            raise NameLookupError(f"there is no avatar '{name}' (avatars: {listing(where) or 'none'})")
-        self.family, self.number = where[name]
-
-    def rows(self, key: str) -> Array:
-        """(n, …) of its memory."""
-        return self.family.memory[key][self.scene.env_ids, self.number]
-
-    def gap(self, points: Array) -> Array:
-        """(n,) [m] from points (n, 3) to the nearest of its capsules."""
-        return self.family.gap(self.scene.state.body_pose[self.scene.env_ids], self.number, points)
+from anysim_avatars.view import AvatarView
 
 
 def doing(scene: SceneView, *, avatar: AvatarView, what: str) -> Array:
@@ -90,7 +69,8 @@ def within(
     return avatar.gap(frame.position) < distance
 
 
-TERMS: Mapping[str, Mapping[str, Callable[..., Array]]] = {
+TERMS: Mapping[str, Mapping[str, Callable[..., object]]] = {
     "observation": {"motion": motion, "gap": gap},
     "predicate": {"doing": doing, "reached": reached, "holding": holding, "let_go": let_go, "within": within},
+    "event": {"step_out": StepOut, "stroll": stroll},
 }

@@ -14,6 +14,7 @@ from anysim_navigation.limits import OUTPUTS, BaseKind, BaseLimits, kind_of, lim
 from anysim_navigation.movers import movers_of
 from anysim_navigation.robot_shape import discs_of
 from anysim_navigation.router import BaseRouter, Mode, frame_pose
+from anysim_navigation.way_costs import way_lengths
 from anysim_schemas.vehicle import AckermannSpec
 from anysim_skills.moving.base import Base
 
@@ -44,12 +45,18 @@ class PlannedBase(Base):
 
     def go(self, ids: Array, target: Array) -> None:
         super().go(ids, target)
+        self._made().go(ids, target, Mode.ROUTE)
+        self.no_way[ids] = False
+
+    def way_lengths(self, ids: Array, at: Array, places: Array) -> Array:
+        return way_lengths(self._made(), ids, self.pose(at), places)
+
+    def _made(self) -> BaseRouter:
         if self.router is None:
             movers = movers_of(self.env.engine.world, self._robot.name, self._named)
             scene, limits = self.env.scene, self._limits()
             self.router = BaseRouter(scene, self._robot, self.frame, limits, movers=movers, close=self.close)
-        self.router.go(ids, target, Mode.ROUTE)
-        self.no_way[ids] = False
+        return self.router
 
     def renew(self, ids: Array) -> None:
         super().renew(ids)

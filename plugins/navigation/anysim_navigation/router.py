@@ -4,7 +4,7 @@ In mode ROUTE a way over the mesh of the env is followed by the dynamic window o
 end of the way, and in mode DIRECT from the beginning, the base goes straight to its pose.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
 from enum import IntEnum
 from typing import NamedTuple
@@ -20,6 +20,7 @@ from anysim_navigation.dynamic_window import STEP, DynamicWindow, distances_of
 from anysim_navigation.limits import BaseKind, BaseLimits
 from anysim_navigation.maps import NavMaps
 from anysim_navigation.movers import Movers
+from anysim_navigation.navmesh import NavMesh
 from anysim_navigation.pose_control import PoseControl, in_frame
 from anysim_navigation.progress import Progress
 from anysim_navigation.robot_shape import agent_of
@@ -113,6 +114,10 @@ class BaseRouter:
         for env in ids.tolist():
             self._progress[env] = None
             self.refused.pop(env, None)
+
+    def meshes(self, env: int) -> Iterator[NavMesh]:
+        """The meshes of an env as it is now, that with the most room first."""
+        return (maps.at(self._scene.state.body_pose[env], self._scene.presence[env]) for maps in self._maps)
 
     def velocities(self, ids: Array) -> Array:
         """(n, 3) what the base is to do now in these envs, which the scene looks at in this order."""

@@ -124,6 +124,11 @@ class Base(Mover):
         now, target = self.pose(at), self.target[ids]
         return P.norm(target[:, :2] - now[:, :2]), np.abs(P.wrapped(target[:, 2] - now[:, 2]))
 
+    def way_lengths(self, ids: Array, at: Array, places: Array) -> Array:
+        """(n, C) [m] of the ways to places (n, C, 2 or more): straight, or by a planner, inf where there is none."""
+        del ids
+        return P.norm(places[..., :2] - self.pose(at)[:, None, :2])
+
     def speed(self, at: Array) -> tuple[Array, Array]:
         """(n,) [m/s] over the ground and (n,) [rad/s] about the vertical."""
         twist = self.frame.twist[at]

@@ -38,16 +38,16 @@ class Stands:
     def look(self, ids: Array, at: Array, middle: Array, goals: Array) -> tuple[Array, Array]:
         """The stands about places (n, 2 or more) now, x, y and yaw (n, C, 3), and the effort (n, C) of each.
 
-        That is infinite where the base would overlap something there or on its straight way, or the arm reaches none of
-        `goals` (n, g, m, 7), ways of m tool poses each.
+        That is infinite where the base would overlap something there or on its way, which is straight or its planner's,
+        or the arm reaches none of `goals` (n, g, m, 7), ways of m tool poses each.
         """
         here = self._base.pose(at)
         stands = np.concatenate([middle[:, None, :2], np.zeros((len(ids), 1, 1))], axis=2) + self._offsets
         way = stands - here[:, None]
         way[..., 2] = P.wrapped(way[..., 2])
-        effort = P.norm(way[..., :2]) + TURN_COST * np.abs(way[..., 2])
+        effort = self._base.way_lengths(ids, at, stands) + TURN_COST * np.abs(way[..., 2])
         around, free = self._footprint.look(ids, at), np.ones(effort.shape, dtype=bool)
-        for share in np.linspace(0.0, 1.0, WAY_POINTS + 1)[1:]:
+        for share in np.linspace(0.0, 1.0, WAY_POINTS + 1)[-1 if self._base.planned else 1 :]:
             free &= self._footprint.free(around, here[:, None] + share * way)
         reached = self._reached(ids, at, stands, goals)
         effort += MISSING_COST * (1.0 - reached / goals.shape[1])

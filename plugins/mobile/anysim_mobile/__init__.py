@@ -1,0 +1,1 @@
+"""Bases that drive up to things, follow people, and stop for them."""

@@ -1,0 +1,31 @@
+"""Lengths of the ways to many places: what a choice among stands costs a base."""
+
+import numpy as np
+
+from anysim.conventions import Array
+from anysim_navigation.agent import NoRoute
+from anysim_navigation.navmesh import NavMesh, length_of
+from anysim_navigation.router import SNAP, BaseRouter
+
+
+def way_lengths(router: BaseRouter, ids: Array, start: Array, places: Array) -> Array:
+    """(n, C) [m] from starts (n, 2 or more) to places (n, C, 2 or more) over the mesh of each env; inf without a way.
+
+    They are over the mesh with the most room that has one.
+    """
+    lengths = np.full(places.shape[:2], np.inf)
+    for row, env in enumerate(ids.tolist()):
+        meshes = list(router.meshes(env))
+        for number, place in enumerate(places[row, :, :2]):
+            lengths[row, number] = _length(meshes, start[row, :2], place)
+    return lengths
+
+
+def _length(meshes: list[NavMesh], start: Array, place: Array) -> float:
+    for mesh in meshes:
+        try:
+            path = mesh.path(start, place, snap=SNAP)
+        except NoRoute:
+            continue
+        return length_of(np.concatenate([start[None], path[1:-1], place[None]]))
+    return float("inf")

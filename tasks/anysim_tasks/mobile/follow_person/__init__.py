@@ -1,0 +1,1 @@
+"""Follow a person who walks, at a distance, and look at them."""

@@ -1,0 +1,1 @@
+"""Drive up to a named thing in a furnished room, and face it."""

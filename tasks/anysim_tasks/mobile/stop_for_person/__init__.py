@@ -1,0 +1,1 @@
+"""Drive on, and stop in time for a person who steps into the way."""
