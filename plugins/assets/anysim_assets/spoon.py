@@ -18,8 +18,8 @@ def spoon(
 ) -> ImportedModel:
     """A spoon that lies level; its frame is in the middle of its bowl's bottom, z up, and its handle is at -x.
 
-    Its one link is `base`. Frames: `inside`, the middle of the bowl's floor; `tip`, the middle of its front rim; `grip`,
-    the middle of the handle. It is made of boxes, so that what is in it stays in it on every engine.
+    Its one link is `base`. Frames: `inside`, the middle of the bowl's floor; `tip`, the middle of its front rim;
+    `grip`, the middle of the handle. It is made of boxes, so that what is in it stays in it on every engine.
 
     Args:
         bowl: outer length, width and height of the bowl [m].

@@ -73,6 +73,7 @@ EMITTED = {
     "rope": {"first": "handle", "last": "handle"},
     "side_hole": {"mouth": "hole", "body": "body"},
     "socket": {"mouth": "hole", "body": "body"},
+    "spoon": {"body": "body"},
     "tee": {"body": "body"},
     "tray": {"rim": "rim", "body": "body"},
     "valve": {"wheel.handle": "rim"},

@@ -23,10 +23,16 @@ OUT = {"clip": "idle", "reach": [0.4, -0.2, 1.1]}
 
 
 def with_bar(engine, do, **hold):
-    run = run_of(do, engine, num_envs=2, dt=0.002, world={
-        "objects": {"bar": {"source": {"box": [0.2, 0.03, 0.03]}, "mass": 0.1}},
-        "layout": {"bar": {"position": [1.5, 0.0, 0.1]}},
-    })  # fmt: skip
+    run = run_of(
+        do,
+        engine,
+        num_envs=2,
+        dt=0.002,
+        world={
+            "objects": {"bar": {"source": {"box": [0.2, 0.03, 0.03]}, "mass": 0.1}},
+            "layout": {"bar": {"position": [1.5, 0.0, 0.1]}},
+        },
+    )
     run["world"]["families"]["grip"] = {"kind": "avatar_hold", "avatar": "ann", "object": "bar", **hold}
     return run
 
@@ -60,8 +66,11 @@ def test_a_hand_holds_on_to_what_is_pulled_with_less_than_its_force(engine):
         assert grip(env).holding.tolist() == [HELD, GIVEN]
         assert P.norm(bar.position - palm.position)[0] < 0.13
         assert env.families.facts(1)["grip"] == {
-            "kind": "hold", "hand": "ann.right_hand", "object": "bar", "is": "let go"
-        }  # fmt: skip
+            "kind": "hold",
+            "hand": "ann.right_hand",
+            "object": "bar",
+            "is": "let go",
+        }
 
 
 def test_a_hand_closes_on_what_is_near_and_still():
