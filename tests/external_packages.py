@@ -3,9 +3,10 @@
 import os
 import shutil
 import subprocess
-import sys
 import tomllib
 from pathlib import Path
+
+from tests import forked
 
 EXTERNAL = Path(__file__).parent / "external"
 FOUND = """
@@ -43,6 +44,4 @@ def install(name: str, folder: Path) -> Path:
 
 def run(folder: Path, *words: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     """Run Python with the folder on its path."""
-    environment = {**os.environ, "PYTHONPATH": str(folder)}
-    command = [sys.executable, *words]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment, cwd=cwd, check=False)
+    return forked.run(*words, cwd=cwd, env={**os.environ, "PYTHONPATH": str(folder)})

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests import forked
+
 ROTTEN = {
     "engine.py": """
 from anysim.testing.kinematic import NullEngine
@@ -74,8 +76,7 @@ def rotten(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def anysim(*words: str, cwd: Path, plugins: Path | None = None) -> subprocess.CompletedProcess[str]:
     environment = {**os.environ, **({} if plugins is None else {"PYTHONPATH": str(plugins)})}
-    command = [sys.executable, "-m", "anysim.cli", *words]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment, cwd=cwd, check=False)
+    return forked.run("-m", "anysim.cli", *words, cwd=cwd, env=environment)
 
 
 def ends_with(code: int, words: list[str], folder: Path) -> None:

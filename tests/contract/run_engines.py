@@ -4,6 +4,7 @@ SUITE is `planners` or `families`. Jobs map what is under test (`module:Class`, 
 (`test_x.py::test_y`); results map it to tests to outcomes: a parametrised test has failed if one of its cases has.
 """
 
+import gc
 import json
 import sys
 from pathlib import Path
@@ -34,6 +35,7 @@ class Outcomes:
 def run(engine: str, tests: list[str], option: str = "--engine", suite: Path = SUITE) -> dict[str, str]:
     """Outcomes of the tests on one engine."""
     outcomes = Outcomes()
+    gc.freeze()  # pytest collects several times at its end, and would look at all that the runs before have loaded
     where = [f"{suite}/{test}" for test in tests]
     options = ["-q", "--no-header", "--tb=no", "-p", "no:cacheprovider", "--import-mode=importlib"]
     options += [

@@ -1,6 +1,5 @@
 """The shipped contract suite, run as its users run it: in its own process, by package name."""
 
-import os
 import re
 import subprocess
 import sys
@@ -9,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from anysim.testing.engines import require_engine
+from tests import forked
 
 ROOT = Path(__file__).parents[2]
 SUMMARY = re.compile(
@@ -17,20 +17,11 @@ SUMMARY = re.compile(
 )
 
 
+WORDS = ("-m", "pytest", "-q", "-p", "no:cacheprovider", "--tb=short", "--pyargs", "anysim.testing")
+
+
 def _run(folder, *options):
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-q",
-        "-p",
-        "no:cacheprovider",
-        "--tb=short",
-        "--pyargs",
-        "anysim.testing",
-        *options,
-    ]
-    return subprocess.run(command, cwd=folder, env=dict(os.environ), capture_output=True, text=True, check=False)
+    return subprocess.run([sys.executable, *WORDS, *options], cwd=folder, capture_output=True, text=True, check=False)
 
 
 def _summary(done):
@@ -115,19 +106,20 @@ def _passes(name, passed, _, why, least=251):
 
 
 def test_without_an_engine_it_says_how(tmp_path):
-    done = _run(tmp_path)
+    done = forked.run(*WORDS, cwd=tmp_path)
     assert done.returncode == pytest.ExitCode.USAGE_ERROR
     assert "--engine NAME" in done.stdout + done.stderr
 
 
 def test_an_unknown_engine_lists_what_exists(tmp_path):
-    done = _run(tmp_path, "--engine", "nul")
+    done = forked.run(*WORDS, "--engine", "nul", cwd=tmp_path)
     assert done.returncode == pytest.ExitCode.USAGE_ERROR
     assert "did you mean 'null'" in done.stdout + done.stderr
 
 
 def test_options_reach_the_engine(tmp_path):
-    done = _run(tmp_path, "--engine", "null", "--engine-option", "colour=red", "-k", "test_context_manager_destroys")
+    words = (*WORDS, "--engine", "null", "--engine-option", "colour=red", "-k", "test_context_manager_destroys")
+    done = forked.run(*words, cwd=tmp_path)
     assert "null takes no options, got colour" in done.stdout
 
 

@@ -16,6 +16,7 @@ from anysim.engine.factory import availability, create_simulation, runnable
 from anysim.errors import AssetError, EngineError, PluginError, PluginFailure
 from anysim.task.env import TaskEnv
 from anysim_inspect.plugins import broken
+from tests import forked
 from tests.task.helpers import BLOCKS, blocks
 
 PACKAGE, MODULE = "anysim-rotten", "anysim_rotten"
@@ -55,8 +56,7 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install
 
 
 def anysim_command(environment: dict[str, str], *words: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "anysim.cli", *words]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment, check=False)
+    return forked.run("-m", "anysim.cli", *words, env=environment)
 
 
 @pytest.mark.parametrize("how", ENDINGS)

@@ -1,8 +1,6 @@
 """Every example runs, and every block of Python in the docs."""
 
 import re
-import subprocess
-import sys
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -11,6 +9,7 @@ import pytest
 import yaml
 
 from anysim.testing.engines import require_drawing
+from tests import forked
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = sorted((ROOT / "docs" / "examples").glob("[0-9]*.py"))
@@ -45,9 +44,7 @@ def blocks(language: str) -> list[tuple[str, str]]:
 
 
 def run(arguments: list[str], cwd: Path) -> None:
-    result = subprocess.run(
-        [sys.executable, *arguments], capture_output=True, text=True, timeout=300, cwd=cwd, check=False
-    )
+    result = forked.run(*arguments, cwd=cwd)
     if result.returncode and "cannot draw here" in result.stderr:
         for engine in ("mujoco", "sapien"):
             require_drawing(engine)

@@ -1,8 +1,6 @@
 """The directory of a run: what cannot be one is said, and two runs do not spend their time on the same episodes."""
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,6 +10,7 @@ from anysim.errors import RecordError
 from anysim.record.collector import Collector
 from anysim.skills.runner import SkillPolicy
 from anysim.task.env import TaskEnv
+from tests import forked
 from tests.task.helpers import BLIND
 
 SHORT = [*BLIND, "record.keep=all", "task.horizon=3"]
@@ -43,8 +42,7 @@ def test_a_name_that_is_too_long_is_no_lack_of_room(env, tmp_path: Path) -> None
 
 def test_the_command_says_it_before_it_builds_anything(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("mine")
-    command = [sys.executable, "-m", "anysim.cli", "run", "no_such_task", "--out", str(tmp_path / "file")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    done = forked.run("-m", "anysim.cli", "run", "no_such_task", "--out", str(tmp_path / "file"))
     assert done.returncode == 2
     assert "is a file, not a directory" in done.stderr
 

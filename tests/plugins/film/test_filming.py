@@ -25,6 +25,7 @@ from anysim_film.sheet import FILM_FILE, read_sheet
 from anysim_film.stage import FilmOrder
 from anysim_inspect.verify import verify
 from anysim_mcap.video import images
+from tests import forked
 from tests.record.test_film import SEEN, filmed_env, recorded as played
 
 SHORT = (*SEEN, "task.horizon=6", "record.keep=all", "record.fps=25")
@@ -291,8 +292,7 @@ def test_the_command(blind: list[Path], tmp_path: Path) -> None:
     """One line an episode, one that sums up, JSON, and errors with exit code 2."""
 
     def render(*words: str) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-m", "anysim.cli", "render", str(tmp_path / "run"), *words]
-        return subprocess.run(command, capture_output=True, text=True, check=False)
+        return forked.run("-m", "anysim.cli", "render", str(tmp_path / "run"), *words)
 
     lines = render("--camera", "wrist").stdout.splitlines()
     assert lines[0] == f"{blind[0].name}: wrist, 4 images -> {blind[0]}"
