@@ -25,11 +25,10 @@ from select import select
 from types import ModuleType
 from typing import NamedTuple, NoReturn, TypedDict
 
-LOADED = (
-    "anysim_schemas.load", "coal", "google.protobuf.descriptor_pb2", "lxml.etree", "mcap.reader", "mcap.writer",
-    "mujoco", "numba", "numpy", "pydantic", "rich.traceback", "scipy.ndimage", "scipy.spatial", "trimesh", "typer",
-    "typer.main", "typer.rich_utils", "yaml",
-)  # fmt: skip
+LOADED = tuple(
+    "anysim_schemas.load coal google.protobuf.descriptor_pb2 lxml.etree mcap.reader mcap.writer mujoco numba numpy "
+    "pydantic rich.traceback scipy.ndimage scipy.spatial trimesh typer typer.main typer.rich_utils yaml".split()
+)
 """No package that keeps state between its uses, starts threads when it is imported, or chooses plugins."""
 
 
