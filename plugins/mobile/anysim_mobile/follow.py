@@ -87,8 +87,8 @@ class Follow(PhasedSkill):
         Straight towards the base (n, 2) where the trail is not that long yet.
         """
         trail = self._trail[ids]
-        far = np.asarray(P.norm(trail - person[:, None]) >= self._distance, dtype=bool)
+        far = P.norm(trail - person[:, None]) >= self._distance
         last = CRUMBS - 1 - far[:, ::-1].argmax(axis=1)
         way = base - person
         straight = person + way * (self._distance / np.maximum(P.norm(way), 1e-6))[:, None]
-        return np.where(far.any(axis=1)[:, None], trail[np.arange(len(ids)), last], straight)
+        return np.where(far.any(axis=1, keepdims=True), trail[np.arange(len(ids)), last], straight)
