@@ -48,5 +48,7 @@ def car_way(mesh: NavMesh, limits: BaseLimits, start: Array, goal: Array) -> lis
             f"({start[0]:.2f}, {start[1]:.2f}) to ({goal[0]:.2f}, {goal[1]:.2f})"
         )
     points, gear = found[:, :2] + middle, found[1:, 3]
+    if not len(gear):  # it is where it is to be
+        return [(np.stack([start[:2], goal]), 1.0)]
     cuts = [0, *(np.flatnonzero(np.diff(gear)) + 1).tolist(), len(gear)]
     return [(points[a : b + 1], float(gear[a])) for a, b in pairwise(cuts) if b > a]

@@ -21,6 +21,8 @@ def test_a_car_turns_round_by_going_backwards_or_in_a_circle() -> None:
     assert np.abs(way[0][0][:, 1]).max() < 0.05
     ahead = car_way(mesh, CAR, np.array([0.0, 0.0, 0.0]), np.array([1.0, 0.0]))
     assert [gear for _, gear in ahead] == [1.0]
+    [(there, _)] = car_way(mesh, CAR, np.array([0.0, 0.0, 0.0]), np.array([0.05, 0.0]))
+    np.testing.assert_allclose(there, [[0.0, 0.0], [0.05, 0.0]])
 
 
 def test_curvature_and_clearance_are_kept_between_boxes() -> None:
