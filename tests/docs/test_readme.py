@@ -6,12 +6,15 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 from urllib.request import urlopen
 
+import numpy as np
 import pytest
 
+import anysim
 from anysim.testing.engines import require_drawing
 
 ROOT = Path(__file__).parents[2]
@@ -75,12 +78,16 @@ def _runs(folder: Path) -> list[Path]:
 
 @pytest.mark.full
 @pytest.mark.parametrize("line", commands())
-def test_a_command_ends_as_the_page_says(line: str, folder: Path) -> None:
+def test_a_command_ends_as_the_page_says(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for engine in ("mujoco", "sapien"):
         require_drawing(engine)
     words = _words(line, folder)
     if "browser" in words:
-        _drives_in_a_browser(words, folder)
+        _answers(words, folder, lambda address: urlopen(address).status == 200)
+        return
+    if "serve" in words:
+        monkeypatch.setenv("ANYSIM_STATE_DIR", str(folder / "state"))
+        _answers(words, folder, _steps)
         return
     done = subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=900, check=False)
     if words[1] == "train" and find_spec("stable_baselines3") is None:
@@ -93,13 +100,19 @@ def test_a_command_ends_as_the_page_says(line: str, folder: Path) -> None:
     assert done.stdout.strip()
 
 
-def _drives_in_a_browser(words: list[str], folder: Path) -> None:
-    """The page is served on this machine, and an interrupt ends it."""
+def _steps(address: str) -> bool:
+    with anysim.connect(address, task="pick_cube", num_envs=2) as env:
+        env.reset(seed=0)
+        return env.step(np.zeros((2, env.action_dim))).reward.shape == (2,)
+
+
+def _answers(words: list[str], folder: Path, asked: Callable[[str], bool]) -> None:
+    """It listens on this machine, answers who asks, and an interrupt ends it."""
     with subprocess.Popen(words, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
         try:
             assert process.stdout
             found = next(filter(None, (re.search(r"http://127\.0\.0\.1\S+", line) for line in process.stdout)))
-            assert urlopen(found[0]).status == 200
+            assert asked(found[0])
             process.send_signal(signal.SIGINT)
             said, _ = process.communicate(timeout=60)
             assert "Traceback" not in said
