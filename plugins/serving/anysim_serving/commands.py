@@ -11,11 +11,10 @@ if TYPE_CHECKING:
 @hookimpl
 def add_cli(app: "typer.Typer") -> None:
     """`anysim serve`, and `anysim bench serve` where `anysim bench` is installed."""
-    from anysim_serving import bench_cli, cli
+    from anysim_serving.cli import bench, serve
 
-    app.command("serve")(cli.serve)
-    for (
-        group
-    ) in app.registered_groups:  # that of anysim-bench is there before: plugins join in the order of their names
+    app.command("serve")(serve.serve)
+    # the group of anysim-bench is there before: plugins join in the order of their names
+    for group in app.registered_groups:
         if group.name == "bench" and group.typer_instance is not None:
-            group.typer_instance.command("serve")(bench_cli.serve)
+            group.typer_instance.command("serve")(bench.serve)
