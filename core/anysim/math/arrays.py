@@ -74,6 +74,16 @@ def wholes(name: str, values: object, count: int, error: type[AnysimError]) -> l
     return [whole(name, value, error) for value in listed]
 
 
+def chosen(mask: Array | None, count: int, error: type[AnysimError]) -> Array:
+    """(n,) the envs of `count` where a mask (N,) bool is true; all of them where there is none."""
+    if mask is None:
+        return np.arange(count)
+    mask = array("mask", mask, error)
+    if mask.dtype != bool or mask.shape != (count,):
+        raise error(f"mask must be a bool array of shape ({count},), got {mask.dtype} {mask.shape}")
+    return np.flatnonzero(mask)
+
+
 def _spelled(number: int) -> str:
     return "2^64 - 1" if number == SEEDS - 1 else f"{number:,}"
 

@@ -179,7 +179,7 @@ class TaskEnv:
         Returns:
             Observations and info of the chosen envs only, in order.
         """
-        ids = self._chosen(mask)
+        ids = arrays.chosen(mask, self.num_envs, TaskError)
         plan = self.counterfactuals.checked(overrides, len(ids), midway=False)
         if episode_seeds is not None:  # before anything moves
             episode_seeds = arrays.wholes("episode_seeds", episode_seeds, len(ids), TaskError)
@@ -212,14 +212,6 @@ class TaskEnv:
         """End episodes that are given up: these envs are truncated now if they were running."""
         running = env_ids[self._code[env_ids] == RUNNING]
         self._code[running] = TRUNCATED
-
-    def _chosen(self, mask: Array | None) -> Array:
-        if mask is None:
-            return np.arange(self.num_envs)
-        mask = arrays.array("mask", mask, TaskError)
-        if mask.dtype != bool or mask.shape != (self.num_envs,):
-            raise TaskError(f"mask must be a bool array of shape ({self.num_envs},), got {mask.dtype} {mask.shape}")
-        return np.flatnonzero(mask)
 
     def _rows(self, env_ids: Sequence[int] | Array | None) -> Array:
         return np.arange(self.num_envs) if env_ids is None else arguments.indices(env_ids, self.num_envs, "env")
@@ -299,7 +291,7 @@ class TaskEnv:
         """The envs to step: None for all of them."""
         if mask is None and np.count_nonzero(running) == self.num_envs:
             return None
-        wanted = self._chosen(mask)
+        wanted = arrays.chosen(mask, self.num_envs, TaskError)
         ended = wanted[~running[wanted]]
         if len(ended) == 0 and len(wanted) == self.num_envs:
             return None
@@ -347,7 +339,7 @@ class TaskEnv:
 
     def snapshot(self, mask: Array | None = None) -> EnvSnapshot:
         """Envs at this moment. Continuing from it equals the uninterrupted run, bit for bit."""
-        ids = self._chosen(mask)
+        ids = arrays.chosen(mask, self.num_envs, TaskError)
         return EnvSnapshot(
             self.engine.snapshot(ids), self._managed(ids), self.streams.snapshot(ids), self.name, spec_hash(self.spec)
         )

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from anysim.task.snapshot import EnvSnapshot
 from anysim_client.errors import ServiceError
 from anysim_client.link import Link
 from anysim_client.messages import Chunk, from_jpegs, snapshot_data, snapshot_of
+from anysim_client.served_env import ServedEnv
 from anysim_client.shared import MARK, SharedSlots
 from anysim_schemas.run import RunSpec
 
@@ -47,7 +48,7 @@ class _Engine(NamedTuple):
     world: _World
 
 
-class RemoteEnv:
+class RemoteEnv(ServedEnv):
     """The env of a session. It belongs to the thread that uses it, as a TaskEnv does.
 
     What a TaskEnv is made of (`managers`, `mdp`, …) stays with the service; `details` tells what they know.
@@ -67,7 +68,8 @@ class RemoteEnv:
         if images not in ("auto", "raw", "jpeg", "shared"):
             raise TaskError(f"images are sent auto, raw, jpeg or shared, not {arrays.shown(images)}")
         self.link, spec = link, link.spec
-        self.name, self.num_envs, self.source = str(spec["task"]), int(spec["num_envs"]), str(spec["source"])
+        super().__init__(int(spec["num_envs"]))
+        self.name, self.source = str(spec["task"]), str(spec["source"])
         self._low, self._high = (np.array(spec["action"][end], dtype=float) for end in ("low", "high"))
         self.action_dim = len(self._low)
         self.observation_sizes = {name: int(size) for name, size in spec["observations"].items()}
@@ -78,7 +80,7 @@ class RemoteEnv:
             self.num_envs,
             _World(spec["world"], spec["world_hash"], _Physics(spec["control_dt"])),
         )
-        self.streams, self.scene = _Streams(self), _Scene(self)
+        self.streams = _Streams(self)
         self.latest: list[dict[str, Any]] = []
         self._form = {"images": "jpeg", "quality": quality} if images == "jpeg" else {}
         self._full = full or None
@@ -86,9 +88,7 @@ class RemoteEnv:
         self._obs: dict[str, Array | None] = {}
         """The latest of all envs; None where a caller has it, in shared memory."""
         self._slot: int | None = None
-        self._code, self._running = np.zeros(self.num_envs, np.int8), np.zeros(self.num_envs, bool)
-        self._info: dict[str, Array] = {}
-        self._stale, self._closed = True, False
+        self._stale = True
         if images in ("auto", "shared") and self.image_shapes:
             self._negotiate()
             if images == "shared" and self._shared is None:
@@ -143,24 +143,6 @@ class RemoteEnv:
         return {name: rows.copy() for name, rows in self._obs.items() if rows is not None}
 
     @property
-    def status(self) -> Array:
-        """(N,) the word of `Status` for each env."""
-        self._refresh()
-        return STATUS_NAMES[self._code]
-
-    @property
-    def info(self) -> dict[str, Array]:
-        """Info of all envs now, as in `StepResult.info`."""
-        self._refresh()
-        return {name: rows.copy() for name, rows in self._info.items()}
-
-    @property
-    def running(self) -> Array:
-        """(N,) bool: reset, and not ended."""
-        self._refresh()
-        return self._running.copy()
-
-    @property
     def codes(self) -> Array:
         """(N,) int8, the place of each env's word in `Status`."""
         self._refresh()
@@ -178,10 +160,6 @@ class RemoteEnv:
         """
         return self.ask("info")["details"]
 
-    def instruction(self, env: int) -> str:
-        """The task in words, as it is in an env's episode."""
-        return self.details()[env]["instruction"]
-
     def sensor_rows(self, env_ids: Array) -> dict[str, Array]:
         """What is recorded of sensors and families (n, …), by the names of the arrays."""
         rows = [one["sensors"] for one in self.details()]
@@ -198,7 +176,7 @@ class RemoteEnv:
         overrides: Any = None,
     ) -> tuple[Obs, dict[str, Array]]:
         """Start new episodes in all envs, or where `mask` (N,) is true; as `TaskEnv.reset`."""
-        ids = self._chosen(mask)
+        ids = arrays.chosen(mask, self.num_envs, TaskError)
         answer = self.ask(
             "reset", seed=_plain(seed), mask=mask, episode_seeds=_plain(episode_seeds), overrides=_plain(overrides)
         )
@@ -311,28 +289,11 @@ class RemoteEnv:
         self._stale = False
         return obs
 
-    def _chosen(self, mask: Array | None) -> Array:
-        if mask is None:
-            return np.arange(self.num_envs)
-        mask = arrays.array("mask", mask, TaskError)
-        if mask.dtype != bool or mask.shape != (self.num_envs,):
-            raise TaskError(f"mask must be a bool array of shape ({self.num_envs},), got {mask.dtype} {mask.shape}")
-        return np.flatnonzero(mask)
-
-    def close(self) -> None:
-        """End the session. May be called twice."""
-        if not self._closed:
-            self._closed = True
-            self.link.close()
-            if self._shared is not None:
-                self._shared.close()
-                self._shared = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def _end(self) -> None:
+        self.link.close()
+        if self._shared is not None:
+            self._shared.close()
+            self._shared = None
 
     def __getattr__(self, name: str) -> Any:
         if name in STAYS:
@@ -357,20 +318,6 @@ class _Streams:
     def episode_seed(self) -> Array:
         """(N,) uint64, what the current episode of each env was drawn from."""
         return self._env.info["episode_seed"]
-
-
-class _Scene:
-    """Of the scene, what learners read."""
-
-    terrain = None
-
-    def __init__(self, env: RemoteEnv) -> None:
-        self._env = env
-
-    @property
-    def elapsed(self) -> Array:
-        """(N,) control steps of each env's episode."""
-        return self._env.info["elapsed_steps"]
 
 
 def _plain(value: Any) -> Any:

@@ -10,7 +10,7 @@ import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from anysim.task.snapshot import EnvSnapshot
 from anysim_client.env import RemoteEnv
 from anysim_client.errors import ConnectionLost, ServiceError, SessionGone, TookTooLong
 from anysim_client.link import Address, Link
+from anysim_client.served_env import ServedEnv
 
 _log = logging.getLogger(__name__)
 LOST = (ConnectionLost, SessionGone, TookTooLong)
@@ -55,8 +56,12 @@ class Member:
         """Its envs' numbers in the batch."""
         return np.arange(self.start, self.stop)
 
+    def rows(self, ids: Array) -> Array:
+        """Where its envs are among some of the batch, in their order."""
+        return np.flatnonzero((ids >= self.start) & (ids < self.stop))
 
-class PooledEnv:
+
+class PooledEnv(ServedEnv):
     """One batched env over many services, with the methods of an env of one service.
 
     Attributes:
@@ -76,28 +81,25 @@ class PooledEnv:
         self._request, self._images = dict(request), images
         self.members: list[Member] = []
         self.losses = 0
-        self._closed = False
+        self._spec: dict[str, Any] = {}
         try:
             for address in addresses:
                 env = self._session(address, request)
                 start = self.members[-1].stop if self.members else 0
                 self.members.append(Member(address, start, start + env.num_envs, env))
+                self._spec = self._spec or env.link.spec
                 self._refuse_another(env)
         except BaseException:
-            self.close()
+            self._end()
             raise
         first = self._any()
-        self._spec = first.link.spec
-        self.num_envs = self.members[-1].stop
+        super().__init__(self.members[-1].stop)
         self.name, self.source, self.action_dim = first.name, first.source, first.action_dim
         self.observation_sizes, self.image_shapes = first.observation_sizes, first.image_shapes
         self.engine = first.engine._replace(num_envs=self.num_envs)
         self.action_bounds, self.action_spaces = first.action_bounds, first.action_spaces
         seed = request.get("seed")
         self.streams = Streams(self.num_envs, first.spec.seed if seed is None else seed)
-        self.scene = _Scene(self)
-        self._code = np.zeros(self.num_envs, np.int8)
-        self._running = np.zeros(self.num_envs, bool)
         self._info = {
             "is_success": np.zeros(self.num_envs, bool),
             "fault": np.zeros(self.num_envs, bool),
@@ -121,7 +123,7 @@ class PooledEnv:
         raise ConnectionLost("all services of the pool are lost")
 
     def _refuse_another(self, env: RemoteEnv) -> None:
-        ours = getattr(self, "_spec", None) or self._any().link.spec
+        ours = self._spec
         for what in _MUST_AGREE:
             if env.link.spec[what] != ours[what]:
                 raise ServiceError(
@@ -141,31 +143,12 @@ class PooledEnv:
         """The latest observation of all envs; zero where a service is lost."""
         return {name: rows.copy() for name, rows in self._obs.items()}
 
-    @property
-    def status(self) -> Array:
-        """(N,) the word of `Status` for each env."""
-        return STATUS_NAMES[self._code]
-
-    @property
-    def info(self) -> dict[str, Array]:
-        """Info of all envs now, as in `StepResult.info`."""
-        return {name: rows.copy() for name, rows in self._info.items()}
-
-    @property
-    def running(self) -> Array:
-        """(N,) bool: reset, and not ended."""
-        return self._running.copy()
-
     def details(self) -> list[dict[str, Any]]:
         """Of each env what `RemoteEnv.details` tells; nothing where a service is lost."""
         told: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for member, answer in self._each(self.members, lambda env, _: env.details()):
             told[member.start : member.stop] = answer
         return told
-
-    def instruction(self, env: int) -> str:
-        """The task in words, as it is in an env's episode."""
-        return self.details()[env].get("instruction", "")
 
     # ------------------------------------------------------------------ episodes
 
@@ -182,7 +165,7 @@ class PooledEnv:
         Raises:
             ConnectionLost: no service of the pool answers.
         """
-        ids = self._chosen(mask)
+        ids = arrays.chosen(mask, self.num_envs, TaskError)
         if seed is not None:
             self.streams.seed(seed, ids)
         given = None if episode_seeds is None else arrays.wholes("episode_seeds", episode_seeds, len(ids), TaskError)
@@ -197,7 +180,7 @@ class PooledEnv:
                 self._revive(member)
 
         def begin(env: RemoteEnv, member: Member) -> None:
-            own = ids[(ids >= member.start) & (ids < member.stop)]
+            own = ids[member.rows(ids)]
             chosen = np.isin(member.ids, own)
             said = [each[i] for i in own.tolist()] if each else overrides
             env.reset(mask=chosen, episode_seeds=self.streams.episode_seed[own].tolist(), overrides=said)
@@ -248,7 +231,7 @@ class PooledEnv:
 
     def _stepped(self, mask: Array | None) -> Array:
         """The envs to step (N,) bool, by the rules of an env."""
-        wanted = np.isin(np.arange(self.num_envs), self._chosen(mask))
+        wanted = np.isin(np.arange(self.num_envs), arrays.chosen(mask, self.num_envs, TaskError))
         ended = wanted & ~self._running
         if not ended.any():
             return wanted
@@ -264,7 +247,7 @@ class PooledEnv:
         Raises:
             ConnectionLost: one of them is lost.
         """
-        ids = self._chosen(mask)
+        ids = arrays.chosen(mask, self.num_envs, TaskError)
         concerned = self._concerned(ids)
         if lost := [member.address.address for member in concerned if member.env is None]:
             raise ConnectionLost(f"envs of {lost[0]} are lost; reset them first")
@@ -291,13 +274,13 @@ class PooledEnv:
                 self._revive(member)
 
         def put(env: RemoteEnv, member: Member) -> None:
-            rows = np.flatnonzero((ids >= member.start) & (ids < member.stop))
+            rows = member.rows(ids)
             said = overrides if each is None else [each[row] for row in rows]
             env.reset_to(snapshot.rows(rows), ids[rows] - member.start, said)
 
         done = [member for member, _ in self._each(concerned, put)]
         for member in done:
-            rows = np.flatnonzero((ids >= member.start) & (ids < member.stop))
+            rows = member.rows(ids)
             self.streams.restore(ids[rows], snapshot.rows(rows).streams)
             self._gather(member)
         return {name: rows[ids] for name, rows in self._obs.items()}
@@ -312,7 +295,7 @@ class PooledEnv:
         found: dict[int, Array] = {}
 
         def draw(env: RemoteEnv, member: Member) -> None:
-            own = ids[(ids >= member.start) & (ids < member.stop)]
+            own = ids[member.rows(ids)]
             found.update(zip(own.tolist(), env.render(camera, own - member.start, **options), strict=True))
 
         self._each(self._concerned(ids), draw)
@@ -324,14 +307,14 @@ class PooledEnv:
         """End episodes that are given up: these envs are truncated now if they were running."""
         ids = np.asarray(env_ids)
         concerned = self._concerned(ids)
-        self._each(concerned, lambda env, m: env.retire(ids[(ids >= m.start) & (ids < m.stop)] - m.start))
+        self._each(concerned, lambda env, m: env.retire(ids[m.rows(ids)] - m.start))
         for member in concerned:
             self._gather(member)
 
     # ------------------------------------------------------------------ members
 
     def _concerned(self, ids: Array) -> list[Member]:
-        return [member for member in self.members if ((ids >= member.start) & (ids < member.stop)).any()]
+        return [member for member in self.members if len(member.rows(ids))]
 
     def _each(self, members: Sequence[Member], do: Callable[[RemoteEnv, Member], Any]) -> list[tuple[Member, Any]]:
         """Ask several members at once, each on a thread; what those answered that were not lost."""
@@ -407,38 +390,7 @@ class PooledEnv:
         shape, kind = self._spec["images"][name]
         return np.zeros((count, *shape), kind)
 
-    def _chosen(self, mask: Array | None) -> Array:
-        if mask is None:
-            return np.arange(self.num_envs)
-        mask = arrays.array("mask", mask, TaskError)
-        if mask.dtype != bool or mask.shape != (self.num_envs,):
-            raise TaskError(f"mask must be a bool array of shape ({self.num_envs},), got {mask.dtype} {mask.shape}")
-        return np.flatnonzero(mask)
-
-    def close(self) -> None:
-        """End all sessions. May be called twice."""
-        if not self._closed:
-            self._closed = True
-            for member in self.members:
-                if member.env is not None:
-                    member.env.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-
-class _Scene:
-    """Of the scene, what learners read."""
-
-    terrain = None
-
-    def __init__(self, env: PooledEnv) -> None:
-        self._env = env
-
-    @property
-    def elapsed(self) -> Array:
-        """(N,) control steps of each env's episode."""
-        return self._env.info["elapsed_steps"]
+    def _end(self) -> None:
+        for member in self.members:
+            if member.env is not None:
+                member.env.close()
