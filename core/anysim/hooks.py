@@ -17,6 +17,8 @@ from anysim import registry
 from anysim.errors import PluginFailure
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import typer
 
     from anysim.conventions import Array
@@ -58,6 +60,14 @@ class Specs:
     @hookspec
     def add_cli(self, app: "typer.Typer") -> None:
         """Add commands to the command line's typer application."""
+
+
+def join_group(app: "typer.Typer", group: str, **commands: "Callable[..., object]") -> None:
+    """Add commands by name to a group of the command line, where the distribution that makes the group is installed."""
+    for one in app.registered_groups:
+        if one.name == group and one.typer_instance is not None:
+            for name, command in commands.items():
+                one.typer_instance.command(name)(command)
 
 
 @cache

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from anysim.hooks import hookimpl
+from anysim.hooks import hookimpl, join_group
 
 if TYPE_CHECKING:
     import typer
@@ -14,7 +14,4 @@ def add_cli(app: "typer.Typer") -> None:
     from anysim_navigation import cli
 
     app.command("map")(cli.make_map)
-    for group in app.registered_groups:
-        if group.name == "bench" and group.typer_instance is not None:
-            group.typer_instance.command("navmesh")(cli.navmesh)
-            group.typer_instance.command("navigate")(cli.navigate)
+    join_group(app, "bench", navmesh=cli.navmesh, navigate=cli.navigate)

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from anysim.hooks import hookimpl
+from anysim.hooks import hookimpl, join_group
 
 if TYPE_CHECKING:
     import typer
@@ -14,7 +14,4 @@ def add_cli(app: "typer.Typer") -> None:
     from anysim_serving.cli import bench, serve
 
     app.command("serve")(serve.serve)
-    # the group of anysim-bench is there before: plugins join in the order of their names
-    for group in app.registered_groups:
-        if group.name == "bench" and group.typer_instance is not None:
-            group.typer_instance.command("serve")(bench.serve)
+    join_group(app, "bench", serve=bench.serve)  # which is there before: plugins join in the order of their names

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from anysim.hooks import hookimpl
+from anysim.hooks import hookimpl, join_group
 
 if TYPE_CHECKING:
     import typer
@@ -13,6 +13,4 @@ def add_cli(app: "typer.Typer") -> None:
     """`anysim bench touch`, where anysim-bench has made the group."""
     from anysim_tactile import cli
 
-    for group in app.registered_groups:
-        if group.name == "bench" and group.typer_instance is not None:
-            group.typer_instance.command("touch")(cli.touch)
+    join_group(app, "bench", touch=cli.touch)
