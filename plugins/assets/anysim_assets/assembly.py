@@ -27,6 +27,7 @@ from anysim.model.world import (
     Surface,
     Vec3,
 )
+from anysim_schemas.errors import KeyFault
 
 Colour = str | Sequence[float]
 
@@ -129,6 +130,24 @@ class Assembly:
         corners = np.array([low, high]) - np.array(origin)
         half, middle = 0.5 * (corners[1] - corners[0]), 0.5 * (corners[0] + corners[1])
         self.solid(body, name, Box(tidy(half)), tidy(middle), density, color)
+
+    def open_box(self, body: int, size: Vec3, wall: float, density: float, color: Colour, key: str) -> None:
+        """A floor and four walls of boards over the link's origin, of an outer `size`; `key` is the parameter's name.
+
+        Raises:
+            KeyFault: the walls leave nothing inside.
+        """
+        x, y, z = size[0] / 2, size[1] / 2, size[2]
+        if min(x, y) <= wall or z <= wall:
+            raise KeyFault(f"walls of {wall:g} m leave nothing of the {key}", key)
+        for name, low, high in (
+            ("floor", (-x, -y, 0.0), (x, y, wall)),
+            ("back", (-x, -y, wall), (-x + wall, y, z)),
+            ("front", (x - wall, -y, wall), (x, y, z)),
+            ("right", (-x + wall, -y, wall), (x - wall, -y + wall, z)),
+            ("left", (-x + wall, y - wall, wall), (x - wall, y, z)),
+        ):
+            self.board(body, name, low, high, density, color)
 
     def site(self, body: int, name: str, position: Vec3, quaternion: Quat = IDENTITY_QUATERNION) -> None:
         """A named frame on a link."""

@@ -4,7 +4,6 @@ from anysim.assets.model import ImportedModel
 from anysim_assets.assembly import Assembly
 from anysim_assets.parameters import Size
 from anysim_schemas.base import Color, Positive
-from anysim_schemas.errors import KeyFault
 
 
 def spoon(
@@ -32,18 +31,9 @@ def spoon(
     Raises:
         KeyFault: the walls leave nothing inside.
     """
-    x, y, z = bowl[0] / 2, bowl[1] / 2, bowl[2]
-    if min(x, y) <= wall or z <= wall:
-        raise KeyFault(f"walls of {wall:g} m leave nothing of the bowl", "bowl")
+    x, z = bowl[0] / 2, bowl[2]
     body = Assembly("spoon")
-    for name, low, high in (
-        ("floor", (-x, -y, 0.0), (x, y, wall)),
-        ("back", (-x, -y, wall), (-x + wall, y, z)),
-        ("front", (x - wall, -y, wall), (x, y, z)),
-        ("right", (-x + wall, -y, wall), (x - wall, -y + wall, z)),
-        ("left", (-x + wall, y - wall, wall), (x - wall, y, z)),
-    ):
-        body.board(0, name, low, high, density, color)
+    body.open_box(0, bowl, wall, density, color, "bowl")
     length, width, height = handle
     body.board(0, "handle", (-x - length, -width / 2, 0.0), (-x, width / 2, height), density, handle_color)
     body.site(0, "inside", (0.0, 0.0, wall))

@@ -5,7 +5,6 @@ from anysim.model.affordances import Affordance, AffordanceKind
 from anysim_assets.assembly import Assembly
 from anysim_assets.parameters import Size
 from anysim_schemas.base import Color, Positive
-from anysim_schemas.errors import KeyFault
 
 
 def tray(
@@ -22,18 +21,8 @@ def tray(
     Raises:
         KeyFault: the walls leave nothing inside.
     """
-    x, y, z = size[0] / 2, size[1] / 2, size[2]
-    if min(x, y) <= wall or z <= wall:
-        raise KeyFault(f"walls of {wall:g} m leave nothing of the size", "size")
     body = Assembly("tray")
-    for name, low, high in (
-        ("floor", (-x, -y, 0.0), (x, y, wall)),
-        ("back", (-x, -y, wall), (-x + wall, y, z)),
-        ("front", (x - wall, -y, wall), (x, y, z)),
-        ("right", (-x + wall, -y, wall), (x - wall, -y + wall, z)),
-        ("left", (-x + wall, y - wall, wall), (x - wall, y, z)),
-    ):
-        body.board(0, name, low, high, density, color)
+    body.open_box(0, size, wall, density, color, "size")
     body.site(0, "inside", (0.0, 0.0, wall))
     walls = tuple(f"base.{name}" for name in ("back", "front", "right", "left"))
     body.afford(Affordance("rim", AffordanceKind.RIM, "", walls, ("carry",), ((0.0, 0.0, -1.0),)))
