@@ -13,6 +13,7 @@ import numpy as np
 from anysim.conventions import Array
 from anysim.engine.capability import Capability
 from anysim.families.base import Family, FamilySetting
+from anysim.kinematics import inertia
 from anysim.math import pose as P
 from anysim.model.world import BodyKind
 
@@ -136,11 +137,8 @@ class CoSolver(Family):
         twist = np.concatenate([twist[..., :3] + P.cross(twist[..., 3:], arm), twist[..., 3:]], axis=-1)
         mass = np.where(self._held, np.inf, self._mass[env_ids])
         mass = np.where(there[:, self._entity], mass, 0.0)
-        xx, yy, zz, xy, xz, yz = np.moveaxis(self._inertia[env_ids], -1, 0)
-        inertia = np.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz], axis=-1).reshape(*own.shape[:2], 3, 3)
-        turn = P.to_matrix(own[..., 3:])
-        inertia = turn @ inertia @ np.swapaxes(turn, -1, -2)
-        return MetBodies(own[..., :3] + arm, twist, mass, inertia, self._friction[env_ids], there, pose)
+        tensor = inertia.turned(self._inertia[env_ids], own[..., 3:])
+        return MetBodies(own[..., :3] + arm, twist, mass, tensor, self._friction[env_ids], there, pose)
 
     # ------------------------------------------------------------------ what others ask of it
 

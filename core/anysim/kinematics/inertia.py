@@ -21,6 +21,7 @@ BALL_RADIUS = 0.01  # [m] of the solid ball that stands for a body with mass and
 VIRTUAL_SHARE = 1e-3
 """The share of a body's mass and inertia that a link without any of its own gets, where a joint needs one: nothing
 beside the body, and enough for single precision where axes of a chain fall into line."""
+_PLACES = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
 _SMALLEST = 1e-5  # [m] radius of gyration: below, an inertia is a placeholder for none
 _FLOOR = 1e-6  # smallest second moment of a moving body, relative to their sum: engines reject exact equality
 _NOISE = 1e-12
@@ -28,8 +29,18 @@ _NOISE = 1e-12
 
 def tensor(inertial: Inertial) -> Array:
     """The inertia about the centre of mass as a matrix (3, 3), body axes."""
-    xx, yy, zz, xy, xz, yz = inertial.inertia
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return matrices(np.array(inertial.inertia))
+
+
+def matrices(moments: Array) -> Array:
+    """(..., 3, 3) of moments (..., 6) in the order xx, yy, zz, xy, xz, yz."""
+    return moments[..., _PLACES]
+
+
+def turned(moments: Array, quaternion: Array) -> Array:
+    """Matrices (..., 3, 3) of moments (..., 6) of bodies that are turned by quaternions (..., 4)."""
+    turn = P.to_matrix(quaternion)
+    return M.product(turn, matrices(moments), np.swapaxes(turn, -1, -2))
 
 
 def make(mass: float, com: Array, matrix: Array) -> Inertial:

@@ -14,7 +14,8 @@ from anysim.conventions import Array
 from anysim.engine.capability import Capability
 from anysim.errors import SpecError, SpecIssue, listing, suggest
 from anysim.families.base import Family, FamilyPart, FamilySetting, FamilyState
-from anysim.math import pose as P
+from anysim.kinematics import inertia
+from anysim.math import matrix as M, pose as P
 from anysim_schemas.base import Flag, Number, Positive, Reference, Spec, Vec3
 
 STIFF, STIFF_TURN = 60.0, 40.0
@@ -73,7 +74,7 @@ class Hold(Family):
         self._grip = self.remember("grip", 7)
         self._clock = self.remember("clock")
         self._mass = self.remember("mass")
-        self._inertia = self.remember("inertia", 3, 3)
+        self._inertia = self.remember("inertia", 6)
 
     def _index(self, body: str, key: str, said: str) -> int:
         names = [one.name for one in self.engine.world.bodies]
@@ -89,8 +90,7 @@ class Hold(Family):
     def reset(self, env_ids: Array) -> None:
         bodies = self._only
         self._mass[env_ids] = self.engine.get_parameters("body.mass", env_ids, bodies)[:, 0]
-        xx, yy, zz, xy, xz, yz = self.engine.get_parameters("body.inertia", env_ids, bodies)[:, 0].T
-        self._inertia[env_ids] = np.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz], axis=-1).reshape(-1, 3, 3)
+        self._inertia[env_ids] = self.engine.get_parameters("body.inertia", env_ids, bodies)[:, 0]
         self._grip[env_ids, 6] = 1.0
         if self.spec_.begins:
             self._grip[env_ids] = self._begin
@@ -144,10 +144,9 @@ class Hold(Family):
         force[:, 2] -= self._mass[ids] * self.engine.world.physics.gravity[2]
         rate = min(STIFF_TURN, 0.35 / duration)
         left = P.rotation_vector(P.multiply(wanted[:, 3:], P.conjugate(pose[:, 1, 3:])))
-        turn = P.to_matrix(pose[:, 1, 3:])
         asked = rate**2 * left + 2.0 * rate * (spin - turning)
-        inertia = turn @ self._inertia[ids] @ np.swapaxes(turn, 1, 2)
-        torque, _ = _bounded((inertia @ asked[..., None])[..., 0], self.spec_.torque)
+        tensor = inertia.turned(self._inertia[ids], pose[:, 1, 3:])
+        torque, _ = _bounded(M.product(tensor, asked[..., None])[..., 0], self.spec_.torque)
         self._clock[ids] = np.where(overcome, self._clock[ids] + duration, 0.0)
         gives = self._clock[ids] >= self.spec_.patience
         self.holding[ids[gives]], self._clock[ids[gives]] = GIVEN, 0.0

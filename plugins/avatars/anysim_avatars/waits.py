@@ -1,5 +1,6 @@
 """Skills that stand still until a person is ready: a hand that reaches out, holds, or is out of the way."""
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -27,9 +28,9 @@ class _Waits(PhasedSkill):
         self._ready = np.zeros(env.num_envs, dtype=np.int64)
         super().__init__(env)
 
+    @abstractmethod
     def ready(self, ids: Array, at: Array) -> Array:
         """(n,) STAY, GO_ON where it is as it should be, or a failure."""
-        raise NotImplementedError
 
     def make_phases(self) -> Sequence[Phase]:
         return (Phase("wait", self._begin, self._wait, self._patience),)

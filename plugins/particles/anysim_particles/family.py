@@ -49,8 +49,8 @@ class Particles(CoSolver):
         """(n,) [kg] of a particle."""
 
     @abstractmethod
-    def step_env(self, row: int, env: int, proxies: object, duration: float) -> None:
-        """Move the particles of an env on, which is row `row` of those that are asked for."""
+    def step_env(self, env: int, proxies: object, duration: float) -> None:
+        """Move the particles of an env on, of which there are some."""
 
     @classmethod
     def members(cls, spec: MatterSpec) -> int:
@@ -151,6 +151,8 @@ class Particles(CoSolver):
 
         def one(row: int) -> None:
             env = int(env_ids[row])
+            if not self.count[env]:
+                return
             proxies = Proxies(
                 com[row],
                 com[row].copy(),
@@ -167,7 +169,7 @@ class Particles(CoSolver):
                 posed.there[row],
                 friction[row],
             )
-            self.step_env(row, env, proxies, duration)
+            self.step_env(env, proxies, duration)
 
         threads = min(self._threads, n)
         if threads > 1:

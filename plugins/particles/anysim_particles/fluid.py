@@ -44,12 +44,10 @@ class Fluid(Particles):
     def disordered(self, env: int) -> Array:
         return self._block + self.generator(env, "packing").uniform(-1e-3, 1e-3, self._block.shape) * self.fluid.spacing
 
-    def step_env(self, row: int, env: int, proxies: Any, duration: float) -> None:
+    def step_env(self, env: int, proxies: Any, duration: float) -> None:
         from anysim_particles.kernels.fluid import fluid_step
 
         fluid, count = self.fluid, int(self.count[env])
-        if count == 0:
-            return
         fluid_step(
             self.x[env],
             self.v[env],

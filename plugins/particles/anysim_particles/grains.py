@@ -34,12 +34,10 @@ class Grains(Particles):
         super().fill(env_ids)
         self.friction[env_ids] = self.drawn_value("friction", env_ids)
 
-    def step_env(self, row: int, env: int, proxies: Any, duration: float) -> None:
+    def step_env(self, env: int, proxies: Any, duration: float) -> None:
         from anysim_particles.kernels.grains import grain_step
 
         grains, count = self.grains, int(self.count[env])
-        if count == 0:
-            return
         grain_step(
             self.x[env],
             self.v[env],

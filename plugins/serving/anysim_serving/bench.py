@@ -20,7 +20,6 @@ import numpy as np
 from anysim.task.contract import Obs
 from anysim_client import wire
 from anysim_client.connect import connect
-from anysim_client.env import RemoteEnv
 from anysim_client.errors import ServiceError
 from anysim_client.websocket import WebSocket
 
@@ -71,10 +70,10 @@ def costs(seconds: float) -> Iterator[Cost]:
 
 
 def _cost(what: str, env: Any, keys: list[str], said: dict[str, Any], seconds: float) -> Cost:
-    size = sum(rows.nbytes for rows in _observed(env, keys).values())
+    size = sum(rows.nbytes for rows in env.observe(keys).values())
     frame = len(wire.pack({"bytes": np.zeros(64 if env.shares_memory else size, np.uint8)}))
     with _echo(said["echo"], frame) as echo:
-        ours, theirs = _in_turn(lambda: _observed(env, keys), echo, said["process"], seconds)
+        ours, theirs = _in_turn(lambda: env.observe(keys), echo, said["process"], seconds)
     mb = size / 1e6
     if env.shares_memory:
         budget, missed = f"{SHARED_MS:g} ms", ours.ms > SHARED_MS
@@ -83,10 +82,6 @@ def _cost(what: str, env: Any, keys: list[str], said: dict[str, Any], seconds: f
     else:
         budget, missed = f"{ROUND_TRIP_MS:g} ms", ours.ms > ROUND_TRIP_MS
     return Cost(what, mb, ours, theirs, budget, missed)
-
-
-def _observed(env: RemoteEnv, keys: list[str]) -> Obs:
-    return env.observe(keys)
 
 
 def _in_turn(
@@ -156,7 +151,6 @@ class Soak(NamedTuple):
     memory_mb: float
     memory_end_mb: float
     sessions_left: int
-    threads_begun: int
     threads_left: int
 
 
@@ -214,9 +208,7 @@ def soak(clients: int, seconds: float) -> Soak:
             time.sleep(0.1)
         total = float(sum(counted))
         fairness = total**2 / (clients * float(np.sum(np.square(counted)))) if total else 0.0
-        return Soak(
-            clients, took, counted, tuple(errors), fairness, memory, memory_end, left, clients, max(threads_left, 0)
-        )
+        return Soak(clients, took, counted, tuple(errors), fairness, memory, memory_end, left, max(threads_left, 0))
 
 
 def _sessions(said: dict[str, Any]) -> int:
