@@ -2,15 +2,18 @@
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from json import dumps
-from typing import Annotated, Any
+from math import inf
+from typing import Annotated, Any, TypeVar
 
 import typer
 from typer.core import TyperGroup
 
-from anysim.errors import PluginError, TaskError
+from anysim.errors import PluginError, TaskError, listing, suggest
 from anysim.registry import INSTALL_HINTS
+
+N = TypeVar("N", int, float)
 
 Task = Annotated[str, typer.Argument(metavar="TASK", help="An installed task (`anysim list tasks`) or a YAML file.")]
 Engine = Annotated[
@@ -65,6 +68,37 @@ def option_values(pairs: Sequence[str] | None, example: str) -> dict[str, Any]:
             raise TaskError(f"--option {pair}: the value cannot be read: {faults[0].message}")
         values[key] = node.plain()
     return values
+
+
+def parts(text: str, option: str, among: Collection[str] = ()) -> list[str]:
+    """The words of an option's value, which commas separate.
+
+    Raises:
+        TaskError: there is none, or one that is not `among` those that there are.
+    """
+    found = [part.strip() for part in text.split(",") if part.strip()]
+    for part in found or [text]:
+        if not found or (among and part not in among):
+            near = suggest(part, list(among))
+            known = f"{near} (there are: {listing(among)})" if among else "; expected words, separated by commas"
+            raise TaskError(f"{option}: there is no '{part}'{known}")
+    return found
+
+
+def numbers(text: str, option: str, kind: type[N], least: float) -> list[N]:
+    """The numbers of an option's value, which commas separate.
+
+    Raises:
+        TaskError: there is none, or one that is no number of at least `least`.
+    """
+    try:
+        found = [kind(part) for part in parts(text, option)]
+    except ValueError:
+        found = []
+    if not found or not all(least <= number < inf for number in found):
+        what = "whole numbers" if kind is int else "numbers"
+        raise TaskError(f"{option} {text}: expected {what} of at least {least:g}, separated by commas")
+    return found
 
 
 UNWRAPPED = "\b\n"

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from anysim.cli.options import AsJson
+from anysim.cli.options import AsJson, numbers, parts
 
 
 def stopping(
@@ -20,14 +20,14 @@ def stopping(
       anysim bench stopping --engines mujoco,pybullet,sapien
     """
     from anysim.cli.output import counting, print_json, print_table
-    from anysim_mobile.stopping import Stop, stop
+    from anysim_mobile.stopping import BASES, Stop, stop
 
     cases = [
-        (robot, engine, float(speed), float(latency))
-        for robot in robots.split(",")
-        for engine in engines.split(",")
-        for latency in latencies.split(",")
-        for speed in speeds.split(",")
+        (robot, engine, speed, latency)
+        for robot in parts(robots, "--robots", BASES)
+        for engine in parts(engines, "--engines")
+        for latency in numbers(latencies, "--latencies", float, 0.0)
+        for speed in numbers(speeds, "--speeds", float, 0.05)
     ]
     found: list[Stop] = []
     with counting("stops", len(cases), quiet=json) as show:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from anysim.cli.options import AsJson, Overrides
+from anysim.cli.options import AsJson, Overrides, parts
 
 
 def make_map(
@@ -132,7 +132,7 @@ def navigate(
 
     store = DriveStore(out)
     cells = [
-        Cell(robot.strip(), engine.strip(), people) for robot in robots.split(",") for engine in engines.split(",")
+        Cell(robot, engine, people) for robot in parts(robots, "--robots") for engine in parts(engines, "--engines")
     ]
     with counting("rooms", rooms * len(cells), quiet=json) as show:
         for cell in cells:

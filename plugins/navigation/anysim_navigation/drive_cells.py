@@ -9,6 +9,7 @@ import numpy as np
 
 from anysim.errors import AnysimError
 from anysim.math.statistics import wilson
+from anysim.record.commit import write_whole
 from anysim_navigation.drive_bench import BASES, Drive, Driving
 
 PLACES = {"seconds": 2, "length": 2, "hardest": 1, "tick": 3}
@@ -54,9 +55,7 @@ class DriveStore:
         lines = [
             json.dumps({**found._asdict(), "drives": sorted(drives)}) for found, drives in sorted(self.drives.items())
         ]
-        draft = self.path.with_name(f"{self.path.name}.draft")
-        draft.write_text("[\n" + ",\n".join(lines) + "\n]\n", "utf-8")
-        draft.replace(self.path)
+        write_whole(self.path.parent, {self.path.name: "[\n" + ",\n".join(lines) + "\n]\n"})
 
 
 def figures(cell: Cell, drives: list[Drive]) -> dict[str, Any]:

@@ -11,6 +11,8 @@ import anysim
 SETTLE = 15
 """Control steps until it is measured."""
 SUBSTEPS = 5
+EDGES = {"fluid": 0.01, "sand": 2.5 * 0.005, "rice": 3.125e-3}
+"""[m] of the cell of a particle, by family."""
 
 
 class FamilyCost(NamedTuple):
@@ -51,7 +53,7 @@ def tank(edge: float, height: float, wall: float = 0.02) -> dict[str, Any]:
 
 def world_of(kind: str, particles: int) -> dict[str, Any]:
     """The tank with about so many particles of a family, as deep as it is wide, and a box over it."""
-    size = {"fluid": 0.01, "sand": 2.5 * 0.005, "rice": 3.125e-3}[kind]
+    size = EDGES[kind]
     members = 4 if kind == "rice" else 1
     side = max(3, round((particles / members) ** (1 / 3)))
     edge, deep = side * size, side * size

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from anysim.cli.options import AsJson
+from anysim.cli.options import AsJson, numbers, parts
 
 
 def families(
@@ -24,14 +24,14 @@ def families(
       anysim bench families --engine mujoco,pybullet,sapien --particles 1000
     """
     from anysim.cli.output import print_json, print_table
-    from anysim_particles.bench import cost
+    from anysim_particles.bench import EDGES, cost
 
     found = [
-        cost(kind.strip(), int(size), int(envs), name.strip(), steps)
-        for name in engine.split(",")
-        for kind in kinds.split(",")
-        for size in particles.split(",")
-        for envs in num_envs.split(",")
+        cost(kind, size, envs, name, steps)
+        for name in parts(engine, "--engine")
+        for kind in parts(kinds, "--kinds", EDGES)
+        for size in numbers(particles, "--particles", int, 1)
+        for envs in numbers(num_envs, "--num-envs", int, 1)
     ]
     if json:
         print_json([one._asdict() for one in found])

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from anysim.cli.options import Overrides, Seed
+from anysim.cli.options import Overrides, Seed, parts
 
 
 def picture(
@@ -42,7 +42,7 @@ def picture(
     from anysim_schemas.files import exists
 
     require_matplotlib("the picture needs matplotlib")
-    names = [name.strip() for name in engines.split(",")] if engines else list(runnable(Capability.RENDER_RGB))
+    names = parts(engines, "--engines") if engines else list(runnable(Capability.RENDER_RGB))
     file = Path(world)
     with working_on(f"drawing {world}", in_a_pipe=True) as tell:
         tell(f"reading {world}")
