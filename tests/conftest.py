@@ -1,5 +1,6 @@
 """Rules of every test: markers, a cache of its own, and nothing left behind."""
 
+import gc
 import multiprocessing
 import os
 import threading
@@ -26,6 +27,13 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "slow: takes many seconds; `make test` leaves it out, `make test-slow` runs it")
     config.addinivalue_line("markers", "full: takes minutes and rarely finds more; only `make test-full` runs it")
     os.environ["ANYSIM_CACHE_DIR"] = str(ROOT / ".cache" / "tests")
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_finish() -> None:
+    """Ten thousand tests live until the end: each full collection that an engine asks for would go through them."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.hookimpl(wrapper=True)
