@@ -8,11 +8,15 @@ and the frozen World, over a socket pair that no other process can reach.
 import json
 import os
 import select
+import signal
 import socket
 import struct
 import subprocess
 import sys
+import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from multiprocessing.spawn import get_executable
 from typing import Any
@@ -31,6 +35,23 @@ GRACE_S = 10.0
 
 THREAD_POOLS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "LP_NUM_THREADS")
 """The variables that size the thread pools of the libraries engines compute and draw with."""
+
+
+@contextmanager
+def _one_message() -> Iterator[None]:
+    """Within it Ctrl-C waits: after half a message nobody could tell where the next one begins."""
+    handler = signal.getsignal(signal.SIGINT) if threading.current_thread() is threading.main_thread() else None
+    if not callable(handler):  # the signal is ignored, or raises nothing in this thread
+        yield
+        return
+    came = list[tuple[int, Any]]()
+    signal.signal(signal.SIGINT, lambda *words: came.append(words))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        if came:
+            handler(*came[0])
 
 
 class WorkerLost(Exception):
@@ -92,11 +113,12 @@ class Worker:
         """
         self._sent += 1  # before all else: whatever Ctrl-C interrupts from here on, the number is not used again
         try:
-            while self._arrival.poll(0):  # of calls that were interrupted; their worker may be waiting to write
-                self._connection.recv()
-            self._connection.send((self._sent, *message))
-            if descriptor is not None:
-                socket.send_fds(self._socket, [b"+"], [descriptor])
+            with _one_message():
+                while self._arrival.poll(0):  # of calls that were interrupted; their worker may be waiting to write
+                    self._connection.recv()
+                self._connection.send((self._sent, *message))
+                if descriptor is not None:
+                    socket.send_fds(self._socket, [b"+"], [descriptor])
         except BlockingIOError:
             raise WorkerLost(self._hangs(self._timeout)) from None
         except (EOFError, OSError):
@@ -124,7 +146,8 @@ class Worker:
         try:
             if not self.has_news(max(0.0, deadline - time.perf_counter())):
                 raise WorkerLost(self._hangs(limit))
-            return self._connection.recv()
+            with _one_message():
+                return self._connection.recv()
         except BlockingIOError:
             raise WorkerLost(self._hangs(self._timeout)) from None
         except (EOFError, OSError, ValueError):  # ValueError: closed here, when it was lost before

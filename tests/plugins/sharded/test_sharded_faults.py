@@ -5,6 +5,7 @@ import re
 import signal
 import sys
 import warnings
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
@@ -256,6 +257,26 @@ def test_an_interrupted_call_leaves_a_usable_engine(moody, monkeypatch):
         got, wanted = read(engine, fields=FIELDS[:4]), read(alone, fields=FIELDS[:4])
         del got["time"], wanted["time"]  # the call did not come to the point of counting
         assert_same(got, wanted, "after the interruption")
+
+
+def test_ctrl_c_within_a_message_waits_for_its_end(monkeypatch):
+    """The length of an answer was read and the answer not: nothing could be read from that worker any more."""
+    alone, engine = _pair()
+    with alone, engine:
+        read_bytes = Connection._recv
+
+        def interrupted(*words):
+            monkeypatch.setattr(Connection, "_recv", read_bytes)
+            length = read_bytes(*words)
+            signal.raise_signal(signal.SIGINT)
+            return length
+
+        monkeypatch.setattr(Connection, "_recv", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            engine.step(2)
+        alone.step(2)
+        assert np.array_equal(engine.get_state().body_pose, alone.get_state().body_pose)
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_the_episode_of_a_lost_env_counts_as_failed():
