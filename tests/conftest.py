@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
+    from typer import Typer
+
     from anysim.assets.model import ImportedModel
     from anysim.model.world import World
 
@@ -68,6 +70,17 @@ def _nothing_runs_on() -> Iterator[None]:
     processes = [f"{p.name} ({p.pid})" for p in multiprocessing.active_children()]
     assert not threads, f"threads that no test stopped: {', '.join(threads)}"
     assert not processes, f"processes that no test stopped: {', '.join(processes)}"
+
+
+@pytest.fixture(scope="session")
+def command_line() -> "Typer":
+    """The application as users have it: with the commands of plugins."""
+    from anysim import hooks
+    from anysim.cli.main import app
+
+    if not any(command.name == "run" for command in app.registered_commands):
+        hooks.add_commands(app)
+    return app
 
 
 INERTIAL = '<inertial><mass value="{m}"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>'

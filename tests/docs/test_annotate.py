@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anysim import hooks
-from anysim.cli.main import app, main
+from anysim.cli.main import main
 from anysim.testing.engines import require_drawing
 from anysim_annotation.files import read_records
 
@@ -22,10 +21,9 @@ SAID = re.findall(r"^    (anysim .*)$", PAGE, re.MULTILINE)
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("command_line")
 def test_the_commands_of_the_page_make_what_it_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     require_drawing("mujoco")
-    if not any(command.name == "render" for command in app.registered_commands):
-        hooks.add_commands(app)
     monkeypatch.chdir(tmp_path)
     for name in ("desk.yaml", "job.yaml"):
         shutil.copy(WORLDS / name, tmp_path)

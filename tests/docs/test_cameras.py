@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from anysim import hooks
-from anysim.cli.main import app, main
+from anysim.cli.main import main
 from anysim.record.reader import open_trajectory
 from anysim.testing.engines import require_drawing
 
@@ -19,11 +18,10 @@ LOOKS = {"camera/eye/depth", "camera/eye/segmentation", "annotation/eye/camera",
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("command_line")
 @pytest.mark.parametrize("line", SAID, ids=lambda line: shlex.split(line)[-1])
 def test_a_command_of_the_page_records_what_it_says(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     require_drawing("mujoco")
-    if not any(command.name == "run" for command in app.registered_commands):
-        hooks.add_commands(app)
     out = tmp_path / shlex.split(line)[-1]
     words = [str(ROOT / word) if word.startswith("docs/") else word for word in shlex.split(line)]
     monkeypatch.chdir(tmp_path)

@@ -6,6 +6,8 @@ parameters, never of the result, so that it is equal on all machines.
 
 import io
 import re
+from collections.abc import Callable
+from functools import lru_cache
 from itertools import islice
 from math import inf, nan
 from pathlib import Path
@@ -26,10 +28,12 @@ FORMATS = (".stl", ".obj", ".dae", ".glb", ".ply")
 HULL_VERTICES = 64  # what PhysX takes in a convex mesh with margin; enough for grasping at millimetres
 VISUAL_ERROR = 0.002  # [m] that what is looked at may be off
 VISUAL_COLORS = 6
+SMALL_BYTES = 256_000  # arrays of a mesh up to so large stay in memory
 MATERIAL_FILES = 100  # of one .obj; what it names beyond is not read
 _VERSION = "anysim-mesh-4"  # change with anything that changes the result
 _ONE: Vec3 = (1.0, 1.0, 1.0)
 Color = tuple[float, float, float, float]
+_units: dict[str, float] = {}
 
 
 class VisualPart(NamedTuple):
@@ -61,7 +65,7 @@ def collision_mesh(path: Path, scale: Vec3 = _ONE, *, upright: bool = False) -> 
         vertices, faces = convex_hull(points, HULL_VERTICES)
         return {"vertices": vertices, "faces": faces}
 
-    return _mesh(path.stem, key, cache.load_or_make("meshes", key, make))
+    return _mesh(path.stem, key, _arrays(key, make))
 
 
 def whole_mesh(path: Path, scale: Vec3 = _ONE, *, upright: bool = False) -> Mesh:
@@ -76,7 +80,7 @@ def whole_mesh(path: Path, scale: Vec3 = _ONE, *, upright: bool = False) -> Mesh
         joined = decimated(vertices, faces, 0.0)
         return {"vertices": joined[0], "faces": joined[1]}
 
-    return _mesh(path.stem, key, cache.load_or_make("meshes", key, make))
+    return _mesh(path.stem, key, _arrays(key, make))
 
 
 def hull_of(name: str, vertices: Array, source: str) -> Mesh:
@@ -87,7 +91,7 @@ def hull_of(name: str, vertices: Array, source: str) -> Mesh:
         hull = convex_hull(np.asarray(vertices, dtype=float), HULL_VERTICES)
         return {"vertices": hull[0], "faces": hull[1]}
 
-    return _mesh(name, key, cache.load_or_make("meshes", key, make))
+    return _mesh(name, key, _arrays(key, make))
 
 
 def light_mesh(name: str, vertices: Array, faces: Array, source: str, *, error: float = VISUAL_ERROR) -> Mesh:
@@ -98,7 +102,7 @@ def light_mesh(name: str, vertices: Array, faces: Array, source: str, *, error: 
         light = decimated(np.asarray(vertices, dtype=float), np.asarray(faces), error)
         return {"vertices": light[0], "faces": light[1]}
 
-    return _mesh(name, key, cache.load_or_make("meshes", key, make))
+    return _mesh(name, key, _arrays(key, make))
 
 
 def visual_parts(
@@ -128,7 +132,7 @@ def visual_parts(
             arrays[f"{i}/color"] = np.array(color if color is not None else (), dtype=float)
         return arrays
 
-    stored = cache.load_or_make("meshes", key, make)
+    stored = _arrays(key, make)
     parts: list[VisualPart] = []
     for i in range(len(stored) // 3):
         arrays = {name: stored[f"{i}/{name}"] for name in ("vertices", "faces")}
@@ -137,6 +141,25 @@ def visual_parts(
         rgba = (float(color[0]), float(color[1]), float(color[2]), float(color[3])) if len(color) else None
         parts.append(VisualPart(mesh, rgba))
     return tuple(parts)
+
+
+def _arrays(key: str, make: Callable[[], dict[str, Array]]) -> dict[str, Array]:
+    """Those of the cache, read-only. Small ones stay in memory for a while: a world is often compiled again."""
+    kept = _kept(key)
+    if kept:
+        return kept
+    arrays = cache.load_or_make("meshes", key, make)
+    for array in arrays.values():
+        array.setflags(write=False)
+    if sum(array.nbytes for array in arrays.values()) <= SMALL_BYTES:
+        kept.update(arrays)
+    return arrays
+
+
+@lru_cache(maxsize=256)
+def _kept(key: str) -> dict[str, Array]:
+    """What stays in memory of an entry of the cache: nothing yet."""
+    return {}
 
 
 def _mesh(name: str, key: str, arrays: dict[str, Array]) -> Mesh:
@@ -153,10 +176,9 @@ def _key(path: Path, *parameters: object) -> str:
         raise AssetError(f"{path}: mesh files are {', '.join(FORMATS)}; '{path.suffix}' is not known")
     data = bounded(path, MESH_BYTES)
     materials = b"".join(bounded(file, MESH_BYTES) for file in _material_files(path, data))
-    unit = _declared(path, data).metres
-    if unit != 1.0:
-        parameters = (*parameters, unit)
-    return cache.digest(_VERSION, path.suffix.lower(), data, materials, *(repr(p) for p in parameters))
+    key = cache.digest(_VERSION, path.suffix.lower(), data, materials, *(repr(p) for p in parameters))
+    unit = _units[key] = _units.get(key) or _declared(path, data).metres
+    return key if unit == 1.0 else cache.digest(key, repr(unit))
 
 
 def _declared(path: Path, data: bytes) -> _ColladaHead:

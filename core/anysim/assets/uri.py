@@ -35,6 +35,10 @@ _MODEL_FOLDERS = frozenset({"urdf", "robots", "xml", "mjcf", "xacro"})
 _SEARCHED = 5000  # files looked at for a near name in an error message
 
 
+Folders = dict[str, list[tuple[Path, Path]]]
+"""Of packages by name: what no file of it may leave, and a folder where it may lie."""
+
+
 class AssetFile(NamedTuple):
     """An existing file, and the folder that no reference inside it may leave. Both are absolute and resolved."""
 
@@ -111,13 +115,19 @@ def _folder_inside(root: Path, rest: str, uri: str) -> AssetFile:
 
 
 def resolve_reference(
-    reference: str, *, file: Path, root: Path, asked_by: str, packages: Mapping[str, Path] = MappingProxyType({})
+    reference: str,
+    *,
+    file: Path,
+    root: Path,
+    asked_by: str,
+    packages: Mapping[str, Path] = MappingProxyType({}),
+    found: Folders | None = None,
 ) -> Path:
     """The file that a mesh reference in the URDF or MJCF `file` stands for.
 
     `package://NAME/rest` (and `model://`) is a file of the package NAME, and of no other: see `_folders_of_package`.
     All else is relative to the file. `asked_by` names what asks, as in `link 'panda_hand' of panda.urdf`, `packages`
-    the folders of packages by name.
+    the folders of packages by name. `found` keeps where packages lie for the next reference in the same file.
 
     Raises:
         AssetError: missing (says where it was looked for and the nearest name there is), or outside of the root.
@@ -132,7 +142,10 @@ def resolve_reference(
         candidates = [(root, Path(rest))]
     elif scheme in ("package", "model"):
         package, _, tail = rest.lstrip("/").partition("/")  # package:///NAME/rest is met, too
-        folders = _folders_of_package(package, file.resolve(), root, packages)
+        found = {} if found is None else found
+        if package not in found:
+            found[package] = _folders_of_package(package, file.resolve(), root, packages)
+        folders = found[package]
         candidates = [(limit, folder / tail) for limit, folder in folders if folder.is_dir()]
         if not candidates:
             places = listing(dict.fromkeys(str(folder) for _, folder in folders), 4)

@@ -9,7 +9,7 @@ import numpy as np
 from anysim.assets.bounded_files import check
 from anysim.assets.meshes import collision_mesh, visual_parts
 from anysim.assets.model import ImportNote
-from anysim.assets.uri import resolve_reference
+from anysim.assets.uri import Folders, resolve_reference
 from anysim.conventions import Array
 from anysim.errors import AssetError
 from anysim.math import pose as P
@@ -43,6 +43,7 @@ class GeometryReader:
         self.geom_links: list[str] = []
         self.meshes: dict[str, Mesh] = {}
         self._read: dict[tuple[Path, Vec3], int] = {}
+        self._folders: Folders = {}
 
     def read(self, link: LinkElement, body: int, pose: Array) -> None:
         """Add the geometry of a link whose frame has this pose (7,) in the body."""
@@ -103,7 +104,12 @@ class GeometryReader:
     def _path(self, link: str, mesh: urdf_xml.Shape) -> Path:
         who = self._file.where("link", link)
         path = resolve_reference(
-            mesh.filename, file=self._file.path, root=self._root, asked_by=who, packages=self._packages
+            mesh.filename,
+            file=self._file.path,
+            root=self._root,
+            asked_by=who,
+            packages=self._packages,
+            found=self._folders,
         )
         self._read[path, self._mesh_scale(mesh)] = path.stat().st_size
         check(self._file.path, ASSET_BYTES, sum(self._read.values()))

@@ -6,11 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer import Typer
 from typer.testing import CliRunner
 
 import anysim
-from anysim import hooks
-from anysim.cli.main import app
 from anysim.errors import AnysimError, RecordError
 from anysim.record.collector import Collector
 from anysim.record.commit import describe
@@ -148,15 +147,7 @@ def test_other_sources_parameters_and_cameras_are_refused_in_words(run: list[Pat
         make(run[:1], "point_cloud", FilmOrder(("frond",)))
 
 
-@pytest.fixture
-def command() -> CliRunner:
-    """The command line with the commands of plugins."""
-    if not any(command.name == "render" for command in app.registered_commands):
-        hooks.add_commands(app)
-    return CliRunner()
-
-
-def test_the_command_says_what_it_made(command: CliRunner, run: list[Path]) -> None:
+def test_the_command_says_what_it_made(command_line: Typer, run: list[Path]) -> None:
     words = [
         "render",
         str(run[0]),
@@ -170,18 +161,18 @@ def test_the_command_says_what_it_made(command: CliRunner, run: list[Path]) -> N
         "--annotate",
         "boxes_2d",
     ]
-    first = command.invoke(app, [*words, "--json"])
+    first = CliRunner().invoke(command_line, [*words, "--json"])
     assert first.exit_code == 0, first.exception
     said = json.loads(first.stdout)
     assert (said["annotated"], said["images"]) == (1, 4)
     boxes = read_records(Path(said["trajectories"][0]["directory"]) / "front.boxes_2d.jsonl")
     assert {box["name"] for box in boxes} <= {"panda", "table", "cube"}
-    again = command.invoke(app, words)
+    again = CliRunner().invoke(command_line, words)
     assert "0 of 1 episodes annotated" in again.stdout
 
 
-def test_a_job_of_images_takes_no_option_of_recordings(command: CliRunner, tmp_path: Path) -> None:
-    failed = command.invoke(app, ["render", str(tmp_path / "desk.yaml"), "-c", "front"])
+def test_a_job_of_images_takes_no_option_of_recordings(command_line: Typer, tmp_path: Path) -> None:
+    failed = CliRunner().invoke(command_line, ["render", str(tmp_path / "desk.yaml"), "-c", "front"])
     assert isinstance(failed.exception, AnysimError)
     assert str(failed.exception).startswith("--camera: what a job of still images draws stands in")
 

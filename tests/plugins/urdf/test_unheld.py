@@ -5,12 +5,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from typer import Typer
 from typer.testing import CliRunner
 
 from anysim import load
 from anysim.api import compile_world
 from anysim.assets.model import ImportedModel
-from anysim.cli.main import app
 from anysim.compile.edit import without_entity
 from anysim.record.collector import run_header
 from anysim_urdf.unheld import READ
@@ -131,7 +131,7 @@ def test_every_element_of_the_format_is_read_or_noted(path: str, urdf: Load) -> 
 
 
 def test_they_are_told_by_check_and_kept_with_what_is_recorded(
-    tmp_path: Path, inertial: Callable[[float], str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, inertial: Callable[[float], str], monkeypatch: pytest.MonkeyPatch, command_line: Typer
 ) -> None:
     """A line with their count, all with -v, in the manifest; with the thing they go."""
     monkeypatch.chdir(tmp_path)
@@ -139,11 +139,14 @@ def test_they_are_told_by_check_and_kept_with_what_is_recorded(
     (tmp_path / "world.yaml").write_text(
         "engine: 'null'\nworld: {objects: {thing: {source: thing.urdf, count: 2}, box: {source: {box: [1, 1, 1]}}}}\n"
     )
-    run = CliRunner().invoke
-    short, long = run(app, ["check", "world.yaml"]).output, run(app, ["check", "world.yaml", "-v"]).output
+
+    def check(*options: str) -> str:
+        return CliRunner().invoke(command_line, ["check", "world.yaml", *options]).output
+
+    short, long = check(), check("-v")
     assert "imported: 1 notes of what sources say and the world does not (thing); `anysim check world.yaml -v`" in short
     assert "imported: thing: <gazebo>: is left out: what it says of friction" in long
-    (told,) = json.loads(run(app, ["check", "world.yaml", "--json"]).output)["world.yaml"]["notes"]
+    (told,) = json.loads(check("--json"))["world.yaml"]["notes"]
     assert told.startswith("thing: <gazebo>: is left out")
     world = compile_world(load(tmp_path / "world.yaml"))
     assert [thing for thing, _ in world.notes] == ["thing"]
