@@ -4,6 +4,7 @@ import difflib
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, cast
 
@@ -98,8 +99,7 @@ class Reader:
             subject = "it" if asked is None else f"the file '{shown}' that it extends"
             self.fatal.append(Fault(place, where, f"{subject} {_read_problem(error, path)}"))
             return None
-        problems: list[Fault] = []
-        node = parse(text, shown, problems)
+        node, problems = _parsed(text, shown)
         (self.faults if node is not None else self.fatal).extend(problems)
         if node is None:
             return None
@@ -162,6 +162,13 @@ class Reader:
             return self._extends is not None and bool(self._extends(f"task:{name}"))
         except (AnysimError, LookupError, OSError):
             return False
+
+
+@lru_cache(maxsize=32)
+def _parsed(text: str, shown: str) -> tuple[Node | None, tuple[Fault, ...]]:
+    """The data of a text, and what is wrong with it. Kept: a task is read several times on its way to an env."""
+    problems: list[Fault] = []
+    return parse(text, shown, problems), tuple(problems)
 
 
 def _relative(path: Path) -> str:
