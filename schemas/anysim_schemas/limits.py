@@ -54,6 +54,9 @@ MODEL_OCTREE = Limit(8, "levels", "an octree of an MJCF mesh", "use fewer levels
 MESH_BYTES = Limit(128 * MIB, "bytes", "a mesh file", "decimate the mesh")
 MESH_FACES = Limit(600_000, "triangles", "a mesh file", "decimate the mesh")
 MESH_NODES = Limit(20_000, "nodes", "the scene of a mesh file", "join its parts")
+FOLDER_ENTRIES = Limit(
+    10_000, "entries", "a folder of sources with all that its pattern looks into", "name a folder further down"
+)
 ASSET_BYTES = Limit(512 * MIB, "bytes of meshes", "a model", "decimate the meshes")
 IMAGE_BYTES = Limit(128 * MIB, "bytes", "an image file", "make the image smaller")
 IMAGE_PIXELS = Limit(8192 * 8192, "pixels", "an image", "make the image smaller")
@@ -80,6 +83,7 @@ _TABLE: Sequence[tuple[str, Sequence[Limit]]] = (
             MODEL_OCTREE,
         ),
     ),
+    ("folders of sources", (FOLDER_ENTRIES,)),
     ("meshes: STL, OBJ, DAE, GLB, PLY", (MESH_BYTES, MESH_FACES, MESH_NODES, ASSET_BYTES)),
     ("images", (IMAGE_BYTES, IMAGE_PIXELS)),
     ("arrays and heightfields", (ARRAY_BYTES, GROUND_CELLS)),

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from anysim.compile import variants
 from anysim.compile.collisions import with_exclusions
 from anysim.compile.edit import without_entity
 from anysim.compile.population import grid
@@ -153,6 +154,35 @@ def test_a_folder_is_its_files_by_name(world: Make, tmp_path: Path) -> None:
     made = world(tmp_path, objects={"mug": {"source": {"folder": "mugs", "pattern": "*.obj", "scale": 2}}})
     assert [(e.name, e.source) for e in made.entities] == [("mug~0", "mugs/a.obj"), ("mug~1", "mugs/b.obj")]
     assert EntityShape(made, "mug~0").bounds(np.array([0, 0, 0, 0, 0, 0, 1.0]))[1].max() == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "wanted"),
+    [
+        ("*", ["a.obj"]),
+        ("*/model.obj", ["cup/model.obj"]),
+        ("c*/m*", ["cup/model.obj"]),
+        ("**/*.obj", ["a.obj", "cup/model.obj", "tall/vase/model.obj"]),
+        ("**/vase/*", ["tall/vase/model.obj"]),
+        ("**/**/m*", ["cup/model.obj", "tall/vase/model.obj"]),
+    ],
+)
+def test_a_pattern_may_go_into_folders(world: Make, tmp_path: Path, pattern: str, wanted: list[str]) -> None:
+    for name in ("a.obj", "cup/model.obj", "tall/vase/model.obj"):
+        (tmp_path / "mugs" / name).parent.mkdir(parents=True, exist_ok=True)
+        tetrahedron(tmp_path / "mugs" / name)
+    made = world(tmp_path, objects={"mug": {"source": {"folder": "mugs", "pattern": pattern}}})
+    assert [e.source for e in made.entities] == [f"mugs/{name}" for name in wanted]
+
+
+def test_a_folder_that_is_a_whole_disk_is_refused(world: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "mugs" / "deep").mkdir(parents=True)
+    for name in "abc":
+        tetrahedron(tmp_path / "mugs" / "deep" / f"{name}.obj")
+    monkeypatch.setattr(variants, "FOLDER_ENTRIES", variants.FOLDER_ENTRIES._replace(value=3))
+    told = messages(world, tmp_path, objects={"mug": {"source": {"folder": "mugs", "pattern": "**/*.none"}}})
+    assert "objects.mug.source: folder 'mugs': has more than 3 entries; the limit of a folder of sources" in told
+    assert told.endswith("name a folder further down")
 
 
 def test_folders_that_cannot_be_used(world: Make, tmp_path: Path) -> None:

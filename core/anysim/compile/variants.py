@@ -3,13 +3,18 @@
 Geometry is fixed at build, so each source in each size is an entity of its own, and a draw decides which is there.
 """
 
-from collections.abc import Sequence
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from anysim.assets.uri import locate_folder
 from anysim.errors import AssetError, listing
 from anysim.randomization.distributions import quantile
+from anysim_schemas.limits import FOLDER_ENTRIES
 from anysim_schemas.object_source import PROCEDURAL, SHAPES, Count, SourceChoice, SourceFolder, SourceSpec, most
 from anysim_schemas.objects import ObjectSpec
 from anysim_schemas.values import Choice, Distribution
@@ -111,8 +116,10 @@ def sources(spec: ObjectSpec, base: Path | None) -> tuple[list[KeyedSource], int
 
 def _files(spec: SourceFolder, base: Path | None) -> list[SourceSpec]:
     folder = locate_folder(spec.folder, base=base)
-    found = sorted(folder.path.glob(spec.pattern), key=lambda path: path.relative_to(folder.path).as_posix())
-    files = [path for path in found if path.is_file() and not path.name.startswith(".")]
+    seen = iter(range(1, sys.maxsize))
+    found = dict.fromkeys(_fitting(folder.path, Path(spec.pattern).parts, seen, spec.folder))
+    ordered = sorted(found, key=lambda path: path.relative_to(folder.path).as_posix())
+    files = [path for path in ordered if path.is_file() and not path.name.startswith(".")]
     for path in files:
         if not path.resolve().is_relative_to(folder.root):
             raise AssetError(f"folder '{spec.folder}' leaves its root {folder.root}: {path.name} is {path.resolve()}")
@@ -128,6 +135,29 @@ def _files(spec: SourceFolder, base: Path | None) -> list[SourceSpec]:
         )
         for path in files
     ]
+
+
+def _fitting(folder: Path, parts: Sequence[str], seen: Iterator[int], where: str) -> Iterator[Path]:
+    """What is below a folder and fits a pattern, by its parts; `**` stands for any number of folders.
+
+    Raises:
+        AssetError: more has to be looked at than a folder of sources may hold.
+    """
+    if not parts:
+        yield folder
+        return
+    first, rest = parts[0], parts[1:]
+    if first == "**":
+        yield from _fitting(folder, rest, seen, where)
+    with suppress(PermissionError), os.scandir(folder) as entries:
+        for entry in entries:
+            if FOLDER_ENTRIES.exceeded(next(seen)):
+                raise AssetError(f"folder '{where}': {FOLDER_ENTRIES.sentence()}")
+            path = folder / entry.name
+            if first == "**" and entry.is_dir(follow_symlinks=False):
+                yield from _fitting(path, parts, seen, where)
+            elif first != "**" and fnmatchcase(entry.name, first) and (not rest or entry.is_dir()):
+                yield from _fitting(path, rest, seen, where)
 
 
 def source_text(source: SourceSpec) -> str:
