@@ -14,10 +14,9 @@ from anysim_skills.articulated.handle import AtHandle, Share
 class Close(AtHandle):
     """Close `part` with `robot`: the fingers astride its handle push until it is open by at most `fraction`."""
 
-    share = 0.0
-
-    def __init__(self, env: TaskEnv, *, fraction: Share = 0.03, **options: object) -> None:
-        self._fraction = fraction
+    def __init__(self, env: TaskEnv, *, fraction: Share = 0.03, beyond: Share = 0.0, **options: object) -> None:
+        """`beyond` is how much further the hand is sent: fingers lag behind a bar that slides across them."""
+        self._fraction, self.share = fraction, -beyond
         super().__init__(env, **options)  # pyright: ignore[reportArgumentType]
 
     def make_phases(self) -> Sequence[Phase]:
