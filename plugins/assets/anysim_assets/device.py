@@ -100,9 +100,9 @@ def device(
     body.site(0, "chamber", ((face - x + wall) / 2, middle, base))
     body.site(0, "well", (place, middle, base))
     level, plate = height - console / 2, console / 2 - 0.01
-    body.board(0, "display", (x, middle - 0.07, level - plate), (x + _PLATE, middle + 0.07, level + plate), density, handle_color)
-    body.board(0, "panel", (x, -plate, level - plate), (x + _PLATE, plate, level + plate), density, handle_color)
-
+    for name, beside, half in (("display", (inner - y) / 2, 2 * plate), ("panel", middle, plate)):
+        low, high = (x, beside - half, level - plate), (x + _PLATE, beside + half, level + plate)
+        body.board(0, name, low, high, density, handle_color)
     origin = (x, y - way / 2, (base + ceiling) / 2)
     slides = {"lower": 0.0, "upper": way, "friction": door_friction, "damping": door_damping}
     door = body.link("door", origin, JointType.PRISMATIC, (0.0, -1.0, 0.0), **slides)
@@ -112,7 +112,7 @@ def device(
     add_handle(body, door, handle, at, room, handle_color, upright=True, link="door")
 
     pushed = {"lower": 0.0, "upper": travel, "friction": button_friction, "damping": button_damping}
-    out = (x + _PLATE + _GAP + travel, 0.0, level)
+    out = (x + _PLATE + _GAP + travel, middle, level)
     start = body.link("start", out, JointType.PRISMATIC, (-1.0, 0.0, 0.0), **pushed)
     body.solid(start, "knob", Cylinder(radius, _KNOB), (_KNOB, 0.0, 0.0), density, button_color, _FORWARD)
     body.site(start, "start.top", (2 * _KNOB, 0.0, 0.0), _FORWARD)
