@@ -14,20 +14,20 @@ from anysim_schemas.errors import KeyFault
 _LEAF, _GAP = 0.012, 0.003  # [m] thickness of the door, and the gaps around it
 _LAP = 0.01  # [m] by which the door is wider than what it covers
 _KNOB, _PLATE = 0.005, 0.004  # [m] half the button's height, thickness of the plates on the console
-_EDGE = 0.02  # [m] from the handle to the door's edge
+_EDGE = 0.05  # [m] from the handle to the door's edge: fingers astride it do not reach around that
 _FORWARD = turned((0.0, 1.0, 0.0), pi / 2)  # z along the device's +x
 
 
 def device(
     *,
-    size: Size = (0.22, 0.56, 0.36),
-    opening: Positive = 0.26,
+    size: Size = (0.22, 0.6, 0.36),
+    opening: Positive = 0.28,
     wall: Positive = 0.012,
     base: Positive = 0.04,
     console: Positive = 0.09,
     well: Positive = 0.038,
     well_depth: Positive = 0.035,
-    well_inset: Positive = 0.06,
+    well_inset: Positive = 0.052,
     door_friction: NonNegative = 2.0,
     door_damping: NonNegative = 5.0,
     radius: Positive = 0.02,
