@@ -1,4 +1,4 @@
-"""Close: push a drawer, a door or a lid shut, with the open hand astride its handle."""
+"""Close: push a drawer, a door or a lid shut, with the open hand astride its handle, or closed on it."""
 
 from collections.abc import Sequence
 
@@ -12,25 +12,31 @@ from anysim_skills.articulated.handle import AtHandle, Share
 
 
 class Close(AtHandle):
-    """Close `part` with `robot`: the fingers astride its handle push until it is open by at most `fraction`."""
+    """Close `part` with `robot`: the fingers astride its handle push until it is open by at most `fraction`.
 
-    def __init__(self, env: TaskEnv, *, fraction: Share = 0.03, beyond: Share = 0.0, **options: object) -> None:
-        """`beyond` is how much further the hand is sent: fingers lag behind a bar that slides across them."""
-        self._fraction, self.share = fraction, -beyond
+    With `grip` they close on it: a bar that slides across the hand has room between open ones.
+    """
+
+    share = 0.0
+
+    def __init__(self, env: TaskEnv, *, fraction: Share = 0.03, grip: bool = False, **options: object) -> None:
+        self._fraction, self._holds = fraction, grip
         super().__init__(env, **options)  # pyright: ignore[reportArgumentType]
 
     def make_phases(self) -> Sequence[Phase]:
-        return (*self.approach_phases(), Phase("push", self.take, self._push, 3 * self.late), *self.phases_away())
+        push = (Phase("push", self.take, self._push, 3 * self.late), *self.phases_away())
+        return (*self.approach_phases(), *((self.closing_phase(),) if self._holds else ()), *push)
 
-    def excluded(self, grasps: Array) -> None:
-        """None: it pushes with what it touches."""
+    def excluded(self, grasps: Array) -> Array | None:
+        """None where it pushes with what it touches."""
+        return super().excluded(grasps) if self._holds else None
 
     def depth(self, ids: Array) -> Array:
-        return np.full(len(ids), 0.02)  # the finger tips come close to the front
+        return np.full(len(ids), 0.0 if self._holds else 0.02)  # the finger tips come close to the front
 
     def _push(self, ids: Array, at: Array) -> Array:
         self.follow(ids, at)
-        self.arm.closed[ids] = False
+        self.arm.closed[ids] = self._holds
         shut = self.part.joint.opening[at] <= self._fraction
         return np.where(shut, GO_ON, np.where(self.jammed(ids, at), _JAMMED, STAY))
 
