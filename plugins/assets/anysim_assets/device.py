@@ -12,6 +12,7 @@ from anysim_schemas.base import Color, NonNegative, Positive
 from anysim_schemas.errors import KeyFault
 
 _LEAF, _GAP = 0.012, 0.003  # [m] thickness of the door, and the gaps around it
+_GLASS = 0.4  # alpha of the door
 _LAP = 0.01  # [m] by which the door is wider than what it covers
 _KNOB, _PLATE = 0.005, 0.004  # [m] half the button's height, thickness of the plates on the console
 _EDGE = 0.05  # [m] from the handle to the door's edge: fingers astride it do not reach around that
@@ -37,7 +38,7 @@ def device(
     handle: Handle = Handle(length=0.1),
     density: Positive = 900.0,
     color: Color = (0.88, 0.89, 0.9),
-    door_color: Color = (0.35, 0.42, 0.48),
+    door_color: Color = (0.45, 0.6, 0.7),
     handle_color: Color = (0.2, 0.2, 0.22),
     button_color: Color = (0.1, 0.6, 0.25),
 ) -> ImportedModel:
@@ -67,7 +68,7 @@ def device(
         handle: of the door, upright near the edge that is to the fore when it closes.
         density: [kg/m^3].
         color: of the boards and the well.
-        door_color: of the door.
+        door_color: of the door, which is of glass.
         handle_color: of the handle, the display and the button's housing.
         button_color: of the button.
 
@@ -107,7 +108,7 @@ def device(
     slides = {"lower": 0.0, "upper": way, "friction": door_friction, "damping": door_damping}
     door = body.link("door", origin, JointType.PRISMATIC, (0.0, -1.0, 0.0), **slides)
     low, high = (x - _LEAF, inner - _LAP, base + _GAP), (x, y, ceiling - _GAP)
-    body.board(door, "leaf", low, high, density, door_color, origin)
+    body.board(door, "leaf", low, high, density, door_color, origin, alpha=_GLASS)
     at, room = (0.0, way / 2 - handle.radius - _EDGE, 0.0), (2 * (_EDGE + handle.radius), ceiling - base)
     add_handle(body, door, handle, at, room, handle_color, upright=True, link="door")
 

@@ -15,7 +15,7 @@ def vial(
     cap: Positive = 0.03,
     cap_radius: Positive = 0.016,
     density: Positive = 1200.0,
-    color: Color = (0.75, 0.86, 0.92),
+    color: Color = (0.55, 0.75, 0.95),
     cap_color: Color = (0.12, 0.35, 0.65),
 ) -> ImportedModel:
     """A closed vial; its frame is in the middle of its bottom, z along it. Frame: `cap`, the middle of its cap.
