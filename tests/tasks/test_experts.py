@@ -33,6 +33,7 @@ TASKS = [
     "unplug_charger",
     "handover",
     "put_away",
+    "lab_vial",
     "lift_cube",
     "place_sphere",
     "stack_pyramid",
@@ -77,7 +78,7 @@ TASKS = [
     "feed_spoon",
     "cowork_place",
 ]
-LONG = {"cowork_place", "mobile_pick_place", "pack", "fetch_from_drawer", "rope_straighten", "dex_relocate"}
+LONG = {"cowork_place", "lab_vial", "mobile_pick_place", "pack", "fetch_from_drawer", "rope_straighten", "dex_relocate"}
 """Episodes of many commands: on one engine in the slow tier, on the others before a release."""
 RUNS = [
     pytest.param(task, engine, marks=pytest.mark.full if task in LONG and engine != "mujoco" else pytest.mark.slow)
