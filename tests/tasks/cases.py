@@ -9,7 +9,7 @@ from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.env import TaskEnv
 from anysim_avatars.hold import FREE, HELD
-from tests.tasks import camera_paths as camera, person_paths as person
+from tests.tasks import bench_paths as bench, camera_paths as camera, person_paths as person
 from tests.tasks.states import failed, level, offset, put, rewarded, seen, set_joint, set_opening
 
 
@@ -165,37 +165,6 @@ def _put_away(env: TaskEnv, share: float) -> None:
         _CARRY(env, 3.0 * share - 1.0)
     else:
         _CARRY(env, 1.0)
-
-
-_LOAD = _towards("vial", lambda env: seen(env, "device.well"))
-
-
-def _start(env: TaskEnv, share: float) -> None:
-    """Open the door, put the vial in, close the door, press: a quarter of the way each."""
-    set_opening(env, "device.door", min(4.0 * share, 1.0) if share <= 0.5 else max(0.0, 3.0 - 4.0 * share))
-    _LOAD(env, min(max(4.0 * share - 1.0, 0.0), 1.0))
-    if share < 1.0:
-        set_opening(env, "device.start", max(4.0 * share - 3.0, 0.0))
-    else:
-        _press(env, 0.0, 1.0)
-
-
-def _press(env: TaskEnv, *openings: float) -> None:
-    """The button where it is in one control step after the other."""
-    for opening in openings:
-        set_opening(env, "device.start", opening)
-        env.scene.elapsed[:] += 1
-        env.scene.look(None)
-        env.mdp.judge()
-
-
-def _pressed_before_the_door_is_closed(env: TaskEnv) -> None:
-    for memory in env.scene.memories:
-        memory.forget(np.arange(env.num_envs))
-    set_opening(env, "device.door", 0.5)
-    _press(env, 0.0, 1.0)
-    set_opening(env, "device.door", 0.0)
-    _press(env, 1.0, 0.0)
 
 
 _PEG = Case(
@@ -508,17 +477,7 @@ CASES: dict[str, Case] = {
     "put_away": Case(
         _put_away, [lambda env: set_opening(env, _DRAWER, 0.2), _shifted("cube", z=0.1), _moving("cube")], ()
     ),
-    "lab_vial": Case(
-        _start,
-        [
-            _pressed_before_the_door_is_closed,
-            lambda env: set_opening(env, "device.door", 0.1),
-            _shifted("vial", z=0.02),
-            _tilted("vial", 0.3),
-            _moving("vial"),
-        ],
-        (),
-    ),
+    "lab_vial": Case(bench.start, bench.WRONG, ()),
     "handover": Case(
         _in_reach_of_the_hand("bar", "partner.tool"),
         [lambda env: put(env, "bar", seen(env, "panda.tool")), _shifted("bar", z=-0.25), _moving("bar")],

@@ -125,7 +125,15 @@ class Assembly:
         )
 
     def board(
-        self, body: int, name: str, low: Vec3, high: Vec3, density: float, color: Colour, origin: Vec3 = ORIGIN, alpha: float = 1.0
+        self,
+        body: int,
+        name: str,
+        low: Vec3,
+        high: Vec3,
+        density: float,
+        color: Colour,
+        origin: Vec3 = ORIGIN,
+        alpha: float = 1.0,
     ) -> None:
         """A box between two corners, given in axes parallel to the link's from a point `origin` of the same axes."""
         corners = np.array([low, high]) - np.array(origin)

@@ -16,6 +16,7 @@ _GLASS = 0.4  # alpha of the door
 _LAP = 0.01  # [m] by which the door is wider than what it covers
 _KNOB, _PLATE = 0.005, 0.004  # [m] half the button's height, thickness of the plates on the console
 _EDGE = 0.05  # [m] from the handle to the door's edge: fingers astride it do not reach around that
+_BAR = Handle(length=0.1)
 _FORWARD = turned((0.0, 1.0, 0.0), pi / 2)  # z along the device's +x
 
 
@@ -35,7 +36,7 @@ def device(
     travel: Positive = 0.01,
     button_friction: NonNegative = 0.5,
     button_damping: NonNegative = 2.0,
-    handle: Handle = Handle(length=0.1),
+    handle: Handle = _BAR,
     density: Positive = 900.0,
     color: Color = (0.88, 0.89, 0.9),
     door_color: Color = (0.45, 0.6, 0.7),
@@ -105,16 +106,16 @@ def device(
         low, high = (x, beside - half, level - plate), (x + _PLATE, beside + half, level + plate)
         body.board(0, name, low, high, density, handle_color)
     origin = (x, y - way / 2, (base + ceiling) / 2)
-    slides = {"lower": 0.0, "upper": way, "friction": door_friction, "damping": door_damping}
-    door = body.link("door", origin, JointType.PRISMATIC, (0.0, -1.0, 0.0), **slides)
+    slide, aside = JointType.PRISMATIC, (0.0, -1.0, 0.0)
+    door = body.link("door", origin, slide, aside, lower=0.0, upper=way, friction=door_friction, damping=door_damping)
     low, high = (x - _LEAF, inner - _LAP, base + _GAP), (x, y, ceiling - _GAP)
     body.board(door, "leaf", low, high, density, door_color, origin, alpha=_GLASS)
     at, room = (0.0, way / 2 - handle.radius - _EDGE, 0.0), (2 * (_EDGE + handle.radius), ceiling - base)
     add_handle(body, door, handle, at, room, handle_color, upright=True, link="door")
 
-    pushed = {"lower": 0.0, "upper": travel, "friction": button_friction, "damping": button_damping}
     out = (x + _PLATE + _GAP + travel, middle, level)
-    start = body.link("start", out, JointType.PRISMATIC, (-1.0, 0.0, 0.0), **pushed)
+    inward, resists = (-1.0, 0.0, 0.0), {"friction": button_friction, "damping": button_damping}
+    start = body.link("start", out, slide, inward, lower=0.0, upper=travel, parent=0, **resists)
     body.solid(start, "knob", Cylinder(radius, _KNOB), (_KNOB, 0.0, 0.0), density, button_color, _FORWARD)
     body.site(start, "start.top", (2 * _KNOB, 0.0, 0.0), _FORWARD)
     button = AffordanceKind.BUTTON
