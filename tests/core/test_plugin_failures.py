@@ -82,17 +82,18 @@ def test_every_list_goes_on_past_plugins_that_end(install: Install) -> None:
     for kind in ("engines", "tasks", "robots", "skills", "terms", "textures"):
         done = anysim_command(environment, "list", kind, "--json")
         assert done.returncode == 0, done.stderr
-        rows = {row["name"]: row for row in json.loads(done.stdout)}
-        assert len(rows) > 1
-        assert rows["rotten"]["from"] == PACKAGE
-        assert "does not load" in rows["rotten"]["what"]
+        listed = {row["name"]: row for row in json.loads(done.stdout)}
+        assert len(listed) > 1
+        assert listed["rotten"]["from"] == PACKAGE
+        assert "does not load" in listed["rotten"]["what"]
         assert f"the plugin 'rotten' of {PACKAGE} does not load: SystemExit: 0" in done.stderr
     assert "mujoco" in anysim_command(environment, "list", "engines").stdout
-    assert {row.what for row in broken()} == {
+    rows = broken()
+    assert {row.what for row in rows} == {
         *(f"{kind.removesuffix('s')}: rotten" for kind in registry.KINDS if kind != "engines"),
         f"observer: {PACKAGE}:rotten",
     }
-    assert all(row.remedy == registry.remedy(PACKAGE) for row in broken())
+    assert all(row.remedy == registry.remedy(PACKAGE) for row in rows)
 
 
 def test_the_doctor_goes_on_past_a_plugin_that_kills_its_process(install: Install) -> None:

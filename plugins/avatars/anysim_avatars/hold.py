@@ -63,7 +63,6 @@ class Hold(Family):
         self._thing = self._index(spec.object, "object", spec.object)
         self.body_names = (f"{spec.avatar}.{spec.hand}_hand", spec.object)
         world = setting.engine.world
-        self._com = np.array([world.bodies[self._thing].inertial.com])
         palm = next(s for s in world.sites if s.body == self._hand and s.name.endswith(f"{spec.hand}_palm"))
         self._palm = np.array([*palm.position, *palm.quaternion])
         self._both = np.array([self._hand, self._thing])
@@ -74,6 +73,7 @@ class Hold(Family):
         self._grip = self.remember("grip", 7)
         self._clock = self.remember("clock")
         self._mass = self.remember("mass")
+        self._com = self.remember("com", 3)
         self._inertia = self.remember("inertia", 6)
 
     def _index(self, body: str, key: str, said: str) -> int:
@@ -90,6 +90,7 @@ class Hold(Family):
     def reset(self, env_ids: Array) -> None:
         bodies = self._only
         self._mass[env_ids] = self.engine.get_parameters("body.mass", env_ids, bodies)[:, 0]
+        self._com[env_ids] = self.engine.get_parameters("body.com", env_ids, bodies)[:, 0]
         self._inertia[env_ids] = self.engine.get_parameters("body.inertia", env_ids, bodies)[:, 0]
         self._grip[env_ids, 6] = 1.0
         if self.spec_.begins:
@@ -133,8 +134,8 @@ class Hold(Family):
         """Force and torque on the object of a critically damped spring, its own weight carried; bounded."""
         wanted = P.compose(pose[:, 0], self._grip[ids])
         mass = self._mass[ids, None]
-        arm = P.rotate(pose[:, 1, 3:], np.broadcast_to(self._com, (len(ids), 3)))
-        target = P.rotate(wanted[:, 3:], np.broadcast_to(self._com, (len(ids), 3)))
+        arm = P.rotate(pose[:, 1, 3:], self._com[ids])
+        target = P.rotate(wanted[:, 3:], self._com[ids])
         gap = wanted[:, :3] + target - pose[:, 1, :3] - arm
         spin, turning = twist[:, 0, 3:], twist[:, 1, 3:]
         goes = twist[:, 0, :3] + P.cross(spin, wanted[:, :3] + target - pose[:, 0, :3])

@@ -58,9 +58,9 @@ def scattered(spec: MatterSpec, radius: float, count: int, numbers: np.random.Ge
     """
     from anysim_particles.kernels.packing import pack
 
-    size = np.array(_size(spec))
-    low, high = np.array([-size[0] / 2, -size[1] / 2, 0.0]) + radius, np.array([size[0] / 2, size[1] / 2, size[2]])
-    high = np.maximum(high - radius, low)
+    x, y, z = _size(spec)
+    high = np.array([max(x / 2 - radius, 0.0), max(y / 2 - radius, 0.0), max(z - radius, radius)])
+    low = np.array([-high[0], -high[1], radius])  # where a ball is wider than the block, they stand in a column
     packed, done, top = np.zeros((count, 3)), 0, high.copy()
     while done < count:
         tried = numbers.uniform(low, top, (20 * count, 3))

@@ -73,6 +73,24 @@ def test_a_hand_holds_on_to_what_is_pulled_with_less_than_its_force(engine):
         }
 
 
+def test_what_is_held_turns_about_its_own_centre_of_mass():
+    """One centre is where the drawing of an episode has put it: a spin is damped, and moves it nowhere."""
+    centre, spin = np.array([[0.0, 0.0, 0.0], [0.08, 0.0, 0.0]]), np.array([0.0, 0.0, 3.0])
+    with anysim.make(with_bar("mujoco", [{"clip": "idle"}], begins=True)) as env:
+        env.reset(seed=0)
+        only = [env.scene.index.body("bar")]
+        env.engine.set_parameters("body.com", centre[:, None], indices=only)
+        grip(env).reset(np.arange(2))
+        bar = env.scene.frame("bar")
+        arm = P.rotate(bar.quaternion, centre)
+        pose = np.concatenate([bar.position, bar.quaternion], axis=-1)
+        twist = np.concatenate([-np.cross(spin, arm), np.tile(spin, (2, 1))], axis=-1)
+        begun = bar.position + arm
+        env.engine.set_body_state(pose[:, None], twist[:, None], bodies=only)
+        wait(env)
+        assert np.abs(bar.position + P.rotate(bar.quaternion, centre) - begun).max() < 1e-4  # the hand breathes
+
+
 def test_a_hand_closes_on_what_is_near_and_still():
     with anysim.make(with_bar("mujoco", [OUT], near=0.08, closing=0.2)) as env:
         env.reset(seed=0)

@@ -14,6 +14,8 @@ from anysim.record.film import film_mode
 from anysim.record.reader import open_trajectory
 from anysim.record.replay import replay
 from anysim.testing.engines import require_drawing, require_engine
+from anysim_particles.blocks import scattered
+from anysim_particles.spec import SandSpec
 from tests.contract.suite_runs import run
 from tests.plugins.particles.matters import ENGINES, begun, in_tank, run_of, wait
 from tests.schemas.test_every_key import Still
@@ -122,6 +124,13 @@ def test_what_cannot_be_is_refused(change, words):
     matter = {key: value for key, value in {**WATER, **change}.items() if value is not None}
     with pytest.raises(anysim.errors.AnysimError, match=words), anysim.make(run_of(matter)) as env:
         env.reset(seed=0)
+
+
+@pytest.mark.parametrize("block", [{"cylinder": (0.003, 0.05)}, {"box": (0.006, 0.006, 0.05)}])
+def test_grains_in_a_block_that_is_narrower_than_one_stand_in_a_column(block):
+    points = scattered(SandSpec(**block), 0.004, 5, np.random.default_rng(0))
+    assert not points[:, :2].any()
+    assert (np.diff(points[:, 2]) >= 0.008).all()
 
 
 def test_a_grain_of_rice_is_long():

@@ -60,7 +60,9 @@ def test_runs_from_the_command_line_are_the_same(engine: str, tmp_path: Path, mo
     require_engine(engine)
     app, runs = typer.Typer(), list[list[dict[str, Any]]]()
     app.command("run")(run)
-    kinds = ((4, "1", "processes"), (4, "1", "processes"), (4, "2", "processes"), (4, "2", "threads"), (16, "2", ""))
+    kinds = [(4, "1", "processes"), (4, "2", "threads"), (16, "2", "")]
+    if engine == "mujoco":
+        kinds[1:1] = [(4, "1", "processes"), (4, "2", "processes")]
     for number, (num_envs, workers, service) in enumerate(kinds):
         monkeypatch.setenv(WORKERS_VARIABLE, workers)
         monkeypatch.setenv(SERVICE_VARIABLE, service)
@@ -69,10 +71,10 @@ def test_runs_from_the_command_line_are_the_same(engine: str, tmp_path: Path, mo
         done = CliRunner().invoke(app, [*words, "-o", "record.keep=all", "--min-success", "0.75", "--json"])
         assert done.exit_code == 0, done.output
         runs.append(manifests(tmp_path / str(number), 4))
-    for one, other in pairwise(runs[:4]):
+    for one, other in pairwise(runs[:-1]):
         assert one == other
-    for manifest in (*runs[0], *runs[4]):
+    for manifest in (*runs[0], *runs[-1]):
         assert manifest["engine"] == engine
         assert manifest["spec"].pop("num_envs") in (4, 16)
         del manifest["files"]  # the number of envs is in them too
-    assert runs[0] == runs[4]
+    assert runs[0] == runs[-1]

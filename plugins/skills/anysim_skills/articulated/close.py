@@ -1,8 +1,10 @@
 """Close: push a drawer, a door or a lid shut, with the open hand astride its handle, or closed on it."""
 
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from anysim.conventions import Array
 from anysim.skills.base import OUTCOMES, Outcome
@@ -10,16 +12,15 @@ from anysim.skills.phases import GO_ON, STAY, Phase
 from anysim.task.env import TaskEnv
 from anysim_skills.articulated.handle import AtHandle, Share
 
+Grip = Annotated[bool, Field(description="fingers close on the handle, as on one that slides across the hand")]
+
 
 class Close(AtHandle):
-    """Close `part` with `robot`: the fingers astride its handle push until it is open by at most `fraction`.
-
-    With `grip` they close on it: a bar that slides across the hand has room between open ones.
-    """
+    """Close `part` with `robot`: the fingers astride its handle push until it is open by at most `fraction`."""
 
     share = 0.0
 
-    def __init__(self, env: TaskEnv, *, fraction: Share = 0.03, grip: bool = False, **options: object) -> None:
+    def __init__(self, env: TaskEnv, *, fraction: Share = 0.03, grip: Grip = False, **options: object) -> None:
         self._fraction, self._holds = fraction, grip
         super().__init__(env, **options)  # pyright: ignore[reportArgumentType]
 
@@ -37,12 +38,11 @@ class Close(AtHandle):
     def _push(self, ids: Array, at: Array) -> Array:
         self.follow(ids, at)
         self.arm.closed[ids] = self._holds
-        shut = self.part.joint.opening[at] <= self._fraction
-        return np.where(shut, GO_ON, np.where(self.jammed(ids, at), _JAMMED, STAY))
+        said = np.where(self.jammed(ids, at), _JAMMED, STAY)
+        return np.where(self.part.joint.opening[at] <= self._fraction, GO_ON, said)
 
     def succeeded(self, env_ids: Array, at: Array) -> Array:
         return np.where(self.part.joint.opening[at] <= self._fraction + 0.02, GO_ON, _MISSED)
 
 
-_JAMMED = OUTCOMES.index(Outcome.JAMMED)
-_MISSED = OUTCOMES.index(Outcome.MISSED_CONTACT)
+_JAMMED, _MISSED = OUTCOMES.index(Outcome.JAMMED), OUTCOMES.index(Outcome.MISSED_CONTACT)
