@@ -20,7 +20,7 @@ PLUGIN_LINES = 3_000
 """Of a plugin, and of each folder of a larger one, where what is deeper counts too."""
 LARGE_PLUGINS = {
     "annotation": 3_100,  # one capture, of live worlds, records, streams, still images and data sets
-    "assets": 4_100,  # builders of one kind (things, rooms, ground) that share their shapes and their parameters
+    "assets": 4_320,  # builders of one kind (things, rooms, ground) that share their shapes and their parameters
     "control": 3_250,  # controllers of tools and vehicles: one kind of entry points, with an extra a solver
     "language": 4_200,  # questions and the checker that finds their answers again read the same episodes and words
     "parity": 3_660,  # one comparison: its layers and probes are read together, and its page shows all of them

@@ -9,7 +9,7 @@ from anysim.conventions import Array
 from anysim.math import pose as P
 from anysim.task.env import TaskEnv
 from anysim_avatars.hold import FREE, HELD
-from tests.tasks import camera_paths as camera, person_paths as person
+from tests.tasks import bench_paths as bench, camera_paths as camera, person_paths as person
 from tests.tasks.states import failed, level, offset, put, rewarded, seen, set_joint, set_opening
 
 
@@ -477,6 +477,7 @@ CASES: dict[str, Case] = {
     "put_away": Case(
         _put_away, [lambda env: set_opening(env, _DRAWER, 0.2), _shifted("cube", z=0.1), _moving("cube")], ()
     ),
+    "lab_vial": Case(bench.start, bench.WRONG, ()),
     "handover": Case(
         _in_reach_of_the_hand("bar", "partner.tool"),
         [lambda env: put(env, "bar", seen(env, "panda.tool")), _shifted("bar", z=-0.25), _moving("bar")],

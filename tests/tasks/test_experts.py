@@ -35,6 +35,7 @@ TASKS = [
     "unplug_charger",
     "handover",
     "put_away",
+    "lab_vial",
     "lift_cube",
     "place_sphere",
     "stack_pyramid",
@@ -79,7 +80,7 @@ TASKS = [
     "feed_spoon",
     "cowork_place",
 ]
-LONG = {"cowork_place", "mobile_pick_place", "pack", "fetch_from_drawer", "rope_straighten", "dex_relocate"}
+LONG = {"cowork_place", "lab_vial", "mobile_pick_place", "pack", "fetch_from_drawer", "rope_straighten", "dex_relocate"}
 """Episodes of many commands: on MuJoCo in the slow tier, on the others before a release."""
 RUNS = [
     pytest.param(

@@ -100,17 +100,18 @@ class Assembly:
         *,
         filled: Shape | None = None,
         collides: bool = True,
+        alpha: float = 1.0,
     ) -> None:
         """A homogeneous solid [kg/m^3] on a link, which has the mass of `filled` where that is given.
 
-        One that does not collide is there for its mass and its looks.
+        One that does not collide is there for its mass and its looks. `alpha` is 1 for what is opaque.
 
         Solids of one link should not overlap but where `filled` says which part of one counts.
         """
         place, turn = split(np.array([*position, *quaternion]))
         owner = self._bodies[body].name
         self._geoms.append(
-            Geom(f"{owner}.{name}", body, shape, place, turn, color=(*rgb(color), 1.0), collides=collides)
+            Geom(f"{owner}.{name}", body, shape, place, turn, color=(*rgb(color), alpha), collides=collides)
         )
         heavy = filled or shape
         own = inertia.of_shape(heavy, density * inertia.volume(heavy, {}), {})
@@ -124,12 +125,20 @@ class Assembly:
         )
 
     def board(
-        self, body: int, name: str, low: Vec3, high: Vec3, density: float, color: Colour, origin: Vec3 = ORIGIN
+        self,
+        body: int,
+        name: str,
+        low: Vec3,
+        high: Vec3,
+        density: float,
+        color: Colour,
+        origin: Vec3 = ORIGIN,
+        alpha: float = 1.0,
     ) -> None:
         """A box between two corners, given in axes parallel to the link's from a point `origin` of the same axes."""
         corners = np.array([low, high]) - np.array(origin)
         half, middle = 0.5 * (corners[1] - corners[0]), 0.5 * (corners[0] + corners[1])
-        self.solid(body, name, Box(tidy(half)), tidy(middle), density, color)
+        self.solid(body, name, Box(tidy(half)), tidy(middle), density, color, alpha=alpha)
 
     def open_box(self, body: int, size: Vec3, wall: float, density: float, color: Colour, key: str) -> None:
         """A floor and four walls of boards over the link's origin, of an outer `size`; `key` is the parameter's name.

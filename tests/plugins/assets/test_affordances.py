@@ -58,6 +58,7 @@ EMITTED = {
     "button": {"cap": "button"},
     "cabinet": {"drawer_1.handle": "handle", "door_1.handle": "handle"},
     "cart": {"body.handle": "handle"},
+    "device": {"door.handle": "handle", "start": "button"},
     "door": {"leaf.handle": "handle"},
     "faucet": {"lever.handle": "lever"},
     "gear": {"hole": "hole", "body": "body"},
@@ -69,6 +70,7 @@ EMITTED = {
     "mug": {"handle": "handle", "rim": "rim", "body": "body"},
     "peg": {"tip": "tip", "body": "body"},
     "plug": {"tip": "tip", "body": "body"},
+    "rack": {},
     "rocker_switch": {"rocker.on": "button", "rocker.off": "button"},
     "rope": {"first": "handle", "last": "handle"},
     "side_hole": {"mouth": "hole", "body": "body"},
@@ -77,6 +79,7 @@ EMITTED = {
     "tee": {"body": "body"},
     "tray": {"rim": "rim", "body": "body"},
     "valve": {"wheel.handle": "rim"},
+    "vial": {"cap": "body"},
 }
 ROBOTS = {"ackermann_base", "camera_body", "differential_base", "holonomic_base", "parallel_gripper"}
 """Builders of what moves and holds others."""

@@ -111,7 +111,7 @@ def test_every_builder_makes_a_sound_model(name: str) -> None:
     for things in (model.bodies, model.joints, model.geoms, model.sites):
         names = [thing.name for thing in things]
         assert len(set(names)) == len(names)
-    held = (".handle", "tcp", "top", "lens", "head", "mouth", "inside", "grip", "bar", "first")
+    held = (".handle", "tcp", "top", "lens", "head", "mouth", "inside", "grip", "bar", "first", "cap", "well_1")
     assert any(site.name.endswith(held) for site in model.sites)
     assert build(name, {}) == model
 
