@@ -1,4 +1,4 @@
-"""What an avatar does of itself in a task: a stroll, and a step into the way of a robot."""
+"""Walks that avatars begin of themselves in a task: a stroll, and a step into the way of a robot."""
 
 import numpy as np
 import pytest
