@@ -121,11 +121,13 @@ def test_a_frozen_file_is_its_hash(tiny: Path) -> None:
 
 
 def test_shipped_protocols_are_what_they_say(tmp_path: Path) -> None:
-    spec = load_protocol("core12").spec
+    protocol = load_protocol("core12")
+    spec = protocol.spec
+    assert freezing.moved(protocol, freezing.parts(protocol)) == [], "`anysim benchmark run core12` would refuse"
     assert (len(spec.tasks), len(spec.policies), len(spec.engines)) == (12, 7, 3)
     assert "core12" in shipped()
     told = json.loads((Path(__file__).parents[3] / "docs" / "benchmark.json").read_text())
-    assert told["frozen"] == json.loads(load_protocol("core12").frozen.read_text())["hash"]
+    assert told["frozen"] == json.loads(protocol.frozen.read_text())["hash"]
     assert told["left"] == 0
     with pytest.raises(TaskError, match="there is no protocol 'core13'; shipped are"):
         load_protocol("core13")
