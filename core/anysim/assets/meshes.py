@@ -144,13 +144,11 @@ def visual_parts(
 
 
 def _arrays(key: str, make: Callable[[], dict[str, Array]]) -> dict[str, Array]:
-    """Those of the cache, read-only. Small ones stay in memory for a while: a world is often compiled again."""
+    """Those of the cache. Small ones stay in memory for a while: a world is often compiled again."""
     kept = _kept(key)
     if kept:
         return kept
     arrays = cache.load_or_make("meshes", key, make)
-    for array in arrays.values():
-        array.setflags(write=False)
     if sum(array.nbytes for array in arrays.values()) <= SMALL_BYTES:
         kept.update(arrays)
     return arrays

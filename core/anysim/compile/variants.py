@@ -4,10 +4,10 @@ Geometry is fixed at build, so each source in each size is an entity of its own,
 """
 
 import os
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from fnmatch import fnmatchcase
+from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -116,8 +116,7 @@ def sources(spec: ObjectSpec, base: Path | None) -> tuple[list[KeyedSource], int
 
 def _files(spec: SourceFolder, base: Path | None) -> list[SourceSpec]:
     folder = locate_folder(spec.folder, base=base)
-    seen = iter(range(1, sys.maxsize))
-    found = dict.fromkeys(_fitting(folder.path, Path(spec.pattern).parts, seen, spec.folder))
+    found = dict.fromkeys(_fitting(folder.path, Path(spec.pattern).parts, count(1), spec.folder))
     ordered = sorted(found, key=lambda path: path.relative_to(folder.path).as_posix())
     files = [path for path in ordered if path.is_file() and not path.name.startswith(".")]
     for path in files:

@@ -17,9 +17,17 @@ ENGINES = ["mujoco", pytest.param("pybullet", marks=pytest.mark.slow), pytest.pa
 JOINTS = {"tap.lever": 1.745, "switch.rocker": 0.6}
 
 
+def on_a_plane(engine: str, objects: dict[str, Any], layout: dict[str, Any], jointed: str) -> TaskEnv:
+    """One env with objects, of which one has joints."""
+    require_engine(engine)
+    world = {"terrain": {"kind": "plane"}, "objects": objects, "layout": layout}
+    task = {"observations": {"policy": [{"term": "object_joint_pos", "object": jointed}]}}
+    file = {"physics": {"dt": 0.001, "control_dt": 0.02}, "world": world, "task": task}
+    return make(file, engine=engine, num_envs=1)
+
+
 def scene(engine: str) -> TaskEnv:
     """A tap, a switch, and a charger in its socket."""
-    require_engine(engine)
     objects = {
         "tap": {"source": "procedural:faucet", "fixed": True},
         "switch": {"source": "procedural:rocker_switch", "fixed": True},
@@ -32,10 +40,7 @@ def scene(engine: str) -> TaskEnv:
         "socket": {"position": [0.6, 0.0, 0.0]},
         "charger": {"position": [0.6, 0.0, 0.04], "checked": False},
     }
-    world = {"terrain": {"kind": "plane"}, "objects": objects, "layout": layout}
-    task = {"observations": {"policy": [{"term": "object_joint_pos", "object": "tap"}]}}
-    file = {"physics": {"dt": 0.001, "control_dt": 0.02}, "world": world, "task": task}
-    return make(file, engine=engine, num_envs=1)
+    return on_a_plane(engine, objects, layout, "tap")
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -6,14 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from anysim.api import make
 from anysim.assets.procedural import build
 from anysim.conventions import Array
 from anysim.geometry.bounds import shape_bounds
 from anysim.math import pose as P
 from anysim.model.world import Cylinder
 from anysim.task.env import TaskEnv
-from anysim.testing.engines import require_engine
+from tests.plugins.assets.test_contact_rich import on_a_plane
 from tests.plugins.assets.test_procedural import complaints
 from tests.tasks.states import put, seen, set_opening
 
@@ -23,7 +22,6 @@ ENDS = {"device.door": 0.292, "device.start": 0.01}
 
 def bench(engine: str) -> TaskEnv:
     """A device, and a vial in a rack."""
-    require_engine(engine)
     objects = {
         "device": {"source": "procedural:device", "fixed": True},
         "rack": {"source": "procedural:rack", "fixed": True},
@@ -34,9 +32,7 @@ def bench(engine: str) -> TaskEnv:
         "rack": {"position": [0.5, 0.0, 0.0]},
         "vial": {"position": [0.465, 0.07, 0.0], "checked": False},
     }
-    world = {"terrain": {"kind": "plane"}, "objects": objects, "layout": layout}
-    task = {"observations": {"policy": [{"term": "object_joint_pos", "object": "device"}]}}
-    return make({"physics": {"dt": 0.001, "control_dt": 0.02}, "world": world, "task": task}, engine=engine, num_envs=1)
+    return on_a_plane(engine, objects, layout, "device")
 
 
 def run(env: TaskEnv, steps: int) -> None:
