@@ -48,7 +48,7 @@ def test_the_suite_passes_without_the_other_engines(engine: str, alone: Any, pro
     out = program(python, *suite, "--engine", engine, cwd=tmp_path, timeout=SUITE_SECONDS).stdout
     found = re.search(rf"anysim contract: engine {engine} \S+: (\d+) passed, (\d+) skipped", out)
     assert found, out[-4000:]
-    assert int(found[1]) > 40
+    assert int(found[1]) >= 40  # `null` has the fewest
 
 
 @pytest.mark.parametrize("engine", ["null", *BACKENDS])
