@@ -100,8 +100,10 @@ class DrawnSkill(MovingSkill):
 class CommandSequence(SkillSequence):
     """The commands of `collect`, one after the other in each env."""
 
-    def __init__(self, collect: CollectSpec, env: TaskEnv, bind: BindSkill) -> None:
-        """`bind` makes a skill by name.
+    def __init__(
+        self, collect: CollectSpec, env: TaskEnv, bind: BindSkill, path: str = "collect.commands"
+    ) -> None:
+        """`bind` makes a skill by name; `path` is where the commands were written.
 
         Raises:
             SpecError: at the key, what is wrong with a command.
@@ -112,7 +114,7 @@ class CommandSequence(SkillSequence):
         self._verify: list[Holds | None] = []
         self._made: dict[str, MovingSkill] = {}
         skills: list[MovingSkill] = []
-        self._lay(collect.commands, "collect.commands", skills)
+        self._lay(collect.commands, path, skills)
         self._look_ahead(skills)
         names = [f"{number} {spec.do}" for number, spec in enumerate(self._specs, 1)]
         dt = env.engine.world.physics.control_dt

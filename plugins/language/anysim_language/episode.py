@@ -15,6 +15,7 @@ from anysim.errors import RecordError
 from anysim.model.world import World
 from anysim.randomization.streams import episode_seed
 from anysim.record.columns import EpisodeColumns
+from anysim.record.header import EpisodeHeader
 from anysim.record.manifest import Manifest
 from anysim.record.reader import TrajectoryReader, open_trajectory
 from anysim.record.replay import begin
@@ -154,6 +155,31 @@ def ended(env: TaskEnv, loaded: LoadedRun, columns: EpisodeColumns, status: str)
     said = dict(columns.annotations)
     held = list(accumulate(range(len(columns)), lambda last, row: said.get(row, last), initial={}))
     return replace(found, instruction=header.instruction, annotations=tuple(held[2:]), status=status)
+
+
+def going(
+    env: TaskEnv,
+    loaded: LoadedRun,
+    header: EpisodeHeader,
+    poses: Sequence[Array],
+    joints: Sequence[Array],
+    annotations: Sequence[Mapping[str, Any]],
+    status: str,
+) -> Episode:
+    """An episode that is under way elsewhere, in a blind env of its world.
+
+    Args:
+        env: the blind env.
+        loaded: what it was made of.
+        header: which episode it is, and what was drawn for it.
+        poses, joints: (B, 7) and (J,) at the reset and after each control step.
+        annotations: what was being done in each step.
+        status: how it stands.
+    """
+    begin(env, header)
+    found = _episode(env, loaded, env.name, header.episode_seed, np.array(poses), np.array(joints))
+    held = list(accumulate(annotations, lambda last, said: said or last, initial={}))
+    return replace(found, annotations=tuple(held[1:]), status=status)
 
 
 def _rows(manifest: Manifest, reader: TrajectoryReader, field: str, here: Sequence[str], there: Sequence[str]) -> Array:

@@ -101,7 +101,7 @@ class Catalogue:
         """How many envs a session would have."""
         if request.num_envs is not None:
             return request.num_envs
-        return self.num_envs or load(self._source(request), overrides=self.overrides).spec.num_envs
+        return self.num_envs or load(self.source(request), overrides=self.overrides).spec.num_envs
 
     def checked(self, request: SessionRequest) -> None:
         """Refuse what is not served, before anything is built.
@@ -110,7 +110,7 @@ class Catalogue:
             ForbiddenSource: it is not in the catalogue, or an override that a client may not set.
             LimitExceeded: more envs than one session may have.
         """
-        self._source(request)
+        self.source(request)
         for name, installed in ((request.engine, "engines"), (request.robot, "robots")):
             if name is not None and (not _NAME.fullmatch(name) or name not in registry.names(installed)):
                 raise ForbiddenSource(
@@ -127,23 +127,29 @@ class Catalogue:
         if (count := self.envs(request)) > self.limits.envs:
             raise LimitExceeded(f"a session has at most {self.limits.envs} envs, asked for {count}")
 
-    def build(self, request: SessionRequest) -> "TaskEnv":
-        """The env of a session."""
+    def build(self, request: SessionRequest, overrides: Sequence[str] = (), proposals: Any = None) -> "TaskEnv":
+        """The env of a session; `overrides` are the service's own, and `proposals` as `anysim.make` takes them."""
         return make(
-            self._source(request),
+            self.source(request),
             engine=request.engine or self.engine,
             num_envs=request.num_envs or self.num_envs,
             robot=request.robot,
             seed=request.seed,
-            overrides=[*self.overrides, *request.overrides],
+            overrides=[*self.overrides, *request.overrides, *overrides],
             curriculum=request.curriculum,
+            proposals=proposals,
         )
 
     def name(self, request: SessionRequest) -> str:
         """What a request asks for."""
         return self.default if request.task is None else request.task
 
-    def _source(self, request: SessionRequest) -> Any:
+    def source(self, request: SessionRequest) -> Any:
+        """What a request asks for, as `anysim.make` takes it.
+
+        Raises:
+            ForbiddenSource: it is not served.
+        """
         name = self.name(request)
         if name in self.sources:
             return self.sources[name]

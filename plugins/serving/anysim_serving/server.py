@@ -29,8 +29,10 @@ class Service:
         app: the application; `app.state.sessions` are its sessions.
     """
 
-    def __init__(self, catalogue: Catalogue, settings: Settings) -> None:
-        """Take the port; nothing is answered yet.
+    def __init__(
+        self, catalogue: Catalogue, settings: Settings, make: Callable[[Catalogue, Settings], Any] | None = None
+    ) -> None:
+        """Take the port; nothing is answered yet. `make` makes an application in place of that of `anysim serve`.
 
         Raises:
             TaskError: the address or the port cannot be had.
@@ -43,7 +45,7 @@ class Service:
         self.settings = replace(settings, port=self._socket.getsockname()[1])
         shown = f"[{settings.host}]" if ":" in settings.host else settings.host
         self.address = f"{settings.scheme}://{shown}:{self.settings.port}"
-        self.app = application(replace(catalogue, limits=settings.limits), self.settings)
+        self.app = (make or application)(replace(catalogue, limits=settings.limits), self.settings)
 
         class Unsignalled(Server):
             @contextmanager

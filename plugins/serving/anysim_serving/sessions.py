@@ -15,7 +15,7 @@ from anysim_client.errors import LimitExceeded, SessionGone, SessionTaken, TookT
 from anysim_serving.catalogue import Catalogue, SessionRequest
 from anysim_serving.operations import handshake
 from anysim_serving.settings import Limits
-from anysim_serving.simulator import Job, Simulator
+from anysim_serving.simulator import Job, Simulated, Simulator
 
 _log = logging.getLogger(__name__)
 _UNTIL_FREED_S = 30.0
@@ -81,18 +81,34 @@ class Sessions:
             AnysimError: what is asked for is not served, or cannot be built.
         """
         count = await asyncio.to_thread(self._checked, request)
+        session = await self.admit(self.catalogue.name(request), count, lambda: self.catalogue.build(request))
+        try:
+            session.spec = await self.do(session, lambda env: handshake(env, session.task))
+        except BaseException:
+            self.end(session, "failed")
+            raise
+        return session
+
+    async def admit(self, name: str, count: int, build: Callable[[], Simulated]) -> Session:
+        """A session of what `build` makes, with `count` envs, on the thread which then steps it.
+
+        Raises:
+            LimitExceeded: there are as many sessions or envs as may be.
+            AnysimError: it cannot be built.
+        """
+        if count > self.limits.envs:
+            raise LimitExceeded(f"a session has at most {self.limits.envs} envs, asked for {count}")
         while self._ending and len(self.open) + len(self._ending) >= self.limits.sessions:
             ends = next(iter(self._ending))  # memory that is being freed may be had again
             await asyncio.to_thread(ends.join, _UNTIL_FREED_S)
             self._ending.discard(ends)
         self._refuse_more(count)
         ident = secrets.token_hex(8)
-        simulator = Simulator(ident, lambda: self.catalogue.build(request), self.limits.waiting)
-        session = Session(ident, secrets.token_urlsafe(24), self.catalogue.name(request), count, simulator)
+        simulator = Simulator(ident, build, self.limits.waiting)
+        session = Session(ident, secrets.token_urlsafe(24), name, count, simulator)
         self.open[ident] = session
         try:
-            env = await asyncio.wait_for(asyncio.wrap_future(simulator.built), self.limits.op_s)
-            session.spec = await self.do(session, lambda _: handshake(env, session.task))
+            await asyncio.wait_for(asyncio.wrap_future(simulator.built), self.limits.op_s)
         except BaseException as error:
             self.end(session, "failed")
             if isinstance(error, TimeoutError):

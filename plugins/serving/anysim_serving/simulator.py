@@ -6,13 +6,19 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Any
+from typing import Any, Protocol
 
-from anysim.task.env import TaskEnv
 from anysim_client.errors import ServiceBusy, SessionGone
 
 _log = logging.getLogger(__name__)
-Job = Callable[[TaskEnv], Any]
+Job = Callable[[Any], Any]
+"""Something to do with what a simulator has built."""
+
+
+class Simulated(Protocol):
+    """An env, or what holds one."""
+
+    def close(self) -> None: ...
 
 
 class Simulator:
@@ -23,11 +29,11 @@ class Simulator:
         busy_s: seconds that operations took so far.
     """
 
-    def __init__(self, name: str, build: Callable[[], TaskEnv], waiting: int) -> None:
+    def __init__(self, name: str, build: Callable[[], Simulated], waiting: int) -> None:
         self._jobs: queue.Queue[tuple[Job, Future[Any]] | None] = queue.Queue(waiting)
         self._build, self._ended = build, threading.Event()
         self.since = self.busy_s = 0.0
-        self.built: Future[TaskEnv] = Future()
+        self.built: Future[Simulated] = Future()
         self._thread = threading.Thread(target=self._run, name=f"simulator {name}", daemon=True)
         self._thread.start()
 
@@ -100,7 +106,7 @@ class Simulator:
             except Exception:  # noqa: BLE001 - whatever it is, the thread ends
                 _log.exception("an env could not be closed")
 
-    def _serve(self, env: TaskEnv) -> None:
+    def _serve(self, env: Simulated) -> None:
         while (waiting := self._jobs.get()) is not None:
             job, future = waiting
             if not future.set_running_or_notify_cancel():

@@ -1,0 +1,1 @@
+"""Tools by concern: each is a function of a workspace and its arguments."""

@@ -1,0 +1,118 @@
+"""Acting: commands into the live hierarchy of skills, and time that passes."""
+
+from typing import Any
+
+from anysim import registry
+from anysim.errors import PluginError, SpecError, SpecIssue, TaskError
+from anysim.plugin_parameters import checked
+from anysim_agents.answers import Answer
+from anysim_agents.arguments import OfSession, RunCommand, RunSkill, Wait
+from anysim_agents.toolbox.catalog import commands
+from anysim_agents.workspace import Told, Workspace
+from anysim_agents.worlds import refuse_files
+from anysim_schemas.collect import CollectSpec, CommandSpec
+
+
+async def run_skill(workspace: Workspace, args: RunSkill, told: Told | None) -> Answer:
+    """Give a robot one command, such as pick, place, open or push, and wait for how it ends: `ok`, or a typed failure
+    (no_ik, collision, missed_contact, timeout, ...) with what was tried and what to do about it. The robot goes on from
+    where the last command left it. Names of things are those of `observe`."""
+    command: dict[str, Any] = {"do": args.skill, **args.parameters}
+    if args.timeout is not None:
+        command["timeout"] = args.timeout
+    return await _run(workspace, args.session, [command], "stop", args, told, "run_skill")
+
+
+async def run_command(workspace: Workspace, args: RunCommand, told: Told | None) -> Answer:
+    """Give a robot several commands, one after the other, as in a task's file: each with conditions (`if`), a check
+    (`success`) and a `timeout` of its own. Nothing is done unless all of them are right. Wait for how they end."""
+    if len(args.commands) > workspace.limits.commands:
+        raise TaskError(f"run_command.commands: at most {workspace.limits.commands} at once, got {len(args.commands)}")
+    return await _run(workspace, args.session, args.commands, args.on_fail, args, told, "run_command")
+
+
+async def _run(
+    workspace: Workspace,
+    handle: str,
+    given: Any,
+    on_fail: str,
+    args: RunSkill | RunCommand,
+    told: Told | None,
+    tool: str,
+) -> Answer:
+    entry = workspace.entry(handle)
+    workspace.refuse_busy(entry)
+    specs = _checked(given, on_fail)
+    try:
+        return Answer(await workspace.command(entry, specs, args.envs, args.wait, told))
+    except SpecError as error:
+        raise SpecError([SpecIssue("", f"{tool}.{i.path}", i.message) for i in error.issues]) from None
+
+
+def _checked(given: Any, on_fail: str) -> CollectSpec:
+    """Commands as those of a file: with known skills, and without files.
+
+    Raises:
+        SpecError: at `commands.0.object`, what is wrong.
+    """
+    known, issues, found = commands(), list[SpecIssue](), list[CommandSpec]()
+    for number, one in enumerate(given):
+        path = f"commands.{number}"
+        one = {"do": one} if isinstance(one, str) else one
+        if not isinstance(one, dict) or not isinstance(one.get("do"), str):
+            words = "a command is a mapping such as {do: pick, object: cube}; `do` is one of list_catalog kind: commands"
+            issues.append(SpecIssue("", path, words))
+            continue
+        skill = one["do"]
+        if skill not in known:
+            try:
+                registry.load("skills", skill)
+                words = "it drives the robot by itself, and is no command"
+            except PluginError as error:
+                words = str(error)
+            issues.append(SpecIssue("", f"{path}.do", words))
+            continue
+        own = {key: value for key, value in one.items() if key not in CommandSpec.model_fields and key != "if"}
+        issues += refuse_files(skill, own, path)
+        try:
+            found.append(checked(CommandSpec, one, path))  # type: ignore[arg-type]
+        except SpecError as error:
+            issues += error.issues
+    if issues:
+        raise SpecError(issues)
+    return CollectSpec(commands=tuple(found), on_fail=on_fail)  # type: ignore[arg-type]
+
+
+async def wait(workspace: Workspace, args: Wait, told: Told | None) -> Answer:
+    """Let simulated time pass while the robots hold what they have: until things have come to rest, or a task's success
+    has held for as long as it must."""
+    del told
+    entry = workspace.entry(args.session)
+
+    def job(held: Any) -> dict[str, Any]:
+        env, ids = held.env, held.numbers(args.envs)
+        steps = max(1, round(args.seconds / env.engine.world.physics.control_dt))
+        made = 0
+        for _ in range(steps):
+            now = ids[env.running[ids]]
+            if len(now) == 0 or held.stop.is_set():
+                break
+            action = held.live.action(now)
+            env.step(action, held.mask(now))
+            for i in now.tolist():
+                held.histories[i].add(env, i, action[i], {})
+            made += 1
+        rows = [{"env": i, "status": str(env.status[i]), "success": held.terms(i)} for i in ids.tolist()]
+        return {"steps": made, "seconds": made * env.engine.world.physics.control_dt, "envs": rows}
+
+    return Answer(await workspace.do(entry, job, changes=True))
+
+
+async def cancel(workspace: Workspace, args: OfSession, told: Told | None) -> Answer:
+    """Give up the commands under way in a session. The robot holds where it is; the next command goes on from there."""
+    del told
+    ended = await workspace.cancel(workspace.entry(args.session))
+    return Answer({"cancelled": False, "why": "no commands are under way"} if ended is None else {"cancelled": True, **ended})
+
+
+TOOLS = ((run_skill, RunSkill, False), (run_command, RunCommand, False), (wait, Wait, False), (cancel, OfSession, False))

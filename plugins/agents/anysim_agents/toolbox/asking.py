@@ -1,0 +1,71 @@
+"""Asking: facts in words, and questions whose answers were found twice."""
+
+from typing import Any
+
+from anysim.errors import TaskError, listing
+from anysim.record.header import EpisodeHeader
+from anysim_agents.answers import Answer
+from anysim_agents.arguments import Ask
+from anysim_agents.held import Held
+from anysim_agents.workspace import Told, Workspace
+
+
+async def ask(workspace: Workspace, args: Ask, told: Told | None) -> Answer:
+    """Ask about an env in words: the scene, the task, the story so far, or questions with verified answers about this
+    moment (what lies on what, what is left of what, what is within reach, what came first, ...). No model answers: every
+    word follows from the state of the simulation."""
+    del told
+    return Answer(await workspace.do(workspace.entry(args.session), lambda held: _asked(held, args)))
+
+
+TOOLS = ((ask, Ask, True),)
+
+
+def _asked(held: Held, args: Ask) -> dict[str, Any]:
+    from anysim_language.episode import going
+    from anysim_language.instruction import instruction_text
+    from anysim_language.narration import narration
+    from anysim_language.scene_text import scene_text
+
+    i = held.number(args.env)
+    history = held.histories[i]
+    blind, loaded = held.blind()
+    header = EpisodeHeader(
+        env=i,
+        episode=0,
+        episode_seed=history.episode_seed,
+        drawn=dict(history.drawn),
+        overridden=dict(history.overridden),
+    )
+    episode = going(blind, loaded, header, history.poses, history.joints, history.doings, str(held.env.status[i]))
+    if args.about == "scene":
+        return {"scene": scene_text(episode, step=-1)}
+    if args.about == "task":
+        return {"task": instruction_text(episode)}
+    if args.about == "story":
+        return {"story": [{"step": s.step, "text": s.text} for s in narration(episode)]}
+    return _questions(episode, args)
+
+
+def _questions(episode: Any, args: Ask) -> dict[str, Any]:
+    from anysim_language.questions.all import chosen, verified
+
+    things = sorted(thing.name for thing in episode.things)
+    if args.thing is not None and args.thing not in things:
+        raise TaskError(f"ask.thing: there is no '{args.thing[:60]}' (things: {listing(things, 40)})")
+    last = len(episode.body_pose) - 1
+    found = [one.question for one in verified(episode, [last]) if one.agreed]
+    families = sorted({question.family for question in found})
+    if args.family is not None and args.family not in families:
+        raise TaskError(f"ask.family: nothing of '{args.family[:60]}' can be asked now (what can: {listing(families, 40)})")
+    wanted = [
+        question
+        for question in found
+        if args.family in (None, question.family)
+        and (args.thing is None or args.thing in question.refers.values() or args.thing in question.program.values())
+    ]
+    rows = [
+        {"family": q.family, "question": q.text, "answer": q.answer, "names": dict(q.refers)}
+        for q in chosen(wanted, args.most)
+    ]
+    return {"found": len(wanted), "families": families, "questions": rows}

@@ -1,0 +1,124 @@
+"""Sessions: begin one, see how it stands, end it."""
+
+from typing import Any
+
+from anysim.engine.capability import Capability
+from anysim.errors import TaskError
+from anysim_agents.answers import Answer
+from anysim_agents.arguments import CreateSession, OfSession, OptionalSession
+from anysim_agents.held import Held
+from anysim_agents.workspace import Entry, Told, Workspace
+from anysim_serving.catalogue import SessionRequest
+
+
+async def create_session(workspace: Workspace, args: CreateSession, told: Told | None) -> Answer:
+    """Begin a session of a task: a simulator of your own, with its episodes begun. Nothing moves until you give a
+    command or wait. It answers with the word for the session, what there is, and which cameras and parts it has."""
+    del told
+    overrides: list[str] = []
+    if args.horizon is not None:
+        if args.horizon > workspace.limits.horizon:
+            raise TaskError(f"create_session.horizon: at most {workspace.limits.horizon} control steps")
+        overrides.append(f"task.horizon={args.horizon}")
+    if args.on_success is not None:
+        overrides.append(f"task.on_success={args.on_success}")
+    request = SessionRequest(
+        task=args.task,
+        num_envs=args.num_envs,
+        engine=args.engine,
+        robot=args.robot,
+        seed=args.seed,
+        overrides=tuple(overrides),
+    )
+    return await begun(workspace, await workspace.create(request))
+
+
+async def begun(workspace: Workspace, entry: Entry) -> Answer:
+    """What an agent is told of a session that has begun."""
+    return Answer({"session": entry.handle, **await workspace.do(entry, about)})
+
+
+def about(held: Held) -> dict[str, Any]:
+    """What a session has."""
+    env, world = held.env, held.env.engine.world
+    task = env.spec.task
+    assert task is not None
+    joints = {e.name: [j.name for j in world.joints[e.joint_start : e.joint_stop]] for e in world.entities}
+    robots = {robot.name for robot in world.robots}
+    return {
+        "task": env.name,
+        "instruction": env.instruction(0),
+        "engine": env.engine.name,
+        "num_envs": env.num_envs,
+        "control_dt_s": world.physics.control_dt,
+        "horizon": task.horizon,
+        "on_success": task.on_success,
+        "robots": {
+            robot.name: {"channels": list(robot.channels), "tools": [f"{robot.name}.{tool}" for tool in robot.tools]}
+            for robot in world.robots
+        },
+        "things": [slot.name for slot in world.slots] or [e.name for e in world.entities if e.name not in robots],
+        "parts": {name: found for name, found in joints.items() if found and name not in robots},
+        "goals": list(env.scene.goals),
+        "cameras": [camera.name for camera in world.cameras],
+        "can_draw": Capability.RENDER_RGB in env.engine.capabilities,
+        "success": list(held.terms(0)),
+        "can_change": list(env.counterfactuals.paths),
+    }
+
+
+async def status(workspace: Workspace, args: OptionalSession, told: Told | None) -> Answer:
+    """Tell how a session stands: the commands under way or how the last ones ended, the state of each env's episode,
+    snapshots, and what `changes` may name; without a session, all sessions and the limits of this server."""
+    del told
+    if args.session is None:
+        return Answer(await _all(workspace))
+    entry = workspace.entry(args.session)
+    return Answer(workspace.about(entry) | await workspace.do(entry, _standing))
+
+
+def _standing(held: Held) -> dict[str, Any]:
+    env = held.env
+    dt = env.engine.world.physics.control_dt
+    rows = [
+        {
+            "env": i,
+            "status": str(env.status[i]),
+            "steps": int(env.info["elapsed_steps"][i]),
+            "seconds": int(env.info["elapsed_steps"][i]) * dt,
+            "success": held.terms(i),
+        }
+        for i in range(env.num_envs)
+    ]
+    return {"envs": rows, "snapshots": list(held.snapshots), "can_change": list(env.counterfactuals.paths)}
+
+
+async def _all(workspace: Workspace) -> dict[str, Any]:
+    limits, service = workspace.limits, workspace.sessions.limits
+    return {
+        "sessions": [workspace.about(entry) for entry in workspace.visible()],
+        "limits": {
+            "sessions": service.sessions,
+            "envs_of_a_session": service.envs,
+            "idle_s": service.idle_s,
+            "lifetime_s": service.lifetime_s,
+            "seconds_of_an_operation": service.op_s,
+            "seconds_of_waiting": limits.wait_s,
+            "yaml_bytes": limits.yaml_bytes,
+            "things_of_a_world": limits.things,
+            "pixels_of_an_image": limits.pixels,
+            "snapshots_of_a_session": limits.snapshots,
+            "commands_at_once": limits.commands,
+        },
+    }
+
+
+async def end_session(workspace: Workspace, args: OfSession, told: Told | None) -> Answer:
+    """End a session, and free its simulator; commands under way are given up."""
+    del told
+    entry = workspace.entry(args.session)
+    await workspace.end(entry)
+    return Answer({"ended": args.session})
+
+
+TOOLS = ((create_session, CreateSession, False), (status, OptionalSession, True), (end_session, OfSession, False))
