@@ -2,11 +2,14 @@
 
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from anysim.cli.options import Engine, NumEnvs, Overrides
+
+if TYPE_CHECKING:
+    from anysim_serving.server import Service
 
 PORT = 8470
 
@@ -52,7 +55,7 @@ def serve(
     """
     import logging
 
-    from anysim_client.token import TOKEN_ENV, forget_token, keep_token
+    from anysim_client.token import TOKEN_ENV
     from anysim_serving.catalogue import Catalogue
     from anysim_serving.server import Service, fresh_token
     from anysim_serving.settings import Limits, Settings
@@ -70,24 +73,33 @@ def serve(
         sources, all_tasks=all_tasks, num_envs=num_envs, engine=engine, overrides=tuple(override or ()), limits=limits
     )
     service = Service(catalogue, settings)
-    kept = keep_token(service.address, token) if token else None
+    use = f'use it: env = anysim.connect("{service.address}"); Ctrl-C ends it'
+    run(service, f"serving {', '.join(catalogue.names())} at {service.address}", use, bool(given))
+
+
+def run(service: "Service", what: str, use: str, token_given: bool) -> None:
+    """Run a service until it is told to stop; say what it is, its token and how to use it."""
+    from anysim_client.token import TOKEN_ENV, forget_token, keep_token
+
+    settings = service.settings
+    kept = keep_token(service.address, settings.token) if settings.token else None
 
     def told() -> None:
-        typer.echo(f"serving {', '.join(catalogue.names())} at {service.address}")
+        typer.echo(what)
         if kept is None:
             typer.echo(
                 "warning: there is no token: every process and user of this machine can use the service", err=True
             )
         else:
-            typer.echo(f"token: {'that of ' + TOKEN_ENV if given else token}")
+            typer.echo(f"token: {'that of ' + TOKEN_ENV if token_given else settings.token}")
             typer.echo(f"kept for your own clients on this machine in {kept}")
         if not settings.on_loopback and settings.certificate is None:
             typer.echo("warning: without TLS the token and all data can be read on the network between", err=True)
-        typer.echo(f'use it: env = anysim.connect("{service.address}"); Ctrl-C ends it')
+        typer.echo(use)
 
     try:
         service.run(told)
     finally:
         if kept is not None:
-            forget_token(kept, token)
+            forget_token(kept, settings.token)
     typer.echo("ended: all envs are freed")
