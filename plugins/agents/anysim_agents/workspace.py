@@ -7,7 +7,6 @@ from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from anysim.api import load
 from anysim.engine.capability import Capability
 from anysim.engine.factory import engine_class
 from anysim.errors import listing
@@ -55,6 +54,7 @@ class Workspace:
         self.sessions = Sessions(catalogue, catalogue.limits)
         self.entries: dict[str, Entry] = {}
         self._count = 0
+        self._giving_up: asyncio.Task[Any] | None = None
 
     # ------------------------------------------------------------------ sessions
 
@@ -68,7 +68,7 @@ class Workspace:
         name = self.catalogue.name(request)
 
         def build() -> Held:
-            loaded = load(self.catalogue.source(request), overrides=[*self.catalogue.overrides, *request.overrides])
+            loaded = self.catalogue.loaded(request)
             desk = Desk() if loaded.spec.world.layout_source is None else None
             more = _view(loaded, request.engine or self.catalogue.engine)
             env = self.catalogue.build(request, more, desk)
@@ -185,13 +185,20 @@ class Workspace:
             wait: seconds after which they go on without this call.
             told: is told of progress.
 
+        A call that is cancelled gives the commands up.
+
         Returns:
             How they ended, or how far they are.
         """
         self.refuse_busy(entry)
         entry.progress = None
         entry.going = asyncio.create_task(self._carry_out(entry, commands, envs, told))
-        done, _ = await asyncio.wait({entry.going}, timeout=min(wait, self.limits.wait_s))
+        entry.going.add_done_callback(_seen)
+        try:
+            done, _ = await asyncio.wait({entry.going}, timeout=min(wait, self.limits.wait_s))
+        except asyncio.CancelledError:  # its client has cancelled the call, or is gone
+            self._giving_up = asyncio.create_task(self.cancel(entry))
+            raise
         if done:
             return entry.going.result()
         return {"done": False, "progress": entry.progress, "next": "call `status` for the end of it, or `cancel`"}
@@ -233,6 +240,12 @@ class Workspace:
         elif entry.run is not None:
             told["commands"] = outcome(entry.run)
         return told
+
+
+def _seen(task: "asyncio.Task[Any]") -> None:
+    """What a task raised was looked at; `status` tells it."""
+    if not task.cancelled():
+        task.exception()
 
 
 def outcome(run: Run) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from anysim.api import load, make, watched
 from anysim.errors import TaskError, listing, suggest
 from anysim_client.errors import ForbiddenSource, LimitExceeded
 from anysim_schemas.base import Spec
+from anysim_schemas.load import LoadedRun, LoadedSpec
 from anysim_serving.settings import Limits
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ class Catalogue:
         """How many envs a session would have."""
         if request.num_envs is not None:
             return request.num_envs
-        return self.num_envs or load(self.source(request), overrides=self.overrides).spec.num_envs
+        return self.num_envs or self.loaded(request).spec.num_envs
 
     def checked(self, request: SessionRequest) -> None:
         """Refuse what is not served, before anything is built.
@@ -139,6 +140,11 @@ class Catalogue:
             curriculum=request.curriculum,
             proposals=proposals,
         )
+
+    def loaded(self, request: SessionRequest) -> LoadedRun:
+        """The file of what a request asks for, with the owner's overrides."""
+        source = self.source(request)
+        return source if isinstance(source, LoadedSpec) else load(source, overrides=self.overrides)
 
     def name(self, request: SessionRequest) -> str:
         """What a request asks for."""

@@ -2,14 +2,13 @@
 
 from typing import Any
 
-from anysim import registry
-from anysim.errors import PluginError, SpecError, SpecIssue, TaskError
-from anysim.plugin_parameters import checked
+from anysim.errors import SpecError, SpecIssue, TaskError, listing, suggest
+from anysim.plugin_parameters import checked, parameters, reference_kind
 from anysim_agents.answers import Answer
 from anysim_agents.arguments import OfSession, RunCommand, RunSkill, Wait
 from anysim_agents.toolbox.catalog import commands
 from anysim_agents.workspace import Told, Workspace
-from anysim_agents.worlds import refuse_files
+from anysim_agents.worlds import paths_of, refuse_files
 from anysim_schemas.collect import CollectSpec, CommandSpec
 
 
@@ -42,11 +41,32 @@ async def _run(
 ) -> Answer:
     entry = workspace.entry(handle)
     workspace.refuse_busy(entry)
-    specs = _checked(given, on_fail)
     try:
+        specs = _checked(given, on_fail)
         return Answer(await workspace.command(entry, specs, args.envs, args.wait, told))
     except SpecError as error:
-        raise SpecError([SpecIssue("", f"{tool}.{i.path}", i.message) for i in error.issues]) from None
+        raise SpecError([_explained(issue, given, tool) for issue in error.issues]) from None
+
+
+def _explained(issue: SpecIssue, given: Any, tool: str) -> SpecIssue:
+    """The issue where the agent wrote it, with what the command takes."""
+    _, number, *key = issue.path.split(".")
+    at = f"{tool}.{issue.path}"
+    if tool == "run_skill":
+        at = f"run_skill.{'skill' if key == ['do'] else '.'.join(['parameters', *key])}"
+    one = given[int(number)]
+    skill = one.get("do") if isinstance(one, dict) else one
+    made = commands().get(skill) if isinstance(skill, str) else None
+    words = issue.message
+    if made is not None and key != ["do"]:
+        hidden = paths_of(skill)
+        taken = [
+            name if p.default is not p.empty or reference_kind(p.annotation) == "robot" else f"{name} (required)"
+            for name, p in parameters(made).items()
+            if name not in hidden
+        ]
+        words += f" ({skill} takes: {listing(taken, 40)}; describe kind: command, name: {skill})"
+    return SpecIssue("", at, words)
 
 
 def _checked(given: Any, on_fail: str) -> CollectSpec:
@@ -65,11 +85,7 @@ def _checked(given: Any, on_fail: str) -> CollectSpec:
             continue
         skill = one["do"]
         if skill not in known:
-            try:
-                registry.load("skills", skill)
-                words = "it drives the robot by itself, and is no command"
-            except PluginError as error:
-                words = str(error)
+            words = f"there is no command '{skill[:60]}'{suggest(skill[:60], list(known))} (list_catalog kind: commands)"
             issues.append(SpecIssue("", f"{path}.do", words))
             continue
         own = {key: value for key, value in one.items() if key not in CommandSpec.model_fields and key != "if"}
@@ -95,7 +111,7 @@ async def wait(workspace: Workspace, args: Wait, told: Told | None) -> Answer:
         made = 0
         for _ in range(steps):
             now = ids[env.running[ids]]
-            if len(now) == 0 or held.stop.is_set():
+            if len(now) == 0:
                 break
             action = held.live.action(now)
             env.step(action, held.mask(now))

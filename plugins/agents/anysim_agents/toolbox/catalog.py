@@ -1,6 +1,7 @@
 """Catalogue: what is installed and served, a page at a time, and each entry in words."""
 
 import asyncio
+import sys
 from collections.abc import Iterator
 from types import UnionType
 from typing import Any, Union, get_args, get_origin
@@ -8,7 +9,7 @@ from typing import Any, Union, get_args, get_origin
 from pydantic import BaseModel
 
 from anysim import registry
-from anysim.api import load, task_path
+from anysim.api import task_path
 from anysim.assets.catalogue import load_robot, missing_source
 from anysim.engine.factory import availability, engine_class
 from anysim.errors import AnysimError, PluginError, TaskError, listing, suggest
@@ -20,6 +21,7 @@ from anysim_agents.arguments import Describe, ListCatalog
 from anysim_agents.workspace import Told, Workspace
 from anysim_agents.worlds import paths_of
 from anysim_schemas.run import RunSpec
+from anysim_serving.catalogue import SessionRequest
 
 
 async def list_catalog(workspace: Workspace, args: ListCatalog, told: Told | None) -> Answer:
@@ -77,8 +79,11 @@ def predicates() -> dict[str, Any]:
 
 
 def first_line(thing: Any) -> str:
-    """The first paragraph of a docstring."""
-    return " ".join((thing.__doc__ or "").split("\n\n")[0].split())
+    """The first paragraph of a docstring, or of its module's where it refers to that."""
+    words = thing.__doc__ or ""
+    if words.startswith("See the module"):
+        words = sys.modules[thing.__module__].__doc__ or ""
+    return " ".join(words.split("\n\n")[0].split())
 
 
 def _rows(workspace: Workspace, kind: str) -> Iterator[dict[str, Any]]:
@@ -104,7 +109,7 @@ def _rows(workspace: Workspace, kind: str) -> Iterator[dict[str, Any]]:
 
 def _task_words(workspace: Workspace, name: str) -> str:
     try:
-        task = load(workspace.catalogue.sources.get(name, name)).spec.task
+        task = workspace.catalogue.loaded(SessionRequest(task=name)).spec.task
     except AnysimError as error:
         return f"does not load: {error}"
     return "" if task is None else task.description
@@ -123,7 +128,7 @@ def _known(kind: str, name: str, names: list[str]) -> None:
 
 def _task(workspace: Workspace, name: str) -> dict[str, Any]:
     _known("task", name, workspace.catalogue.names())
-    spec = load(workspace.catalogue.sources.get(name, name)).spec
+    spec = workspace.catalogue.loaded(SessionRequest(task=name)).spec
     world, task = spec.world, spec.task
     data: dict[str, Any] = {
         "name": name,
@@ -214,11 +219,17 @@ def parameter(found: Any) -> dict[str, Any]:
     if found.default is found.empty and kind != "robot":
         row["required"] = True
     elif found.default is not found.empty and found.default is not None:
-        row["default"] = list(found.default) if isinstance(found.default, tuple) else found.default
+        row["default"] = _as_data(found.default)
     return row
 
 
 _SIGNS = {"Gt": ">", "Ge": "at least", "Lt": "<", "Le": "at most", "MinLen": "length at least", "MaxLen": "length at most"}
+
+
+def _as_data(default: Any) -> Any:
+    if isinstance(default, tuple):
+        return [_as_data(item) for item in default]
+    return default if isinstance(default, str | int | float) else repr(default)
 
 
 def _slots(bound: Any) -> list[Any]:

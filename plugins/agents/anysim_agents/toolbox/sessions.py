@@ -63,7 +63,6 @@ def about(held: Held) -> dict[str, Any]:
         "cameras": [camera.name for camera in world.cameras],
         "can_draw": Capability.RENDER_RGB in env.engine.capabilities,
         "success": list(held.terms(0)),
-        "can_change": list(env.counterfactuals.paths),
     }
 
 
