@@ -100,9 +100,7 @@ class DrawnSkill(MovingSkill):
 class CommandSequence(SkillSequence):
     """The commands of `collect`, one after the other in each env."""
 
-    def __init__(
-        self, collect: CollectSpec, env: TaskEnv, bind: BindSkill, path: str = "collect.commands"
-    ) -> None:
+    def __init__(self, collect: CollectSpec, env: TaskEnv, bind: BindSkill, path: str = "collect.commands") -> None:
         """`bind` makes a skill by name; `path` is where the commands were written.
 
         Raises:

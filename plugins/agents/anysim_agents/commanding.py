@@ -11,8 +11,8 @@ from anysim.conventions import Array
 from anysim.errors import TaskError
 from anysim.skills.base import OUTCOMES, Outcome
 from anysim.skills.commands import CommandSequence
-from anysim_agents.held import Held
-from anysim_schemas.collect import CollectSpec
+from anysim_agents.agent_env import AgentEnv
+from anysim_schemas.collect import CollectSpec, CommandSpec
 
 TURN_S = 0.1
 """Seconds of control steps after which other operations of the session have their turn; results do not depend on it."""
@@ -38,74 +38,74 @@ class Run:
     over: bool = False
 
 
-def begin(held: Held, commands: CollectSpec, ids: Array) -> Run:
+def begin(agent: AgentEnv, commands: CollectSpec, ids: Array) -> Run:
     """Give commands to envs. Runs on the simulator's thread.
 
     Raises:
         SpecError: at `commands.0.object`, what is wrong with them; nothing has begun.
         TaskError: an episode there has ended.
     """
-    env = held.env
+    env = agent.env
     over = {int(i): str(env.status[i]) for i in ids if not env.running[i]}
     if over:
         raise TaskError(
             f"the episodes of envs {over} have ended, and nothing can be done in them; call reset for new ones, or "
             f"reset_to with a snapshot of a moment before"
         )
-    sequence = held.live.bound(commands)
-    held.stop.clear()
-    held.live.give(ids, sequence)
-    words = ", ".join(command.do for command in commands.commands if hasattr(command, "do"))
+    sequence = agent.live.bound(commands)
+    agent.stop.clear()
+    agent.live.give(ids, sequence)
+    words = ", ".join(command.do for command in commands.commands if isinstance(command, CommandSpec))
     return Run(words, ids, sequence, dict.fromkeys(ids.tolist(), 0))
 
 
-def go_on(held: Held, run: Run) -> dict[str, Any]:
+def go_on(agent: AgentEnv, run: Run) -> dict[str, Any]:
     """A turn of control steps; the progress after it. Runs on the simulator's thread."""
     began = time.perf_counter()
     while not run.over and time.perf_counter() - began < TURN_S:
-        _step(held, run)
-    return progress(held, run)
+        _step(agent, run)
+    return progress(agent, run)
 
 
-def _step(held: Held, run: Run) -> None:
-    env, live = held.env, held.live
-    if held.stop.is_set():
+def _step(agent: AgentEnv, run: Run) -> None:
+    env, live = agent.env, agent.live
+    if agent.stop.is_set():
         live.drop(np.array([i for i in run.ids.tolist() if i not in run.ended]))
-        _end(held, run, "cancelled")
+        _end(agent, run, "cancelled")
         return
     ids = np.array([i for i in run.ids.tolist() if i not in run.ended])
     action = live.action(ids)
-    result = env.step(action, held.mask(ids))
+    result = env.step(action, agent.mask(ids))
     for i in ids.tolist():
         run.steps[i] += 1
-        held.histories[i].add(env, i, action[i], live.describe(i))
+        agent.histories[i].add(env, i, action[i], live.describe(i))
         if not live.under_way(i):
-            run.ended[i] = _report(held, run, i, str(OUTCOMES[live.outcome[i]]))
+            run.ended[i] = _report(agent, run, i, str(OUTCOMES[live.outcome[i]]))
         elif not env.running[i]:
-            run.ended[i] = _report(held, run, i, f"episode {result.status[i]}")
+            run.ended[i] = _report(agent, run, i, f"episode {result.status[i]}")
             live.drop(np.array([i]))
     run.over = len(run.ended) == len(run.ids)
 
 
-def _end(held: Held, run: Run, outcome: str) -> None:
+def _end(agent: AgentEnv, run: Run, outcome: str) -> None:
     for i in run.ids.tolist():
         if i not in run.ended:
-            run.ended[i] = _report(held, run, i, outcome)
+            run.ended[i] = _report(agent, run, i, outcome)
     run.over = True
 
 
-def _report(held: Held, run: Run, env: int, outcome: str) -> dict[str, Any]:
+def _report(agent: AgentEnv, run: Run, env: int, outcome: str) -> dict[str, Any]:
     """How commands ended in an env."""
     said = dict(run.sequence.describe(env))
     done = run.sequence.segments(env, False)
-    steps, dt = run.steps[env], held.env.engine.world.physics.control_dt
+    steps, dt = run.steps[env], agent.env.engine.world.physics.control_dt
     report: dict[str, Any] = {"env": env, "outcome": outcome, "ok": outcome == str(Outcome.OK)}
     if outcome != str(Outcome.OK):
         report |= {"at": said.get("phase", ""), "attempts": said.get("attempt", 1)}
         report |= {"tried": said["ladder"]} if "ladder" in said else {}
         report["advice"] = ADVICE.get(outcome, "")
     report |= {"commands_done": len(done), "steps": steps, "seconds": steps * dt}
-    return report | {"status": str(held.env.status[env]), "success": held.terms(env)}
+    return report | {"status": str(agent.env.status[env]), "success": agent.terms(env)}
 
 
 ADVICE: Mapping[str, str] = {
@@ -131,7 +131,7 @@ ADVICE: Mapping[str, str] = {
 """What to do about each outcome, in a sentence."""
 
 
-def progress(held: Held, run: Run) -> dict[str, Any]:
+def progress(agent: AgentEnv, run: Run) -> dict[str, Any]:
     """Where commands stand."""
     under_way = [i for i in run.ids.tolist() if i not in run.ended]
     at = {str(i): run.sequence.describe(i).get("phase", "") for i in under_way[:8]}

@@ -37,3 +37,7 @@ class AgentLimits:
     replay: int = 5_000
     wait_s: float = 300.0
     page: int = 40
+
+
+AGENT = AgentLimits()
+"""Those of an agent whose server says nothing else."""

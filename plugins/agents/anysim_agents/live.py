@@ -22,7 +22,7 @@ PATH = "commands"
 class LiveCommands(MovingSkill):
     """What an env does is the list of commands that it was given last.
 
-    Whatever a command of this episode has moved goes on to be held by the later ones, as between the commands of a file.
+    What a command of this episode has moved is held by the later ones, as between the commands of a file.
 
     Attributes:
         movers: all that commands have moved so far.

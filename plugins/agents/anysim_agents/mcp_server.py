@@ -16,17 +16,17 @@ from typing import Any
 from anysim import __version__
 from anysim.errors import PluginError
 from anysim_agents.answers import Answer
-from anysim_agents.limits import AgentLimits
+from anysim_agents.limits import AGENT, AgentLimits
 from anysim_agents.tools import call, definitions, in_words
 from anysim_agents.workspace import Told, Workspace
 from anysim_serving.catalogue import Catalogue
 from anysim_serving.settings import Settings
 
 INSTRUCTIONS = (
-    "Worlds of robots and things, simulated. Begin with list_catalog and create_session (or create_world with a YAML text "
-    "of your own); observe, render and look_at tell what is where; run_skill and run_command have robots act, and answer "
-    "with typed outcomes; nothing moves in between. An error says what to do: repair the call and try again. Lengths are in "
-    "metres, angles in radians unless said otherwise, z is up."
+    "Worlds of robots and things, simulated. Begin with list_catalog and create_session (or create_world with a YAML "
+    "text of your own). observe, render and look_at tell what is where; run_skill and run_command have robots act, and "
+    "answer with typed outcomes; nothing moves in between. An error says what to do: repair the call and try again. "
+    "Lengths are in metres, angles in radians unless said otherwise, z is up."
 )
 HTTP_PATH = "/mcp"
 MOST_CONNECTIONS = 64
@@ -43,8 +43,8 @@ def sdk() -> Any:
         import mcp
     except ImportError as error:
         raise PluginError(
-            f"the Model Context Protocol's SDK is not installed ({error}): pip install 'anysim-agents[mcp]'. The tools do "
-            f"without it: `anysim mcp --definitions openai` prints them, `anysim_agents.tools.call` does what they say"
+            f"the Model Context Protocol's SDK is not installed ({error}): pip install 'anysim-agents[mcp]'. The tools "
+            f"do without it: `anysim mcp --definitions openai` prints them, `anysim_agents.tools.call` calls them"
         ) from None
     return mcp
 
@@ -126,7 +126,7 @@ def _content(answer: Answer) -> list[dict[str, Any]]:
     return [{"type": "text", "text": text}, *images]
 
 
-# ------------------------------------------------------------------------------------------------------------- transports
+# ---------------------------------------------------------------------------------------------------------- transports
 
 
 @asynccontextmanager
@@ -174,7 +174,7 @@ def _own_output() -> Iterator[tuple[Any, ...]]:
         os.close(wire)
 
 
-def http_application(agents: AgentLimits = AgentLimits()) -> Callable[[Catalogue, Settings], Any]:
+def http_application(agents: AgentLimits = AGENT) -> Callable[[Catalogue, Settings], Any]:
     """What makes the application of `anysim_serving.server.Service`: streamable HTTP at HTTP_PATH, and nothing else.
 
     Who may ask is decided before it, by `anysim_serving.access.Gate`: token, Host, Origin, and sizes.

@@ -23,7 +23,7 @@ class Tool:
 
     Attributes:
         name: by which it is called.
-        about: what it does, for whoever chooses among tools.
+        about: what it does, for the model that chooses among tools.
         arguments: the model of its arguments.
         run: does it.
         reads: whether it changes nothing.
@@ -97,7 +97,9 @@ async def call(
     """
     tool = TOOLS.get(name)
     if tool is None:
-        raise TaskError(f"there is no tool '{name[:60]}'{suggest(name[:60], list(TOOLS))} (tools: {listing(TOOLS, 40)})")
+        raise TaskError(
+            f"there is no tool '{name[:60]}'{suggest(name[:60], list(TOOLS))} (tools: {listing(TOOLS, 40)})"
+        )
     given = checked(tool.arguments, dict(arguments or {}), name)
     answer = await tool.run(workspace, given, told)
     return Answer(shortened(answer.data), answer.images)

@@ -12,9 +12,9 @@ from anysim.engine.factory import engine_class
 from anysim.errors import listing
 from anysim.task.env import TaskEnv
 from anysim_agents import commanding
+from anysim_agents.agent_env import AgentEnv, Desk
 from anysim_agents.commanding import Run
-from anysim_agents.held import Desk, Held
-from anysim_agents.limits import AgentLimits
+from anysim_agents.limits import AGENT, AgentLimits
 from anysim_client.errors import SessionGone, SessionTaken
 from anysim_schemas.collect import CollectSpec
 from anysim_schemas.load import LoadedRun
@@ -48,7 +48,7 @@ class Entry:
 class Workspace:
     """What one server holds. Its methods belong to the event loop's thread."""
 
-    def __init__(self, catalogue: Catalogue, limits: AgentLimits = AgentLimits(), *, shared: bool = True) -> None:
+    def __init__(self, catalogue: Catalogue, limits: AgentLimits = AGENT, *, shared: bool = True) -> None:
         """`shared` says whether several clients may reach the server: sessions then have names that nobody guesses."""
         self.catalogue, self.limits, self._shared = catalogue, limits, shared
         self.sessions = Sessions(catalogue, catalogue.limits)
@@ -67,12 +67,12 @@ class Workspace:
         count = await asyncio.to_thread(self._checked, request)
         name = self.catalogue.name(request)
 
-        def build() -> Held:
+        def build() -> AgentEnv:
             loaded = self.catalogue.loaded(request)
             desk = Desk() if loaded.spec.world.layout_source is None else None
             more = _view(loaded, request.engine or self.catalogue.engine)
             env = self.catalogue.build(request, more, desk)
-            return _held(env, desk, self.limits)
+            return _agent_env(env, desk, self.limits)
 
         return await self._admit(name, count, build)
 
@@ -84,10 +84,10 @@ class Workspace:
         """
         from anysim.api import make
 
-        def build() -> Held:
+        def build() -> AgentEnv:
             desk = Desk() if loaded.spec.world.layout_source is None else None
             env = make(loaded, num_envs=num_envs, seed=seed, overrides=_view(loaded, None), proposals=desk)
-            return _held(env, desk, self.limits)
+            return _agent_env(env, desk, self.limits)
 
         return await self._admit(loaded.spec.world.name, num_envs, build)
 
@@ -95,7 +95,7 @@ class Workspace:
         self.catalogue.checked(request)
         return self.catalogue.envs(request)
 
-    async def _admit(self, name: str, count: int, build: Callable[[], Held]) -> Entry:
+    async def _admit(self, name: str, count: int, build: Callable[[], AgentEnv]) -> Entry:
         session = await self.sessions.admit(name, count, build)
         self.sessions.attach(session)  # an agent may think for as long as `idle_s`
         self._count += 1
@@ -149,7 +149,7 @@ class Workspace:
 
     # ------------------------------------------------------------------ operations
 
-    async def do(self, entry: Entry, job: Callable[[Held], Any], *, changes: bool = False) -> Any:
+    async def do(self, entry: Entry, job: Callable[[AgentEnv], Any], *, changes: bool = False) -> Any:
         """Have a session's thread do something; what `changes` the env is refused while commands are under way.
 
         Raises:
@@ -207,9 +207,9 @@ class Workspace:
         self, entry: Entry, commands: CollectSpec, envs: Sequence[int] | None, told: Told | None
     ) -> dict[str, Any]:
         entry.run = None
-        entry.run = run = await self.do(entry, lambda held: commanding.begin(held, commands, held.numbers(envs)))
+        entry.run = run = await self.do(entry, lambda agent: commanding.begin(agent, commands, agent.numbers(envs)))
         while not run.over:
-            entry.progress = now = await self.do(entry, lambda held: commanding.go_on(held, run))
+            entry.progress = now = await self.do(entry, lambda agent: commanding.go_on(agent, run))
             if told is not None:
                 try:
                     await told(float(now["steps"]), "; ".join(f"env {i}: {at}" for i, at in now["at"].items()))
@@ -224,7 +224,7 @@ class Workspace:
         while entry.run is None and not entry.going.done():
             await asyncio.sleep(0.005)  # they are about to begin
         if not entry.going.done():
-            await self.do(entry, lambda held: held.stop.set())
+            await self.do(entry, lambda agent: agent.stop.set())
         await asyncio.wait({entry.going})
         return None if entry.run is None else outcome(entry.run)
 
@@ -254,9 +254,9 @@ def outcome(run: Run) -> dict[str, Any]:
     return {"done": run.over, "ok": all(end["ok"] for end in ends), "commands": run.words, "envs": ends}
 
 
-def _held(env: TaskEnv, desk: Desk | None, limits: AgentLimits) -> Held:
+def _agent_env(env: TaskEnv, desk: Desk | None, limits: AgentLimits) -> AgentEnv:
     try:
-        return Held(env, desk, limits)
+        return AgentEnv(env, desk, limits)
     except BaseException:
         env.close()
         raise
@@ -269,4 +269,3 @@ def _view(loaded: LoadedRun, engine: str | None) -> list[str]:
         return []
     camera = {"from": [1.0, -1.0, 1.0], "look_at": [0.0, 0.0, 0.2], "size": [320, 240]}
     return [f"{VIEW}={json.dumps(camera)}"]
-

@@ -115,7 +115,7 @@ def _parsed(text: str, limits: AgentLimits) -> Node:
     return root
 
 
-# ------------------------------------------------------------------------------------------------- nothing leads to files
+# ---------------------------------------------------------------------------------------------- nothing leads to files
 
 
 def _leading_out(node: Node, keys: tuple[str, ...]) -> Iterator[Fault]:
@@ -150,7 +150,7 @@ def _refusal(value: str, keys: tuple[str, ...]) -> str:
         return _suspicious(value.removeprefix(PROCEDURAL))
     if FILE_KEYS & set(keys):
         return f"a text cannot name a file or a folder, got {shown}"
-    return _suspicious(value, references=keys[0] in ("task", "collect"))
+    return _suspicious(value, references=keys[:1] in (("task",), ("collect",)))
 
 
 def _suspicious(value: str, references: bool = False) -> str:
@@ -208,7 +208,7 @@ def _files_of_skills(loaded: LoadedRun) -> Iterator[SpecIssue]:
         yield from refuse_files(skill, own, path)
 
 
-# ---------------------------------------------------------------------------------------------------------------- limits
+# ------------------------------------------------------------------------------------------------------------- limits
 
 
 def _beyond(loaded: LoadedRun, limits: AgentLimits) -> Iterator[SpecIssue]:
@@ -222,7 +222,9 @@ def _beyond(loaded: LoadedRun, limits: AgentLimits) -> Iterator[SpecIssue]:
 
     count = len(world.robots) + sum(1 if o.count is None else most(o.count) for o in world.objects.values())
     if count > limits.things:
-        yield issue("world.objects", f"{count} robots and objects; at most {limits.things} are taken, instances counted")
+        yield issue(
+            "world.objects", f"{count} robots and objects; at most {limits.things} are taken, instances counted"
+        )
     if len(world.cameras) > limits.cameras:
         yield issue("world.cameras", f"{len(world.cameras)} cameras; at most {limits.cameras} are taken")
     for name, camera in world.cameras.items():
@@ -231,7 +233,8 @@ def _beyond(loaded: LoadedRun, limits: AgentLimits) -> Iterator[SpecIssue]:
             words = f"an image of {wide}x{high}; at most {limits.pixels} pixels are taken"
             yield issue(f"world.cameras.{name}.size", words)
     if physics.control_dt / physics.dt > limits.substeps:
-        words = f"{physics.control_dt / physics.dt:.0f} physics steps in a control step; at most {limits.substeps} are taken"
+        steps = physics.control_dt / physics.dt
+        words = f"{steps:.0f} physics steps in a control step; at most {limits.substeps} are taken"
         yield issue("physics.dt", words)
     if spec.task is not None and spec.task.horizon > limits.horizon:
         yield issue("task.horizon", f"{spec.task.horizon} control steps; at most {limits.horizon} are taken")

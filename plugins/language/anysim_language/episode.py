@@ -148,38 +148,19 @@ def recorded(trajectory: Path, base: Path | None = None) -> Episode:
 
 def ended(env: TaskEnv, loaded: LoadedRun, columns: EpisodeColumns, status: str) -> Episode:
     """An episode that has just ended, by its columns with their reset, in a blind env of its world."""
-    header = columns.header.episode
-    begin(env, header)
-    poses, joints = columns.state["body_pose"], columns.state["joint_pos"]
-    found = _episode(env, loaded, columns.header.run.task, header.episode_seed, poses, joints)
     said = dict(columns.annotations)
     held = list(accumulate(range(len(columns)), lambda last, row: said.get(row, last), initial={}))
-    return replace(found, instruction=header.instruction, annotations=tuple(held[2:]), status=status)
+    poses, joints = columns.state["body_pose"], columns.state["joint_pos"]
+    return going(env, loaded, columns.header.episode, poses, joints, held[2:], status)
 
 
 def going(
-    env: TaskEnv,
-    loaded: LoadedRun,
-    header: EpisodeHeader,
-    poses: Sequence[Array],
-    joints: Sequence[Array],
-    annotations: Sequence[Mapping[str, Any]],
-    status: str,
+    env: TaskEnv, loaded: LoadedRun, header: EpisodeHeader, poses: Array, joints: Array, said: Sequence[Any], word: str
 ) -> Episode:
-    """An episode that is under way elsewhere, in a blind env of its world.
-
-    Args:
-        env: the blind env.
-        loaded: what it was made of.
-        header: which episode it is, and what was drawn for it.
-        poses, joints: (B, 7) and (J,) at the reset and after each control step.
-        annotations: what was being done in each step.
-        status: how it stands.
-    """
+    """An episode so far, in a blind env: states from the reset on, what was `said` in each step, and its status."""
     begin(env, header)
-    found = _episode(env, loaded, env.name, header.episode_seed, np.array(poses), np.array(joints))
-    held = list(accumulate(annotations, lambda last, said: said or last, initial={}))
-    return replace(found, annotations=tuple(held[1:]), status=status)
+    found = _episode(env, loaded, env.name, header.episode_seed, poses, joints)
+    return replace(found, instruction=header.instruction, annotations=tuple(said), status=word)
 
 
 def _rows(manifest: Manifest, reader: TrajectoryReader, field: str, here: Sequence[str], there: Sequence[str]) -> Array:

@@ -45,9 +45,9 @@ def mcp(
 ) -> None:
     """Offer tools to an agent: observe, draw, command robots, write worlds, keep moments, ask what would have been.
 
-    Without --http it speaks with the program that starts it, over stdin and stdout. With --http it listens on a port; the
-    token is printed and kept as that of `anysim serve` (ANYSIM_SERVE_TOKEN gives another one), and clients send it as
-    `Authorization: Bearer TOKEN`.
+    Without --http it speaks with the program that starts it, over stdin and stdout. With --http it listens on a port;
+    the token is printed and kept as that of `anysim serve` (ANYSIM_SERVE_TOKEN gives another one), and clients send it
+    as `Authorization: Bearer TOKEN`.
 
     Examples:
       anysim mcp put_away stack_cube
@@ -100,4 +100,9 @@ def mcp(
     )
     service = Service(catalogue, settings, mcp_server.http_application())
     address = f"{service.address}{mcp_server.HTTP_PATH}"
-    run(service, f"tools for agents at {address}", "clients send `Authorization: Bearer TOKEN`; Ctrl-C ends it", bool(given))
+    run(
+        service,
+        f"tools for agents at {address}",
+        "clients send `Authorization: Bearer TOKEN`; Ctrl-C ends it",
+        bool(given),
+    )

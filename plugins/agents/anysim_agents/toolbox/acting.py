@@ -13,9 +13,12 @@ from anysim_schemas.collect import CollectSpec, CommandSpec
 
 
 async def run_skill(workspace: Workspace, args: RunSkill, told: Told | None) -> Answer:
-    """Give a robot one command, such as pick, place, open or push, and wait for how it ends: `ok`, or a typed failure
-    (no_ik, collision, missed_contact, timeout, ...) with what was tried and what to do about it. The robot goes on from
-    where the last command left it. Names of things are those of `observe`."""
+    """Give a robot one command, such as pick, place, open or push, and wait for how it ends.
+
+    It ends `ok`, or with a typed failure (no_ik, collision, missed_contact, timeout, ...), with what was tried
+    and what to do about it. The robot goes on from where the last command left it. Names of things are those of
+    `observe`.
+    """
     command: dict[str, Any] = {"do": args.skill, **args.parameters}
     if args.timeout is not None:
         command["timeout"] = args.timeout
@@ -23,8 +26,11 @@ async def run_skill(workspace: Workspace, args: RunSkill, told: Told | None) -> 
 
 
 async def run_command(workspace: Workspace, args: RunCommand, told: Told | None) -> Answer:
-    """Give a robot several commands, one after the other, as in a task's file: each with conditions (`if`), a check
-    (`success`) and a `timeout` of its own. Nothing is done unless all of them are right. Wait for how they end."""
+    """Give a robot several commands, one after the other, as in a task's file, and wait for how they end.
+
+    Each may have a condition (`if`), a check (`success`) and a `timeout` of its own. Nothing is done unless all
+    of them are right.
+    """
     if len(args.commands) > workspace.limits.commands:
         raise TaskError(f"run_command.commands: at most {workspace.limits.commands} at once, got {len(args.commands)}")
     return await _run(workspace, args.session, args.commands, args.on_fail, args, told, "run_command")
@@ -56,9 +62,9 @@ def _explained(issue: SpecIssue, given: Any, tool: str) -> SpecIssue:
         at = f"run_skill.{'skill' if key == ['do'] else '.'.join(['parameters', *key])}"
     one = given[int(number)]
     skill = one.get("do") if isinstance(one, dict) else one
-    made = commands().get(skill) if isinstance(skill, str) else None
+    made = commands().get(str(skill))
     words = issue.message
-    if made is not None and key != ["do"]:
+    if isinstance(skill, str) and made is not None and key != ["do"]:
         hidden = paths_of(skill)
         taken = [
             name if p.default is not p.empty or reference_kind(p.annotation) == "robot" else f"{name} (required)"
@@ -80,12 +86,16 @@ def _checked(given: Any, on_fail: str) -> CollectSpec:
         path = f"commands.{number}"
         one = {"do": one} if isinstance(one, str) else one
         if not isinstance(one, dict) or not isinstance(one.get("do"), str):
-            words = "a command is a mapping such as {do: pick, object: cube}; `do` is one of list_catalog kind: commands"
+            words = (
+                "a command is a mapping such as {do: pick, object: cube}; `do` is one of list_catalog kind: commands"
+            )
             issues.append(SpecIssue("", path, words))
             continue
         skill = one["do"]
         if skill not in known:
-            words = f"there is no command '{skill[:60]}'{suggest(skill[:60], list(known))} (list_catalog kind: commands)"
+            words = (
+                f"there is no command '{skill[:60]}'{suggest(skill[:60], list(known))} (list_catalog kind: commands)"
+            )
             issues.append(SpecIssue("", f"{path}.do", words))
             continue
         own = {key: value for key, value in one.items() if key not in CommandSpec.model_fields and key != "if"}
@@ -100,35 +110,47 @@ def _checked(given: Any, on_fail: str) -> CollectSpec:
 
 
 async def wait(workspace: Workspace, args: Wait, told: Told | None) -> Answer:
-    """Let simulated time pass while the robots hold what they have: until things have come to rest, or a task's success
-    has held for as long as it must."""
+    """Let simulated time pass while the robots hold what they have.
+
+    Until things have come to rest, or a task's success has held for as long as it must.
+    """
     del told
     entry = workspace.entry(args.session)
 
-    def job(held: Any) -> dict[str, Any]:
-        env, ids = held.env, held.numbers(args.envs)
+    def job(agent: Any) -> dict[str, Any]:
+        env, ids = agent.env, agent.numbers(args.envs)
         steps = max(1, round(args.seconds / env.engine.world.physics.control_dt))
         made = 0
         for _ in range(steps):
             now = ids[env.running[ids]]
             if len(now) == 0:
                 break
-            action = held.live.action(now)
-            env.step(action, held.mask(now))
+            action = agent.live.action(now)
+            env.step(action, agent.mask(now))
             for i in now.tolist():
-                held.histories[i].add(env, i, action[i], {})
+                agent.histories[i].add(env, i, action[i], {})
             made += 1
-        rows = [{"env": i, "status": str(env.status[i]), "success": held.terms(i)} for i in ids.tolist()]
+        rows = [{"env": i, "status": str(env.status[i]), "success": agent.terms(i)} for i in ids.tolist()]
         return {"steps": made, "seconds": made * env.engine.world.physics.control_dt, "envs": rows}
 
     return Answer(await workspace.do(entry, job, changes=True))
 
 
 async def cancel(workspace: Workspace, args: OfSession, told: Told | None) -> Answer:
-    """Give up the commands under way in a session. The robot holds where it is; the next command goes on from there."""
+    """Give up the commands under way in a session.
+
+    The robot holds where it is; the next command goes on from there.
+    """
     del told
     ended = await workspace.cancel(workspace.entry(args.session))
-    return Answer({"cancelled": False, "why": "no commands are under way"} if ended is None else {"cancelled": True, **ended})
+    return Answer(
+        {"cancelled": False, "why": "no commands are under way"} if ended is None else {"cancelled": True, **ended}
+    )
 
 
-TOOLS = ((run_skill, RunSkill, False), (run_command, RunCommand, False), (wait, Wait, False), (cancel, OfSession, False))
+TOOLS = (
+    (run_skill, RunSkill, False),
+    (run_command, RunCommand, False),
+    (wait, Wait, False),
+    (cancel, OfSession, False),
+)

@@ -1,43 +1,51 @@
 """Asking: facts in words, and questions whose answers were found twice."""
 
+from itertools import accumulate
 from typing import Any
+
+import numpy as np
 
 from anysim.errors import TaskError, listing
 from anysim.record.header import EpisodeHeader
+from anysim_agents.agent_env import AgentEnv
 from anysim_agents.answers import Answer
 from anysim_agents.arguments import Ask
-from anysim_agents.held import Held
 from anysim_agents.workspace import Told, Workspace
 
 
 async def ask(workspace: Workspace, args: Ask, told: Told | None) -> Answer:
-    """Ask about an env in words: the scene, the task, the story so far, or questions with verified answers about this
-    moment (what lies on what, what is left of what, what is within reach, what came first, ...). No model answers: every
-    word follows from the state of the simulation."""
+    """Ask about an env in words: the scene, the task, the story so far, or questions with verified answers.
+
+    Questions are about this moment: what lies on what, what is left of what, what is within reach, what came
+    first, ... No model answers: every word follows from the state of the simulation.
+    """
     del told
-    return Answer(await workspace.do(workspace.entry(args.session), lambda held: _asked(held, args)))
+    return Answer(await workspace.do(workspace.entry(args.session), lambda agent: _asked(agent, args)))
 
 
 TOOLS = ((ask, Ask, True),)
 
 
-def _asked(held: Held, args: Ask) -> dict[str, Any]:
+def _asked(agent: AgentEnv, args: Ask) -> dict[str, Any]:
     from anysim_language.episode import going
     from anysim_language.instruction import instruction_text
     from anysim_language.narration import narration
     from anysim_language.scene_text import scene_text
 
-    i = held.number(args.env)
-    history = held.histories[i]
-    blind, loaded = held.blind()
+    i = agent.number(args.env)
+    history = agent.histories[i]
+    blind, loaded = agent.blind()
     header = EpisodeHeader(
         env=i,
         episode=0,
         episode_seed=history.episode_seed,
         drawn=dict(history.drawn),
         overridden=dict(history.overridden),
+        instruction=agent.env.instruction(i),
     )
-    episode = going(blind, loaded, header, history.poses, history.joints, history.doings, str(held.env.status[i]))
+    doings = list(accumulate(history.doings, lambda last, now: now or last))  # the last one, where time only passes
+    poses, joints = np.array(history.poses), np.array(history.joints)
+    episode = going(blind, loaded, header, poses, joints, doings, str(agent.env.status[i]))
     if args.about == "scene":
         return {"scene": scene_text(episode, step=-1)}
     if args.about == "task":
@@ -57,7 +65,9 @@ def _questions(episode: Any, args: Ask) -> dict[str, Any]:
     found = [one.question for one in verified(episode, [last]) if one.agreed]
     families = sorted({question.family for question in found})
     if args.family is not None and args.family not in families:
-        raise TaskError(f"ask.family: nothing of '{args.family[:60]}' can be asked now (what can: {listing(families, 40)})")
+        raise TaskError(
+            f"ask.family: nothing of '{args.family[:60]}' can be asked now (what can: {listing(families, 40)})"
+        )
     wanted = [
         question
         for question in found

@@ -25,8 +25,11 @@ from anysim_serving.catalogue import SessionRequest
 
 
 async def list_catalog(workspace: Workspace, args: ListCatalog, told: Told | None) -> Answer:
-    """List what there is: tasks that sessions can be of, robots, engines, commands that robots can be given, predicates
-    for `if` and `success`, builders of assets, planners, sensors. `describe` tells more of each."""
+    """List what there is, a page at a time; `describe` tells more of each.
+
+    There are tasks that sessions can be of, robots, engines, commands that robots can be given, predicates for
+    `if` and `success`, builders of assets, planners and sensors.
+    """
     del told
     rows = await asyncio.to_thread(lambda: list(_rows(workspace, args.kind)))
     wanted = args.contains.lower()
@@ -41,8 +44,11 @@ async def list_catalog(workspace: Workspace, args: ListCatalog, told: Told | Non
 
 
 async def describe(workspace: Workspace, args: Describe, told: Told | None) -> Answer:
-    """Describe one entry of the catalogue: of a command its parameters, of a robot its channels and tools, of a task its
-    world and commands; or, with kind yaml, the keys that a world of your own may have."""
+    """Describe one entry of the catalogue, or the keys of a world.
+
+    Of a command its parameters, of a robot its channels and tools, of a task its world and commands; with kind
+    yaml, the keys that a world of your own may have.
+    """
     del told
     return Answer(await asyncio.to_thread(lambda: _ABOUT[args.kind](workspace, args.name)))
 
@@ -50,7 +56,7 @@ async def describe(workspace: Workspace, args: Describe, told: Told | None) -> A
 TOOLS = ((list_catalog, ListCatalog, True), (describe, Describe, True))
 
 
-# ------------------------------------------------------------------------------------------------------------ one a line
+# --------------------------------------------------------------------------------------------------------- one a line
 
 
 def commands() -> dict[str, type[MovingSkill]]:
@@ -115,7 +121,7 @@ def _task_words(workspace: Workspace, name: str) -> str:
     return "" if task is None else task.description
 
 
-# ------------------------------------------------------------------------------------------------------------ in full
+# --------------------------------------------------------------------------------------------------------- in full
 
 
 def _known(kind: str, name: str, names: list[str]) -> None:
@@ -223,7 +229,14 @@ def parameter(found: Any) -> dict[str, Any]:
     return row
 
 
-_SIGNS = {"Gt": ">", "Ge": "at least", "Lt": "<", "Le": "at most", "MinLen": "length at least", "MaxLen": "length at most"}
+_SIGNS = {
+    "Gt": ">",
+    "Ge": "at least",
+    "Lt": "<",
+    "Le": "at most",
+    "MinLen": "length at least",
+    "MaxLen": "length at most",
+}
 
 
 def _as_data(default: Any) -> Any:

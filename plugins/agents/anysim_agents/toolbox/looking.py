@@ -7,37 +7,43 @@ import numpy as np
 from anysim.engine.capability import Capability
 from anysim.errors import CapabilityError, NameLookupError, TaskError, listing
 from anysim.math import pose as P
+from anysim_agents.agent_env import AgentEnv
 from anysim_agents.answers import Answer, png
 from anysim_agents.arguments import LookAt, OfEnv, Render
-from anysim_agents.held import Held
 from anysim_agents.limits import AgentLimits
 from anysim_agents.workspace import Told, Workspace
 
 
 async def observe(workspace: Workspace, args: OfEnv, told: Told | None) -> Answer:
-    """Observe an env: where things, parts, goals and the robots' tools are (position [m], quaternion x, y, z, w, in the
-    world's frame), how far each condition of success is met, and how the episode stands."""
+    """Observe an env: where everything is, and how the episode stands.
+
+    It tells the places of things, parts, goals and the robots' tools (position [m], quaternion x, y, z, w, in the
+    world's frame), and which conditions of success hold.
+    """
     del told
-    return Answer(await workspace.do(workspace.entry(args.session), lambda held: _observed(held, args.env)))
+    return Answer(await workspace.do(workspace.entry(args.session), lambda agent: _observed(agent, args.env)))
 
 
 async def render(workspace: Workspace, args: Render, told: Told | None) -> Answer:
     """Draw what a camera of the session sees now, as an image."""
     del told
-    return await workspace.do(workspace.entry(args.session), lambda held: _rendered(held, args))
+    return await workspace.do(workspace.entry(args.session), lambda agent: _rendered(agent, args))
 
 
 async def look_at(workspace: Workspace, args: LookAt, told: Told | None) -> Answer:
-    """Look at a thing or a point from where you like, as an image. No camera of the session is moved by it."""
+    """Look at a thing or a point from where you like, as an image.
+
+    No camera of the session is moved by it.
+    """
     del told
-    return await workspace.do(workspace.entry(args.session), lambda held: _looked(held, args))
+    return await workspace.do(workspace.entry(args.session), lambda agent: _looked(agent, args))
 
 
 TOOLS = ((observe, OfEnv, True), (render, Render, True), (look_at, LookAt, True))
 
 
-def _observed(held: Held, number: int) -> dict[str, Any]:
-    env, i = held.env, held.number(number)
+def _observed(agent: AgentEnv, number: int) -> dict[str, Any]:
+    env, i = agent.env, agent.number(number)
     scene, world, state = env.scene, env.engine.world, env.engine.get_state()
     scene.look(np.array([i]))
     robots = {robot.name: robot for robot in world.robots}
@@ -70,16 +76,16 @@ def _observed(held: Held, number: int) -> dict[str, Any]:
         "status": str(env.status[i]),
         "time_s": steps * dt,
         "left_s": (0 if task is None else task.horizon - steps) * dt,
-        "success": held.terms(i),
+        "success": agent.terms(i),
         "things": things,
-        "robots": {name: _robot(held, i, name) for name in robots},
+        "robots": {name: _robot(agent, i, name) for name in robots},
         "goals": {name: rows[i] for name, rows in scene.goals.items()},
-        "doing": held.live.describe(i) if held.live.under_way(i) else None,
+        "doing": agent.live.describe(i) if agent.live.under_way(i) else None,
     }
 
 
-def _robot(held: Held, i: int, name: str) -> dict[str, Any]:
-    env, robot = held.env, held.env.scene.robot(name)
+def _robot(agent: AgentEnv, i: int, name: str) -> dict[str, Any]:
+    env, robot = agent.env, agent.env.scene.robot(name)
     base = robot.base.pose[0]
     tools = {f"{name}.{tool}": robot.tool(tool).pose[0] for tool in robot.model.tools}
     row: dict[str, Any] = {"base": {"position": base[:3], "quaternion": base[3:]}}
@@ -92,17 +98,17 @@ def _robot(held: Held, i: int, name: str) -> dict[str, Any]:
     return row
 
 
-# ---------------------------------------------------------------------------------------------------------------- images
+# ---------------------------------------------------------------------------------------------------------- images
 
 
-def _camera(held: Held, name: str | None) -> str:
+def _camera(agent: AgentEnv, name: str | None) -> str:
     """A camera of the world by name, else its first one.
 
     Raises:
         CapabilityError: the engine draws nothing.
         NameLookupError: there is no such camera.
     """
-    engine = held.env.engine
+    engine = agent.env.engine
     if Capability.RENDER_RGB not in engine.capabilities:
         raise CapabilityError(
             f"the engine {engine.name} draws nothing; `observe` tells where things are, or create a session on "
@@ -116,26 +122,28 @@ def _camera(held: Held, name: str | None) -> str:
 
 def _size(limits: AgentLimits, width: int, height: int) -> None:
     if width * height > limits.pixels:
-        raise TaskError(f"an image has at most {limits.pixels} pixels, asked for {width}x{height}; ask for a smaller one")
+        raise TaskError(
+            f"an image has at most {limits.pixels} pixels, asked for {width}x{height}; ask for a smaller one"
+        )
 
 
-def _rendered(held: Held, args: Render) -> Answer:
-    i, name = held.number(args.env), _camera(held, args.camera)
-    known = {camera.name: (camera.width, camera.height) for camera in held.env.engine.world.cameras}
+def _rendered(agent: AgentEnv, args: Render) -> Answer:
+    i, name = agent.number(args.env), _camera(agent, args.camera)
+    known = {camera.name: (camera.width, camera.height) for camera in agent.env.engine.world.cameras}
     wide, high = known.get(name, (640, 480))
     width, height = args.width or wide, args.height or high
-    _size(held.limits, width, height)
-    image = held.env.render(name, [i], size=(width, height), markers=args.markers)[0]
+    _size(agent.limits, width, height)
+    image = agent.env.render(name, [i], size=(width, height), markers=args.markers)[0]
     return Answer({"env": i, "camera": name, "size": [width, height]}, (png(image),))
 
 
-def _looked(held: Held, args: LookAt) -> Answer:
-    i, name = held.number(args.env), _camera(held, None)
-    engine, ids = held.env.engine, [i]
+def _looked(agent: AgentEnv, args: LookAt) -> Answer:
+    i, name = agent.number(args.env), _camera(agent, None)
+    engine, ids = agent.env.engine, [i]
     if name == "default":
         raise CapabilityError("this world has no camera that could look; `render` draws an overview of it")
-    _size(held.limits, args.width, args.height)
-    target = _target(held, i, args.target)
+    _size(agent.limits, args.width, args.height)
+    target = _target(agent, i, args.target)
     around, up = np.radians(args.azimuth), np.radians(args.elevation)
     ray = np.array([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)])
     eye = target + args.distance * ray
@@ -154,11 +162,11 @@ def _looked(held: Held, args: LookAt) -> Answer:
     return Answer({"env": i, "target": target, "eye": eye, "size": [args.width, args.height]}, (png(image),))
 
 
-def _target(held: Held, i: int, target: Any) -> np.ndarray:
+def _target(agent: AgentEnv, i: int, target: Any) -> np.ndarray:
     if not isinstance(target, str):
         return np.array(target, dtype=float)
-    held.env.scene.look(np.array([i]))
-    frame = held.env.scene.frame(target)
+    agent.env.scene.look(np.array([i]))
+    frame = agent.env.scene.frame(target)
     if not frame.present[0]:
         raise TaskError(f"target: '{target}' is not there in env {i}; `observe` tells what is")
     return frame.position[0].copy()

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 
 from anysim.errors import TaskError
+from anysim_agents.agent_env import AgentEnv
 from anysim_agents.answers import Answer
 from anysim_agents.arguments import Counterfactual, Reset, ResetTo, Snapshot
-from anysim_agents.held import Held
 from anysim_agents.history import History
 from anysim_agents.workspace import Told, Workspace
 
@@ -17,28 +17,30 @@ MOST_TOLD = 12
 
 
 async def snapshot(workspace: Workspace, args: Snapshot, told: Told | None) -> Answer:
-    """Keep this moment, to go back to it with `reset_to`: going on from it is the same to the bit, and what a hand holds
-    it goes on to hold."""
+    """Keep this moment, to go back to it with `reset_to`.
+
+    Going on from it is the same to the bit, and what a hand holds it goes on to hold.
+    """
     del told
     entry = workspace.entry(args.session)
-    taken = await workspace.do(entry, lambda held: _taken(held, args), changes=True)
+    taken = await workspace.do(entry, lambda agent: _taken(agent, args), changes=True)
     return Answer(taken)
 
 
-def _taken(held: Held, args: Snapshot) -> dict[str, Any]:
-    name = held.take(held.numbers(args.envs))
-    return {"snapshot": name, "envs": list(held.snapshots[name].histories), "kept": list(held.snapshots)}
+def _taken(agent: AgentEnv, args: Snapshot) -> dict[str, Any]:
+    name = agent.take(agent.numbers(args.envs))
+    return {"snapshot": name, "envs": list(agent.snapshots[name].histories), "kept": list(agent.snapshots)}
 
 
 async def reset(workspace: Workspace, args: Reset, told: Told | None) -> Answer:
     """Begin new episodes, drawn anew or from a seed; `changes` are values in place of what would be drawn."""
     del told
 
-    def job(held: Held) -> dict[str, Any]:
-        ids = held.numbers(args.envs)
-        held.reset(ids, args.seed, args.changes)
-        env = held.env
-        rows = [{"env": i, "episode_seed": str(held.histories[i].episode_seed)} for i in ids.tolist()]
+    def job(agent: AgentEnv) -> dict[str, Any]:
+        ids = agent.numbers(args.envs)
+        agent.reset(ids, args.seed, args.changes)
+        env = agent.env
+        rows = [{"env": i, "episode_seed": str(agent.histories[i].episode_seed)} for i in ids.tolist()]
         return {"reset": rows, "instruction": env.instruction(int(ids[0]))}
 
     return Answer(await workspace.do(workspace.entry(args.session), job, changes=True))
@@ -48,24 +50,29 @@ async def reset_to(workspace: Workspace, args: ResetTo, told: Told | None) -> An
     """Go back to a moment that was kept; `changes` are values to go on with in place of those of then."""
     del told
 
-    def job(held: Held) -> dict[str, Any]:
-        kept = held.taken(args.snapshot)
-        held.put(kept, args.changes)
-        env = held.env
+    def job(agent: AgentEnv) -> dict[str, Any]:
+        kept = agent.taken(args.snapshot)
+        agent.put(kept, args.changes)
+        env = agent.env
         return {"envs": [{"env": i, "status": str(env.status[i]), "steps": len(h)} for i, h in kept.histories.items()]}
 
     return Answer(await workspace.do(workspace.entry(args.session), job, changes=True))
 
 
 async def counterfactual(workspace: Workspace, args: Counterfactual, told: Told | None) -> Answer:
-    """See what would have been: what was done since a moment is done again, once as it was and once with `changes`, such
-    as {objects.cube.mass: 0.5}. It tells from which control step on things differ, and where they end. The session is
-    afterwards as it was."""
+    """See what would have been, had something been otherwise.
+
+    What was done since a moment is done again, once as it was and once with `changes`, such as
+    {objects.cube.mass: 0.5}. It tells from which control step on things differ, and where they end. The session
+    is afterwards as it was.
+    """
     del told
     if not args.changes:
-        raise TaskError("counterfactual.changes: give at least one value by its path; `status` lists them as can_change")
+        raise TaskError(
+            "counterfactual.changes: give at least one value by its path; `status` lists them as can_change"
+        )
     entry = workspace.entry(args.session)
-    return Answer(await workspace.do(entry, lambda held: _otherwise(held, args), changes=True))
+    return Answer(await workspace.do(entry, lambda agent: _otherwise(agent, args), changes=True))
 
 
 TOOLS = (
@@ -76,32 +83,34 @@ TOOLS = (
 )
 
 
-def _otherwise(held: Held, args: Counterfactual) -> dict[str, Any]:
-    i = held.number(args.env)
-    history = held.histories[i]
+def _otherwise(agent: AgentEnv, args: Counterfactual) -> dict[str, Any]:
+    i = agent.number(args.env)
+    history = agent.histories[i]
     start = 0
     if args.snapshot is not None:
-        before = held.taken(args.snapshot).histories.get(i)
+        before = agent.taken(args.snapshot).histories.get(i)
         if before is None:
-            raise TaskError(f"snapshot: '{args.snapshot}' has no env {i}; it has {list(held.taken(args.snapshot).histories)}")
+            raise TaskError(
+                f"snapshot: '{args.snapshot}' has no env {i}; it has {list(agent.taken(args.snapshot).histories)}"
+            )
         start = len(before)
         if before.episode_seed != history.episode_seed or not _same(before, history):
             raise TaskError(f"snapshot: '{args.snapshot}' is of another course of events than env {i} has now")
     actions = history.actions[start:]
     if not actions:
         raise TaskError("nothing has been done since then; give a command first, or an earlier snapshot")
-    if len(actions) > held.limits.replay:
+    if len(actions) > agent.limits.replay:
         raise TaskError(
-            f"{len(actions)} control steps since then, at most {held.limits.replay} are repeated; take a later snapshot"
+            f"{len(actions)} control steps since then, at most {agent.limits.replay} are repeated; take a later snapshot"
         )
     ids = np.array([i])
-    now = held.keep(ids)
+    now = agent.keep(ids)
     try:
-        as_was = _course(held, args, i, actions, {})
-        changed = _course(held, args, i, actions, args.changes)
+        as_was = _course(agent, args, i, actions, {})
+        changed = _course(agent, args, i, actions, args.changes)
     finally:
-        held.put(now, {})
-    return _compared(held, as_was, changed, start)
+        agent.put(now, {})
+    return _compared(agent, as_was, changed, start)
 
 
 def _same(before: History, now: History) -> bool:
@@ -111,17 +120,19 @@ def _same(before: History, now: History) -> bool:
     )
 
 
-def _course(held: Held, args: Counterfactual, i: int, actions: list[Any], changes: dict[str, Any]) -> dict[str, Any]:
+def _course(
+    agent: AgentEnv, args: Counterfactual, i: int, actions: list[Any], changes: dict[str, Any]
+) -> dict[str, Any]:
     """The course of events with changes: places of bodies after each step, how it stood, and what held at its end."""
-    env, mask = held.env, held.mask(np.array([i]))
+    env, mask = agent.env, agent.mask(np.array([i]))
     if args.snapshot is None:
-        history = held.histories[i]
+        history = agent.histories[i]
         for manager in env.managers:
             manager.recall(i, history.drawn)
         own = dict(history.overridden) | changes
         env.reset(mask=mask, episode_seeds=[history.episode_seed], overrides=own)
     else:
-        kept = held.taken(args.snapshot)
+        kept = agent.taken(args.snapshot)
         row = list(kept.histories).index(i)
         env.reset_to(kept.snapshot.rows([row]), [i], changes or None)
     poses = [env.engine.get_state().body_pose[i].copy()]
@@ -132,11 +143,11 @@ def _course(held: Held, args: Counterfactual, i: int, actions: list[Any], change
         whole[i] = action
         env.step(whole, mask)
         poses.append(env.engine.get_state().body_pose[i].copy())
-    return {"poses": np.array(poses), "status": str(env.status[i]), "success": held.terms(i)}
+    return {"poses": np.array(poses), "status": str(env.status[i]), "success": agent.terms(i)}
 
 
-def _compared(held: Held, was: dict[str, Any], changed: dict[str, Any], start: int) -> dict[str, Any]:
-    world = held.env.engine.world
+def _compared(agent: AgentEnv, was: dict[str, Any], changed: dict[str, Any], start: int) -> dict[str, Any]:
+    world = agent.env.engine.world
     steps = min(len(was["poses"]), len(changed["poses"]))
     apart = np.linalg.norm(was["poses"][:steps, :, :3] - changed["poses"][:steps, :, :3], axis=2)
     first = np.flatnonzero((apart > APART).any(axis=1))

@@ -4,16 +4,19 @@ from typing import Any
 
 from anysim.engine.capability import Capability
 from anysim.errors import TaskError
+from anysim_agents.agent_env import AgentEnv
 from anysim_agents.answers import Answer
 from anysim_agents.arguments import CreateSession, OfSession, OptionalSession
-from anysim_agents.held import Held
 from anysim_agents.workspace import Entry, Told, Workspace
 from anysim_serving.catalogue import SessionRequest
 
 
 async def create_session(workspace: Workspace, args: CreateSession, told: Told | None) -> Answer:
-    """Begin a session of a task: a simulator of your own, with its episodes begun. Nothing moves until you give a
-    command or wait. It answers with the word for the session, what there is, and which cameras and parts it has."""
+    """Begin a session of a task: a simulator of your own, with its episodes begun.
+
+    Nothing moves until you give a command or wait. It answers with the word for the session, what there is, and
+    which cameras and parts it has.
+    """
     del told
     overrides: list[str] = []
     if args.horizon is not None:
@@ -38,9 +41,9 @@ async def begun(workspace: Workspace, entry: Entry) -> Answer:
     return Answer({"session": entry.handle, **await workspace.do(entry, about)})
 
 
-def about(held: Held) -> dict[str, Any]:
+def about(agent: AgentEnv) -> dict[str, Any]:
     """What a session has."""
-    env, world = held.env, held.env.engine.world
+    env, world = agent.env, agent.env.engine.world
     task = env.spec.task
     assert task is not None
     joints = {e.name: [j.name for j in world.joints[e.joint_start : e.joint_stop]] for e in world.entities}
@@ -62,13 +65,16 @@ def about(held: Held) -> dict[str, Any]:
         "goals": list(env.scene.goals),
         "cameras": [camera.name for camera in world.cameras],
         "can_draw": Capability.RENDER_RGB in env.engine.capabilities,
-        "success": list(held.terms(0)),
+        "success": list(agent.terms(0)),
     }
 
 
 async def status(workspace: Workspace, args: OptionalSession, told: Told | None) -> Answer:
-    """Tell how a session stands: the commands under way or how the last ones ended, the state of each env's episode,
-    snapshots, and what `changes` may name; without a session, all sessions and the limits of this server."""
+    """Tell how a session stands, or without one all sessions and the limits of this server.
+
+    Of a session: the commands under way, or how the last ones ended; each env's episode; snapshots; and what
+    `changes` may name.
+    """
     del told
     if args.session is None:
         return Answer(await _all(workspace))
@@ -76,8 +82,8 @@ async def status(workspace: Workspace, args: OptionalSession, told: Told | None)
     return Answer(workspace.about(entry) | await workspace.do(entry, _standing))
 
 
-def _standing(held: Held) -> dict[str, Any]:
-    env = held.env
+def _standing(agent: AgentEnv) -> dict[str, Any]:
+    env = agent.env
     dt = env.engine.world.physics.control_dt
     rows = [
         {
@@ -85,11 +91,11 @@ def _standing(held: Held) -> dict[str, Any]:
             "status": str(env.status[i]),
             "steps": int(env.info["elapsed_steps"][i]),
             "seconds": int(env.info["elapsed_steps"][i]) * dt,
-            "success": held.terms(i),
+            "success": agent.terms(i),
         }
         for i in range(env.num_envs)
     ]
-    return {"envs": rows, "snapshots": list(held.snapshots), "can_change": list(env.counterfactuals.paths)}
+    return {"envs": rows, "snapshots": list(agent.snapshots), "can_change": list(env.counterfactuals.paths)}
 
 
 async def _all(workspace: Workspace) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What an agent's session holds beside its env. All of it belongs to the thread of the session's simulator."""
+"""An agent's env, and all that its session has beside it. It belongs to the thread of the session's simulator."""
 
 import threading
 from collections.abc import Mapping, Sequence
@@ -13,8 +13,8 @@ from anysim.task.bindings import bind_term
 from anysim.task.env import TaskEnv
 from anysim.task.snapshot import EnvSnapshot
 from anysim_agents.history import History
-from anysim_agents.live import LiveCommands
 from anysim_agents.limits import AgentLimits
+from anysim_agents.live import LiveCommands
 from anysim_schemas.load import LoadedRun
 from anysim_schemas.proposals import Proposal
 
@@ -38,7 +38,7 @@ class Desk:
         return self.pending
 
 
-class Kept(NamedTuple):
+class Moment(NamedTuple):
     """An env at a moment: its snapshot, its history, and how its arms hold what they hold."""
 
     snapshot: EnvSnapshot
@@ -46,7 +46,7 @@ class Kept(NamedTuple):
     arms: Mapping[int, Sequence[dict[str, Any]]]
 
 
-class Held:
+class AgentEnv:
     """An env, the commands that it is given, and what has happened in it.
 
     Attributes:
@@ -63,7 +63,7 @@ class Held:
         self.env, self.desk, self.limits = env, desk, limits
         self.live = LiveCommands(env)
         self.histories: dict[int, History] = {}
-        self.snapshots: dict[str, Kept] = {}
+        self.snapshots: dict[str, Moment] = {}
         self._taken = 0
         self.stop = threading.Event()
         task = env.spec.task
@@ -135,13 +135,13 @@ class Held:
         for env in ids.tolist():
             self.histories[env] = History.begun(self.env, env)
 
-    def keep(self, ids: Array) -> Kept:
+    def keep(self, ids: Array) -> Moment:
         """These envs at this moment."""
         numbers = ids.tolist()
         histories = {env: self.histories[env].copy() for env in numbers}
-        return Kept(self.env.snapshot(self.mask(ids)), histories, {env: self.live.kept(env) for env in numbers})
+        return Moment(self.env.snapshot(self.mask(ids)), histories, {env: self.live.kept(env) for env in numbers})
 
-    def put(self, kept: Kept, overrides: Mapping[str, Any]) -> None:
+    def put(self, kept: Moment, overrides: Mapping[str, Any]) -> None:
         """Put envs back into a moment.
 
         Raises:
@@ -163,7 +163,7 @@ class Held:
             del self.snapshots[next(iter(self.snapshots))]
         return name
 
-    def taken(self, name: str) -> Kept:
+    def taken(self, name: str) -> Moment:
         """What was kept under a name.
 
         Raises:
