@@ -25,6 +25,7 @@ class Run:
     Attributes:
         words: what was asked for, for people.
         ids: the envs.
+        first: how many commands each has had in its episode before.
         steps: control steps that each has made of it.
         ended: how it ended, by env; empty while it is under way.
         over: whether it has ended in all of them.
@@ -33,6 +34,7 @@ class Run:
     words: str
     ids: Array
     sequence: CommandSequence
+    first: dict[int, int]
     steps: dict[int, int] = field(default_factory=dict)
     ended: dict[int, dict[str, Any]] = field(default_factory=dict)
     over: bool = False
@@ -55,8 +57,11 @@ def begin(agent: AgentEnv, commands: CollectSpec, ids: Array) -> Run:
     sequence = agent.live.bound(commands)
     agent.stop.clear()
     agent.live.give(ids, sequence)
-    words = ", ".join(command.do for command in commands.commands if isinstance(command, CommandSpec))
-    return Run(words, ids, sequence, dict.fromkeys(ids.tolist(), 0))
+    given = [command for command in commands.commands if isinstance(command, CommandSpec)]
+    first = {i: len(agent.histories[i].commands) for i in ids.tolist()}
+    for i in first:
+        agent.histories[i].commands.extend((command.do, command.params) for command in given)
+    return Run(", ".join(command.do for command in given), ids, sequence, first, dict.fromkeys(first, 0))
 
 
 def go_on(agent: AgentEnv, run: Run) -> dict[str, Any]:
@@ -78,13 +83,19 @@ def _step(agent: AgentEnv, run: Run) -> None:
     result = env.step(action, agent.mask(ids))
     for i in ids.tolist():
         run.steps[i] += 1
-        agent.histories[i].add(env, i, action[i], live.describe(i))
+        agent.histories[i].add(env, i, action[i], _numbered(live.describe(i), run.first[i]))
         if not live.under_way(i):
             run.ended[i] = _report(agent, run, i, str(OUTCOMES[live.outcome[i]]))
         elif not env.running[i]:
             run.ended[i] = _report(agent, run, i, f"episode {result.status[i]}")
             live.drop(np.array([i]))
     run.over = len(run.ended) == len(run.ids)
+
+
+def _numbered(said: Mapping[str, Any], before: int) -> dict[str, Any]:
+    """What a command says, with its number in the episode: `3 place: lower`."""
+    number, _, rest = str(said.get("phase", "")).partition(" ")
+    return {**said, "phase": f"{int(number) + before} {rest}"} if number.isdecimal() else dict(said)
 
 
 def _end(agent: AgentEnv, run: Run, outcome: str) -> None:

@@ -17,7 +17,8 @@ class History:
         drawn, overridden: what was drawn in it, and set in place of draws.
         actions: (A,) of each control step.
         poses, joints: (B, 7) and (J,) at the reset and after each step.
-        doings: what the commands said in each step.
+        doings: what the commands said in each step, numbered through the episode.
+        commands: those that were given so far, each a skill and its parameters.
     """
 
     episode_seed: int
@@ -27,6 +28,7 @@ class History:
     poses: list[Array] = field(default_factory=list)
     joints: list[Array] = field(default_factory=list)
     doings: list[Mapping[str, Any]] = field(default_factory=list)
+    commands: list[tuple[str, Mapping[str, Any]]] = field(default_factory=list)
 
     @classmethod
     def begun(cls, env: TaskEnv, number: int) -> "History":
@@ -50,7 +52,7 @@ class History:
 
     def copy(self, **others: Any) -> "History":
         """One that goes on by itself."""
-        lists = {name: list(getattr(self, name)) for name in ("actions", "poses", "joints", "doings")}
+        lists = {name: list(getattr(self, name)) for name in ("actions", "poses", "joints", "doings", "commands")}
         return replace(self, **(lists | others))
 
     def __len__(self) -> int:

@@ -1,5 +1,6 @@
 """Asking: facts in words, and questions whose answers were found twice."""
 
+from dataclasses import replace
 from itertools import accumulate
 from typing import Any
 
@@ -27,7 +28,7 @@ TOOLS = ((ask, Ask, True),)
 
 
 def _asked(agent: AgentEnv, args: Ask) -> dict[str, Any]:
-    from anysim_language.episode import going
+    from anysim_language.episode import Deed, going
     from anysim_language.instruction import instruction_text
     from anysim_language.narration import narration
     from anysim_language.scene_text import scene_text
@@ -46,6 +47,7 @@ def _asked(agent: AgentEnv, args: Ask) -> dict[str, Any]:
     doings = list(accumulate(history.doings, lambda last, now: now or last))  # the last one, where time only passes
     poses, joints = np.array(history.poses), np.array(history.joints)
     episode = going(blind, loaded, header, poses, joints, doings, str(agent.env.status[i]))
+    episode = replace(episode, deeds=tuple(Deed(skill, params) for skill, params in history.commands))
     if args.about == "scene":
         return {"scene": scene_text(episode, step=-1)}
     if args.about == "task":
