@@ -1,9 +1,11 @@
 """Acting: commands into the live hierarchy of skills, and time that passes."""
 
+from collections.abc import Iterator, Mapping
 from typing import Any
 
-from anysim.errors import SpecError, SpecIssue, TaskError, listing, suggest
+from anysim.errors import PluginError, SpecError, SpecIssue, TaskError, listing, suggest
 from anysim.plugin_parameters import checked, parameters, reference_kind
+from anysim.task.term_registry import find
 from anysim_agents.answers import Answer
 from anysim_agents.arguments import OfSession, RunCommand, RunSkill, Wait
 from anysim_agents.toolbox.catalog import commands
@@ -100,6 +102,7 @@ def _checked(given: Any, on_fail: str) -> CollectSpec:
             continue
         own = {key: value for key, value in one.items() if key not in CommandSpec.model_fields and key != "if"}
         issues += refuse_files(skill, own, path)
+        issues += _unknown_terms(one, path)
         try:
             found.append(checked(CommandSpec, one, path))  # type: ignore[arg-type]
         except SpecError as error:
@@ -107,6 +110,18 @@ def _checked(given: Any, on_fail: str) -> CollectSpec:
     if issues:
         raise SpecError(issues)
     return CollectSpec(commands=tuple(found), on_fail=on_fail)  # type: ignore[arg-type]
+
+
+def _unknown_terms(command: Mapping[str, Any], path: str) -> Iterator[SpecIssue]:
+    """The predicates of a command that there are not."""
+    for key in ("if", "success"):
+        spec = command.get(key)
+        name = spec.get("term") if isinstance(spec, dict) else spec
+        if isinstance(name, str):
+            try:
+                find("predicate", name)
+            except PluginError as error:
+                yield SpecIssue("", f"{path}.{key}.term", str(error))
 
 
 async def wait(workspace: Workspace, args: Wait, told: Told | None) -> Answer:

@@ -101,8 +101,8 @@ def _otherwise(agent: AgentEnv, args: Counterfactual) -> dict[str, Any]:
         raise TaskError("nothing has been done since then; give a command first, or an earlier snapshot")
     if len(actions) > agent.limits.replay:
         raise TaskError(
-            f"there are {len(actions)} control steps since then, and at most {agent.limits.replay} are repeated; take a "
-            f"later snapshot"
+            f"there are {len(actions)} control steps since then, and at most {agent.limits.replay} are repeated; take "
+            f"a later snapshot"
         )
     ids = np.array([i])
     now = agent.keep(ids)
