@@ -55,6 +55,7 @@ class Workspace:
         self.entries: dict[str, Entry] = {}
         self._count = 0
         self._giving_up: asyncio.Task[Any] | None = None
+        self._one = asyncio.Lock()
 
     # ------------------------------------------------------------------ sessions
 
@@ -148,6 +149,11 @@ class Workspace:
         await self.sessions.close(lambda words: None)
 
     # ------------------------------------------------------------------ operations
+
+    async def apart(self, work: Callable[[], Any]) -> Any:
+        """What takes a while and needs no session, on a thread: one at a time, whoever asks."""
+        async with self._one:
+            return await asyncio.to_thread(work)
 
     async def do(self, entry: Entry, job: Callable[[AgentEnv], Any], *, changes: bool = False) -> Any:
         """Have a session's thread do something; what `changes` the env is refused while commands are under way.

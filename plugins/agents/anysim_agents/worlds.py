@@ -3,6 +3,7 @@
 import re
 import tempfile
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -54,21 +55,35 @@ def read(text: str, limits: AgentLimits) -> LoadedRun:
     Raises:
         SpecError: every fault with line and column, as `world.yaml:7:13`; a name of a file; more than the limits.
     """
+    return watched(_read(text, limits, None))
+
+
+def _read(text: str, limits: AgentLimits, past: list[SpecIssue] | None) -> LoadedRun:
+    """The run, or what is whole of it where `past` takes the faults; within the limits."""
     root = _parsed(text, limits)
     if found := list(_leading_out(root, ())):
         raise SpecError(in_order(found, [NAME]))
-    with tempfile.TemporaryDirectory(prefix="anysim-") as folder:
-        path = Path(folder).resolve() / NAME
-        path.write_text(text, encoding="utf-8")
+    with _file(text) as path:
         try:
-            loaded = watched(load(path))
+            loaded = load(path, past=past)
         except SpecError as error:
             raise renamed(error, path) from None
+        if past:
+            past[:] = renamed(SpecError(past), path).issues
     named = {key: place.replace(str(path), NAME) for key, place in loaded.provenance.items()}
     loaded = LoadedRun(loaded.spec, named, tuple(file for file in loaded.files if file != path), loaded.data)
     if issues := [*_files_of_skills(loaded), *_beyond(loaded, limits)]:
         raise SpecError(issues)
     return loaded
+
+
+@contextmanager
+def _file(text: str) -> Iterator[Path]:
+    """The text as a file, alone in a folder of its own, for as long as it is read."""
+    with tempfile.TemporaryDirectory(prefix="anysim-") as folder:
+        path = Path(folder).resolve() / NAME
+        path.write_text(text, encoding="utf-8")
+        yield path
 
 
 def renamed(error: SpecError, path: Path) -> SpecError:
@@ -84,17 +99,17 @@ def report(text: str, limits: AgentLimits, all_engines: bool) -> dict[str, Any]:
     """What `anysim check` says of a text: faults, warnings, and which engines can run it."""
     from anysim_inspect.cli.check import report_on
 
+    past: list[SpecIssue] = []
     try:
-        read(text, limits)
-    except SpecError as error:
-        return {"ok": False, "faults": [str(issue) for issue in error.issues]}
-    with tempfile.TemporaryDirectory(prefix="anysim-") as folder:
-        path = Path(folder).resolve() / NAME
-        path.write_text(text, encoding="utf-8")
+        _read(text, limits, past)
+    except SpecError as error:  # nothing of it can be looked at any further, or is to be
+        faults = [*past, *error.issues]
+        return {"ok": False, "faults": list(dict.fromkeys(str(issue) for issue in faults))}
+    with _file(text) as path:
         found = report_on(str(path), None, all_engines, [])
 
     def told(words: str) -> str:
-        return words.replace(str(path), NAME).replace(folder, "the world")
+        return words.replace(str(path), NAME).replace(str(path.parent), "the world")
 
     engines = {answer.engine: told(answer.refusal) or RUNS for answer in found.answers}
     data: dict[str, Any] = {"ok": not found.faults, "faults": [told(fault) for fault in found.faults]}

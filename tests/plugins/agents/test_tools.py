@@ -195,7 +195,10 @@ def test_an_arm_is_commanded_looked_at_put_back_and_asked_about() -> None:
         held = await tool("run_skill", session="s1", skill="grasp", parameters={"object": "cube"})
         assert held["ok"], held
         kept = (await tool("snapshot", session="s1"))["snapshot"]
-        lift = {"session": "s1", "commands": [{"do": "lift", "object": "cube"}, {"do": "bring", "object": "cube", "goal": "goal"}]}
+        lift = {
+            "session": "s1",
+            "commands": [{"do": "lift", "object": "cube"}, {"do": "bring", "object": "cube", "goal": "goal"}],
+        }
         assert (await tool("run_command", **lift))["ok"]
         once = await tool("observe", session="s1")
         story = (await tool("ask", session="s1", about="story"))["story"]

@@ -1,6 +1,5 @@
 """Authoring: worlds and layouts of an agent's own, with the same errors as those of a file."""
 
-import asyncio
 from dataclasses import asdict
 from typing import Any
 
@@ -21,7 +20,7 @@ async def check_world(workspace: Workspace, args: CheckWorld, told: Told | None)
     It tells every fault with line and column, what looks doubtful, and whether the engine can run it.
     """
     del told
-    return Answer(await asyncio.to_thread(worlds.report, args.yaml, workspace.limits, args.all_engines))
+    return Answer(await workspace.apart(lambda: worlds.report(args.yaml, workspace.limits, args.all_engines)))
 
 
 async def create_world(workspace: Workspace, args: CreateWorld, told: Told | None) -> Answer:
@@ -31,12 +30,12 @@ async def create_world(workspace: Workspace, args: CreateWorld, told: Told | Non
     task:NAME`); it cannot name files.
     """
     del told
-    found = await asyncio.to_thread(worlds.report, args.yaml, workspace.limits, False)
+    found = await workspace.apart(lambda: worlds.report(args.yaml, workspace.limits, False))
     if not found["ok"]:
         raise TaskError("\n".join(found["faults"]))
     if refused := [words for words in found["engines"].values() if words != worlds.RUNS]:
         raise TaskError("\n".join(refused))
-    loaded = await asyncio.to_thread(worlds.read, args.yaml, workspace.limits)
+    loaded = await workspace.apart(lambda: worlds.read(args.yaml, workspace.limits))
     return await begun(workspace, await workspace.create_world(loaded, args.num_envs, args.seed))
 
 

@@ -1,6 +1,5 @@
 """Catalogue: what is installed and served, a page at a time, and each entry in words."""
 
-import asyncio
 import sys
 from collections.abc import Iterator
 from types import UnionType
@@ -31,7 +30,7 @@ async def list_catalog(workspace: Workspace, args: ListCatalog, told: Told | Non
     `if` and `success`, builders of assets, planners and sensors.
     """
     del told
-    rows = await asyncio.to_thread(lambda: list(_rows(workspace, args.kind)))
+    rows = await workspace.apart(lambda: list(_rows(workspace, args.kind)))
     wanted = args.contains.lower()
     found = [row for row in rows if wanted in row["name"].lower() or wanted in row.get("what", "").lower()]
     page = found[args.start : args.start + workspace.limits.page]
@@ -50,7 +49,7 @@ async def describe(workspace: Workspace, args: Describe, told: Told | None) -> A
     yaml, the keys that a world of your own may have.
     """
     del told
-    return Answer(await asyncio.to_thread(lambda: _ABOUT[args.kind](workspace, args.name)))
+    return Answer(await workspace.apart(lambda: _ABOUT[args.kind](workspace, args.name)))
 
 
 TOOLS = ((list_catalog, ListCatalog, True), (describe, Describe, True))
