@@ -80,14 +80,16 @@ def _step(agent: AgentEnv, run: Run) -> None:
         return
     ids = np.array([i for i in run.ids.tolist() if i not in run.ended])
     action = live.action(ids)
-    result = env.step(action, agent.mask(ids))
-    for i in ids.tolist():
+    on = [i for i in ids.tolist() if live.under_way(i)]
+    for i in set(ids.tolist()) - set(on):
+        run.ended[i] = _report(agent, run, i, str(OUTCOMES[live.outcome[i]]))
+    if on:
+        env.step(action, agent.mask(np.array(on)))
+    for i in on:
         run.steps[i] += 1
         agent.histories[i].add(env, i, action[i], _numbered(live.describe(i), run.first[i]))
-        if not live.under_way(i):
-            run.ended[i] = _report(agent, run, i, str(OUTCOMES[live.outcome[i]]))
-        elif not env.running[i]:
-            run.ended[i] = _report(agent, run, i, f"episode {result.status[i]}")
+        if not env.running[i]:
+            run.ended[i] = _report(agent, run, i, f"episode {env.status[i]}")
             live.drop(np.array([i]))
     run.over = len(run.ended) == len(run.ids)
 

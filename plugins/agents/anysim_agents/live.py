@@ -56,9 +56,7 @@ class LiveCommands(MovingSkill):
 
     def give(self, ids: Array, sequence: CommandSequence) -> None:
         """Begin with commands in these envs, in which none is under way."""
-        self.env.scene.look(ids)
-        for mover in self.movers:
-            mover.prepare(ids)
+        self._prepare(ids)
         for env in ids.tolist():
             self.given[env] = sequence
         self.outcome[ids] = STAY
@@ -90,11 +88,40 @@ class LiveCommands(MovingSkill):
         self.phase[ids] = 0
         self.outcome[ids], self.attempts[ids] = sequence.outcome[ids], sequence.attempts[ids]
 
+    def act(self, env_ids: Array, action: Array) -> None:
+        """As of every skill; where commands end nothing moves, so that the next ones go on in the same control step."""
+        ids = env_ids[self.outcome[env_ids] == STAY]
+        self._prepare(ids)
+        self.decide(ids, np.arange(len(ids)))
+        self._move(ids[self.outcome[ids] == STAY], action)
+
     def action(self, ids: Array) -> Array:
-        """The action (N, A) of the next control step; only the rows `ids` mean anything."""
+        """The action (N, A) of the next control step of envs that have something to do.
+
+        Only the rows of those mean anything that are under way after it.
+        """
         action = self._still.copy()
         self.act(ids, action)
         return action
+
+    def rest(self, ids: Array) -> Array:
+        """The action (N, A) of envs that have nothing to do: what was moved stays where it is told to be."""
+        action = self._still.copy()
+        self._prepare(ids)
+        self._move(ids, action)
+        return action
+
+    def _prepare(self, ids: Array) -> None:
+        self.env.scene.look(ids)
+        for mover in self.movers if len(ids) else ():
+            mover.prepare(ids)
+
+    def _move(self, ids: Array, action: Array) -> None:
+        self.env.scene.look(ids)
+        for mover in self.movers if len(ids) else ():
+            mover.act(ids, action)
+        for service in dict.fromkeys(service for mover in self.movers for service in mover.planners):
+            service.flush()
 
     def under_way(self, env: int) -> bool:
         """Whether an env has something to do."""

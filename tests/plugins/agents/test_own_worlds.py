@@ -1,7 +1,6 @@
 """Worlds that agents write: the same errors as those of files, no way to a file, and limits."""
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -81,7 +80,8 @@ def test_what_is_good_is_a_session(tmp_path: Path) -> None:
             assert seen["things"]["ball"]["position"] == [
                 round(float(v), 4) for v in env.engine.get_state().body_pose[1, ball, :3]
             ]
-        extended = "extends: task:pick_cube\nworld: {objects: {ball: {source: {sphere: 0.03}}}, layout: {ball: {on: table, x: 0.5, y: 0.2}}}\n"
+        extended = "extends: task:pick_cube\n"
+        extended += "world: {objects: {ball: {source: {sphere: 0.03}}}, layout: {ball: {on: table, x: 0.5, y: 0.2}}}\n"
         assert (await tool("check_world", yaml=extended))["ok"]
 
     used(scenario)
@@ -150,7 +150,7 @@ def test_a_file_that_is_there_is_neither_read_nor_told_of(tmp_path: Path, monkey
         assert not report["ok"]
         assert "hidden" not in json.dumps(report)
         assert str(tmp_path) not in json.dumps(report)
-    assert sorted(os.listdir(tmp_path)) == ["mug", "secret"]
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["mug", "secret"]
 
 
 def test_a_skill_takes_no_file_from_an_agent() -> None:

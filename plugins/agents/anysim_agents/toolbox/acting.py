@@ -140,7 +140,7 @@ async def wait(workspace: Workspace, args: Wait, told: Told | None) -> Answer:
             now = ids[env.running[ids]]
             if len(now) == 0:
                 break
-            action = agent.live.action(now)
+            action = agent.live.rest(now)
             env.step(action, agent.mask(now))
             for i in now.tolist():
                 agent.histories[i].add(env, i, action[i], {})
