@@ -44,10 +44,6 @@ Seed = Annotated[
 ]
 
 
-class Nothing(Arguments):
-    """No arguments."""
-
-
 class ListCatalog(Arguments):
     """What to list."""
 

@@ -25,15 +25,17 @@ class Tool:
         name: by which it is called.
         about: what it does, for the model that chooses among tools.
         arguments: the model of its arguments.
-        run: does it.
+        run: does it, in a workspace with its arguments.
         reads: whether it changes nothing.
+        tells: whether it takes what is told of progress as well.
     """
 
     name: str
     about: str
     arguments: type[Arguments]
-    run: Callable[[Workspace, Any, Told | None], Awaitable[Answer]]
+    run: Callable[..., Awaitable[Answer]]
     reads: bool
+    tells: bool
 
     def schema(self) -> dict[str, Any]:
         """The JSON schema of its arguments, without references."""
@@ -59,7 +61,9 @@ def _tools() -> dict[str, Tool]:
     for module in (catalog, sessions, looking, acting, moments, asking, authoring):
         for function, arguments, reads in module.TOOLS:
             about = " ".join((function.__doc__ or "").split())
-            found[function.__name__] = Tool(function.__name__, about, arguments, function, reads)
+            found[function.__name__] = Tool(
+                function.__name__, about, arguments, function, reads, function in acting.TELLS
+            )
     return found
 
 
@@ -101,7 +105,7 @@ async def call(
             f"there is no tool '{name[:60]}'{suggest(name[:60], list(TOOLS))} (tools: {listing(TOOLS, 40)})"
         )
     given = checked(tool.arguments, dict(arguments or {}), name)
-    answer = await tool.run(workspace, given, told)
+    answer = await (tool.run(workspace, given, told) if tool.tells else tool.run(workspace, given))
     return Answer(shortened(answer.data), answer.images)
 
 

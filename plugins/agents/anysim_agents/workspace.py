@@ -151,7 +151,7 @@ class Workspace:
     # ------------------------------------------------------------------ operations
 
     async def apart(self, work: Callable[[], Any]) -> Any:
-        """What takes a while and needs no session, on a thread: one at a time, whoever asks."""
+        """What takes a while and needs no session, on a thread: one at a time, whichever session asks."""
         async with self._one:
             return await asyncio.to_thread(work)
 

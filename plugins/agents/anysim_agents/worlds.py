@@ -39,7 +39,6 @@ _ENDING = re.compile(
 _REFERENCE = re.compile(r"[A-Za-z]\w*(\.\w+)*/[A-Za-z]\w*(\.\w+)*")
 """An affordance such as `block/mouth`, or an observed image."""
 _TASK = re.compile(r"task:[A-Za-z0-9_.:-]+")
-_OPEN_ENGINE = ("name",)
 REMEDY = (
     "a world that is sent as text has shapes (box, sphere, cylinder, capsule), `procedural:NAME` (list_catalog kind: "
     "assets), robots of the catalogue, and `extends: task:NAME`"
@@ -88,11 +87,12 @@ def _file(text: str) -> Iterator[Path]:
 
 def renamed(error: SpecError, path: Path) -> SpecError:
     """The error with the name that the agent knows in place of that of the file."""
+    issues = [(_told(i.where, path), i.path, _told(i.message, path)) for i in error.issues]
+    return SpecError([SpecIssue(*issue) for issue in issues])
 
-    def told(words: str) -> str:
-        return words.replace(str(path), NAME).replace(str(path.parent), "the world")
 
-    return SpecError([SpecIssue(told(i.where), i.path, told(i.message)) for i in error.issues])
+def _told(words: str, path: Path) -> str:
+    return words.replace(str(path), NAME).replace(str(path.parent), "the world")
 
 
 def report(text: str, limits: AgentLimits, all_engines: bool) -> dict[str, Any]:
@@ -108,12 +108,9 @@ def report(text: str, limits: AgentLimits, all_engines: bool) -> dict[str, Any]:
     with _file(text) as path:
         found = report_on(str(path), None, all_engines, [])
 
-    def told(words: str) -> str:
-        return words.replace(str(path), NAME).replace(str(path.parent), "the world")
-
-    engines = {answer.engine: told(answer.refusal) or RUNS for answer in found.answers}
-    data: dict[str, Any] = {"ok": not found.faults, "faults": [told(fault) for fault in found.faults]}
-    return data | {"warnings": [told(warning) for warning in found.warnings], "engines": engines}
+    engines = {answer.engine: _told(answer.refusal, path) or RUNS for answer in found.answers}
+    faults, warnings = ([_told(words, path) for words in several] for several in (found.faults, found.warnings))
+    return {"ok": not faults, "faults": faults, "warnings": warnings, "engines": engines}
 
 
 def _parsed(text: str, limits: AgentLimits) -> Node:
@@ -137,11 +134,12 @@ def _leading_out(node: Node, keys: tuple[str, ...]) -> Iterator[Fault]:
     """Every value that could be the name of a file, or start processes, with its place."""
     path = ".".join(keys)
     if isinstance(node.value, dict):
-        if keys == ("engine",) and (more := [key for key in node.value if key not in _OPEN_ENGINE]):
+        if keys == ("engine",) and (more := [key for key in node.value if key != "name"]):
             words = f"an agent's world chooses an engine by its name alone, without {listing(more)}"
             yield Fault(node.place, path, words)
         for key, child in node.value.items():
-            yield from _named(key, child.key or child.mark, path)
+            if why := _suspicious(key):
+                yield Fault(child.key or child.mark, ".".join((*keys, key)), f"{why}; {REMEDY}")
             yield from _leading_out(child, (*keys, key))
     elif isinstance(node.value, list):
         for number, item in enumerate(node.value):
@@ -151,15 +149,10 @@ def _leading_out(node: Node, keys: tuple[str, ...]) -> Iterator[Fault]:
             yield Fault(node.mark, path, f"{why}; {REMEDY}")
 
 
-def _named(key: str, mark: Mark, path: str) -> Iterator[Fault]:
-    if why := _suspicious(key):
-        yield Fault(mark, f"{path}.{key}".lstrip("."), f"{why}; {REMEDY}")
-
-
 def _refusal(value: str, keys: tuple[str, ...]) -> str:
     """Why a value is not taken; empty where it is."""
     shown = repr(value[:60])
-    if "extends" in keys[:1] or (len(keys) > 1 and keys[0] == "extends"):
+    if keys[:1] == ("extends",):
         return "" if _TASK.fullmatch(value) else f"an agent's world extends installed tasks alone, not {shown}"
     if value.startswith(PROCEDURAL):
         return _suspicious(value.removeprefix(PROCEDURAL))

@@ -124,12 +124,11 @@ def _unknown_terms(command: Mapping[str, Any], path: str) -> Iterator[SpecIssue]
                 yield SpecIssue("", f"{path}.{key}.term", str(error))
 
 
-async def wait(workspace: Workspace, args: Wait, told: Told | None) -> Answer:
+async def wait(workspace: Workspace, args: Wait) -> Answer:
     """Let simulated time pass while the robots hold what they have.
 
     Until things have come to rest, or a task's success has held for as long as it must.
     """
-    del told
     entry = workspace.entry(args.session)
 
     def job(agent: Any) -> dict[str, Any]:
@@ -151,12 +150,11 @@ async def wait(workspace: Workspace, args: Wait, told: Told | None) -> Answer:
     return Answer(await workspace.do(entry, job, changes=True))
 
 
-async def cancel(workspace: Workspace, args: OfSession, told: Told | None) -> Answer:
+async def cancel(workspace: Workspace, args: OfSession) -> Answer:
     """Give up the commands under way in a session.
 
     The robot holds where it is; the next command goes on from there.
     """
-    del told
     ended = await workspace.cancel(workspace.entry(args.session))
     return Answer(
         {"cancelled": False, "why": "no commands are under way"} if ended is None else {"cancelled": True, **ended}
@@ -169,3 +167,5 @@ TOOLS = (
     (wait, Wait, False),
     (cancel, OfSession, False),
 )
+TELLS = (run_skill, run_command)
+"""Tools that tell their progress."""

@@ -11,16 +11,15 @@ from anysim.record.header import EpisodeHeader
 from anysim_agents.agent_env import AgentEnv
 from anysim_agents.answers import Answer
 from anysim_agents.arguments import Ask
-from anysim_agents.workspace import Told, Workspace
+from anysim_agents.workspace import Workspace
 
 
-async def ask(workspace: Workspace, args: Ask, told: Told | None) -> Answer:
+async def ask(workspace: Workspace, args: Ask) -> Answer:
     """Ask about an env in words: the scene, the task, the story so far, or questions with verified answers.
 
     Questions are about this moment: what lies on what, what is left of what, what is within reach, what came
     first, ... No model answers: every word follows from the state of the simulation.
     """
-    del told
     return Answer(await workspace.do(workspace.entry(args.session), lambda agent: _asked(agent, args)))
 
 

@@ -10,26 +10,24 @@ from anysim_agents.agent_env import AgentEnv
 from anysim_agents.answers import Answer
 from anysim_agents.arguments import CheckWorld, CreateWorld, ProposeLayout
 from anysim_agents.toolbox.sessions import begun
-from anysim_agents.workspace import Told, Workspace
+from anysim_agents.workspace import Workspace
 from anysim_schemas.proposals import Proposal
 
 
-async def check_world(workspace: Workspace, args: CheckWorld, told: Told | None) -> Answer:
+async def check_world(workspace: Workspace, args: CheckWorld) -> Answer:
     """Check the text of a world of your own, without building it.
 
     It tells every fault with line and column, what looks doubtful, and whether the engine can run it.
     """
-    del told
     return Answer(await workspace.apart(lambda: worlds.report(args.yaml, workspace.limits, args.all_engines)))
 
 
-async def create_world(workspace: Workspace, args: CreateWorld, told: Told | None) -> Answer:
+async def create_world(workspace: Workspace, args: CreateWorld) -> Answer:
     """Begin a session of a world of your own, given as the text of a YAML file.
 
     It has shapes, procedural assets and robots of the catalogue, and may extend an installed task (`extends:
     task:NAME`); it cannot name files.
     """
-    del told
     found = await workspace.apart(lambda: worlds.report(args.yaml, workspace.limits, False))
     if not found["ok"]:
         raise TaskError("\n".join(found["faults"]))
@@ -39,14 +37,13 @@ async def create_world(workspace: Workspace, args: CreateWorld, told: Told | Non
     return await begun(workspace, await workspace.create_world(loaded, args.num_envs, args.seed))
 
 
-async def propose_layout(workspace: Workspace, args: ProposeLayout, told: Told | None) -> Answer:
+async def propose_layout(workspace: Workspace, args: ProposeLayout) -> Answer:
     """Begin an episode in which things are where you propose.
 
     Without poses you are told what can be placed, how large it is and where there is room. Every pose is checked
     (names, regions, collisions) and moved no further than the world's bounds allow; where one cannot be kept
     nothing changes, and each reason is told.
     """
-    del told
     return Answer(await workspace.do(workspace.entry(args.session), lambda agent: _proposed(agent, args), changes=True))
 
 

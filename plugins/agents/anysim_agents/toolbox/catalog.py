@@ -17,19 +17,18 @@ from anysim.skills.phases import MovingSkill
 from anysim.task import term_registry
 from anysim_agents.answers import Answer
 from anysim_agents.arguments import Describe, ListCatalog
-from anysim_agents.workspace import Told, Workspace
+from anysim_agents.workspace import Workspace
 from anysim_agents.worlds import paths_of
 from anysim_schemas.run import RunSpec
 from anysim_serving.catalogue import SessionRequest
 
 
-async def list_catalog(workspace: Workspace, args: ListCatalog, told: Told | None) -> Answer:
+async def list_catalog(workspace: Workspace, args: ListCatalog) -> Answer:
     """List what there is, a page at a time; `describe` tells more of each.
 
     There are tasks that sessions can be of, robots, engines, commands that robots can be given, predicates for
     `if` and `success`, builders of assets, planners and sensors.
     """
-    del told
     rows = await workspace.apart(lambda: list(_rows(workspace, args.kind)))
     wanted = args.contains.lower()
     found = [row for row in rows if wanted in row["name"].lower() or wanted in row.get("what", "").lower()]
@@ -42,14 +41,13 @@ async def list_catalog(workspace: Workspace, args: ListCatalog, told: Told | Non
     return Answer(data)
 
 
-async def describe(workspace: Workspace, args: Describe, told: Told | None) -> Answer:
+async def describe(workspace: Workspace, args: Describe) -> Answer:
     """Describe one entry of the catalogue, or the keys of a world.
 
     Of a command its parameters, of a robot its channels and tools, of a task its world and commands; with kind
     yaml, the keys that a world of your own may have.
     """
-    del told
-    return Answer(await workspace.apart(lambda: _ABOUT[args.kind](workspace, args.name)))
+    return Answer(await workspace.apart(lambda: _about(workspace, args)))
 
 
 TOOLS = ((list_catalog, ListCatalog, True), (describe, Describe, True))
@@ -123,6 +121,10 @@ def _task_words(workspace: Workspace, name: str) -> str:
 # --------------------------------------------------------------------------------------------------------- in full
 
 
+def _about(workspace: Workspace, args: Describe) -> dict[str, Any]:
+    return _task(workspace, args.name) if args.kind == "task" else _ABOUT[args.kind](args.name)
+
+
 def _known(kind: str, name: str, names: list[str]) -> None:
     if name not in names:
         raise TaskError(
@@ -160,8 +162,7 @@ def _task(workspace: Workspace, name: str) -> dict[str, Any]:
     return data
 
 
-def _robot(workspace: Workspace, name: str) -> dict[str, Any]:
-    del workspace
+def _robot(name: str) -> dict[str, Any]:
     _known("robot", name, registry.names("robots"))
     spec = load_robot(name).spec
     channels = {key: list(channel.joints) for key, channel in spec.channels.items()}
@@ -175,8 +176,7 @@ def _robot(workspace: Workspace, name: str) -> dict[str, Any]:
     }
 
 
-def _engine(workspace: Workspace, name: str) -> dict[str, Any]:
-    del workspace
+def _engine(name: str) -> dict[str, Any]:
     _known("engine", name, registry.names("engines"))
     here, made = availability(name), engine_class(name)
     data: dict[str, Any] = {"name": name, "what": first_line(made), "available": here.available}
@@ -185,22 +185,19 @@ def _engine(workspace: Workspace, name: str) -> dict[str, Any]:
     return data | {"version": here.version, "capabilities": sorted(str(c) for c in made.capabilities.supported)}
 
 
-def _command(workspace: Workspace, name: str) -> dict[str, Any]:
-    del workspace
+def _command(name: str) -> dict[str, Any]:
     known = commands()
     _known("command", name, list(known))
     return _callable(name, known[name], set(paths_of(name)))
 
 
-def _predicate(workspace: Workspace, name: str) -> dict[str, Any]:
-    del workspace
+def _predicate(name: str) -> dict[str, Any]:
     known = predicates()
     _known("predicate", name, list(known))
     return _callable(name, known[name], set())
 
 
-def _asset(workspace: Workspace, name: str) -> dict[str, Any]:
-    del workspace
+def _asset(name: str) -> dict[str, Any]:
     _known("asset", name, registry.names("assets"))
     said = _callable(name, registry.load("assets", name), set())
     return said | {"use": f"world.objects.NAME.source: {{procedural: {name}, params: {{…}}}}"}
@@ -265,9 +262,8 @@ def _spelled(annotation: Any) -> str:
     return str(annotation).rpartition(".")[2] if origin is None else f"{_spelled(origin)} of {_spelled(parts[-1])}"
 
 
-def _yaml(workspace: Workspace, name: str) -> dict[str, Any]:
+def _yaml(name: str) -> dict[str, Any]:
     """The keys of a world at a dotted path."""
-    del workspace
     model: Any = RunSpec
     walked: list[str] = []
     for key in filter(None, name.split(".")):
@@ -328,7 +324,6 @@ def _values(annotation: Any) -> list[Any]:
 
 
 _ABOUT = {
-    "task": _task,
     "robot": _robot,
     "engine": _engine,
     "command": _command,

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from anysim.conventions import Array
 from anysim.engine.capability import Capability
 from anysim.errors import CapabilityError, NameLookupError, TaskError, listing
 from anysim.math import pose as P
@@ -11,31 +12,28 @@ from anysim_agents.agent_env import AgentEnv
 from anysim_agents.answers import Answer, png
 from anysim_agents.arguments import LookAt, OfEnv, Render
 from anysim_agents.limits import AgentLimits
-from anysim_agents.workspace import Told, Workspace
+from anysim_agents.workspace import Workspace
 
 
-async def observe(workspace: Workspace, args: OfEnv, told: Told | None) -> Answer:
+async def observe(workspace: Workspace, args: OfEnv) -> Answer:
     """Observe an env: where everything is, and how the episode stands.
 
     It tells the places of things, parts, goals and the robots' tools (position [m], quaternion x, y, z, w, in the
     world's frame), and which conditions of success hold.
     """
-    del told
     return Answer(await workspace.do(workspace.entry(args.session), lambda agent: _observed(agent, args.env)))
 
 
-async def render(workspace: Workspace, args: Render, told: Told | None) -> Answer:
+async def render(workspace: Workspace, args: Render) -> Answer:
     """Draw what a camera of the session sees now, as an image."""
-    del told
     return await workspace.do(workspace.entry(args.session), lambda agent: _rendered(agent, args))
 
 
-async def look_at(workspace: Workspace, args: LookAt, told: Told | None) -> Answer:
+async def look_at(workspace: Workspace, args: LookAt) -> Answer:
     """Look at a thing or a point from where you like, as an image.
 
     No camera of the session is moved by it.
     """
-    del told
     return await workspace.do(workspace.entry(args.session), lambda agent: _looked(agent, args))
 
 
@@ -53,7 +51,7 @@ def _observed(agent: AgentEnv, number: int) -> dict[str, Any]:
         if entity.name in robots or not presence[i, k]:
             continue
         pose, twist = state.body_pose[i, entity.root], state.body_twist[i, entity.root]
-        row: dict[str, Any] = {"position": pose[:3], "quaternion": pose[3:]}
+        row = _place(pose)
         if (speed := float(np.linalg.norm(twist[:3]))) > 1e-3:
             row["speed"] = speed
         joints = world.joints[entity.joint_start : entity.joint_stop]
@@ -85,17 +83,15 @@ def _observed(agent: AgentEnv, number: int) -> dict[str, Any]:
 
 
 def _robot(agent: AgentEnv, i: int, name: str) -> dict[str, Any]:
-    env, robot = agent.env, agent.env.scene.robot(name)
-    base = robot.base.pose[0]
-    tools = {f"{name}.{tool}": robot.tool(tool).pose[0] for tool in robot.model.tools}
-    row: dict[str, Any] = {"base": {"position": base[:3], "quaternion": base[3:]}}
-    row["tools"] = {tool: {"position": pose[:3], "quaternion": pose[3:]} for tool, pose in tools.items()}
-    state, joints = env.engine.get_state(), env.engine.world.joints
-    row["joints"] = {
-        channel: [float(state.joint_pos[i, j]) for j in spec.joints] for channel, spec in robot.model.channels.items()
-    }
-    del joints
-    return row
+    robot = agent.env.scene.robot(name)
+    state = agent.env.engine.get_state()
+    tools = {f"{name}.{tool}": _place(robot.tool(tool).pose[0]) for tool in robot.model.tools}
+    joints = {channel: state.joint_pos[i, list(spec.joints)] for channel, spec in robot.model.channels.items()}
+    return {"base": _place(robot.base.pose[0]), "tools": tools, "joints": joints}
+
+
+def _place(pose: Array) -> dict[str, Any]:
+    return {"position": pose[:3], "quaternion": pose[3:]}
 
 
 # ---------------------------------------------------------------------------------------------------------- images
@@ -162,7 +158,7 @@ def _looked(agent: AgentEnv, args: LookAt) -> Answer:
     return Answer({"env": i, "target": target, "eye": eye, "size": [args.width, args.height]}, (png(image),))
 
 
-def _target(agent: AgentEnv, i: int, target: Any) -> np.ndarray:
+def _target(agent: AgentEnv, i: int, target: Any) -> Array:
     if not isinstance(target, str):
         return np.array(target, dtype=float)
     agent.env.scene.look(np.array([i]))

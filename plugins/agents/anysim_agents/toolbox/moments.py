@@ -9,19 +9,18 @@ from anysim_agents.agent_env import AgentEnv
 from anysim_agents.answers import Answer
 from anysim_agents.arguments import Counterfactual, Reset, ResetTo, Snapshot
 from anysim_agents.history import History
-from anysim_agents.workspace import Told, Workspace
+from anysim_agents.workspace import Workspace
 
 APART = 1e-6
 """[m] from which on two places are told apart, as of `anysim counterfactual`."""
 MOST_TOLD = 12
 
 
-async def snapshot(workspace: Workspace, args: Snapshot, told: Told | None) -> Answer:
+async def snapshot(workspace: Workspace, args: Snapshot) -> Answer:
     """Keep this moment, to go back to it with `reset_to`.
 
     Going on from it is the same to the bit, and what a hand holds it goes on to hold.
     """
-    del told
     entry = workspace.entry(args.session)
     taken = await workspace.do(entry, lambda agent: _taken(agent, args), changes=True)
     return Answer(taken)
@@ -32,9 +31,8 @@ def _taken(agent: AgentEnv, args: Snapshot) -> dict[str, Any]:
     return {"snapshot": name, "envs": list(agent.snapshots[name].histories), "kept": list(agent.snapshots)}
 
 
-async def reset(workspace: Workspace, args: Reset, told: Told | None) -> Answer:
+async def reset(workspace: Workspace, args: Reset) -> Answer:
     """Begin new episodes, drawn anew or from a seed; `changes` are values in place of what would be drawn."""
-    del told
 
     def job(agent: AgentEnv) -> dict[str, Any]:
         ids = agent.numbers(args.envs)
@@ -46,9 +44,8 @@ async def reset(workspace: Workspace, args: Reset, told: Told | None) -> Answer:
     return Answer(await workspace.do(workspace.entry(args.session), job, changes=True))
 
 
-async def reset_to(workspace: Workspace, args: ResetTo, told: Told | None) -> Answer:
+async def reset_to(workspace: Workspace, args: ResetTo) -> Answer:
     """Go back to a moment that was kept; `changes` are values to go on with in place of those of then."""
-    del told
 
     def job(agent: AgentEnv) -> dict[str, Any]:
         kept = agent.taken(args.snapshot)
@@ -59,14 +56,13 @@ async def reset_to(workspace: Workspace, args: ResetTo, told: Told | None) -> An
     return Answer(await workspace.do(workspace.entry(args.session), job, changes=True))
 
 
-async def counterfactual(workspace: Workspace, args: Counterfactual, told: Told | None) -> Answer:
+async def counterfactual(workspace: Workspace, args: Counterfactual) -> Answer:
     """See what would have been, had something been otherwise.
 
     What was done since a moment is done again, once as it was and once with `changes`, such as
     {objects.cube.mass: 0.5}. It tells from which control step on things differ, and where they end. The session
     is afterwards as it was.
     """
-    del told
     if not args.changes:
         raise TaskError(
             "counterfactual.changes: give at least one value by its path; `status` lists them as can_change"

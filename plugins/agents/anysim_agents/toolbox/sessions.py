@@ -7,17 +7,16 @@ from anysim.errors import TaskError
 from anysim_agents.agent_env import AgentEnv
 from anysim_agents.answers import Answer
 from anysim_agents.arguments import CreateSession, OfSession, OptionalSession
-from anysim_agents.workspace import Entry, Told, Workspace
+from anysim_agents.workspace import Entry, Workspace
 from anysim_serving.catalogue import SessionRequest
 
 
-async def create_session(workspace: Workspace, args: CreateSession, told: Told | None) -> Answer:
+async def create_session(workspace: Workspace, args: CreateSession) -> Answer:
     """Begin a session of a task: a simulator of your own, with its episodes begun.
 
     Nothing moves until you give a command or wait. It answers with the word for the session, what there is, and
     which cameras and parts it has.
     """
-    del told
     overrides: list[str] = []
     if args.horizon is not None:
         if args.horizon > workspace.limits.horizon:
@@ -69,13 +68,12 @@ def about(agent: AgentEnv) -> dict[str, Any]:
     }
 
 
-async def status(workspace: Workspace, args: OptionalSession, told: Told | None) -> Answer:
+async def status(workspace: Workspace, args: OptionalSession) -> Answer:
     """Tell how a session stands, or without one all sessions and the limits of this server.
 
     Of a session: the commands under way, or how the last ones ended; each env's episode; snapshots; and what
     `changes` may name.
     """
-    del told
     if args.session is None:
         return Answer(await _all(workspace))
     entry = workspace.entry(args.session)
@@ -118,9 +116,8 @@ async def _all(workspace: Workspace) -> dict[str, Any]:
     }
 
 
-async def end_session(workspace: Workspace, args: OfSession, told: Told | None) -> Answer:
+async def end_session(workspace: Workspace, args: OfSession) -> Answer:
     """End a session, and free its simulator; commands under way are given up."""
-    del told
     entry = workspace.entry(args.session)
     await workspace.end(entry)
     return Answer({"ended": args.session})
