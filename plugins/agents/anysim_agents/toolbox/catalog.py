@@ -137,17 +137,10 @@ def _task(workspace: Workspace, name: str) -> dict[str, Any]:
     _known("task", name, workspace.catalogue.names())
     spec = workspace.catalogue.loaded(SessionRequest(task=name)).spec
     world, task = spec.world, spec.task
-    data: dict[str, Any] = {
-        "name": name,
-        "description": "" if task is None else task.description,
-        "robots": {key: robot.robot for key, robot in world.robots.items()},
-        "objects": list(world.objects),
-        "cameras": list(world.cameras),
-        "engine": spec.engine.name,
-        "control_dt_s": spec.physics.control_dt,
-        "other_robots": list(spec.alternates),
-        "levels": list(spec.levels),
-    }
+    data: dict[str, Any] = {"name": name, "description": "" if task is None else task.description}
+    data |= {"robots": {key: robot.robot for key, robot in world.robots.items()}, "objects": list(world.objects)}
+    data |= {"cameras": list(world.cameras), "engine": spec.engine.name, "control_dt_s": spec.physics.control_dt}
+    data |= {"other_robots": list(spec.alternates), "levels": list(spec.levels)}
     if task is not None:
         data |= {"horizon": task.horizon, "on_success": task.on_success, "hold": task.hold}
         data |= {"success": {key: {"term": t.term, **t.params} for key, t in task.success.items()}}

@@ -24,14 +24,8 @@ async def create_session(workspace: Workspace, args: CreateSession) -> Answer:
         overrides.append(f"task.horizon={args.horizon}")
     if args.on_success is not None:
         overrides.append(f"task.on_success={args.on_success}")
-    request = SessionRequest(
-        task=args.task,
-        num_envs=args.num_envs,
-        engine=args.engine,
-        robot=args.robot,
-        seed=args.seed,
-        overrides=tuple(overrides),
-    )
+    chosen = args.model_dump(exclude={"horizon", "on_success"})
+    request = SessionRequest(**chosen, overrides=tuple(overrides))
     return await begun(workspace, await workspace.create(request))
 
 
@@ -75,7 +69,8 @@ async def status(workspace: Workspace, args: OptionalSession) -> Answer:
     `changes` may name.
     """
     if args.session is None:
-        return Answer(await _all(workspace))
+        sessions = [workspace.about(entry) for entry in workspace.visible()]
+        return Answer({"sessions": sessions, "limits": vars(workspace.sessions.limits) | vars(workspace.limits)})
     entry = workspace.entry(args.session)
     return Answer(workspace.about(entry) | await workspace.do(entry, _standing))
 
@@ -94,26 +89,6 @@ def _standing(agent: AgentEnv) -> dict[str, Any]:
         for i in range(env.num_envs)
     ]
     return {"envs": rows, "snapshots": list(agent.snapshots), "can_change": list(env.counterfactuals.paths)}
-
-
-async def _all(workspace: Workspace) -> dict[str, Any]:
-    limits, service = workspace.limits, workspace.sessions.limits
-    return {
-        "sessions": [workspace.about(entry) for entry in workspace.visible()],
-        "limits": {
-            "sessions": service.sessions,
-            "envs_of_a_session": service.envs,
-            "idle_s": service.idle_s,
-            "lifetime_s": service.lifetime_s,
-            "seconds_of_an_operation": service.op_s,
-            "seconds_of_waiting": limits.wait_s,
-            "yaml_bytes": limits.yaml_bytes,
-            "things_of_a_world": limits.things,
-            "pixels_of_an_image": limits.pixels,
-            "snapshots_of_a_session": limits.snapshots,
-            "commands_at_once": limits.commands,
-        },
-    }
 
 
 async def end_session(workspace: Workspace, args: OfSession) -> Answer:
