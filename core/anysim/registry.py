@@ -44,6 +44,7 @@ KINDS: Mapping[str, str] = {
     "rooms": "builders of rooms",
     "terrains": "builders of generated ground",
     "textures": "patterns of procedural textures",
+    "views": "views of envs, which `anysim run --view` opens",
     "vocabularies": "words for things and deeds (a package with NAME.yaml)",
 }
 """The kinds that anysim looks up, and what each is."""
@@ -104,6 +105,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
     "anysim-tactile": {"sensors": "tactile_fingertip tactile_pad tactile_probe"},
     "anysim-teleop": {"commands": "teleop", "devices": "browser keyboard script"},
     "anysim-urdf": {"importers": "urdf"},
+    "anysim-viewer": {"commands": "view", "views": "page"},
 }
 INSTALL_HINTS: Mapping[tuple[str, str], str] = {
     (kind, name): package

@@ -64,6 +64,9 @@ def run(
     strict_observers: Annotated[
         bool, typer.Option("--strict-observers", help="End the run where an observer raises, instead of a warning.")
     ] = False,
+    view: Annotated[
+        bool, typer.Option("--view", help="Show the envs in a browser while they run; the address is printed.")
+    ] = False,
     verbose: Verbose = False,
     json: AsJson = False,
 ) -> None:
@@ -75,7 +78,7 @@ def run(
 
     Examples:
       anysim run pick_cube --num-envs 16 --episodes 64 --seed 1
-      anysim run stack_cube --robot ur5_gripper
+      anysim run stack_cube --robot ur5_gripper --view
       anysim run pick_cube -o world.objects.cube.mass=0.3 --out runs/heavy
       anysim run pick_cube=3 push_cube=1 --num-envs 16 --hours 2 --bytes 20GB --out runs/mixed
       anysim run pick_cube put_away --balance segments --num-envs 16 --episodes 64 --out runs/mixed
@@ -103,7 +106,7 @@ def run(
         for part, count in zip(parts, shared_out(parts, total), strict=True):
             if count == 0:
                 continue
-            order = Order(part, engine, num_envs, seed, overrides, strict_observers, verbose, json)
+            order = Order(part, engine, num_envs, seed, overrides, strict_observers, view, verbose, json)
             own = out if out is None or len(parts) == 1 else out / Path(part.task).stem
             ends = bounded and episodes is None
             collections.append(_begin(stack, order, own, count, None if ends else count, limits))
@@ -159,6 +162,7 @@ class Order(NamedTuple):
     seed: int | None
     overrides: Sequence[str]
     strict_observers: bool
+    view: bool
     verbose: bool
     json: bool
 
@@ -167,6 +171,7 @@ def _begin(
     stack: ExitStack, order: Order, out: Path | None, episodes: int, total: int | None, limits: "Limits"
 ) -> "Collection":
     """Make the env of a task, which closes with the stack, and what collects with it."""
+    from anysim import registry
     from anysim.api import make
     from anysim.cli.output import working_on
     from anysim.record.names import run_name
@@ -184,6 +189,9 @@ def _begin(
                 strict_observers=order.strict_observers,
             )
         )
+    if order.view:
+        shown = stack.enter_context(registry.load("views", "page")(env))
+        typer.echo(f"view of {env.name}: {shown.url}", err=order.json)
     seed = env.spec.seed if order.seed is None else order.seed
     directory = out or Path("runs") / run_name(env.name, env.engine.name, env.spec.to_dict(), seed)
     made = Collection(env, directory, episodes, seed, limits, share=order.part.share, total=total)

@@ -1,0 +1,120 @@
+"""What a view costs the loop that it looks at."""
+
+import subprocess
+import sys
+import time
+from statistics import median
+from typing import NamedTuple
+
+import numpy as np
+
+from anysim.api import make
+from anysim.errors import AnysimError
+from anysim.task.env import TaskEnv
+from anysim_viewer.watch import RunView
+
+SLOWEST = 600.0
+"""[s] after which the client of a measurement ends by itself."""
+
+
+class Cost(NamedTuple):
+    """Processor time of control steps of all envs [us], medians over the rounds.
+
+    Attributes:
+        loop: `fast`, one step after the other, or `paced`, as many as time passes.
+        engine, num_envs: of what.
+        alone, viewed: of the stepping thread.
+        rate: moments that were handed over a second of wall time.
+        process_alone, process_viewed: of all threads of the process.
+    """
+
+    loop: str
+    engine: str
+    num_envs: int
+    alone: float
+    viewed: float
+    rate: float
+    process_alone: float
+    process_viewed: float
+
+    @property
+    def share(self) -> float:
+        """What the view adds, as a share of what the loop took before."""
+        return self.viewed / self.alone - 1.0
+
+
+class Run(NamedTuple):
+    """One measurement: processor time of the thread and of the process [us] for each step, and wall time [s] of all."""
+
+    thread: float
+    process: float
+    wall: float
+
+
+def cost(task: str, engine: str | None, num_envs: int, steps: int, rounds: int) -> list[Cost]:
+    """Measure both loops, with a view and without in turn, so that what else the machine does hits both alike."""
+    with make(task, engine=engine, num_envs=num_envs) as env:
+        env.reset(seed=0)
+        _steps(env, 10, paced=False)
+        found = [_cost(env, loop, steps, rounds) for loop in ("fast", "paced")]
+    return found
+
+
+def _cost(env: TaskEnv, loop: str, steps: int, rounds: int) -> Cost:
+    paced = loop == "paced"
+    alone: list[Run] = []
+    viewed: list[Run] = []
+    rates: list[float] = []
+    for _ in range(rounds):
+        alone.append(_steps(env, steps, paced))
+        with RunView(env, port=0) as view:
+            client = subprocess.Popen(
+                [sys.executable, "-m", "anysim_viewer.client", view.url, str(SLOWEST)],
+                stdout=subprocess.PIPE,
+                text=True,
+            )
+            try:
+                _await(view)
+                before = view.handed
+                viewed.append(_steps(env, steps, paced))
+                rates.append((view.handed - before) / viewed[-1].wall)
+            finally:
+                client.terminate()
+                client.communicate()
+    return Cost(
+        loop,
+        env.engine.name,
+        env.num_envs,
+        median(run.thread for run in alone),
+        median(run.thread for run in viewed),
+        median(rates),
+        median(run.process for run in alone),
+        median(run.process for run in viewed),
+    )
+
+
+def _await(view: RunView) -> None:
+    """Wait until the client looks."""
+    end = time.monotonic() + 60.0
+    while not view.watched:
+        if time.monotonic() > end:
+            raise AnysimError("the client of the measurement did not come within a minute")
+        time.sleep(0.05)
+    time.sleep(0.5)  # what it is sent at first belongs to no step
+
+
+def _steps(env: TaskEnv, steps: int, paced: bool) -> Run:
+    still = np.tile(np.clip(np.zeros(env.action_dim), *env.action_bounds), (env.num_envs, 1))
+    thread = process = 0
+    began = due = time.monotonic()
+    for _ in range(steps):
+        if not env.running.all():
+            env.reset(mask=~env.running)
+        before = time.thread_time_ns(), time.process_time_ns()
+        env.step(still)
+        thread += time.thread_time_ns() - before[0]
+        process += time.process_time_ns() - before[1]
+        if paced:
+            due += env.engine.world.physics.control_dt
+            time.sleep(max(0.0, due - time.monotonic()))
+    return Run(thread / steps / 1e3, process / steps / 1e3, time.monotonic() - began)
