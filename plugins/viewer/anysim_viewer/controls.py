@@ -8,7 +8,7 @@ from viser import Icon
 from viser.uplot import Scale, Series
 
 from anysim.conventions import Array
-from anysim.errors import AnysimError
+from anysim.errors import AnysimError, TaskError, listing
 from anysim_viewer.drawing import Drawing
 from anysim_viewer.moment import Wanted
 from anysim_viewer.page import Page
@@ -16,7 +16,20 @@ from anysim_viewer.page import Page
 NO_CAMERA = "none"
 MOST_POINTS = 600
 """Points of a curve that are sent."""
+SLOWEST, FASTEST = 0.05, 4.0
+"""Simulated seconds a second."""
 _INK, _ACCENT = "#2f7ed8", "#e8710a"
+
+
+def among(what: str, value: object, known: Sequence[str]) -> str:
+    """What was chosen in the page: one of the choices that it was given, whatever comes over the wire.
+
+    Raises:
+        TaskError: none of them.
+    """
+    if value not in known:
+        raise TaskError(f"there is no {what} {str(value)[:40]!r} to choose ({listing(known)})")
+    return str(value)
 
 
 class Transport:
@@ -35,13 +48,13 @@ class Transport:
         self._play = gui.add_button("", color="teal")
         self._step = gui.add_button("Step", icon=Icon.PLAYER_SKIP_FORWARD, hint="one control step")
         hint = "simulated seconds a second, at most"
-        slider = gui.add_slider("speed", 0.05, 4.0, 0.05, 1.0, hint=hint, visible=with_speed)
+        slider = gui.add_slider("speed", SLOWEST, FASTEST, 0.05, 1.0, hint=hint, visible=with_speed)
         self._play.on_click(lambda _: page.ask(lambda: self.play(not self.playing)))
         self._step.on_click(lambda _: page.ask(lambda: self._once(step)))
 
         @slider.on_update
         def _(_: object) -> None:
-            self.speed = float(slider.value)
+            self.speed = min(max(float(slider.value), SLOWEST), FASTEST)
 
         self.play(playing)
 
@@ -64,7 +77,7 @@ class Switches:
     ) -> None:
         """`refusals` say why something cannot be shown, by its name."""
         gui = page.server.gui
-        self._wanted, self._image, self._page = wanted, None, page
+        self._wanted, self._page, self._cameras = wanted, page, cameras
         with gui.add_folder("Show"):
             for name in drawing.shown:
                 box = gui.add_checkbox(
@@ -75,7 +88,7 @@ class Switches:
 
             @scale.on_update
             def _(_: object) -> None:
-                drawing.force_scale = float(scale.value)
+                drawing.force_scale = min(max(float(scale.value), 0.0), 100.0)
 
             self.camera = gui.add_dropdown(
                 "camera",
@@ -94,7 +107,7 @@ class Switches:
         self._page.ask(lambda: None)  # wakes the loop, which shows it
 
     def _look(self) -> None:
-        self._wanted.camera = "" if self.camera.value == NO_CAMERA else str(self.camera.value)
+        self._wanted.camera = "" if self.camera.value == NO_CAMERA else among("camera", self.camera.value, self._cameras)
         self._why.visible = False
         if not self._wanted.camera:
             self._picture.visible = False

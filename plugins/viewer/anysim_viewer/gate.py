@@ -24,16 +24,15 @@ from anysim.errors import TaskError
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 _HOST = re.compile(r"(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+)(:\d{1,5})?")
 _POLICY = (
-    "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; connect-src 'self' data: blob:; "
-    "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
+    "frame-ancestors 'none'; base-uri 'none'; form-action 'none'; "
+    "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:"
 )
 PROTECTION = {
     "Cache-Control": "no-store",
-    "Content-Security-Policy": _POLICY,
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
 }
-"""What every answer says: the page loads nothing from elsewhere, and stands in no other page."""
+"""What every answer says, beside the page's policy."""
 
 
 @dataclass(frozen=True)
@@ -139,6 +138,19 @@ class Gate:
             return refusal(HTTPStatus.UNAUTHORIZED, words)
         return None
 
+    def protected(self, request: Request, response: Response) -> Response:
+        """An answer of the server inside: its page loads nothing from elsewhere, and stands in no other page.
+
+        It talks to where it came from, whose name a worker that is made of a blob has to be told.
+        """
+        host = request.headers.get("Host", "")
+        own = f"connect-src 'self' {self.scheme}://{host} {self.scheme.replace('http', 'ws')}://{host} data: blob:"
+        for name, value in {**PROTECTION, "Content-Security-Policy": f"{_POLICY}; {own}"}.items():
+            if name in response.headers:
+                del response.headers[name]
+            response.headers[name] = value
+        return response
+
     def close(self) -> None:
         """Free the port."""
         self.socket.close()
@@ -155,6 +167,7 @@ class Gate:
         secure = "; Secure" if self.tls is not None else ""
         cookie = f"{self._cookie}={self.access.token}; Path=/; HttpOnly; SameSite=Strict{secure}"
         more = {"Location": "/", "Set-Cookie": cookie, "Content-Length": "0"}
+        more |= {"Content-Security-Policy": _POLICY}
         return Response(HTTPStatus.SEE_OTHER, "See Other", Headers({**PROTECTION, **more}), b"")
 
 
@@ -162,15 +175,8 @@ def refusal(status: HTTPStatus, words: str) -> Response:
     """An answer that is a sentence."""
     body = f"{words}\n".encode()
     more = {"Content-Type": "text/plain; charset=utf-8", "Content-Length": str(len(body)), "Connection": "close"}
+    more |= {"Content-Security-Policy": _POLICY}
     return Response(status, status.phrase, Headers({**PROTECTION, **more}), body)
-
-
-def protected(response: Response) -> Response:
-    """An answer of the server inside, with what all of them say."""
-    for name, value in PROTECTION.items():
-        del response.headers[name]
-        response.headers[name] = value
-    return response
 
 
 def _is_address(name: str) -> bool:

@@ -9,7 +9,7 @@ from anysim.engine.capability import Capability
 from anysim.errors import AnysimError, TaskError
 from anysim.task.env import TaskEnv
 from anysim_viewer.actor import NOTHING, Actor, names_of
-from anysim_viewer.controls import Plots, Switches, Transport, Words
+from anysim_viewer.controls import Plots, Switches, Transport, Words, among
 from anysim_viewer.drawing import Drawing
 from anysim_viewer.moment import Wanted, cameras_of, looks_of, moment_of, picture
 from anysim_viewer.mover import Movable, Mover, movables, pose_of, put
@@ -92,6 +92,7 @@ class LiveView(View):
         self.reset()
 
     def _build(self, actors: tuple[str, ...], play: bool) -> None:
+        self._actors, self._cameras = actors, cameras_of(self.env.engine)
         page, gui = self.page, self.page.server.gui
         self._words = Words(page)
         with gui.add_folder("Run"):
@@ -106,34 +107,33 @@ class LiveView(View):
         reset.on_click(lambda _: page.ask(lambda: self.reset(int(seed.value))))
         who.on_update(lambda _: page.ask(lambda: self.choose_actor(str(who.value))))
         self._again = again
-        self._switches = Switches(page, self._drawing, self._wanted, cameras_of(self.env.engine), refusals_of(self.env))
+        self._switches = Switches(page, self._drawing, self._wanted, self._cameras, refusals_of(self.env))
         self._mover = Mover(page, movables(self.env), self.move)
         self._plots = Plots(page)
-        cameras = cameras_of(self.env.engine)
         with gui.add_folder("Video", expand_by_default=False):
-            self._film = gui.add_dropdown("of", tuple(cameras) or ("none",), disabled=not cameras)
-            self._record = gui.add_button("Record", disabled=not cameras, hint="an mp4 of what the camera sees")
+            self._film = gui.add_dropdown("of", tuple(self._cameras) or ("none",), disabled=not self._cameras)
+            self._record = gui.add_button("Record", disabled=not self._cameras, hint="an mp4 of what the camera sees")
         self._record.on_click(lambda _: page.ask(self.record))
 
     # ------------------------------------------------------------------ what can be asked
 
     def reset(self, seed: int | None = None) -> None:
         """Begin new episodes in all envs; those of a seed if one is given, at first those of `self.seed`."""
-        self.seed = self.seed if seed is None else seed
+        self.seed = self.seed if seed is None else max(0, seed)
         self.env.reset(seed=self.seed)
         self._actor.begin(np.arange(self.env.num_envs))
         self._curve.begin()
 
     def choose_env(self, i: int) -> None:
         """Look at another env."""
-        self.i, self._changes = i, -1
+        self.i, self._changes = min(max(i, 0), self.env.num_envs - 1), -1
         self._curve.begin()
         if self._video is not None:
             self.record()
 
     def choose_actor(self, name: str) -> None:
         """Have somebody else act, from the beginning of the same episodes: who acts may have planned from there."""
-        made = Actor(self.env, name)
+        made = Actor(self.env, among("policy", name, self._actors))
         self._actor = made
         self.env.reset(episode_seeds=[int(seed) for seed in self.env.streams.episode_seed])
         made.begin(np.arange(self.env.num_envs))
@@ -148,7 +148,7 @@ class LiveView(View):
     def record(self) -> None:
         """Begin a video, or complete the one that is being made."""
         if self._video is None:
-            camera = str(self._film.value)
+            camera = among("camera", self._film.value, self._cameras)
             first = picture(self.env, camera, self.i)
             self._video = Video(self.env, self.i, camera, first, self._out)
             self._record.label = "Stop"

@@ -14,7 +14,7 @@ from viser.infra import _infra
 from websockets.http11 import Request, Response
 
 from anysim.errors import AnysimError, PluginError
-from anysim_viewer.gate import Access, Gate, protected
+from anysim_viewer.gate import Access, Gate
 
 _making = threading.Lock()
 
@@ -36,7 +36,7 @@ def _behind(gate: Gate) -> Iterator[None]:
             if refused is not None:
                 return refused
             answer = process_request(connection, request)
-            return None if answer is None else protected(answer)
+            return None if answer is None else gate.protected(request, answer)
 
         gate.used = True
         more = {} if gate.tls is None else {"ssl": gate.tls}

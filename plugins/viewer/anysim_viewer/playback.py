@@ -12,7 +12,7 @@ from anysim.record.film import capture_of
 from anysim.record.manifest import Manifest, read_manifest
 from anysim.record.reader import TrajectoryReader
 from anysim_film.stage import FilmOrder, Stage, Staged
-from anysim_viewer.controls import Plots, Switches, Transport, Words
+from anysim_viewer.controls import Plots, Switches, Transport, Words, among
 from anysim_viewer.drawing import Drawing
 from anysim_viewer.moment import OVERVIEW, Matter, Moment, Wanted, cameras_of, color_of, looks_of
 from anysim_viewer.page import Page
@@ -85,7 +85,7 @@ class Playback(View):
     def record(self) -> None:
         """Begin a video, or complete the one that is being made."""
         if self._video is None:
-            camera = str(self._film.value)
+            camera = among("camera", self._film.value, self._cameras)
             self._video = Video(self._staged.env, 0, camera, self._picture(camera), self._out)
             self._record.label = "Stop"
             return
@@ -155,9 +155,11 @@ class Playback(View):
             self._episode: Any = gui.add_dropdown("episode", tuple(names), initial_value=names[0])
             self._slider: Any = gui.add_slider("row", 0, max(1, len(self.steps) - 1), 1, 0, hint="row of the recording")
             self.transport = Transport(page, self.forward, playing=self._play_at_once)
-        self._episode.on_update(lambda _: page.ask(lambda: self.begin(names.index(str(self._episode.value)))))
+        self._episode.on_update(
+            lambda _: page.ask(lambda: self.begin(names.index(among("episode", self._episode.value, names))))
+        )
         self._slider.on_update(lambda event: self._slid(event))
-        cameras = cameras_of(engine)
+        cameras = self._cameras = cameras_of(engine)
         refusals = {"contacts": "contacts are not recorded"}
         if not cameras:
             refusals["camera"] = f"{engine.name} draws no images"

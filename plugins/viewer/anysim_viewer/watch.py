@@ -167,7 +167,7 @@ class RunView:
     # ------------------------------------------------------------------ on the view's thread
 
     def _choose(self, i: int) -> None:
-        self._i, self._changes = i, -1
+        self._i, self._changes = min(max(i, 0), self._env.num_envs - 1), -1
         self._curve.begin()
 
     def _draw(self) -> None:

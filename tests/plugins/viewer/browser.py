@@ -29,7 +29,9 @@ class Browser:
         self._socket, self._numbers = socket, count(1)
         self.asked: list[str] = []
         """Addresses that the page asked for."""
-        for domain in ("Page", "Runtime", "Network"):
+        self.complaints: list[str] = []
+        """What the browser and the page's scripts complained of."""
+        for domain in ("Page", "Runtime", "Network", "Log"):
             self.call(f"{domain}.enable")
 
     def call(self, method: str, **params: Any) -> Any:
@@ -41,6 +43,8 @@ class Browser:
             if told.get("method") in ("Network.requestWillBeSent", "Network.webSocketCreated"):
                 params = told["params"]
                 self.asked.append(params["url"] if "url" in params else params["request"]["url"])
+            if told.get("method") == "Log.entryAdded" and told["params"]["entry"]["level"] == "error":
+                self.complaints.append(told["params"]["entry"]["text"])
             if told.get("id") == number:
                 if "error" in told:
                     raise RuntimeError(f"{method}: {told['error']}")
@@ -62,7 +66,7 @@ class Browser:
         end = time.monotonic() + seconds
         while not (value := self.run(script)):
             if time.monotonic() > end:
-                raise TimeoutError(f"{script}; the page says: {self.run('document.body.innerText')[:2000]}")
+                raise TimeoutError(f"{script}; the page says: {self.run('document.body.innerText')[:2000]}; {self.complaints}")
             time.sleep(0.25)
         return value
 
