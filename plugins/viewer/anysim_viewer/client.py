@@ -1,6 +1,6 @@
 """A client of the page without a browser, for measurements and tests: it is told what a browser is told.
 
-    python -m anysim_viewer.client URL SECONDS     be a client, and print how much came
+python -m anysim_viewer.client URL SECONDS     be a client, and print how much came
 """
 
 import json
@@ -48,11 +48,7 @@ class Client:
         except TimeoutError:
             return []
         found = decoded(raw)
-        self.windows, self.messages, self.bytes = (
-            self.windows + 1,
-            self.messages + len(found),
-            self.bytes + len(raw),
-        )
+        self.windows, self.messages, self.bytes = (self.windows + 1, self.messages + len(found), self.bytes + len(raw))
         return found
 
 

@@ -107,7 +107,9 @@ class Switches:
         self._page.ask(lambda: None)  # wakes the loop, which shows it
 
     def _look(self) -> None:
-        self._wanted.camera = "" if self.camera.value == NO_CAMERA else among("camera", self.camera.value, self._cameras)
+        self._wanted.camera = (
+            "" if self.camera.value == NO_CAMERA else among("camera", self.camera.value, self._cameras)
+        )
         self._why.visible = False
         if not self._wanted.camera:
             self._picture.visible = False

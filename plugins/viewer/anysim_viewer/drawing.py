@@ -264,5 +264,3 @@ def place(node: Any, pose: Array) -> None:
         node.position = pose[:3]
     if not np.allclose(node.wxyz, wxyz, rtol=0.0, atol=1e-6):
         node.wxyz = wxyz
-
-

@@ -27,11 +27,7 @@ _POLICY = (
     "frame-ancestors 'none'; base-uri 'none'; form-action 'none'; "
     "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:"
 )
-PROTECTION = {
-    "Cache-Control": "no-store",
-    "Referrer-Policy": "no-referrer",
-    "X-Content-Type-Options": "nosniff",
-}
+PROTECTION = {"Cache-Control": "no-store", "Referrer-Policy": "no-referrer", "X-Content-Type-Options": "nosniff"}
 """What every answer says, beside the page's policy."""
 
 

@@ -40,9 +40,7 @@ def _behind(gate: Gate) -> Iterator[None]:
 
         gate.used = True
         more = {} if gate.tls is None else {"ssl": gate.tls}
-        return websockets.asyncio.server.serve(
-            handler, sock=gate.socket, process_request=checked, **options, **more
-        )
+        return websockets.asyncio.server.serve(handler, sock=gate.socket, process_request=checked, **options, **more)
 
     inside: Any = _infra
     real = inside.websockets
@@ -86,9 +84,8 @@ class Page:
                 f"viser {viser.__version__} makes its server in a way that cannot be guarded, so nothing is served; "
                 "install viser 1.1.1"
             )
-        self.server.gui.configure_theme(
-            control_layout="collapsible", control_width="large", show_logo=False, show_share_button=False
-        )
+        self.server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
+        self.server.gui.main_panel.dock_right()
 
     @property
     def watched(self) -> bool:

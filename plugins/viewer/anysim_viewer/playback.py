@@ -166,7 +166,7 @@ class Playback(View):
         if not self._matter:
             refusals["matter"] = "no points of matter were recorded; see record.streams.matter"
         self._switches = Switches(page, self._drawing, self._wanted, cameras, refusals)
-        with gui.add_folder("Step"):
+        with gui.add_folder("Details"):
             self._table = Words(page)
         self._plots = Plots(page)
         with gui.add_folder("Video", expand_by_default=False):

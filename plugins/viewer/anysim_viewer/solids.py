@@ -14,7 +14,7 @@ from anysim.model.world import Geom, HeightField, Texture, World
 
 
 class Look(NamedTuple):
-    """How a surface looks: red, green, blue, 0 to 255; opacity 0 to 1; a texture's number or -1; whether it is round."""
+    """How a surface looks: red, green, blue, 0 to 255; opacity 0 to 1; a texture's number or -1; whether round."""
 
     color: tuple[int, int, int]
     opacity: float

@@ -42,7 +42,9 @@ class Video:
     def add(self, image: Array) -> None:
         """Write the next picture."""
         if image.shape != self._shape:
-            raise RecordError(f"a picture of a video of {self._shape} is {image.shape}; end the video and begin another")
+            raise RecordError(
+                f"a picture of a video of {self._shape} is {image.shape}; end the video and begin another"
+            )
         self._images.append({self.camera: image})
         self.frames += 1
 

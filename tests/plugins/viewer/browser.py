@@ -14,7 +14,9 @@ from urllib.request import urlopen
 
 from websockets.sync.client import connect
 
-CHROMIUM = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), "")
+CHROMIUM = next(
+    (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), ""
+)
 FLAGS = (
     "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--no-first-run", "--disable-extensions",
     "--disable-background-networking", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
@@ -66,7 +68,9 @@ class Browser:
         end = time.monotonic() + seconds
         while not (value := self.run(script)):
             if time.monotonic() > end:
-                raise TimeoutError(f"{script}; the page says: {self.run('document.body.innerText')[:2000]}; {self.complaints}")
+                raise TimeoutError(
+                    f"{script}; the page says: {self.run('document.body.innerText')[:2000]}; {self.complaints}"
+                )
             time.sleep(0.25)
         return value
 

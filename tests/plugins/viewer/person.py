@@ -9,7 +9,7 @@ from typing import Any
 from anysim_viewer.client import Client, connected
 from anysim_viewer.view import View
 
-PATIENCE = 60.0
+PATIENCE = 40.0
 """[s] after which a test gives up."""
 
 
@@ -26,7 +26,7 @@ class Person:
         """Take in what comes within a moment."""
         for message in self.client.receive(seconds):
             kind = message["type"]
-            if kind == "NotificationMessage":
+            if kind == "NotificationShowMessage":
                 self.told.append(message["props"]["body"])
             elif kind == "GuiUpdateMessage":
                 self.elements[message["uuid"]].update(message["updates"])
@@ -47,7 +47,11 @@ class Person:
         """Look until something is true."""
         end = time.monotonic() + PATIENCE
         while not true():
-            assert time.monotonic() < end, (sorted(self.nodes), [e.get("label") for e in self.elements.values()], self.told)
+            assert time.monotonic() < end, (
+                sorted(self.nodes),
+                [e.get("label") for e in self.elements.values()],
+                self.told,
+            )
             self.look()
 
     def find(self, label: str) -> str:

@@ -61,7 +61,12 @@ def test_a_socket_does_not_take_the_token_from_its_address(gate: Gate) -> None:
 
 def test_other_sites_and_other_names_are_refused(gate: Gate) -> None:
     own = {"Cookie": cookie(gate)}
-    for origin in ("http://evil.example", f"https://127.0.0.1:{gate.port}", "null", f"http://127.0.0.1:{gate.port + 1}"):
+    for origin in (
+        "http://evil.example",
+        f"https://127.0.0.1:{gate.port}",
+        "null",
+        f"http://127.0.0.1:{gate.port + 1}",
+    ):
         answer = gate.check(request(gate, Origin=origin, Upgrade="websocket", **own))
         assert answer is not None
         assert answer.status_code == HTTPStatus.FORBIDDEN

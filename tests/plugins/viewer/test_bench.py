@@ -1,0 +1,15 @@
+"""`anysim bench view`: what a view costs, measured with a client."""
+
+import pytest
+
+from anysim_viewer.bench import cost
+
+
+@pytest.mark.slow
+def test_both_loops_are_measured_with_a_client_that_looks() -> None:
+    fast, paced = cost("reach", "null", 1, 30, 1)
+    assert (fast.loop, paced.loop) == ("fast", "paced")
+    for one in (fast, paced):
+        assert one.alone > 0
+        assert one.viewed > 0
+        assert one.rate > 1.0
