@@ -1,4 +1,4 @@
-"""Who acts in a view: nobody, the task's expert, or a policy by the name that `anysim evaluate` knows it by."""
+"""Sources of actions in a view: none, the task's expert, or a policy by the name that `anysim evaluate` knows."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What a view costs the loop that it looks at."""
+"""The cost of a view to the loop that it looks at."""
 
 import subprocess
 import sys

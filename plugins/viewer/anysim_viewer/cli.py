@@ -51,7 +51,7 @@ def view(
 
     Of a task or a world: play, pause, one step, reset with a seed, who acts, drag goals and objects, cameras, contacts,
     plots, videos. Of a run: the same to be looked at, and a slider through each episode. The address that is printed
-    carries a token; whoever has it may look and drive. Ctrl-C ends it.
+    carries a token; who has it may look and drive. Ctrl-C ends it.
 
     Examples:
       anysim view pick_cube --policy expert --play

@@ -10,7 +10,7 @@ from viser.uplot import Scale, Series
 from anysim.conventions import Array
 from anysim.errors import AnysimError, TaskError, listing
 from anysim_viewer.drawing import Drawing
-from anysim_viewer.moment import Wanted
+from anysim_viewer.moment import Selection
 from anysim_viewer.page import Page
 
 NO_CAMERA = "none"
@@ -73,7 +73,7 @@ class Switches:
     """What is shown beside bodies, and the picture of a camera."""
 
     def __init__(
-        self, page: Page, drawing: Drawing, wanted: Wanted, cameras: Sequence[str], refusals: dict[str, str]
+        self, page: Page, drawing: Drawing, wanted: Selection, cameras: Sequence[str], refusals: dict[str, str]
     ) -> None:
         """`refusals` say why something cannot be shown, by its name."""
         gui = page.server.gui

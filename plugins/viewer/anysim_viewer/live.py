@@ -11,7 +11,7 @@ from anysim.task.env import TaskEnv
 from anysim_viewer.actor import NOTHING, Actor, names_of
 from anysim_viewer.controls import Plots, Switches, Transport, Words, among
 from anysim_viewer.drawing import Drawing
-from anysim_viewer.moment import Wanted, cameras_of, looks_of, moment_of, picture
+from anysim_viewer.moment import Selection, cameras_of, looks_of, moment_of, picture
 from anysim_viewer.mover import Movable, Mover, movables, pose_of, put
 from anysim_viewer.page import Page
 from anysim_viewer.video import Video
@@ -87,7 +87,7 @@ class LiveView(View):
         self._actor = Actor(env, NOTHING if policy is None else policy)
         self._curve, self._changes = Curve(), -1
         self._video: Video | None = None
-        self._wanted, self._drawing = Wanted(), Drawing(page, env.engine.world)
+        self._wanted, self._drawing = Selection(), Drawing(page, env.engine.world)
         self._build(names_of(env, policy), play)
         self.reset()
 

@@ -1,4 +1,4 @@
-"""What is shown of an env at one moment: copies, so that the env may move on while the page draws."""
+"""Moments of an env as they are shown: copies, so that the env may move on while the page draws."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -52,7 +52,7 @@ class Moment:
 
 
 @dataclass
-class Wanted:
+class Selection:
     """What is to be shown beside bodies: chosen in the page.
 
     Attributes:
@@ -88,7 +88,7 @@ def picture(env: TaskEnv, camera: str, i: int) -> Array:
     return capture_of(env).picture(camera, np.array([i]))[0]
 
 
-def moment_of(env: TaskEnv, i: int, wanted: Wanted) -> Moment:
+def moment_of(env: TaskEnv, i: int, wanted: Selection) -> Moment:
     """Env `i` now; an engine is asked for what is wanted only."""
     state, engine = env.engine.get_state(), env.engine
     ids = np.array([i])

@@ -14,7 +14,7 @@ from anysim.record.reader import TrajectoryReader
 from anysim_film.stage import FilmOrder, Stage, Staged
 from anysim_viewer.controls import Plots, Switches, Transport, Words, among
 from anysim_viewer.drawing import Drawing
-from anysim_viewer.moment import OVERVIEW, Matter, Moment, Wanted, cameras_of, color_of, looks_of
+from anysim_viewer.moment import OVERVIEW, Matter, Moment, Selection, cameras_of, color_of, looks_of
 from anysim_viewer.page import Page
 from anysim_viewer.video import Video
 from anysim_viewer.view import View
@@ -41,7 +41,7 @@ class Playback(View):
         """
         super().__init__(page)
         self.trajectories, self.number, self.at, self._out = trajectories, 0, 0, out
-        self._stage, self._wanted = Stage(order), Wanted()
+        self._stage, self._wanted = Stage(order), Selection()
         self._video: Video | None = None
         self._drawing: Drawing | None = None
         self._play_at_once = play

@@ -15,7 +15,7 @@ from anysim_viewer.controls import Plots, Switches, Transport, Words
 from anysim_viewer.drawing import Drawing
 from anysim_viewer.gate import Access, fresh_token
 from anysim_viewer.live import Curve, refusals_of
-from anysim_viewer.moment import Moment, Wanted, cameras_of, looks_of, moment_of
+from anysim_viewer.moment import Moment, Selection, cameras_of, looks_of, moment_of
 from anysim_viewer.page import Page
 from anysim_viewer.solids import Looks
 from anysim_viewer.view import RATE
@@ -54,7 +54,7 @@ class RunView:
         self._page = _page(env.name, port)
         self.url, self.handed = self._page.url, 0
         self._i, self._due, self._changes = 0, 0.0, -1
-        self._curve, self._wanted = Curve(), Wanted()
+        self._curve, self._wanted = Curve(), Selection()
         self._drawing = Drawing(self._page, env.engine.world)
         self._closed, self._go = threading.Event(), threading.Event()
         self._sight: Sight | None = None
