@@ -11,6 +11,7 @@ import numpy as np
 from anysim.api import make
 from anysim.errors import AnysimError
 from anysim.task.env import TaskEnv
+from anysim_viewer.view import RATE
 from anysim_viewer.watch import RunView
 
 SLOWEST = 600.0
@@ -24,7 +25,7 @@ class Cost(NamedTuple):
         loop: `fast`, one step after the other, or `paced`, as many as time passes.
         engine, num_envs: of what.
         alone, viewed: of the stepping thread.
-        rate: moments that were handed over a second of wall time.
+        moments: that were handed over, for each step.
         process_alone, process_viewed: of all threads of the process.
     """
 
@@ -33,22 +34,26 @@ class Cost(NamedTuple):
     num_envs: int
     alone: float
     viewed: float
-    rate: float
+    moments: float
     process_alone: float
     process_viewed: float
 
     @property
+    def moment(self) -> float:
+        """Of the stepping thread for each moment [us]: how often moments come depends on what else a machine does."""
+        return (self.viewed - self.alone) / self.moments
+
+    @property
     def share(self) -> float:
-        """What the view adds, as a share of what the loop took before."""
-        return self.viewed / self.alone - 1.0
+        """Of a core's time that moments take the stepping thread, at the most that are sent a second."""
+        return RATE * self.moment / 1e6
 
 
 class Run(NamedTuple):
-    """One measurement: processor time of the thread and of the process [us] for each step, and wall time [s] of all."""
+    """One measurement: processor time of the thread and of the process [us] for each step."""
 
     thread: float
     process: float
-    wall: float
 
 
 def cost(task: str, engine: str | None, num_envs: int, steps: int, rounds: int) -> list[Cost]:
@@ -64,7 +69,7 @@ def _cost(env: TaskEnv, loop: str, steps: int, rounds: int) -> Cost:
     paced = loop == "paced"
     alone: list[Run] = []
     viewed: list[Run] = []
-    rates: list[float] = []
+    moments: list[float] = []
     for _ in range(rounds):
         alone.append(_steps(env, steps, paced))
         with RunView(env, port=0) as view:
@@ -77,7 +82,7 @@ def _cost(env: TaskEnv, loop: str, steps: int, rounds: int) -> Cost:
                 _await(view)
                 before = view.handed
                 viewed.append(_steps(env, steps, paced))
-                rates.append((view.handed - before) / viewed[-1].wall)
+                moments.append((view.handed - before) / steps)
             finally:
                 client.terminate()
                 client.communicate()
@@ -87,7 +92,7 @@ def _cost(env: TaskEnv, loop: str, steps: int, rounds: int) -> Cost:
         env.num_envs,
         median(run.thread for run in alone),
         median(run.thread for run in viewed),
-        median(rates),
+        median(moments),
         median(run.process for run in alone),
         median(run.process for run in viewed),
     )
@@ -106,7 +111,7 @@ def _await(view: RunView) -> None:
 def _steps(env: TaskEnv, steps: int, paced: bool) -> Run:
     still = np.tile(np.clip(np.zeros(env.action_dim), *env.action_bounds), (env.num_envs, 1))
     thread = process = 0
-    began = due = time.monotonic()
+    due = time.monotonic()
     for _ in range(steps):
         if not env.running.all():
             env.reset(mask=~env.running)
@@ -117,4 +122,4 @@ def _steps(env: TaskEnv, steps: int, paced: bool) -> Run:
         if paced:
             due += env.engine.world.physics.control_dt
             time.sleep(max(0.0, due - time.monotonic()))
-    return Run(thread / steps / 1e3, process / steps / 1e3, time.monotonic() - began)
+    return Run(thread / steps / 1e3, process / steps / 1e3)

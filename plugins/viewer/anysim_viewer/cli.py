@@ -104,15 +104,15 @@ def bench(
     if json:
         print_json([one._asdict() for one in found])
         return
-    heads = ("loop", "envs", "alone [us/step]", "viewed [us/step]", "cost", "moments/s", "process [us/step]")
+    heads = ("loop", "envs", "alone [us/step]", "viewed", "a moment [us]", "share at 20 Hz", "all threads [us/step]")
     rows = [
         (
             one.loop,
             str(one.num_envs),
             f"{one.alone:,.0f}",
             f"{one.viewed:,.0f}",
-            f"{one.share:+.1%}",
-            f"{one.rate:.1f}",
+            f"{one.moment:,.0f}",
+            f"{one.share:.1%}",
             f"{one.process_alone:,.0f} -> {one.process_viewed:,.0f}",
         )
         for one in found

@@ -210,6 +210,8 @@ class LiveView(View):
     def _line(self, step: int, seconds: float) -> str:
         env, task, i = self.env, self.env.spec.task, self.i
         status = str(env.status[i]) + (f" ({why})" if (why := self._why()) else "")
+        if not env.running[i] and env.info["is_success"][i]:
+            status = "success"  # also where who acts was done before the task's time was up
         horizon = f" of {task.horizon}" if task is not None else ""
         last = f"{self._curve.reward[-1]:.4g}" if self._curve.reward else "-"
         said = env.instruction(i)

@@ -30,7 +30,7 @@ class Sight(NamedTuple):
     moment: Moment
     looks: Looks | None
     words: str
-    curve: tuple[Array, Array, Array]
+    curve: tuple[list[int], list[float], list[bool]]
 
 
 class RunView:
@@ -115,9 +115,9 @@ class RunView:
         if env is not self._env:
             return
         i = self._i
-        self._curve.add(
-            int(result.info["elapsed_steps"][i]), float(result.reward[i]), bool(result.info["is_success"][i])
-        )
+        step = int(result.info["elapsed_steps"][i])
+        if not self._curve.steps or step != self._curve.steps[-1]:  # an env that has ended waits for the others
+            self._curve.add(step, float(result.reward[i]), bool(result.info["is_success"][i]))
         now = time.monotonic()
         if now >= self._due:
             self._due = now + 1.0 / RATE
@@ -148,7 +148,7 @@ class RunView:
             self._switches.refuse(error)
             return
         curve = self._curve
-        rows = np.array(curve.steps), np.array(curve.reward), np.array(curve.success)
+        rows = curve.steps.copy(), curve.reward.copy(), curve.success.copy()
         with self._new:
             if looks is None and self._sight is not None:
                 looks = self._sight.looks  # of one that was not drawn
@@ -182,7 +182,7 @@ class RunView:
                 self._drawing.look(sight.looks)
             self._drawing.show(sight.moment)
             self._switches.show(sight.moment.image)
-            self._plots.show(*sight.curve)
+            self._plots.show(*map(np.array, sight.curve))
             self._words.say(sight.words)
 
 

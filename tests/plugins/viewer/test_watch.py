@@ -11,7 +11,7 @@ from anysim import hooks
 from anysim_viewer.client import connected
 from anysim_viewer.watch import RunView
 from tests.plugins.viewer.person import Person
-from tests.task.helpers import BLOCKS
+from tests.task.helpers import BLIND, BLOCKS
 
 
 def steps(env: Any, count: int) -> list[Any]:
@@ -78,13 +78,11 @@ def test_it_ends_with_its_env() -> None:
 
 
 @pytest.mark.slow
-def test_the_command_shows_a_run(command_line: Any, tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_shows_a_run(command_line: Any, tmp_path: Any) -> None:
     from typer.testing import CliRunner
 
-    ran = CliRunner().invoke(
-        command_line,
-        ["run", "pick_cube", "-e", "null", "-o", "task.horizon=3", "-o", "record.cameras=[]", "-o", "world.cameras={}",
-         "-o", "task.images={}", "--out", str(tmp_path / "run"), "--view"],
-    )  # fmt: skip
+    options = [word for one in (*BLIND, "task.horizon=3") for word in ("-o", one)]
+    words = ["run", "pick_cube", "-e", "null", *options, "--out", str(tmp_path / "run"), "--view"]
+    ran = CliRunner().invoke(command_line, words)
     assert ran.exit_code == 0, ran.output
     assert "view of pick_cube: http://127.0.0.1:" in ran.output
