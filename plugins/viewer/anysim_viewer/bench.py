@@ -3,8 +3,9 @@
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
 from statistics import median
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -56,7 +57,7 @@ class Run(NamedTuple):
     process: float
 
 
-def cost(task: str, engine: str | None, num_envs: int, steps: int, rounds: int) -> list[Cost]:
+def cost(task: str | Mapping[str, Any], engine: str | None, num_envs: int, steps: int, rounds: int) -> list[Cost]:
     """Measure both loops, with a view and without in turn, so that what else the machine does hits both alike."""
     with make(task, engine=engine, num_envs=num_envs) as env:
         env.reset(seed=0)

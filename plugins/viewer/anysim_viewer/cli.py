@@ -189,12 +189,6 @@ def _run(page: "Page", shown: "View", access: "Access", what: str, open_browser:
     import threading
     import webbrowser
 
-    typer.echo(f"{what}: {page.url}")
-    if not access.token:
-        typer.echo("warning: there is no token: every process and user of this machine can look and drive", err=True)
-    if not access.on_loopback and access.certificate is None:
-        typer.echo("warning: without TLS the token and all data can be read on the network between", err=True)
-    typer.echo("Ctrl-C ends it")
     stop = threading.Event()
 
     def end(*_: object) -> None:
@@ -203,6 +197,14 @@ def _run(page: "Page", shown: "View", access: "Access", what: str, open_browser:
 
     before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
+        typer.echo(f"{what}: {page.url}")
+        if not access.token:
+            typer.echo(
+                "warning: there is no token: every process and user of this machine can look and drive", err=True
+            )
+        if not access.on_loopback and access.certificate is None:
+            typer.echo("warning: without TLS the token and all data can be read on the network between", err=True)
+        typer.echo("Ctrl-C ends it")
         if open_browser:
             webbrowser.open(page.url)
         shown.run(stop)

@@ -49,17 +49,14 @@ def test_a_port_that_is_taken_is_told(command_line: Any, tmp_path: Path) -> None
 def test_it_ends_when_it_is_told(tmp_path: Path, number: signal.Signals) -> None:
     world = tmp_path / "ball.yaml"
     world.write_text("engine: 'null'\nworld: {objects: {ball: {source: {sphere: 0.1}, mass: 1.0}}}\n")
-    process = subprocess.Popen(
-        [sys.executable, "-u", "-m", "anysim.cli", "view", str(world), "--port", "0"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        cwd=tmp_path,
-    )
-    assert process.stdout is not None
-    first = process.stdout.readline()
-    assert re.fullmatch(r"viewing ball on null \S+, seed 0: http://127\.0\.0\.1:\d+/\?token=\S{32}\n", first), first
-    assert process.stdout.readline() == "Ctrl-C ends it\n"
-    process.send_signal(number)
-    assert process.wait(60) == 0
-    assert process.stdout.read() == "ended\n"
+    command = [sys.executable, "-u", "-m", "anysim.cli", "view", str(world), "--port", "0"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=tmp_path
+    ) as process:
+        assert process.stdout is not None
+        first = process.stdout.readline()
+        assert re.fullmatch(r"viewing ball on null \S+, seed 0: http://127\.0\.0\.1:\d+/\?token=\S{32}\n", first), first
+        assert process.stdout.readline() == "Ctrl-C ends it\n"
+        process.send_signal(number)
+        assert process.wait(60) == 0
+        assert process.stdout.read() == "ended\n"
