@@ -14,6 +14,7 @@ from anysim_evaluation.driver import drive, episode_seeds
 from anysim_evaluation.policy import make_policy
 from tests.tasks.cases import CASES
 from tests.tasks.states import blind, failed, judged, put, rewarded, seen, set_opening
+from tests.tiers import by_turns
 
 NEAR = 1e-5
 """[m, rad] engines keep poses in single precision."""
@@ -103,9 +104,7 @@ def test_nothing_random_solves_a_task_or_falls_at_once(task: str) -> None:
         assert "success" not in env.status.tolist()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ["mujoco", "pybullet", "sapien"])
-@pytest.mark.parametrize("task", [*CASES, "pick_cube"])
+@pytest.mark.parametrize(("task", "engine"), by_turns([*CASES, "pick_cube"]))
 def test_a_task_begins_apart_bears_random_actions_and_replays_exactly(task: str, engine: str) -> None:
     """Nothing is inside of anything at a reset, no action is a fault, and the same ones do the same, bit by bit."""
     require_engine(engine)
