@@ -31,6 +31,7 @@ TASKS = [
     "flip_switch",
     "plug_charger",
     "pour_beads",
+    "pour_water",
     "unplug_charger",
     "handover",
     "put_away",
