@@ -47,7 +47,7 @@ def test_it_steps_on_the_spot_and_as_commanded(engine: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", [ENGINES[0], *(pytest.param(e, marks=pytest.mark.full) for e in ENGINES[1:])])
+@pytest.mark.parametrize("engine", ENGINES)
 def test_it_steps_on_after_pushes_from_eight_sides(engine: str) -> None:
     with made("bolt", engine, 8) as env:
         env.reset(seed=0)
