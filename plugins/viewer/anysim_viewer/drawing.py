@@ -105,17 +105,17 @@ class Drawing:
         )
 
     def _textured(self, name: str, solid: Solid) -> None:
-        import trimesh
         from PIL import Image
+        from trimesh import Trimesh
+        from trimesh.visual import TextureVisuals
+        from trimesh.visual.material import PBRMaterial
 
         texture = self.world.textures[solid.look.texture]
         once = len(solid.places) == 0 or float(solid.places.max()) <= 1.0
         image = Image.fromarray(tinted(texture, solid.look.color, whole=once))
-        material = trimesh.visual.material.PBRMaterial(
-            baseColorTexture=image, metallicFactor=0.0, roughnessFactor=0.9, doubleSided=True
-        )
-        visual = trimesh.visual.TextureVisuals(uv=solid.places, material=material)
-        mesh = trimesh.Trimesh(solid.vertices, solid.faces, visual=visual, process=False)
+        material = PBRMaterial(baseColorTexture=image, metallicFactor=0.0, roughnessFactor=0.9, doubleSided=True)
+        visual = TextureVisuals(uv=solid.places, material=material)
+        mesh = Trimesh(solid.vertices, solid.faces, visual=visual, process=False)
         self._scene.add_mesh_trimesh(name, mesh)
 
     def _batch(self, bodies: tuple[int, ...], geom: int, looks: Looks) -> None:
@@ -137,11 +137,9 @@ class Drawing:
 
     def _move(self, pose: Array, present: Array) -> None:
         there = np.ones(len(pose), dtype=bool) if len(present) == 0 else present[self._entity]
-        moved = ~np.isclose(pose, self._pose, rtol=0.0, atol=1e-6, equal_nan=False).all(axis=1)
-        if self._there is not None:
-            changed = there != self._there
-        else:
-            changed = np.ones(len(pose), dtype=bool)
+        same: Array = np.isclose(pose, self._pose, rtol=0.0, atol=1e-6)
+        moved = ~same.all(axis=1)
+        changed = np.ones(len(pose), dtype=bool) if self._there is None else np.not_equal(there, self._there)
         for body, node in self._nodes.items():
             if changed[body]:
                 node.visible = bool(there[body])
@@ -247,7 +245,7 @@ class Drawing:
         middle = np.median(places, axis=0) if len(places) else np.zeros(3)
         eye = next((np.array(c.position) for c in world.cameras if c.body < 0), None)
         if eye is None:
-            reach = max(0.6, float(np.quantile(np.linalg.norm(places - middle, axis=1), 0.9)))
+            reach = max(0.25, float(np.quantile(np.linalg.norm(places - middle, axis=1), 0.9)))
             eye = middle + _EYE * reach * np.array([0.75, -0.75, 0.55])
         else:
             camera = next(c for c in world.cameras if c.body < 0)

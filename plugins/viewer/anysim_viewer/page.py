@@ -39,7 +39,7 @@ def _behind(gate: Gate) -> Iterator[None]:
             return None if answer is None else gate.protected(request, answer)
 
         gate.used = True
-        more = {} if gate.tls is None else {"ssl": gate.tls}
+        more: dict[str, Any] = {} if gate.tls is None else {"ssl": gate.tls}
         return websockets.asyncio.server.serve(handler, sock=gate.socket, process_request=checked, **options, **more)
 
     inside: Any = _infra

@@ -182,7 +182,8 @@ class RunView:
                 self._drawing.look(sight.looks)
             self._drawing.show(sight.moment)
             self._switches.show(sight.moment.image)
-            self._plots.show(*map(np.array, sight.curve))
+            steps, reward, success = sight.curve
+            self._plots.show(np.array(steps), np.array(reward), np.array(success))
             self._words.say(sight.words)
 
 
