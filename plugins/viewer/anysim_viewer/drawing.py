@@ -139,11 +139,13 @@ class Drawing:
         there = np.ones(len(pose), dtype=bool) if len(present) == 0 else present[self._entity]
         same: Array = np.isclose(pose, self._pose, rtol=0.0, atol=1e-6)
         moved = ~same.all(axis=1)
-        changed = np.ones(len(pose), dtype=bool) if self._there is None else np.not_equal(there, self._there)
+        changed: Array = np.ones(len(pose), dtype=bool)
+        if self._there is not None:
+            changed = np.logical_xor(there, self._there)
         for body, node in self._nodes.items():
             if changed[body]:
                 node.visible = bool(there[body])
-            if moved[body] and there[body]:
+            if (moved[body] or changed[body]) and there[body]:
                 node.position, node.wxyz = pose[body, :3], pose[body, [6, 3, 4, 5]]
         for bodies, rows, handle in self._batches:
             if moved[rows].any() or changed[rows].any():

@@ -124,3 +124,19 @@ def test_nothing_is_sent_where_nothing_has_moved() -> None:
         drawing.show(moment(world))
         assert not person.client.receive(0.5)
         assert person.client.messages == before
+
+
+def test_what_comes_is_drawn_where_it_went_meanwhile() -> None:
+    world = boxes(1)
+    away = np.zeros(len(world.entities), dtype=bool)
+    moved = np.array(world.initial_body_pose)
+    moved[0, :3] = [0.5, 0.5, 0.5]
+    with drawn(world) as (drawing, person):
+        drawing.show(moment(world))
+        drawing.show(replace(moment(world, present=away), body_pose=moved))
+        person.until(
+            lambda: any(one.get("visible") is False for name, one in person.nodes.items() if "/bodies/0" in name)
+        )
+        drawing.show(replace(moment(world), body_pose=moved))
+        node = next(one for name, one in person.nodes.items() if name.startswith("/bodies/0-") and name.count("/") == 2)
+        person.until(lambda: node["visible"] and np.allclose(node["position"], [0.5, 0.5, 0.5]))
