@@ -144,9 +144,14 @@ def alike(world: World, looks: Looks, least: int) -> Mapping[int, tuple[int, ...
         seen = [g for g in geoms if world.geoms[g].visible]
         if seen and all(looks.texture[g] < 0 for g in seen):
             key = tuple(
-                (world.geoms[g].shape, world.geoms[g].position, world.geoms[g].quaternion, looks.material[g],
-                 looks.color[g].tobytes())
+                (
+                    world.geoms[g].shape,
+                    world.geoms[g].position,
+                    world.geoms[g].quaternion,
+                    looks.material[g],
+                    looks.color[g].tobytes(),
+                )
                 for g in seen
-            )  # fmt: skip
+            )
             table.setdefault(key, []).append(body)
     return {bodies[0]: tuple(bodies) for bodies in table.values() if len(bodies) >= least}

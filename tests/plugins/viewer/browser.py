@@ -18,10 +18,19 @@ CHROMIUM = next(
     (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), ""
 )
 FLAGS = (
-    "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--no-first-run", "--disable-extensions",
-    "--disable-background-networking", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-    "--hide-scrollbars", "--mute-audio", "--remote-debugging-port=0",
-)  # fmt: skip
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-dev-shm-usage",
+    "--no-first-run",
+    "--disable-extensions",
+    "--disable-background-networking",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--hide-scrollbars",
+    "--mute-audio",
+    "--remote-debugging-port=0",
+)
 
 
 class Browser:
@@ -76,8 +85,11 @@ class Browser:
 
     def click(self, words: str) -> None:
         """Press the button with these words."""
-        self.wait(f"(() => {{ const b = [...document.querySelectorAll('button')].find(b => b.innerText.trim() == "
-                  f"{json.dumps(words)}); if (b) b.click(); return !!b; }})()", 30)  # fmt: skip
+        self.wait(
+            f"(() => {{ const b = [...document.querySelectorAll('button')].find(b => b.innerText.trim() == "
+            f"{json.dumps(words)}); if (b) b.click(); return !!b; }})()",
+            30,
+        )
 
     def drag(self, start: tuple[float, float], end: tuple[float, float], steps: int = 12) -> None:
         """Drag with the mouse from one point of the page to another [px]."""
