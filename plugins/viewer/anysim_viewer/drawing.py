@@ -138,10 +138,10 @@ class Drawing:
     def _move(self, pose: Array, present: Array) -> None:
         there = np.ones(len(pose), dtype=bool) if len(present) == 0 else present[self._entity]
         same: Array = np.isclose(pose, self._pose, rtol=0.0, atol=1e-6)
-        moved = ~same.all(axis=1)
+        moved = np.asarray(~same.all(axis=1))
         changed: Array = np.ones(len(pose), dtype=bool)
         if self._there is not None:
-            changed = np.logical_xor(there, self._there)
+            changed = np.asarray(there ^ self._there)
         for body, node in self._nodes.items():
             if changed[body]:
                 node.visible = bool(there[body])
