@@ -20,11 +20,11 @@ from anysim.math import pose as P
 from anysim_urdf.unheld import notes_of
 
 Rgba = tuple[float, float, float, float]
-_GEOMETRY = {"box": ("size", 3), "sphere": ("radius", 1), "cylinder": ("radius", 1), "mesh": ("filename", 0)}
+_GEOMETRY = ("box", "sphere", "cylinder", "capsule", "mesh")
 
 
 class Shape(NamedTuple):
-    """`kind` is box (size: edge lengths), sphere (radius), cylinder (radius, length) or mesh (size: scale)."""
+    """`kind` is box (size: edge lengths), sphere (radius), cylinder, capsule (radius, length) or mesh (size: scale)."""
 
     kind: str
     size: tuple[float, ...]
@@ -155,7 +155,7 @@ class UrdfFile:
             size = self._numbers(shape, "scale", (1, 3), (1.0, 1.0, 1.0))
             size = size * 3 if len(size) == 1 else size
         else:
-            keys = ("radius", "length") if shape.tag == "cylinder" else ("radius",)
+            keys = ("radius", "length") if shape.tag in ("cylinder", "capsule") else ("radius",)
             size = tuple(self._number(shape, key, None) for key in keys)
         if 0.0 in size or (min(size) < 0 and shape.tag != "mesh"):  # a negative scale of a mesh mirrors
             raise self._error(shape, f"<{shape.tag}> of {self._owner(element)} has the size {list(size)}")
