@@ -82,6 +82,8 @@ ROWS: tuple[Row, ...] = (
     *_looks("robot"),
     Row("robot/transmission", _OUT, "", "gears and drives are those of the catalogue's entry"),
     Row("robot/gazebo", _OUT, "", "what it says of friction, sensors and plugins is Gazebo's alone"),
+    Row("robot/gazebo/springStiffness", _EXACT, "", "of the joint that `reference` names"),
+    Row("robot/gazebo/springReference", _EXACT, "", "of the joint that `reference` names"),
     Row("robot/sensor", _OUT, "", "those of a world are its own"),
 )
 """An element that is not here is left out with a note, and so is an attribute."""

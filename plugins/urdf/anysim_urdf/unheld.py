@@ -34,6 +34,8 @@ def _unread(node: Any, path: str, owner: str = "robot") -> Iterator[tuple[str, s
     for child in node:
         tag = str(child.tag)
         below = f"{path}/{tag}"
+        if tag == "gazebo" and _springs_alone(child):
+            continue
         if not known(below):
             yield f"<{tag}>", _left_out(element(below)), owner
             continue
@@ -41,6 +43,12 @@ def _unread(node: Any, path: str, owner: str = "robot") -> Iterator[tuple[str, s
             yield f"<{tag}>", f"of several in one <{node.tag}> the first is read", owner
         seen.add(tag)
         yield from _unread(child, below, owner)
+
+
+def _springs_alone(gazebo: Any) -> bool:
+    """Whether a <gazebo> holds nothing but the spring of a joint."""
+    joints = {joint.get("name") for joint in gazebo.getparent().findall("joint")}
+    return len(gazebo) > 0 and gazebo.get("reference") in joints and all(known(f"robot/gazebo/{c.tag}") for c in gazebo)
 
 
 def _left_out(row: Row | None) -> str:

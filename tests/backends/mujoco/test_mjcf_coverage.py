@@ -30,8 +30,8 @@ WHOLE = """<mujoco><compiler angle="radian"/><asset>
     diaginertia="0.1 0.2 0.25"/>
     <joint name="turn" type="hinge" pos="0 0 0.1" axis="0 0 1" range="-1 1" limited="true" armature="0.1"
     damping="1" frictionloss="0.1"
-      ref="0.1" stiffness="0" actuatorfrclimited="true" actuatorfrcrange="-5 5" solreflimit="0.03 1"/><geom
-    name="fist" size="0.1"/>
+      ref="0.1" springref="0.2" stiffness="2" actuatorfrclimited="true" actuatorfrcrange="-5 5" solreflimit="0.03 1"/>
+    <geom name="fist" size="0.1"/>
     <site name="tip" pos="0 0 0.1" quat="1 0 0 0"/><site name="line" type="capsule" size="0.1"
     fromto="0 0 0 0 0 1"/>
     <body name="hand" pos="0 1 0" euler="0 0 0.1"><inertial pos="0 0 0" mass="1" fullinertia="0.1 0.2 0.25 0 0 0"/>

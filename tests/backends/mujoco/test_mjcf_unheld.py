@@ -64,7 +64,7 @@ def test_a_plain_file_has_no_notes(load: Callable[..., ImportedModel]) -> None:
         ("joint", 'range="10 90"', "turn: starts at 0, outside of [0.174533, 1.5708]; now at the limit (repaired)"),
         ("joint", 'damping="0.1 0.2 0.3"', "joint damping: is a polynomial; its linear part alone is kept"),
         ("joint", 'actuatorfrcrange="-1 5"', "joint actfrcrange: [-1, 5] is one-sided; the larger end limits both"),
-        ("joint", 'stiffness="5"', "turn: has a spring of 5"),
+        ("joint", 'stiffness="5 1"', "joint stiffness: is a polynomial; its linear part alone is kept"),
         ("top", '<joint name="free" type="free" damping="2" armature="0.1"/>', "joint armature: a free joint has none"),
         ("top", '<joint name="free" type="free" damping="2"/>', "joint damping: a free joint has none here (1: free)"),
         (

@@ -12,6 +12,7 @@ from anysim import load
 from anysim.api import compile_world
 from anysim.assets.model import Fate, ImportedModel
 from anysim.compile.edit import without_entity
+from anysim.errors import AssetError
 from anysim.record.collector import run_header
 from anysim_urdf import coverage
 from anysim_urdf.coverage import ROWS
@@ -43,6 +44,23 @@ def test_a_plain_file_has_no_notes(pair: Load) -> None:
     shape = '<{0} name="s"><origin xyz="0 0 1"/><geometry><sphere radius="1"/></geometry><material name="m"/></{0}>'
     robot = '<material name="m"><color rgba="1 0 0 1"/></material><material name="n"/>'
     assert words(pair(shape.format("visual") + shape.format("collision") * 2, '<dynamics damping="1"/>', robot)) == []
+
+
+def test_springs_of_gazebo_are_the_joint_s(pair: Load) -> None:
+    spring = "<springStiffness>5</springStiffness><springReference>0.2</springReference>"
+    model = pair(robot=f'<gazebo reference="j">{spring}</gazebo>')
+    assert (model.joints[0].stiffness, model.joints[0].spring_rest) == (5.0, 0.2)
+    assert words(model) == []
+    other = pair(robot=f'<gazebo reference="b">{spring}</gazebo><gazebo reference="j">{spring}<mu1>1</mu1></gazebo>')
+    assert other.joints[0].stiffness == 5.0
+    (note,) = words(other)
+    assert note.startswith("<gazebo>: is left out: what it says of friction")
+    assert "(2: robot)" in note
+
+
+def test_a_spring_that_is_no_number_is_refused(pair: Load) -> None:
+    with pytest.raises(AssetError, match="<springStiffness> holds 'stiff': expected a finite number"):
+        pair(robot='<gazebo reference="j"><springStiffness>stiff</springStiffness></gazebo>')
 
 
 @pytest.mark.parametrize(
@@ -122,7 +140,6 @@ def test_what_the_table_reads_is_in_the_model(path: str, key: str, tmp_path: Pat
     """Another value is another model, or an error that says why not: nothing that is read has no effect."""
     from lxml import etree
 
-    from anysim.errors import AssetError
     from anysim_urdf.load import import_urdf
 
     corners = ("0 0 0", "1 0 0", "0 1 0", "0 0 1")

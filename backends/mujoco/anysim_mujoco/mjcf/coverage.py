@@ -34,11 +34,11 @@ FIELDS: Mapping[str, tuple[Row, ...]] = {
         Row(_IDLE, "simple fuse sleep", "it is of how MuJoCo computes"),
     ),
     "joint": (
-        Row(_EXACT, "type pos axis range limited armature frictionloss ref actfrclimited springdamper"),
+        Row(_EXACT, "type pos axis range limited armature frictionloss ref actfrclimited springdamper springref"),
         Row(_ABOUT, "damping", "the linear part of a polynomial; none of a free joint"),
         Row(_ABOUT, "actfrcrange", "the larger end limits both"),
         Row(_ABOUT, "solref_limit", "its time constant"),
-        Row(_OUT, "stiffness springref", "joints have no springs"),
+        Row(_ABOUT, "stiffness", "the linear part of a polynomial; none of a free joint"),
         Row(_OUT, "solimp_limit", "limits are as soft as the engine has them"),
         Row(_OUT, "margin", "limits act at the limit"),
         Row(_OUT, "solref_friction solimp_friction", "dry friction is as stiff as the engine has it"),
