@@ -168,24 +168,6 @@ class ClaimsJointFriction(_Stored):
     name_of, caught_by = "joint.friction", ("test_parameters.py::test_joint_friction_matters",)
 
 
-class ClaimsJointSprings(Right):
-    """Springs pull at nothing."""
-
-    caught_by = ("test_physics.py::test_a_spring_swings_about_its_rest",)
-
-    def _spoil(self, world):
-        return replace(world, joints=tuple(replace(joint, stiffness=0.0) for joint in world.joints))
-
-
-class SpringsToZero(Right):
-    """Springs pull to zero, not to their rest."""
-
-    caught_by = ("test_physics.py::test_a_spring_pulls_beside_the_drive",)
-
-    def _spoil(self, world):
-        return replace(world, joints=tuple(replace(joint, spring_rest=0.0) for joint in world.joints))
-
-
 class StoredInertia(_Stored):
     """Inertias are stored and do nothing."""
 

@@ -65,8 +65,9 @@ class _Law:
         self._kp = np.array([a.kp for a in drives]) * position
         self._kd = np.array([a.kd for a in drives]) * position
         self._limit = np.array([a.effort_limit for a in drives])
-        self._damping = np.array([joint.damping for joint in joints])
-        self._spring = np.array([[joint.stiffness, joint.spring_rest] for joint in joints]).reshape(-1, 2).T
+        self._damping, *self._spring = (
+            np.array([(j.damping, j.stiffness, j.spring_rest) for j in joints]).reshape(-1, 3).T
+        )
 
     def all(self, q: Array) -> Array:
         """Positions of all joints (J,) from those of the leaders."""
