@@ -1,4 +1,4 @@
-"""Engines whose states no world can be in: flights, energy from nowhere, what is not finite; springs that do not pull."""
+"""Engines whose states no world can be in: flights, energy from nowhere, what is not finite; dead springs."""
 
 from dataclasses import replace
 

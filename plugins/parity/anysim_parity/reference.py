@@ -65,9 +65,7 @@ class _Law:
         self._kp = np.array([a.kp for a in drives]) * position
         self._kd = np.array([a.kd for a in drives]) * position
         self._limit = np.array([a.effort_limit for a in drives])
-        self._damping, *self._spring = (
-            np.array([(j.damping, j.stiffness, j.spring_rest) for j in joints]).reshape(-1, 3).T
-        )
+        self._damping, *self._spring = np.reshape([(j.damping, j.stiffness, j.spring_rest) for j in joints], (-1, 3)).T
 
     def all(self, q: Array) -> Array:
         """Positions of all joints (J,) from those of the leaders."""

@@ -50,8 +50,8 @@ VALUES = dict(
 type: slide; inertia: shell; material: blue; mesh: block; hfield: dale; quat: 1 1 0 0; refquat: 1 1 0 0;
 axisangle: 0 1 1 1; euler: 1 1 0.1; contype: 0; conaffinity: 2; condim: 4; priority: 2; limited: false;
 actuatorfrclimited: false; forcelimited: false; ctrllimited: false; active: false; gravcomp: 1; joint1: turn;
-joint2: grip; joint: hand; gaintype: affine; biastype: none; dyntype: integrator; shellinertia: true; axis: 0 1
-0; pos: 0.1 0.2 0.3; refpos: 0.1 0.2 0.3; fromto: 0 0 0 0 1 1; stiffness: 3; polycoef: 0.1 2 0 0 0; ref: 0.3;
+joint2: grip; joint: hand; gaintype: affine; biastype: none; dyntype: integrator; shellinertia: true; axis: 0 1 0;
+pos: 0.1 0.2 0.3; refpos: 0.1 0.2 0.3; fromto: 0 0 0 0 1 1; stiffness: 3; polycoef: 0.1 2 0 0 0; ref: 0.3;
 nrow: 4; ncol: 1; elevation: 1 0 0 0.5; angle: degree; solreflimit: 0.06 1""".split(";")
 )
 """Other values than those of the model; numbers are scaled where there is none."""

@@ -129,8 +129,8 @@ WHOLE = """<robot name="r"><material name="red"><color rgba="1 0 0 1"/></materia
 OTHERWISE = dict(
     pair.strip().split(": ")
     for pair in """
-xyz: 0 1 0; rpy: 0.2 0.1 0; size: 2 2 2; scale: 2 2 2; rgba: 0 0 1 1; type: prismatic; link: c; filename:
-other.obj; joint: k; name: own""".split(";")
+xyz: 0 1 0; rpy: 0.2 0.1 0; size: 2 2 2; scale: 2 2 2; rgba: 0 0 1 1; type: prismatic; link: c;
+filename: other.obj; joint: k; name: own""".split(";")
 )
 READ = [
     (row.path, key) for row in ROWS for key in row.attributes.split() if row.fate in (Fate.EXACT, Fate.APPROXIMATED)
