@@ -154,6 +154,17 @@ def test_partial_gravity_compensation_is_all_or_none(
     assert any(words in note for note in found), found
 
 
+def test_what_mujoco_warns_of_is_noted(tmp_path: Path) -> None:
+    """An attribute that it will read no more one day."""
+    path = tmp_path / "heavy.xml"
+    body = '<body name="a"><freejoint/><geom size="0.1"/></body>'
+    path.write_text(f'<mujoco><compiler settotalmass="3"/><worldbody>{body}</worldbody></mujoco>')
+    model = import_mjcf(path, root=tmp_path)
+    assert abs(model.bodies[0].inertial.mass - 3.0) < 1e-9
+    (note,) = model.report
+    assert str(note).startswith("MuJoCo: warns: compiler attribute 'settotalmass' is deprecated")
+
+
 def test_a_mixed_solref_is_as_soft_as_the_default(load: Callable[..., ImportedModel]) -> None:
     model = load(rod='solref="0.1 -1"', joint='range="-9 9" solreflimit="0.1 -1"')
     assert {geom.surface.softness for geom in model.geoms} == {0.0}
