@@ -32,6 +32,7 @@ from anysim.engine.factory import create_simulation
 from anysim.errors import AnysimError
 from anysim.model.world import Actuator, BodyKind, ControlMode, World
 from anysim_mujoco.mjcf.load import VIRTUAL_SHARE
+from anysim_mujoco.mjcf.unheld import tendon_effects
 
 STEPS = 100
 
@@ -175,8 +176,8 @@ def _row(model: ImportedModel, world: World, raw: Raw, row: Row) -> Row:
 def _alone(model: ImportedModel, raw: Raw) -> Iterator[str]:
     """What moves the bodies of a file and is not in the model."""
     option = raw.model.opt
-    if raw.model.ntendon:
-        yield f"{raw.model.ntendon} tendons"
+    if acting := sum(bool(tendon_effects(raw.model, t)) for t in range(raw.model.ntendon)):
+        yield f"{acting} tendons"
     if option.density or option.viscosity:
         yield "a fluid"
     if raw.model.dof_frictionloss[raw.v].any():

@@ -286,3 +286,23 @@ def test_every_element_and_attribute_of_mujoco_is_in_the_table() -> None:
         seen |= attributes & known[kind]
     assert missing == []
     assert len(seen) > 100
+
+
+TENDONS = """<tendon><fixed name="look"><joint joint="turn" coef="1"/></fixed>
+<fixed name="pull" stiffness="5" damping="1"><joint joint="grip" coef="1"/></fixed>
+<fixed name="stop" limited="true" range="0 1"><joint joint="turn" coef="1"/></fixed>
+<fixed name="haul"><joint joint="turn" coef="1"/></fixed>
+<fixed name="tied"><joint joint="grip" coef="1"/></fixed></tendon>
+<actuator><motor name="winch" tendon="haul"/></actuator><equality><tendon tendon1="tied"/></equality>"""
+
+
+def test_tendons_are_left_out_with_their_effect(load: Callable[..., ImportedModel]) -> None:
+    found = [str(note) for note in load(rest=TENDONS).report if note.where == "tendons"]
+    assert found == [
+        "tendons: do nothing in the file either: they only measure (1: look) (info)",
+        "tendons: pull as springs, which is left out (1: pull) (dropped)",
+        "tendons: damp, which is left out (1: pull) (dropped)",
+        "tendons: limit a length, which is left out (1: stop) (dropped)",
+        "tendons: carry the force of drives, which is left out (1: haul) (dropped)",
+        "tendons: are tied to a length, which is left out (1: tied) (dropped)",
+    ]

@@ -144,7 +144,7 @@ WHOLE: Mapping[str, Row] = {
     "ball": Row(_NOT, "", "as the `type` of a joint: there are hinges and slides"),
     "connect weld": Row(_NOT, "", "where it is active: loops are not closed"),
     "flex flexvert flexstrain flexcomp edge elasticity contact pin": Row(_NOT, "", "flexes: bodies are rigid"),
-    "tendon fixed spatial pulley": Row(_OUT, "", "with what they drive and couple"),
+    "tendon fixed spatial pulley": Row(_OUT, "", "the report says what they do; one that only measures does nothing"),
     "general motor position velocity": Row(_ABOUT, "", _LAWS),
     "intvelocity orientation pid damper cylinder muscle adhesion dcmotor": Row(_OUT, "", _LAWS),
     "texture layer": Row(_OUT, "", "surfaces have plain colours"),

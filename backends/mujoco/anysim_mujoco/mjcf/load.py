@@ -36,7 +36,7 @@ from anysim_mujoco.mjcf.drives import drive_hint, left_out, shared
 from anysim_mujoco.mjcf.file import compiled
 from anysim_mujoco.mjcf.geoms import GeomReader, pose_of
 from anysim_mujoco.mjcf.pairs import PairReader
-from anysim_mujoco.mjcf.unheld import mixed
+from anysim_mujoco.mjcf.unheld import mixed, of_tendons
 
 _IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 _HINGE, _SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
@@ -116,8 +116,7 @@ class _MjcfImport:
                 )
         if model.nflex:
             raise AssetError(f"{self.path}: holds {model.nflex} flexes; the neutral model has rigid bodies")
-        if model.ntendon:
-            self._note("dropped", "tendons", f"{model.ntendon} of them are left out, with what they drive and couple")
+        self.notes += of_tendons(model)
 
     def _top(self) -> int:
         model = self.model

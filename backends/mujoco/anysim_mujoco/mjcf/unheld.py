@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 import mujoco
+import numpy as np
 
 from anysim.assets.model import Fate, ImportNote
 from anysim.errors import listing
@@ -157,6 +158,34 @@ def _named(elements: list[Any], effect: str) -> str:
     names = [one.name for one in elements if one.name]
     who = listing(names, 3) if names else "without a name"
     return f"{effect} ({len(elements)}: {who})"
+
+
+def of_tendons(model: Any) -> Iterator[ImportNote]:
+    """Notes of the tendons of a compiled file: what each would do, which is left out; most only measure."""
+    told: dict[str, list[Any]] = {}
+    for t in range(model.ntendon):
+        for effect in tendon_effects(model, t) or ["do nothing in the file either: they only measure"]:
+            told.setdefault(effect, []).append(model.tendon(t))
+    for effect, ones in told.items():
+        idle = "nothing" in effect
+        yield ImportNote(
+            "info" if idle else "dropped", "tendons", _named(ones, effect + ", which is left out" * (not idle))
+        )
+
+
+def tendon_effects(model: Any, t: int) -> list[str]:
+    """What tendon `t` of a compiled file does to its joints and bodies; empty where it only measures."""
+    fields = {"stiffness": "pull as springs", "damping": "damp", "frictionloss": "rub", "armature": "add inertia"}
+    found = [words for field, words in fields.items() if np.any(getattr(model, f"tendon_{field}")[t])]
+    if model.tendon_limited[t]:
+        found.append("limit a length")
+    drives = np.asarray(model.actuator_trntype) == int(mujoco.mjtTrn.mjTRN_TENDON)
+    if np.any(drives & (np.asarray(model.actuator_trnid)[:, 0] == t)):
+        found.append("carry the force of drives")
+    ties = np.asarray(model.eq_type) == int(mujoco.mjtEq.mjEQ_TENDON)
+    if np.any(ties & ((np.asarray(model.eq_obj1id) == t) | (np.asarray(model.eq_obj2id) == t))):
+        found.append("are tied to a length")
+    return found
 
 
 # ------------------------------------------------------------------ fields that are read in part
