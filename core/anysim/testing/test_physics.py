@@ -9,7 +9,7 @@ import pytest
 
 from anysim.engine.capability import Capability as C
 from anysim.math import pose as P
-from anysim.model.world import Box, Capsule, ControlMode, Cylinder, Sphere, Surface
+from anysim.model.world import Actuation, Box, Capsule, ControlMode, Cylinder, Sphere, Surface
 from anysim.testing import tolerances, worlds
 from anysim.testing.compare import assert_close, assert_ratio
 from anysim.testing.fixtures import needs
@@ -160,6 +160,16 @@ def test_a_spring_pulls_beside_the_drive(build, limit):
         wanted = rest + limit / stiffness
     assert_close(state.joint_pos[0, 0], wanted, tolerances.AT_REST, "position at rest")
     assert_close(state.joint_effort[0, 0], stiffness * (wanted - rest), tolerances.AT_REST * kp, "effort of the drive")
+
+
+@needs(C.JOINT_SPRINGS, C.CONTROL_EFFORT, C.ACTUATION_NATIVE)
+def test_a_spring_pulls_under_native_actuation(build):
+    """It is no part of a drive, whoever computes that: 3 N hold it 3 / k from its rest."""
+    world = worlds.slider(stiffness=50.0, spring_rest=-0.1, damping=20.0)
+    engine = build(worlds.actuated(world, Actuation.NATIVE))
+    engine.set_control(effort=3.0)
+    engine.step(3000)
+    assert_close(engine.get_state().joint_pos[0, 0], -0.1 + 3.0 / 50.0, tolerances.AT_REST, "position at rest")
 
 
 def test_double_pendulum_keeps_its_energy(build):

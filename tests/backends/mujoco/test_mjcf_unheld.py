@@ -48,7 +48,11 @@ def test_a_plain_file_has_no_notes(load: Callable[..., ImportedModel]) -> None:
         ("option", 'gravity="0 0 -1"', "option gravity: 0 0 -1 is left out: the world's `physics` has it"),
         ("option", 'timestep="0.01"', "option timestep: 0.01 is left out: the world's `physics` has it"),
         ("option", 'o_margin="0.1"', "option o_margin: 0.1 is left out"),
-        ("flag", '<flag gravity="disable" contact="disable"/>', "option flag disable: contact, gravity: is left out"),
+        (
+            "flag",
+            '<flag gravity="disable" contact="disable"/>',
+            "disable: contact, gravity: is left out: the world's `physics` has gravity, the",
+        ),
         ("flag", '<flag filterparent="disable"/>', "option flag disable: filterparent"),
         ("flag", '<flag override="enable"/>', "option flag enable: override"),
         ("rest", '<contact><pair name="p" geom1="trunk" geom2="fist"/></contact>', "pairs: are left out"),

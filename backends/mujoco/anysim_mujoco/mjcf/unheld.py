@@ -123,7 +123,8 @@ def _options(spec: mujoco.MjSpec) -> Iterator[ImportNote]:
             kind = mujoco.mjtDisableBit if field == "disableflags" else mujoco.mjtEnableBit
             named = {name.partition("_")[2].lower(): int(bit) for name, bit in kind.__members__.items() if "_" in name}
             flags = ", ".join(name for name, bit in named.items() if value & bit)
-            yield ImportNote("dropped", f"option flag {field[:-5]}", f"{flags}: is left out, they are MuJoCo's alone")
+            why = "the world's `physics` has gravity, the others" if "gravity" in flags else "they"
+            yield ImportNote("dropped", f"option flag {field[:-5]}", f"{flags}: is left out: {why} are MuJoCo's alone")
         else:
             yield ImportNote("dropped", f"option {field}", _left_out("option", field, value))
 
