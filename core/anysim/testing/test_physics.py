@@ -151,7 +151,7 @@ def test_a_spring_swings_about_its_rest(build):
 def test_a_spring_pulls_beside_the_drive(build, limit):
     """At rest kp (q* - q) = k (q - q0), or the effort limit, which bounds the drive and not the spring."""
     kp, stiffness, rest = 100.0, 50.0, -0.1
-    joint = {"stiffness": stiffness, "spring_rest": rest, "damping": 20.0}
+    joint: dict[str, Any] = {"stiffness": stiffness, "spring_rest": rest, "damping": 20.0}
     engine = build(worlds.slider(ControlMode.POSITION, kp, 30.0, limit, **joint))
     engine.set_control(position=0.2)
     engine.step(3000)

@@ -44,8 +44,8 @@ WHOLE = """<mujoco><compiler angle="radian"/><asset>
   ctrlrange="-2 2"/></actuator>
 <keyframe><key name="home" qpos="0.2 0.2"/></keyframe></mujoco>"""
 """A model with the attributes that the table reads."""
-VALUES = dict(
-    pair.strip().split(": ")
+VALUES = {
+    key.strip(): value.strip()
     for pair in """
 type: slide; inertia: shell; material: blue; mesh: block; hfield: dale; quat: 1 1 0 0; refquat: 1 1 0 0;
 axisangle: 0 1 1 1; euler: 1 1 0.1; contype: 0; conaffinity: 2; condim: 4; priority: 2; limited: false;
@@ -53,7 +53,8 @@ actuatorfrclimited: false; forcelimited: false; ctrllimited: false; active: fals
 joint2: grip; joint: hand; gaintype: affine; biastype: none; dyntype: integrator; shellinertia: true; axis: 0 1 0;
 pos: 0.1 0.2 0.3; refpos: 0.1 0.2 0.3; fromto: 0 0 0 0 1 1; stiffness: 3; polycoef: 0.1 2 0 0 0; ref: 0.3;
 nrow: 4; ncol: 1; elevation: 1 0 0 0.5; angle: degree; solreflimit: 0.06 1""".split(";")
-)
+    for key, value in [pair.split(":")]
+}
 """Other values than those of the model; numbers are scaled where there is none."""
 ALIKE = {("geom", "conaffinity"), ("mesh", "face"), ("site", "type")}
 """What has no effect on this model: masks that let no other pair pass, faces of a hull, looks of a frame."""

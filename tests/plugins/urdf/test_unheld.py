@@ -126,12 +126,13 @@ WHOLE = """<robot name="r"><material name="red"><color rgba="1 0 0 1"/></materia
 <joint name="k" type="revolute"><parent link="a"/><child link="c"/><limit lower="-4" upper="4" effort="1" velocity="1"/>
   <mimic joint="j" multiplier="2" offset="0.5"/></joint></robot>"""
 """A robot with every element and attribute that the table does not leave out."""
-OTHERWISE = dict(
-    pair.strip().split(": ")
+OTHERWISE = {
+    key.strip(): value.strip()
     for pair in """
 xyz: 0 1 0; rpy: 0.2 0.1 0; size: 2 2 2; scale: 2 2 2; rgba: 0 0 1 1; type: prismatic; link: c;
 filename: other.obj; joint: k; name: own""".split(";")
-)
+    for key, value in [pair.split(":")]
+}
 READ = [
     (row.path, key) for row in ROWS for key in row.attributes.split() if row.fate in (Fate.EXACT, Fate.APPROXIMATED)
 ]
