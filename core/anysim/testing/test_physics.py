@@ -164,7 +164,7 @@ def test_a_spring_pulls_beside_the_drive(build, limit):
 
 @needs(C.JOINT_SPRINGS, C.CONTROL_EFFORT, C.ACTUATION_NATIVE)
 def test_a_spring_pulls_under_native_actuation(build):
-    """It is no part of a drive, whoever computes that: 3 N hold it 3 / k from its rest."""
+    """It is no part of a drive, nor of one that the engine computes: 3 N hold it 3 / k from its rest."""
     world = worlds.slider(stiffness=50.0, spring_rest=-0.1, damping=20.0)
     engine = build(worlds.actuated(world, Actuation.NATIVE))
     engine.set_control(effort=3.0)
