@@ -164,6 +164,7 @@ check-tables:
 	$(BIN)/python scripts/term_table.py --check
 	$(BIN)/python scripts/command_table.py --check
 	$(BIN)/python scripts/limits_table.py --check
+	$(BIN)/python scripts/importing_table.py --check
 	$(BIN)/python scripts/matter_table.py --check
 	$(BIN)/python scripts/robot_table.py --check
 	$(BIN)/python scripts/benchmark_table.py --check
@@ -194,6 +195,7 @@ docs: schema $(TEST)  ## write what is generated and run the examples of docs/
 	$(BIN)/python scripts/term_table.py
 	$(BIN)/python scripts/command_table.py
 	$(BIN)/python scripts/limits_table.py
+	$(BIN)/python scripts/importing_table.py
 	$(BIN)/python scripts/matter_table.py
 	$(BIN)/python scripts/robot_table.py
 	$(BIN)/python -m pytest tests/docs $(ARGS)
