@@ -29,6 +29,7 @@ CLAIMED = {
     Capability.SHAPE_MESH: ("ClaimsMeshes", "CentredMesh"),
     Capability.MIMIC_JOINTS: ("ClaimsMimics", "MimicsStayBehind"),
     Capability.JOINT_FRICTION: ("ClaimsJointFriction",),
+    Capability.JOINT_SPRINGS: ("ClaimsJointSprings", "SpringsToZero"),
     Capability.ARMATURE: ("StoredArmature", "NoArmature"),
     Capability.JOINT_LIMITS: ("ClaimsJointLimits",),
     Capability.EFFORT_LIMITS: ("NoEffortLimit", "StoredLimits"),

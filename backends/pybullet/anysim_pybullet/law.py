@@ -1,7 +1,7 @@
 """The drives of all envs: which articulations need the computed law, and how Bullet is given what it says.
 
-See `anysim_mechanics.computed_drives` for the law. An articulation without drives, damping, armature, compensated
-gravity or a wrench is left to Bullet alone.
+See `anysim_mechanics.computed_drives` for the law. An articulation without drives, damping, springs, armature,
+compensated gravity or a wrench is left to Bullet alone.
 """
 
 from typing import Any, NamedTuple
@@ -21,8 +21,8 @@ from anysim_pybullet.client import Env
 from anysim_pybullet.lift import Lifter
 from anysim_pybullet.motors import Motors
 
-_ONLY_COUPLED = np.array([0, 0, 0, 0, 1, 0, 1, 0, 1, 0], dtype=float)
-"""Takes everything away from the drive of a joint that a motor moves, but limits and its multiplier."""
+_ONLY_COUPLED = np.array([0, 0, 0, 0, 1, 0, 1, 0, 1, 0, 1, 1], dtype=float)
+"""Takes everything away from the drive of a joint that a motor moves, but limits, its multiplier and its spring."""
 
 
 class Laws(DriveArrays):
