@@ -24,6 +24,7 @@ WORDS = {
     "all": "everything below",
     "agents": "`anysim mcp`: tools with which language models observe, command and write worlds",
     "annotation": "`anysim render --annotate` and jobs of stills: boxes, maps, depth, normals, points, flow",
+    "app": "`anysim app`: a local page of tasks, runs and videos, from which views and runs are started",
     "assets": "cabinets, lids, valves, wheeled bases, a gripper, a flying camera, rooms, ground, patterns",
     "avatars": "people who walk, sit, talk, look and reach",
     "banks": "`anysim bank`: grasps sampled on assets and tried in physics",

@@ -58,6 +58,7 @@ _OFFERS: Mapping[str, Mapping[str, str]] = {
         "renderings": "annotations stills",
         "streams": "annotations",
     },
+    "anysim-app": {"commands": "app"},
     "anysim-assets": {
         "assets": "cabinet hinge_box mug parallel_gripper valve",
         "rooms": "furnished",

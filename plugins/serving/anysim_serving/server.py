@@ -30,9 +30,15 @@ class Service:
     """
 
     def __init__(
-        self, catalogue: Catalogue, settings: Settings, make: Callable[[Catalogue, Settings], Any] | None = None
+        self,
+        catalogue: Catalogue,
+        settings: Settings,
+        make: Callable[[Catalogue, Settings], Any] | None = None,
+        door: Callable[[Any, Settings], Any] | None = None,
     ) -> None:
-        """Take the port; nothing is answered yet. `make` makes an application in place of that of `anysim serve`.
+        """Take the port; nothing is answered yet.
+
+        `make` makes an application in place of that of `anysim serve`, and `door` what stands before its gate.
 
         Raises:
             TaskError: the address or the port cannot be had.
@@ -52,8 +58,9 @@ class Service:
             def capture_signals(self) -> Iterator[None]:
                 yield  # `run` has them, and a thread cannot have any
 
+        gate = Gate(self.app, self.settings)
         config = Config(
-            Gate(self.app, self.settings),
+            gate if door is None else door(gate, self.settings),
             ws="websockets-sansio",
             ws_max_size=settings.limits.message_bytes,
             ws_per_message_deflate=False,
