@@ -14,6 +14,7 @@ LEROBOT := .venv-lerobot/installed
 ROBOMIMIC := .venv-lerobot/with-robomimic
 RLDS := .venv-rlds/installed
 STRANDS := .venv-strands/installed
+OPENENV := .venv-openenv/installed
 RERUN := .venv-rerun/installed
 NODE := .node-mcap/installed
 
@@ -34,7 +35,7 @@ $(BIN)/python -c 'import sysconfig; print("import site; site.addsitedir(%r)" % s
 endef
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test test-slow test-full test-learning test-maniskill test-lerobot test-robomimic test-rlds test-strands test-rerun test-viewers check format lock schema docs site bench wheels clean
+.PHONY: help venv demo test test-slow test-full test-learning test-maniskill test-lerobot test-robomimic test-rlds test-strands test-openenv test-rerun test-viewers check format lock schema docs site bench wheels clean
 
 help:  ## list the targets
 	@echo "make TARGET, where TARGET is one of"
@@ -131,6 +132,14 @@ $(STRANDS): $(TEST) plugins/adapters/pyproject.toml
 	.venv-strands/bin/python scripts/older_generics.py strands_robots
 	@touch $@
 
+test-openenv: $(OPENENV)  ## run the checks with OpenEnv's own client, in an environment with it
+	.venv-openenv/bin/python -m pytest -n 0 tests/plugins/adapters/test_openenv.py $(ARGS)
+
+$(OPENENV): $(TEST) plugins/adapters/pyproject.toml
+	$(call beside,.venv-openenv)
+	.venv-openenv/bin/python -m pip install --quiet openenv==0.10.0
+	@touch $@
+
 test-rerun: $(RERUN)  ## run the checks with Rerun's own reader, in an environment with rerun-sdk
 	.venv-rerun/bin/python -m pytest -n 0 -s tests/plugins/export/test_rerun.py $(ARGS)
 
@@ -218,5 +227,5 @@ wheels: $(STAMP)  ## build the wheels of all packages into dist/ (docs/install.m
 	@ls dist
 
 clean:  ## remove .venv, caches, wheels and the demo's output; other recordings stay
-	rm -rf .venv .venv-tools .venv-torch .venv-lerobot .venv-rlds .venv-strands .venv-rerun .node-mcap .cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache build dist runs/demo
+	rm -rf .venv .venv-tools .venv-torch .venv-lerobot .venv-rlds .venv-strands .venv-openenv .venv-rerun .node-mcap .cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache build dist runs/demo
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
