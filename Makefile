@@ -90,8 +90,9 @@ $(PEERS): $(TEST) plugins/maniskill/pyproject.toml plugins/evaluation/pyproject.
 	.venv-peers/bin/python -m pip install --quiet termcolor opencv-python-headless
 	@touch $@
 
-test-lerobot: $(LEROBOT)  ## run the checks against LeRobot's own loader, in an environment with torch
-	.venv-lerobot/bin/python -m pytest -n 0 -s tests/plugins/export/test_lerobot_loader.py $(ARGS)
+test-lerobot: $(LEROBOT)  ## run the checks with LeRobot's own loader and evaluation, in an environment with torch
+	.venv-lerobot/bin/python -m pytest -n 0 -s tests/plugins/export/test_lerobot_loader.py \
+	  tests/plugins/adapters/test_lerobot_env.py $(ARGS)
 
 # lerobot without its dependencies: they pin an older torch, numpy and PyAV, bring viewers, and its loader does without.
 # torchvision is the last one whose reader of videos lerobot 0.4 finds.

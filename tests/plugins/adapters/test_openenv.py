@@ -67,9 +67,14 @@ def test_an_episode_is_that_of_a_local_env(socket: Any) -> None:
     assert again["type"] == "error"
     assert "send reset first" in again["data"]["message"]
     assert ask(socket, "reset")["type"] == "observation"
+    state = ask(socket, "state")["data"]
+    assert (state["episode_id"], state["step_count"]) == (None, 0)
+    assert ask(socket, "step", action=action.tolist())["type"] == "observation"
+    assert ask(socket, "state")["data"]["step_count"] == 1
 
 
 def test_what_is_wrong_is_said_and_the_session_goes_on(socket: Any) -> None:
+    assert ask(socket, "state")["data"]["step_count"] == 0
     ask(socket, "reset", seed=1)
     for message, code in (
         ("{", "INVALID_JSON"),

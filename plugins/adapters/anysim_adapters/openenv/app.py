@@ -135,7 +135,7 @@ class Episode:
 
     def __init__(self) -> None:
         self._name: str | None = None
-        self._ended = True
+        self._begun, self._ended = False, True
 
     def reset(self, env: TaskEnv, data: dict[str, Any]) -> dict[str, Any]:
         """Begin an episode; `seed` makes it that one."""
@@ -146,7 +146,7 @@ class Episode:
         if name is not None and not (isinstance(name, str) and len(name) <= 200):
             raise TaskError("episode_id is a text of at most 200 letters")
         env.reset(seed=None if seed is None else [whole("seed", seed, TaskError)])
-        self._name, self._ended = name, False
+        self._name, self._begun, self._ended = name, True, False
         return {"observation": _observation(env), "reward": None, "done": False, "metadata": _told(env)}
 
     def step(self, env: TaskEnv, data: dict[str, Any]) -> dict[str, Any]:
@@ -171,7 +171,7 @@ class Episode:
         low, high = env.action_bounds
         return {
             "episode_id": self._name,
-            "step_count": 0 if self._ended and self._name is None else int(env.info["elapsed_steps"][0]),
+            "step_count": int(env.info["elapsed_steps"][0]) if self._begun else 0,
             "task": env.name,
             "status": str(env.status[0]),
             "action": {"names": list(env.action_spaces.labels), "low": low, "high": high},
