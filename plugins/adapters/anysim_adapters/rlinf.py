@@ -14,7 +14,7 @@ from anysim.task.env import TaskEnv
 PRIVILEGED = "privileged"
 
 
-class Stepped(NamedTuple):
+class SingleStep(NamedTuple):
     """Results of one step: observations, rewards, ends (N,), and infos."""
 
     obs: dict[str, Any]
@@ -85,7 +85,7 @@ class ChunkEnv:
         self._waiting[mask], self._returns[mask] = False, 0.0
         return self._seen(), self._infos()
 
-    def step(self, actions: Any, auto_reset: bool = True) -> Stepped:
+    def step(self, actions: Any, auto_reset: bool = True) -> SingleStep:
         """One control step of all envs that have not ended, by actions (N, A)."""
         given = numbers("actions", actions, TaskError)
         if given.shape != (self.num_envs, self.env.action_dim):
@@ -106,7 +106,7 @@ class ChunkEnv:
             truncations, terminations = truncations | terminations, np.zeros_like(terminations)
         if auto_reset and self.auto_reset and done.any():
             obs, infos = self._next(done, obs, infos)
-        return Stepped(obs, rewards, terminations, truncations, infos)
+        return SingleStep(obs, rewards, terminations, truncations, infos)
 
     def chunk_step(self, chunk_actions: Any) -> Chunk:
         """K control steps of all envs, by actions (N, K, A)."""

@@ -1,4 +1,4 @@
-"""What strands-robots says of objects and robots in the words of a world, without strands-robots."""
+"""Objects and robots of strands-robots in the words of a world, without strands-robots."""
 
 from pathlib import Path
 from typing import Any
@@ -26,8 +26,11 @@ def test_sizes_are_full_extents() -> None:
     assert made("cylinder", [0.1, 9, 0.4])["source"] == {"cylinder": [0.05, 0.4]}
     assert made("capsule", [0.1, 9, 0.4])["source"] == {"capsule": [0.05, 0.4]}
     assert made("box", is_static=True, color=[1, 0, 0, 1]) == {
-        "source": {"box": [0.05, 0.05, 0.05]}, "fixed": True, "mass": 0.1, "color": [1, 0, 0],
-    }  # fmt: skip
+        "source": {"box": [0.05, 0.05, 0.05]},
+        "fixed": True,
+        "mass": 0.1,
+        "color": [1, 0, 0],
+    }
 
 
 @pytest.mark.parametrize(

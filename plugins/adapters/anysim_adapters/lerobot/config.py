@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any
 
+import gymnasium as gym
 from lerobot.configs.types import FeatureType, PolicyFeature  # pyright: ignore[reportMissingImports]
 from lerobot.envs.configs import EnvConfig  # pyright: ignore[reportMissingImports]
 from lerobot.utils.constants import ACTION, OBS_IMAGES, OBS_STATE  # pyright: ignore[reportMissingImports]
@@ -10,6 +11,17 @@ from lerobot.utils.constants import ACTION, OBS_IMAGES, OBS_STATE  # pyright: ig
 from anysim_adapters.lerobot_env import GROUP, IMAGES, task_env
 
 GYM_ID = "anysim/LeRobot-v0"
+
+
+def register() -> None:
+    """Let gymnasium know the env, without its own wrappers, through which LeRobot does not find the instruction."""
+    if GYM_ID not in gym.registry:
+        gym.register(
+            id=GYM_ID,
+            entry_point="anysim_adapters.lerobot_env:LeRobotEnv",
+            order_enforce=False,
+            disable_env_checker=True,
+        )
 
 
 @EnvConfig.register_subclass("anysim")
@@ -24,6 +36,7 @@ class AnysimEnv(EnvConfig):
 
     def __post_init__(self) -> None:
         """Build the task once, to say what it shows and how often it acts."""
+        register()
         if self.features and self.fps:
             return
         with task_env(**self.gym_kwargs) as env:

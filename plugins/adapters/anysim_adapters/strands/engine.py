@@ -407,9 +407,15 @@ class AnysimSimulation(SimEngine):
         if seed is not None:
             self._rng = np.random.default_rng(whole("seed", seed, EngineError))
         ranges = Ranges(
-            randomize_colors, randomize_lighting, randomize_physics, randomize_positions,
-            position_noise, color_range, friction_range, mass_range,
-        )  # fmt: skip
+            randomize_colors,
+            randomize_lighting,
+            randomize_physics,
+            randomize_positions,
+            position_noise,
+            color_range,
+            friction_range,
+            mass_range,
+        )
         with self._lock:
             done = randomize(self._open.engine, ranges, self._rng)
         return success(f"randomized: {listing(done) or 'nothing'}", {"randomized": done})
