@@ -16,6 +16,7 @@ RLDS := .venv-rlds/installed
 STRANDS := .venv-strands/installed
 OPENENV := .venv-openenv/installed
 RERUN := .venv-rerun/installed
+MCPOLD := .venv-mcp-old/installed
 NODE := .node-mcap/installed
 
 # The demo: a scripted robot picks cubes in four worlds at once, records it, and a picture shows what happened. Then
@@ -35,7 +36,7 @@ $(BIN)/python -c 'import sysconfig; print("import site; site.addsitedir(%r)" % s
 endef
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test test-slow test-full test-learning test-maniskill test-lerobot test-robomimic test-rlds test-strands test-openenv test-rerun test-viewers check format lock schema docs site bench wheels clean
+.PHONY: help venv demo test test-slow test-full test-learning test-maniskill test-lerobot test-robomimic test-rlds test-strands test-openenv test-rerun test-viewers test-mcp-old check format lock schema docs site bench wheels clean
 
 help:  ## list the targets
 	@echo "make TARGET, where TARGET is one of"
@@ -155,6 +156,14 @@ test-viewers: $(RERUN) $(NODE)  ## open recordings and their export with the MCA
 $(NODE):
 	npm install --prefix .node-mcap --silent --no-fund --no-audit --ignore-scripts \
 	  @mcap/core@2.2.2 @mcap/nodejs@1.0.2 @mcap/support@1.1.0
+	@touch $@
+
+test-mcp-old: $(MCPOLD)  ## run the checks of the agents' server with version 1 of the protocol's SDK
+	.venv-mcp-old/bin/python -m pytest -n 0 tests/plugins/agents/test_mcp_1.py $(ARGS)
+
+$(MCPOLD): $(TEST)
+	$(call beside,.venv-mcp-old)
+	.venv-mcp-old/bin/python -m pip install --quiet "mcp>=1.30,<2"
 	@touch $@
 
 CHECKS := check-lint check-format check-style check-layers check-schema check-tables check-types check-site

@@ -103,7 +103,7 @@ class TreeDrives:
         self.wrench = np.zeros((n + 1, 6)) if wrench is None else wrench[tree.bodies]
         self.motion, self.root, out = np.zeros((2, n)), np.zeros(13), np.zeros(2 * n + 6)
         self.root[:7] = arrays.roots[env, tree.bodies[0]]
-        self.torque, self.effort, self.base = np.split(out, [n, 2 * n])
+        self.torque, self.effort, self.base = out[:n], out[n : 2 * n], out[2 * n :]
         self.lift = -bodies[0, K.MASS] * bodies[0, K.COMPENSATED] * gravity
         constants = dt, arrays.implicit, tree.joint_ints, tree.joint_floats, bodies, arrays.acting[env, tree.joints]
         state = self.wrench, gravity, self.root, self.motion, tree.first, arrays.remembered(env, tree.number)

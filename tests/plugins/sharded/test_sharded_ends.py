@@ -43,10 +43,7 @@ STEP_FOR_EVER = """
 WAIT = """
     sys.stdin.read()
 """
-WAYS = [
-    pytest.param(STEP_FOR_EVER, id="stepping"),
-    pytest.param(WAIT, id="waiting", marks=pytest.mark.slow),
-]
+WAYS = [pytest.param(STEP_FOR_EVER, id="stepping"), pytest.param(WAIT, id="waiting", marks=pytest.mark.slow)]
 
 
 def _start(tmp_path, more, **options):
@@ -91,8 +88,7 @@ def shared_memory():
 
 
 @pytest.mark.parametrize(
-    "ending",
-    ["", *(pytest.param(words, marks=pytest.mark.slow) for words in ("env.close()", "raise SystemExit(0)"))],
+    "ending", ["", *(pytest.param(words, marks=pytest.mark.slow) for words in ("env.close()", "raise SystemExit(0)"))]
 )
 def test_a_plain_script(tmp_path, shared_memory, ending):
     """Without a guard for the main module, and without closing: it runs once, says nothing, and leaves nothing."""
