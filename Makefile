@@ -13,6 +13,8 @@ PEERS := .venv-peers/installed
 LEROBOT := .venv-lerobot/installed
 ROBOMIMIC := .venv-lerobot/with-robomimic
 RLDS := .venv-rlds/installed
+STRANDS := .venv-strands/installed
+OPENENV := .venv-openenv/installed
 RERUN := .venv-rerun/installed
 MCPOLD := .venv-mcp-old/installed
 NODE := .node-mcap/installed
@@ -34,7 +36,7 @@ $(BIN)/python -c 'import sysconfig; print("import site; site.addsitedir(%r)" % s
 endef
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test test-slow test-full test-learning test-maniskill test-lerobot test-robomimic test-rlds test-rerun test-viewers test-mcp-old check format lock schema docs site bench wheels clean
+.PHONY: help venv demo test test-slow test-full test-learning test-maniskill test-lerobot test-robomimic test-rlds test-strands test-openenv test-rerun test-viewers test-mcp-old check format lock schema docs site bench wheels clean
 
 help:  ## list the targets
 	@echo "make TARGET, where TARGET is one of"
@@ -89,8 +91,9 @@ $(PEERS): $(TEST) plugins/maniskill/pyproject.toml plugins/evaluation/pyproject.
 	.venv-peers/bin/python -m pip install --quiet termcolor opencv-python-headless
 	@touch $@
 
-test-lerobot: $(LEROBOT)  ## run the checks against LeRobot's own loader, in an environment with torch
-	.venv-lerobot/bin/python -m pytest -n 0 -s tests/plugins/export/test_lerobot_loader.py $(ARGS)
+test-lerobot: $(LEROBOT)  ## run the checks with LeRobot's own loader and evaluation, in an environment with torch
+	.venv-lerobot/bin/python -m pytest -n 0 -s tests/plugins/export/test_lerobot_loader.py \
+	  tests/plugins/adapters/test_lerobot_env.py $(ARGS)
 
 # lerobot without its dependencies: they pin an older torch, numpy and PyAV, bring viewers, and its loader does without.
 # torchvision is the last one whose reader of videos lerobot 0.4 finds.
@@ -117,6 +120,26 @@ test-rlds: $(RLDS)  ## run the checks against TFDS's own builder and reader, in 
 $(RLDS): $(TEST)
 	$(call beside,.venv-rlds)
 	.venv-rlds/bin/python -m pip install --quiet tensorflow-cpu tensorflow-datasets
+	@touch $@
+
+test-strands: $(STRANDS)  ## run the checks under strands-robots' own runner and benchmarks, in an environment with it
+	.venv-strands/bin/python -m pytest -n 0 tests/plugins/adapters/test_strands.py $(ARGS)
+
+# strands-robots without its dependencies, which pin an older Pillow and OpenCV. It asks for Python 3.12; on 3.11 its few
+# generic functions are rewritten, and all else is as it was released.
+$(STRANDS): $(TEST) plugins/adapters/pyproject.toml
+	$(call beside,.venv-strands)
+	.venv-strands/bin/python -m pip install --quiet "strands-agents>=1.57.2,<2"
+	.venv-strands/bin/python -m pip install --quiet --no-deps --ignore-requires-python strands-robots==0.5.3
+	.venv-strands/bin/python scripts/older_generics.py strands_robots
+	@touch $@
+
+test-openenv: $(OPENENV)  ## run the checks with OpenEnv's own client, in an environment with it
+	.venv-openenv/bin/python -m pytest -n 0 tests/plugins/adapters/test_openenv.py $(ARGS)
+
+$(OPENENV): $(TEST) plugins/adapters/pyproject.toml
+	$(call beside,.venv-openenv)
+	.venv-openenv/bin/python -m pip install --quiet openenv==0.10.0
 	@touch $@
 
 test-rerun: $(RERUN)  ## run the checks with Rerun's own reader, in an environment with rerun-sdk
@@ -216,5 +239,5 @@ wheels: $(STAMP)  ## build the wheels of all packages into dist/ (docs/install.m
 	@ls dist
 
 clean:  ## remove .venv, caches, wheels and the demo's output; other recordings stay
-	rm -rf .venv .venv-tools .venv-torch .venv-lerobot .venv-rlds .venv-rerun .node-mcap .cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache build dist runs/demo
+	rm -rf .venv .venv-tools .venv-torch .venv-lerobot .venv-rlds .venv-strands .venv-openenv .venv-rerun .node-mcap .cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache build dist runs/demo
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -75,6 +75,22 @@ def test_adding_and_removing_an_object_is_the_identity(scene: World) -> None:
     assert without_entity(more, "ball").hash == scene.hash
 
 
+def test_a_robot_may_stand_in_any_orientation(scene: World) -> None:
+    turn = (0.5, 0.5, 0.5, 0.5)
+    given = with_robot(scene, "wall_arm", "franka_panda", {"position": [0, 2, 1], "quaternion": turn})
+    said = with_robot(scene, "wall_arm", "franka_panda", {"position": [0, 2, 1], "roll": np.pi / 2, "yaw": np.pi / 2})
+    upright = with_robot(scene, "wall_arm", "franka_panda", {"position": [0, 2, 1]})
+    for made in (given, said):
+        root = made.bodies[made.entities[-1].body_start]
+        assert root.position == (0, 2, 1)
+        assert np.allclose(root.quaternion, turn)
+        assert made.bodies[made.entities[-1].body_start + 1 :] == upright.bodies[upright.entities[-1].body_start + 1 :]
+    with pytest.raises(SpecError, match=r"robots\.x\.quaternion: give either"):
+        with_robot(scene, "x", "franka_panda", {"quaternion": turn, "yaw": 1.0})
+    with pytest.raises(SpecError, match=r"robots\.x\.roll: expected a finite number"):
+        with_robot(scene, "x", "franka_panda", {"roll": "flat"})
+
+
 def test_adding_and_removing_a_robot_is_the_identity(scene: World) -> None:
     more = with_robot(scene, "third", "franka_panda", {"position": [0, 2, 0], "yaw": 0.5})
     assert [r.name for r in more.robots] == ["left", "right", "third"]

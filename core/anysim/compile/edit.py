@@ -25,7 +25,8 @@ from anysim_schemas.objects import ObjectSpec
 from anysim_schemas.robots import RobotSpec
 
 S = TypeVar("S", bound=Spec)
-_PLACE = ("position", "roll", "pitch", "yaw", "quaternion")
+_TURN = ("roll", "pitch", "yaw", "quaternion")
+_PLACE = ("position", *_TURN)
 
 
 def with_object(world: World, name: str, spec: Mapping[str, Any]) -> World:
@@ -47,7 +48,7 @@ def with_object(world: World, name: str, spec: Mapping[str, Any]) -> World:
 
 
 def with_robot(world: World, name: str, robot: str, placement: Mapping[str, Any]) -> World:
-    """With one more robot of the catalogue: `placement` has fields of a `robots` entry, such as `position` and `yaw`.
+    """With one more robot: `placement` has fields of a `robots` entry; `roll`, `pitch`, or a `quaternion` turn it too.
 
     Raises:
         SpecError: the name is taken, the robot unknown, or a field unknown or wrong.
@@ -55,9 +56,17 @@ def with_robot(world: World, name: str, robot: str, placement: Mapping[str, Any]
     path = f"robots.{name}"
     _free_name(world, name, path)
     builder, issues = WorldBuilder(world), Issues(path)
-    parsed = _parse(RobotSpec, {"robot": robot, **placement}, path)
+    tilted = any(key in placement for key in _TURN if key != "yaw")
+    fields = {key: value for key, value in placement.items() if not (tilted and key in _TURN)}
+    parsed = _parse(RobotSpec, {"robot": robot, **fields}, path, extra=_TURN)
     add_robot(builder, name, parsed, issues)
     issues.raise_if_any()
+    if tilted:
+        root, (_, turn) = (
+            builder.entities[-1].body_start,
+            _place({k: placement[k] for k in _TURN if k in placement}, path),
+        )
+        builder.bodies[root] = replace(builder.bodies[root], quaternion=turn)
     made = with_dynamics(builder.build(), {name: parsed}, (about := Issues("robots")))
     about.raise_if_any()
     return made

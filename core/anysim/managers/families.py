@@ -132,8 +132,7 @@ class FamilyManager(Manager):
 
     def points(self, name: str) -> Callable[[Array], FamilyState] | None:
         """What gives the state of a family of matter in some envs; None where the name is of no such family."""
-        family = self._families.get(name)
-        return family.state if family is not None and family.drawn else None
+        return self._families[name].state if name in self._drawn else None
 
     def facts(self, env: int) -> dict[str, Mapping[str, object]]:
         """What the families of an env say of their entities, by entity."""

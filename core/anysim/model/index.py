@@ -42,7 +42,6 @@ class Index:
         self._sites = {s.name: i for i, s in enumerate(world.sites)}
         self._actuators = {a.name: i for i, a in enumerate(world.actuators)}
         self._cameras = {c.name: i for i, c in enumerate(world.cameras)}
-        self._sensors = {s.name: i for i, s in enumerate(world.contact_sensors)}
         self._entities = {e.name: i for i, e in enumerate(world.entities)}
         self._robots = {r.name: r for r in world.robots}
 
@@ -74,9 +73,6 @@ class Index:
 
     def camera(self, name: str) -> int:
         return self._find("camera", self._cameras, name)
-
-    def contact_sensor(self, name: str) -> int:
-        return self._find("contact sensor", self._sensors, name)
 
     def entity(self, name: str) -> Entity:
         """An entity by name; what can be several things is none, but each of these is (`mug~1`)."""

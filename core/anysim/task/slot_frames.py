@@ -138,11 +138,8 @@ class Points:
     """The points of a family's matter as a Follower has things; their axes are the world's."""
 
     def __init__(self, scene: "SceneView", state: Callable[[Array], FamilyState], name: str) -> None:
-        self._state, self._scene = state, scene
+        self._now = lambda: state(scene.env_ids)
         self.names = tuple(f"{name}.{i}" for i in range(self._now().points.shape[1]))
-
-    def _now(self) -> FamilyState:
-        return self._state(self._scene.env_ids)
 
     @property
     def present(self) -> Array:
@@ -153,21 +150,20 @@ class Points:
     @property
     def poses(self) -> Array:
         """(n, K, 7) in the world frame."""
-        here = np.broadcast_to(_HERE, (len(self._scene.env_ids), len(self.names), 7))
-        return np.concatenate([np.where(self.present[..., None], self._now().points, 0.0), here[..., 3:]], axis=-1)
+        return self._beside(self._now().points, _HERE[3:])
 
     @property
     def twists(self) -> Array:
         """(n, K, 6) [m/s]: velocities, and no rates."""
-        moving = np.where(self.present[..., None], self._now().velocities, 0.0)
-        return np.concatenate([moving, np.zeros_like(moving)], axis=-1)
+        return self._beside(self._now().velocities, np.zeros(3))
+
+    def _beside(self, rows: Array, same: Array) -> Array:
+        there = np.where(self.present[..., None], rows, 0.0)
+        return np.concatenate([there, np.broadcast_to(same, (*rows.shape[:2], len(same)))], axis=-1)
 
 
 class CategoryView:
-    """All instances of a category or an instancer, or all particles of a family; K is the same in every env.
-
-    In YAML: its name.
-    """
+    """All instances of a category or instancer, or particles of a family; K is one for all envs. In YAML: its name."""
 
     reference_kind = "category"
 

@@ -1,0 +1,1 @@
+"""Adapters by which clients of other projects attach to anysim unchanged."""

@@ -1,0 +1,1 @@
+"""LeRobot's environments: its parser imports this package and `config`, which declares `--env.type=anysim`."""

@@ -1,0 +1,1 @@
+"""OpenEnv's protocol: envs of tasks for its clients."""

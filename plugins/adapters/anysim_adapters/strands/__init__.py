@@ -1,0 +1,1 @@
+"""Backends of strands-robots: its simulation contract on each engine of anysim."""
