@@ -60,7 +60,12 @@ class Deformable(Soft):
             f'<flexcomp name="it" type="grid" dim="3" dof="quadratic" {written}><elasticity {elastic}/>'
             f"{contact_of(values['friction'], self._step)}</flexcomp>"
         )
-        return FlexSource(xml, fixed, np.zeros(0), OPTIONS)
+        sides = {side: on_side(nodes, box, side) for side in spec.attached}
+        return FlexSource(xml, fixed, np.zeros(0), OPTIONS, sides)
+
+    def attached_sides(self) -> list[tuple[str, str]]:
+        assert isinstance(self.soft, DeformableSpec)
+        return [*self.soft.attached.items()]
 
     def mass(self, env: int) -> float:
         assert isinstance(self.soft, DeformableSpec)

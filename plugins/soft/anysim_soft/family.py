@@ -2,7 +2,7 @@
 
 import os
 from abc import abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import ClassVar
 
@@ -20,7 +20,7 @@ from anysim.model.world import Body, BodyKind
 from anysim.randomization.draw import draw_rows
 from anysim_schemas.base import Spec
 from anysim_soft.spec import MOST, SoftSpec
-from anysim_soft.subworld import FlexSource, ProxyMass, Scenery, SubWorld
+from anysim_soft.subworld import FlexSource, Joint, ProxyMass, Scenery, SubWorld
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -53,6 +53,10 @@ class Soft(CoSolver):
     def source(self, values: Mapping[str, float], pose: Array) -> FlexSource:
         """The flex with drawn parameters, its frame at a pose (7,)."""
 
+    def attached_sides(self) -> Sequence[tuple[str, str]]:
+        """Which sides of it are held by which bodies."""
+        return ()
+
     @property
     @abstractmethod
     def radius(self) -> float:
@@ -80,7 +84,7 @@ class Soft(CoSolver):
         self._at = None if setting.spec.at is None else self._root(setting.spec.at)
         self._heavier = np.ones(k)
         for name, factor in setting.spec.held.items():
-            self._heavier[self._loose(name)] = factor
+            self._heavier[self._met(name, "held", loose=True)] = factor
         self._late = self._held | (self._heavier > 1.0)
         self._gravity = np.array(world.physics.gravity, dtype=float)
         self._step = world.physics.dt / self.soft.substeps
@@ -89,14 +93,24 @@ class Soft(CoSolver):
         self.values = self.remember("values", len(self.drawn_keys))
         self.frame, self.pending = self.remember("frame", 7), self.remember("pending", k, 6)
         built = ProxyMass(np.ones(k), np.zeros((k, 3)), np.tile([1.0, 1.0, 1.0, 0.0, 0.0, 0.0], (k, 1)))
-        example = SubWorld(self.source(self._nominal(), np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])), self.scenery, built, self._step, self._gravity)
+        source = self.source(dict.fromkeys(self.drawn_keys, 0.1), np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]))
+        example = SubWorld(source, self.scenery, built, (), self._step, self._gravity)
         self.faces = example.faces
+        self._nodes = np.zeros(0, dtype=np.intp)
+        self._holders = np.zeros(0, dtype=np.intp)
+        for side, name in self.attached_sides():
+            nodes = np.flatnonzero(source.sides[side])
+            self._nodes = np.concatenate([self._nodes, nodes])
+            self._holders = np.append(self._holders, [self._met(name, "attached", loose=False)] * len(nodes))
+        self.anchors = self.remember("anchors", len(self._nodes), 3)
+        example = SubWorld(source, self.scenery, built, self._joints(self.anchors[0]), self._step, self._gravity)
         size = len(example.points())
         self.x, self.v = self.remember("x", size, 3), self.remember("v", size, 3)
         self.moved, self.state_row = self.remember("moved", 6), self.remember("state", example.state_size)
 
-    def _nominal(self) -> dict[str, float]:
-        return dict.fromkeys(self.drawn_keys, 0.1)
+    def _joints(self, anchors: Array) -> list[Joint]:
+        rows = zip(self._nodes.tolist(), self._holders.tolist(), anchors, strict=True)
+        return [Joint(node, place, anchor.copy()) for node, place, anchor in rows]
 
     def _root(self, name: str) -> int:
         """The body that is called so, or the root of the object."""
@@ -104,17 +118,17 @@ class Soft(CoSolver):
         entity = world.entity_numbers.get(name)
         return self.body(name) if entity is None else world.entities[entity].root
 
-    def _loose(self, name: str) -> int:
-        """The place in `met` of a free body, or of an object that is one."""
-        body = self._root(name)
-        place = np.flatnonzero(self.met == body)
-        if not len(place) or self._held[place[0]]:
-            free = [self.engine.world.bodies[i].name for i, held in zip(self.met, self._held, strict=True) if not held]
+    def _met(self, name: str, key: str, *, loose: bool) -> int:
+        """The place in `met` of a body, or of an object's root."""
+        body, bodies = self._root(name), self.engine.world.bodies
+        places = {int(i): place for place, i in enumerate(self.met) if not (loose and self._held[place])}
+        if body not in places:
+            kind = "free body" if loose else "body that moves and"
+            known = listing([bodies[i].name for i in places])
             raise PluginError(
-                f"world.families.{self.setting.name}.held: '{name}' is no free body that collides "
-                f"(free bodies: {listing(free)}); links of joints need no entry"
+                f"world.families.{self.setting.name}.{key}: '{name}' is no {kind} that collides (there are: {known})"
             )
-        return int(place[0])
+        return places[body]
 
     def drawn_value(self, key: str, env_ids: Array) -> Array:
         """A parameter as it is in the episodes of these envs."""
@@ -140,15 +154,21 @@ class Soft(CoSolver):
             place = pose[:, :3] + P.rotate(P.from_axis_angle(UP, heading), place)
             yaw = yaw + heading
         self.frame[env_ids] = np.concatenate([place, P.from_axis_angle(UP, yaw)], axis=1)
+        poses = self.engine.get_state().body_pose[:, self.met[self._holders]]
         for env in env_ids.tolist():
             one = self._world(env)
+            if len(self._nodes):
+                one.load(one.beginning())
+                away = one.node_places()[self._nodes] - poses[env, :, :3]
+                self.anchors[env] = P.rotate_inverse(poses[env, :, 3:], away)
+                one = self._world(env)
             self.state_row[env] = one.beginning()
             one.load(self.state_row[env])
             self.x[env] = one.points()
 
     def _world(self, env: int) -> SubWorld:
         """The model of an env: all that it is made of is in the memory, and it is made anew when that has changed."""
-        parts = (self.values, self.frame, self._mass, self._com, self._inertia)
+        parts = (self.values, self.frame, self.anchors, self._mass, self._com, self._inertia)
         key = b"".join(part[env].tobytes() for part in parts)
         made = self._worlds.get(env)
         if made is None or made[0] != key:
@@ -156,7 +176,9 @@ class Soft(CoSolver):
             bodies = ProxyMass(mass, self._com[env].copy(), self._inertia[env] * self._heavier[:, None])
             values = dict(zip(self.drawn_keys, self.values[env].tolist(), strict=True))
             source = self.source(values, self.frame[env])
-            made = self._worlds[env] = (key, SubWorld(source, self.scenery, bodies, self._step, self._gravity))
+            joints = self._joints(self.anchors[env])
+            made = (key, SubWorld(source, self.scenery, bodies, joints, self._step, self._gravity))
+            self._worlds[env] = made
         return made[1]
 
     def solve(self, env_ids: Array, bodies: MetBodies, duration: float) -> Array:

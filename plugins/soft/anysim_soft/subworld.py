@@ -4,8 +4,9 @@ Proxies and what is fixed collide with the flex alone. A proxy has the true mass
 what the engine says. One of a body that joints hold is so heavy that it moves as it does.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import mujoco
@@ -18,6 +19,8 @@ from anysim_mujoco.geoms import add_assets, add_geom
 
 HEAVY = 1e4
 """[kg], [kg m^2] of a body that joints hold."""
+STIFF = (0.999, 0.99999, 0.001, 0.5, 2.0)
+"""Impedance of what holds a rope together, or matter at a body."""
 AWAY = -1e4
 """[m] height of the proxy of a body that is not there."""
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
@@ -31,12 +34,24 @@ class FlexSource(NamedTuple):
         fixed: (V,) bool of its nodes, those that do not move.
         mass: (V,) [kg] of its nodes; empty where the element says it.
         options: attributes of `option`.
+        sides: (V,) bool by name, the nodes there that bodies hold.
+        adjust: changes the model once it is made.
     """
 
     xml: str
     fixed: Array
     mass: Array
     options: Mapping[str, object]
+    sides: Mapping[str, Array] = MappingProxyType({})
+    adjust: Callable[[Any], None] | None = None
+
+
+class Joint(NamedTuple):
+    """A node that stays at a place of a body: its number, the body's place in `met`, and (3,) [m] in the body's frame."""
+
+    node: int
+    place: int
+    anchor: Array
 
 
 class ProxyMass(NamedTuple):
@@ -92,9 +107,17 @@ class Outcome(NamedTuple):
 class SubWorld:
     """The model of one env; all that changes is in the state that is passed in and comes out."""
 
-    def __init__(self, source: FlexSource, scenery: Scenery, bodies: ProxyMass, dt: float, gravity: Array) -> None:
-        self.scenery, self.gravity = scenery, np.array(gravity, dtype=float)
-        self.model = model = _compiled(source, scenery, bodies, dt, gravity)
+    def __init__(
+        self,
+        source: FlexSource,
+        scenery: Scenery,
+        bodies: ProxyMass,
+        joints: Sequence[Joint],
+        dt: float,
+        gravity: Array,
+    ) -> None:
+        self.scenery, self.gravity, self.source = scenery, np.array(gravity, dtype=float), source
+        self.model = model = _compiled(source, scenery, bodies, joints, dt, gravity)
         self.data = mujoco.MjData(model)
         self.held = ~np.isfinite(bodies.mass)
         nodes = model.flex_nodebodyid if model.flex_interp[0] else model.flex_vertbodyid
@@ -107,9 +130,9 @@ class SubWorld:
         self._uneven = bool(model.flex_interp[0])
         self._pinned = len(self._moving) < len(self.nodes)
         k, s = len(scenery.met), len(scenery.still)
-        joints = [model.body(f"met {i}").jntadr[0] for i in range(k)]
-        self._pose = model.jnt_qposadr[joints].reshape(k, 1) + np.arange(7)
-        self._twist = model.jnt_dofadr[joints].reshape(k, 1) + np.arange(6)
+        free = [model.body(f"met {i}").jntadr[0] for i in range(k)]
+        self._pose = model.jnt_qposadr[free].reshape(k, 1) + np.arange(7)
+        self._twist = model.jnt_dofadr[free].reshape(k, 1) + np.arange(6)
         self._mocap = model.body_mocapid[[model.body(f"still {i}").id for i in range(s)]]
         self._geoms = np.array([model.geom(f"{i}").id for i in range(len(scenery.geoms))], dtype=np.intp)
         self._com = bodies.com
@@ -144,6 +167,10 @@ class SubWorld:
     def points(self) -> Array:
         """(V, 3) [m] the vertices."""
         return self.data.flexvert_xpos.copy()
+
+    def node_places(self) -> Array:
+        """(V, 3) [m] the nodes."""
+        return self.data.xpos[self.nodes].copy()
 
     def momentum(self) -> Array:
         """(6,) of the flex, about the world's origin."""
@@ -244,7 +271,14 @@ def _faces(model: Any) -> Array:
     return np.array(flat, dtype=np.int32).reshape(-1, 3)
 
 
-def _compiled(source: FlexSource, scenery: Scenery, bodies: ProxyMass, dt: float, gravity: Array) -> Any:
+def _compiled(
+    source: FlexSource,
+    scenery: Scenery,
+    bodies: ProxyMass,
+    joints: Sequence[Joint],
+    dt: float,
+    gravity: Array,
+) -> Any:
     options = " ".join(f'{key}="{value}"' for key, value in source.options.items())
     pull = " ".join(repr(float(g)) for g in gravity)
     spec = mujoco.MjSpec.from_string(
@@ -275,12 +309,23 @@ def _compiled(source: FlexSource, scenery: Scenery, bodies: ProxyMass, dt: float
         element.mass = HEAVY if held else bodies.mass[place]
         moments = np.array([HEAVY] * 3 + [0.0] * 3) if held else bodies.inertia[place]
         element.fullinertia = moments
-        _add_shapes(spec, element, scenery.number[body], scenery)
-    return spec.compile()
+        _add_shapes(spec, element, scenery.number[body], scenery, touches=place not in {j.place for j in joints})
+    names = [model.body(body).name for body in nodes]
+    for joint in joints:
+        element = spec.add_equality(type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_BODY)
+        element.name1, element.name2 = f"met {joint.place}", names[joint.node]
+        element.solref, element.solimp = [2 * dt, 1.0], STIFF
+    made = spec.compile()
+    for row, joint in zip(np.flatnonzero(made.eq_type == mujoco.mjtEq.mjEQ_CONNECT), joints, strict=True):
+        made.eq_data[row, :3], made.eq_data[row, 3:6] = joint.anchor, 0.0
+    if source.adjust is not None:
+        source.adjust(made)
+    return made
 
 
-def _add_shapes(spec: Any, owner: Any, numbers: Iterable[int], scenery: Scenery) -> None:
+def _add_shapes(spec: Any, owner: Any, numbers: Iterable[int], scenery: Scenery, *, touches: bool = True) -> None:
+    """Add shapes of the World to a body; what holds the flex does not touch it."""
     for number in numbers:
         element = add_geom(spec, owner, scenery.world.geoms[number], scenery.world)
         element.name, element.material = f"{number}", ""
-        element.contype, element.conaffinity, element.priority = 1, 0, 0
+        element.contype, element.conaffinity, element.priority = int(touches), 0, 0
