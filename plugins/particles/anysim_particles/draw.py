@@ -1,6 +1,4 @@
-"""Drawing of matter into what an engine has drawn: balls and triangles that hide, and are hidden by, what is farther or
-nearer.
-"""
+"""Drawing of matter into what an engine has drawn: balls and triangles, where they are nearer than what is there."""
 
 from collections.abc import Mapping, Sequence
 
@@ -49,7 +47,13 @@ def draw_spheres(
 
 
 def draw_triangles(
-    points: Array, faces: Array, color: Sequence[float], mark: int, view: CameraView, row: int, images: Mapping[str, Array]
+    points: Array,
+    faces: Array,
+    color: Sequence[float],
+    mark: int,
+    view: CameraView,
+    row: int,
+    images: Mapping[str, Array],
 ) -> None:
     """Draw a surface of triangles (F, 3) through points (P, 3) [m] of the world; the rest as `draw_spheres` has it."""
     from anysim_particles.kernels.triangles import triangles

@@ -5,9 +5,11 @@ from typing import Any
 MATTER: dict[str, dict[str, Any]] = {
     "block": {"kind": "deformable", "box": [0.2, 0.2, 0.2], "points": [8, 8, 8]},
     "block of 27 cells": {"kind": "deformable", "box": [0.2, 0.2, 0.2], "points": [8, 8, 8], "cells": [3, 3, 3]},
+    "rope": {"kind": "rope", "path": [[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]], "position": [0.0, 0.0, 0.01]},
+    "cloth 20x20": {"kind": "fem_cloth", "size": [0.6, 0.6], "points": [20, 20], "position": [0.0, 0.0, 0.01]},
 }
 """What is measured, by what it is called."""
-HEIGHTS = {"deformable": 0.26}
+HEIGHTS = {"deformable": 0.26, "rope": 0.09, "fem_cloth": 0.08}
 """[m] of the ball's middle, by family."""
 
 

@@ -13,9 +13,9 @@ from anysim_soft.subworld import FlexSource
 
 SKIN = 0.001
 """[m] from the surface at which contacts act."""
-OPTIONS = {"integrator": "discrete", "solver": "Newton", "iterations": 2000, "tolerance": 1e-12, "cone": "elliptic"}
-"""Elastic solids need the integrator that knows their stiffness. Where its iterations end too early, matter is damped less
-than it should be; a loose tolerance would lose momentum."""
+OPTIONS = {"integrator": "discrete", "solver": "Newton", "iterations": 2000, "tolerance": 1e-15, "cone": "elliptic"}
+"""Elastic solids need the integrator that knows their stiffness. Where its iterations end too early, matter is damped
+less than it should be; a loose tolerance would lose momentum."""
 SOLIMP = "0.99 0.999 0.001"
 
 
@@ -26,7 +26,6 @@ class Deformable(Soft):
     label = "soft block"
     tint = (0.85, 0.45, 0.35)
     drawn_keys = (*Soft.drawn_keys, "young", "poisson", "damping")
-    radius = SKIN
 
     @classmethod
     def count(cls, spec: SoftSpec) -> int:
@@ -62,6 +61,10 @@ class Deformable(Soft):
         )
         sides = {side: on_side(nodes, box, side) for side in spec.attached}
         return FlexSource(xml, fixed, np.zeros(0), OPTIONS, sides)
+
+    @property
+    def radius(self) -> float:
+        return SKIN
 
     def attached_sides(self) -> list[tuple[str, str]]:
         assert isinstance(self.soft, DeformableSpec)

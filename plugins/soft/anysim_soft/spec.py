@@ -57,7 +57,7 @@ class DeformableSpec(SoftSpec):
         default=(1, 1, 1), description="quadratic elements along each edge: what bends needs two or more along it"
     )
     points: tuple[Points, Points, Points] = Field(
-        default=(5, 5, 5), description="of its surface along each edge, that meet bodies and are drawn"
+        default=(5, 5, 5), description="of a lattice along each edge, of which the outer ones meet bodies and are drawn"
     )
     fixed: tuple[Side, ...] = Field(default=(), description="faces, edges or corners that stay where they begin")
 
@@ -111,7 +111,7 @@ class FemClothSpec(SoftSpec):
     poisson: Value[Annotated[float, Field(ge=0.0, le=0.45)]] = Field(default=0.3, description="Poisson's ratio")
     bending: NonNegativeValue | None = Field(
         default=None,
-        description="flexural rigidity of a strip by its width [N m]; young thickness^3 / 12 if not given, as of a plate",
+        description="flexural rigidity of a strip by its width [N m]; young thickness^3 / 12 if not given",
     )
     damping: NonNegativeValue = Field(
         default=0.01,

@@ -47,7 +47,7 @@ class FlexSource(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """A node that stays at a place of a body: its number, the body's place in `met`, and (3,) [m] in the body's frame."""
+    """A node that a body holds: its number, the body's place in `met`, and where in the body's frame, (3,) [m]."""
 
     node: int
     place: int
@@ -55,7 +55,7 @@ class Joint(NamedTuple):
 
 
 class ProxyMass(NamedTuple):
-    """Bodies that it meets: (K,) [kg], (K, 3) [m], (K, 6) [kg m^2] as the World has them; inf masses of what is held."""
+    """Bodies that it meets: (K,) [kg], inf where joints hold them, (K, 3) [m] and (K, 6) [kg m^2], body axes."""
 
     mass: Array
     com: Array
@@ -220,8 +220,8 @@ class SubWorld:
     def _even_contacts(self) -> None:
         """Make the rows of contacts push the flex as much as what it touches.
 
-        Quadratic elements weigh some nodes negatively, and MuJoCo leaves these out of its Jacobian: what is left sums up
-        to more than one, and a tenth of the momentum would come from nowhere. Here it is scaled to one.
+        Quadratic elements weigh some nodes negatively, and MuJoCo leaves these out of its Jacobian: what is left
+        sums up to more than one, and a tenth of the momentum would come from nowhere. Here it is scaled to one.
         """
         model, data = self.model, self.data
         rows = np.flatnonzero(data.efc_type == mujoco.mjtConstraint.mjCNSTR_CONTACT_ELLIPTIC)
@@ -272,12 +272,7 @@ def _faces(model: Any) -> Array:
 
 
 def _compiled(
-    source: FlexSource,
-    scenery: Scenery,
-    bodies: ProxyMass,
-    joints: Sequence[Joint],
-    dt: float,
-    gravity: Array,
+    source: FlexSource, scenery: Scenery, bodies: ProxyMass, joints: Sequence[Joint], dt: float, gravity: Array
 ) -> Any:
     options = " ".join(f'{key}="{value}"' for key, value in source.options.items())
     pull = " ".join(repr(float(g)) for g in gravity)

@@ -10,7 +10,7 @@ G = 9.81
 
 @pytest.mark.parametrize("poisson", [0.0, pytest.param(0.3, marks=pytest.mark.slow)])
 def test_a_sheet_in_its_plane_stretches_as_young_and_poisson_say(poisson):
-    """Pulled by a weight that lies in its plane: longer by rho g L^2 / (2 E) within 3 %, and thinner by Poisson's share."""
+    """Pulled by a weight in its plane: longer by rho g L^2 / (2 E) within 3 %, and thinner by Poisson's share."""
     young, length, width = 1e6, 0.3, 0.1
     sheet = {"kind": "fem_cloth", "size": [length, width], "points": [13, 5], "young": young, "poisson": poisson}
     sheet |= {"density": 1000.0, "damping": 0.02, "fixed": ["-x"], "position": [0.0, 0.0, 1.0]}
@@ -29,7 +29,7 @@ def test_a_sheet_in_its_plane_stretches_as_young_and_poisson_say(poisson):
     ("poisson", "stiffer"), [(0.0, 1.0), pytest.param(0.3, 1.0, marks=pytest.mark.slow), (0.0, 2.0)]
 )
 def test_a_strip_that_lies_on_its_ends_bends_as_a_plate(poisson, stiffer):
-    """Edges that are fixed are hinges: sunk by 5 w L^4 / (384 D) at its middle within 6 %, D from thickness or given."""
+    """Edges that are fixed are hinges: sunk by 5 w L^4 / (384 D) within 6 %, D from thickness or given."""
     young, length, thickness = 1e9, 0.2, 0.005
     rigidity = stiffer * young * thickness**3 / 12
     sheet = {"kind": "fem_cloth", "size": [length, 0.1], "points": [9, 5], "young": young, "poisson": poisson}

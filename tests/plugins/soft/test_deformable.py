@@ -32,7 +32,7 @@ def test_beams_of_more_cells_do_too(poisson, cells):
 
 
 def test_a_bar_gets_longer_and_thinner_as_young_and_poisson_say():
-    """Hanging from one end by its own weight: rho g L^2 / (2 E) longer, and at its middle thinner by Poisson's share."""
+    """Hung by one end, by its own weight: rho g L^2 / (2 E) longer, and thinner by Poisson's share."""
     young, length = 2e5, 0.2
     matter = {"kind": "deformable", "box": [0.05, 0.05, length], "position": [0.0, 0.0, 0.5], "young": young}
     matter |= {"poisson": 0.3, "damping": 0.1, "cells": [1, 1, 4], "points": [3, 3, 9], "fixed": ["+z"]}
@@ -72,3 +72,35 @@ def test_air_slows_it_as_its_drag_says():
         found = it.balance(ALL)
         lost = found.now - found.begun - found.received + found.given
         assert np.abs(lost[0, :3]).max() < 1e-9 * np.abs(found.received).max()
+
+
+def test_a_body_that_something_else_holds_gets_all_of_its_impulse_a_little_later():
+    """Four times as heavy for the matter and relaxed: at rest it is carried with its true weight, and none is lost."""
+    matter = {"kind": "deformable", "box": [0.2, 0.2, 0.1], "young": 3e4, "held": {"ball": 4.0}}
+    with begun(run_of(matter, world=with_ball([0.0, 0.0, 0.151]))) as (env, it):
+        wait(env, 5)
+        assert np.abs(it.pending).max() > 0
+        found = it.balance(ALL)
+        lost = found.now - found.begun - found.received + found.given
+        assert np.abs(lost[0, :3]).max() < 1e-6 * np.abs(found.received).max()
+        wait(env, 25)
+        forces = []
+        for _ in range(15):
+            wait(env)
+            forces.append(it.body_force(ALL)[0, 0, 2])
+        assert np.mean(forces) == pytest.approx(0.5 * 9.81, rel=0.05)
+
+
+def test_a_link_moves_matter_and_feels_it():
+    """The door of a cabinet swings into a block: an impulse against its motion, and none is lost."""
+    pytest.importorskip("anysim_assets")
+    world = {"objects": {"arm": {"source": {"procedural": "hinge_box"}}}, "layout": {"arm": {"position": [0, 0, 0.2]}}}
+    matter = {"kind": "deformable", "box": [0.06, 0.06, 0.06], "young": 3e4, "position": [0.0, 0.0, 0.45]}
+    with begun(run_of(matter, world=world)) as (env, it):
+        assert not env.engine.world.loose[it.met].all()
+        wait(env, 15)
+        found = it.balance(ALL)
+        assert np.abs(found.given[0, :3]).max() > 0
+        lost = found.now - found.begun - found.received + found.given
+        assert np.abs(lost[0, :3]).max() < 1e-6 * np.abs(found.received[0, :3]).max()
+        assert np.isfinite(it.x).all()
