@@ -26,11 +26,7 @@ def world() -> dict[str, Any]:
     cloth = {"kind": "fem_cloth", "size": [0.26, 0.26], "young": 1e6, "fixed": corners, "position": [0.3, 0, 0.2]}
     rope = {"kind": "rope", "path": [[-0.25, 0, 0], [0.2, 0, 0]], "radius": 0.008, "position": [0.0, 0.2, 0.26]}
     return {
-        "objects": {
-            "heavy": {**ball, "color": "red"},
-            "light": {**ball, "mass": 0.1, "color": "yellow"},
-            "bar": bar,
-        },
+        "objects": {"heavy": {**ball, "color": "red"}, "light": {**ball, "mass": 0.1, "color": "yellow"}, "bar": bar},
         "layout": {
             "heavy": {"position": [0.0, 0.0, 0.2]},
             "light": {"position": [0.3, 0.0, 0.25]},

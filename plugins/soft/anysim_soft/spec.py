@@ -110,8 +110,7 @@ class FemClothSpec(SoftSpec):
     young: PositiveValue = Field(default=1e5, description="Young's modulus [Pa] in the plane")
     poisson: Value[Annotated[float, Field(ge=0.0, le=0.45)]] = Field(default=0.3, description="Poisson's ratio")
     bending: NonNegativeValue | None = Field(
-        default=None,
-        description="flexural rigidity of a strip by its width [N m]; young thickness^3 / 12 if not given",
+        default=None, description="flexural rigidity of a strip by its width [N m]; young thickness^3 / 12 if not given"
     )
     damping: NonNegativeValue = Field(
         default=0.01,
